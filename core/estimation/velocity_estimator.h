@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "core/motion.h"
+
+namespace tendon {
+
+/// Estimates velocity from positions that an encoder has rounded.
+///
+/// The backward difference of counts is worthless at low speed: one 30 µm count at 1 kHz reads as
+/// 30 mm/s. First-order adaptive windowing takes, per axis, the longest window whose end-to-end line
+/// passes within one count of every sample in it:
+///
+///     v = (x(k) − x(k−n)) / (t(k) − t(k−n)),
+///     n = max { n ≤ window : |x(k−i) − (x(k) − v·(t(k) − t(k−i)))| ≤ resolution, 0 < i < n }
+///
+/// so it is smooth when slow and prompt when fast, with no cut-off frequency to choose. With
+/// resolution 0 (exact sensing) it is the backward difference for every motion but a straight line.
+///
+/// Source: Janabi-Sharifi, Hayward, Chen, "Discrete-time adaptive windowing for velocity estimation",
+/// IEEE TCST 8(6), 2000 (end-fit form), with measured time stamps in place of a fixed period.
+///
+/// Thread-safe: no. Realtime-safe: yes; at most 3 · kWindow steps per sample.
+class VelocityEstimator {
+ public:
+  /// Longer windows smooth slow motion more and notice a reversal later: 16 ms at 1 kHz resolves
+  /// 2 mm/s with a 30 µm encoder.
+  static constexpr std::size_t kWindow = 16;
+
+  /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument when it
+  /// is negative or not finite.
+  explicit VelocityEstimator(double resolution);
+
+  /// Takes the next sample and returns the velocity (m/s). A sample that is not finite or not newer
+  /// than the one before changes nothing.
+  Vec3 observe(LocalTime at, const Vec3& position) noexcept;
+
+ private:
+  struct Sample {
+    LocalTime at;
+    Vec3 position;
+  };
+  static constexpr std::size_t kSlots = 32;  // a power of two, at least kWindow + 1
+  static_assert(kSlots > kWindow);
+  const Sample& back(std::size_t i) const noexcept { return samples_[(newest_ - i) % kSlots]; }
+
+  double resolution_;
+  std::array<Sample, kSlots> samples_{};
+  std::size_t newest_ = 0;
+  std::size_t count_ = 0;
+  Vec3 velocity_ = Vec3::Zero();
+};
+
+}  // namespace tendon

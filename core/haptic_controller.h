@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "core/control/adjusting_output_limiter.h"
+#include "core/energy_ledger.h"
+#include "core/held_force.h"
+#include "core/mode.h"
+#include "core/motion.h"
+#include "core/reason.h"
+#include "core/remote_force.h"
+
+namespace tendon {
+
+/// What one haptic step found and decided. Enough to take the step again.
+struct Step {
+  Motion hand;                      ///< the motion it saw; hand.at = when
+  Duration held{};                  ///< T_act: length of the interval that this step ended; 0 in the first
+  Vec3 was_applied = Vec3::Zero();  ///< N, the force held during it
+  Vec3 wanted = Vec3::Zero();       ///< N, what the remote environment asks for, after hold or local model
+  double permitted = 0;  ///< N, the limiter's bound on ‖force‖ (per axis: on the largest component); ∞ when off
+  Vec3 force = Vec3::Zero();  ///< N, to be applied now
+  double energy = 0;          ///< J, the ledger after the interval (per axis: the sum)
+  Reasons reasons;            ///< why `force` is not `wanted`
+  Mode mode = Mode::kIdle;
+  std::uint64_t force_sequence = 0;  ///< the remote force in use; 0 = none
+  Duration force_age{};              ///< since it arrived
+  Duration loop_age{};               ///< since the motion it answers was sampled
+};
+
+/// The heart: from one look at the hand to the force it is to feel.
+///
+///     ledger ← the interval just ended, with the force really held          (EnergyLedger)
+///     F ← newest remote force, held, faded or stopped by its age            (HeldForce)
+///     F ← ‖F‖ ≤ max_force                                                   (saturate)
+///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
+///     F ← ‖F‖ ≤ f_c + 2 √(b E / T_max)                                      (AdjustingOutputLimiter)
+///
+/// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
+/// faster than the slew limit allows, because energy is a matter of safety and smoothness is not.
+///
+/// Overruns: an interval longer than longest_hold is booked as it was, and flagged; the ledger may then
+/// be negative, and recovers by itself. When it was longer than the device's own watchdog, nobody knows
+/// for how long the force was held: the worst is booked. (Set longest_hold = watchdog and the theorem
+/// holds through any pause, at the price of a lower bound: K_op → 2b / T_max.)
+///
+/// Faults are latched: force zero (through the slew limit while the hand can be seen) until `rearm`.
+///
+/// Thread-safe: no. Realtime-safe: yes.
+class HapticController {
+ public:
+  enum class Limiter : std::uint8_t {
+    kNone,     ///< no bound on energy; the ledger is kept all the same. For simulated devices only
+    kPerAxis,  ///< the paper's form: an account and a bound per axis. Depends on the frame
+    kJoint,    ///< one account, direction kept, the same in every frame
+  };
+
+  enum class Fault : std::uint8_t {
+    kNone,
+    kPositionNotFinite,  ///< the device measured NaN or infinity
+    kDeviceSilent,       ///< max_missed readings in a row failed
+  };
+
+  struct Config {
+    Limiter limiter = Limiter::kJoint;
+    Friction friction;        ///< lower bounds (kPerAxis: of each axis by itself, see control.md 1.6 (a))
+    Duration longest_hold{};  ///< T_max; > 0
+    Duration watchdog{};      ///< the device's own; 0 = it has none
+    double max_force = 0;     ///< N; > 0
+    double max_slew = 0;      ///< N/s; > 0, may be infinite
+    HeldForce::Config hold;
+    /// Readings that may fail in a row before it is a fault: 20 ms at 1 kHz, what libfranka allows.
+    std::uint32_t max_missed = 20;
+  };
+
+  /// Throws std::invalid_argument naming the field when a value is impossible.
+  explicit HapticController(const Config& config);
+
+  /// A newer remote force has come. Returns false when it was refused because it is not finite.
+  bool observe(const RemoteForce& force) noexcept { return held_.observe(force); }
+
+  /// The remote environment has left.
+  void release(LocalTime now) noexcept { held_.release(now); }
+
+  /// One haptic step. `applied` is the force that the device has really held since the step before.
+  Step step(const Motion& hand, const Vec3& applied) noexcept;
+
+  /// A haptic step in which the device gave no position: the force to apply is zero.
+  Step step_unseen(LocalTime now, const Vec3& applied) noexcept;
+
+  Fault fault() const noexcept { return fault_; }
+  /// Clears the fault. Forces start again from idle: the next fresh one is ramped in.
+  void rearm() noexcept;
+
+  /// The least of the accounts (joint form: the only one), J.
+  double least_energy() const noexcept;
+
+ private:
+  void book(const Motion& hand, const Vec3& applied, Step& step) noexcept;
+  void book_unseen(const Vec3& applied, Duration held) noexcept;
+  void limit(Step& step) const noexcept;
+  double energy() const noexcept;
+
+  Config config_;
+  AdjustingOutputLimiter limiter_;
+  EnergyLedger ledger_;               ///< the joint account
+  std::array<EnergyLedger, 3> axes_;  ///< the accounts of the per-axis form
+  HeldForce held_;
+  Fault fault_ = Fault::kNone;
+  std::uint32_t missed_ = 0;
+  std::optional<Motion> last_;  ///< empty when the position before this step is unknown
+  LocalTime last_at_{};         ///< when the force held now was applied
+  bool started_ = false;
+};
+
+}  // namespace tendon

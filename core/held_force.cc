@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/held_force.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tendon {
+
+HeldForce::HeldForce(const Config& config) : config_(config) {
+  const auto at_least = [](Duration value, Duration least, const char* name) {
+    if (value < least) {
+      throw std::invalid_argument(std::string(name) + " must be at least " + std::to_string(seconds(least)) +
+                                  " s, got " + std::to_string(seconds(value)) + " s");
+    }
+  };
+  at_least(config.hold, Duration::zero(), "hold");
+  at_least(config.decay, Duration(1), "decay");
+  at_least(config.safe_stop, config.hold, "safe_stop");
+  at_least(config.ramp_in, Duration::zero(), "ramp_in");
+  at_least(config.max_valid_for, Duration(1), "max_valid_for");
+}
+
+bool HeldForce::observe(const RemoteForce& force) noexcept {
+  if (!force.force.allFinite()) return false;
+  if (force.model && !(force.model->at.allFinite() && force.model->stiffness.allFinite())) return false;
+  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop) engaged_ = force.received;
+  newest_ = force;
+  mode_ = Mode::kActive;
+  return true;
+}
+
+void HeldForce::release(LocalTime now) noexcept {
+  if (newest_) newest_->valid_for = std::min(newest_->valid_for, now - newest_->received);
+}
+
+Duration HeldForce::validity() const noexcept { return std::min(newest_->valid_for, config_.max_valid_for); }
+
+HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
+  if (!newest_) return {};
+  Wanted result;
+  result.age = hand.at - newest_->received;
+  const Duration overdue = result.age - validity();
+  // A safe stop is only left by `observe`: a clock that stands still must not revive a force.
+  if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
+    mode_ = Mode::kSafeStop;
+    result.mode = mode_;
+    result.reasons = Reason::kSafeStop;
+    return result;
+  }
+
+  double gain = 1;
+  if (overdue <= Duration::zero()) {
+    mode_ = Mode::kActive;
+  } else if (overdue <= config_.hold) {
+    mode_ = Mode::kHolding;
+    result.reasons |= Reason::kHeld;
+  } else {
+    mode_ = Mode::kDecaying;
+    result.reasons |= Reason::kDecaying;
+    gain = std::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
+  }
+  const Duration since_engaged = hand.at - engaged_;
+  if (since_engaged < config_.ramp_in) {
+    result.reasons |= Reason::kRampIn;
+    gain *= std::max(0.0, seconds(since_engaged) / seconds(config_.ramp_in));
+  }
+
+  result.mode = mode_;
+  result.force = newest_->force;
+  if (newest_->model) result.force -= newest_->model->stiffness * (hand.position - newest_->model->at);
+  result.force *= gain;
+  return result;
+}
+
+}  // namespace tendon

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "core/mode.h"
+#include "core/motion.h"
+#include "core/reason.h"
+#include "core/remote_force.h"
+
+namespace tendon {
+
+/// Holds the newest remote force between arrivals, and decides what to render when they stop coming.
+///
+/// With age = now − received and v = valid_for (clipped to max_valid_for):
+///
+///     age ≤ v                        Active     F(x)                    as it was sent
+///     age ≤ v + hold                 Holding    F(x)
+///     age < v + safe_stop            Decaying   F(x) · e^(−(age − v − hold)/decay)
+///     otherwise                      SafeStop   0, until a fresh force comes
+///
+/// F(x) = force, or force − K (x − at) when the remote environment sent a local model. The first force
+/// ever, and the first one after a safe stop, is ramped in linearly over `ramp_in`: the hand is never
+/// kicked by an engine that comes back. A force that is not finite is refused, and the one before it
+/// ages on.
+///
+/// It decides what is *wanted*; that it cannot hurt is the business of the limiter downstream.
+///
+/// Thread-safe: no. Realtime-safe: yes.
+class HeldForce {
+ public:
+  struct Config {
+    /// Bridges two lost datagrams of a 100 Hz engine.
+    Duration hold = std::chrono::milliseconds(20);
+    /// Time constant: 90 % gone after 115 ms, too slow to be felt as a kick, too fast to be leant on.
+    Duration decay = std::chrono::milliseconds(50);
+    /// Counted from the end of validity; the force has faded to 1 % by then.
+    Duration safe_stop = std::chrono::milliseconds(250);
+    Duration ramp_in = std::chrono::milliseconds(100);
+    /// No engine can ask to be believed for longer.
+    Duration max_valid_for = std::chrono::milliseconds(500);
+  };
+
+  struct Wanted {
+    Vec3 force = Vec3::Zero();  ///< N, on the hand
+    Mode mode = Mode::kIdle;
+    Reasons reasons;
+    Duration age{};  ///< since it was received; 0 when idle
+  };
+
+  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive
+  /// or safe_stop is shorter than hold.
+  explicit HeldForce(const Config& config);
+
+  /// Takes a newer force. Returns false, and changes nothing, when it is not finite.
+  bool observe(const RemoteForce& force) noexcept;
+
+  /// The remote environment has left: its force is no longer fresh from now on.
+  void release(LocalTime now) noexcept;
+
+  /// Forgets the force: idle, until a fresh one comes and is ramped in.
+  void disengage() noexcept {
+    newest_.reset();
+    mode_ = Mode::kIdle;
+  }
+
+  /// What is wanted at `hand.position` at `hand.at`.
+  Wanted wanted(const Motion& hand) noexcept;
+
+  /// The force that is held; empty when idle.
+  const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
+
+ private:
+  Duration validity() const noexcept;
+
+  Config config_;
+  std::optional<RemoteForce> newest_;
+  Mode mode_ = Mode::kIdle;
+  LocalTime engaged_{};  ///< start of the ramp
+};
+
+}  // namespace tendon

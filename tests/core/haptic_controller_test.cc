@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/haptic_controller.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+HapticController::Config config() {
+  HapticController::Config c;
+  c.friction = {0.05, 0.26};
+  c.longest_hold = milliseconds(1);
+  c.max_force = 8;
+  c.max_slew = kInf;
+  c.hold.ramp_in = Duration::zero();
+  return c;
+}
+
+// A controller, a hand that moves as it is told and a device that applies what it is told.
+struct Bench {
+  explicit Bench(const HapticController::Config& c) : controller(c) {}
+
+  Step move_to(double x, Duration after = milliseconds(1)) {
+    now += after;
+    const Step step = controller.step({LocalTime(now), Vec3(x, 0, 0), Vec3::Zero()}, applied);
+    applied = step.force;
+    return step;
+  }
+  void want(double force) {
+    RemoteForce remote;
+    remote.sequence = ++sequence;
+    remote.received = LocalTime(now);
+    remote.answers = LocalTime(now);
+    remote.force = Vec3(force, 0, 0);
+    remote.valid_for = milliseconds(500);
+    controller.observe(remote);
+  }
+
+  HapticController controller;
+  Vec3 applied = Vec3::Zero();
+  Duration now{};
+  std::uint64_t sequence = 0;
+};
+
+TEST(HapticController, TheFirstForceIsNoMoreThanFriction) {
+  Bench bench(config());
+  bench.want(-5);
+  bench.move_to(0);
+  const Step step = bench.move_to(0);
+  EXPECT_DOUBLE_EQ(step.force.x(), -0.05);
+  EXPECT_TRUE(step.reasons.has(Reason::kEnergy));
+}
+
+TEST(HapticController, TheLedgerCountsTheForceAppliedNotTheForceWanted) {
+  Bench wanted_and_got(config());
+  Bench clamped(config());
+  for (Bench* bench : {&wanted_and_got, &clamped}) {
+    bench->move_to(0);
+    for (int i = 1; i <= 50; ++i) bench->move_to(i * 1e-4);
+    bench->want(-0.5);
+    bench->move_to(51e-4);
+  }
+  clamped.applied *= 0.5;  // the device's clamp
+  const double before = clamped.controller.least_energy();
+  const double full = wanted_and_got.move_to(56e-4).energy - before;
+  const double half = clamped.move_to(56e-4).energy - before;
+  EXPECT_NEAR(full - half, 0.25 * 5e-4, 1e-15);  // 0.5 N against 0.25 N over 0.5 mm
+}
+
+TEST(HapticController, TheBoundAssumesTheLongestHoldAndTheLedgerTakesTheActualOne) {
+  HapticController::Config c = config();
+  c.longest_hold = milliseconds(2);
+  Bench bench(c);
+  bench.move_to(0);
+  const Step step = bench.move_to(1e-3, milliseconds(1));
+  EXPECT_DOUBLE_EQ(step.energy, 0.05 * 1e-3 + 0.26 * 1e-6 / 1e-3);
+  EXPECT_DOUBLE_EQ(step.permitted, 0.05 + 2 * std::sqrt(0.26 * step.energy / 2e-3));
+}
+
+TEST(HapticController, AnOverrunIsBookedAsItWasAndFlagged) {
+  Bench bench(config());
+  bench.move_to(0);
+  const Step step = bench.move_to(1e-3, milliseconds(5));
+  EXPECT_TRUE(step.reasons.has(Reason::kOverrun));
+  EXPECT_FALSE(step.reasons.has(Reason::kWatchdog));
+  EXPECT_DOUBLE_EQ(step.energy, 0.05 * 1e-3 + 0.26 * 1e-6 / 5e-3);
+}
+
+// Earns some energy, wants a force, then pauses while the hand follows the force: the worst case.
+Step after_a_pause(Bench& bench, Duration pause) {
+  bench.move_to(0);
+  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.want(-6);
+  const Step before = bench.move_to(0.02);
+  const double follows = seconds(pause) * (before.force.norm() - 0.05) / (2 * 0.26);
+  return bench.move_to(0.02 - follows, pause);
+}
+
+TEST(HapticController, AfterAnOverrunTheLedgerRecoversMonotonicallyWithFrictionForcesOnly) {
+  Bench bench(config());
+  const Step overrun = after_a_pause(bench, milliseconds(30));
+  ASSERT_LT(overrun.energy, -1e-3);
+  ASSERT_TRUE(overrun.reasons.has(Reason::kOverrun));
+  double before = overrun.energy;
+  double x = overrun.hand.position.x();
+  int steps = 0;
+  while (before < 0) {
+    x += (steps % 40 < 20 ? 1 : -1) * 1e-3;
+    bench.want(-6);
+    const Step step = bench.move_to(x);
+    ASSERT_GE(step.energy, before);
+    if (step.energy < 0) {
+      ASSERT_LE(step.force.norm(), 0.05 * (1 + 1e-12));
+    }
+    before = step.energy;
+    ASSERT_LT(++steps, 100000);
+  }
+}
+
+TEST(HapticController, APauseBeyondTheDevicesWatchdogIsChargedTheWorstAndNoMore) {
+  HapticController::Config c = config();
+  c.watchdog = milliseconds(5);
+  Bench bench(c);
+  bench.move_to(0);
+  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.want(-6);
+  const Step before = bench.move_to(0.02);
+  const Step after = bench.move_to(0.07, milliseconds(60));  // far along with the force off: no credit for that
+  EXPECT_TRUE(after.reasons.has(Reason::kWatchdog));
+  EXPECT_NEAR(after.energy, before.energy - 5e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
+}
+
+TEST(HapticController, WithTheLongestHoldEqualToTheWatchdogNoPauseMakesTheLedgerNegative) {
+  HapticController::Config c = config();
+  c.watchdog = milliseconds(5);
+  c.longest_hold = milliseconds(5);
+  for (const int pause : {1, 4, 5, 6, 20, 60, 500}) {
+    Bench bench(c);
+    EXPECT_GE(after_a_pause(bench, milliseconds(pause)).energy, -1e-12) << pause << " ms";
+  }
+}
+
+TEST(HapticController, NotANumberForceIsRefusedAndTheOneBeforeGoesOn) {
+  Bench bench(config());
+  bench.move_to(0);
+  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.want(-0.5);
+  const double before = bench.move_to(0.02).force.x();
+  bench.want(std::nan(""));
+  EXPECT_EQ(bench.move_to(0.02).force.x(), before);
+}
+
+TEST(HapticController, NotANumberPositionGivesZeroForceFreezesTheLedgerAndLatchesAFault) {
+  Bench bench(config());
+  bench.move_to(0);
+  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.want(-0.5);
+  bench.move_to(0.02);
+  const double energy = bench.controller.least_energy();
+  const Step blind = bench.move_to(std::nan(""));
+  EXPECT_EQ(blind.force, Vec3::Zero());
+  EXPECT_LE(blind.energy, energy);
+  EXPECT_TRUE(std::isfinite(blind.energy));
+  EXPECT_EQ(bench.controller.fault(), HapticController::Fault::kPositionNotFinite);
+  const Step seen = bench.move_to(0.02);
+  EXPECT_EQ(seen.force, Vec3::Zero());
+  EXPECT_EQ(seen.mode, Mode::kFault);
+  EXPECT_LE(seen.energy, energy);
+}
+
+TEST(HapticController, AFaultIsLeftOnlyByRearmAndForcesAreRampedInAgain) {
+  HapticController::Config c = config();
+  c.hold.ramp_in = milliseconds(100);
+  Bench bench(c);
+  bench.move_to(std::nan(""));
+  bench.want(-1);
+  EXPECT_EQ(bench.move_to(0).mode, Mode::kFault);
+  bench.controller.rearm();
+  EXPECT_EQ(bench.move_to(0).mode, Mode::kIdle);
+  bench.want(-1);
+  const Step step = bench.move_to(0);
+  EXPECT_EQ(step.mode, Mode::kActive);
+  EXPECT_TRUE(step.reasons.has(Reason::kRampIn));
+}
+
+TEST(HapticController, ASilentDeviceGetsZeroForceAndIsAFaultAfterTwentyMisses) {
+  Bench bench(config());
+  bench.move_to(0);
+  for (int i = 1; i <= 20; ++i) {
+    EXPECT_EQ(bench.controller.fault(), HapticController::Fault::kNone);
+    bench.now += milliseconds(1);
+    const Step step = bench.controller.step_unseen(LocalTime(bench.now), bench.applied);
+    EXPECT_EQ(step.force, Vec3::Zero());
+    EXPECT_TRUE(step.reasons.has(Reason::kUnseen));
+    bench.applied = step.force;
+  }
+  EXPECT_EQ(bench.controller.fault(), HapticController::Fault::kDeviceSilent);
+}
+
+TEST(HapticController, TheForceNeverGrowsFasterThanTheSlewLimit) {
+  HapticController::Config c = config();
+  c.max_slew = 500;
+  Bench bench(c);
+  bench.move_to(0);
+  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.want(-2);
+  double before = bench.applied.x();
+  for (int i = 0; i < 20; ++i) {
+    const Step step = bench.move_to(0.08);
+    EXPECT_LE(std::abs(step.force.x() - before), 0.5 + 1e-12);
+    if (std::abs(step.force.x() + 2) > 1e-9 && !step.reasons.has(Reason::kEnergy)) {
+      EXPECT_TRUE(step.reasons.has(Reason::kSlew));
+    }
+    before = step.force.x();
+  }
+  EXPECT_NEAR(before, -2, 1e-12);
+}
+
+TEST(HapticController, APauseDoesNotLetTheForceJump) {
+  HapticController::Config c = config();
+  c.max_slew = 500;
+  Bench bench(c);
+  bench.move_to(0);
+  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.want(-4);
+  EXPECT_LE(bench.move_to(0.08, milliseconds(60)).force.norm(), 0.5 + 1e-12);
+}
+
+TEST(HapticController, StaysWithinTheDevicesForceAndSaysSo) {
+  HapticController::Config c = config();
+  c.max_force = 2;
+  Bench bench(c);
+  bench.move_to(0);
+  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.want(-100);
+  const Step step = bench.move_to(0.08);
+  EXPECT_DOUBLE_EQ(step.force.norm(), 2);
+  EXPECT_TRUE(step.reasons.has(Reason::kMaxForce));
+  EXPECT_FALSE(step.reasons.has(Reason::kEnergy));
+}
+
+TEST(HapticController, WithoutALimiterTheLedgerIsStillKept) {
+  HapticController::Config c = config();
+  c.limiter = HapticController::Limiter::kNone;
+  Bench bench(c);
+  bench.move_to(0);
+  bench.want(-4);
+  bench.move_to(0);
+  const Step step = bench.move_to(-1e-3);
+  EXPECT_LT(step.energy, 0);
+  EXPECT_EQ(step.permitted, kInf);
+}
+
+TEST(HapticController, InOneDimensionThePerAxisAndTheJointFormAreTheSame) {
+  HapticController::Config joint = config();
+  HapticController::Config axes = config();
+  axes.limiter = HapticController::Limiter::kPerAxis;
+  Bench a(joint);
+  Bench z(axes);
+  for (int i = 0; i < 1000; ++i) {
+    const double x = 0.01 * std::sin(i * 0.01);
+    if (i % 10 == 0) {
+      a.want(-3000 * x);
+      z.want(-3000 * x);
+    }
+    EXPECT_NEAR(a.move_to(x).force.x(), z.move_to(x).force.x(), 1e-12);
+  }
+}
+
+TEST(HapticController, ReportsTheAgeOfTheWholeLoop) {
+  Bench bench(config());
+  RemoteForce remote;
+  remote.sequence = 9;
+  remote.answers = LocalTime(milliseconds(10));
+  remote.received = LocalTime(milliseconds(50));
+  remote.valid_for = milliseconds(100);
+  bench.controller.observe(remote);
+  bench.now = milliseconds(59);
+  const Step step = bench.move_to(0);
+  EXPECT_EQ(step.force_sequence, 9U);
+  EXPECT_EQ(step.force_age, milliseconds(10));
+  EXPECT_EQ(step.loop_age, milliseconds(50));
+}
+
+TEST(HapticController, RefusesImpossibleLimits) {
+  HapticController::Config c = config();
+  c.max_force = 0;
+  EXPECT_THROW(HapticController{c}, std::invalid_argument);
+  c = config();
+  c.max_slew = -1;
+  EXPECT_THROW(HapticController{c}, std::invalid_argument);
+  c = config();
+  c.longest_hold = Duration::zero();
+  EXPECT_THROW(HapticController{c}, std::invalid_argument);
+  c = config();
+  c.friction.viscous = -1;
+  EXPECT_THROW(HapticController{c}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon

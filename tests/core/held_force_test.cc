@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/held_force.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+
+Motion at(Duration t, const Vec3& x = Vec3::Zero()) { return {LocalTime(t), x, Vec3::Zero()}; }
+
+RemoteForce force_at(Duration received, const Vec3& force, Duration valid_for = milliseconds(30)) {
+  RemoteForce remote;
+  remote.sequence = 1;
+  remote.received = LocalTime(received);
+  remote.force = force;
+  remote.valid_for = valid_for;
+  return remote;
+}
+
+HeldForce::Config without_ramp() {
+  HeldForce::Config config;
+  config.ramp_in = Duration::zero();
+  return config;
+}
+
+TEST(HeldForce, WantsNothingBeforeTheFirstForce) {
+  HeldForce held({});
+  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kIdle);
+  EXPECT_EQ(held.wanted(at(milliseconds(5))).force, Vec3::Zero());
+}
+
+TEST(HeldForce, GoesFromValidToHeldToFadingToSafeStop) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
+  EXPECT_EQ(held.wanted(at(milliseconds(30))).mode, Mode::kActive);
+  EXPECT_EQ(held.wanted(at(milliseconds(30))).force.x(), 2);
+  EXPECT_EQ(held.wanted(at(milliseconds(50))).mode, Mode::kHolding);
+  EXPECT_EQ(held.wanted(at(milliseconds(50))).force.x(), 2);
+  EXPECT_EQ(held.wanted(at(milliseconds(100))).mode, Mode::kDecaying);
+  EXPECT_NEAR(held.wanted(at(milliseconds(100))).force.x(), 2 * std::exp(-1.0), 1e-12);
+  EXPECT_EQ(held.wanted(at(milliseconds(280))).mode, Mode::kSafeStop);
+  EXPECT_EQ(held.wanted(at(milliseconds(280))).force, Vec3::Zero());
+}
+
+TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
+  HeldForce held({});
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
+  EXPECT_EQ(held.wanted(at(milliseconds(600))).mode, Mode::kSafeStop);
+  EXPECT_EQ(held.wanted(at(milliseconds(5))).mode, Mode::kSafeStop);  // even if the clock stepped back
+  held.observe(force_at(milliseconds(1000), Vec3(2, 0, 0), milliseconds(400)));
+  const auto half = held.wanted(at(milliseconds(1050)));
+  EXPECT_EQ(half.mode, Mode::kActive);
+  EXPECT_NEAR(half.force.x(), 1, 1e-12);
+  EXPECT_TRUE(half.reasons.has(Reason::kRampIn));
+  EXPECT_EQ(held.wanted(at(milliseconds(1100))).force.x(), 2);
+}
+
+TEST(HeldForce, AFreshForceWhileFadingIsNotRampedAgain) {
+  HeldForce held({});
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
+  EXPECT_EQ(held.wanted(at(milliseconds(150))).mode, Mode::kDecaying);
+  held.observe(force_at(milliseconds(151), Vec3(2, 0, 0)));
+  EXPECT_EQ(held.wanted(at(milliseconds(152))).force.x(), 2);
+}
+
+TEST(HeldForce, FollowsTheHandWithTheLocalModel) {
+  HeldForce held(without_ramp());
+  RemoteForce remote = force_at(Duration::zero(), Vec3(-1, 0, 0));
+  remote.model = LocalModel{Vec3(0.01, 0, 0), Vec3(100, 0, 0).asDiagonal()};
+  held.observe(remote);
+  // 10 mm deeper than what the force was computed for, 100 N/m: 1 N more, along −x.
+  EXPECT_NEAR((held.wanted(at(milliseconds(1), Vec3(0.02, 0.5, 0))).force - Vec3(-2, 0, 0)).norm(), 0, 1e-12);
+}
+
+TEST(HeldForce, RefusesWhatIsNotFiniteAndAgesTheForceBefore) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
+  EXPECT_FALSE(held.observe(force_at(milliseconds(20), Vec3(std::nan(""), 0, 0))));
+  RemoteForce bad_model = force_at(milliseconds(20), Vec3(1, 0, 0));
+  bad_model.model = LocalModel{Vec3::Zero(), Mat3::Constant(std::numeric_limits<double>::infinity())};
+  EXPECT_FALSE(held.observe(bad_model));
+  EXPECT_EQ(held.wanted(at(milliseconds(40))).mode, Mode::kHolding);
+  EXPECT_EQ(held.wanted(at(milliseconds(40))).force.x(), 2);
+}
+
+TEST(HeldForce, NoEngineIsBelievedForLongerThanTheLimit) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0), std::chrono::hours(1)));
+  EXPECT_EQ(held.wanted(at(milliseconds(501))).mode, Mode::kHolding);
+}
+
+TEST(HeldForce, ReleaseEndsValidityAtOnce) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0), milliseconds(400)));
+  held.release(LocalTime(milliseconds(10)));
+  EXPECT_EQ(held.wanted(at(milliseconds(11))).mode, Mode::kHolding);
+  EXPECT_EQ(held.wanted(at(milliseconds(100))).mode, Mode::kDecaying);
+}
+
+TEST(HeldForce, RefusesImpossibleTimes) {
+  HeldForce::Config config;
+  config.safe_stop = milliseconds(10);
+  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
+  config = {};
+  config.decay = Duration::zero();
+  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/spsc_ring.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <thread>
+
+namespace tendon {
+namespace {
+
+TEST(SpscRing, GivesBackEverythingInOrder) {
+  SpscRing<int, 4> ring;
+  EXPECT_EQ(ring.front(), nullptr);
+  for (int round = 0; round < 3; ++round) {
+    for (int i = 0; i < 4; ++i) EXPECT_TRUE(ring.try_push(i));
+    for (int i = 0; i < 4; ++i) {
+      ASSERT_NE(ring.front(), nullptr);
+      EXPECT_EQ(*ring.front(), i);
+      ring.pop();
+    }
+    EXPECT_EQ(ring.front(), nullptr);
+  }
+}
+
+TEST(SpscRing, SaysSoWhenItIsFullAndKeepsWhatItHas) {
+  SpscRing<int, 2> ring;
+  EXPECT_TRUE(ring.try_push(1));
+  EXPECT_TRUE(ring.try_push(2));
+  EXPECT_FALSE(ring.try_push(3));
+  EXPECT_EQ(*ring.front(), 1);
+}
+
+TEST(SpscRing, BetweenThreadsNothingIsLostTornOrReordered) {
+  struct Pair {
+    std::uint64_t a, b;
+  };
+  constexpr std::uint64_t kLast = 200000;
+  SpscRing<Pair, 64> ring;
+  std::jthread writer([&ring] {
+    for (std::uint64_t i = 1; i <= kLast;) {
+      if (ring.try_push({i, ~i})) ++i;
+    }
+  });
+  for (std::uint64_t expected = 1; expected <= kLast;) {
+    const Pair* pair = ring.front();
+    if (pair == nullptr) continue;
+    ASSERT_EQ(pair->a, expected);
+    ASSERT_EQ(pair->b, ~expected);
+    ring.pop();
+    ++expected;
+  }
+}
+
+}  // namespace
+}  // namespace tendon
