@@ -1,0 +1,596 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/codec.h"
+
+#include <google/protobuf/arena.h>
+#include <google/protobuf/stubs/logging.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "protocol/limits.h"
+#include "tendon.pb.h"
+
+namespace tendon {
+namespace {
+
+namespace pb = tendon::v1;
+
+constexpr std::byte kMagic{0x54};  // 'T'
+
+// ---- little-endian integers ----
+
+template <class Unsigned>
+void put_le(Unsigned value, std::byte* to) noexcept {
+  for (std::size_t i = 0; i < sizeof(Unsigned); ++i) to[i] = static_cast<std::byte>(value >> (8 * i));
+}
+
+template <class Unsigned>
+Unsigned get_le(const std::byte* from) noexcept {
+  Unsigned value = 0;
+  for (std::size_t i = 0; i < sizeof(Unsigned); ++i) {
+    value = static_cast<Unsigned>(value | static_cast<Unsigned>(std::to_integer<Unsigned>(from[i]) << (8 * i)));
+  }
+  return value;
+}
+
+void encode_header(const Header& header, std::byte* to) noexcept {
+  to[0] = kMagic;
+  to[1] = static_cast<std::byte>(kProtocolVersion << 4 | static_cast<std::uint32_t>(header.type));
+  to[2] = to[3] = std::byte{0};
+  put_le(header.connection_id, to + 4);
+  put_le(header.packet_number, to + 8);
+}
+
+std::uint8_t* bytes(std::byte* p) noexcept { return reinterpret_cast<std::uint8_t*>(p); }
+
+// ---- text ----
+
+/// Length of the UTF-8 character at the front of `text`; 0 when there is none (RFC 3629, table 3-7 of
+/// the Unicode standard: no overlong forms, no surrogates, nothing above U+10FFFF).
+std::size_t utf8_character(std::string_view text) noexcept {
+  const auto at = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned>(static_cast<unsigned char>(text[i])) : 0U;
+  };
+  const auto follows = [&](std::size_t i) { return (at(i) & 0xC0U) == 0x80U; };
+  const unsigned first = at(0);
+  if (text.empty()) return 0;
+  if (first < 0x80) return 1;
+  if (first >= 0xC2 && first <= 0xDF) return follows(1) ? 2 : 0;
+  if (first >= 0xE0 && first <= 0xEF) {
+    const bool overlong = first == 0xE0 && at(1) < 0xA0;
+    const bool surrogate = first == 0xED && at(1) > 0x9F;
+    return follows(1) && follows(2) && !overlong && !surrogate ? 3 : 0;
+  }
+  if (first >= 0xF0 && first <= 0xF4) {
+    const bool overlong = first == 0xF0 && at(1) < 0x90;
+    const bool too_high = first == 0xF4 && at(1) > 0x8F;
+    return follows(1) && follows(2) && follows(3) && !overlong && !too_high ? 4 : 0;
+  }
+  return 0;
+}
+
+/// The front of `text`, as far as it is UTF-8 and not longer than `limit` bytes. Protobuf parsers refuse
+/// a whole datagram for one bad character.
+std::string clip(std::string_view text, std::size_t limit) {
+  std::size_t size = 0;
+  while (size < text.size()) {
+    const std::size_t next = utf8_character(text.substr(size));
+    if (next == 0 || size + next > limit) break;
+    size += next;
+  }
+  return std::string(text.substr(0, size));
+}
+
+// ---- single values; `read` is false when the value is out of bounds ----
+
+bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }  // false for NaN
+
+bool read(const pb::Vec3& from, Vec3& to) noexcept {
+  to = {from.x(), from.y(), from.z()};
+  return bounded(from.x()) && bounded(from.y()) && bounded(from.z());
+}
+
+void write(const Vec3& from, pb::Vec3& to) {
+  to.set_x(from.x());
+  to.set_y(from.y());
+  to.set_z(from.z());
+}
+
+template <class Time>
+bool read(std::int64_t ns, Time& to) noexcept {
+  to = Time{Duration{ns}};
+  return ns >= -limits::kMaxTime.count() && ns <= limits::kMaxTime.count();
+}
+
+/// Our enums have the numbers of the wire: first is 1, all up to `last` are used.
+template <class Enum>
+bool read_enum(int from, Enum last, Enum& to) noexcept {
+  if (from < 1 || from > static_cast<int>(last)) return false;
+  to = static_cast<Enum>(from);
+  return true;
+}
+bool read(pb::Mode from, Mode& to) noexcept { return read_enum(from, Mode::kFault, to); }
+bool read(pb::Role from, Role& to) noexcept { return read_enum(from, Role::kController, to); }
+bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kTimedOut, to); }
+
+bool read(const std::string& from, std::size_t limit, std::string& to) {
+  if (from.size() > limit) return false;
+  to = from;
+  return true;
+}
+
+using Texts = google::protobuf::RepeatedPtrField<std::string>;
+
+bool read_features(const Texts& from, std::vector<std::string>& to) {
+  if (from.size() > limits::kMaxFeatures) return false;
+  to.assign(from.begin(), from.end());
+  return std::all_of(to.begin(), to.end(), [](const auto& text) { return text.size() <= limits::kMaxFeature; });
+}
+
+void write_features(const std::vector<std::string>& from, Texts& to) {
+  for (const std::string& feature : from) {
+    if (to.size() == limits::kMaxFeatures) break;
+    *to.Add() = clip(feature, limits::kMaxFeature);
+  }
+}
+
+// ---- frames ----
+
+bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
+  to.tick = from.tick();
+  to.energy = from.energy_j();
+  to.permitted_force = from.permitted_force_n();
+  to.reasons = from.reasons();
+  to.force_sequence = from.force_sequence();
+  to.force_age = Duration{static_cast<Duration::rep>(from.force_age_ns())};
+  const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
+  return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
+         read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
+         bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
+         from.force_age_ns() <= static_cast<std::uint64_t>(limits::kMaxTime.count()) && read(from.mode(), to.mode);
+}
+
+void write(const DeviceState& from, pb::DeviceState& to) {
+  to.set_tick(from.tick);
+  to.set_sampled_ns(from.sampled.time_since_epoch().count());
+  write(from.position, *to.mutable_position_m());
+  write(from.velocity, *to.mutable_velocity_mps());
+  write(from.force_applied, *to.mutable_force_applied_n());
+  to.set_energy_j(from.energy);
+  to.set_permitted_force_n(from.permitted_force);
+  to.set_reasons(from.reasons);
+  to.set_force_sequence(from.force_sequence);
+  to.set_force_age_ns(static_cast<std::uint64_t>(from.force_age.count()));
+  to.set_mode(static_cast<pb::Mode>(from.mode));
+}
+
+bool read(const pb::LocalModel& from, LocalModel& to) noexcept {
+  const auto& k = from.stiffness_npm();
+  if (!std::all_of(k.begin(), k.end(), bounded)) return false;
+  switch (k.size()) {
+    case 1:
+      to.stiffness = k.Get(0) * Mat3::Identity();
+      break;
+    case 3:
+      to.stiffness = Vec3(k.Get(0), k.Get(1), k.Get(2)).asDiagonal();
+      break;
+    case 9:
+      to.stiffness = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.data());
+      break;
+    default:
+      return false;
+  }
+  return read(from.at_m(), to.at);
+}
+
+/// The shortest of the three forms that says the same.
+void write(const LocalModel& from, pb::LocalModel& to) {
+  write(from.at, *to.mutable_at_m());
+  const Mat3& k = from.stiffness;
+  auto& out = *to.mutable_stiffness_npm();
+  out.Clear();
+  const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
+  if (diagonal && k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2)) {
+    out.Add(k(0, 0));
+  } else if (diagonal) {
+    for (int i = 0; i < 3; ++i) out.Add(k(i, i));
+  } else {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) out.Add(k(row, column));
+    }
+  }
+}
+
+bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept {
+  to.sequence = from.sequence();
+  to.based_on_tick = from.based_on_tick();
+  to.valid_for = std::chrono::microseconds(from.valid_for_us());
+  to.model.reset();
+  if (from.has_model() && !read(from.model(), to.model.emplace())) return false;
+  return to.sequence > 0 && read(from.force_n(), to.force) && to.valid_for > Duration::zero() &&
+         to.valid_for <= limits::kMaxValidFor;
+}
+
+void write(const ForceCommand& from, pb::ForceCommand& to) {
+  to.set_sequence(from.sequence);
+  to.set_based_on_tick(from.based_on_tick);
+  write(from.force, *to.mutable_force_n());
+  if (from.model) {
+    write(*from.model, *to.mutable_model());
+  } else {
+    to.clear_model();
+  }
+  // Out-of-range durations become 0, which the receiver refuses; a cast would make them look valid.
+  const bool possible = from.valid_for > Duration::zero() && from.valid_for <= limits::kMaxValidFor;
+  const auto us = std::chrono::ceil<std::chrono::microseconds>(possible ? from.valid_for : Duration::zero());
+  to.set_valid_for_us(static_cast<std::uint32_t>(us.count()));
+}
+
+bool read(const pb::Control& from, Control& to) noexcept {
+  to.id = from.id();
+  switch (from.op_case()) {
+    case pb::Control::kSetStateRate:
+      to.request = SetStateRate{from.set_state_rate().hz()};
+      break;
+    case pb::Control::kRearm:
+      to.request = Rearm{};
+      break;
+    case pb::Control::OP_NOT_SET:
+      to.request.reset();
+      break;
+  }
+  return to.id > 0;
+}
+
+void write_request(const SetStateRate& from, pb::Control& to) { to.mutable_set_state_rate()->set_hz(from.hz); }
+void write_request(const Rearm&, pb::Control& to) { to.mutable_rearm(); }
+
+void write(const Control& from, pb::Control& to) {
+  to.set_id(from.id);
+  to.clear_op();
+  if (from.request) std::visit([&](const auto& request) { write_request(request, to); }, *from.request);
+}
+
+bool read(const pb::ControlAck& from, ControlAck& to) {
+  to.id = from.id();
+  return to.id > 0 && read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail);
+}
+
+void write(const ControlAck& from, pb::ControlAck& to) {
+  to.set_id(from.id);
+  to.set_code(static_cast<pb::Code>(from.code));
+  to.set_detail(clip(from.detail, limits::kMaxDetail));
+}
+
+bool read(const pb::Bye& from, Bye& to) {
+  return read(from.code(), to.code) && read(from.reason(), limits::kMaxDetail, to.reason);
+}
+
+void write(const Bye& from, pb::Bye& to) {
+  to.set_code(static_cast<pb::Code>(from.code));
+  to.set_reason(clip(from.reason, limits::kMaxDetail));
+}
+
+bool read(const pb::Echo& from, IncomingEcho& to) noexcept {
+  to.packet_number = from.peer_packet_number();
+  to.received_mask = from.received_mask();
+  return read(from.peer_tx_time_ns(), to.sent) && read(from.rx_time_ns(), to.received);
+}
+
+/// Appends the frame to `content`, or counts it.
+template <class Value, class Message>
+void take(const Message& from, DataContent& content) {
+  Frame& frame = content.frames.emplace_back(std::in_place_type<Value>);
+  if (read(from, std::get<Value>(frame))) return;
+  content.frames.pop_back();
+  ++content.invalid;
+}
+
+// ---- handshake ----
+
+bool read(const pb::Hello& from, Hello& to) {
+  to.version_min = from.version_min();
+  to.version_max = from.version_max();
+  return to.version_min >= 1 && to.version_min <= to.version_max && read(from.role(), to.role) &&
+         read(from.name(), limits::kMaxName, to.name) && read_features(from.features(), to.features);
+}
+
+void write(const Hello& from, pb::Hello& to) {
+  to.set_version_min(from.version_min);
+  to.set_version_max(from.version_max);
+  to.set_role(static_cast<pb::Role>(from.role));
+  to.set_name(clip(from.name, limits::kMaxName));
+  write_features(from.features, *to.mutable_features());
+}
+
+bool read(const pb::Welcome& from, Welcome& to) {
+  to.version = from.version();
+  to.max_force = from.max_force_n();
+  to.position_resolution = from.position_resolution_m();
+  to.loop_hz = from.loop_hz();
+  to.timeout = std::chrono::milliseconds(from.timeout_ms());
+  return to.version >= 1 && read_features(from.features(), to.features) && read(from.role(), to.role) &&
+         read(from.device_name(), limits::kMaxName, to.device_name) && bounded(to.max_force) && to.max_force >= 0 &&
+         bounded(to.position_resolution) && to.position_resolution >= 0 && to.loop_hz >= 1 &&
+         to.loop_hz <= limits::kMaxLoopHz && to.timeout > Duration::zero() && to.timeout <= limits::kMaxTimeout &&
+         read(from.server(), limits::kMaxName, to.server);
+}
+
+void write(const Welcome& from, pb::Welcome& to) {
+  to.set_version(from.version);
+  write_features(from.features, *to.mutable_features());
+  to.set_role(static_cast<pb::Role>(from.role));
+  to.set_device_name(clip(from.device_name, limits::kMaxName));
+  to.set_max_force_n(from.max_force);
+  to.set_position_resolution_m(from.position_resolution);
+  to.set_loop_hz(from.loop_hz);
+  to.set_timeout_ms(
+      static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::milliseconds>(from.timeout).count()));
+  to.set_server(clip(from.server, limits::kMaxName));
+}
+
+bool read(const pb::Refused& from, Refused& to) {
+  to.version_min = from.version_min();
+  to.version_max = from.version_max();
+  return read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail);
+}
+
+void write(const Refused& from, pb::Refused& to) {
+  to.set_code(static_cast<pb::Code>(from.code));
+  to.set_detail(clip(from.detail, limits::kMaxDetail));
+  to.set_version_min(from.version_min);
+  to.set_version_max(from.version_max);
+}
+
+void write_answer(const Welcome& from, pb::Answer& to) { write(from, *to.mutable_welcome()); }
+void write_answer(const Refused& from, pb::Answer& to) { write(from, *to.mutable_refused()); }
+
+/// Parses without a word: protobuf prints a line for every text that is not UTF-8, and a stranger must
+/// not be able to fill our log.
+template <class Message>
+bool parse(std::span<const std::byte> from, Message& to) {
+  const google::protobuf::LogSilencer silence;
+  return to.ParseFromArray(from.data(), static_cast<int>(from.size()));
+}
+
+// Bytes of the handshake datagrams, after the header.
+constexpr std::size_t kRandomAt = kHeaderSize;
+constexpr std::size_t kCookieAt = kRandomAt + sizeof(ClientRandom);
+constexpr std::size_t kRetrySize = kCookieAt + sizeof(Cookie);
+constexpr std::size_t kHelloLengthAt = kRetrySize;
+constexpr std::size_t kHelloAt = kHelloLengthAt + 2;
+constexpr std::size_t kAnswerAt = kCookieAt;
+
+std::array<std::byte, 16> get16(std::span<const std::byte> datagram, std::size_t at) noexcept {
+  std::array<std::byte, 16> value;
+  std::copy_n(datagram.begin() + static_cast<std::ptrdiff_t>(at), value.size(), value.begin());
+  return value;
+}
+
+void put16(const std::array<std::byte, 16>& value, std::byte* to) noexcept {
+  std::copy(value.begin(), value.end(), to);
+}
+
+/// The header, when the datagram is a handshake datagram of that type.
+std::optional<Header> handshake_header(std::span<const std::byte> datagram, DatagramType type) noexcept {
+  const std::optional<Header> header = decode_header(datagram);
+  if (!header || header->type != type || header->packet_number != 0) return {};
+  if (type != DatagramType::kAnswer && header->connection_id != 0) return {};
+  return header;
+}
+
+}  // namespace
+
+std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcept {
+  if (datagram.size() < kHeaderSize || datagram.size() > kMaxDatagram) return {};
+  const auto version = std::to_integer<std::uint32_t>(datagram[1] >> 4);
+  const auto type = std::to_integer<std::uint8_t>(datagram[1] & std::byte{0x0F});
+  if (datagram[0] != kMagic || version != kProtocolVersion) return {};
+  if (type < 1 || type > static_cast<std::uint8_t>(DatagramType::kAnswer)) return {};
+  if (datagram[2] != std::byte{0} || datagram[3] != std::byte{0}) return {};
+  return Header{.type = static_cast<DatagramType>(type),
+                .connection_id = get_le<std::uint32_t>(datagram.data() + 4),
+                .packet_number = get_le<std::uint64_t>(datagram.data() + 8)};
+}
+
+// ---- Data ----
+
+/// One small Datagram per kind of frame. Protobuf defines the concatenation of two messages as their
+/// merge, so a datagram with several frames is written piece after piece, and each piece keeps its
+/// objects for the next time.
+struct DataWriter::Pieces {
+  pb::Datagram head, state, force, control, ack, bye;
+  pb::Frame& state_frame = *state.add_frames();
+  pb::Frame& force_frame = *force.add_frames();
+  pb::Frame& control_frame = *control.add_frames();
+  pb::Frame& ack_frame = *ack.add_frames();
+  pb::Frame& bye_frame = *bye.add_frames();
+};
+
+DataWriter::DataWriter() : pieces_(std::make_unique<Pieces>()) {}
+DataWriter::~DataWriter() = default;
+DataWriter::DataWriter(DataWriter&&) noexcept = default;
+DataWriter& DataWriter::operator=(DataWriter&&) noexcept = default;
+
+template <class Piece>
+bool DataWriter::append(const Piece& piece) {
+  const std::size_t size = piece.ByteSizeLong();
+  if (size > kMaxDatagram - size_) return false;
+  piece.SerializeWithCachedSizesToArray(bytes(buffer_ + size_));
+  size_ += size;
+  return true;
+}
+
+void DataWriter::begin(std::span<std::byte, kMaxDatagram> buffer, std::uint32_t connection_id,
+                       std::uint64_t packet_number, LocalTime sent, const std::optional<OutgoingEcho>& echo) {
+  buffer_ = buffer.data();
+  encode_header({.type = DatagramType::kData, .connection_id = connection_id, .packet_number = packet_number}, buffer_);
+  size_ = kHeaderSize;
+
+  pb::Datagram& head = pieces_->head;
+  head.set_tx_time_ns(sent.time_since_epoch().count());
+  if (echo) {
+    pb::Echo& out = *head.mutable_echo();
+    out.set_peer_tx_time_ns(echo->sent.time_since_epoch().count());
+    out.set_rx_time_ns(echo->received.time_since_epoch().count());
+    out.set_peer_packet_number(echo->packet_number);
+    out.set_received_mask(echo->received_mask);
+  } else {
+    head.clear_echo();
+  }
+  append(head);
+}
+
+bool DataWriter::add(const DeviceState& state) {
+  write(state, *pieces_->state_frame.mutable_state());
+  return append(pieces_->state);
+}
+bool DataWriter::add(const ForceCommand& command) {
+  write(command, *pieces_->force_frame.mutable_force());
+  return append(pieces_->force);
+}
+bool DataWriter::add(const Control& control) {
+  write(control, *pieces_->control_frame.mutable_control());
+  return append(pieces_->control);
+}
+bool DataWriter::add(const ControlAck& ack) {
+  write(ack, *pieces_->ack_frame.mutable_control_ack());
+  return append(pieces_->ack);
+}
+bool DataWriter::add(const Bye& bye) {
+  write(bye, *pieces_->bye_frame.mutable_bye());
+  return append(pieces_->bye);
+}
+
+/// Parsed objects live in an arena whose first block is ours: no heap for a state or a force, and one
+/// `Reset` frees what a hostile datagram made of its 1200 bytes.
+struct DataReader::Memory {
+  alignas(16) std::array<char, 8192> block;
+  google::protobuf::Arena arena{block.data(), block.size()};
+  DataContent content;
+};
+
+DataReader::DataReader() : memory_(std::make_unique<Memory>()) {}
+DataReader::~DataReader() = default;
+DataReader::DataReader(DataReader&&) noexcept = default;
+DataReader& DataReader::operator=(DataReader&&) noexcept = default;
+
+const DataContent* DataReader::read(std::span<const std::byte> body) {
+  memory_->arena.Reset();
+  auto& datagram = *google::protobuf::Arena::CreateMessage<pb::Datagram>(&memory_->arena);
+  DataContent& content = memory_->content;
+  if (body.size() > kMaxDatagram || !parse(body, datagram) || datagram.frames_size() > limits::kMaxFrames) {
+    return nullptr;
+  }
+  if (!tendon::read(datagram.tx_time_ns(), content.sent)) return nullptr;
+
+  content.frames.clear();
+  content.invalid = 0;
+  content.echo.reset();
+  if (datagram.has_echo() && !tendon::read(datagram.echo(), content.echo.emplace())) {
+    content.echo.reset();
+    ++content.invalid;
+  }
+  for (const pb::Frame& frame : datagram.frames()) {
+    switch (frame.body_case()) {
+      case pb::Frame::kState:
+        take<DeviceState>(frame.state(), content);
+        break;
+      case pb::Frame::kForce:
+        take<ForceCommand>(frame.force(), content);
+        break;
+      case pb::Frame::kControl:
+        take<Control>(frame.control(), content);
+        break;
+      case pb::Frame::kControlAck:
+        take<ControlAck>(frame.control_ack(), content);
+        break;
+      case pb::Frame::kBye:
+        take<Bye>(frame.bye(), content);
+        break;
+      case pb::Frame::BODY_NOT_SET:
+        break;  // a frame of a newer peer
+    }
+  }
+  return &content;
+}
+
+// ---- Handshake ----
+
+std::size_t encode(const HelloDatagram& hello, std::span<std::byte, kMaxDatagram> buffer) {
+  pb::Hello message;
+  write(hello.hello, message);
+  const std::size_t size = message.ByteSizeLong();
+
+  std::byte* const to = buffer.data();
+  encode_header({.type = DatagramType::kHello}, to);
+  put16(hello.random, to + kRandomAt);
+  put16(hello.cookie, to + kCookieAt);
+  put_le(static_cast<std::uint16_t>(size), to + kHelloLengthAt);
+  message.SerializeWithCachedSizesToArray(bytes(to + kHelloAt));
+  std::fill(to + kHelloAt + size, to + kMaxDatagram, std::byte{0});
+  return kMaxDatagram;
+}
+
+std::size_t encode(const RetryDatagram& retry, std::span<std::byte, kMaxDatagram> buffer) {
+  std::byte* const to = buffer.data();
+  encode_header({.type = DatagramType::kRetry}, to);
+  put16(retry.random, to + kRandomAt);
+  put16(retry.cookie, to + kCookieAt);
+  return kRetrySize;
+}
+
+std::size_t encode(const AnswerDatagram& answer, std::span<std::byte, kMaxDatagram> buffer) {
+  pb::Answer message;
+  std::visit([&](const auto& body) { write_answer(body, message); }, answer.answer);
+  const std::size_t size = message.ByteSizeLong();
+
+  std::byte* const to = buffer.data();
+  encode_header({.type = DatagramType::kAnswer, .connection_id = answer.connection_id}, to);
+  put16(answer.random, to + kRandomAt);
+  message.SerializeWithCachedSizesToArray(bytes(to + kAnswerAt));
+  return kAnswerAt + size;
+}
+
+std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram) {
+  if (datagram.size() != kMaxDatagram || !handshake_header(datagram, DatagramType::kHello)) return {};
+  const std::size_t size = get_le<std::uint16_t>(datagram.data() + kHelloLengthAt);
+  if (size > kMaxDatagram - kHelloAt) return {};
+  const auto padding = datagram.subspan(kHelloAt + size);
+  if (std::any_of(padding.begin(), padding.end(), [](std::byte b) { return b != std::byte{0}; })) return {};
+
+  pb::Hello message;
+  HelloDatagram hello{.random = get16(datagram, kRandomAt), .cookie = get16(datagram, kCookieAt), .hello = {}};
+  if (!parse(datagram.subspan(kHelloAt, size), message) || !read(message, hello.hello)) return {};
+  return hello;
+}
+
+std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram) {
+  if (datagram.size() != kRetrySize || !handshake_header(datagram, DatagramType::kRetry)) return {};
+  return RetryDatagram{.random = get16(datagram, kRandomAt), .cookie = get16(datagram, kCookieAt)};
+}
+
+std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram) {
+  const std::optional<Header> header = handshake_header(datagram, DatagramType::kAnswer);
+  if (!header || datagram.size() < kAnswerAt) return {};
+
+  pb::Answer message;
+  if (!parse(datagram.subspan(kAnswerAt), message)) return {};
+  AnswerDatagram answer{
+      .connection_id = header->connection_id, .random = get16(datagram, kRandomAt), .answer = Welcome{}};
+  switch (message.body_case()) {
+    case pb::Answer::kWelcome:
+      if (!read(message.welcome(), std::get<Welcome>(answer.answer))) return {};
+      return answer;
+    case pb::Answer::kRefused:
+      if (!read(message.refused(), answer.answer.emplace<Refused>())) return {};
+      return answer;
+    case pb::Answer::BODY_NOT_SET:
+      return {};
+  }
+  return {};
+}
+
+}  // namespace tendon

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/time.h"
+
+// Every bound that the wire has, each with its reason. Both ends must agree on them: they are part of
+// the protocol (WIRE.md lists them), not settings. What is beyond a bound is refused by the receiver
+// and counted; the sender cuts texts and lists to size.
+
+namespace tendon::limits {
+
+/// Largest magnitude of any physical quantity in SI units, per component. It is not physics (what a
+/// device can do is the server's business): its square times itself stays finite even in single
+/// precision (1e36 < 3.4e38), and a unit mistaken by 1e9 or more is noticed.
+inline constexpr double kMaxValue = 1e12;
+
+/// Largest distance of any clock reading from its zero: 36 years. The sum of four such times, which a
+/// round trip is, cannot overflow 64 bits.
+inline constexpr Duration kMaxTime{std::int64_t{1} << 60};
+
+/// A force cannot be promised for longer: beyond every peer timeout, the promise is about a dead peer.
+inline constexpr Duration kMaxValidFor = std::chrono::seconds(10);
+
+/// Frames in one datagram. We send at most 2 + 2·16 (state, force, the two request windows); a
+/// 1200-byte datagram could otherwise hold 590 empty ones.
+inline constexpr int kMaxFrames = 64;
+
+/// Requests sent and not yet answered. Both ends keep this many slots, which is what makes the answers
+/// survive loss (see requests.h). A request is a human act; 16 are a burst of clicks.
+inline constexpr std::uint32_t kRequestWindow = 16;
+
+/// Bytes of UTF-8. With these the largest Hello (674 bytes before padding) and the largest Welcome
+/// (746) stay below the 1200 bytes of a datagram, with room to grow.
+inline constexpr std::size_t kMaxName = 64;
+inline constexpr std::size_t kMaxFeature = 32;
+inline constexpr int kMaxFeatures = 16;
+/// One sentence: the reason of a refusal, an answer or a Bye.
+inline constexpr std::size_t kMaxDetail = 128;
+
+/// Haptic steps per second: ten times beyond the fastest loop known to us (100 kHz, on FPGAs).
+inline constexpr std::uint32_t kMaxLoopHz = 1'000'000;
+
+/// The longest silence that a server may grant. An hour is far beyond any use; it keeps sums of times small.
+inline constexpr Duration kMaxTimeout = std::chrono::hours(1);
+
+/// How often a Bye is said: at 10 % loss one conversation in a thousand ends by timeout instead.
+inline constexpr int kByes = 3;
+
+}  // namespace tendon::limits

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace tendon {
+
+/// Which packet numbers have arrived, as far back as it matters: a packet is let in once. A ring of
+/// bits as in RFC 6479: a number's bit never moves, advancing clears the words it runs over.
+///
+/// Ask with `contains` before anything is believed of a packet, `insert` once it has proved good, so
+/// that a forged one cannot use up the number of a real one.
+class ReplayWindow {
+ public:
+  /// 1024 bits, of which the word being filled is not a full memory: 960 numbers are always remembered,
+  /// about one second at 1 kHz. Anything later is of no use to a hand.
+  static constexpr std::uint64_t kBits = 1024;
+  static constexpr std::uint64_t kRemembered = kBits - 64;
+
+  /// True when `number` was inserted, or is too old to know.
+  bool contains(std::uint64_t number) const noexcept {
+    if (empty_ || number > highest_) return false;
+    if (highest_ - number >= kRemembered) return true;
+    return (words_[word(number)] & bit(number)) != 0;
+  }
+
+  /// `number` must not be contained.
+  void insert(std::uint64_t number) noexcept {
+    if (empty_ || number > highest_) {
+      // The first number clears nothing: the words are zero already.
+      const std::uint64_t from = empty_ ? number / 64 : highest_ / 64;
+      const std::uint64_t to = number / 64;
+      const std::uint64_t steps = to - from < words_.size() ? to - from : words_.size();
+      for (std::uint64_t i = 0; i < steps; ++i) words_[(to - i) % words_.size()] = 0;
+      highest_ = number;
+      empty_ = false;
+    }
+    words_[word(number)] |= bit(number);
+    ++count_;
+  }
+
+  /// Bit i: (number − 1 − i) is known to have been inserted.
+  std::uint32_t mask_before(std::uint64_t number) const noexcept {
+    std::uint32_t mask = 0;
+    for (std::uint64_t i = 0; i < 32 && i < number; ++i) {
+      const std::uint64_t earlier = number - 1 - i;
+      if (highest_ - earlier < kRemembered && (words_[word(earlier)] & bit(earlier)) != 0) mask |= 1U << i;
+    }
+    return mask;
+  }
+
+  bool empty() const noexcept { return empty_; }
+  std::uint64_t highest() const noexcept { return highest_; }
+  /// Numbers from 0 to the highest that were never inserted.
+  std::uint64_t missing() const noexcept { return empty_ ? 0 : highest_ + 1 - count_; }
+
+ private:
+  static std::size_t word(std::uint64_t number) noexcept { return (number / 64) % (kBits / 64); }
+  static std::uint64_t bit(std::uint64_t number) noexcept { return std::uint64_t{1} << (number % 64); }
+
+  std::array<std::uint64_t, kBits / 64> words_{};
+  std::uint64_t highest_ = 0;
+  std::uint64_t count_ = 0;
+  bool empty_ = true;
+};
+
+}  // namespace tendon

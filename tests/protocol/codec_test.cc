@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/codec.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "protocol/limits.h"
+#include "tests/protocol/examples.h"
+#include "tests/protocol/raw_protobuf.h"
+
+namespace tendon {
+namespace {
+
+using examples::Bytes;
+using examples::data;
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+std::span<const std::byte> body(const Bytes& datagram) { return std::span(datagram).subspan(kHeaderSize); }
+
+const DataContent* read(DataReader& reader, const Bytes& datagram) { return reader.read(body(datagram)); }
+
+/// A tx_time and one frame, given as the raw content of message Frame.
+Bytes datagram_with(const RawProtobuf& frame) { return RawProtobuf().fixed64(1, 1).message(3, frame).bytes(); }
+
+/// A force command as `change` makes it, as raw content of message Frame.
+RawProtobuf raw_force(const std::function<void(RawProtobuf&)>& change) {
+  RawProtobuf force;
+  force.varint(1, 1).varint(5, 1000);
+  change(force);
+  return RawProtobuf().message(2, force);
+}
+
+// ---- round trips ----
+
+double any_value() {
+  const double mantissa = *rc::gen::map(rc::gen::inRange(-1'000'000, 1'000'001), [](int i) { return i / 1e6; });
+  return mantissa * std::pow(10.0, *rc::gen::inRange(-12, 13));
+}
+Vec3 any_vector() {
+  const double x = any_value();
+  const double y = any_value();
+  return {x, y, any_value()};
+}
+Duration any_time() {
+  return Duration{*rc::gen::inRange<std::int64_t>(-limits::kMaxTime.count(), limits::kMaxTime.count())};
+}
+
+RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
+  DeviceState in;
+  in.tick = *rc::gen::arbitrary<std::uint64_t>();
+  in.sampled = PeerTime{any_time()};
+  in.position = any_vector();
+  in.velocity = any_vector();
+  in.force_applied = any_vector();
+  in.energy = any_value();
+  in.permitted_force = *rc::gen::arbitrary<bool>() ? kInf : std::abs(any_value());
+  in.reasons = *rc::gen::arbitrary<std::uint32_t>();
+  in.force_sequence = *rc::gen::arbitrary<std::uint64_t>();
+  in.force_age = std::chrono::abs(any_time());
+  in.mode = static_cast<Mode>(*rc::gen::inRange(1, 7));
+
+  DataReader reader;
+  const DataContent* content = read(reader, data(1, {}, in));
+  RC_ASSERT(content != nullptr);
+  RC_ASSERT(content->frames.size() == 1U);
+  const auto& out = std::get<DeviceState>(content->frames[0]);
+  RC_ASSERT(out.tick == in.tick);
+  RC_ASSERT((out.sampled == in.sampled));
+  RC_ASSERT(out.position == in.position);
+  RC_ASSERT(out.velocity == in.velocity);
+  RC_ASSERT(out.force_applied == in.force_applied);
+  RC_ASSERT(out.energy == in.energy);
+  RC_ASSERT(out.permitted_force == in.permitted_force);
+  RC_ASSERT(out.reasons == in.reasons);
+  RC_ASSERT(out.force_sequence == in.force_sequence);
+  RC_ASSERT((out.force_age == in.force_age));
+  RC_ASSERT((out.mode == in.mode));
+}
+
+RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
+  ForceCommand in;
+  in.sequence = *rc::gen::inRange<std::uint64_t>(1, ~std::uint64_t{0});
+  in.based_on_tick = *rc::gen::arbitrary<std::uint64_t>();
+  in.force = any_vector();
+  in.valid_for = std::chrono::microseconds(*rc::gen::inRange(1, 10'000'001));
+  const int form = *rc::gen::inRange(0, 4);
+  if (form > 0) {
+    in.model = LocalModel{.at = any_vector(), .stiffness = any_value() * Mat3::Identity()};
+    if (form == 2) in.model->stiffness = any_vector().asDiagonal();
+    if (form == 3) in.model->stiffness << any_vector(), any_vector(), any_vector();
+  }
+
+  DataReader reader;
+  const DataContent* content = read(reader, data(1, {}, in));
+  RC_ASSERT(content != nullptr);
+  RC_ASSERT(content->frames.size() == 1U);
+  const auto& out = std::get<ForceCommand>(content->frames[0]);
+  RC_ASSERT(out.sequence == in.sequence);
+  RC_ASSERT(out.based_on_tick == in.based_on_tick);
+  RC_ASSERT(out.force == in.force);
+  RC_ASSERT((out.valid_for == in.valid_for));
+  RC_ASSERT(out.model.has_value() == in.model.has_value());
+  if (in.model) {
+    RC_ASSERT(out.model->at == in.model->at);
+    RC_ASSERT(out.model->stiffness == in.model->stiffness);
+  }
+}
+
+TEST(Codec, SeveralFramesAndAnEchoShareOneDatagram) {
+  DataReader reader;
+  const auto* content = read(reader, data(42, examples::echo(), examples::state(), examples::force(),
+                                          Control{.id = 1, .request = Rearm{}}, Bye{.code = Code::kOk, .reason = "x"}));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 4U);
+  EXPECT_EQ(std::get<DeviceState>(content->frames[0]).tick, 1000U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[1]).sequence, 100U);
+  EXPECT_TRUE(std::holds_alternative<Rearm>(*std::get<Control>(content->frames[2]).request));
+  EXPECT_EQ(std::get<Bye>(content->frames[3]).reason, "x");
+  EXPECT_EQ(content->sent, PeerTime{Duration{1'000'100'000}});
+  ASSERT_TRUE(content->echo.has_value());
+  EXPECT_EQ(content->echo->sent, LocalTime{Duration{5'000'000}});
+  EXPECT_EQ(content->echo->received, PeerTime{Duration{999'000'000}});
+  EXPECT_EQ(content->echo->packet_number, 3U);
+  EXPECT_EQ(content->echo->received_mask, 0b101U);
+}
+
+TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastDatagram) {
+  DataWriter writer;
+  DataReader reader;
+  std::array<std::byte, kMaxDatagram> buffer;
+  writer.begin(buffer, 1, 0, LocalTime{}, examples::echo());
+  writer.add(examples::force());
+  ForceCommand plain = examples::force();
+  plain.model.reset();
+  writer.begin(buffer, 1, 1, LocalTime{}, {});
+  writer.add(plain);
+  const auto* content = reader.read(std::span(buffer).first(writer.size()).subspan(kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  EXPECT_FALSE(content->echo.has_value());
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_FALSE(std::get<ForceCommand>(content->frames[0]).model.has_value());
+}
+
+TEST(Codec, AFrameThatDoesNotFitLeavesTheDatagramAsItWas) {
+  DataWriter writer;
+  DataReader reader;
+  std::array<std::byte, kMaxDatagram> buffer;
+  writer.begin(buffer, 1, 0, LocalTime{}, {});
+  std::size_t fitted = 0;
+  while (writer.add(examples::state())) ++fitted;
+  EXPECT_LE(writer.size(), kMaxDatagram);
+  const auto* content = reader.read(std::span(buffer).first(writer.size()).subspan(kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  EXPECT_EQ(content->frames.size(), fitted);
+}
+
+// ---- what is refused ----
+
+struct BadState {
+  const char* what;
+  void (*spoil)(DeviceState&);
+};
+
+TEST(Codec, AStateOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadState cases[] = {
+      {"NaN position", [](DeviceState& s) { s.position.y() = kNan; }},
+      {"infinite velocity", [](DeviceState& s) { s.velocity.z() = kInf; }},
+      {"huge force", [](DeviceState& s) { s.force_applied.x() = -1.001e12; }},
+      {"infinite energy", [](DeviceState& s) { s.energy = -kInf; }},
+      {"NaN bound", [](DeviceState& s) { s.permitted_force = kNan; }},
+      {"negative bound", [](DeviceState& s) { s.permitted_force = -1; }},
+      {"late sample", [](DeviceState& s) { s.sampled = PeerTime{limits::kMaxTime + Duration{1}}; }},
+      {"negative age", [](DeviceState& s) { s.force_age = Duration{-1}; }},
+      {"mode 0", [](DeviceState& s) { s.mode = Mode{0}; }},
+      {"mode 7", [](DeviceState& s) { s.mode = Mode{7}; }},
+  };
+  for (const BadState& bad : cases) {
+    DeviceState state = examples::state();
+    bad.spoil(state);
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, state, examples::force()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    EXPECT_TRUE(std::holds_alternative<ForceCommand>(content->frames[0])) << bad.what;
+  }
+}
+
+struct BadForce {
+  const char* what;
+  void (*spoil)(ForceCommand&);
+};
+
+TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadForce cases[] = {
+      {"NaN force", [](ForceCommand& f) { f.force.x() = kNan; }},
+      {"infinite force", [](ForceCommand& f) { f.force.z() = -kInf; }},
+      {"NaN stiffness", [](ForceCommand& f) { f.model->stiffness(1, 2) = kNan; }},
+      {"infinite stiffness", [](ForceCommand& f) { f.model->stiffness(2, 2) = kInf; }},
+      {"infinite position", [](ForceCommand& f) { f.model->at.x() = kInf; }},
+      {"sequence 0", [](ForceCommand& f) { f.sequence = 0; }},
+      {"valid for nothing", [](ForceCommand& f) { f.valid_for = Duration{}; }},
+      {"valid for less than nothing", [](ForceCommand& f) { f.valid_for = Duration{-1}; }},
+      {"valid for too long", [](ForceCommand& f) { f.valid_for = limits::kMaxValidFor + Duration{1}; }},
+      {"valid for 2³² µs + 1 s", [](ForceCommand& f) { f.valid_for = std::chrono::microseconds(4'295'967'296); }},
+  };
+  for (const BadForce& bad : cases) {
+    ForceCommand force = examples::force();
+    bad.spoil(force);
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, force, examples::state()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
+  }
+}
+
+TEST(Codec, StiffnessHasOneThreeOrNineEntries) {
+  for (std::size_t entries = 0; entries <= 10; ++entries) {
+    DataReader reader;
+    const auto datagram = datagram_with(raw_force(
+        [&](RawProtobuf& force) { force.message(4, RawProtobuf().packed(2, std::vector<double>(entries, 2.0))); }));
+    const auto* content = reader.read(datagram);
+    ASSERT_NE(content, nullptr);
+    EXPECT_EQ(content->frames.size(), entries == 1 || entries == 3 || entries == 9 ? 1U : 0U) << entries;
+  }
+}
+
+TEST(Codec, NineStiffnessEntriesAreRowByRow) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(raw_force([](RawProtobuf& force) {
+    force.message(4, RawProtobuf().packed(2, {0, 1, 2, 3, 4, 5, 6, 7, 8}));
+  })));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).model->stiffness(1, 0), 3.0);
+}
+
+TEST(Codec, AStiffnessTravelsInItsShortestForm) {
+  ForceCommand force = examples::force();
+  const auto size = [&](const Mat3& stiffness) {
+    force.model->stiffness = stiffness;
+    return data(1, {}, force).size();
+  };
+  const std::size_t isotropic = size(2000 * Mat3::Identity());
+  EXPECT_EQ(size(Vec3(1, 2, 3).asDiagonal()), isotropic + 16);
+  EXPECT_GE(size(Mat3::Constant(1)), isotropic + 64);
+}
+
+TEST(Codec, FramesAndRequestsOfANewerPeerAreNoError) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(RawProtobuf().text(100, "what we do not know")));
+  ASSERT_NE(content, nullptr);
+  EXPECT_EQ(content->invalid, 0U);
+  EXPECT_TRUE(content->frames.empty());
+
+  content = reader.read(datagram_with(RawProtobuf().message(3, RawProtobuf().varint(1, 5).text(100, "new"))));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<Control>(content->frames[0]).id, 5U);
+  EXPECT_FALSE(std::get<Control>(content->frames[0]).request.has_value());
+}
+
+TEST(Codec, TooManyFramesMakeADatagramMalformed) {
+  RawProtobuf many;
+  many.fixed64(1, 1);
+  for (int i = 0; i < limits::kMaxFrames; ++i) many.text(3, "");
+  DataReader reader;
+  EXPECT_NE(reader.read(many.bytes()), nullptr);
+  many.text(3, "");
+  EXPECT_EQ(reader.read(many.bytes()), nullptr);
+}
+
+TEST(Codec, ADatagramFromBeyondAllClocksIsMalformed) {
+  DataReader reader;
+  EXPECT_NE(reader.read(RawProtobuf().fixed64(1, std::uint64_t{1} << 60U).bytes()), nullptr);
+  EXPECT_EQ(reader.read(RawProtobuf().fixed64(1, (std::uint64_t{1} << 60U) + 1).bytes()), nullptr);
+}
+
+TEST(Codec, TextThatIsNotUtf8MakesADatagramMalformedWithoutAWord) {
+  testing::internal::CaptureStderr();
+  DataReader reader;
+  EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(5, RawProtobuf().varint(1, 1).text(2, "\xFF")))), nullptr);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Codec, OurOwnTextIsCutToSizeAtACharacterAndWhereItIsNotUtf8) {
+  const auto reason = [](const std::string& text) {
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, Bye{.code = Code::kOk, .reason = text}));
+    return content && content->frames.size() == 1 ? std::get<Bye>(content->frames[0]).reason : "refused";
+  };
+  const std::string full(limits::kMaxDetail, 'x');
+  EXPECT_EQ(reason(full), full);
+  EXPECT_EQ(reason(full + "y"), full);
+  EXPECT_EQ(reason(full.substr(1) + "ä"), full.substr(1));
+  EXPECT_EQ(reason("10 µm → ∞ 🙂"), "10 µm → ∞ 🙂");
+  EXPECT_EQ(reason("good\xC0\x80"), "good");          // overlong
+  EXPECT_EQ(reason("good\xED\xA0\x80"), "good");      // surrogate
+  EXPECT_EQ(reason("good\xF4\x90\x80\x80"), "good");  // beyond U+10FFFF
+  EXPECT_EQ(reason("good\xE2\x82"), "good");          // cut in two
+}
+
+TEST(Codec, AForceIsValidForWholeMicrosecondsRoundedUp) {
+  ForceCommand force = examples::force();
+  force.valid_for = Duration{1};
+  DataReader reader;
+  const auto* content = read(reader, data(1, {}, force));
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).valid_for, std::chrono::microseconds(1));
+}
+
+// ---- header and handshake ----
+
+RC_GTEST_PROP(Codec, AHeaderComesOutAsItWentIn, ()) {
+  const auto connection = *rc::gen::arbitrary<std::uint32_t>();
+  const auto number = *rc::gen::arbitrary<std::uint64_t>();
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(buffer, connection, number, LocalTime{}, {});
+  const auto header = decode_header(std::span(buffer).first(writer.size()));
+  RC_ASSERT(header.has_value());
+  RC_ASSERT((*header == Header{DatagramType::kData, connection, number}));
+}
+
+TEST(Codec, TheFullestHelloAndWelcomeFit) {
+  const std::vector<std::string> features(limits::kMaxFeatures + 1, std::string(limits::kMaxFeature + 1, 'f'));
+  const std::string name(limits::kMaxName + 1, 'n');
+  const Hello hello{
+      .version_min = ~0U, .version_max = ~0U, .role = Role::kController, .name = name, .features = features};
+  const auto out = decode_hello(examples::encoded(HelloDatagram{.random = {}, .cookie = {}, .hello = hello}));
+  ASSERT_TRUE(out.has_value());
+  EXPECT_EQ(out->hello.name.size(), limits::kMaxName);
+  EXPECT_EQ(out->hello.features.size(), static_cast<std::size_t>(limits::kMaxFeatures));
+
+  const Welcome welcome{.version = ~0U,
+                        .features = features,
+                        .role = Role::kController,
+                        .device_name = name,
+                        .max_force = 1,
+                        .position_resolution = 1,
+                        .loop_hz = limits::kMaxLoopHz,
+                        .timeout = limits::kMaxTimeout,
+                        .server = name};
+  const Bytes bytes = examples::encoded(AnswerDatagram{.connection_id = 1, .random = {}, .answer = welcome});
+  EXPECT_LE(bytes.size(), 746U);  // as limits.h says
+  EXPECT_TRUE(decode_answer(bytes).has_value());
+}
+
+TEST(Codec, AHelloWithAnythingInItsPaddingIsRefused) {
+  Bytes bytes = examples::datagrams()[0].bytes;
+  ASSERT_TRUE(decode_hello(bytes).has_value());
+  bytes.back() = std::byte{1};
+  EXPECT_FALSE(decode_hello(bytes).has_value());
+}
+
+TEST(Codec, AHelloThatMakesNoSenseIsRefused) {
+  const auto accepted = [](auto spoil) {
+    Hello hello = examples::hello();
+    spoil(hello);
+    return decode_hello(examples::encoded(HelloDatagram{.random = {}, .cookie = {}, .hello = hello})).has_value();
+  };
+  EXPECT_TRUE(accepted([](Hello&) {}));
+  EXPECT_FALSE(accepted([](Hello& h) { h.version_min = 0; }));
+  EXPECT_FALSE(accepted([](Hello& h) { h.version_min = 2; }));
+  EXPECT_FALSE(accepted([](Hello& h) { h.role = Role{0}; }));
+  EXPECT_FALSE(accepted([](Hello& h) { h.role = Role{3}; }));
+}
+
+TEST(Codec, AWelcomeThatMakesNoSenseIsRefused) {
+  const auto accepted = [](auto spoil) {
+    Welcome welcome = examples::welcome();
+    spoil(welcome);
+    return decode_answer(examples::encoded(AnswerDatagram{.connection_id = 1, .random = {}, .answer = welcome}))
+        .has_value();
+  };
+  EXPECT_TRUE(accepted([](Welcome&) {}));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.version = 0; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.max_force = kNan; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.position_resolution = -1; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.loop_hz = 0; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.timeout = Duration{}; }));
+}
+
+}  // namespace
+}  // namespace tendon

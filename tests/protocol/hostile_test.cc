@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "protocol/handshake.h"
+#include "protocol/limits.h"
+#include "protocol/session.h"
+#include "tests/protocol/examples.h"
+
+// Bytes that nobody of ours would send: never a crash, always counted, never a value out of bounds.
+
+namespace tendon {
+namespace {
+
+using examples::Bytes;
+
+bool bounded(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= limits::kMaxValue; }
+
+/// A session that is given bad bytes and looks at everything that comes of them.
+class Target {
+ public:
+  Target() : session_({.connection_id = examples::kConnection}, LocalTime{}) {
+    // Packets and requests sent, so that the echoes and answers of the examples have something to hit.
+    std::array<std::byte, kMaxDatagram> buffer;
+    for (int i = 0; i < 10; ++i) session_.request(Rearm{});
+    for (std::uint64_t i = 1; i <= 4; ++i) {
+      session_.send(examples::state());
+      session_.next_datagram(LocalTime{}, buffer);
+    }
+  }
+
+  /// True when exactly one of the datagram counters took notice.
+  bool take(const Bytes& datagram) {
+    const auto total = [this] {
+      const LinkStats& s = session_.stats();
+      return s.datagrams_received + s.duplicated + s.malformed;
+    };
+    const std::uint64_t before = total();
+    session_.receive(LocalTime{std::chrono::seconds(1)}, datagram);
+    const bool counted = total() == before + 1;
+    while (const auto event = session_.next_event()) look(*event);
+    std::array<std::byte, kMaxDatagram> buffer;
+    for (int i = 0; i < 4; ++i) session_.next_datagram(LocalTime{std::chrono::seconds(1)}, buffer);
+    return counted;
+  }
+
+  bool open() const { return session_.open(); }
+  const LinkStats& stats() const { return session_.stats(); }
+
+ private:
+  static void look(const Session::Event& event) {
+    if (const auto* arrived = std::get_if<Session::StateArrived>(&event)) {
+      const DeviceState& s = arrived->state;
+      EXPECT_TRUE(bounded(s.position) && bounded(s.velocity) && bounded(s.force_applied));
+      EXPECT_TRUE(std::isfinite(s.energy) && s.permitted_force >= 0);
+      EXPECT_TRUE(s.mode >= Mode::kIdle && s.mode <= Mode::kFault);
+      EXPECT_GE(s.force_age, Duration{});
+    } else if (const auto* commanded = std::get_if<Session::ForceArrived>(&event)) {
+      const ForceCommand& f = commanded->command;
+      EXPECT_TRUE(bounded(f.force));
+      EXPECT_TRUE(!f.model || (bounded(f.model->at) && f.model->stiffness.allFinite()));
+      EXPECT_TRUE(f.valid_for > Duration{} && f.valid_for <= limits::kMaxValidFor);
+    } else if (const auto* closed = std::get_if<Session::Closed>(&event)) {
+      EXPECT_LE(closed->reason.size(), limits::kMaxDetail);
+    } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&event)) {
+      EXPECT_LE(answered->detail.size(), limits::kMaxDetail);
+    }
+  }
+
+  Session session_;
+};
+
+/// Everything there is that takes bytes from strangers.
+bool take_everywhere(const Bytes& datagram) {
+  std::array<std::byte, kMaxDatagram> buffer;
+  ClientHandshake client({.hello = examples::hello(), .random = examples::random()}, LocalTime{});
+  client.receive(LocalTime{}, datagram);
+  client.next_datagram(LocalTime{}, buffer);
+  Doorman door({});
+  const auto reply = door.receive(LocalTime{}, Address{}, datagram, buffer);
+  EXPECT_LE(reply.size, datagram.size());
+  EXPECT_EQ(door.malformed() == 1, reply.size == 0 && !reply.guest);
+  return Target().take(datagram);
+}
+
+TEST(HostileBytes, EveryTruncationOfEveryDatagramIsCounted) {
+  for (const auto& [name, bytes] : examples::datagrams()) {
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      EXPECT_TRUE(take_everywhere(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size))))
+          << name << " cut to " << size;
+    }
+  }
+}
+
+TEST(HostileBytes, EveryCorruptionOfOneByteIsCounted) {
+  for (const auto& [name, bytes] : examples::datagrams()) {
+    const bool padded = bytes.size() == kMaxDatagram;
+    for (std::size_t at = 0; at < (padded ? 100 : bytes.size()); ++at) {
+      for (unsigned flip = 1; flip < 256; ++flip) {
+        Bytes bad = bytes;
+        bad[at] ^= static_cast<std::byte>(flip);
+        EXPECT_TRUE(Target().take(bad)) << name << " byte " << at << " xor " << flip;
+        if (flip == 1 || flip == 0x80 || flip == 0xFF) take_everywhere(bad);
+      }
+    }
+  }
+}
+
+TEST(HostileBytes, ADatagramTooLongIsMalformed) {
+  for (const auto& [name, bytes] : examples::datagrams()) {
+    for (const std::size_t size : {kMaxDatagram + 1, std::size_t{2000}, std::size_t{65507}}) {
+      Bytes longer = bytes;
+      longer.resize(size);
+      Target target;
+      EXPECT_TRUE(target.take(longer));
+      EXPECT_EQ(target.stats().malformed, 1U) << name;
+      EXPECT_TRUE(target.open());
+    }
+  }
+}
+
+TEST(HostileBytes, NoiseBehindAGoodHeaderIsCountedAndLeavesTheSessionOpen) {
+  std::mt19937_64 random(2026);
+  Target target;
+  for (std::uint64_t i = 0; i < 100'000; ++i) {
+    Bytes bytes = examples::data(i, {});
+    bytes.resize(kHeaderSize + random() % 200);
+    for (std::size_t at = kHeaderSize; at < bytes.size(); ++at) bytes[at] = static_cast<std::byte>(random());
+    ASSERT_TRUE(target.take(bytes));
+  }
+  EXPECT_TRUE(target.open());
+  EXPECT_GT(target.stats().malformed, 90'000U);
+}
+
+TEST(HostileBytes, ADatagramFullOfEmptyFramesIsMalformed) {
+  Bytes bytes = examples::data(0, {});
+  while (bytes.size() + 2 <= kMaxDatagram) {
+    bytes.push_back(std::byte{0x1A});
+    bytes.push_back(std::byte{0});
+  }
+  Target target;
+  EXPECT_TRUE(target.take(bytes));
+  EXPECT_EQ(target.stats().malformed, 1U);
+}
+
+}  // namespace
+}  // namespace tendon

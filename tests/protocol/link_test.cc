@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/link.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+TEST(Address, ReadsBackWhatItWrites) {
+  for (const char* const text : {"127.0.0.1:47100", "192.168.1.20:0", "255.255.255.255:65535", "[::1]:47100",
+                                 "[2001:db8::7]:1", "[::]:0", "0.0.0.0:9"}) {
+    EXPECT_EQ(to_string(parse_address(text)), text);
+  }
+}
+
+TEST(Address, AnIpv4AddressIsMappedIntoIpv6) {
+  const std::array<std::uint8_t, 16> mapped = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 10, 1, 2, 3};
+  EXPECT_EQ(parse_address("10.1.2.3:5").ip, mapped);
+  EXPECT_EQ(parse_address("10.1.2.3:5").port, 5);
+  EXPECT_EQ(parse_address("[::ffff:10.1.2.3]:5"), parse_address("10.1.2.3:5"));
+}
+
+TEST(Address, LocalhostIsTheIpv4Loopback) { EXPECT_EQ(parse_address("localhost:80"), parse_address("127.0.0.1:80")); }
+
+TEST(Address, RefusesEverythingElseWithOneSentence) {
+  using namespace std::string_view_literals;
+  for (const std::string_view text : {""sv,
+                                      ":"sv,
+                                      "127.0.0.1"sv,
+                                      "127.0.0.1:"sv,
+                                      ":47100"sv,
+                                      "127.0.0.1:65536"sv,
+                                      "127.0.0.1:-1"sv,
+                                      "127.0.0.1:+1"sv,
+                                      "127.0.0.1:80 "sv,
+                                      " 127.0.0.1:80"sv,
+                                      "127.0.0.1:0x50"sv,
+                                      "127.1:80"sv,
+                                      "256.0.0.1:80"sv,
+                                      "::1:80"sv,
+                                      "[::1]"sv,
+                                      "[]:80"sv,
+                                      "[127.0.0.1]:80"sv,
+                                      "[::1:80"sv,
+                                      "[fe80::1%lo]:80"sv,
+                                      "example.org:80"sv,
+                                      "127.0.0.1\0x:80"sv}) {
+    try {
+      parse_address(text);
+      ADD_FAILURE() << "accepted " << text;
+    } catch (const std::invalid_argument& error) {
+      const std::string expected = "expected HOST:PORT like 127.0.0.1:47100, got \"" + std::string(text) + "\"";
+      EXPECT_STREQ(error.what(), expected.c_str());
+    }
+  }
+}
+
+TEST(Address, KnowsWhatStaysOnThisMachine) {
+  for (const char* const text : {"127.0.0.1:1", "127.255.3.4:1", "[::1]:1", "[::ffff:127.0.0.1]:1"}) {
+    EXPECT_TRUE(is_loopback(parse_address(text))) << text;
+  }
+  for (const char* const text : {"0.0.0.0:1", "[::]:1", "128.0.0.1:1", "126.0.0.1:1", "[::2]:1", "[7f00::1]:1"}) {
+    EXPECT_FALSE(is_loopback(parse_address(text))) << text;
+  }
+}
+
+}  // namespace
+}  // namespace tendon

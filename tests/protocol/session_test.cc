@@ -1,0 +1,463 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/session.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/codec.h"
+#include "protocol/limits.h"
+#include "protocol/round_trip.h"
+#include "tests/protocol/examples.h"
+#include "tests/protocol/raw_protobuf.h"
+
+namespace tendon {
+namespace {
+
+using examples::Bytes;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr LocalTime kOpened{seconds(100)};
+
+Session::Config config() {
+  Session::Config config;
+  config.connection_id = examples::kConnection;
+  return config;
+}
+
+std::vector<Bytes> pull(Session& session, LocalTime now) {
+  std::vector<Bytes> out;
+  std::array<std::byte, kMaxDatagram> buffer;
+  while (const std::size_t size = session.next_datagram(now, buffer)) {
+    out.emplace_back(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
+  }
+  return out;
+}
+
+std::vector<Session::Event> events(Session& session) {
+  std::vector<Session::Event> out;
+  while (auto event = session.next_event()) out.push_back(std::move(*event));
+  return out;
+}
+
+void deliver(Session& to, LocalTime now, const std::vector<Bytes>& datagrams) {
+  for (const Bytes& datagram : datagrams) to.receive(now, datagram);
+}
+
+ForceCommand force(std::uint64_t sequence) {
+  ForceCommand command = examples::force();
+  command.sequence = sequence;
+  return command;
+}
+DeviceState state(std::uint64_t tick) {
+  DeviceState state = examples::state();
+  state.tick = tick;
+  return state;
+}
+
+/// A Data datagram with a body by hand.
+Bytes raw(std::uint64_t packet_number, const RawProtobuf& body) {
+  Bytes bytes = examples::data(packet_number, {});
+  bytes.resize(kHeaderSize);
+  bytes.insert(bytes.end(), body.bytes().begin(), body.bytes().end());
+  return bytes;
+}
+
+/// A and Z in one time, passing datagrams by hand.
+class TwoEnds : public testing::Test {
+ protected:
+  LocalTime now_ = kOpened;
+  Session a_{config(), kOpened};
+  Session z_{config(), kOpened};
+};
+
+// ---- state and force ----
+
+TEST_F(TwoEnds, AForceAndAStateArriveAsTheyWereSent) {
+  a_.send(force(7));
+  z_.send(state(8));
+  deliver(z_, now_, pull(a_, now_));
+  deliver(a_, now_, pull(z_, now_));
+  const auto at_z = events(z_);
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::ForceArrived>(at_z[0]).command.sequence, 7U);
+  EXPECT_EQ(std::get<Session::ForceArrived>(at_z[0]).command.force, examples::force().force);
+  ASSERT_EQ(at_a.size(), 1U);
+  EXPECT_EQ(std::get<Session::StateArrived>(at_a[0]).state.tick, 8U);
+}
+
+TEST_F(TwoEnds, WhatHasNotLeftYetIsReplacedByTheNewer) {
+  for (std::uint64_t n = 1; n <= 1000; ++n) a_.send(force(n));
+  deliver(z_, now_, pull(a_, now_));
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::ForceArrived>(at_z[0]).command.sequence, 1000U);
+  EXPECT_EQ(a_.stats().datagrams_sent, 1U);
+}
+
+TEST_F(TwoEnds, WhatWasNotTakenOutYetIsReplacedByTheNewer) {
+  for (std::uint64_t n = 1; n <= 1000; ++n) {
+    a_.send(force(n));
+    z_.send(state(n));
+    deliver(z_, now_, pull(a_, now_));
+    deliver(a_, now_, pull(z_, now_));
+  }
+  EXPECT_EQ(events(z_).size(), 1U);
+  EXPECT_EQ(events(a_).size(), 1U);
+}
+
+TEST_F(TwoEnds, AnOlderForceOrStateThatComesLateIsDroppedAndCounted) {
+  a_.send(force(1));
+  const auto old_force = pull(a_, now_);
+  a_.send(force(2));
+  deliver(z_, now_, pull(a_, now_));
+  deliver(z_, now_, old_force);
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::ForceArrived>(at_z[0]).command.sequence, 2U);
+  EXPECT_EQ(z_.stats().stale, 1U);
+  EXPECT_EQ(z_.stats().reordered, 1U);
+
+  a_.send(force(2));  // not newer either
+  deliver(z_, now_, pull(a_, now_));
+  EXPECT_TRUE(events(z_).empty());
+  EXPECT_EQ(z_.stats().stale, 2U);
+}
+
+// ---- round trip ----
+
+TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeThatThePeerTook) {
+  const auto there = pull(a_, now_);  // T1
+  now_ += milliseconds(3);
+  deliver(z_, now_, there);  // T2
+  pull(z_, now_);            // is lost
+  now_ += milliseconds(500);
+  const auto back = pull(z_, now_);  // T3
+  now_ += milliseconds(4);
+  deliver(a_, now_, back);  // T4
+  EXPECT_EQ(a_.stats().round_trip, milliseconds(7));
+  EXPECT_EQ(a_.stats().smoothed_round_trip, milliseconds(7));
+  EXPECT_EQ(a_.stats().round_trip_variation, std::chrono::microseconds(3500));
+}
+
+TEST_F(TwoEnds, AnImpossibleEchoIsCountedAndTheRestIsRead) {
+  pull(a_, now_);  // packet 0
+  const auto echoing = [](Duration sent, Duration received, std::uint64_t number) {
+    return OutgoingEcho{.sent = PeerTime{sent}, .received = LocalTime{received}, .packet_number = number};
+  };
+  const Duration opened = kOpened.time_since_epoch();
+  const Duration written = milliseconds(1000);  // examples::data writes at 1000.1 ms of the peer's clock
+  const OutgoingEcho impossible[] = {
+      echoing(opened, written, 1),                    // a packet that A has not sent
+      echoing(opened - Duration{1}, written, 0),      // sent before there was a session
+      echoing(opened + Duration{1}, written, 0),      // sent in the future
+      echoing(opened, written + milliseconds(1), 0),  // received after the echo was written
+      echoing(Duration::max(), written, 0),           // beyond all clocks
+  };
+  std::uint64_t number = 0;
+  for (const OutgoingEcho& echo : impossible) {
+    a_.receive(now_, examples::data(number, echo, state(number + 1)));
+    EXPECT_EQ(a_.stats().invalid, ++number);
+    EXPECT_EQ(events(a_).size(), 1U);
+  }
+  EXPECT_EQ(a_.stats().round_trip, Duration{});
+  a_.receive(now_ + milliseconds(1), examples::data(number, echoing(opened, written, 0)));
+  EXPECT_EQ(a_.stats().invalid, number);
+  EXPECT_EQ(a_.stats().round_trip, milliseconds(1) - std::chrono::microseconds(100));
+}
+
+TEST_F(TwoEnds, EachEndLearnsWhatWasLostInWhichDirection) {
+  for (std::uint64_t n = 1; n <= 20; ++n) {
+    a_.send(force(n));
+    const auto there = pull(a_, now_);
+    if (n % 4 != 0) deliver(z_, now_, there);  // 4, 8, 12, 16, 20 are lost
+    z_.send(state(n));
+    deliver(a_, now_, pull(z_, now_));
+  }
+  EXPECT_EQ(z_.stats().lost, 4U);  // 20 was the last: not missed yet
+  EXPECT_EQ(a_.stats().lost_outgoing, 4U);
+  EXPECT_EQ(a_.stats().lost, 0U);
+  EXPECT_EQ(z_.stats().lost_outgoing, 0U);
+}
+
+// ---- requests ----
+
+TEST_F(TwoEnds, ARequestIsDeliveredOnceHoweverOftenItComes) {
+  const auto id = a_.request(SetStateRate{.hz = 250});
+  ASSERT_TRUE(id.has_value());
+  const auto first = pull(a_, now_);
+  now_ += RoundTrip::kFirstTimeout;
+  const auto second = pull(a_, now_);
+  deliver(z_, now_, first);
+  deliver(z_, now_, second);
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::RequestArrived>(at_z[0]).id, *id);
+  EXPECT_EQ(std::get<SetStateRate>(std::get<Session::RequestArrived>(at_z[0]).request).hz, 250U);
+}
+
+TEST_F(TwoEnds, AnAnswerThatWasLostIsGivenAgainWhenTheRequestComesAgain) {
+  const auto id = a_.request(Rearm{});
+  deliver(z_, now_, pull(a_, now_));
+  ASSERT_EQ(events(z_).size(), 1U);
+  z_.answer(*id, Code::kDenied, "only from the controller");
+  EXPECT_EQ(pull(z_, now_).size(), 1U);  // is lost
+  EXPECT_TRUE(pull(z_, now_).empty());
+
+  now_ += RoundTrip::kFirstTimeout;
+  deliver(z_, now_, pull(a_, now_));
+  EXPECT_TRUE(events(z_).empty());
+  deliver(a_, now_, pull(z_, now_));
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_a.size(), 1U);
+  const auto& answered = std::get<Session::RequestAnswered>(at_a[0]);
+  EXPECT_EQ(answered.id, *id);
+  EXPECT_EQ(answered.code, Code::kDenied);
+  EXPECT_EQ(answered.detail, "only from the controller");
+}
+
+TEST_F(TwoEnds, RequestsThatOvertakeEachOtherAreDeliveredInOrder) {
+  a_.request(SetStateRate{.hz = 1});
+  const auto first = pull(a_, now_);
+  a_.request(SetStateRate{.hz = 2});
+  const auto second = pull(a_, now_);
+  deliver(z_, now_, second);
+  EXPECT_TRUE(events(z_).empty());
+  deliver(z_, now_, first);
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 2U);
+  EXPECT_EQ(std::get<Session::RequestArrived>(at_z[0]).id, 1U);
+  EXPECT_EQ(std::get<Session::RequestArrived>(at_z[1]).id, 2U);
+}
+
+TEST_F(TwoEnds, AnswersAreToldInTheOrderOfTheRequestsWhateverTheOrderOfAnswering) {
+  a_.request(Rearm{});
+  a_.request(Rearm{});
+  deliver(z_, now_, pull(a_, now_));
+  events(z_);
+  z_.answer(2, Code::kOk, "");
+  deliver(a_, now_, pull(z_, now_));
+  EXPECT_TRUE(events(a_).empty());
+  z_.answer(1, Code::kOk, "");
+  deliver(a_, now_, pull(z_, now_));
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_a.size(), 2U);
+  EXPECT_EQ(std::get<Session::RequestAnswered>(at_a[0]).id, 1U);
+}
+
+TEST_F(TwoEnds, ASeventeenthOpenRequestIsRefused) {
+  for (std::uint32_t i = 0; i < limits::kRequestWindow; ++i) EXPECT_EQ(a_.request(Rearm{}), i + 1);
+  EXPECT_FALSE(a_.request(Rearm{}).has_value());
+  deliver(z_, now_, pull(a_, now_));
+  events(z_);
+  z_.answer(1, Code::kOk, "");
+  deliver(a_, now_, pull(z_, now_));
+  EXPECT_FALSE(a_.request(Rearm{}).has_value());  // the answer is here, but was not taken out
+  EXPECT_EQ(events(a_).size(), 1U);
+  EXPECT_EQ(a_.request(Rearm{}), limits::kRequestWindow + 1);
+}
+
+TEST_F(TwoEnds, AnswersThatDoNotFitIntoOneDatagramTakeSeveral) {
+  for (std::uint32_t i = 0; i < limits::kRequestWindow; ++i) a_.request(Rearm{});
+  deliver(z_, now_, pull(a_, now_));
+  events(z_);
+  for (std::uint32_t i = 1; i <= limits::kRequestWindow; ++i) {
+    z_.answer(i, Code::kInvalid, std::string(limits::kMaxDetail, 'x'));
+  }
+  z_.send(state(1));
+  const auto datagrams = pull(z_, now_);
+  EXPECT_EQ(datagrams.size(), 3U);
+  deliver(a_, now_, datagrams);
+  EXPECT_EQ(events(a_).size(), limits::kRequestWindow + 1);
+}
+
+TEST_F(TwoEnds, TheWaitForAnAnswerDoublesUpToASecond) {
+  a_.request(Rearm{});
+  std::vector<Duration> waits;
+  LocalTime last = now_;
+  pull(a_, now_);
+  for (int sent = 1; sent < 7;) {
+    now_ += milliseconds(10);
+    DataReader reader;
+    for (const Bytes& datagram : pull(a_, now_)) {
+      if (reader.read(std::span(datagram).subspan(kHeaderSize))->frames.empty()) continue;  // keep-alive
+      waits.push_back(now_ - last);
+      last = now_;
+      ++sent;
+    }
+  }
+  EXPECT_EQ(waits, (std::vector<Duration>{milliseconds(100), milliseconds(200), milliseconds(400), milliseconds(800),
+                                          seconds(1), seconds(1)}));
+}
+
+TEST_F(TwoEnds, ARequestOfANewerPeerIsAnsweredUnsupported) {
+  const RawProtobuf unknown = RawProtobuf().varint(1, 1).text(100, "new");
+  z_.receive(now_, raw(0, RawProtobuf().fixed64(1, 1).message(3, RawProtobuf().message(3, unknown))));
+  EXPECT_TRUE(events(z_).empty());
+  const auto datagrams = pull(z_, now_);
+  ASSERT_EQ(datagrams.size(), 1U);
+  DataReader reader;
+  const auto* content = reader.read(std::span(datagrams[0]).subspan(kHeaderSize));
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ControlAck>(content->frames[0]).code, Code::kUnsupported);
+}
+
+TEST_F(TwoEnds, RequestsAndAnswersThatACorrectPeerCannotSendAreCounted) {
+  z_.receive(now_, examples::data(0, {}, Control{.id = limits::kRequestWindow + 1, .request = Rearm{}}));
+  EXPECT_EQ(z_.stats().invalid, 1U);
+  z_.receive(now_, examples::data(1, {}, ControlAck{.id = 1, .code = Code::kOk, .detail = ""}));
+  EXPECT_EQ(z_.stats().invalid, 2U);
+  z_.receive(now_, examples::data(2, {}, Control{.id = 1, .request = Rearm{}}));
+  EXPECT_EQ(events(z_).size(), 1U);
+  z_.receive(now_, examples::data(3, {}, Control{.id = 17, .request = Rearm{}}));  // 1 is not answered yet
+  EXPECT_EQ(z_.stats().invalid, 3U);
+  EXPECT_TRUE(events(z_).empty());
+}
+
+TEST_F(TwoEnds, AnAnswerToWhatWasNotAskedIsIgnored) {
+  pull(z_, now_);
+  z_.answer(1, Code::kOk, "");
+  z_.answer(0, Code::kOk, "");
+  EXPECT_TRUE(pull(z_, now_).empty());
+}
+
+// ---- silence and the end ----
+
+TEST_F(TwoEnds, TheFirstDatagramLeavesAtOnce) {
+  EXPECT_LE(a_.next_tick(), now_);
+  EXPECT_EQ(pull(a_, now_).size(), 1U);
+}
+
+TEST_F(TwoEnds, SilenceIsFilledWithKeepAlives) {
+  pull(a_, now_);
+  EXPECT_EQ(a_.next_tick(), now_ + milliseconds(50));
+  EXPECT_TRUE(pull(a_, now_ + milliseconds(50) - Duration{1}).empty());
+  EXPECT_EQ(pull(a_, now_ + milliseconds(50)).size(), 1U);
+}
+
+TEST_F(TwoEnds, WhoSpeaksNeedsNoKeepAlives) {
+  for (int i = 0; i < 100; ++i) {
+    now_ += milliseconds(10);
+    a_.send(force(static_cast<std::uint64_t>(i) + 1));
+    pull(a_, now_);
+  }
+  EXPECT_EQ(a_.stats().datagrams_sent, 100U);
+}
+
+TEST_F(TwoEnds, ASilentPeerIsGoneAfterTheTimeoutAndNotBefore) {
+  now_ += milliseconds(700);
+  deliver(z_, now_, pull(a_, now_));
+  z_.tick(now_ + seconds(2) - Duration{1});
+  EXPECT_TRUE(z_.open());
+  z_.tick(now_ + seconds(2));
+  EXPECT_FALSE(z_.open());
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::Closed>(at_z[0]).code, Code::kTimedOut);
+  EXPECT_EQ(std::get<Session::Closed>(at_z[0]).reason, "nothing heard for 2000 ms");
+  EXPECT_TRUE(pull(z_, now_ + seconds(3)).empty());
+  EXPECT_EQ(z_.next_tick(), LocalTime::max());
+}
+
+TEST_F(TwoEnds, AByeIsSaidThreeTimesAndOneIsEnough) {
+  a_.close(Code::kShutdown, "SIGTERM");
+  EXPECT_FALSE(a_.open());
+  EXPECT_LE(a_.next_tick(), now_);
+  const auto byes = pull(a_, now_);
+  ASSERT_EQ(byes.size(), 3U);
+  EXPECT_EQ(a_.next_tick(), LocalTime::max());
+  EXPECT_TRUE(events(a_).empty());
+
+  z_.receive(now_, byes[2]);
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::Closed>(at_z[0]).code, Code::kShutdown);
+  EXPECT_EQ(std::get<Session::Closed>(at_z[0]).reason, "SIGTERM");
+  z_.receive(now_, byes[1]);
+  EXPECT_TRUE(events(z_).empty());
+  EXPECT_TRUE(pull(z_, now_).empty());
+}
+
+TEST_F(TwoEnds, WhatArrivedBeforeTheByeIsToldBeforeTheEnd) {
+  a_.send(force(1));
+  deliver(z_, now_, pull(a_, now_));
+  a_.close(Code::kOk, "");
+  deliver(z_, now_, pull(a_, now_));
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 2U);
+  EXPECT_TRUE(std::holds_alternative<Session::ForceArrived>(at_z[0]));
+  EXPECT_TRUE(std::holds_alternative<Session::Closed>(at_z[1]));
+}
+
+TEST_F(TwoEnds, AfterTheEndNothingIsBelieved) {
+  a_.send(force(1));
+  const auto datagrams = pull(a_, now_);
+  z_.close(Code::kOk, "");
+  deliver(z_, now_, datagrams);
+  EXPECT_TRUE(events(z_).empty());
+  EXPECT_EQ(z_.stats().datagrams_received, 0U);
+}
+
+// ---- what is dropped ----
+
+TEST_F(TwoEnds, AReplayedDatagramIsCountedAndNothingElse) {
+  a_.request(Rearm{});
+  a_.send(force(1));
+  const auto recorded = pull(a_, now_);
+  deliver(z_, now_, recorded);
+  events(z_);
+  for (int i = 0; i < 5; ++i) deliver(z_, now_ + seconds(i) / 4, recorded);
+  EXPECT_TRUE(events(z_).empty());
+  EXPECT_EQ(z_.stats().duplicated, 5U);
+  EXPECT_EQ(z_.stats().datagrams_received, 1U);
+  z_.tick(now_ + seconds(2));
+  EXPECT_FALSE(z_.open());  // a replay does not keep the dead alive
+}
+
+TEST_F(TwoEnds, ADatagramOlderThanTheWindowIsDropped) {
+  const auto old = pull(a_, now_);
+  for (std::uint64_t n = 1; n <= 1024; ++n) {
+    a_.send(force(n));
+    deliver(z_, now_, pull(a_, now_));
+  }
+  deliver(z_, now_, old);
+  EXPECT_EQ(z_.stats().duplicated, 1U);
+}
+
+TEST_F(TwoEnds, ADatagramOfAnotherConversationIsMalformed) {
+  Session::Config other = config();
+  other.connection_id += 1;
+  Session stranger(other, kOpened);
+  deliver(z_, now_, pull(stranger, now_));
+  EXPECT_EQ(z_.stats().malformed, 1U);
+  EXPECT_EQ(z_.stats().datagrams_received, 0U);
+}
+
+TEST_F(TwoEnds, AMalformedDatagramDoesNotUseUpThePacketNumberOfAGoodOne) {
+  a_.send(force(1));
+  const auto good = pull(a_, now_);
+  Bytes bad = good[0];
+  bad.pop_back();
+  z_.receive(now_, bad);
+  EXPECT_EQ(z_.stats().malformed, 1U);
+  deliver(z_, now_, good);
+  EXPECT_EQ(events(z_).size(), 1U);
+}
+
+TEST_F(TwoEnds, AWelcomeThatComesTwiceIsADuplicate) {
+  z_.receive(now_, examples::datagrams()[2].bytes);
+  EXPECT_EQ(z_.stats().duplicated, 1U);
+  EXPECT_EQ(z_.stats().malformed, 0U);
+}
+
+TEST(Session, ImpossibleSettingsAreRefusedAtOnce) {
+  for (Duration Session::Config::*field :
+       {&Session::Config::keep_alive, &Session::Config::timeout, &Session::Config::min_resend}) {
+    Session::Config bad = config();
+    bad.*field = Duration{};
+    EXPECT_THROW(Session(bad, kOpened), std::invalid_argument);
+  }
+}
+
+}  // namespace
+}  // namespace tendon
