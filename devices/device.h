@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/motion.h"
+
+namespace tendon {
+
+/// What a device can do, in the words of its data sheet.
+struct DeviceInfo {
+  std::string name;
+  double max_force = 0;            ///< N, norm of the force vector it can give out
+  double position_resolution = 0;  ///< m, one encoder count at the handle; 0 = exact
+  Duration watchdog{};             ///< force drops to zero when no command comes for so long; 0 = it has none
+};
+
+/// One encoder reading.
+struct PositionSample {
+  LocalTime at{};
+  Vec3 position = Vec3::Zero();  ///< m, device base frame
+};
+
+/// A haptic device of impedance type: position out, force in. Counts and transfers end here; above
+/// this interface everything is SI.
+///
+/// Thread-safe: no; the haptic thread owns it.
+/// Realtime-safe: `read` and `apply` must neither allocate, lock, log nor block longer than the
+/// device's own transfer.
+class Device {
+ public:
+  virtual ~Device() = default;
+
+  virtual const DeviceInfo& info() const noexcept = 0;
+
+  /// Samples the position. Empty when the device did not answer.
+  virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;
+
+  /// Commands `force` (N, on the hand) and returns **the force really written** after every clamp
+  /// and rounding of the device. It is held until the next `apply` (or until the device's own
+  /// watchdog ends it). The energy ledger counts what is returned here, never what was asked for.
+  virtual Vec3 apply(const Vec3& force) noexcept = 0;
+};
+
+}  // namespace tendon

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/motion.h"
+#include "devices/simulated/scripted_motion.h"
+
+namespace tendon {
+
+/// The operator's hand on the handle: a mass that is one with the handle, tied by a spring and a
+/// damper to the point s(t) where the operator wants to be:
+///
+///     F_hand = k (s − x) + c (ṡ − v) − m_hand dv/dt        (N, on the handle)
+///
+/// The second-order model with a moving equilibrium point of Hajian and Howe (J. Biomech. Eng.
+/// 119:109, 1997) and Kuchenbecker, Park and Niemeyer (IMECE 2003). A pinch grip has about 100–600
+/// N/m, 2–5 N·s/m, 30–100 g (recalled, not re-checked).
+///
+/// Thread-safe: yes, it never changes. Realtime-safe: all but the constructor.
+class OperatorHand {
+ public:
+  struct Config {
+    double stiffness;  ///< k, N/m, > 0
+    double damping;    ///< c, N·s/m, ≥ 0
+    double mass;       ///< kg, ≥ 0
+    ScriptedMotion motion;
+  };
+
+  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  explicit OperatorHand(Config config);
+
+  /// k (s(t) − x) + c ṡ(t): all of the force that does not depend on the handle's velocity or
+  /// acceleration. Whoever integrates handles those two implicitly.
+  Vec3 drive(double t, const Vec3& x) const noexcept;
+
+  /// Where the hand wants to be `t` seconds after the start.
+  ScriptedMotion::Point target(double t) const noexcept { return config_.motion.at(t); }
+
+  double stiffness() const noexcept { return config_.stiffness; }
+  double damping() const noexcept { return config_.damping; }
+  double mass() const noexcept { return config_.mass; }
+
+ private:
+  Config config_;
+};
+
+}  // namespace tendon

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/simulated/profiles.h"
+
+#include <algorithm>
+#include <array>
+#include <iomanip>
+#include <sstream>
+
+namespace tendon {
+namespace {
+
+using enum Provenance;
+
+constexpr std::string_view kDiolaiti = "Diolaiti et al., IEEE T-RO 22(2), 2006, device table";
+constexpr std::string_view kPhantomSheet = "SensAble PHANToM Premium 1.0/1.5 data sheet";
+constexpr std::string_view kTouchSheet = "Geomagic/3D Systems Touch data sheet";
+
+/// 5 ms is five haptic periods at 1 kHz: it outlives the late wake-ups of a healthy loop (0.2 ms at p99
+/// without real-time priority, periods of up to 2 ms in our own tests) and cuts the force off before a hand at
+/// 1 m/s has moved 5 mm against it.
+constexpr KnownNumber kAssumedWatchdog = {0.005, kAssumed, "5 haptic periods at 1 kHz; not documented"};
+
+constexpr std::array kProfiles = {
+    DeviceProfile{
+        .name = "phantom-premium",
+        .mass = {0.075, kRecalled, kPhantomSheet},
+        .viscous_friction = {0.005, kRecalled, kDiolaiti},
+        .coulomb_friction = {0.04, kRecalled, kPhantomSheet},
+        .encoder_step = {0.03e-3, kRecalled, kPhantomSheet},
+        .max_force = {8.5, kRecalled, kPhantomSheet},
+        .amplifier_bandwidth = {500, kAssumed, "upper end of the 200-500 Hz usual in device models"},
+        .watchdog = kAssumedWatchdog,
+        .viscous_bound = {0.005, kAssumed, "the value itself: nothing smaller is known"},
+        .coulomb_bound = {0.03, kAssumed, "three quarters of the value"},
+    },
+    DeviceProfile{
+        .name = "touch",
+        .mass = {0.045, kRecalled, kTouchSheet},
+        .viscous_friction = {0.01, kAssumed, "unknown; twice that of the phantom-premium"},
+        .coulomb_friction = {0.26, kRecalled, kTouchSheet},
+        .encoder_step = {0.055e-3, kRecalled, kTouchSheet},
+        .max_force = {3.3, kQuoted, "read back from the device's driver by user code"},
+        .amplifier_bandwidth = {300, kAssumed, "middle of 200-500 Hz"},
+        .watchdog = kAssumedWatchdog,
+        .viscous_bound = {0.005, kAssumed, "half the value, which is itself assumed"},
+        .coulomb_bound = {0.195, kAssumed, "three quarters of the value"},
+    },
+    DeviceProfile{
+        .name = "falcon",
+        .mass = {0.2, kAssumed, "middle of 0.15-0.25 kg; see Martin and Hillier, ACRA 2009"},
+        .viscous_friction = {1.0, kAssumed, "unknown; start value"},
+        .coulomb_friction = {0.4, kAssumed, "middle of 0.3-0.5 N"},
+        .encoder_step = {0.043e-3, kQuoted, "computed at the centre from libnifalcon's geometry and gears"},
+        .max_force = {8.0, kQuoted, "CHAI3D, device specification"},
+        .amplifier_bandwidth = {200, kAssumed, "lower end of 200-500 Hz"},
+        .watchdog = std::nullopt,  // its firmware documents none
+        .viscous_bound = {0.5, kAssumed, "half the value, which is itself assumed"},
+        .coulomb_bound = {0.3, kAssumed, "lower end of 0.3-0.5 N"},
+    },
+};
+
+}  // namespace
+
+std::string_view to_string(Provenance provenance) noexcept {
+  switch (provenance) {
+    case kMeasured:
+      return "measured";
+    case kQuoted:
+      return "quoted";
+    case kRecalled:
+      return "recalled";
+    case kAssumed:
+      return "assumed";
+  }
+  return "?";
+}
+
+SimulatedDevice::Config DeviceProfile::device() const {
+  SimulatedDevice::Config config;
+  config.name = name;
+  config.mass = mass.value;
+  config.viscous_friction = viscous_friction.value;
+  config.coulomb_friction = coulomb_friction.value;
+  config.encoder_step = encoder_step.value;
+  config.max_force = max_force.value;
+  config.amplifier_bandwidth = amplifier_bandwidth.value;
+  if (watchdog) config.watchdog = from_seconds(watchdog->value);
+  return config;
+}
+
+std::span<const DeviceProfile> device_profiles() noexcept { return kProfiles; }
+
+const DeviceProfile* find_device_profile(std::string_view name) noexcept {
+  const auto* const found = std::find_if(kProfiles.begin(), kProfiles.end(),
+                                         [name](const DeviceProfile& profile) { return profile.name == name; });
+  return found == kProfiles.end() ? nullptr : found;
+}
+
+std::string provenance_table(const DeviceProfile& profile) {
+  std::ostringstream table;
+  const auto line = [&table](std::string_view what, const KnownNumber& number, std::string_view unit) {
+    std::ostringstream value;
+    value << number.value << ' ' << unit;
+    table << "  " << std::left << std::setw(28) << what << std::setw(15) << value.str() << std::setw(10)
+          << to_string(number.provenance) << number.note << '\n';
+  };
+  table << profile.name << '\n';
+  line("apparent mass", profile.mass, "kg");
+  line("viscous friction", profile.viscous_friction, "N s/m");
+  line("Coulomb friction", profile.coulomb_friction, "N");
+  line("encoder count", profile.encoder_step, "m");
+  line("largest force", profile.max_force, "N");
+  line("amplifier bandwidth", profile.amplifier_bandwidth, "Hz");
+  if (profile.watchdog) line("watchdog", *profile.watchdog, "s");
+  line("viscous friction, at least", profile.viscous_bound, "N s/m");
+  line("Coulomb friction, at least", profile.coulomb_bound, "N");
+  return table.str();
+}
+
+}  // namespace tendon

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "core/friction.h"
+#include "devices/simulated/simulated_device.h"
+
+namespace tendon {
+
+/// How a number came to be known. In this order of trust.
+enum class Provenance {
+  kMeasured,  ///< identified on a real device, by us
+  kQuoted,    ///< read in the source named, or computed from what is printed there
+  kRecalled,  ///< quoted from memory of the source named: check it before you rely on it
+  kAssumed,   ///< a guess; the note says why this one
+};
+
+std::string_view to_string(Provenance provenance) noexcept;
+
+/// A number and how it came to be known.
+struct KnownNumber {
+  double value;
+  Provenance provenance;
+  std::string_view note;  ///< source, or reason
+};
+
+/// A real device's numbers, for a simulated device that is like it. These are start values and make no
+/// claim about any one unit; before a limiter runs on hardware, identify that unit's friction.
+struct DeviceProfile {
+  std::string_view name;
+  KnownNumber mass;                     ///< kg
+  KnownNumber viscous_friction;         ///< N·s/m
+  KnownNumber coulomb_friction;         ///< N
+  KnownNumber encoder_step;             ///< m
+  KnownNumber max_force;                ///< N
+  KnownNumber amplifier_bandwidth;      ///< Hz
+  std::optional<KnownNumber> watchdog;  ///< s; a device without one has none here
+  KnownNumber viscous_bound;            ///< N·s/m, for the limiter
+  KnownNumber coulomb_bound;            ///< N, for the limiter
+
+  /// The simulated device, without a hand. Its `info()` has the data-sheet numbers.
+  SimulatedDevice::Config device() const;
+  /// What the limiter may count on: never above the friction that the device has.
+  Friction friction_bounds() const noexcept { return {.coulomb = coulomb_bound.value, .viscous = viscous_bound.value}; }
+};
+
+/// All of them: phantom-premium, touch, falcon.
+std::span<const DeviceProfile> device_profiles() noexcept;
+
+/// The one of that name, or null.
+const DeviceProfile* find_device_profile(std::string_view name) noexcept;
+
+/// Every number of the profile, one per line: what, value with unit, provenance, source.
+std::string provenance_table(const DeviceProfile& profile);
+
+}  // namespace tendon

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <variant>
+
+#include "devices/simulated/scripted_motion.h"
+
+namespace tendon {
+
+/// A motion recorded in a CSV file, and how to read it: commas between the cells, `.` as decimal
+/// point, no quotes, one line per sample.
+struct RecordedMotionFile {
+  /// A column by its name in the header line, or by its number, from 0. A file of which both columns
+  /// are given by number has no header line.
+  using Column = std::variant<std::string, std::size_t>;
+
+  std::filesystem::path path;
+  Column time = std::string("t_s");  ///< s, strictly increasing
+  Column position;                   ///< in the file's own unit
+  double scale = 1;                  ///< m per unit of `position`; not 0. Negative turns the motion round
+  Vec3 origin = Vec3::Zero();        ///< m, where position 0 lies
+  Vec3 direction = Vec3::UnitX();
+  ScriptedMotion::Recorded::AtEnd at_end = ScriptedMotion::Recorded::AtEnd::kHold;
+};
+
+/// The most samples that a recording may have: 33 minutes at 2 kHz, 64 MB. A limit, because a wrong
+/// path may lead to anything.
+inline constexpr std::size_t kMaxRecordedSamples = 4'000'000;
+
+/// Reads the whole file, before the loop runs. Throws std::runtime_error "file:line: what was expected,
+/// what was found" for a file that cannot be opened, a missing column, a cell that is not a finite
+/// number, time that does not increase, or fewer than 2 samples.
+ScriptedMotion::Recorded load_recorded_motion(const RecordedMotionFile& file);
+
+}  // namespace tendon

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/simulated/simulated_device.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string_view>
+#include <utility>
+
+#include "devices/simulated/expect.h"
+
+namespace tendon {
+namespace {
+
+void expect_effect(const std::optional<double>& value, std::string_view field) {
+  if (!value) return;
+  expect(*value > 0 && std::isfinite(*value), field, *value,
+         "a number above 0 (left out when there is no such effect)");
+}
+
+/// `force` cut down to the norm `limit` in its own direction. Through its largest component, because the
+/// square of a mad but finite force overflows.
+Vec3 saturated(const Vec3& force, double limit) {
+  const double largest = force.lpNorm<Eigen::Infinity>();
+  if (!(largest > 0)) return force;
+  const Vec3 shape = force / largest;
+  const double length = shape.norm();  // 1 … √3
+  if (largest <= limit / length) return force;
+  return shape * (limit / length);
+}
+
+/// The centre of the count that `x` lies in.
+Vec3 counted(const Vec3& x, double step) { return (x.array() / step + 0.5).floor().matrix() * step; }
+
+}  // namespace
+
+SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
+  expect(config_.mass > 0 && std::isfinite(config_.mass), "mass", config_.mass, "a number above 0 kg");
+  expect_finite(config_.start_velocity, "start_velocity");
+  if (config_.start_position) expect_finite(*config_.start_position, "start_position");
+  expect_effect(config_.viscous_friction, "viscous_friction");
+  expect_effect(config_.coulomb_friction, "coulomb_friction");
+  expect_effect(config_.encoder_step, "encoder_step");
+  expect_effect(config_.max_force, "max_force");
+  expect_effect(config_.amplifier_bandwidth, "amplifier_bandwidth");
+  if (config_.watchdog) {
+    expect(*config_.watchdog > Duration::zero(), "watchdog", seconds(*config_.watchdog),
+           "a duration above 0 s (left out when there is none)");
+  }
+  if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
+  if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
+
+  info_ = {.name = config_.name,
+           .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
+           .position_resolution = config_.encoder_step.value_or(0),
+           .watchdog = config_.watchdog.value_or(Duration::zero())};
+
+  truth_.position = config_.start_position.value_or(hand_ ? hand_->target(0).position : Vec3::Zero());
+  truth_.velocity = config_.start_velocity;
+  settle_energies();
+}
+
+std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
+  truth_.watchdog_fired = false;
+  if (!last_read_) {
+    last_read_ = now;
+    until_watchdog_ = config_.watchdog;
+  } else if (now > *last_read_) {
+    advance(std::min(now - *last_read_, kMaxGap));
+    last_read_ = now;
+    settle_energies();
+  }
+  return PositionSample{now, config_.encoder_step ? counted(truth_.position, *config_.encoder_step) : truth_.position};
+}
+
+Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {
+  command_ = Vec3::Zero();
+  if (force.allFinite()) command_ = config_.max_force ? saturated(force, *config_.max_force) : force;
+  until_watchdog_ = config_.watchdog;
+  return command_;
+}
+
+void SimulatedDevice::advance(Duration gap) noexcept {
+  if (until_watchdog_ && gap > *until_watchdog_) {
+    const Duration before = *until_watchdog_;
+    until_watchdog_.reset();
+    integrate(before);
+    command_.setZero();
+    truth_.watchdog_fired = true;
+    integrate(gap - before);
+    return;
+  }
+  if (until_watchdog_) *until_watchdog_ -= gap;
+  integrate(gap);
+}
+
+void SimulatedDevice::integrate(Duration span) noexcept {
+  if (span <= Duration::zero()) return;
+  const auto substeps = (span + kMaxSubstep - Duration(1)) / kMaxSubstep;
+  const double h = seconds(span) / static_cast<double>(substeps);
+  const double begin = seconds(lived_);
+  lived_ += span;
+
+  const double mass = hand_ ? config_.mass + hand_->mass() : config_.mass;
+  double resistance = mass;
+  if (config_.viscous_friction) resistance += h / 2 * *config_.viscous_friction;
+  if (hand_) resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
+
+  for (Duration::rep i = 0; i < substeps; ++i) {
+    const Vec3 v0 = truth_.velocity;
+    truth_.device_force = force_over(h);
+    Vec3 push = truth_.device_force;
+    Vec3 drive;
+    if (hand_) {
+      drive = hand_->drive(begin + h * (static_cast<double>(i) + 0.5), truth_.position);
+      push += drive;
+    }
+
+    Vec3 mean = mass * v0 + h / 2 * push;
+    if (config_.coulomb_friction) {
+      const double momentum = mean.norm();
+      const double lost = h / 2 * *config_.coulomb_friction;
+      mean *= momentum > lost ? (1 - lost / momentum) / resistance : 0.0;
+    } else {
+      mean /= resistance;
+    }
+
+    truth_.velocity = 2 * mean - v0;
+    if (config_.coulomb_friction && truth_.velocity.dot(mean) <= 0 && push.norm() <= *config_.coulomb_friction) {
+      truth_.velocity.setZero();
+    }
+    if (hand_) {
+      const Vec3 pull = drive - (hand_->damping() + h / 2 * hand_->stiffness()) * mean;
+      drive_work_ += h * pull.dot(mean);
+      truth_.hand_force = pull - hand_->mass() / h * (truth_.velocity - v0);
+    }
+    truth_.position += h * mean;
+  }
+}
+
+/// The mean force of the motors over the next h seconds: the command, or the exact mean of the first-order
+/// response to it.
+Vec3 SimulatedDevice::force_over(double h) noexcept {
+  if (!amplifier_force_) return command_;
+  const double h_over_tau = h * 2 * std::numbers::pi * *config_.amplifier_bandwidth;
+  const double reached = -std::expm1(-h_over_tau);  // 1 − e^(−h/τ)
+  const Vec3 missing = command_ - *amplifier_force_;
+  *amplifier_force_ += missing * reached;
+  return command_ - missing * (reached / h_over_tau);
+}
+
+/// The hand's mass moves with the handle: what it has gained in kinetic energy did not go through the
+/// port between the two.
+void SimulatedDevice::settle_energies() noexcept {
+  const double half_v2 = truth_.velocity.squaredNorm() / 2;
+  truth_.kinetic_energy = config_.mass * half_v2;
+  if (!hand_) return;
+  truth_.hand_work = drive_work_ - hand_->mass() * (half_v2 - config_.start_velocity.squaredNorm() / 2);
+}
+
+}  // namespace tendon

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/motion.h"
+#include "devices/device.h"
+#include "devices/simulated/operator_hand.h"
+
+namespace tendon {
+
+/// A haptic device of impedance type that exists only as its equation of motion, with an operator's
+/// hand on its handle:
+///
+///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      sgn(v) = v/|v|;  any |sgn| ≤ 1 at v = 0
+///
+/// Forces in N on the handle: F_device is what the device exerts on the hand, F_hand what the hand
+/// exerts on the device. Friction is isotropic. Each effect is one that the configuration lists or that
+/// does not exist: what is left out costs an empty optional and a branch.
+///
+/// **Time.** The device lives from `read` to `read`: the first one sets the instant 0, each later one
+/// moves the world on to its `now` with the force that `apply` left there. Encoder and force change at
+/// the same instant, that of the last `read`. Time that goes backwards moves nothing. Of a gap longer
+/// than kMaxGap only that much is lived through: to the simulated world, the rest did not happen.
+///
+/// **Integration.** Substeps of equal length h ≤ kMaxSubstep; each is one implicit midpoint rule with
+/// set-valued friction (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
+///
+///     m (v₁ − v₀)/h = F_device + F_hand − b v̄ − f_c sgn(v̄),      x₁ = x₀ + h v̄
+///
+/// where F_hand is taken at the midpoint in time, position and velocity. It is solved in closed form: the
+/// half-step momentum p is shrunk by the friction impulse, then divided by mass and damping,
+///
+///     v̄ = (1 − h f_c/(2|p|))₊ p / (m + (h/2)(b + c + k h/2)),      p = m v₀ + (h/2)(F_device + drive)
+///
+/// and when the velocity came to or through zero and friction can hold what pushes, the device rests:
+/// v₁ = 0. So it sticks exactly, with no velocity threshold, in any direction. Why this rule: it is
+/// stable for any hand, and since m (v₁ − v₀)·v̄ is exactly the change of kinetic energy it neither
+/// makes energy nor hides any. A damped integrator would make every limiter look better than it is:
+/// semi-implicit Euler at 50 µs holds springs stable that are 5 % too stiff for the real device.
+/// Consequently, as long as the force held is the force returned (no amplifier lag, no watchdog ran
+/// out), with the E of EnergyLedger fed with the true position and friction, up to rounding,
+///
+///     work of the hand + kinetic energy at the start ≥ E + kinetic energy now
+class SimulatedDevice final : public Device {
+ public:
+  struct Config {
+    std::string name = "simulated";
+    double mass = 0;                     ///< kg, apparent mass at the handle, > 0
+    std::optional<Vec3> start_position;  ///< m; left out: where the hand's motion starts, or the origin
+    Vec3 start_velocity = Vec3::Zero();  ///< m/s
+
+    /// Effects: listed (> 0) or not there.
+    std::optional<double> viscous_friction;  ///< b, N·s/m
+    std::optional<double> coulomb_friction;  ///< f_c, N
+    /// m, one encoder count per axis. The sample is the centre of the count, so the truth is never
+    /// more than half a count away; the origin is a centre.
+    std::optional<double> encoder_step;
+    std::optional<double> max_force;  ///< N, norm of the force vector; its direction is kept
+    /// Hz, −3 dB, first order. The motors follow the force that `apply` returned with this lag.
+    std::optional<double> amplifier_bandwidth;
+    std::optional<Duration> watchdog;  ///< without an `apply` for so long the force is zero until the next one
+
+    std::optional<OperatorHand::Config> hand;
+  };
+
+  /// What really happens, for tests: nothing in production may look at it.
+  struct Truth {
+    Vec3 position = Vec3::Zero();      ///< m
+    Vec3 velocity = Vec3::Zero();      ///< m/s
+    Vec3 device_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
+    Vec3 hand_force = Vec3::Zero();    ///< N, mean over the last substep, on the handle
+    double hand_work = 0;              ///< J, ∫ F_hand·dx since the start
+    double kinetic_energy = 0;         ///< J, of the device alone (the hand's mass is the hand's)
+    bool watchdog_fired = false;       ///< it took the force away during the last interval
+  };
+
+  /// 50 µs is 20 substeps per haptic period at 1 kHz. It puts the stiffness at which a sampled spring loses
+  /// stability (75 g, 1 kHz) within 1.4e-6 of the exact one at 0.26 N·s/m, and 2.8e-5 at 5. The error goes
+  /// with the square of this, the cost with its inverse.
+  static constexpr Duration kMaxSubstep = std::chrono::microseconds(50);
+
+  /// 10 s is far beyond any pause that a loop survives, and bounds what one `read` may cost (200 000
+  /// substeps, some 10 ms).
+  static constexpr Duration kMaxGap = std::chrono::seconds(10);
+
+  /// Throws std::invalid_argument naming the field, its value and what was expected.
+  explicit SimulatedDevice(Config config);
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+
+  /// Always answers.
+  std::optional<PositionSample> read(LocalTime now) noexcept override;
+
+  /// Returns the force after saturation. A force with a component that is not finite is no force:
+  /// zero is held and returned.
+  Vec3 apply(const Vec3& force) noexcept override;
+
+  const Truth& truth() const noexcept { return truth_; }
+
+ private:
+  void advance(Duration gap) noexcept;
+  void integrate(Duration span) noexcept;
+  Vec3 force_over(double h) noexcept;
+  void settle_energies() noexcept;
+
+  Config config_;
+  std::optional<OperatorHand> hand_;
+  DeviceInfo info_;
+  std::optional<LocalTime> last_read_;
+  Duration lived_{};                        ///< since the first read
+  Vec3 command_ = Vec3::Zero();             ///< N, held
+  std::optional<Vec3> amplifier_force_;     ///< N, lags behind `command_`
+  std::optional<Duration> until_watchdog_;  ///< empty: it has run out, or there is none
+  double drive_work_ = 0;                   ///< J, of the hand's spring and damper
+  Truth truth_;
+};
+
+}  // namespace tendon

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/simulated/recorded_motion.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "devices/simulated/simulated_device.h"
+#include "tests/devices/device_bench.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A file that is gone with its test.
+class CsvFile {
+ public:
+  explicit CsvFile(const std::string& text)
+      : path_(std::filesystem::temp_directory_path() / ("tendon_motion_" + std::to_string(getpid()) + ".csv")) {
+    std::ofstream(path_, std::ios::binary) << text;
+  }
+  ~CsvFile() { std::filesystem::remove(path_); }
+  CsvFile(const CsvFile&) = delete;
+  CsvFile& operator=(const CsvFile&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string complaint(const RecordedMotionFile& file) {
+  try {
+    load_recorded_motion(file);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(RecordedMotion, ReadsColumnsByTheirNamesAndScalesThePosition) {
+  const CsvFile csv("t_s,other, angle_rad \n10,9,1\n10.5,9,-2\r\n\n11,9,4e-1\n");
+  const auto motion = load_recorded_motion({.path = csv.path(), .position = "angle_rad", .scale = 0.075});
+  ASSERT_EQ(motion.samples.size(), 3U);
+  EXPECT_EQ(motion.samples[1].t, 10.5);
+  EXPECT_EQ(motion.samples[1].x, -0.15);
+  EXPECT_EQ(motion.samples[2].x, 0.4 * 0.075);
+}
+
+TEST(RecordedMotion, ReadsColumnsByTheirNumbersFromAFileWithoutAHeader) {
+  const CsvFile csv("7,0,1\n8,0.5,2\n9,1,3");
+  const auto motion = load_recorded_motion({.path = csv.path(), .time = 1U, .position = 0U});
+  ASSERT_EQ(motion.samples.size(), 3U);
+  EXPECT_EQ(motion.samples[2].t, 1);
+  EXPECT_EQ(motion.samples[2].x, 9);
+}
+
+TEST(RecordedMotion, NamesFileAndLineAndWhatWasExpectedWhenAFileIsWrong) {
+  const struct {
+    const char* text;
+    const char* says;
+  } cases[] = {
+      {"t_s,x\n0,1\n1,two\n", ":3: expected a finite number in column 1 (from 0), found 'two'"},
+      {"t_s,x\n0,1\n\n1,\n", ":4: expected a finite number in column 1 (from 0), found ''"},
+      {"t_s,x\n0,1\n1,1.5e\n", ":3: expected a finite number in column 1 (from 0), found '1.5e'"},
+      {"t_s,x\n0,nan\n", ":2: expected a finite number in column 1 (from 0), found 'nan'"},
+      {"t_s,x\n0,1e999\n", ":2: expected a finite number in column 1 (from 0), found '1e999'"},
+      {"t_s,x\n0,1\n1\n", ":3: expected a finite number in column 1 (from 0), found a line that ends before it"},
+      {"t_s,x\n0,1\n1,1\n1,2\n", ":4: expected a time after that of the sample before, found '1'"},
+      {"t_s,y\n0,1\n", ":1: expected a column 'x', found 't_s,y'"},
+      {"", ":0: expected a header line, found an empty file"},
+      {"t_s,x\n0,1\n", ":2: expected 2 samples or more, found 1"},
+  };
+  for (const auto& bad : cases) {
+    const CsvFile csv(bad.text);
+    EXPECT_EQ(complaint({.path = csv.path(), .position = "x"}), csv.path().string() + bad.says);
+  }
+}
+
+TEST(RecordedMotion, SaysWhyAFileCannotBeOpened) {
+  EXPECT_EQ(complaint({.path = "no/such/file.csv", .position = "x"}),
+            "no/such/file.csv: expected a CSV file of a recorded motion, cannot open it: No such file or directory");
+  EXPECT_EQ(complaint({.path = std::filesystem::temp_directory_path(), .position = "x"}),
+            std::filesystem::temp_directory_path().string() +
+                ": expected a CSV file of a recorded motion, found a directory");
+}
+
+TEST(RecordedMotion, RefusesAScaleThatWouldMakeThePositionVanish) {
+  EXPECT_THROW(load_recorded_motion({.path = "any.csv", .position = "x", .scale = 0}), std::invalid_argument);
+}
+
+TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
+  // The recording is not ours to ship with the tests: 4.4 s of an operator at 2 kHz, lever arm 0.075 m.
+  const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
+  if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the recorded human motion is not there";
+
+  const auto recorded =
+      load_recorded_motion({.path = std::filesystem::path(data) / "tue-1dof-teleop" / "m2_question1d_foam.csv",
+                            .position = "master_pos_rad",
+                            .scale = 0.075});
+  ASSERT_EQ(recorded.samples.size(), 8813U);
+  EXPECT_EQ(recorded.samples.front().x, 0.00638790506 * 0.075);
+  const double length = recorded.samples.back().t - recorded.samples.front().t;
+  EXPECT_NEAR(length, 8812 * 0.0005, 1e-9);
+
+  const ScriptedMotion motion(recorded);
+  double furthest = 0;
+  double fastest = 0;
+  for (double t = 0; t < length; t += 1e-4) {
+    furthest = std::max(furthest, motion.at(t).position.norm());
+    fastest = std::max(fastest, motion.at(t).velocity.norm());
+  }
+  RecordProperty("furthest_m", std::to_string(furthest));
+  RecordProperty("fastest_m_s", std::to_string(fastest));
+  EXPECT_GT(furthest, 0.005);
+  EXPECT_LT(furthest, 0.1);
+  EXPECT_LT(fastest, 3) << "faster than a hand moves: the path between the samples is wrong";
+
+  // A firm grip on a light device goes where the hand wants to be.
+  SimulatedDevice::Config config;
+  config.mass = 0.075;
+  config.coulomb_friction = 0.04;
+  config.hand = OperatorHand::Config{.stiffness = 2000, .damping = 20, .mass = 0.05, .motion = motion};
+  Bench bench(config);
+  for (int i = 1; i < static_cast<int>(length * 1000); ++i) {
+    bench.wait(1ms);
+    ASSERT_LT((bench.truth().position - motion.at(1e-3 * i).position).norm(), 2e-3) << i << " ms";
+  }
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,531 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/simulated/simulated_device.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "tests/devices/device_bench.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+SimulatedDevice::Config bare(double mass = 0.075) {
+  SimulatedDevice::Config config;
+  config.mass = mass;
+  return config;
+}
+
+OperatorHand::Config waving_hand(const Vec3& direction = Vec3::UnitX()) {
+  return {.stiffness = 400,
+          .damping = 2,
+          .mass = 0.05,
+          .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 1.5, .direction = direction})};
+}
+
+// ---- time ------------------------------------------------------------------------------------------------------
+
+TEST(SimulatedDevice, TheFirstReadOnlySetsTheInstantZero) {
+  auto config = bare();
+  config.start_velocity = {1, 0, 0};
+  SimulatedDevice device(config);
+  const auto first = device.read(LocalTime(5h));
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->at, LocalTime(5h));
+  EXPECT_EQ(first->position, Vec3::Zero());
+  EXPECT_NEAR(device.read(LocalTime(5h + 100ms))->position.x(), 0.1, 1e-13);
+}
+
+TEST(SimulatedDevice, TimeThatGoesBackwardsMovesNothing) {
+  auto config = bare();
+  config.start_velocity = {1, 0, 0};
+  SimulatedDevice device(config);
+  device.read(LocalTime(1s));
+  device.read(LocalTime(2s));
+  EXPECT_NEAR(device.read(LocalTime(500ms))->position.x(), 1, 1e-11);
+  EXPECT_NEAR(device.read(LocalTime(2s))->position.x(), 1, 1e-11);
+  EXPECT_NEAR(device.read(LocalTime(3s))->position.x(), 2, 1e-11);
+}
+
+TEST(SimulatedDevice, LivesThroughNoMoreOfAGapThanTheLongestItAllows) {
+  auto config = bare();
+  config.start_velocity = {1, 0, 0};
+  Bench bench(config);
+  bench.wait(1h);
+  EXPECT_NEAR(bench.truth().position.x(), seconds(SimulatedDevice::kMaxGap), 1e-9);
+}
+
+TEST(SimulatedDevice, DoesNotDependOnHowOftenItIsRead) {
+  auto config = bare();
+  config.coulomb_friction = 0.04;
+  config.viscous_friction = 0.1;
+  config.hand = waving_hand();
+  Bench often(config);
+  Bench seldom(config);
+  for (int i = 0; i < 100; ++i) {
+    seldom.wait(10ms);
+    for (int j = 0; j < 10; ++j) often.wait(1ms);
+    ASSERT_LT((often.truth().position - seldom.truth().position).norm(), 1e-12);
+  }
+}
+
+// ---- viscous friction ------------------------------------------------------------------------------------------
+
+TEST(ViscousFriction, LetsTheVelocityFallAsTheExponentialOfTheClosedForm) {
+  const double m = 0.075;
+  const double b = 0.26;
+  const Vec3 v0(0.3, -0.4, 0.1);
+  auto config = bare(m);
+  config.viscous_friction = b;
+  config.start_velocity = v0;
+  Bench bench(config);
+  for (int i = 1; i <= 100; ++i) {
+    bench.wait(10ms);
+    const double left = std::exp(-b * 0.01 * i / m);
+    ASSERT_LT((bench.truth().velocity - v0 * left).norm(), 1e-8);
+    ASSERT_LT((bench.truth().position - v0 * (m / b * (1 - left))).norm(), 1e-8);
+  }
+}
+
+// ---- Coulomb friction ------------------------------------------------------------------------------------------
+
+TEST(CoulombFriction, HoldsWhatPushesWithLessInAnyDirection) {
+  auto config = bare();
+  config.coulomb_friction = 0.04;
+  Dice dice(1);
+  for (int i = 0; i < 100; ++i) {
+    Bench bench(config);
+    bench.push(dice.vector(1).normalized() * 0.04 * dice.uniform(0, 0.9999), 100ms);
+    ASSERT_EQ(bench.truth().position, Vec3::Zero());
+    ASSERT_EQ(bench.truth().velocity, Vec3::Zero());
+  }
+}
+
+TEST(CoulombFriction, LetsOnlyWhatIsAboveItAccelerate) {
+  auto config = bare(0.075);
+  config.coulomb_friction = 0.04;
+  Bench bench(config);
+  const Vec3 direction = Vec3(1, 2, -2) / 3;
+  bench.push(0.05 * direction, 500ms);
+  const double acceleration = (0.05 - 0.04) / 0.075;
+  EXPECT_LT((bench.truth().velocity - direction * acceleration * 0.5).norm(), 1e-12);
+  EXPECT_LT((bench.truth().position - direction * acceleration * 0.125).norm(), 1e-12);
+}
+
+TEST(CoulombFriction, StopsAfterTheSlidingDistanceOfTheClosedFormAndThenRestsForGood) {
+  const double m = 0.075;
+  const double f_c = 0.04;
+  const Vec3 direction = Vec3(2, -1, 2) / 3;
+  auto config = bare(m);
+  config.coulomb_friction = f_c;
+  config.start_velocity = 0.2 * direction;
+  Bench bench(config);
+
+  const Duration stops = from_seconds(m * 0.2 / f_c);
+  bench.wait(stops - 1ms);
+  EXPECT_NEAR(bench.truth().velocity.norm(), f_c / m * 1e-3, 1e-9);
+  bench.wait(2ms);
+  const Vec3 rest = bench.truth().position;
+  EXPECT_LT((rest - direction * (m * 0.2 * 0.2 / (2 * f_c))).norm(), 1e-9);
+  EXPECT_EQ(bench.truth().velocity, Vec3::Zero());
+  bench.wait(1s);
+  EXPECT_EQ(bench.truth().position, rest);
+  EXPECT_EQ(bench.truth().velocity, Vec3::Zero());
+}
+
+TEST(CoulombFriction, HoldsAgainstAForceThatBrakedTheDeviceToAStop) {
+  auto config = bare();
+  config.coulomb_friction = 0.04;
+  config.start_velocity = {0.1, 0, 0};
+  Bench bench(config);
+  bench.push({-0.039, 0, 0}, 2s);
+  const Vec3 rest = bench.truth().position;
+  EXPECT_NEAR(rest.x(), 0.075 * 0.01 / (2 * 0.079), 1e-9);
+  EXPECT_EQ(bench.truth().velocity, Vec3::Zero());
+  bench.wait(1s);
+  EXPECT_EQ(bench.truth().position, rest);
+}
+
+TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
+  // Braked by F + f_c until it stops, then pulled back by F − f_c. What is left of the 50 µs in which it turns
+  // may have the wrong sign of friction; a pause of that length would cost 3 mm/s.
+  const double m = 0.075;
+  const double error = 2 * 0.04 / m * seconds(SimulatedDevice::kMaxSubstep);
+  for (const double v0 : {0.1, 0.1003, 0.1011, 0.1017, 0.1026}) {
+    auto config = bare(m);
+    config.coulomb_friction = 0.04;
+    config.start_velocity = {v0, 0, 0};
+    Bench bench(config);
+    bench.push({-5, 0, 0}, 10ms);
+    const double back = 10e-3 - m * v0 / 5.04;
+    EXPECT_NEAR(bench.truth().velocity.x(), -4.96 / m * back, error);
+    EXPECT_NEAR(bench.truth().position.x(), m * v0 * v0 / (2 * 5.04) - 4.96 / (2 * m) * back * back, error * 10e-3);
+  }
+}
+
+TEST(CoulombFriction, OpposesTheVelocityAlongACurvedPath) {
+  // Pushed sideways while sliding: against a Runge-Kutta solution of m dv/dt = F − f_c v/|v| in steps of 1 µs.
+  const double m = 0.075;
+  const double f_c = 0.04;
+  const Vec3 force(0, 0.1, 0.05);
+  auto config = bare(m);
+  config.coulomb_friction = f_c;
+  config.start_velocity = {0.3, 0, 0};
+  Bench bench(config);
+  bench.push(force, 200ms);
+
+  const auto acceleration = [&](const Vec3& v) { return Vec3((force - f_c * v.normalized()) / m); };
+  const double h = 1e-6;
+  Vec3 v = config.start_velocity;
+  for (int i = 0; i < 200'000; ++i) {
+    const Vec3 k1 = acceleration(v);
+    const Vec3 k2 = acceleration(v + h / 2 * k1);
+    const Vec3 k3 = acceleration(v + h / 2 * k2);
+    const Vec3 k4 = acceleration(v + h * k3);
+    v += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+  }
+  EXPECT_LT((bench.truth().velocity - v).norm(), 1e-8);
+}
+
+TEST(SimulatedDevice, DoesNotKnowWhichWayTheFrameIsTurned) {
+  const Mat3 turn = Eigen::AngleAxisd(1.1, Vec3(1, -2, 3).normalized()).toRotationMatrix();
+  const auto config = [](const Mat3& frame) {
+    auto c = bare();
+    c.viscous_friction = 0.1;
+    c.coulomb_friction = 0.04;
+    c.max_force = 1;
+    c.amplifier_bandwidth = 300;
+    c.start_velocity = frame * Vec3(0.1, 0.2, -0.1);
+    c.hand = waving_hand(frame * Vec3::UnitX());
+    return c;
+  };
+  Bench straight(config(Mat3::Identity()));
+  Bench turned(config(turn));
+  Dice dice(7);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 force = dice.vector(1.2);
+    straight.push(force, 1ms);
+    turned.push(turn * force, 1ms);
+    ASSERT_LT((turn * straight.truth().position - turned.truth().position).norm(), 1e-12);
+    ASSERT_LT((turn * straight.truth().velocity - turned.truth().velocity).norm(), 1e-12);
+  }
+}
+
+// ---- encoder ---------------------------------------------------------------------------------------------------
+
+TEST(Encoder, SaysTheCentreOfTheCountSoTheTruthIsWithinHalfACount) {
+  const double step = 30e-6;
+  auto config = bare();
+  config.encoder_step = step;
+  config.hand = waving_hand(Vec3(1, 0.3, -0.7));
+  Bench bench(config);
+  EXPECT_EQ(bench.wait(Duration(0)), Vec3::Zero()) << "the origin is the centre of a count";
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 seen = bench.wait(1ms);
+    ASSERT_LE((seen - bench.truth().position).lpNorm<Eigen::Infinity>(), step / 2 * (1 + 1e-9));
+    const Vec3 counts = seen / step;
+    ASSERT_LT((counts - counts.array().round().matrix()).norm(), 1e-9);
+  }
+}
+
+TEST(Encoder, HasCountsOfOneWidthAlsoAroundTheOrigin) {
+  auto config = bare();
+  config.encoder_step = 1e-3;
+  config.start_velocity = {1, 0, 0};
+  config.start_position = Vec3(-3.5e-3, 0, 0);
+  Bench bench(config);
+  bench.wait(5us);  // off the edge between two counts
+  for (int count = -3; count <= 3; ++count) {
+    for (int i = 0; i < 10; ++i) {
+      ASSERT_NEAR(bench.wait(i == 0 ? 0us : 100us).x(), count * 1e-3, 1e-12);
+    }
+    bench.wait(100us);
+  }
+}
+
+// ---- saturation ------------------------------------------------------------------------------------------------
+
+TEST(Saturation, KeepsTheDirectionAndReturnsTheForceReallyHeld) {
+  auto config = bare();
+  config.max_force = 3.3;
+  Bench bench(config);
+  for (const Vec3& wanted : {Vec3(10, -20, 5), Vec3(1e6, 1, 0), Vec3(1e300, -1e300, 1e299),
+                             Vec3(1.7e308, 1.7e308, 1.7e308), Vec3(2, 2, 2)}) {
+    const Vec3 held = bench.device().apply(wanted);
+    EXPECT_NEAR(held.norm(), 3.3, 1e-14);
+    EXPECT_LT((held.normalized() - (wanted / wanted.lpNorm<Eigen::Infinity>()).normalized()).norm(), 1e-15);
+    const Vec3 before = bench.truth().velocity;
+    bench.wait(1ms);
+    EXPECT_LT((bench.truth().velocity - before - held * (1e-3 / 0.075)).norm(), 1e-12);
+  }
+}
+
+TEST(Saturation, LeavesASmallerForceAsItIsToTheLastBit) {
+  auto config = bare();
+  config.max_force = 3.3;
+  Bench bench(config);
+  Dice dice(3);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 force = dice.vector(1.9);
+    ASSERT_EQ(bench.device().apply(force), force);
+  }
+  EXPECT_EQ(bench.device().apply(Vec3::Zero()), Vec3::Zero());
+}
+
+TEST(SimulatedDevice, IsNeverMovedByAForceThatIsNotANumber) {
+  for (const bool saturates : {false, true}) {
+    for (const double bad : {kNan, kInf, -kInf}) {
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        auto config = bare();
+        if (saturates) config.max_force = 8.5;
+        Bench bench(config);
+        Vec3 force(1, 1, 1);
+        force[axis] = bad;
+        EXPECT_EQ(bench.device().apply(force), Vec3::Zero());
+        bench.wait(1s);
+        EXPECT_EQ(bench.truth().position, Vec3::Zero());
+      }
+    }
+  }
+}
+
+TEST(SimulatedDevice, DropsTheForceItHeldWhenTheNextIsNotANumber) {
+  Bench bench(bare());
+  bench.push({1, 0, 0}, 1ms);
+  const Vec3 before = bench.truth().velocity;
+  bench.push({kNan, 0, 0}, 10ms);
+  EXPECT_EQ(bench.truth().velocity, before);
+}
+
+// ---- amplifier -------------------------------------------------------------------------------------------------
+
+TEST(Amplifier, FollowsAStepAsAFirstOrderLag) {
+  const double m = 0.075;
+  const double tau = 1 / (2 * std::numbers::pi * 300);
+  auto config = bare(m);
+  config.amplifier_bandwidth = 300;
+  Bench bench(config);
+  EXPECT_EQ(bench.device().apply({2, 0, 0}), Vec3(2, 0, 0)) << "what is returned is what was written, before the lag";
+  for (int i = 1; i <= 50; ++i) {
+    bench.wait(100us);
+    const double t = 1e-4 * i;
+    // The impulse is exact; the force is known as its mean over the last 50 µs.
+    ASSERT_NEAR(bench.truth().velocity.x(), 2 / m * (t - tau * (1 - std::exp(-t / tau))), 1e-13);
+    ASSERT_NEAR(bench.truth().device_force.x(), 2 * (1 - std::exp(-(t - 25e-6) / tau)), 2e-3);
+  }
+}
+
+TEST(Amplifier, HasFallenByThreeDecibelsAtItsBandwidth) {
+  // A sine of commands at 10 kHz, read back from the momentum it leaves: in the steady state the velocity
+  // swings by F/(m ω) times the gain.
+  const double f = 50;
+  auto config = bare(1);
+  const auto swing = [&] {
+    Bench bench(config);
+    double low = kInf;
+    double high = -kInf;
+    for (int i = 0; i < 10'000; ++i) {
+      bench.push({std::sin(2 * std::numbers::pi * f * 1e-4 * i), 0, 0}, 100us);
+      if (i < 8000) continue;
+      low = std::min(low, bench.truth().velocity.x());
+      high = std::max(high, bench.truth().velocity.x());
+    }
+    return high - low;
+  };
+  const double prompt = swing();
+  config.amplifier_bandwidth = f;
+  EXPECT_NEAR(swing() / prompt, std::numbers::sqrt2 / 2, 1e-3);
+}
+
+// ---- watchdog --------------------------------------------------------------------------------------------------
+
+TEST(Watchdog, TakesTheForceAwayAfterExactlyItsTime) {
+  auto config = bare(0.075);
+  config.watchdog = 5ms;
+  // Read intervals that end on, before and far beyond the instant: the impulse is force × 5 ms in each case.
+  for (const Duration interval : {Duration(5ms), Duration(1700us), Duration(333'333), Duration(1s)}) {
+    Bench bench(config);
+    bench.device().apply({0.3, -0.6, 0.6});
+    int fired = 0;
+    for (Duration waited{}; waited < 20ms; waited += interval) {
+      bench.wait(interval);
+      fired += bench.truth().watchdog_fired ? 1 : 0;
+    }
+    EXPECT_LT((bench.truth().velocity - Vec3(0.3, -0.6, 0.6) * (5e-3 / 0.075)).norm(), 1e-15);
+    EXPECT_EQ(fired, 1);
+  }
+}
+
+TEST(Watchdog, StaysQuietAsLongAsForcesComeInTime) {
+  auto config = bare(0.075);
+  config.watchdog = 5ms;
+  Bench bench(config);
+  for (int i = 0; i < 100; ++i) {
+    bench.push({0.1, 0, 0}, 5ms);
+    ASSERT_FALSE(bench.truth().watchdog_fired);
+  }
+  EXPECT_NEAR(bench.truth().velocity.x(), 0.1 * 0.5 / 0.075, 1e-12);
+}
+
+TEST(Watchdog, LetsTheNextForceThroughAgain) {
+  auto config = bare(0.075);
+  config.watchdog = 5ms;
+  Bench bench(config);
+  bench.push({1, 0, 0}, 100ms);
+  const double before = bench.truth().velocity.x();
+  bench.push({1, 0, 0}, 3ms);
+  EXPECT_NEAR(bench.truth().velocity.x() - before, 3e-3 / 0.075, 1e-14);
+  EXPECT_FALSE(bench.truth().watchdog_fired);
+}
+
+// ---- effects that are not listed -------------------------------------------------------------------------------
+
+TEST(SimulatedDevice, WithoutAnyEffectIsNewtonsSecondLawAndNothingElse) {
+  const double m = 0.075;
+  Bench bench(bare(m));
+  Dice dice(11);
+  Vec3 x = Vec3::Zero();
+  Vec3 v = Vec3::Zero();
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 force = dice.vector(5);
+    bench.push(force, 1ms);
+    x += v * 1e-3 + force * (1e-6 / (2 * m));
+    v += force * (1e-3 / m);
+    ASSERT_LT((bench.truth().position - x).norm(), 1e-12 * (1 + x.norm()));
+    ASSERT_LT((bench.truth().velocity - v).norm(), 1e-12 * (1 + v.norm()));
+  }
+}
+
+TEST(SimulatedDevice, TakesTheSamePathToTheLastBitWithEffectsThatNeverBite) {
+  auto plain = bare();
+  plain.viscous_friction = 0.1;
+  plain.hand = waving_hand(Vec3(1, 1, 0));
+  auto listed = plain;
+  listed.max_force = 1e9;
+  listed.watchdog = 1h;
+  Bench a(plain);
+  Bench z(listed);
+  Dice dice(5);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 force = dice.vector(5);
+    const Duration interval(static_cast<Duration::rep>(dice.uniform(0.3e6, 2e6)));
+    ASSERT_EQ(a.push(force, interval), z.push(force, interval));
+    ASSERT_EQ(a.truth().velocity, z.truth().velocity);
+    ASSERT_EQ(a.truth().hand_work, z.truth().hand_work);
+  }
+}
+
+TEST(SimulatedDevice, EncoderStepChangesWhatIsSeenAndNotWhatHappens) {
+  auto exact = bare();
+  exact.coulomb_friction = 0.04;
+  exact.hand = waving_hand();
+  auto coarse = exact;
+  coarse.encoder_step = 1e-3;
+  Bench a(exact);
+  Bench z(coarse);
+  for (int i = 0; i < 1000; ++i) {
+    a.wait(1ms);
+    z.wait(1ms);
+    ASSERT_EQ(a.truth().position, z.truth().position);
+  }
+}
+
+TEST(SimulatedDevice, RepeatsItselfToTheLastBit) {
+  auto config = bare();
+  config.viscous_friction = 0.01;
+  config.coulomb_friction = 0.04;
+  config.encoder_step = 30e-6;
+  config.max_force = 8.5;
+  config.amplifier_bandwidth = 400;
+  config.watchdog = 5ms;
+  config.hand = waving_hand();
+  Bench a(config);
+  Bench z(config);
+  Dice dice(13);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 force = dice.vector(12);
+    const Duration interval(static_cast<Duration::rep>(dice.uniform(0.1e6, 8e6)));
+    ASSERT_EQ(a.push(force, interval), z.push(force, interval));
+    ASSERT_EQ(a.truth().position, z.truth().position);
+  }
+}
+
+// ---- configuration ---------------------------------------------------------------------------------------------
+
+TEST(SimulatedDevice, SaysWhatItCanDo) {
+  auto config = bare();
+  EXPECT_EQ(SimulatedDevice(config).info().max_force, kInf);
+  EXPECT_EQ(SimulatedDevice(config).info().position_resolution, 0);
+  EXPECT_EQ(SimulatedDevice(config).info().watchdog, Duration(0));
+  config.name = "phantom";
+  config.max_force = 8.5;
+  config.encoder_step = 30e-6;
+  config.watchdog = 5ms;
+  const SimulatedDevice device(config);
+  EXPECT_EQ(device.info().name, "phantom");
+  EXPECT_EQ(device.info().max_force, 8.5);
+  EXPECT_EQ(device.info().position_resolution, 30e-6);
+  EXPECT_EQ(device.info().watchdog, Duration(5ms));
+}
+
+TEST(SimulatedDevice, StartsWhereTheHandStartsUnlessToldOtherwise) {
+  auto config = bare();
+  config.hand = OperatorHand::Config{
+      .stiffness = 400,
+      .damping = 2,
+      .mass = 0.05,
+      .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0, .frequency = 1, .centre = {0.1, 0.2, 0.3}})};
+  EXPECT_EQ(Bench(config).wait(1s), Vec3(0.1, 0.2, 0.3));
+  config.start_position = Vec3(1, 0, 0);
+  EXPECT_EQ(Bench(config).truth().position, Vec3(1, 0, 0));
+}
+
+TEST(SimulatedDevice, RefusesImpossibleValuesNamingFieldValueAndWhatWasExpected) {
+  using Config = SimulatedDevice::Config;
+  struct Case {
+    std::function<void(Config&)> spoil;
+    std::string says;
+  };
+  const Case cases[] = {
+      {[](Config& c) { c.mass = 0; }, "mass = 0: expected a number above 0 kg"},
+      {[](Config& c) { c.mass = -0.075; }, "mass = -0.075: expected a number above 0 kg"},
+      {[](Config& c) { c.mass = kNan; }, "mass = nan: expected a number above 0 kg"},
+      {[](Config& c) { c.mass = kInf; }, "mass = inf: expected a number above 0 kg"},
+      {[](Config& c) { c.viscous_friction = -1; }, "viscous_friction = -1: expected"},
+      {[](Config& c) { c.coulomb_friction = 0; }, "coulomb_friction = 0: expected a number above 0 (left out when"},
+      {[](Config& c) { c.encoder_step = kNan; }, "encoder_step = nan: expected"},
+      {[](Config& c) { c.max_force = -8.5; }, "max_force = -8.5: expected"},
+      {[](Config& c) { c.amplifier_bandwidth = kInf; }, "amplifier_bandwidth = inf: expected"},
+      {[](Config& c) { c.watchdog = Duration(0); }, "watchdog = 0: expected a duration above 0 s"},
+      {[](Config& c) { c.start_position = Vec3(0, kNan, 0); }, "start_position.y = nan: expected a finite number"},
+      {[](Config& c) { c.start_velocity.z() = kInf; }, "start_velocity.z = inf: expected a finite number"},
+      {[](Config& c) { c.hand->stiffness = 0; }, "hand.stiffness = 0: expected"},
+      {[](Config& c) { c.hand->damping = -1; }, "hand.damping = -1: expected 0 N·s/m or more"},
+      {[](Config& c) { c.hand->mass = -0.1; }, "hand.mass = -0.1: expected 0 kg or more"},
+  };
+  for (const Case& bad : cases) {
+    auto config = bare();
+    config.hand = waving_hand();
+    bad.spoil(config);
+    try {
+      const SimulatedDevice device(config);
+      ADD_FAILURE() << "accepted; should have said: " << bad.says;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_EQ(std::string(error.what()).rfind(bad.says, 0), 0U) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tendon
