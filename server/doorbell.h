@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace tendon {
+
+/// Wakes the one thread that waits for it, from another thread or from a signal handler: the haptic
+/// thread rings it after each step, the network thread waits for it together with its socket.
+/// Rings that nobody has answered yet count as one. (An eventfd.)
+class Doorbell {
+ public:
+  /// Throws std::system_error when the process has no file descriptor left.
+  Doorbell();
+  ~Doorbell();
+  Doorbell(const Doorbell&) = delete;
+  Doorbell& operator=(const Doorbell&) = delete;
+
+  /// Thread-safe: yes. Async-signal-safe: yes (errno is kept). Realtime-safe: yes: one system call
+  /// that never waits, no heap, no lock of ours.
+  void ring() noexcept;
+
+  /// Takes back the rings so far. Called by whoever waits on fd(); UdpLink::wait does it by itself.
+  void answer() noexcept;
+
+  /// Readable while the bell has rung and was not answered: for poll() and UdpLink::wait.
+  int fd() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
+}  // namespace tendon

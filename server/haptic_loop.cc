@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/haptic_loop.h"
+
+#include <stdexcept>
+
+namespace tendon {
+
+namespace {
+
+DeviceState to_state(const StepRecord& record) noexcept {
+  DeviceState state;
+  state.tick = record.tick;
+  state.sampled = PeerTime(record.hand.at.time_since_epoch());  // our clock is the client's peer's
+  state.position = record.hand.position;
+  state.velocity = record.hand.velocity;
+  state.force_applied = record.applied;
+  state.energy = record.energy;
+  state.permitted_force = record.permitted;
+  state.reasons = record.reasons.bits();
+  state.force_sequence = record.force_sequence;
+  state.force_age = record.force_age;
+  state.mode = record.mode;
+  return state;
+}
+
+}  // namespace
+
+HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
+    : config_(config),
+      device_(device),
+      mail_(mail),
+      controller_(config.control),
+      velocity_(device.info().position_resolution) {
+  if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
+}
+
+void HapticLoop::take_mail(LocalTime now) noexcept {
+  while (const HapticOrder* order = mail_.orders.front()) {
+    switch (*order) {
+      case HapticOrder::kRelease:
+        controller_.release(now);
+        break;
+      case HapticOrder::kRearm:
+        controller_.rearm();
+        break;
+    }
+    mail_.orders.pop();
+  }
+  if (const RemoteForce* force = mail_.force.take()) controller_.observe(*force);
+}
+
+LocalTime HapticLoop::step(LocalTime now) noexcept {
+  if (tick_ == 0) due_ = now;
+  take_mail(now);
+
+  StepRecord record;
+  if (const auto sample = device_.read(now)) {
+    const Motion hand{sample->at, sample->position, velocity_.observe(sample->at, sample->position)};
+    static_cast<Step&>(record) = controller_.step(hand, applied_);
+  } else {
+    static_cast<Step&>(record) = controller_.step_unseen(now, applied_);
+  }
+  applied_ = device_.apply(record.force);
+  if (applied_ != record.force) record.reasons |= Reason::kDeviceClamp;
+  record.applied = applied_;
+  record.tick = ++tick_;
+  record.scheduled = due_;
+  publish(record);
+
+  due_ += config_.period;
+  if (due_ <= now) due_ = now + config_.period;
+  return due_;
+}
+
+void HapticLoop::publish(const StepRecord& record) noexcept {
+  mail_.state.put(to_state(record));
+  if (!mail_.steps.try_push(record)) mail_.steps_lost.fetch_add(1, std::memory_order_relaxed);
+  mail_.flight.record(record);
+
+  const auto fault = controller_.fault();
+  if (fault != HapticController::Fault::kNone && fault_.load(std::memory_order_relaxed) != fault) mail_.flight.freeze();
+  fault_.store(fault, std::memory_order_relaxed);
+  steps_.store(record.tick, std::memory_order_relaxed);
+  // One writer: a load and a store are enough.
+  const auto count = [](std::atomic<std::uint64_t>& counter) {
+    counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  };
+  if (record.reasons.has(Reason::kOverrun)) count(overruns_);
+  if (record.reasons.has(Reason::kUnseen)) count(unseen_);
+  if (record.held.count() > longest_interval_ns_.load(std::memory_order_relaxed)) {
+    longest_interval_ns_.store(record.held.count(), std::memory_order_relaxed);
+  }
+}
+
+void HapticLoop::stop() noexcept { applied_ = device_.apply(Vec3::Zero()); }
+
+HapticLoop::Stats HapticLoop::stats() const noexcept {
+  return {steps_.load(std::memory_order_relaxed), overruns_.load(std::memory_order_relaxed),
+          unseen_.load(std::memory_order_relaxed), Duration(longest_interval_ns_.load(std::memory_order_relaxed)),
+          fault_.load(std::memory_order_relaxed)};
+}
+
+}  // namespace tendon

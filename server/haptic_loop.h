@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "core/estimation/velocity_estimator.h"
+#include "core/haptic_controller.h"
+#include "devices/device.h"
+#include "server/mailboxes.h"
+
+namespace tendon {
+
+/// One half of the world: reads the device, runs the control law, applies the force.
+///
+/// One thread calls `step` when it is due, and does nothing else but wait and read the clock.
+///
+/// Thread-safe: `stats` from any thread; the rest from the haptic thread only.
+/// Realtime-safe: yes. No heap, no lock, no log, no socket (see tests/realtime).
+class HapticLoop {
+ public:
+  struct Config {
+    Duration period = std::chrono::milliseconds(1);
+    HapticController::Config control;
+  };
+
+  struct Stats {
+    std::uint64_t steps = 0;
+    std::uint64_t overruns = 0;  ///< intervals longer than the bound assumed
+    std::uint64_t unseen = 0;    ///< steps in which the device gave no position
+    Duration longest_interval{};
+    HapticController::Fault fault = HapticController::Fault::kNone;
+  };
+
+  /// `device` and `mail` must outlive the loop. Throws std::invalid_argument when a value is impossible.
+  HapticLoop(const Config& config, Device& device, Mailboxes& mail);
+
+  /// One haptic step. Returns when the next one is due: one period after this one was, or, when this one
+  /// was late by a period or more, one period from now: steps that were missed are not made up for.
+  LocalTime step(LocalTime now) noexcept;
+
+  /// Zero force, now. The last thing the haptic thread does.
+  void stop() noexcept;
+
+  Stats stats() const noexcept;
+
+ private:
+  void take_mail(LocalTime now) noexcept;
+  void publish(const StepRecord& record) noexcept;
+
+  Config config_;
+  Device& device_;
+  Mailboxes& mail_;
+  HapticController controller_;
+  VelocityEstimator velocity_;
+  Vec3 applied_ = Vec3::Zero();
+  std::uint64_t tick_ = 0;
+  LocalTime due_{};
+
+  std::atomic<std::uint64_t> steps_{0};
+  std::atomic<std::uint64_t> overruns_{0};
+  std::atomic<std::uint64_t> unseen_{0};
+  std::atomic<std::int64_t> longest_interval_ns_{0};
+  std::atomic<HapticController::Fault> fault_{HapticController::Fault::kNone};
+};
+
+}  // namespace tendon

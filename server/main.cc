@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <ctime>
+#include <exception>
+#include <iostream>
+#include <sstream>
+#include <string>
+
+#include "devices/simulated/profiles.h"
+#include "server/build_info.h"
+#include "server/log.h"
+#include "server/scene.h"
+#include "server/server.h"
+
+namespace {
+
+using namespace tendon;
+
+/// A year: what is longer was not meant.
+constexpr double kLongestRun_s = 365.0 * 86400;
+
+sigset_t signals_to_end() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaddset(&set, signal);
+  return set;
+}
+
+// Waits for a signal to end, or for `duration_s` seconds when it is above zero. Returns why it ended.
+std::string wait_for_the_end(const sigset_t& signals, double duration_s) {
+  if (duration_s <= 0) {
+    int signal = 0;
+    sigwait(&signals, &signal);
+    return std::string("signal ") + std::to_string(signal);
+  }
+  const Duration duration = from_seconds(duration_s);
+  const auto whole = std::chrono::floor<std::chrono::seconds>(duration);
+  const timespec timeout{.tv_sec = whole.count(), .tv_nsec = (duration - whole).count()};
+  const int signal = sigtimedwait(&signals, nullptr, &timeout);
+  return signal > 0 ? "signal " + std::to_string(signal) : "its duration is over";
+}
+
+void print_json(const Server::Summary& summary) {
+  const auto& [haptic, network, recording, uptime] = summary;
+  std::ostringstream out;
+  const auto add = [&out](const char* name, auto value) { out << ",\"" << name << "\":" << value; };
+  add("uptime_s", seconds(uptime));
+  add("steps", haptic.steps);
+  add("overruns", haptic.overruns);
+  add("unseen", haptic.unseen);
+  add("longest_interval_us", seconds(haptic.longest_interval) * 1e6);
+  add("fault", static_cast<int>(haptic.fault));
+  add("welcomed", network.welcomed);
+  add("refused", network.refused);
+  add("timed_out", network.timed_out);
+  add("forces", network.forces);
+  add("denied", network.denied);
+  add("unanswerable", network.unanswerable);
+  add("malformed", network.malformed + network.controller.malformed);
+  add("invalid", network.controller.invalid);
+  add("duplicated", network.controller.duplicated);
+  add("lost", network.controller.lost);
+  add("round_trip_ms", seconds(network.controller.smoothed_round_trip) * 1e3);
+  if (recording) {
+    add("recorded_bytes", recording->bytes);
+    add("recorded_steps", recording->steps);
+    add("lost_steps", recording->lost_steps);
+    add("lost_datagrams", recording->lost_datagrams);
+    add("recording_ended_early", recording->error.empty() ? "false" : "true");
+  }
+  std::cout << "{\"event\":\"stopped\"" << out.str() << "}" << std::endl;
+}
+
+int run(Scene scene, double duration_s, bool json) {
+  // Every thread inherits this mask, so that signals come to sigwait only.
+  const sigset_t signals = signals_to_end();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  // What ends a recording or closes a log must not end the device loop.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+
+  Server server(scene);
+  server.start();
+  log::info("tendond " + std::string(kVersion) + " (" + std::string(kCommit) + ") listens on " +
+            to_string(server.address()));
+  if (scene.recording) log::info("recording to " + scene.recording->string());
+  if (json) {
+    std::cout << "{\"event\":\"listening\",\"address\":\"" << to_string(server.address()) << "\"}" << std::endl;
+  }
+  const std::string why = wait_for_the_end(signals, duration_s);
+  const Server::Summary summary = server.stop();
+  log::info("stopped: " + why + "; " + std::to_string(summary.haptic.steps) + " steps, " +
+            std::to_string(summary.haptic.overruns) + " overruns, " + std::to_string(summary.network.forces) +
+            " forces");
+  if (json) print_json(summary);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "tendond: the haptics server. Runs the device loop and the output limiter beside the device, and lets\n"
+      "remote physics engines send forces over UDP.\n\n"
+      "Example:  tendond deploy/scenes/demo.toml --record run.mcap\n");
+  std::string scene_file;
+  std::string record;
+  std::string listen;
+  double duration_s = 0;
+  bool without_limiter = false;
+  bool json = false;
+  bool profiles = false;
+  bool scene_help = false;
+  auto* scene_option = app.add_option("scene", scene_file, "Scene file (TOML)");
+  app.add_option("--record", record, "Record to this MCAP file, whatever the scene says");
+  app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
+  app.add_option("--duration-s", duration_s, "Stop after so many seconds; 0 = at SIGINT or SIGTERM");
+  app.add_flag("--without-limiter", without_limiter, "Switch the output limiter off. Simulated devices only");
+  app.add_flag("--json", json, "One JSON object per line on stdout: listening, stopped");
+  app.add_flag("--profiles", profiles, "Print the device profiles, and how each of their numbers is known");
+  app.add_flag("--scene-help", scene_help, "Print every key that a scene may have");
+  app.set_version_flag("--version", std::string(kVersion) + " (" + std::string(kCommit) + ")");
+  try {
+    app.parse(argc, argv);
+    if (profiles) {
+      for (const DeviceProfile& profile : device_profiles()) std::cout << provenance_table(profile) << '\n';
+      return 0;
+    }
+    if (scene_help) {
+      std::cout << scene_reference();
+      return 0;
+    }
+    if (!(duration_s >= 0 && duration_s <= kLongestRun_s)) {  // NaN is neither
+      throw CLI::ValidationError("--duration-s", "expected 0 to 31536000 seconds");
+    }
+    if (scene_option->count() == 0) throw CLI::RequiredError("scene");
+  } catch (const CLI::ParseError& problem) {
+    return app.exit(problem) == 0 ? 0 : 2;
+  }
+
+  try {
+    Scene scene = read_scene(scene_file);
+    if (!record.empty()) scene.recording = record;
+    if (!listen.empty()) scene.network.listen = parse_address(listen);
+    if (without_limiter) scene.loop.control.limiter = HapticController::Limiter::kNone;
+    return run(std::move(scene), duration_s, json);
+  } catch (const std::exception& problem) {
+    log::error(problem.what());
+    return 2;
+  }
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+// The names and numbers of the MCAP container format, version 0, that the writer and the reader share.
+// Source: https://mcap.dev/spec
+//
+//   file   = magic, Header, data section, DataEnd, summary section, summary offset section, Footer, magic
+//   record = opcode (1 byte), length of content (8 bytes), content
+//
+// Integers are little-endian; strings, arrays and maps are preceded by their length in bytes (4 bytes).
+
+namespace tendon::mcap {
+
+inline constexpr std::array<std::byte, 8> kMagic = {std::byte{0x89}, std::byte{'M'}, std::byte{'C'},  std::byte{'A'},
+                                                    std::byte{'P'},  std::byte{'0'}, std::byte{'\r'}, std::byte{'\n'}};
+
+enum class Opcode : std::uint8_t {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kChunkIndex = 0x08,
+  kStatistics = 0x0B,
+  kSummaryOffset = 0x0E,
+  kDataEnd = 0x0F,
+};
+
+/// Opcode and length, before the content of every record.
+inline constexpr std::size_t kRecordHead = 1 + 8;
+
+/// The CRC-32 (of zlib, PNG, Ethernet) of some bytes followed by `bytes`, given that of the former; that of none is 0.
+std::uint32_t extend_crc(std::uint32_t crc, std::span<const std::byte> bytes);
+
+}  // namespace tendon::mcap

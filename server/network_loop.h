@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocol/handshake.h"
+#include "protocol/link.h"
+#include "protocol/messages.h"
+#include "protocol/session.h"
+#include "server/mailboxes.h"
+
+namespace tendon {
+
+/// The other half of the world: lets guests in, hands their forces to the haptic loop and the device's
+/// states to them.
+///
+/// One thread calls `turn` when a datagram has come, when the haptic loop has made a step, or when the
+/// time that the last turn returned has come; it does nothing else but wait and read the clock.
+///
+/// One controller and up to `max_observers` observers. The link is drained in every turn, so nothing
+/// waits behind what is old; forces are newest-wins, every request is answered.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class NetworkLoop {
+ public:
+  struct Config {
+    std::array<std::byte, 32> secret{};     ///< of the cookies; random at start
+    std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
+    std::string server_name = "tendond";
+    std::string device_name;
+    double max_force = 0;            ///< N, told to guests
+    double position_resolution = 0;  ///< m, told to guests
+    Duration haptic_period = std::chrono::milliseconds(1);
+    /// Each costs a state datagram of some 250 bytes per haptic step.
+    std::size_t max_observers = 8;
+    Duration controller_timeout = std::chrono::seconds(2);
+    Duration observer_timeout = std::chrono::seconds(10);
+    /// Datagrams taken in one turn; a flood must not keep states from being sent. A 1 kHz engine sends 1 per turn.
+    std::size_t max_datagrams = 256;
+  };
+
+  struct Stats {
+    std::uint64_t welcomed = 0;
+    std::uint64_t refused = 0;
+    std::uint64_t timed_out = 0;
+    std::uint64_t malformed = 0;     ///< datagrams that belong to nobody
+    std::uint64_t forces = 0;        ///< handed to the haptic loop
+    std::uint64_t denied = 0;        ///< forces and requests that only a controller may send
+    std::uint64_t unanswerable = 0;  ///< forces that answer a step which never was, or long ago
+    LinkStats controller;            ///< the link of the present controller, or of the last one
+  };
+
+  /// What the operator should read in the log.
+  struct Notice {
+    bool warning = false;
+    std::string text;
+  };
+
+  /// `link` and `mail` must outlive the loop.
+  NetworkLoop(const Config& config, Link& link, Mailboxes& mail);
+
+  /// One round. Returns when the next one is due at the latest.
+  LocalTime turn(LocalTime now);
+
+  /// Says goodbye to every guest. The last thing the network thread does.
+  void close(LocalTime now);
+
+  const Stats& stats() const noexcept { return stats_; }
+
+  /// What happened since the last call, for the log; at most 64 are kept.
+  std::vector<Notice> take_notices();
+
+ private:
+  struct Guest {
+    Address address;
+    ClientRandom random;  ///< of its Hello: the same one again is the same attempt
+    std::string name;
+    Role role;
+    Welcome welcome;
+    Session session;
+    std::uint64_t state_every = 1;  ///< haptic steps
+    std::uint64_t last_state = 0;   ///< tick
+    bool gone = false;
+  };
+
+  bool drain(LocalTime now);
+  void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
+  void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
+  void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);
+  std::string reason_to_refuse(const Address& from, const Doorman::Guest& guest, Code& code) const;
+  void serve(LocalTime now, Guest& guest);
+  void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
+  void answer(Guest& guest, std::uint32_t id, const Request& request);
+  void leave(Guest& guest, const std::string& how);
+  void publish();
+  void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
+  void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
+           std::size_t size);
+  void notice(bool warning, std::string text);
+
+  Config config_;
+  Link& link_;
+  Mailboxes& mail_;
+  Doorman doorman_;
+  std::vector<Guest> guests_;
+  std::uint32_t next_connection_id_;
+  DatagramRecord tapped_;  ///< kept: 1200 bytes
+
+  /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.
+  struct Sampled {
+    std::uint64_t tick = 0;
+    LocalTime at{};
+  };
+  static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz, longer than any loop worth rendering
+  std::array<Sampled, kRemembered> sampled_{};
+
+  Stats stats_;
+  std::vector<Notice> notices_;
+};
+
+}  // namespace tendon

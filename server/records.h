@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/haptic_controller.h"
+#include "protocol/link.h"
+
+namespace tendon {
+
+/// One haptic step, as it is recorded: everything that it takes to take it again, and what the device
+/// made of it.
+struct StepRecord : Step {
+  std::uint64_t tick = 0;
+  LocalTime scheduled{};        ///< when the step was due
+  Vec3 applied = Vec3::Zero();  ///< N, really written by the device (`force` is what it was told)
+};
+
+/// One datagram that went in or out.
+struct DatagramRecord {
+  enum class Direction : std::uint8_t { kIn = 1, kOut = 2 };
+  LocalTime at{};
+  Direction direction = Direction::kIn;
+  Address peer;
+  std::uint32_t size = 0;  ///< bytes on the wire; `bytes` holds at most kMaxDatagram of them
+  std::array<std::byte, kMaxDatagram> bytes;
+};
+
+}  // namespace tendon

@@ -1,0 +1,962 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <initializer_list>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "devices/simulated/profiles.h"
+#include "devices/simulated/recorded_motion.h"
+#include "protocol/limits.h"
+
+// In three parts: how values are written (units, rules); which keys there are (the declarations); what
+// walks over the declarations (Reader fills a Draft from a file, Reference prints them) and what is done
+// with the Draft. A new key is one line in the second part.
+
+namespace tendon {
+namespace {
+
+// --- How values are written ---------------------------------------------------------------------------
+
+/// The end of a key's name tells its unit.
+struct Unit {
+  std::string_view suffix;
+  std::string_view symbol;
+  double per_si;  ///< a whole number: dividing by it rounds once, so 43 µm is the same double as 0.000043
+};
+
+constexpr Unit kNoUnit = {"", "", 1};
+
+/// Longest suffix first.
+constexpr std::array kUnits = {
+    Unit{"_n_s_per_m", "N·s/m", 1}, Unit{"_n_per_m", "N/m", 1}, Unit{"_n_per_s", "N/s", 1}, Unit{"_hz", "Hz", 1},
+    Unit{"_kg", "kg", 1},           Unit{"_mm", "mm", 1e3},     Unit{"_ms", "ms", 1e3},     Unit{"_um", "µm", 1e6},
+    Unit{"_us", "µs", 1e6},         Unit{"_m", "m", 1},         Unit{"_n", "N", 1},
+};
+
+const Unit& unit_of(std::string_view key) {
+  const auto* const found =
+      std::find_if(kUnits.begin(), kUnits.end(), [key](const Unit& unit) { return key.ends_with(unit.suffix); });
+  return found == kUnits.end() ? kNoUnit : *found;
+}
+
+std::string with_symbol(std::string text, const Unit& unit) {
+  if (!unit.symbol.empty()) text.append(" ").append(unit.symbol);
+  return text;
+}
+
+/// The shortest text that reads back as `value`; without an exponent where a person would use none.
+std::string digits(double value) {
+  std::array<char, 32> text{};
+  const double size = std::abs(value);
+  const bool plain = size == 0 || (size >= 1e-4 && size < 1e9);
+  const auto end = plain ? std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed).ptr
+                         : std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+std::string in_quotes(std::string_view text) { return '"' + std::string(text) + '"'; }
+
+/// What the file has, in the words of an error.
+std::string found_in(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::string:
+      return in_quotes(**node.as_string());
+    case toml::node_type::integer:
+      return std::to_string(**node.as_integer());
+    case toml::node_type::floating_point:
+      return digits(**node.as_floating_point());
+    case toml::node_type::boolean:
+      return **node.as_boolean() ? "true" : "false";
+    case toml::node_type::array:
+      return "an array of " + std::to_string(node.as_array()->size());
+    case toml::node_type::table:
+      return "a table";
+    default:
+      return "a date or time";
+  }
+}
+
+std::optional<double> number_in(const toml::node& node) {
+  if (const auto* integer = node.as_integer()) return static_cast<double>(**integer);
+  if (const auto* number = node.as_floating_point()) return **number;
+  return std::nullopt;
+}
+
+/// Why a value is not accepted; none when it is.
+struct Refusal {
+  const toml::node* found;
+  std::string expected;
+};
+using Verdict = std::optional<Refusal>;
+
+// A rule says which values a key may have: `expected` in words, `take` converts one to SI, `shown` is the
+// way back, for the defaults in the reference.
+
+/// The longest time in a scene. Nothing in a haptic loop is meant to last an hour, and sums of times stay small.
+constexpr Duration kLongest = limits::kMaxTimeout;
+
+/// A number in the key's unit.
+struct Number {
+  double least = -limits::kMaxValue;
+  double most = limits::kMaxValue;
+  bool without_least = false;
+  bool or_infinite = false;
+
+  std::string expected(const Unit& unit) const {
+    std::string text;
+    if (least <= -limits::kMaxValue) {
+      text = unit.symbol.empty() ? "a number" : "a number of " + std::string(unit.symbol);
+    } else if (most < limits::kMaxValue) {
+      text = with_symbol("a number from " + digits(least) + " to " + digits(most), unit);
+    } else if (without_least) {
+      text = with_symbol("a number above " + digits(least), unit);
+    } else {
+      text = with_symbol("a number of " + digits(least), unit) + " or more";
+    }
+    return or_infinite ? text + ", or inf" : text;
+  }
+
+  Verdict take(const toml::node& node, const Unit& unit, double& to) const {
+    const auto number = number_in(node);
+    if (auto refusal = check(node, unit, number, most)) return refusal;
+    to = *number / unit.per_si;
+    return {};
+  }
+
+  Verdict take(const toml::node& node, const Unit& unit, Duration& to) const {
+    const auto number = number_in(node);
+    if (auto refusal = check(node, unit, number, std::min(most, seconds(kLongest) * unit.per_si))) return refusal;
+    const Duration rounded(std::llround(*number * (1e9 / unit.per_si)));
+    if (without_least && rounded <= Duration::zero()) return Refusal{&node, expected(unit)};
+    to = rounded;
+    return {};
+  }
+
+  template <class T>
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<T>& to) const {
+    T value{};
+    if (auto refusal = take(node, unit, value)) return refusal;
+    to = value;
+    return {};
+  }
+
+  static std::string shown(const Unit& unit, double value) { return digits(value * unit.per_si); }
+  static std::string shown(const Unit& unit, Duration value) {
+    return digits(static_cast<double>(value.count()) / (1e9 / unit.per_si));
+  }
+  template <class T>
+  static std::string shown(const Unit& unit, const std::optional<T>& value) {
+    return value ? shown(unit, *value) : "none";
+  }
+
+ private:
+  Verdict check(const toml::node& node, const Unit& unit, std::optional<double> number, double limit) const {
+    if (number && or_infinite && *number == std::numeric_limits<double>::infinity()) return {};
+    const bool too_small = number && !(without_least ? *number > least : *number >= least);  // a NaN too
+    if (!number || too_small) return Refusal{&node, expected(unit)};
+    if (*number <= limit) return {};
+    return Refusal{&node, limit < most || most >= limits::kMaxValue
+                              ? with_symbol("a number of at most " + digits(limit), unit)
+                              : expected(unit)};
+  }
+};
+
+constexpr Number kAnyNumber{};
+constexpr Number kZeroOrMore{.least = 0};
+constexpr Number kAboveZero{.least = 0, .without_least = true};
+constexpr Number kAboveZeroOrInf{.least = 0, .without_least = true, .or_infinite = true};
+
+/// A number of the device's effects: what is `false` does not exist.
+struct OrFalse {
+  Number number;
+
+  std::string expected(const Unit& unit) const { return number.expected(unit) + ", or false for none"; }
+
+  template <class T>
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<T>& to) const {
+    if (const auto* none = node.as_boolean(); none != nullptr && !**none) {
+      to.reset();
+      return {};
+    }
+    if (auto refusal = number.take(node, unit, to)) return Refusal{&node, expected(unit)};
+    return {};
+  }
+
+  template <class T>
+  static std::string shown(const Unit& unit, const std::optional<T>& value) {
+    return Number::shown(unit, value);
+  }
+};
+
+struct Count {
+  std::size_t most;
+
+  std::string expected(const Unit&) const { return "a whole number from 0 to " + std::to_string(most); }
+
+  Verdict take(const toml::node& node, const Unit& unit, std::size_t& to) const {
+    const auto* count = node.as_integer();
+    if (count == nullptr || **count < 0 || static_cast<std::uint64_t>(**count) > most) {
+      return Refusal{&node, expected(unit)};
+    }
+    to = static_cast<std::size_t>(**count);
+    return {};
+  }
+
+  static std::string shown(const Unit&, std::size_t value) { return std::to_string(value); }
+};
+
+/// A point or a direction.
+struct Vector {
+  static std::string expected(const Unit& unit) {
+    return unit.symbol.empty() ? "[x, y, z]" : "[x, y, z] in " + std::string(unit.symbol);
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, Vec3& to) {
+    const auto* array = node.as_array();
+    if (array == nullptr || array->size() != 3) return Refusal{&node, expected(unit)};
+    Vec3 vector;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      if (auto refusal = kAnyNumber.take(*array->get(static_cast<std::size_t>(i)), unit, vector[i])) return refusal;
+    }
+    to = vector;
+    return {};
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::optional<Vec3>& to) {
+    return take(node, unit, to.emplace());
+  }
+
+  static std::string shown(const Unit& unit, const Vec3& value) {
+    return "[" + Number::shown(unit, value.x()) + ", " + Number::shown(unit, value.y()) + ", " +
+           Number::shown(unit, value.z()) + "]";
+  }
+  static std::string shown(const Unit& unit, const std::optional<Vec3>& value) {
+    return value ? shown(unit, *value) : "none";
+  }
+};
+
+template <class Rule>
+struct ListOf {
+  Rule rule;
+
+  std::string expected(const Unit& unit) const { return "[…], of which each is " + rule.expected(unit); }
+
+  template <class T>
+  Verdict take(const toml::node& node, const Unit& unit, std::vector<T>& to) const {
+    const auto* array = node.as_array();
+    if (array == nullptr) return Refusal{&node, expected(unit)};
+    to.clear();
+    for (const toml::node& element : *array) {
+      if (auto refusal = rule.take(element, unit, to.emplace_back())) return refusal;
+    }
+    return {};
+  }
+
+  template <class T>
+  static std::string shown(const Unit&, const std::vector<T>&) {
+    return "[]";
+  }
+};
+
+struct YesNo {
+  static std::string expected(const Unit&) { return "true or false"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, bool& to) {
+    const auto* truth = node.as_boolean();
+    if (truth == nullptr) return Refusal{&node, expected(unit)};
+    to = **truth;
+    return {};
+  }
+
+  static std::string shown(const Unit&, bool value) { return value ? "true" : "false"; }
+};
+
+struct Path {
+  static std::string expected(const Unit&) { return "a path in quotes"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::filesystem::path& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr || (*text)->empty()) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::optional<std::filesystem::path>& to) {
+    return take(node, unit, to.emplace());
+  }
+
+  static std::string shown(const Unit&, const std::filesystem::path& value) { return in_quotes(value.string()); }
+  static std::string shown(const Unit&, const std::optional<std::filesystem::path>&) { return "none"; }
+};
+
+struct Column {
+  static std::string expected(const Unit&) { return "a column's name in quotes or its number, from 0"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, RecordedMotionFile::Column& to) {
+    if (const auto* name = node.as_string(); name != nullptr && !(*name)->empty()) {
+      to = **name;
+      return {};
+    }
+    const auto* number = node.as_integer();
+    if (number == nullptr || **number < 0) return Refusal{&node, expected(unit)};
+    to = static_cast<std::size_t>(**number);
+    return {};
+  }
+
+  static std::string shown(const Unit&, const RecordedMotionFile::Column& value) {
+    const auto* name = std::get_if<std::string>(&value);
+    return name != nullptr ? in_quotes(*name) : std::to_string(std::get<std::size_t>(value));
+  }
+};
+
+/// Where this server listens. UdpLink refuses other addresses too, but has no line to name.
+struct LoopbackAddress {
+  static std::string expected(const Unit&) {
+    return "a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", because what is sent is not encrypted and "
+           "anyone on a network could command forces";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, Address& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr) return Refusal{&node, expected(unit)};
+    try {
+      const Address address = parse_address(**text);
+      if (!is_loopback(address)) return Refusal{&node, expected(unit)};
+      to = address;
+      return {};
+    } catch (const std::invalid_argument&) {
+      return Refusal{&node, expected(unit)};
+    }
+  }
+
+  static std::string shown(const Unit&, const Address& value) { return in_quotes(to_string(value)); }
+};
+
+/// One of a few names.
+template <class T>
+struct Names {
+  std::vector<std::pair<std::string_view, T>> all;
+
+  std::string expected(const Unit&) const {
+    std::string text = all.size() == 1 ? "" : "one of ";
+    for (const auto& [name, value] : all) text += (name == all.front().first ? "" : ", ") + in_quotes(name);
+    return text;
+  }
+
+  Verdict take(const toml::node& node, const Unit& unit, T& to) const {
+    const auto* text = node.as_string();
+    if (text == nullptr) return Refusal{&node, expected(unit)};
+    for (const auto& [name, value] : all) {
+      if (name != **text) continue;
+      to = value;
+      return {};
+    }
+    return Refusal{&node, expected(unit)};
+  }
+
+  std::string shown(const Unit&, const T& wanted) const {
+    for (const auto& [name, value] : all) {
+      if (value == wanted) return in_quotes(name);
+    }
+    return "none";
+  }
+};
+
+// --- Which keys there are -----------------------------------------------------------------------------
+
+/// A scene while it is read: what depends on several keys is still open.
+struct Draft {
+  Draft() {
+    // 1 N per step at 1 kHz: a hand cannot tell the ramp from a step, and a force that flips its sign at every
+    // datagram loses its edge.
+    scene.loop.control.max_slew = 1000;
+  }
+
+  Scene scene;
+  const DeviceProfile* profile = nullptr;
+  OperatorHand::Config hand{0, 0, 0, ScriptedMotion(ScriptedMotion::Sine{})};  // not listed: not there, so 0
+  bool has_hand = false;
+  ScriptedMotion::Script motion = ScriptedMotion::Sine{};
+  std::optional<RecordedMotionFile> recorded_motion;
+  std::optional<Duration> longest_hold;
+  std::optional<double> coulomb_bound;
+  std::optional<double> viscous_bound;
+  std::optional<double> max_force;
+};
+
+/// What holds when a key is not there, where that is not simply the value of the target.
+struct Absent {
+  bool required = false;
+  std::string_view text = {};
+};
+constexpr Absent kRequired = {.required = true};
+
+enum class DeviceKind : std::uint8_t { kSimulated };
+enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
+
+Names<const DeviceProfile*> profile_names() {
+  Names<const DeviceProfile*> names;
+  for (const DeviceProfile& profile : device_profiles()) names.all.emplace_back(profile.name, &profile);
+  return names;
+}
+
+Names<MotionKind> motion_names() {
+  return {{{"sine", MotionKind::kSine},
+           {"ramp-hold", MotionKind::kRampHold},
+           {"minimum-jerk", MotionKind::kMinimumJerk},
+           {"recorded", MotionKind::kRecorded}}};
+}
+
+Names<ScriptedMotion::Recorded::AtEnd> at_end_names() {
+  using enum ScriptedMotion::Recorded::AtEnd;
+  return {{{"hold", kHold}, {"repeat", kRepeat}}};
+}
+
+Names<HapticController::Limiter> limiter_names() {
+  using enum HapticController::Limiter;
+  return {{{"adjusting-output-limiter", kJoint}, {"adjusting-output-limiter-per-axis", kPerAxis}, {"none", kNone}}};
+}
+
+template <class Table>
+void declare_effects(Table& effects, const DeviceProfile* profile, SimulatedDevice::Config& device) {
+  constexpr OrFalse kEffect{kAboveZero};
+  constexpr Absent kProfiles{.text = "the profile's; without a profile there is no such effect"};
+  effects.key("mass_kg", device.mass, kAboveZero, "apparent mass at the handle",
+              Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
+  effects.key("viscous_friction_n_s_per_m", device.viscous_friction, kEffect, "true viscous friction", kProfiles);
+  effects.key("coulomb_friction_n", device.coulomb_friction, kEffect, "true Coulomb friction", kProfiles);
+  effects.key("encoder_step_um", device.encoder_step, kEffect, "one encoder count, on each axis", kProfiles);
+  effects.key("max_force_n", device.max_force, kEffect, "the device clamps the force vector to this length", kProfiles);
+  effects.key("amplifier_bandwidth_hz", device.amplifier_bandwidth, kEffect,
+              "the motors follow the command with this bandwidth (-3 dB, first order)", kProfiles);
+  effects.key("watchdog_ms", device.watchdog, kEffect,
+              "the device drops the force when it gets no command for this long", kProfiles);
+}
+
+template <class Table>
+void declare_motion(Table& motion, Draft& draft) {
+  motion.kind(motion_names(), [&draft](Table& keys, MotionKind kind) {
+    switch (kind) {
+      case MotionKind::kSine: {
+        auto& sine = std::get<ScriptedMotion::Sine>(draft.motion = ScriptedMotion::Sine{});
+        keys.key("amplitude_mm", sine.amplitude, kZeroOrMore, "to either side of the centre", kRequired);
+        keys.key("frequency_hz", sine.frequency, kZeroOrMore, "cycles per second", kRequired);
+        keys.key("centre_mm", sine.centre, Vector{}, "where it starts");
+        keys.key("direction", sine.direction, Vector{}, "where it moves first; its length does not count");
+        return;
+      }
+      case MotionKind::kRampHold: {
+        auto& ramp = std::get<ScriptedMotion::RampHold>(draft.motion = ScriptedMotion::RampHold{});
+        keys.key("from_mm", ramp.from, Vector{}, "where it starts", kRequired);
+        keys.key("to_mm", ramp.to, Vector{}, "where it goes at constant speed", kRequired);
+        keys.key("ramp_ms", ramp.ramp, kAboveZero, "for how long it goes", kRequired);
+        keys.key("hold_ms", ramp.hold, kZeroOrMore, "for how long it rests at either end, to and fro for ever",
+                 Absent{.text = "it goes once and stays"});
+        return;
+      }
+      case MotionKind::kMinimumJerk: {
+        auto& reach = std::get<ScriptedMotion::MinimumJerk>(draft.motion = ScriptedMotion::MinimumJerk{});
+        keys.key("points_mm", reach.points, ListOf<Vector>{}, "2 or more points, at rest at each", kRequired);
+        keys.key("durations_ms", reach.durations, ListOf<Number>{kAboveZero}, "of the ways between them", kRequired);
+        keys.key("back_and_forth", reach.back_and_forth, YesNo{}, "for ever; else it stays at the last point");
+        return;
+      }
+      case MotionKind::kRecorded: {
+        auto& file = draft.recorded_motion.emplace();
+        keys.key("file", file.path, Path{}, "CSV file, relative to the scene file", kRequired);
+        keys.key("time_column", file.time, Column{}, "time in s");
+        keys.key("position_column", file.position, Column{}, "position along a line", kRequired);
+        keys.key("scale_m", file.scale, kAnyNumber, "how long one unit of the position is; negative turns it round");
+        keys.key("origin_mm", file.origin, Vector{}, "where position 0 lies");
+        keys.key("direction", file.direction, Vector{}, "of the line; its length does not count");
+        keys.key("at_end", file.at_end, at_end_names(), "stay at the last sample, or start again");
+        return;
+      }
+    }
+  });
+}
+
+template <class Table>
+void declare_device(Table& device, Draft& draft) {
+  device.kind(Names<DeviceKind>{{{"simulated", DeviceKind::kSimulated}}}, [&draft](Table& keys, DeviceKind) {
+    SimulatedDevice::Config& config = draft.scene.device;
+    keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
+    if (draft.profile != nullptr) config = draft.profile->device();
+    keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
+             Absent{.text = "where the hand starts, or the origin"});
+    keys.table("effects", [&](Table& effects) { declare_effects(effects, draft.profile, config); });
+    draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
+      hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip", kRequired);
+      hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip");
+      hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle");
+      hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
+    });
+  });
+}
+
+/// The wire tells the loop's rate in whole Hz, so a period is 1 s or less.
+constexpr Number kPeriod{.least = 1e6 / limits::kMaxLoopHz, .most = 1e6};
+/// The wire tells timeouts in whole ms.
+constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
+/// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
+constexpr Count kObservers{1000};
+
+template <class Table>
+void declare_scene(Table& scene, Draft& draft) {
+  scene.table("device", [&draft](Table& device) { declare_device(device, draft); });
+
+  scene.table("loop", [&draft](Table& loop) {
+    loop.key("period_us", draft.scene.loop.period, kPeriod, "from one haptic step to the next");
+    loop.key("longest_hold_us", draft.longest_hold, kAboveZero,
+             "T_max of the limiter: a force held for longer is an overrun. Not below the period",
+             Absent{.text = "2 periods"});
+  });
+
+  scene.table("limiter", [&draft](Table& limiter) {
+    constexpr Absent kProfiles{.text = "the profile's; required without a profile, unless kind is \"none\""};
+    limiter.key("kind", draft.scene.loop.control.limiter, limiter_names(),
+                "keeps the device from giving out energy. \"none\" is for simulated devices only");
+    limiter.key("coulomb_friction_n", draft.coulomb_bound, kZeroOrMore,
+                "lower bound of the device's Coulomb friction (per axis: of each axis by itself)", kProfiles);
+    limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
+                "lower bound of the device's viscous friction", kProfiles);
+  });
+
+  scene.table("force", [&draft](Table& force) {
+    HapticController::Config& control = draft.scene.loop.control;
+    force.key("max_force_n", draft.max_force, kAboveZero, "no force is longer than this",
+              Absent{.text = "the device's; required when the device has none"});
+    force.key("max_slew_n_per_s", control.max_slew, kAboveZeroOrInf, "no force changes faster than this");
+    force.key("hold_ms", control.hold.hold, kZeroOrMore, "a force is held for this long after its validity ends");
+    force.key("decay_ms", control.hold.decay, kAboveZero, "time constant of its fading after that");
+    force.key("safe_stop_ms", control.hold.safe_stop, kZeroOrMore,
+              "zero force this long after validity ends. Not below hold_ms");
+    force.key("ramp_in_ms", control.hold.ramp_in, kZeroOrMore, "the first force is ramped in for this long");
+    force.key("max_valid_for_ms", control.hold.max_valid_for, kAboveZero,
+              "a force is valid for no longer than this, whatever its sender asks for");
+  });
+
+  scene.table("network", [&draft](Table& keys) {
+    Scene::Network& network = draft.scene.network;
+    keys.key("listen", network.listen, LoopbackAddress{}, "port 0 lets the system choose one");
+    keys.key("max_observers", network.max_observers, kObservers, "guests besides the controller");
+    keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
+    keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
+  });
+
+  scene.optional_table("recording", [&draft](Table& recording) {
+    recording.key("path", draft.scene.recording, Path{}, "MCAP file, relative to the current directory", kRequired);
+  });
+}
+
+// --- What walks over the declarations -----------------------------------------------------------------
+
+std::string joined(std::string_view path, std::string_view name) {
+  return path.empty() ? std::string(name) : std::string(path) + '.' + std::string(name);
+}
+
+/// How many letters have to be added, left out, replaced or swapped with their neighbour to turn `a` into `b`.
+std::size_t edits(std::string_view a, std::string_view b) {
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) {
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      const std::size_t replaced = d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      d[i][j] = std::min({replaced, d[i - 1][j] + 1, d[i][j - 1] + 1});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    }
+  }
+  return d[a.size()][b.size()];
+}
+
+/// What the writer of an unknown key may have meant.
+std::string advice(std::string_view unknown, const std::vector<std::string_view>& known) {
+  for (const std::string_view key : known) {
+    const Unit& unit = unit_of(key);
+    const std::string_view stem = key.substr(0, key.size() - unit.suffix.size());
+    const bool only_the_unit_differs = unknown == stem || unknown.starts_with(std::string(stem) + '_');
+    if (!unit.suffix.empty() && only_the_unit_differs) {
+      return std::string(stem) + " is given in " + std::string(unit.symbol) + ": " + std::string(key);
+    }
+  }
+  // Beyond a third of its letters a key is another word, not a misspelt one. Longer than any key of ours: no word.
+  constexpr std::size_t kLongestWord = 64;
+  std::string_view closest;
+  std::size_t fewest = unknown.size() <= kLongestWord ? unknown.size() / 3 + 1 : 0;
+  for (const std::string_view key : known) {
+    if (fewest == 0) break;
+    if (const std::size_t count = edits(unknown, key); count < fewest) {
+      fewest = count;
+      closest = key;
+    }
+  }
+  if (!closest.empty()) return "did you mean " + std::string(closest) + "?";
+  std::string all;
+  for (const std::string_view key : known) all.append(all.empty() ? "known here: " : ", ").append(key);
+  return all;
+}
+
+/// A place in the file that an error can name; line 0 is none.
+struct Place {
+  std::uint32_t line = 0;
+  std::uint32_t column = 0;
+  friend bool operator<(const Place& a, const Place& b) {
+    return std::pair(a.line, a.column) < std::pair(b.line, b.column);
+  }
+};
+
+Place place_of(const toml::node& node) { return {node.source().begin.line, node.source().begin.column}; }
+
+[[noreturn]] void fail(const std::string& file, Place at, const std::string& key, const std::string& sentence) {
+  std::string text = file;
+  if (at.line > 0) text += ':' + std::to_string(at.line);
+  throw SceneError(text + ": " + key + ": " + sentence);
+}
+
+/// Of all that is wrong with a file, what to report.
+class Findings {
+ public:
+  void wrong(Place at, std::string key, std::string sentence) { add({false, at, std::move(key), std::move(sentence)}); }
+  void missing(Place at, std::string key, std::string sentence) {
+    add({true, at, std::move(key), std::move(sentence)});
+  }
+
+  void throw_first(const std::string& file) const {
+    if (first_) fail(file, first_->at, first_->key, first_->sentence);
+  }
+
+ private:
+  struct Finding {
+    bool missing;
+    Place at;
+    std::string key;
+    std::string sentence;
+  };
+
+  void add(Finding finding) {
+    const auto rank = [](const Finding& f) { return std::pair(f.missing, f.at); };
+    if (!first_ || rank(finding) < rank(*first_)) first_ = std::move(finding);
+  }
+
+  std::optional<Finding> first_;
+};
+
+/// Fills the targets of one table's declarations from the file; `table` is null where the file has none.
+class Reader {
+ public:
+  Reader(Findings& findings, const toml::table* table, std::string path, Place place)
+      : findings_(findings), table_(table), path_(std::move(path)), place_(place) {}
+
+  template <class T, class Rule>
+  bool key(std::string_view name, T& target, const Rule& rule, std::string_view /*meaning*/,
+           const Absent& absent = {}) {
+    const Unit& unit = unit_of(name);
+    const toml::node* node = look_up(name);
+    if (node == nullptr) {
+      if (absent.required) {
+        findings_.missing(place_, joined(path_, name), "missing, expected " + rule.expected(unit));
+      }
+      return false;
+    }
+    const Verdict refusal = rule.take(*node, unit, target);
+    if (!refusal) return true;
+    findings_.wrong(place_of(*refusal->found), joined(path_, name),
+                    "expected " + refusal->expected + ", found " + found_in(*refusal->found));
+    return false;
+  }
+
+  /// A required key that decides which others there are.
+  template <class T, class Declare>
+  void kind(const Names<T>& names, const Declare& declare) {
+    T value{};
+    kind_known_ = key("kind", value, names, "", kRequired);
+    if (kind_known_) declare(*this, value);
+  }
+
+  template <class Declare>
+  void table(std::string_view name, const Declare& declare) {
+    const toml::node* node = look_up(name);
+    if (node != nullptr && !node->is_table()) {
+      findings_.wrong(place_of(*node), joined(path_, name), "expected a table, found " + found_in(*node));
+      return;
+    }
+    Reader inner(findings_, node != nullptr ? node->as_table() : nullptr, joined(path_, name),
+                 node != nullptr ? place_of(*node) : place_);
+    declare(inner);
+    inner.refuse_unknown();
+  }
+
+  template <class Declare>
+  bool optional_table(std::string_view name, const Declare& declare) {
+    const bool there = look_up(name) != nullptr;
+    if (there) table(name, declare);
+    return there;
+  }
+
+  void refuse_unknown() const {
+    if (table_ == nullptr || !kind_known_) return;
+    for (const auto& [name, node] : *table_) {
+      if (std::find(known_.begin(), known_.end(), name.str()) != known_.end()) continue;
+      findings_.wrong(place_of(node), joined(path_, name.str()),
+                      (node.is_table() ? "unknown table; " : "unknown key; ") + advice(name.str(), known_));
+    }
+  }
+
+ private:
+  const toml::node* look_up(std::string_view name) {
+    if (std::find(known_.begin(), known_.end(), name) == known_.end()) known_.push_back(name);
+    return table_ != nullptr ? table_->get(name) : nullptr;
+  }
+
+  Findings& findings_;
+  const toml::table* table_;
+  std::string path_;
+  Place place_;
+  std::vector<std::string_view> known_;
+  bool kind_known_ = true;  ///< else the table's keys are not known either
+};
+
+/// Writes the declarations down for people.
+class Reference {
+ public:
+  explicit Reference(std::string& text, std::string path = {}) : text_(text), path_(std::move(path)) {}
+
+  template <class T, class Rule>
+  bool key(std::string_view name, const T& target, const Rule& rule, std::string_view meaning,
+           const Absent& absent = {}) {
+    const Unit& unit = unit_of(name);
+    std::string without = "Default: ";
+    if (!absent.text.empty()) {
+      without += absent.text;
+    } else if (absent.required) {
+      without = "Required";
+    } else {
+      without += rule.shown(unit, target);
+    }
+    text_.append(indent_).append(name).append("\n");
+    text_.append(indent_).append("    ").append(meaning).append(".\n");
+    text_.append(indent_).append("    ").append(rule.expected(unit)).append(". ").append(without).append(".\n");
+    return false;
+  }
+
+  template <class T, class Declare>
+  void kind(const Names<T>& names, const Declare& declare) {
+    for (const auto& [name, value] : names.all) {
+      text_.append("  kind = ").append(in_quotes(name)).append("\n");
+      Reference inner(text_, path_);
+      inner.indent_ = "    ";
+      declare(inner, value);
+    }
+  }
+
+  template <class Declare>
+  void table(std::string_view name, const Declare& declare) {
+    const std::string path = joined(path_, name);
+    text_.append(text_.empty() ? "[" : "\n[").append(path).append("]\n");
+    Reference inner(text_, path);
+    declare(inner);
+  }
+
+  template <class Declare>
+  bool optional_table(std::string_view name, const Declare& declare) {
+    table(name, declare);
+    return true;
+  }
+
+ private:
+  std::string& text_;
+  std::string path_;
+  std::string indent_ = "  ";
+};
+
+/// Turns a draft without mistakes of its own into a scene: what depends on several keys.
+class Settlement {
+ public:
+  Settlement(Draft draft, const toml::table& file, const std::string& name)
+      : draft_(std::move(draft)), file_(file), name_(name) {}
+
+  Scene scene(const std::filesystem::path& directory) {
+    settle_motion(directory);
+    settle_control();
+    // Rules of the constructors that are not among ours yet.
+    Scene& scene = draft_.scene;
+    if (draft_.has_hand) scene.device.hand = draft_.hand;
+    build("device", [&scene] { SimulatedDevice{scene.device}; });
+    build("loop", [&scene] { HapticController{scene.loop.control}; });
+    return std::move(scene);
+  }
+
+ private:
+  /// Throws. The line is that of the first of `places` that the file has; of the innermost table around the
+  /// key when it has none of them.
+  [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
+                          const std::string& sentence) const {
+    Place place;
+    const auto look = [&](std::string_view path) {
+      if (const auto node = file_.at_path(path); node && place.line == 0) place = place_of(*node.node());
+    };
+    for (const std::string_view path : places) look(path);
+    for (std::string_view path = key;; path = path.substr(0, path.rfind('.'))) {
+      look(path);
+      if (path.find('.') == std::string_view::npos) break;
+    }
+    fail(name_, place, std::string(key), sentence);
+  }
+
+  template <class Build>
+  void build(std::string_view table, const Build& attempt) const {
+    try {
+      attempt();
+    } catch (const std::invalid_argument& refused) {
+      blame(table, {}, refused.what());
+    }
+  }
+
+  void settle_motion(const std::filesystem::path& directory) {
+    if (!draft_.has_hand) return;
+    build("device.hand.motion", [&] {
+      if (draft_.recorded_motion) {
+        draft_.recorded_motion->path = directory / draft_.recorded_motion->path;
+        try {
+          draft_.motion = load_recorded_motion(*draft_.recorded_motion);
+        } catch (const std::runtime_error& refused) {
+          blame("device.hand.motion.file", {}, refused.what());
+        }
+      }
+      draft_.hand.motion = ScriptedMotion(std::move(draft_.motion));
+    });
+  }
+
+  void settle_control() {
+    const SimulatedDevice::Config& device = draft_.scene.device;
+    HapticLoop::Config& loop = draft_.scene.loop;
+    HapticController::Config& control = loop.control;
+
+    // A loop without real-time priority is late by up to a period now and then; each time is an overrun beyond this.
+    control.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
+    if (control.longest_hold < loop.period) {
+      blame("loop.longest_hold_us", {}, at_least(loop.period, "the period", control.longest_hold, "_us"));
+    }
+    if (control.hold.safe_stop < control.hold.hold) {
+      blame("force.safe_stop_ms", {"force.safe_stop_ms", "force.hold_ms"},
+            at_least(control.hold.hold, "hold_ms", control.hold.safe_stop, "_ms"));
+    }
+    control.watchdog = device.watchdog.value_or(Duration::zero());
+
+    if (!draft_.max_force && !device.max_force) {
+      blame("force.max_force_n", {}, "missing, expected a number above 0 N, because the device has no max_force_n");
+    }
+    control.max_force = draft_.max_force ? *draft_.max_force : *device.max_force;
+
+    // Friction that is isotropic as a vector is less on each axis by itself: Σ f |dx_i| ≤ √3 f ‖dx‖ (control.md 1.6
+    // (a)).
+    const bool per_axis = control.limiter == HapticController::Limiter::kPerAxis;
+    const DeviceProfile* profile = draft_.profile;
+    control.friction.coulomb =
+        friction_bound("coulomb_friction_n", draft_.coulomb_bound, profile ? &profile->coulomb_bound : nullptr,
+                       device.coulomb_friction.value_or(0), per_axis ? 1 / std::numbers::sqrt3 : 1);
+    control.friction.viscous =
+        friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound, profile ? &profile->viscous_bound : nullptr,
+                       device.viscous_friction.value_or(0), 1);
+  }
+
+  static std::string at_least(Duration least, const std::string& what, Duration found, std::string_view suffix) {
+    const Unit& unit = unit_of(suffix);
+    return "expected " + what + " of " + with_symbol(Number::shown(unit, least), unit) + " or more, found " +
+           Number::shown(unit, found);
+  }
+
+  /// The bound that the limiter may count on. `axis_share`: of the friction, what an axis by itself has.
+  double friction_bound(const std::string& key, std::optional<double> given, const KnownNumber* profiles, double truth,
+                        double axis_share) const {
+    const std::string full = "limiter." + key;
+    const Unit& unit = unit_of(key);
+    if (!given && profiles == nullptr) {
+      if (draft_.scene.loop.control.limiter == HapticController::Limiter::kNone) return 0;
+      blame(full, {}, "missing, expected " + kZeroOrMore.expected(unit) + ", because there is no profile");
+    }
+    const double bound = given ? *given : profiles->value * axis_share;
+    const double most = truth * axis_share;
+    if (bound > most) {
+      blame(full, {full, "device.effects." + key},
+            "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
+                (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +
+                ", because a higher bound voids the limiter's proof, found " + digits(bound) +
+                (given ? "" : " (the profile's)"));
+    }
+    return bound;
+  }
+
+  Draft draft_;
+  const toml::table& file_;
+  const std::string& name_;
+};
+
+toml::table parse_toml(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw SceneError(name + ':' + std::to_string(error.source().begin.line) +
+                     ": not TOML: " + std::string(error.description()));
+  }
+}
+
+}  // namespace
+
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory) {
+  if (text.size() > kMaxSceneBytes) {
+    throw SceneError(name + ": expected a scene of at most " + std::to_string(kMaxSceneBytes) + " bytes, found more");
+  }
+  const toml::table file = parse_toml(text, name);
+  Draft draft;
+  draft.scene.text = text;
+  Findings findings;
+  Reader reader(findings, &file, "", {});
+  declare_scene(reader, draft);
+  reader.refuse_unknown();
+  findings.throw_first(name);
+  return Settlement(std::move(draft), file, name).scene(directory);
+}
+
+Scene read_scene(const std::filesystem::path& file) {
+  struct Close {
+    void operator()(std::FILE* stream) const { std::fclose(stream); }
+  };
+  const auto fail = [&file] {
+    throw SceneError("cannot read " + file.string() + ": " + std::generic_category().message(errno));
+  };
+  const std::unique_ptr<std::FILE, Close> stream(std::fopen(file.c_str(), "rbe"));
+  if (!stream) fail();
+  std::string text(kMaxSceneBytes + 1, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
+  if (std::ferror(stream.get()) != 0) fail();
+  return parse_scene(text, file.string(), file.parent_path());
+}
+
+std::string scene_reference() {
+  std::string text;
+  Draft draft;
+  Reference reference(text);
+  declare_scene(reference, draft);
+  return text;
+}
+
+}  // namespace tendon

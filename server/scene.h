@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "core/time.h"
+#include "devices/simulated/simulated_device.h"
+#include "protocol/link.h"
+#include "server/haptic_loop.h"
+#include "server/network_loop.h"
+
+namespace tendon {
+
+/// All that a server is to run, as plain values in SI units, checked: what the constructors of the
+/// device and of the loops take without a complaint.
+struct Scene {
+  struct Network {
+    Address listen = parse_address("127.0.0.1:47100");
+    std::size_t max_observers = NetworkLoop::Config{}.max_observers;
+    Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
+    Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
+  };
+
+  SimulatedDevice::Config device;
+  HapticLoop::Config loop;
+  Network network;
+  std::optional<std::filesystem::path> recording;  ///< relative to the current directory; empty: nothing is recorded
+  std::string text;                                ///< the file, whole, for the recording
+};
+
+/// What is wrong with a scene, for the operator to act on:
+/// "FILE:LINE: KEY: expected …, found …". The line is left out where nothing in the file is to blame
+/// (a table that is not there), the key where there is none (a syntax error).
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// No scene that a person writes comes near it, and a wrong path may lead to anything. Every second byte can
+/// nest one table deeper, and toml++ recurses: 4 times as much overflows a stack of 8 MiB.
+inline constexpr std::size_t kMaxSceneBytes = 16'384;
+
+/// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys.
+/// Throws SceneError; "cannot read FILE: No such file or directory" when there is no such file.
+///
+/// Of several mistakes the first in the file is reported; a key that is missing only when all that is
+/// there is right, because a misspelt key is both.
+Scene read_scene(const std::filesystem::path& file);
+
+/// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for
+/// relative to `directory`.
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory);
+
+/// Every key that a scene may have: meaning, what is accepted in which unit, and what holds without it.
+std::string scene_reference();
+
+}  // namespace tendon

@@ -1,0 +1,618 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "devices/simulated/profiles.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ScratchFolder;
+
+constexpr std::string_view kMinimal =
+    "[device]\n"
+    "kind = \"simulated\"\n"
+    "profile = \"falcon\"\n";
+
+/// Four lines, so what is added begins at line 5.
+constexpr std::string_view kWithoutProfile =
+    "[device]\n"
+    "kind = \"simulated\"\n"
+    "[device.effects]\n"
+    "mass_kg = 0.2\n";
+
+/// Nine lines, of which the last begins the hand's motion.
+constexpr std::string_view kHand =
+    "[device]\n"
+    "kind = \"simulated\"\n"
+    "profile = \"falcon\"\n"
+    "\n"
+    "[device.hand]\n"
+    "stiffness_n_per_m = 300\n"
+    "damping_n_s_per_m = 3\n"
+    "\n"
+    "[device.hand.motion]\n";
+
+Scene parse(const std::string& text, const std::filesystem::path& directory = {}) {
+  return parse_scene(text, "s.toml", directory);
+}
+
+Scene minimal_and(const std::string& more) { return parse(std::string(kMinimal) + more); }
+
+std::string error_of(const std::string& text, const std::filesystem::path& directory = {}) {
+  try {
+    parse(text, directory);
+  } catch (const SceneError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string error_of_minimal_and(const std::string& more) { return error_of(std::string(kMinimal) + more); }
+
+void write(const std::filesystem::path& file, std::string_view text) { std::ofstream(file) << text; }
+
+ScriptedMotion::Point target(const Scene& scene, double t) { return scene.device.hand->motion.at(t); }
+
+// --- Good scenes --------------------------------------------------------------------------------------
+
+TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
+  const Scene scene = parse(std::string(kMinimal));
+  const DeviceProfile& falcon = *find_device_profile("falcon");
+
+  EXPECT_EQ(scene.device.name, "falcon");
+  EXPECT_EQ(scene.device.mass, falcon.mass.value);
+  EXPECT_EQ(scene.device.viscous_friction, falcon.viscous_friction.value);
+  EXPECT_EQ(scene.device.coulomb_friction, falcon.coulomb_friction.value);
+  EXPECT_EQ(scene.device.encoder_step, falcon.encoder_step.value);
+  EXPECT_EQ(scene.device.max_force, falcon.max_force.value);
+  EXPECT_EQ(scene.device.amplifier_bandwidth, falcon.amplifier_bandwidth.value);
+  EXPECT_FALSE(scene.device.watchdog);
+  EXPECT_FALSE(scene.device.start_position);
+  EXPECT_FALSE(scene.device.hand);
+
+  const HapticController::Config& control = scene.loop.control;
+  EXPECT_EQ(scene.loop.period, HapticLoop::Config{}.period);
+  EXPECT_EQ(control.longest_hold, 2 * scene.loop.period);
+  EXPECT_EQ(control.watchdog, 0ns);
+  EXPECT_EQ(control.limiter, HapticController::Limiter::kJoint);
+  EXPECT_EQ(control.friction.coulomb, falcon.coulomb_bound.value);
+  EXPECT_EQ(control.friction.viscous, falcon.viscous_bound.value);
+  EXPECT_EQ(control.max_force, falcon.max_force.value);
+  EXPECT_EQ(control.max_slew, 1000);
+  EXPECT_EQ(control.max_missed, HapticController::Config{}.max_missed);
+  EXPECT_EQ(control.hold.hold, HeldForce::Config{}.hold);
+  EXPECT_EQ(control.hold.decay, HeldForce::Config{}.decay);
+  EXPECT_EQ(control.hold.safe_stop, HeldForce::Config{}.safe_stop);
+  EXPECT_EQ(control.hold.ramp_in, HeldForce::Config{}.ramp_in);
+  EXPECT_EQ(control.hold.max_valid_for, HeldForce::Config{}.max_valid_for);
+
+  EXPECT_EQ(to_string(scene.network.listen), "127.0.0.1:47100");
+  EXPECT_EQ(scene.network.max_observers, NetworkLoop::Config{}.max_observers);
+  EXPECT_EQ(scene.network.controller_timeout, NetworkLoop::Config{}.controller_timeout);
+  EXPECT_EQ(scene.network.observer_timeout, NetworkLoop::Config{}.observer_timeout);
+  EXPECT_FALSE(scene.recording);
+  EXPECT_EQ(scene.text, kMinimal);
+}
+
+TEST(Scene, ReadsEveryKey) {
+  const Scene scene = parse(R"(
+[device]
+kind = "simulated"
+profile = "phantom-premium"
+start_position_mm = [1, -2.5, 3]
+[device.effects]
+mass_kg = 0.1
+viscous_friction_n_s_per_m = 0.2
+coulomb_friction_n = 0.3
+encoder_step_um = 43
+max_force_n = 9
+amplifier_bandwidth_hz = 250
+watchdog_ms = 5.5
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+[device.hand.motion]
+kind = "sine"
+amplitude_mm = 15
+frequency_hz = 0.5
+centre_mm = [0, 10, 0]
+direction = [0, 0, 2]
+[loop]
+period_us = 500
+longest_hold_us = 1500
+[limiter]
+kind = "adjusting-output-limiter-per-axis"
+coulomb_friction_n = 0.1
+viscous_friction_n_s_per_m = 0.15
+[force]
+max_force_n = 5
+max_slew_n_per_s = inf
+hold_ms = 10
+decay_ms = 20
+safe_stop_ms = 30
+ramp_in_ms = 40
+max_valid_for_ms = 50
+[network]
+listen = "[::1]:5000"
+max_observers = 3
+controller_timeout_ms = 1500
+observer_timeout_ms = 2500
+[recording]
+path = "run.mcap"
+)");
+  EXPECT_EQ(scene.device.start_position, Vec3(0.001, -0.0025, 0.003));
+  EXPECT_EQ(scene.device.mass, 0.1);
+  EXPECT_EQ(scene.device.viscous_friction, 0.2);
+  EXPECT_EQ(scene.device.coulomb_friction, 0.3);
+  EXPECT_EQ(scene.device.encoder_step, 43e-6);
+  EXPECT_EQ(scene.device.max_force, 9);
+  EXPECT_EQ(scene.device.amplifier_bandwidth, 250);
+  EXPECT_EQ(scene.device.watchdog, 5500us);
+  ASSERT_TRUE(scene.device.hand);
+  EXPECT_EQ(scene.device.hand->stiffness, 300);
+  EXPECT_EQ(scene.device.hand->damping, 3);
+  EXPECT_EQ(scene.device.hand->mass, 0.05);
+  EXPECT_EQ(target(scene, 0).position, Vec3(0, 0.01, 0));
+  EXPECT_EQ(target(scene, 0.5).position, Vec3(0, 0.01, 0.015));  // a quarter of the cycle
+
+  const HapticController::Config& control = scene.loop.control;
+  EXPECT_EQ(scene.loop.period, 500us);
+  EXPECT_EQ(control.longest_hold, 1500us);
+  EXPECT_EQ(control.watchdog, 5500us);
+  EXPECT_EQ(control.limiter, HapticController::Limiter::kPerAxis);
+  EXPECT_EQ(control.friction.coulomb, 0.1);
+  EXPECT_EQ(control.friction.viscous, 0.15);
+  EXPECT_EQ(control.max_force, 5);
+  EXPECT_EQ(control.max_slew, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(control.hold.hold, 10ms);
+  EXPECT_EQ(control.hold.decay, 20ms);
+  EXPECT_EQ(control.hold.safe_stop, 30ms);
+  EXPECT_EQ(control.hold.ramp_in, 40ms);
+  EXPECT_EQ(control.hold.max_valid_for, 50ms);
+  EXPECT_EQ(to_string(scene.network.listen), "[::1]:5000");
+  EXPECT_EQ(scene.network.max_observers, 3U);
+  EXPECT_EQ(scene.network.controller_timeout, 1500ms);
+  EXPECT_EQ(scene.network.observer_timeout, 2500ms);
+  EXPECT_EQ(scene.recording, "run.mcap");
+}
+
+TEST(Scene, ReadsAMotionOfRampAndHold) {
+  const Scene scene =
+      parse(std::string(kHand) +
+            "kind = \"ramp-hold\"\nfrom_mm = [0, 0, 0]\nto_mm = [8, 0, 0]\nramp_ms = 1000\nhold_ms = 500\n");
+  EXPECT_EQ(target(scene, 0.5).position, Vec3(0.004, 0, 0));
+  EXPECT_EQ(target(scene, 1.25).position, Vec3(0.008, 0, 0));
+  EXPECT_EQ(target(scene, 2.0).position, Vec3(0.004, 0, 0));  // on its way back
+}
+
+TEST(Scene, ReadsAMotionOfLeastJerk) {
+  const std::string text = std::string(kHand) +
+                           "kind = \"minimum-jerk\"\npoints_mm = [[0, 0, 0], [8, 0, 0], [8, 4, 0]]\n"
+                           "durations_ms = [1000, 500]\n";
+  EXPECT_EQ(target(parse(text), 0.5).position, Vec3(0.004, 0, 0));
+  EXPECT_EQ(target(parse(text), 1.25).position, Vec3(0.008, 0.002, 0));
+  EXPECT_EQ(target(parse(text), 3.0).position, Vec3(0, 0, 0));
+  EXPECT_EQ(target(parse(text + "back_and_forth = false\n"), 3.0).position, Vec3(0.008, 0.004, 0));
+}
+
+TEST(Scene, LooksForARecordedMotionBesideTheSceneFile) {
+  const ScratchFolder folder;
+  write(folder.path() / "hand.csv", "t_s,angle,other\n0,0,9\n1,2,9\n2,4,9\n");
+  write(folder.path() / "scene.toml", std::string(kHand) +
+                                          "kind = \"recorded\"\nfile = \"hand.csv\"\nposition_column = \"angle\"\n"
+                                          "scale_m = 0.5\norigin_mm = [0, 0, 250]\ndirection = [0, 1, 0]\n");
+  const Scene scene = read_scene(folder.path() / "scene.toml");
+  EXPECT_EQ(target(scene, 1).position, Vec3(0, 1, 0.25));
+  EXPECT_EQ(target(scene, 5).position, Vec3(0, 2, 0.25));  // stays at the end
+}
+
+TEST(Scene, ReadsARecordedMotionByColumnNumbersAndRepeatsIt) {
+  const ScratchFolder folder;
+  write(folder.path() / "hand.csv", "0,0\n1,2\n2,4\n");
+  const Scene scene = parse(std::string(kHand) +
+                                "kind = \"recorded\"\nfile = \"hand.csv\"\ntime_column = 0\nposition_column = 1\n"
+                                "at_end = \"repeat\"\n",
+                            folder.path());
+  EXPECT_EQ(target(scene, 3).position, Vec3(2, 0, 0));
+}
+
+TEST(Scene, ConvertsUnitsWithoutAnErrorInTheLastDigit) {
+  const Scene scene = minimal_and(
+      "start_position_mm = [0.1, 15, 0.7]\n"
+      "[device.effects]\nencoder_step_um = 43\nwatchdog_ms = 4.35\n"
+      "[loop]\nperiod_us = 1.001\nlongest_hold_us = 1000.001\n"
+      "[force]\nhold_ms = 0.1\ndecay_ms = 0.29\n");
+  EXPECT_EQ(scene.device.start_position, Vec3(0.0001, 0.015, 0.0007));
+  EXPECT_EQ(scene.device.encoder_step, 0.000043);
+  EXPECT_EQ(scene.device.watchdog, 4'350'000ns);
+  EXPECT_EQ(scene.loop.period, 1001ns);
+  EXPECT_EQ(scene.loop.control.longest_hold, 1'000'001ns);
+  EXPECT_EQ(scene.loop.control.hold.hold, 100'000ns);
+  EXPECT_EQ(scene.loop.control.hold.decay, 290'000ns);
+}
+
+TEST(Scene, AnEffectThatIsFalseDoesNotExist) {
+  const Scene scene = minimal_and("[device.effects]\nencoder_step_um = false\namplifier_bandwidth_hz = false\n");
+  EXPECT_FALSE(scene.device.encoder_step);
+  EXPECT_FALSE(scene.device.amplifier_bandwidth);
+  EXPECT_TRUE(scene.device.coulomb_friction) << "the other effects of the profile stay";
+}
+
+TEST(Scene, WithoutAProfileOnlyTheListedEffectsExist) {
+  const Scene scene = parse(std::string(kWithoutProfile) + "[limiter]\nkind = \"none\"\n[force]\nmax_force_n = 5\n");
+  EXPECT_EQ(scene.device.name, "simulated");
+  EXPECT_EQ(scene.device.mass, 0.2);
+  EXPECT_FALSE(scene.device.viscous_friction);
+  EXPECT_FALSE(scene.device.coulomb_friction);
+  EXPECT_FALSE(scene.device.encoder_step);
+  EXPECT_FALSE(scene.device.max_force);
+  EXPECT_FALSE(scene.device.amplifier_bandwidth);
+  EXPECT_FALSE(scene.device.watchdog);
+  EXPECT_EQ(scene.loop.control.limiter, HapticController::Limiter::kNone);
+  EXPECT_EQ(scene.loop.control.friction.coulomb, 0);
+  EXPECT_EQ(scene.loop.control.friction.viscous, 0);
+  EXPECT_EQ(scene.loop.control.max_force, 5);
+}
+
+TEST(Scene, PerAxisTheProfilesCoulombFrictionIsSharedByTheAxes) {
+  const Scene scene = minimal_and("[limiter]\nkind = \"adjusting-output-limiter-per-axis\"\n");
+  const DeviceProfile& falcon = *find_device_profile("falcon");
+  EXPECT_DOUBLE_EQ(scene.loop.control.friction.coulomb * std::sqrt(3), falcon.coulomb_bound.value);
+  EXPECT_EQ(scene.loop.control.friction.viscous, falcon.viscous_bound.value);
+}
+
+TEST(Scene, ABoundMayBeTheTrueFrictionItself) {
+  EXPECT_EQ(minimal_and("[limiter]\ncoulomb_friction_n = 0.4\nviscous_friction_n_s_per_m = 1\n")
+                .loop.control.friction.coulomb,
+            0.4);
+}
+
+// --- Broken scenes ------------------------------------------------------------------------------------
+
+TEST(SceneError, NamesTheFileThatCannotBeRead) {
+  const ScratchFolder folder;
+  const auto error = [](const std::filesystem::path& file) -> std::string {
+    try {
+      read_scene(file);
+    } catch (const SceneError& problem) {
+      return problem.what();
+    }
+    return "no error";
+  };
+  const std::string missing = (folder.path() / "missing.toml").string();
+  EXPECT_EQ(error(missing), "cannot read " + missing + ": No such file or directory");
+  EXPECT_EQ(error(folder.path()), "cannot read " + folder.path().string() + ": Is a directory");
+  EXPECT_EQ(error("/dev/zero"), "/dev/zero: expected a scene of at most 16384 bytes, found more");
+}
+
+struct Broken {
+  std::string more;  ///< after kMinimal
+  std::string error;
+};
+
+void expect_errors(const std::vector<Broken>& scenes) {
+  for (const auto& [more, error] : scenes) EXPECT_EQ(error_of_minimal_and(more), error) << more;
+}
+
+TEST(SceneError, NamesTheLineOfASyntaxError) {
+  expect_errors({
+      {"[loop\n", "s.toml:4: not TOML: Error while parsing table header: expected ']', saw '\\n'"},
+      {"[loop]\nperiod_us = 1 2\n",
+       "s.toml:5: not TOML: Error while parsing key-value pair: expected a comment or whitespace, saw '2'"},
+      {"\nkind = \"simulated\"\n",
+       "s.toml:5: not TOML: Error while parsing key-value pair: cannot redefine existing string 'kind'"},
+  });
+}
+
+TEST(SceneError, TellsTheUnitWhenOnlyThatIsWrong) {
+  expect_errors({
+      {"[loop]\nperiod_ms = 1\n", "s.toml:5: loop.period_ms: unknown key; period is given in µs: period_us"},
+      {"[force]\nmax_force = 1\n", "s.toml:5: force.max_force: unknown key; max_force is given in N: max_force_n"},
+      {"[device.effects]\nmass_g = 200\n",
+       "s.toml:5: device.effects.mass_g: unknown key; mass is given in kg: mass_kg"},
+  });
+}
+
+TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
+  expect_errors({
+      {"profil = \"falcon\"\n", "s.toml:4: device.profil: unknown key; did you mean profile?"},
+      {"[limitre]\n", "s.toml:4: limitre: unknown table; did you mean limiter?"},
+      {"[recording]\nfilename = \"x\"\n", "s.toml:5: recording.filename: unknown key; known here: path"},
+      {"[device.gravity]\n",
+       "s.toml:4: device.gravity: unknown table; known here: kind, profile, start_position_mm, effects, hand"},
+      {"[loop]\n" + std::string(10'000, 'x') + " = 1\n",
+       "s.toml:5: loop." + std::string(10'000, 'x') + ": unknown key; known here: period_us, longest_hold_us"},
+  });
+}
+
+TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
+  const std::vector<std::string> tables = {"device",  "device.effects", "device.hand", "device.hand.motion", "loop",
+                                           "limiter", "force",          "network",     "recording"};
+  const std::string good =
+      "device.kind = \"simulated\"\ndevice.profile = \"falcon\"\ndevice.hand.stiffness_n_per_m = 1\n"
+      "device.hand.motion = {kind = \"sine\", amplitude_mm = 1, frequency_hz = 1 EXTRA}\nrecording.path = \"x\"\n";
+  const std::size_t extra = good.find(" EXTRA");
+  for (const std::string& table : tables) {
+    std::string text = good;
+    const bool inlined = table == "device.hand.motion";
+    text.replace(extra, 6, inlined ? ", zzzzzz = 1" : "");
+    if (!inlined) text += table + ".zzzzzz = 1\n";
+    const std::string line = inlined ? "4" : "6";
+    EXPECT_TRUE(error_of(text).starts_with("s.toml:" + line + ": " + table + ".zzzzzz: unknown key; known here: "))
+        << error_of(text);
+  }
+  EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
+            "s.toml:4: other: unknown table; known here: device, loop, limiter, force, network, recording");
+}
+
+TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
+  EXPECT_EQ(error_of(std::string(kHand) + "kind = \"sine\"\namplitude_mm = 1\nfrequency_hz = 1\nramp_ms = 3\n"),
+            "s.toml:13: device.hand.motion.ramp_ms: unknown key; known here: kind, amplitude_mm, frequency_hz, "
+            "centre_mm, direction");
+}
+
+TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
+  EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
+            "s.toml:5: network.zzzzzz: unknown key; known here: listen, max_observers, controller_timeout_ms, "
+            "observer_timeout_ms");
+  EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
+            "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found \"x\"");
+}
+
+TEST(SceneError, AMisspeltRequiredKeyIsNotCalledMissing) {
+  EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\n[device.effects]\nmas_kg = 0.2\n"),
+            "s.toml:4: device.effects.mas_kg: unknown key; did you mean mass_kg?");
+}
+
+TEST(SceneError, TellsWhatWasExpectedAndWhatWasFound) {
+  const std::string mass = "s.toml:5: device.effects.mass_kg: expected a number above 0 kg, found ";
+  const std::string friction =
+      "s.toml:5: device.effects.coulomb_friction_n: expected a number above 0 N, or false for none, found ";
+  expect_errors({
+      {"[device.effects]\nmass_kg = \"0.2\"\n", mass + "\"0.2\""},
+      {"[device.effects]\nmass_kg = true\n", mass + "true"},
+      {"[device.effects]\nmass_kg = [1, 2]\n", mass + "an array of 2"},
+      {"[device.effects]\nmass_kg = {}\n", mass + "a table"},
+      {"[device.effects]\nmass_kg = 2026-01-01\n", mass + "a date or time"},
+      {"[device.effects]\nmass_kg = -0.2\n", mass + "-0.2"},
+      {"[device.effects]\nmass_kg = 0\n", mass + "0"},
+      {"[device.effects]\nmass_kg = false\n", mass + "false"},
+      {"[device.effects]\nmass_kg = nan\n", mass + "nan"},
+      {"[device.effects]\nmass_kg = -inf\n", mass + "-inf"},
+      {"[device.effects]\nmass_kg = inf\n",
+       "s.toml:5: device.effects.mass_kg: expected a number of at most 1e+12 kg, found inf"},
+      {"[device.effects]\ncoulomb_friction_n = 0\n", friction + "0"},
+      {"[device.effects]\ncoulomb_friction_n = true\n", friction + "true"},
+      {"start_position_mm = [1, 2]\n",
+       "s.toml:4: device.start_position_mm: expected [x, y, z] in mm, found an array of 2"},
+      {"start_position_mm = [1,\n 2, \"3\"]\n",
+       "s.toml:5: device.start_position_mm: expected a number of mm, found \"3\""},
+      {"start_position_mm = [1, nan, 2]\n", "s.toml:4: device.start_position_mm: expected a number of mm, found nan"},
+      {"[recording]\npath = 3\n", "s.toml:5: recording.path: expected a path in quotes, found 3"},
+      {"[recording]\npath = \"\"\n", "s.toml:5: recording.path: expected a path in quotes, found \"\""},
+      {"[network]\nmax_observers = 2.5\n",
+       "s.toml:5: network.max_observers: expected a whole number from 0 to 1000, found 2.5"},
+      {"[network]\nmax_observers = -1\n",
+       "s.toml:5: network.max_observers: expected a whole number from 0 to 1000, found -1"},
+      {"[[loop]]\n", "s.toml:4: loop: expected a table, found an array of 1"},
+      {"hand = 3\n", "s.toml:4: device.hand: expected a table, found 3"},
+  });
+}
+
+TEST(SceneError, RefusesTimesThatNoLoopCanHave) {
+  const std::string period = "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found ";
+  const std::string timeout = "s.toml:5: network.controller_timeout_ms: expected a number from 1 to 3600000 ms, found ";
+  expect_errors({
+      {"[loop]\nperiod_us = 0\n", period + "0"},
+      {"[loop]\nperiod_us = -1000\n", period + "-1000"},
+      {"[loop]\nperiod_us = 1000001\n", period + "1000001"},
+      {"[loop]\nperiod_us = inf\n", period + "inf"},
+      {"[loop]\nlongest_hold_us = 1e-9\n", "s.toml:5: loop.longest_hold_us: expected a number above 0 µs, found 1e-09"},
+      {"[force]\nhold_ms = 1e300\n", "s.toml:5: force.hold_ms: expected a number of at most 3600000 ms, found 1e+300"},
+      {"[force]\nhold_ms = -1\n", "s.toml:5: force.hold_ms: expected a number of 0 ms or more, found -1"},
+      {"[force]\ndecay_ms = 0\n", "s.toml:5: force.decay_ms: expected a number above 0 ms, found 0"},
+      {"[network]\ncontroller_timeout_ms = 0.5\n", timeout + "0.5"},
+      {"[network]\ncontroller_timeout_ms = 4e6\n", timeout + "4000000"},
+  });
+}
+
+TEST(SceneError, RefusesForcesThatAreNone) {
+  expect_errors({
+      {"[force]\nmax_force_n = inf\n", "s.toml:5: force.max_force_n: expected a number of at most 1e+12 N, found inf"},
+      {"[force]\nmax_force_n = 0\n", "s.toml:5: force.max_force_n: expected a number above 0 N, found 0"},
+      {"[force]\nmax_slew_n_per_s = 0\n",
+       "s.toml:5: force.max_slew_n_per_s: expected a number above 0 N/s, or inf, found 0"},
+      {"[force]\nmax_slew_n_per_s = -inf\n",
+       "s.toml:5: force.max_slew_n_per_s: expected a number above 0 N/s, or inf, found -inf"},
+  });
+}
+
+TEST(SceneError, NamesTheKindsAndProfilesThatThereAre) {
+  EXPECT_EQ(error_of("[device]\nkind = \"real\"\n"), "s.toml:2: device.kind: expected \"simulated\", found \"real\"");
+  EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\nprofile = \"hawk\"\n"),
+            "s.toml:3: device.profile: expected one of \"phantom-premium\", \"touch\", \"falcon\", found \"hawk\"");
+  EXPECT_EQ(error_of(std::string(kHand) + "kind = \"cosine\"\n"),
+            "s.toml:10: device.hand.motion.kind: expected one of \"sine\", \"ramp-hold\", \"minimum-jerk\", "
+            "\"recorded\", found \"cosine\"");
+  expect_errors({
+      {"[limiter]\nkind = \"off\"\n",
+       "s.toml:5: limiter.kind: expected one of \"adjusting-output-limiter\", \"adjusting-output-limiter-per-axis\", "
+       "\"none\", found \"off\""},
+  });
+}
+
+TEST(SceneError, NamesWhatIsMissing) {
+  EXPECT_EQ(error_of(""), "s.toml: device.kind: missing, expected \"simulated\"");
+  EXPECT_EQ(error_of("\n[device]\n"), "s.toml:2: device.kind: missing, expected \"simulated\"");
+  EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\n"),
+            "s.toml:1: device.effects.mass_kg: missing, expected a number above 0 kg");
+  expect_errors({
+      {"[recording]\n", "s.toml:4: recording.path: missing, expected a path in quotes"},
+      {"[device.hand]\n", "s.toml:4: device.hand.stiffness_n_per_m: missing, expected a number above 0 N/m"},
+      {"[device.hand]\nstiffness_n_per_m = 1\n",
+       "s.toml:4: device.hand.motion.kind: missing, expected one of \"sine\", \"ramp-hold\", \"minimum-jerk\", "
+       "\"recorded\""},
+  });
+  EXPECT_EQ(error_of(std::string(kHand) + "kind = \"sine\"\nfrequency_hz = 1\n"),
+            "s.toml:9: device.hand.motion.amplitude_mm: missing, expected a number of 0 mm or more");
+}
+
+TEST(SceneError, WithoutAProfileForceAndFrictionMustBeSaid) {
+  EXPECT_EQ(error_of(std::string(kWithoutProfile)),
+            "s.toml: force.max_force_n: missing, expected a number above 0 N, because the device has no max_force_n");
+  EXPECT_EQ(error_of(std::string(kWithoutProfile) + "[force]\nmax_force_n = 5\n[limiter]\n"),
+            "s.toml:7: limiter.coulomb_friction_n: missing, expected a number of 0 N or more, because there is no "
+            "profile");
+  EXPECT_EQ(error_of(std::string(kWithoutProfile) + "max_force_n = 5\n[limiter]\ncoulomb_friction_n = 0\n"),
+            "s.toml:6: limiter.viscous_friction_n_s_per_m: missing, expected a number of 0 N·s/m or more, because "
+            "there is no profile");
+}
+
+TEST(SceneError, RefusesTimesThatContradictEachOther) {
+  expect_errors({
+      {"[loop]\nlongest_hold_us = 999\n",
+       "s.toml:5: loop.longest_hold_us: expected the period of 1000 µs or more, found 999"},
+      {"[force]\nsafe_stop_ms = 10\n", "s.toml:5: force.safe_stop_ms: expected hold_ms of 20 ms or more, found 10"},
+      {"[force]\nhold_ms = 300\n", "s.toml:5: force.safe_stop_ms: expected hold_ms of 300 ms or more, found 250"},
+  });
+}
+
+TEST(SceneError, ABoundAboveTheTrueFrictionVoidsTheProof) {
+  const std::string why = ", because a higher bound voids the limiter's proof, found ";
+  expect_errors({
+      {"[limiter]\ncoulomb_friction_n = 0.41\n",
+       "s.toml:5: limiter.coulomb_friction_n: expected at most 0.4 N, the true friction of the simulated device" + why +
+           "0.41"},
+      {"[limiter]\nviscous_friction_n_s_per_m = 1.01\n",
+       "s.toml:5: limiter.viscous_friction_n_s_per_m: expected at most 1 N·s/m, the true friction of the simulated "
+       "device" +
+           why + "1.01"},
+      {"[device.effects]\ncoulomb_friction_n = 0.1\n",
+       "s.toml:5: limiter.coulomb_friction_n: expected at most 0.1 N, the true friction of the simulated device" + why +
+           "0.3 (the profile's)"},
+      {"[device.effects]\nviscous_friction_n_s_per_m = false\n",
+       "s.toml:5: limiter.viscous_friction_n_s_per_m: expected at most 0 N·s/m, the true friction of the simulated "
+       "device" +
+           why + "0.5 (the profile's)"},
+  });
+  const std::string per_axis =
+      error_of_minimal_and("[limiter]\nkind = \"adjusting-output-limiter-per-axis\"\ncoulomb_friction_n = 0.3\n");
+  EXPECT_TRUE(per_axis.starts_with("s.toml:6: limiter.coulomb_friction_n: expected at most 0.2309")) << per_axis;
+  EXPECT_NE(per_axis.find("(an axis by itself has 1/√3 of it)"), std::string::npos) << per_axis;
+}
+
+TEST(SceneError, ListensOnThisMachineOnly) {
+  for (const std::string text :
+       {"0.0.0.0:47100", "192.168.1.20:47100", "127.0.0.1", "tendon.example:1", "[::1]:99999"}) {
+    const std::string error = error_of_minimal_and("[network]\nlisten = \"" + text + "\"\n");
+    EXPECT_EQ(error,
+              "s.toml:5: network.listen: expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", "
+              "because what is sent is not encrypted and anyone on a network could command forces, found \"" +
+                  text + "\"");
+  }
+}
+
+TEST(SceneError, PassesOnWhatIsWrongWithARecordedMotion) {
+  const ScratchFolder folder;
+  const std::string csv = (folder.path() / "hand.csv").string();
+  const std::string scene = std::string(kHand) + "kind = \"recorded\"\nfile = \"hand.csv\"\nposition_column = \"x\"\n";
+  EXPECT_EQ(error_of(scene, folder.path()), "s.toml:11: device.hand.motion.file: " + csv +
+                                                ": expected a CSV file of a recorded motion, cannot open it: No such "
+                                                "file or directory");
+  write(csv, "t_s,y\n0,0\n1,1\n");
+  EXPECT_EQ(error_of(scene, folder.path()),
+            "s.toml:11: device.hand.motion.file: " + csv + ":1: expected a column 'x', found 't_s,y'");
+  write(csv, "t_s,x\n0,0\n1,nan\n");
+  EXPECT_EQ(error_of(scene, folder.path()), "s.toml:11: device.hand.motion.file: " + csv +
+                                                ":3: expected a finite number in column 1 (from 0), found 'nan'");
+  EXPECT_EQ(error_of(scene + "time_column = -1\n", folder.path()),
+            "s.toml:13: device.hand.motion.time_column: expected a column's name in quotes or its number, from 0, "
+            "found -1");
+}
+
+TEST(SceneError, WhatOnlyAConstructorRefusesHasTheLineOfItsTable) {
+  EXPECT_EQ(error_of(std::string(kHand) +
+                     "kind = \"minimum-jerk\"\npoints_mm = [[0, 0, 0], [1, 0, 0]]\ndurations_ms = [1, 2]\n"),
+            "s.toml:9: device.hand.motion: minimum_jerk.durations (their number) = 2: expected one fewer than points, "
+            "one per leg");
+  EXPECT_EQ(
+      error_of(std::string(kHand) + "kind = \"sine\"\namplitude_mm = 1\nfrequency_hz = 1\ndirection = [0, 0, 0]\n"),
+      "s.toml:9: device.hand.motion: sine.direction (its length) = 0: expected a vector that is not zero");
+}
+
+TEST(SceneError, OfAnElementInAListHasTheElementsLine) {
+  EXPECT_EQ(
+      error_of(std::string(kHand) + "kind = \"minimum-jerk\"\npoints_mm = [[0, 0, 0],\n[1, 0]]\ndurations_ms = [1]\n"),
+      "s.toml:12: device.hand.motion.points_mm: expected [x, y, z] in mm, found an array of 2");
+  EXPECT_EQ(error_of(std::string(kHand) +
+                     "kind = \"minimum-jerk\"\npoints_mm = [[0, 0, 0], [1, 0, 0]]\ndurations_ms = [0]\n"),
+            "s.toml:12: device.hand.motion.durations_ms: expected a number above 0 ms, found 0");
+}
+
+TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
+  std::string deep = "[a";
+  while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
+  EXPECT_EQ(error_of(deep + "]\n"),
+            "s.toml:1: a: unknown table; known here: device, loop, limiter, force, network, recording");
+  EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
+}
+
+// --- What ships ---------------------------------------------------------------------------------------
+
+TEST(ShippedScenes, DemoIsAHandAtAWallWithTheLimiterOn) {
+  const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "demo.toml");
+  EXPECT_EQ(scene.device.name, "falcon");
+  ASSERT_TRUE(scene.device.hand);
+  EXPECT_EQ(scene.device.hand->stiffness, 300);
+  EXPECT_EQ(scene.device.hand->damping, 3);
+  EXPECT_EQ(scene.device.hand->mass, 0.05);
+  EXPECT_EQ(target(scene, 0.5).position, Vec3(0.015, 0, 0));
+  EXPECT_EQ(scene.loop.control.limiter, HapticController::Limiter::kJoint);
+  EXPECT_EQ(scene.recording, "demo.mcap");
+}
+
+TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {
+  EXPECT_EQ(read_scene(std::filesystem::path(TENDON_SCENES) / "minimal.toml").device.name, "falcon");
+}
+
+TEST(ShippedScenes, RecordedHandFollowsTheRecordingBesideIt) {
+  const ScratchFolder folder;
+  std::filesystem::copy(std::filesystem::path(TENDON_SCENES) / "recorded-hand.toml", folder.path() / "scene.toml");
+  write(folder.path() / "hand.csv", "t_s,master_pos_rad\n15,0\n16,0.5\n17,1\n");
+  EXPECT_EQ(target(read_scene(folder.path() / "scene.toml"), 1).position, Vec3(0.0375, 0, 0));
+}
+
+TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
+  const std::string text = scene_reference();
+  const auto has = [&text](std::string_view part) { return text.find(part) != std::string::npos; };
+  EXPECT_TRUE(
+      has("[loop]\n"
+          "  period_us\n"
+          "      from one haptic step to the next.\n"
+          "      a number from 1 to 1000000 µs. Default: 1000.\n"))
+      << text;
+  for (const std::string_view key :
+       {"[device]", "profile", "start_position_mm", "[device.effects]", "watchdog_ms", "[device.hand]",
+        "[device.hand.motion]", "kind = \"sine\"", "kind = \"ramp-hold\"", "kind = \"minimum-jerk\"",
+        "kind = \"recorded\"", "position_column", "[limiter]", "[force]", "max_valid_for_ms", "[network]",
+        "observer_timeout_ms", "[recording]"}) {
+    EXPECT_TRUE(has(key)) << key;
+  }
+}
+
+}  // namespace
+}  // namespace tendon
