@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prints where the hand is, what it feels, and how far away it is. It only looks on.
+#include <cstdio>
+
+#include "clients/cpp/options.h"
+
+using namespace tendon;
+
+constexpr char kText[] = "tick %ju   position %+.4f %+.4f %+.4f m   force %+.2f %+.2f %+.2f N   round trip %.1f ms\n";
+constexpr char kJson[] =
+    "{\"tick\":%ju,\"position_m\":[%.6f,%.6f,%.6f],\"force_n\":[%.4f,%.4f,%.4f],\"round_trip_ms\":%.3f}\n";
+
+int main(int argc, char** argv) {
+  Options options{.client = {.name = "echo_motion", .rate_hz = 10}};
+  CommandLine line("Prints the hand's motion, the force it feels and the network's round trip.", options);
+  if (const auto exit_code = line.parse(argc, argv)) return *exit_code;
+
+  return run(options, [&](const DeviceState& hand, const LinkStats& link) {
+    const Vec3 &x = hand.position, &f = hand.force_applied;
+    std::printf(options.json ? kJson : kText, std::uintmax_t{hand.tick}, x.x(), x.y(), x.z(), f.x(), f.y(), f.z(),
+                1e3 * seconds(link.smoothed_round_trip));
+    std::fflush(stdout);
+  });
+}

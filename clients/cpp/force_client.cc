@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/force_client.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <variant>
+
+#include "protocol/limits.h"
+
+namespace tendon {
+namespace {
+
+// See Config::valid_for.
+constexpr int kValidPeriods = 3;
+constexpr Duration kMinValidFor = std::chrono::milliseconds(20);
+constexpr Duration kMaxObservedPeriod = std::chrono::milliseconds(100);
+
+void require(bool ok, const char* sentence) {
+  if (!ok) throw std::invalid_argument(sentence);
+}
+
+const ForceClient::Config& checked(const ForceClient::Config& config) {
+  require(config.name.size() <= limits::kMaxName, "name: at most 64 bytes");
+  require(
+      config.rate_hz == 0 || (config.rate_hz >= ForceClient::kMinRateHz && config.rate_hz <= ForceClient::kMaxRateHz),
+      "rate_hz: expected 0, or 0.001 to 100000");
+  require(config.state_hz <= limits::kMaxLoopHz, "state_hz: expected 0 to 1000000");
+  require(config.valid_for >= Duration::zero() && config.valid_for <= limits::kMaxValidFor,
+          "valid_for: expected 0 to 10 s");
+  require(config.patience > Duration::zero(), "patience: must be above zero");
+  require(config.retry_min > Duration::zero(), "retry_min: must be above zero");
+  require(config.retry_max >= config.retry_min, "retry_max: must not be below retry_min");
+  require(config.max_datagrams > 0, "max_datagrams: must be above zero");
+  return config;
+}
+
+bool usable(const auto& numbers) { return (numbers.array().abs() <= limits::kMaxValue).all(); }  // false for NaN
+
+}  // namespace
+
+ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now)
+    : link_(link),
+      server_(server),
+      config_(checked(config)),
+      role_(role),
+      period_(config.rate_hz > 0 ? from_seconds(1 / config.rate_hz) : Duration::zero()),
+      random_(config.seed),
+      back_off_(config.retry_min),
+      next_call_(now) {
+  greet(now);
+}
+
+ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now)
+    : ForceClient(link, server, config, Role::kController, now) {
+  require(physics != nullptr, "physics: a controller needs a callback");
+  physics_ = std::move(physics);
+}
+
+ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now)
+    : ForceClient(link, server, config, Role::kObserver, now) {
+  require(watch != nullptr, "watch: an observer needs a callback");
+  watch_ = std::move(watch);
+}
+
+bool ForceClient::rearm() { return session_ && session_->request(Rearm{}).has_value(); }
+
+LocalTime ForceClient::turn(LocalTime now) {
+  if (stats_.phase == Phase::kStopped) return LocalTime::max();
+  const bool more = drain(now);
+  tick(now);
+  flush(now);
+  return call(now) || more ? now : next_turn();
+}
+
+void ForceClient::stop(LocalTime now) {
+  if (session_) {
+    session_->close(Code::kOk, config_.name + " stops");
+    flush(now);
+  }
+  end(now, Phase::kStopped, Code::kOk, "stopped");
+}
+
+ForceClient::Stats ForceClient::stats() const {
+  Stats stats = stats_;
+  if (session_) stats.link = session_->stats();
+  return stats;
+}
+
+void ForceClient::greet(LocalTime now) {
+  ClientHandshake::Config config;
+  config.hello.version_min = kProtocolVersion;
+  config.hello.version_max = kProtocolVersion;
+  config.hello.role = role_;
+  config.hello.name = config_.name;
+  config.hello.features = {std::string(kFeatureLocalModel)};
+  const std::array<std::uint64_t, 2> random = {random_(), random_()};
+  static_assert(sizeof random == sizeof config.random);
+  std::memcpy(config.random.data(), random.data(), sizeof random);
+  handshake_.emplace(config, now);
+  give_up_ = now + config_.patience;
+  stats_.phase = Phase::kGreeting;
+  ++stats_.attempts;
+}
+
+/// Acts on the server's answer, once it is there.
+void ForceClient::settle(LocalTime now) {
+  if (!handshake_->outcome()) return;
+  const ClientHandshake::Outcome outcome = *handshake_->outcome();
+  if (const auto* refused = std::get_if<Refused>(&outcome)) {
+    end(now, Phase::kRefused, refused->code, refused->detail);
+    return;
+  }
+  const auto& accepted = std::get<ClientHandshake::Accepted>(outcome);
+  handshake_.reset();
+  welcome_ = accepted.welcome;
+  Session::Config config;
+  config.connection_id = accepted.connection_id;
+  session_.emplace(config, now);
+  if (config_.state_hz > 0) session_->request(SetStateRate{config_.state_hz});
+  sequence_ = 0;
+  stats_.phase = Phase::kOpen;
+  ++stats_.sessions;
+}
+
+void ForceClient::end(LocalTime now, Phase phase, Code code, std::string reason) {
+  stats_ = stats();
+  stats_.phase = phase;
+  stats_.code = code;
+  stats_.reason = std::move(reason);
+  handshake_.reset();
+  session_.reset();
+  unseen_.reset();
+  retry_ = now + back_off_;
+  back_off_ = std::min(2 * back_off_, config_.retry_max);
+}
+
+/// True when there may be more in the link.
+bool ForceClient::drain(LocalTime now) {
+  // One byte more than the largest datagram: one that is too large stays too large after the cut.
+  std::array<std::byte, kMaxDatagram + 1> buffer{};
+  for (int i = 0; i < config_.max_datagrams; ++i) {
+    Address from;
+    const std::size_t size = link_.receive(from, buffer);
+    if (size == 0) return false;
+    if (from != server_) {
+      ++stats_.strangers;
+      continue;
+    }
+    const auto datagram = std::span<const std::byte>(buffer).first(std::min(size, buffer.size()));
+    if (handshake_) {
+      handshake_->receive(now, datagram);
+      settle(now);
+    } else if (session_) {
+      session_->receive(now, datagram);
+      take_events(now);
+    }
+  }
+  return true;
+}
+
+/// What is due by time.
+void ForceClient::tick(LocalTime now) {
+  if (session_) {
+    session_->tick(now);
+    take_events(now);
+  } else if (handshake_) {
+    if (now >= give_up_) {
+      end(now, Phase::kUnanswered, Code::kTimedOut, "no answer from " + to_string(server_));
+    } else {
+      handshake_->tick(now);
+    }
+  } else if (now >= retry_) {
+    greet(now);
+  }
+}
+
+void ForceClient::take_events(LocalTime now) {
+  while (session_) {
+    const std::optional<Session::Event> event = session_->next_event();
+    if (!event) return;
+    if (const auto* arrived = std::get_if<Session::StateArrived>(&*event)) {
+      ++stats_.states;
+      if (unseen_) ++stats_.states_skipped;
+      unseen_ = arrived->state;
+      back_off_ = config_.retry_min;
+    } else if (const auto* closed = std::get_if<Session::Closed>(&*event)) {
+      end(now, Phase::kLost, closed->code, closed->reason);
+    }
+  }
+}
+
+void ForceClient::flush(LocalTime now) {
+  std::array<std::byte, kMaxDatagram> buffer{};
+  const auto next = [&] {
+    if (session_) return session_->next_datagram(now, buffer);
+    if (handshake_) return handshake_->next_datagram(now, buffer);
+    return std::size_t{0};
+  };
+  while (const std::size_t size = next()) link_.send(server_, std::span<const std::byte>(buffer).first(size));
+}
+
+/// True when a force now waits to be sent.
+bool ForceClient::call(LocalTime now) {
+  if (!unseen_ || now < next_call_) return false;
+  next_call_ += period_;
+  if (next_call_ <= now) next_call_ = now + period_;
+  const DeviceState state = *std::exchange(unseen_, std::nullopt);
+  try {
+    if (watch_) {
+      watch_(state, stats().link);
+      return false;
+    }
+    const Touch touch = physics_(state);
+    if (session_) send(touch, state);  // unless the callback has called stop()
+    return true;
+  } catch (...) {
+    stop(now);
+    throw;
+  }
+}
+
+void ForceClient::send(const Touch& touch, const DeviceState& answered) {
+  if (!usable(touch.force) || (touch.stiffness && !usable(*touch.stiffness))) {
+    ++stats_.forces_unusable;
+    return;
+  }
+  ForceCommand command;
+  command.valid_for = valid_for(answered.tick);
+  command.sequence = ++sequence_;
+  command.based_on_tick = answered.tick;
+  command.force = touch.force;
+  const auto& agreed = welcome_->features;
+  const bool with_model = std::find(agreed.begin(), agreed.end(), kFeatureLocalModel) != agreed.end();
+  if (touch.stiffness && with_model) command.model = LocalModel{answered.position, *touch.stiffness};
+  answered_tick_ = answered.tick;
+  session_->send(command);
+  ++stats_.forces;
+}
+
+Duration ForceClient::valid_for(std::uint64_t tick) const {
+  if (config_.valid_for > Duration::zero()) return config_.valid_for;
+  Duration period = period_;
+  if (sequence_ > 0) {
+    const double apart = static_cast<double>(tick - answered_tick_) / welcome_->loop_hz;
+    period = std::max(period, from_seconds(std::min(apart, seconds(kMaxObservedPeriod))));
+  }
+  return std::clamp(kValidPeriods * period, kMinValidFor, limits::kMaxValidFor);
+}
+
+LocalTime ForceClient::next_turn() const {
+  if (session_) return unseen_ ? std::min(next_call_, session_->next_tick()) : session_->next_tick();
+  if (handshake_) return std::min(give_up_, handshake_->next_tick());
+  return retry_;
+}
+
+}  // namespace tendon

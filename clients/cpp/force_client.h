@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <random>
+#include <string>
+
+#include "protocol/handshake.h"
+#include "protocol/link.h"
+#include "protocol/messages.h"
+#include "protocol/session.h"
+
+namespace tendon {
+
+/// What the physics answers to one device state: what the hand is to feel there.
+struct Touch {
+  Touch() = default;
+  /// Implicit, so that a callback may simply return a Vec3.
+  Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
+
+  Vec3 force = Vec3::Zero();  ///< N, on the hand: a wall that resists motion along +x sends −x
+  /// Used when the server has agreed to `kFeatureLocalModel`.
+  std::optional<Mat3> stiffness;  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
+};
+
+/// The physics engine, seen from here: device state in, force out. It may take its time: while it
+/// computes, newer states replace older ones. What it throws comes out of ForceClient::turn.
+using Physics = std::function<Touch(const DeviceState& hand)>;
+
+/// An onlooker: device state and the state of the link in, nothing out.
+using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)>;
+
+/// A guest at a Tendon server, without socket, clock or thread: it says Hello, keeps the session
+/// alive, hands the newest device state to one callback, sends the force that comes back, and begins
+/// again when the server is gone.
+///
+///     ForceClient client(link, server, config, physics, now);
+///     for (;;) wait for a datagram, at most until client.turn(now);
+///
+/// * **Newest wins.** A turn drains the link; of the states that came in, the callback sees the newest
+///   one, once, and the others are counted as skipped.
+/// * **Rate.** With rate_hz = r the callback is called at multiples of 1/r, or as soon after as there
+///   is a state it has not seen; after a delay of a whole period the grid starts anew, it never
+///   catches up. With rate_hz = 0 it is called once for every new state.
+/// * **Force.** Each carries the tick it answers, a sequence number (1, 2, 3 … per session) and how
+///   long it is valid (see Config::valid_for). It leaves in the turn after the one that computed it,
+///   which is due at once: the datagram's time stamp must not be older than the physics' work.
+///   A force or stiffness that is not finite, or beyond limits::kMaxValue, is counted and not sent;
+///   the server then treats this client as one that is late.
+/// * **Reconnection.** However an attempt or a session ends (no answer, refused, Bye, silence), the next
+///   attempt waits retry_min, then twice as long each time, at most retry_max. The first state of a
+///   new session resets that. Each attempt has a new random.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class ForceClient {
+ public:
+  struct Config {
+    std::string name = "guest";  ///< for the server's log; at most limits::kMaxName bytes
+    double rate_hz = 0;          ///< calls per second, kMinRateHz … kMaxRateHz; 0 = one for every new state
+    /// States per second to ask the server for, 0 … limits::kMaxLoopHz; 0 = what the server gives by itself.
+    std::uint32_t state_hz = 0;
+    /// How long the server may take a force as fresh, counted from its arrival; at most
+    /// limits::kMaxValidFor. 0 = derived from the period T at which forces really leave, that is the
+    /// asked one or, when the physics is slower, the time between the states of the last two forces:
+    ///
+    ///     T         = max(1 / rate_hz, min(Δtick / loop_hz, 100 ms))      with rate_hz = 0: the second term
+    ///     valid_for = max(3 T, 20 ms)
+    ///
+    /// 3 T: two forces in a row may be lost and the third is still in time. 20 ms: an engine at 1 kHz
+    /// would otherwise be late by a delay variation of 3 ms. 100 ms: a gap is not a period; an engine
+    /// slower than 10 Hz says so by rate_hz.
+    Duration valid_for{};
+    std::uint64_t seed = 0;  ///< of the randoms of the handshakes; take one from the system at each start
+    /// Hellos of one attempt go unanswered for so long before it is given up: 20 of them at the
+    /// handshake's 100 ms, enough for a round trip of 1 s at 50 % loss.
+    Duration patience = std::chrono::seconds(2);
+    Duration retry_min = std::chrono::milliseconds(100);  ///< first wait before the next attempt; > 0
+    /// Longest wait before the next attempt: a server that restarts is found again within it, and one
+    /// that refuses us is asked no more often.
+    Duration retry_max = std::chrono::seconds(2);
+    /// Datagrams taken from the link in one turn: a flood must not keep us from sending. 256 are what a
+    /// 1 kHz server sends in a quarter of a second, the longest silence before it stops the device.
+    int max_datagrams = 256;
+  };
+  static constexpr double kMinRateHz = 1e-3;
+  static constexpr double kMaxRateHz = 1e5;
+
+  enum class Phase : std::uint8_t {
+    kGreeting = 1,    ///< an attempt is under way
+    kOpen = 2,        ///< states come in, forces go out
+    kUnanswered = 3,  ///< nobody answered; waiting for the next attempt
+    kRefused = 4,     ///< the server said no; waiting for the next attempt
+    kLost = 5,        ///< the session has ended; waiting for the next attempt
+    kStopped = 6,     ///< stop() was called, or the callback threw; for good
+  };
+
+  struct Stats {
+    Phase phase = Phase::kGreeting;
+    /// Why the last attempt or session ended: the server's words where it had any.
+    Code code = Code::kOk;
+    std::string reason;
+    LinkStats link;  ///< of the present session, or of the last one
+    std::uint64_t attempts = 0;
+    std::uint64_t sessions = 0;         ///< of these, answered with a Welcome
+    std::uint64_t states = 0;           ///< states that came in
+    std::uint64_t states_skipped = 0;   ///< of these, replaced by a newer one before a callback was due
+    std::uint64_t forces = 0;           ///< forces sent
+    std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
+    std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
+  };
+
+  /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves
+  /// with the first turn. Throws std::invalid_argument naming the field when `config` is impossible.
+  ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now);
+  /// An observer: sees states; never sends a force.
+  ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
+
+  /// Does all there is to do at `now` and returns when it wants to be called again at the latest; a
+  /// datagram is a reason to call it earlier. What the callback throws passes through, after a Bye
+  /// to the server.
+  LocalTime turn(LocalTime now);
+
+  /// Asks the server to clear a latched fault of its device. Controllers only: an observer is refused. False when
+  /// there is no session to ask in, or too many requests are open.
+  bool rearm();
+
+  /// Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing.
+  void stop(LocalTime now);
+
+  Stats stats() const;
+  Phase phase() const noexcept { return stats_.phase; }
+
+  /// What the server said of itself and its device when the newest session opened; empty before that.
+  const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
+
+ private:
+  ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now);
+
+  void greet(LocalTime now);
+  void settle(LocalTime now);
+  void end(LocalTime now, Phase phase, Code code, std::string reason);
+  bool drain(LocalTime now);
+  void take_events(LocalTime now);
+  void tick(LocalTime now);
+  void flush(LocalTime now);
+  bool call(LocalTime now);
+  void send(const Touch& touch, const DeviceState& answered);
+  Duration valid_for(std::uint64_t tick) const;
+  LocalTime next_turn() const;
+
+  Link& link_;
+  Address server_;
+  Config config_;
+  Role role_;
+  Physics physics_;  ///< the controller's callback
+  Watch watch_;      ///< the observer's callback
+  Duration period_;  ///< of the callback; 0 = none
+
+  std::mt19937_64 random_;
+  std::optional<ClientHandshake> handshake_;
+  std::optional<Session> session_;
+  std::optional<Welcome> welcome_;
+  LocalTime give_up_{};  ///< end of the present attempt's patience
+  LocalTime retry_{};    ///< when the next attempt begins
+  Duration back_off_{};  ///< wait before the attempt after that
+
+  std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
+  LocalTime next_call_{};
+  std::uint64_t sequence_ = 0;       ///< of the newest force
+  std::uint64_t answered_tick_ = 0;  ///< the tick it answers
+  Stats stats_;
+};
+
+}  // namespace tendon

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+namespace tendon {
+namespace {
+
+constexpr double kMaxDurationS = 1e9;  // 31 years, and far from where Duration ends (292)
+
+std::string check_address(const std::string& text) {
+  try {
+    parse_address(text);
+    return {};
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+}
+
+/// Accepts 0 and the numbers from `least` to `most`. (CLI::Range accepts NaN.)
+CLI::Validator number(double least, double most) {
+  return CLI::Validator(
+      [=](const std::string& text) -> std::string {
+        double value = 0;
+        const char* const end = text.data() + text.size();
+        const auto [stop, error] = std::from_chars(text.data(), end, value);
+        const bool ok = error == std::errc{} && stop == end && (value == 0 || (value >= least && value <= most));
+        if (ok) return {};
+        std::ostringstream expected;
+        expected << "expected " << (least > 0 ? "0, or " : "") << least << " to " << most << ", got \"" << text << '"';
+        return expected.str();
+      },
+      "");
+}
+
+}  // namespace
+
+struct CommandLine::Parser {
+  CLI::App app;
+  Options& options;
+};
+
+CommandLine::CommandLine(std::string purpose, Options& options)
+    : parser_(new Parser{CLI::App(std::move(purpose), options.client.name), options}) {
+  CLI::App& app = parser_->app;
+  app.footer("Example: " + options.client.name + " --server " + to_string(options.server) + " --duration-s 10");
+  app.set_help_flag("-h,--help", "Print this and leave");
+  app.add_option_function<std::string>(
+         "--server", [&](const std::string& text) { options.server = parse_address(text); }, "Where tendond listens")
+      ->type_name("HOST:PORT")
+      ->default_str(to_string(options.server))
+      ->check(CLI::Validator(check_address, ""));
+  app.add_option("--rate-hz", options.client.rate_hz, "Times per second; 0 = for every device state that arrives")
+      ->capture_default_str()
+      ->check(number(ForceClient::kMinRateHz, ForceClient::kMaxRateHz));
+  app.add_option_function<double>(
+         "--duration-s", [&](double s) { options.duration = from_seconds(s); }, "Leave after this time; 0 = at Ctrl-C")
+      ->default_str("0")
+      ->check(number(0, kMaxDurationS));
+  app.add_flag("--json", options.json, "One JSON object per line on stdout");
+}
+
+CommandLine::~CommandLine() = default;
+
+void CommandLine::add(const std::string& name, double& value, const std::string& meaning) {
+  parser_->app.add_option(name, value, meaning)
+      ->capture_default_str()
+      ->check(number(0, std::numeric_limits<double>::max()));
+}
+
+void CommandLine::add(const std::string& name, bool& value, const std::string& meaning) {
+  parser_->app.add_flag(name, value, meaning);
+}
+
+std::optional<int> CommandLine::parse(int argc, const char* const* argv) {
+  try {
+    parser_->app.parse(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    return parser_->app.exit(error) == 0 ? 0 : 2;  // prints the help, or what is wrong
+  }
+}
+
+}  // namespace tendon

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "clients/cpp/run.h"
+
+namespace tendon {
+
+/// The command line that all guests share, --server, --rate-hz, --duration-s, --json and --help, and
+/// what a program adds to it.
+class CommandLine {
+ public:
+  /// `purpose` heads the --help; `options` holds the defaults and receives what is given. The options
+  /// and values named here must outlive parse().
+  CommandLine(std::string purpose, Options& options);
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  /// A number ≥ 0: "--stiffness-n-per-m".
+  void add(const std::string& name, double& value, const std::string& meaning);
+  /// A switch: "--local-model".
+  void add(const std::string& name, bool& value, const std::string& meaning);
+
+  /// Empty: go on. Otherwise the exit code to leave with: 0 after --help, 2 after a wrong usage, which
+  /// stderr has been told about.
+  std::optional<int> parse(int argc, const char* const* argv);
+
+ private:
+  struct Parser;  // keeps CLI11 out of this header
+  std::unique_ptr<Parser> parser_;
+};
+
+}  // namespace tendon

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <random>
+#include <utility>
+
+#include "clients/cpp/udp_transport.h"
+
+namespace tendon {
+namespace {
+
+/// Longest sleep: a signal that slips in just before the sleep is noticed after it.
+constexpr Duration kLongestWait = std::chrono::milliseconds(100);
+
+volatile std::sig_atomic_t stop_asked = 0;
+
+/// SIGINT and SIGTERM ask for a stop; a second one of the same kind ends the process as usual.
+class StopSignals {
+ public:
+  StopSignals() {
+    stop_asked = 0;
+    struct sigaction action {};
+    action.sa_handler = [](int) { stop_asked = 1; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigaction(SIGINT, &action, &old_int_);
+    sigaction(SIGTERM, &action, &old_term_);
+  }
+  ~StopSignals() {
+    sigaction(SIGINT, &old_int_, nullptr);
+    sigaction(SIGTERM, &old_term_, nullptr);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+ private:
+  struct sigaction old_int_ {};
+  struct sigaction old_term_ {};
+};
+
+LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
+
+std::uint64_t seed_from_system() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32U) | device();
+}
+
+double milliseconds(Duration d) { return 1e3 * seconds(d); }
+
+/// Refusals that another attempt does not change.
+bool final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
+
+/// The connection's state in a sentence; empty when there is nothing to say.
+std::string sentence(const ForceClient& client, const Options& options) {
+  const ForceClient::Stats stats = client.stats();
+  const std::string server = to_string(options.server);
+  switch (stats.phase) {
+    case ForceClient::Phase::kOpen:
+      return "connected to " + client.welcome()->device_name + " at " + server + " (" + client.welcome()->server +
+             ", " + std::to_string(client.welcome()->loop_hz) + " Hz)";
+    case ForceClient::Phase::kUnanswered:
+      return "no answer from " + server + "; is tendond running there? Trying on";
+    case ForceClient::Phase::kRefused:
+      return server + " refuses: " + stats.reason + (final(stats.code) ? "" : "; trying on");
+    case ForceClient::Phase::kLost:
+      return "lost " + server + ": " + stats.reason + "; trying on";
+    case ForceClient::Phase::kGreeting:
+    case ForceClient::Phase::kStopped:
+      return {};
+  }
+  return {};
+}
+
+void print_summary(const ForceClient::Stats& stats, Duration duration, const Options& options) {
+  using ull = unsigned long long;
+  const LinkStats& link = stats.link;
+  if (options.json) {
+    std::printf(
+        "{\"summary\":{\"duration_s\":%.3f,\"sessions\":%llu,\"states\":%llu,\"states_skipped\":%llu,\"forces\":%llu,"
+        "\"forces_unusable\":%llu,\"lost_incoming\":%llu,\"lost_outgoing\":%llu,\"round_trip_ms\":%.3f,"
+        "\"round_trip_variation_ms\":%.3f}}\n",
+        seconds(duration), ull{stats.sessions}, ull{stats.states}, ull{stats.states_skipped}, ull{stats.forces},
+        ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing}, milliseconds(link.smoothed_round_trip),
+        milliseconds(link.round_trip_variation));
+  } else if (stats.sessions == 0) {
+    std::fprintf(stderr, "%s: was not connected\n", options.client.name.c_str());
+  } else {
+    std::fprintf(stderr,
+                 "%s: %.1f s, %llu states came in (%llu skipped for a newer one), %llu forces went out (%llu more were "
+                 "unusable), lost on the way: %llu in, %llu out, round trip %.2f ± %.2f ms\n",
+                 options.client.name.c_str(), seconds(duration), ull{stats.states}, ull{stats.states_skipped},
+                 ull{stats.forces}, ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing},
+                 milliseconds(link.smoothed_round_trip), milliseconds(link.round_trip_variation));
+  }
+}
+
+template <typename Callback>
+int run_with(const Options& options, Callback callback) {
+  const auto say = [&](const std::string& text) { std::cerr << options.client.name << ": " << text << '\n'; };
+  try {
+    const StopSignals signals;
+    UdpTransport transport(options.server);
+    ForceClient::Config config = options.client;
+    config.seed = seed_from_system();
+    const LocalTime start = read_clock();
+    const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
+    ForceClient client(transport, options.server, config, std::move(callback), start);
+
+    std::string said;
+    LocalTime now = start;
+    while (now < end && stop_asked == 0) {
+      const LocalTime next = std::min(client.turn(now), end);
+      if (const std::string text = sentence(client, options); !text.empty() && text != said) say(said = text);
+      if (client.phase() == ForceClient::Phase::kRefused && final(client.stats().code)) return 1;
+      transport.wait(std::min(next - now, kLongestWait));
+      now = read_clock();
+    }
+    client.stop(now);
+    const ForceClient::Stats stats = client.stats();
+    print_summary(stats, now - start, options);
+    return stats.sessions > 0 ? 0 : 1;
+  } catch (const std::exception& error) {
+    say(error.what());
+    return 1;
+  }
+}
+
+}  // namespace
+
+int run(const Options& options, Physics physics) { return run_with(options, std::move(physics)); }
+int run(const Options& options, Watch watch) { return run_with(options, std::move(watch)); }
+
+}  // namespace tendon

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "clients/cpp/force_client.h"
+
+namespace tendon {
+
+/// What run() needs to know; CommandLine (options.h) fills it from a command line.
+struct Options {
+  Address server = parse_address("127.0.0.1:47100");
+  ForceClient::Config client;  ///< `seed` is replaced by one from the system
+  Duration duration{};         ///< ends after this time; 0 = at SIGINT or SIGTERM
+  bool json = false;           ///< the closing summary as one JSON object on stdout, not as text on stderr
+};
+
+/// Runs a guest in real time, on this thread, until it is told to stop (Options::duration, SIGINT or
+/// SIGTERM); then it says Bye. This is all that `main` needs: an exit code comes back.
+///
+///     0   it has been connected to the server
+///     1   it could not connect, the server refused it for good, or the callback threw
+///
+/// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps
+/// trying. stderr gets one sentence for each change of the connection, stdout nothing but the callback's
+/// own output and, with `json`, the summary: {"summary":{"duration_s":…, …}}.
+///
+/// One at a time in a process, because the signal handlers are the process's.
+int run(const Options& options, Physics physics);  ///< a controller
+int run(const Options& options, Watch watch);      ///< an observer
+
+}  // namespace tendon

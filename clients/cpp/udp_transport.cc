@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/udp_transport.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <asio/io_context.hpp>
+#include <asio/ip/udp.hpp>
+#include <ctime>
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+using asio::ip::udp;
+
+/// Times that one receive() skips an empty datagram or an error report (ICMP "port unreachable", while
+/// no server is up): a flood of them must not keep us from sending.
+constexpr int kMaxSkips = 64;
+
+udp::endpoint to_endpoint(const Address& address) {
+  const asio::ip::address_v6 v6(address.ip);
+  if (v6.is_v4_mapped()) return {asio::ip::make_address_v4(asio::ip::v4_mapped, v6), address.port};
+  return {v6, address.port};
+}
+
+}  // namespace
+
+struct UdpTransport::Socket {
+  asio::io_context context;
+  udp::socket socket{context};
+};
+
+UdpTransport::UdpTransport(const Address& server) : server_(server), socket_(std::make_unique<Socket>()) {
+  try {
+    socket_->socket.connect(to_endpoint(server));
+    socket_->socket.non_blocking(true);
+  } catch (const std::system_error& error) {
+    throw std::runtime_error("cannot reach " + to_string(server) + ": " + error.code().message());
+  }
+}
+
+UdpTransport::~UdpTransport() = default;
+
+void UdpTransport::send(const Address& to, std::span<const std::byte> datagram) {
+  if (to != server_) return;
+  asio::error_code lost;
+  socket_->socket.send(asio::buffer(datagram.data(), datagram.size()), 0, lost);
+}
+
+std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
+  from = server_;
+  for (int i = 0; i < kMaxSkips; ++i) {
+    asio::error_code error;
+    // MSG_TRUNC: the size is that of the datagram, even when the buffer is smaller.
+    const std::size_t size = socket_->socket.receive(asio::buffer(buffer.data(), buffer.size()), MSG_TRUNC, error);
+    if (!error && size > 0) return size;
+    if (error == asio::error::would_block) return 0;
+  }
+  return 0;
+}
+
+void UdpTransport::wait(Duration timeout) {
+  pollfd readable{socket_->socket.native_handle(), POLLIN, 0};
+  const Duration left = std::max(timeout, Duration::zero());
+  const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
+  const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};
+  ::ppoll(&readable, 1, &time, nullptr);
+}
+
+}  // namespace tendon

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/clients/cpp/a_and_z.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "protocol/codec.h"
+
+namespace tendon::a_and_z {
+
+void Network::send(LocalTime now, const Address& from, const Address& to, std::span<const std::byte> bytes) {
+  const bool lost = uniform() < weather_.loss;
+  const Duration delay = weather_.delay + from_seconds(uniform() * seconds(weather_.jitter));
+  if (!lost) flying_.emplace(now + delay, Datagram{from, to, {bytes.begin(), bytes.end()}});
+}
+
+std::size_t Network::receive(LocalTime now, const Address& to, Address& from, std::span<std::byte> buffer) {
+  for (auto it = flying_.begin(); it != flying_.end() && it->first <= now; ++it) {
+    const Datagram& datagram = it->second;
+    if (datagram.to != to) continue;
+    const std::size_t size = datagram.bytes.size();
+    from = datagram.from;
+    std::copy_n(datagram.bytes.begin(), std::min(size, buffer.size()), buffer.begin());
+    flying_.erase(it);
+    return size;
+  }
+  return 0;
+}
+
+void Network::drop_arrived(LocalTime now) { flying_.erase(flying_.begin(), flying_.upper_bound(now)); }
+
+LocalTime Server::turn(LocalTime now) {
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  while (const std::size_t size = link_.receive(from, buffer)) {
+    const auto datagram = std::span<const std::byte>(buffer).first(size);
+    const std::optional<Header> header = decode_header(datagram);
+    if (!header) continue;
+    if (header->type == DatagramType::kHello) {
+      hello(now, from, datagram);
+    } else if (session_ && header->connection_id == session_->connection_id()) {
+      session_->receive(now, datagram);
+    }
+  }
+  if (!session_) return LocalTime::max();
+
+  session_->tick(now);
+  if (now >= next_state_) {
+    DeviceState state;
+    tick += static_cast<std::uint64_t>(kLoopHz / state_hz);
+    state.tick = tick;
+    state.position = position(tick);
+    session_->send(state);
+    next_state_ = now + from_seconds(1.0 / state_hz);
+  }
+  while (session_) {
+    const std::optional<Session::Event> event = session_->next_event();
+    if (!event) break;
+    if (const auto* force = std::get_if<Session::ForceArrived>(&*event)) {
+      forces.emplace_back(now, force->command);
+    } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
+      requests.push_back(request->request);
+      session_->answer(request->id, Code::kOk, "");
+    } else if (const auto* end = std::get_if<Session::Closed>(&*event)) {
+      closed = end->code;
+      session_.reset();
+    }
+  }
+  flush(now);
+  return session_ ? std::min(session_->next_tick(), next_state_) : LocalTime::max();
+}
+
+void Server::say_bye(LocalTime now, Code code) {
+  session_->close(code, "Z closes");
+  flush(now);
+  session_.reset();
+}
+
+void Server::hello(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
+  std::array<std::byte, kMaxDatagram> buffer{};
+  const Doorman::Reply reply = doorman_.receive(now, from, datagram, buffer);
+  const auto send = [&](std::size_t size) {
+    if (size > 0) link_.send(from, std::span<const std::byte>(buffer).first(size));
+  };
+  send(reply.size);
+  if (!reply.guest) return;
+  if (attempt_ != reply.guest->random) {
+    attempt_ = reply.guest->random;
+    attempts.push_back(now);
+    hellos.push_back(reply.guest->hello);
+    if (!refusal) {
+      ++welcomes;
+      Session::Config config;
+      config.connection_id = ++connection_id_;
+      session_.emplace(config, now);
+      guest_ = from;
+      next_state_ = now;
+    }
+  }
+  if (refusal) {
+    send(Doorman::refuse(reply.guest->random, *refusal, buffer));
+    return;
+  }
+  Welcome welcome;
+  welcome.version = kProtocolVersion;
+  welcome.role = reply.guest->hello.role;
+  welcome.device_name = "hand at Z";
+  welcome.max_force = 10;
+  welcome.loop_hz = kLoopHz;
+  welcome.timeout = std::chrono::seconds(2);
+  welcome.server = "Z";
+  send(Doorman::welcome(connection_id_, reply.guest->random, welcome, buffer));
+}
+
+void Server::flush(LocalTime now) {
+  std::array<std::byte, kMaxDatagram> buffer{};
+  while (session_) {
+    const std::size_t size = session_->next_datagram(now, buffer);
+    if (size == 0) break;
+    link_.send(guest_, std::span<const std::byte>(buffer).first(size));
+  }
+}
+
+void World::run(Duration length) {
+  const LocalTime end = now + length;
+  for (turn(); next() <= end; turn()) advance();
+  now = end;
+}
+
+bool World::run_until(ForceClient::Phase phase, Duration limit) {
+  const LocalTime end = now + limit;
+  for (turn(); a->phase() != phase; turn()) {
+    if (next() > end) return false;
+    advance();
+  }
+  return true;
+}
+
+void World::advance() {
+  constexpr int kMaxTurns = 1000;  // at one instant: a few datagrams arrive together, each costs two turns
+  turns_at_once_ = next() > now ? 0 : turns_at_once_ + 1;
+  if (turns_at_once_ > kMaxTurns) throw std::logic_error("somebody wants to be called again and again at one instant");
+  now = std::max(now, next());
+}
+
+void World::turn() {
+  if (z) z_next_ = z->turn(now);
+  if (a) a_next_ = a->turn(now);
+  network_.drop_arrived(now);
+}
+
+LocalTime World::next() const {
+  LocalTime next = network_.next_arrival();
+  if (a) next = std::min(next, a_next_);
+  if (z) next = std::min(next, z_next_);
+  return next;
+}
+
+}  // namespace tendon::a_and_z

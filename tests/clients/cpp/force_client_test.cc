@@ -1,0 +1,461 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/force_client.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+#include "protocol/limits.h"
+#include "tests/clients/cpp/a_and_z.h"
+
+namespace tendon {
+namespace {
+
+using a_and_z::Server;
+using a_and_z::Weather;
+using a_and_z::World;
+using std::chrono::milliseconds;
+using Phase = ForceClient::Phase;
+constexpr Duration kSecond = std::chrono::seconds(1);
+
+constexpr Weather kFineWeather{.loss = 0, .delay = milliseconds(5), .jitter = Duration::zero()};
+
+/// A force by which one can tell the state that it answers.
+Vec3 answer(const DeviceState& hand) { return -100 * hand.position; }
+
+TEST(ForceClient, ComesInThroughTheRetryThoughAThirdOfAllDatagramsIsLost) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    World world(seed, {.loss = 0.3});
+    world.connect({.rate_hz = 100}, answer);
+    ASSERT_TRUE(world.run_until(Phase::kOpen, 4 * kSecond)) << "seed " << seed;
+    world.run(kSecond);
+    EXPECT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
+    EXPECT_EQ(world.a->welcome()->device_name, "hand at Z");
+    EXPECT_GT(world.z->forces.size(), 40U) << "seed " << seed;
+  }
+}
+
+TEST(ForceClient, TellsTheServerWhoItIs) {
+  World world(1);
+  world.connect({.name = "wall"}, answer);
+  ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
+  EXPECT_EQ(world.z->hellos.front().name, "wall");
+  EXPECT_EQ(world.z->hellos.front().role, Role::kController);
+}
+
+TEST(ForceClient, AnswersEachStateWithTheForceOfThatState) {
+  World world(2);
+  world.connect({}, answer);
+  world.run(2 * kSecond);
+  ASSERT_GT(world.z->forces.size(), 1000U);
+  for (const auto& [at, command] : world.z->forces) {
+    EXPECT_EQ(command.force, Vec3(-100 * Server::position(command.based_on_tick)));
+    EXPECT_FALSE(command.model);
+  }
+}
+
+TEST(ForceClient, ShowsThePhysicsTheNewestStateOnly) {
+  World world(3, {.loss = 0.1, .delay = milliseconds(20), .jitter = milliseconds(15)});
+  std::vector<std::uint64_t> seen;
+  std::uint64_t behind = 0;
+  world.connect({.rate_hz = 20}, [&](const DeviceState& hand) {
+    seen.push_back(hand.tick);
+    behind = std::max(behind, world.z->tick - hand.tick);
+    return answer(hand);
+  });
+  world.run(5 * kSecond);
+  ASSERT_GT(seen.size(), 90U);
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end(), std::less_equal<>())) << "a state came back, or came twice";
+  // The youngest of the last 35 states takes little more than the constant delay; a queue would take 35 ms and more.
+  EXPECT_LE(behind, 30U);
+  const ForceClient::Stats stats = world.a->stats();
+  EXPECT_EQ(stats.states, seen.size() + stats.states_skipped + 1) << "the +1 still waits for its turn";
+}
+
+TEST(ForceClient, OfStatesThatArriveTogetherOnlyTheNewestIsComputed) {
+  World world(4, kFineWeather);
+  int calls = 0;
+  world.connect({}, [&](const DeviceState& hand) {
+    ++calls;
+    return answer(hand);
+  });
+  ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
+  world.run(kSecond);
+  // A does nothing for 50 ms, as if its physics had computed for so long.
+  const ForceClient::Stats before = world.a->stats();
+  const int calls_before = calls;
+  const LocalTime end = world.now + milliseconds(50);
+  for (; world.now < end; world.now += milliseconds(1)) world.z->turn(world.now);
+  world.a->turn(world.now);
+  EXPECT_EQ(calls, calls_before + 1);
+  EXPECT_GT(world.a->stats().states_skipped, before.states_skipped + 40);
+}
+
+TEST(ForceClient, KeepsItsRate) {
+  World world(5, {.loss = 0.05, .delay = milliseconds(10), .jitter = milliseconds(5)});
+  std::vector<LocalTime> calls;
+  world.connect({.rate_hz = 100}, [&](const DeviceState& hand) {
+    calls.push_back(world.now);
+    return answer(hand);
+  });
+  ASSERT_TRUE(world.run_until(Phase::kOpen, 4 * kSecond));
+  calls.clear();
+  world.run(10 * kSecond);
+  EXPECT_GE(calls.size(), 985U);
+  EXPECT_LE(calls.size(), 1001U);
+}
+
+TEST(ForceClient, NeverCatchesUpWhatItHasMissed) {
+  World world(6, kFineWeather);
+  std::vector<LocalTime> calls;
+  world.connect({.rate_hz = 100}, [&](const DeviceState& hand) {
+    calls.push_back(world.now);
+    return answer(hand);
+  });
+  world.run(kSecond);
+  world.network().set({.loss = 1});
+  world.run(kSecond / 2);
+  world.network().set(kFineWeather);
+  calls.clear();
+  world.run(kSecond);
+  EXPECT_LE(calls.size(), 101U);
+  for (std::size_t i = 1; i < calls.size(); ++i) EXPECT_GE(calls[i] - calls[i - 1], milliseconds(9));
+}
+
+TEST(ForceClient, WithoutARateComputesEveryNewState) {
+  World world(7, kFineWeather);
+  int calls = 0;
+  world.connect({}, [&](const DeviceState& hand) {
+    ++calls;
+    return answer(hand);
+  });
+  ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
+  world.run(kSecond);
+  EXPECT_NEAR(calls, 1000, 6);
+  EXPECT_EQ(world.a->stats().states_skipped, 0U);
+}
+
+TEST(ForceClient, NumbersTheForcesWithoutAGap) {
+  World world(8, kFineWeather);
+  world.connect({.rate_hz = 50}, answer);
+  world.run(kSecond);
+  ASSERT_GT(world.z->forces.size(), 40U);
+  for (std::size_t i = 0; i < world.z->forces.size(); ++i) EXPECT_EQ(world.z->forces[i].second.sequence, i + 1);
+}
+
+// The work of the physics lies between the two turns; a time stamp from before it would hide it.
+TEST(ForceClient, SendsAForceInTheTurnAfterItsComputationWhichIsDueAtOnce) {
+  World world(9, kFineWeather);
+  bool called = false;
+  world.connect({}, [&](const DeviceState& hand) {
+    called = true;
+    return answer(hand);
+  });
+  world.run(kSecond);
+  // Z's next state is on its way; let it arrive.
+  called = false;
+  world.z->turn(world.now += milliseconds(1));
+  world.now += milliseconds(5);
+  const int sent = world.a_port.sent;
+  EXPECT_EQ(world.a->turn(world.now), world.now);
+  EXPECT_TRUE(called);
+  EXPECT_EQ(world.a_port.sent, sent);
+  world.a->turn(world.now + milliseconds(3));
+  EXPECT_EQ(world.a_port.sent, sent + 1);
+}
+
+TEST(ForceClient, AForceIsValidForThreePeriodsAndAtLeastTwentyMilliseconds) {
+  const auto valid_ms = [](const ForceClient::Config& config, int state_hz = 1000) {
+    World world(10, kFineWeather);
+    world.z->state_hz = state_hz;
+    world.connect(config, answer);
+    world.run(2 * kSecond);
+    return 1e3 * seconds(world.z->forces.back().second.valid_for);
+  };
+  constexpr double kOneTick = 3;
+  EXPECT_NEAR(valid_ms({.rate_hz = 100}), 30, kOneTick);
+  EXPECT_EQ(valid_ms({.rate_hz = 1000}), 20);
+  EXPECT_NEAR(valid_ms({.rate_hz = 2}), 1500, kOneTick);
+  EXPECT_EQ(valid_ms({.rate_hz = 0}), 20);
+  EXPECT_EQ(valid_ms({.rate_hz = 0}, 50), 60);
+  EXPECT_EQ(valid_ms({.rate_hz = 100}, 50), 60) << "no forces between the states";
+  EXPECT_EQ(valid_ms({.rate_hz = 0}, 2), 300) << "a gap is not a period";
+  EXPECT_EQ(valid_ms({.rate_hz = 100, .valid_for = milliseconds(7)}), 7);
+}
+
+TEST(ForceClient, TheStiffnessIsThatAtThePositionTheForceWasComputedFor) {
+  World world(11);
+  world.connect({.rate_hz = 100}, [](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    touch.stiffness = Vec3(100, 100, 100).asDiagonal();
+    return touch;
+  });
+  world.run(kSecond);
+  ASSERT_FALSE(world.z->forces.empty());
+  const ForceCommand& command = world.z->forces.back().second;
+  ASSERT_TRUE(command.model);
+  EXPECT_EQ(command.model->at, Server::position(command.based_on_tick));
+  EXPECT_EQ(command.model->stiffness, Mat3(Vec3(100, 100, 100).asDiagonal()));
+}
+
+TEST(ForceClient, DoesNotSendAForceThatIsNoForce) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  World world(12, kFineWeather);
+  int calls = 0;
+  world.connect({.rate_hz = 100}, [&](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    switch (++calls % 5) {
+      case 0:
+        touch.force.y() = kNan;
+        break;
+      case 1:
+        touch.force.z() = -kInf;
+        break;
+      case 2:
+        touch.stiffness = Mat3::Constant(kNan);
+        break;
+      case 3:
+        touch.force.x() = 10 * limits::kMaxValue;
+        break;
+      default:
+        break;
+    }
+    return touch;
+  });
+  world.run(2 * kSecond);
+  const ForceClient::Stats stats = world.a->stats();
+  EXPECT_EQ(stats.forces + stats.forces_unusable, static_cast<std::uint64_t>(calls));
+  EXPECT_NEAR(static_cast<double>(stats.forces), calls / 5.0, 1);
+  EXPECT_NEAR(static_cast<double>(world.z->forces.size()), static_cast<double>(stats.forces), 1);
+  for (const auto& [at, command] : world.z->forces) EXPECT_TRUE(command.force.allFinite());
+  EXPECT_EQ(world.z->forces.back().second.sequence, world.z->forces.size()) << "what is not sent takes no number";
+}
+
+TEST(ForceClient, AnObserverSeesTheHandAndTheLinkAndSendsNoForce) {
+  World world(13, kFineWeather);
+  int calls = 0;
+  Duration round_trip{};
+  world.connect({.rate_hz = 10}, [&](const DeviceState& hand, const LinkStats& link) {
+    ++calls;
+    EXPECT_EQ(hand.position, Server::position(hand.tick));
+    round_trip = link.smoothed_round_trip;
+  });
+  world.run(5 * kSecond);
+  EXPECT_EQ(world.z->hellos.front().role, Role::kObserver);
+  EXPECT_NEAR(calls, 50, 2);
+  EXPECT_NEAR(seconds(round_trip), 0.010, 0.001);
+  EXPECT_TRUE(world.z->forces.empty());
+  EXPECT_EQ(world.a->phase(), Phase::kOpen) << "keep-alives hold the session";
+}
+
+TEST(ForceClient, AsksForTheStateRateOnceInEachSession) {
+  World world(14, {.loss = 0.3});
+  world.connect({.state_hz = 250}, answer);
+  world.run(5 * kSecond);
+  ASSERT_EQ(world.z->requests.size(), static_cast<std::size_t>(world.z->welcomes));
+  EXPECT_EQ(std::get<SetStateRate>(world.z->requests.front()).hz, 250U);
+}
+
+TEST(ForceClient, ReportsARefusalAndAsksAgainEverMoreSeldom) {
+  World world(15, kFineWeather);
+  world.z->refusal = Refused{Code::kBusy, "the device has a controller", 1, 1};
+  world.connect({}, answer);
+  ASSERT_TRUE(world.run_until(Phase::kRefused, kSecond));
+  EXPECT_EQ(world.a->stats().code, Code::kBusy);
+  EXPECT_EQ(world.a->stats().reason, "the device has a controller");
+
+  world.run(60 * kSecond);
+  const std::vector<LocalTime>& attempts = world.z->attempts;
+  EXPECT_LE(attempts.size(), 35U) << "one in 2 s, and five on the way there";
+  EXPECT_GE(attempts.size(), 30U);
+  for (std::size_t i = 2; i < attempts.size(); ++i) {
+    EXPECT_GE(attempts[i] - attempts[i - 1], attempts[i - 1] - attempts[i - 2]) << "attempt " << i;
+  }
+  EXPECT_EQ(world.a->stats().attempts, attempts.size());
+  EXPECT_EQ(world.a->stats().sessions, 0U);
+
+  world.z->refusal.reset();
+  EXPECT_TRUE(world.run_until(Phase::kOpen, 3 * kSecond)) << "let in as soon as the place is free";
+}
+
+TEST(ForceClient, EveryAttemptHasItsOwnRandom) {
+  World world(16, kFineWeather);
+  world.z->refusal = Refused{Code::kBusy, "busy", 1, 1};
+  world.connect({}, answer);
+  world.run(10 * kSecond);
+  // Z counts an attempt when its random differs from the one before.
+  EXPECT_EQ(world.z->attempts.size(), world.a->stats().attempts);
+}
+
+TEST(ForceClient, ConnectsAgainWhenTheServerHasRestarted) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    World world(seed);
+    world.connect({.rate_hz = 100}, answer);
+    world.run(3 * kSecond);
+    ASSERT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
+    world.restart_server();
+    // 2 s of silence, 100 ms of back-off, a handshake.
+    world.run(4 * kSecond);
+    EXPECT_EQ(world.a->phase(), Phase::kOpen) << "seed " << seed;
+    EXPECT_EQ(world.a->stats().sessions, 2U) << "seed " << seed;
+    ASSERT_FALSE(world.z->forces.empty()) << "seed " << seed;
+    EXPECT_LE(world.z->forces.front().second.sequence, 5U) << "forces are numbered from 1 again";
+  }
+}
+
+TEST(ForceClient, FindsAServerThatStartsLate) {
+  World world(17);
+  world.kill_server();
+  world.connect({}, answer);
+  ASSERT_TRUE(world.run_until(Phase::kUnanswered, 3 * kSecond));
+  EXPECT_EQ(world.a->stats().code, Code::kTimedOut);
+  world.run(60 * kSecond);
+  EXPECT_LE(world.a_port.sent, 500) << "20 Hellos in every 4 s";
+  world.restart_server();
+  EXPECT_TRUE(world.run_until(Phase::kOpen, 3 * kSecond));
+}
+
+TEST(ForceClient, ConnectsAgainSoonAfterTheServerSaidByeHoweverOften) {
+  World world(18, kFineWeather);
+  world.connect({.rate_hz = 100}, answer);
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(world.run_until(Phase::kOpen, milliseconds(200))) << "after Bye number " << i;
+    world.run(kSecond);
+    world.z->say_bye(world.now, Code::kShutdown);
+    ASSERT_TRUE(world.run_until(Phase::kLost, milliseconds(20)));
+    EXPECT_EQ(world.a->stats().code, Code::kShutdown);
+    EXPECT_EQ(world.a->stats().reason, "Z closes");
+    EXPECT_GT(world.a->stats().link.datagrams_received, 0U) << "the last session's figures stay readable";
+  }
+}
+
+TEST(ForceClient, SaysByeWhenItStops) {
+  World world(19, kFineWeather);
+  world.connect({.rate_hz = 100}, answer);
+  world.run(kSecond);
+  world.a->stop(world.now);
+  EXPECT_EQ(world.a->phase(), Phase::kStopped);
+  world.run(milliseconds(10));
+  EXPECT_EQ(world.z->closed, Code::kOk) << "at once, not by a timeout";
+  const int sent = world.a_port.sent;
+  EXPECT_EQ(world.a->turn(world.now + 10 * kSecond), LocalTime::max());
+  EXPECT_EQ(world.a_port.sent, sent);
+}
+
+TEST(ForceClient, WhatThePhysicsThrowsComesOutOfTheTurnAfterABye) {
+  World world(20, kFineWeather);
+  world.connect({.rate_hz = 100}, [&](const DeviceState& hand) -> Touch {
+    if (hand.tick > 500) throw std::runtime_error("the mesh has burst");
+    return answer(hand);
+  });
+  EXPECT_THROW(world.run(kSecond), std::runtime_error);
+  EXPECT_EQ(world.a->phase(), Phase::kStopped);
+  world.run(milliseconds(10));
+  EXPECT_EQ(world.z->closed, Code::kOk);
+}
+
+TEST(ForceClient, ThePhysicsMayStopItAndItsForceIsThenNotSent) {
+  World world(21, kFineWeather);
+  std::uint64_t calls = 0;
+  world.connect({.rate_hz = 100}, [&](const DeviceState& hand) {
+    if (++calls == 50) world.a->stop(world.now);
+    return answer(hand);
+  });
+  world.run(kSecond);
+  EXPECT_EQ(world.a->phase(), Phase::kStopped);
+  EXPECT_EQ(world.z->closed, Code::kOk);
+  EXPECT_EQ(calls, 50U);
+  EXPECT_EQ(world.a->stats().forces, 49U);
+}
+
+TEST(ForceClient, HearsNobodyButItsServer) {
+  World world(22, kFineWeather);
+  world.connect({.rate_hz = 100}, answer);
+  world.run(kSecond);
+  const LinkStats before = world.a->stats().link;
+  const Address stranger = parse_address("203.0.113.9:47100");
+  const std::vector<std::byte> noise(100, std::byte{0x54});
+  for (int i = 0; i < 10; ++i) world.network().send(world.now, stranger, a_and_z::a_address, noise);
+  world.run(milliseconds(100));
+  EXPECT_EQ(world.a->stats().strangers, 10U);
+  EXPECT_EQ(world.a->stats().link.malformed, before.malformed);
+}
+
+TEST(ForceClient, CountsADatagramThatIsTooLargeAsMalformedThoughItsBeginningIsGood) {
+  World world(23, kFineWeather);
+  world.connect({.rate_hz = 100}, answer);
+  world.run(kSecond);
+  // Header of Data, connection 1, a new packet number; tx_time_ns = 0; then unknown fields to the end.
+  std::vector<unsigned char> bytes = {0x54, 0x13, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
+  bytes.insert(bytes.end(), {0x09, 0, 0, 0, 0, 0, 0, 0, 0, 0x78, 0x80, 0x00});
+  const auto pad_to = [&](std::size_t size) {
+    while (bytes.size() < size) bytes.insert(bytes.end(), {0x78, 0x00});
+    return std::as_bytes(std::span(bytes));
+  };
+  const LinkStats before = world.a->stats().link;
+  world.a->turn(world.now);
+  world.network().send(world.now, a_and_z::z_address, a_and_z::a_address, pad_to(kMaxDatagram));
+  ++bytes[8];
+  world.network().send(world.now, a_and_z::z_address, a_and_z::a_address, pad_to(5000));
+  world.run(milliseconds(6));
+  const LinkStats after = world.a->stats().link;
+  EXPECT_EQ(after.malformed, before.malformed + 1);
+  EXPECT_GT(after.lost, before.lost + 60'000) << "the first was good: its number leaves a gap";
+}
+
+TEST(ForceClient, AFloodDoesNotKeepItFromSending) {
+  World world(24, kFineWeather);
+  world.connect({.rate_hz = 100}, [](const DeviceState&, const LinkStats&) {});
+  world.run(kSecond);
+  const std::vector<std::byte> noise(100, std::byte{0x00});
+  for (int i = 0; i < 1000; ++i) world.network().send(world.now, a_and_z::z_address, a_and_z::a_address, noise);
+  world.now += milliseconds(60);
+  const int sent = world.a_port.sent;
+  EXPECT_EQ(world.a->turn(world.now), world.now) << "there is more to read";
+  EXPECT_EQ(world.a_port.sent, sent + 1) << "the keep-alive";
+}
+
+TEST(ForceClient, OneSeedIsOneWorld) {
+  const auto run = [](std::uint64_t seed) {
+    World world(seed, {.loss = 0.2, .jitter = milliseconds(10)});
+    world.connect({.rate_hz = 100}, answer);
+    world.run(5 * kSecond);
+    std::vector<std::pair<LocalTime, std::uint64_t>> forces;
+    for (const auto& [at, command] : world.z->forces) forces.emplace_back(at, command.based_on_tick);
+    return forces;
+  };
+  EXPECT_EQ(run(25), run(25));
+  EXPECT_NE(run(25), run(26));
+}
+
+TEST(ForceClient, RefusesAnImpossibleConfigurationByName) {
+  const auto complaint = [](const ForceClient::Config& config) -> std::string {
+    World world(27);
+    try {
+      world.connect(config, answer);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint({}), "");
+  EXPECT_TRUE(complaint({.name = std::string(65, 'x')}).starts_with("name:"));
+  EXPECT_TRUE(complaint({.rate_hz = -1}).starts_with("rate_hz:"));
+  EXPECT_TRUE(complaint({.rate_hz = 1e-300}).starts_with("rate_hz:"));
+  EXPECT_TRUE(complaint({.rate_hz = std::nan("")}).starts_with("rate_hz:"));
+  EXPECT_TRUE(complaint({.state_hz = 2'000'000}).starts_with("state_hz:"));
+  EXPECT_TRUE(complaint({.valid_for = 11 * kSecond}).starts_with("valid_for:"));
+  EXPECT_TRUE(complaint({.patience = Duration::zero()}).starts_with("patience:"));
+  EXPECT_TRUE(complaint({.retry_min = Duration::zero()}).starts_with("retry_min:"));
+  EXPECT_TRUE(complaint({.retry_max = milliseconds(1)}).starts_with("retry_max:"));
+  EXPECT_TRUE(complaint({.max_datagrams = 0}).starts_with("max_datagrams:"));
+}
+
+}  // namespace
+}  // namespace tendon

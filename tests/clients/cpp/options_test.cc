@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/options.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace tendon {
+namespace {
+
+struct Parsed {
+  std::optional<int> exit_code;
+  Options options;
+  double stiffness = 2000;
+  bool local_model = false;
+  std::string out;
+  std::string err;
+};
+
+Parsed parse(std::vector<const char*> words) {
+  Parsed parsed;
+  parsed.options.client = {.name = "virtual_wall", .rate_hz = 100};
+  CommandLine line("A wall.", parsed.options);
+  line.add("--stiffness-n-per-m", parsed.stiffness, "How hard it is");
+  line.add("--local-model", parsed.local_model, "Send the stiffness");
+  words.insert(words.begin(), "virtual_wall");
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  parsed.exit_code = line.parse(static_cast<int>(words.size()), words.data());
+  parsed.out = testing::internal::GetCapturedStdout();
+  parsed.err = testing::internal::GetCapturedStderr();
+  return parsed;
+}
+
+TEST(CommandLine, NothingGivenLeavesTheDefaults) {
+  const Parsed parsed = parse({});
+  EXPECT_FALSE(parsed.exit_code);
+  EXPECT_EQ(to_string(parsed.options.server), "127.0.0.1:47100");
+  EXPECT_EQ(parsed.options.client.rate_hz, 100);
+  EXPECT_EQ(parsed.options.duration, Duration::zero());
+  EXPECT_FALSE(parsed.options.json);
+}
+
+TEST(CommandLine, ReadsWhatIsGiven) {
+  const Parsed parsed = parse({"--server", "[::1]:5000", "--rate-hz", "250.5", "--duration-s", "1.5", "--json",
+                               "--stiffness-n-per-m", "800", "--local-model"});
+  EXPECT_FALSE(parsed.exit_code);
+  EXPECT_EQ(to_string(parsed.options.server), "[::1]:5000");
+  EXPECT_EQ(parsed.options.client.rate_hz, 250.5);
+  EXPECT_EQ(parsed.options.duration, std::chrono::milliseconds(1500));
+  EXPECT_TRUE(parsed.options.json);
+  EXPECT_EQ(parsed.stiffness, 800);
+  EXPECT_TRUE(parsed.local_model);
+}
+
+TEST(CommandLine, HelpShowsAnExampleAndLeavesWithZero) {
+  const Parsed parsed = parse({"--help"});
+  EXPECT_EQ(parsed.exit_code, 0);
+  EXPECT_NE(parsed.out.find("Example: virtual_wall --server 127.0.0.1:47100"), std::string::npos) << parsed.out;
+  EXPECT_NE(parsed.out.find("--stiffness-n-per-m"), std::string::npos);
+}
+
+TEST(CommandLine, WrongUsageLeavesWithTwoAndASentence) {
+  const std::vector<std::vector<const char*>> wrong = {{"--server", "127.0.0.1"},
+                                                       {"--server", "localhost:99999"},
+                                                       {"--rate-hz", "-1"},
+                                                       {"--rate-hz", "nan"},
+                                                       {"--rate-hz", "fast"},
+                                                       {"--rate-hz", "1e-9"},
+                                                       {"--duration-s", "-3"},
+                                                       {"--duration-s", "inf"},
+                                                       {"--stiffness-n-per-m", "-5"},
+                                                       {"--stiffness-n-per-m", "inf"},
+                                                       {"--stiffness-n-per-m", "nan"},
+                                                       {"--unknown"},
+                                                       {"surplus"}};
+  for (const auto& words : wrong) {
+    const Parsed parsed = parse(words);
+    EXPECT_EQ(parsed.exit_code, 2) << words.front() << " " << words.back();
+    EXPECT_FALSE(parsed.err.empty());
+    EXPECT_TRUE(parsed.out.empty());
+  }
+  EXPECT_NE(parse({"--server", "nowhere"}).err.find("expected HOST:PORT"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/udp_transport.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace tendon {
+namespace {
+
+/// A plain socket on loopback. Datagrams to loopback have arrived when send() returns.
+class Z {
+ public:
+  Z() : fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
+    sockaddr_in self = loopback(0);
+    EXPECT_EQ(::bind(fd_, as_sockaddr(self), sizeof self), 0);
+    socklen_t size = sizeof self;
+    EXPECT_EQ(::getsockname(fd_, as_sockaddr(self), &size), 0);
+    port_ = ntohs(self.sin_port);
+  }
+  ~Z() { close(); }
+  Z(const Z&) = delete;
+  Z& operator=(const Z&) = delete;
+
+  void close() {
+    if (fd_ >= 0) ::close(fd_);
+    fd_ = -1;
+  }
+  Address address() const { return parse_address("127.0.0.1:" + std::to_string(port_)); }
+  /// The size of the datagram that has come, and remembers its sender.
+  ssize_t receive() {
+    std::array<char, kMaxDatagram> buffer{};
+    socklen_t size = sizeof guest_;
+    return ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT, as_sockaddr(guest_), &size);
+  }
+  void reply(std::size_t size) {
+    const std::vector<char> bytes(size, 'z');
+    ::sendto(fd_, bytes.data(), bytes.size(), 0, as_sockaddr(guest_), sizeof guest_);
+  }
+  const sockaddr_in& guest() const { return guest_; }
+
+ private:
+  static sockaddr_in loopback(std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(port);
+    return address;
+  }
+  static sockaddr* as_sockaddr(sockaddr_in& address) { return reinterpret_cast<sockaddr*>(&address); }
+
+  int fd_;
+  std::uint16_t port_ = 0;
+  sockaddr_in guest_{};
+};
+
+constexpr std::array<std::byte, 8> kWords{};
+
+TEST(UdpTransport, TalksWithItsServer) {
+  Z z;
+  UdpTransport a(z.address());
+  a.send(z.address(), kWords);
+  EXPECT_EQ(z.receive(), 8);
+  z.reply(20);
+  a.wait(std::chrono::seconds(10));
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  EXPECT_EQ(a.receive(from, buffer), 20U);
+  EXPECT_EQ(from, z.address());
+  EXPECT_EQ(a.receive(from, buffer), 0U) << "none left, and no waiting";
+}
+
+TEST(UdpTransport, TellsTheFullSizeOfADatagramItHadToCut) {
+  Z z;
+  UdpTransport a(z.address());
+  a.send(z.address(), kWords);
+  z.receive();
+  z.reply(5000);
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  EXPECT_EQ(a.receive(from, buffer), 5000U);
+}
+
+TEST(UdpTransport, SkipsEmptyDatagrams) {
+  Z z;
+  UdpTransport a(z.address());
+  a.send(z.address(), kWords);
+  z.receive();
+  z.reply(0);
+  z.reply(7);
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  EXPECT_EQ(a.receive(from, buffer), 7U);
+}
+
+TEST(UdpTransport, AServerThatIsNotThereIsSilenceNotAnError) {
+  Z z;
+  const Address address = z.address();
+  z.close();
+  UdpTransport a(address);
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  for (int i = 0; i < 3; ++i) {
+    a.send(address, kWords);
+    EXPECT_EQ(a.receive(from, buffer), 0U);
+  }
+}
+
+TEST(UdpTransport, HearsNobodyButItsServer) {
+  Z z;
+  Z stranger;
+  UdpTransport a(z.address());
+  a.send(z.address(), kWords);
+  z.receive();
+  UdpTransport b(stranger.address());
+  b.send(stranger.address(), kWords);
+  stranger.receive();
+  // The stranger learns A's port and writes to it.
+  const_cast<sockaddr_in&>(stranger.guest()) = z.guest();
+  stranger.reply(20);
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Address from;
+  EXPECT_EQ(a.receive(from, buffer), 0U);
+}
+
+}  // namespace
+}  // namespace tendon
