@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/realtime/heap_guard.h"
+
+#include <cstddef>
+
+// glibc's own allocator, below the names that are replaced here.
+extern "C" {
+void* __libc_malloc(std::size_t size);                     // NOLINT(bugprone-reserved-identifier)
+void* __libc_calloc(std::size_t count, std::size_t size);  // NOLINT(bugprone-reserved-identifier)
+void* __libc_realloc(void* block, std::size_t size);       // NOLINT(bugprone-reserved-identifier)
+void __libc_free(void* block);                             // NOLINT(bugprone-reserved-identifier)
+}
+
+namespace {
+
+thread_local bool counting = false;
+thread_local std::uint64_t calls = 0;
+
+void count() noexcept {
+  if (counting) ++calls;
+}
+
+}  // namespace
+
+extern "C" {
+
+void* malloc(std::size_t size) {
+  count();
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t number, std::size_t size) {
+  count();
+  return __libc_calloc(number, size);
+}
+void* realloc(void* block, std::size_t size) {
+  count();
+  return __libc_realloc(block, size);
+}
+void free(void* block) {
+  count();
+  __libc_free(block);
+}
+
+}  // extern "C"
+
+namespace tendon {
+
+HeapGuard::HeapGuard() {
+  ::calls = 0;
+  ::counting = true;
+}
+HeapGuard::~HeapGuard() { ::counting = false; }
+std::uint64_t HeapGuard::calls() const { return ::calls; }
+
+}  // namespace tendon

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+namespace tendon {
+
+/// Counts every heap call of the calling thread while it lives: malloc, calloc, realloc, free and all that
+/// ends in them (new, delete, std::string …). For the promise that the haptic thread makes none.
+///
+/// Works by interposing glibc's malloc in this executable: link heap_guard.cc, not into sanitizer builds.
+class HeapGuard {
+ public:
+  HeapGuard();
+  ~HeapGuard();
+  HeapGuard(const HeapGuard&) = delete;
+  HeapGuard& operator=(const HeapGuard&) = delete;
+
+  std::uint64_t calls() const;
+};
+
+}  // namespace tendon
