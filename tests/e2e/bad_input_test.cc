@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Bad input of an operator is answered by a sentence that says what to do, on stderr, and exit code 2.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+struct BadInput {
+  std::string what;
+  std::string program;
+  std::vector<std::string> arguments;
+  std::vector<std::string> says;
+};
+
+void expect_refusals(const std::filesystem::path& folder, const std::vector<BadInput>& inputs) {
+  for (const BadInput& input : inputs) {
+    SCOPED_TRACE(input.program + ": " + input.what);
+    Process process(program(input.program), input.arguments, folder);
+    EXPECT_EQ(process.wait(), 2);
+    EXPECT_EQ(process.out(), "");
+    for (const std::string& words : input.says) {
+      EXPECT_NE(process.err().find(words), std::string::npos) << "not \"" << words << "\" in: " << process.err();
+    }
+  }
+}
+
+constexpr std::string_view kFalcon = "[device]\nkind = \"simulated\"\nprofile = \"falcon\"\n";
+
+TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrongAndExitCode2) {
+  const ScratchFolder folder;
+  const auto path = [&](const std::string& name) { return (folder.path() / name).string(); };
+  const std::string demo = demo_scene().string();
+  const std::string unit = write(path("unit.toml"), std::string(kFalcon) + "[loop]\nperiod_ms = 1\n");
+  const std::string unknown = write(path("unknown.toml"), std::string(kFalcon) + "[loop]\ncolour = 1\n");
+  const std::string negative =
+      write(path("negative.toml"), std::string(kFalcon) + "[device.effects]\nmass_kg = -0.2\n");
+  const std::string syntax = write(path("syntax.toml"), "[device\n");
+  expect_refusals(
+      folder.path(),
+      {
+          {"no scene named", "tendond", {}, {"scene", "required"}},
+          {"missing scene file", "tendond", {path("none.toml")}, {"cannot read", "none.toml", "No such file"}},
+          {"a folder as scene", "tendond", {path("")}, {"cannot read", "Is a directory"}},
+          {"not TOML", "tendond", {syntax}, {syntax + ":1"}},
+          {"key in the wrong unit", "tendond", {unit}, {unit + ":5: loop.period_ms: unknown key", "period_us"}},
+          {"unknown key", "tendond", {unknown}, {unknown + ":5: loop.colour: unknown key"}},
+          {"negative mass", "tendond", {negative}, {negative + ":5: device.effects.mass_kg: expected", "found -0.2"}},
+          {"recording into a missing folder",
+           "tendond",
+           {demo, "--listen", "127.0.0.1:0", "--record", path("none/run.mcap")},
+           {"cannot write recording " + path("none/run.mcap"), "No such file or directory"}},
+          {"recording over a folder",
+           "tendond",
+           {demo, "--listen", "127.0.0.1:0", "--record", path("")},
+           {"cannot write recording", "Is a directory"}},
+          {"unknown option", "tendond", {demo, "--recrod", "run.mcap"}, {"--recrod"}},
+          {"no address", "tendond", {demo, "--listen", "here"}, {"expected HOST:PORT like 127.0.0.1:47100", "here"}},
+          {"negative duration", "tendond", {demo, "--duration-s", "-1"}, {"--duration-s", "-1"}},
+      });
+}
+
+TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
+  const ScratchFolder folder;
+  const std::vector<std::string> ends = {"--listen", "127.0.0.1:0", "--to", "127.0.0.1:47100"};
+  const auto with = [&](const std::string& option, const std::string& value) {
+    std::vector<std::string> arguments = ends;
+    arguments.insert(arguments.end(), {option, value});
+    return arguments;
+  };
+  expect_refusals(
+      folder.path(),
+      {
+          {"no argument", "tendon-inject", {}, {"--listen", "required"}},
+          {"no server", "tendon-inject", {"--listen", "127.0.0.1:0"}, {"--to", "required"}},
+          {"loss of 150 %", "tendon-inject", with("--loss", "150%"), {"loss", "150%"}},
+          {"negative delay", "tendon-inject", with("--delay-ms", "-5"), {"delay", "-5"}},
+          {"jitter that is no number", "tendon-inject", with("--jitter-ms", "some"), {"--jitter-ms", "some"}},
+          {"no such histogram", "tendon-inject", with("--histogram", "none.csv"), {"none.csv"}},
+          {"unknown option", "tendon-inject", with("--lose", "2%"), {"--lose"}},
+      });
+}
+
+TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrongAndExitCode2) {
+  const ScratchFolder folder;
+  std::vector<BadInput> inputs;
+  for (const std::string client : {"virtual_wall", "echo_motion"}) {
+    inputs.push_back({"bad address", client, {"--server", "there"}, {"--server", "expected HOST:PORT", "there"}});
+    inputs.push_back({"port too high", client, {"--server", "127.0.0.1:70000"}, {"--server", "127.0.0.1:70000"}});
+    inputs.push_back({"negative rate", client, {"--rate-hz", "-1"}, {"--rate-hz", "-1"}});
+    inputs.push_back({"unknown option", client, {"--sevrer", "127.0.0.1:47100"}, {"--sevrer"}});
+  }
+  inputs.push_back({"not a number", "virtual_wall", {"--stiffness-n-per-m", "nan"}, {"--stiffness-n-per-m", "nan"}});
+  expect_refusals(folder.path(), inputs);
+}
+
+TEST(BadInput, ASecondServerOnAPortInUseSaysSoAndLeavesTheRecordingOfTheFirstAlone) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "run.mcap";
+  Server server(folder.path(), demo_scene(), {"--record", file.string()});
+  expect_refusals(folder.path(), {{"port in use",
+                                   "tendond",
+                                   {demo_scene().string(), "--listen", server.address(), "--record", file.string()},
+                                   {"cannot listen on " + server.address() + ": Address already in use"}}});
+  expect_refusals(folder.path(), {{"port in use",
+                                   "tendon-inject",
+                                   {"--listen", server.address(), "--to", "127.0.0.1:9"},
+                                   {"cannot listen on " + server.address() + ": Address already in use"}}});
+  const std::string end = server.stop();
+  EXPECT_EQ(read_recording(file).steps.size(), count_in(end, "steps"));
+}
+
+TEST(BadInput, AnAddressThatOthersCanReachIsRefusedWithTheReason) {
+  const ScratchFolder folder;
+  const std::string reason = "anyone on the network could command forces";
+  const std::string scene =
+      write(folder.path() / "open.toml", std::string(kFalcon) + "[network]\nlisten = \"0.0.0.0:47100\"\n");
+  const std::string demo = demo_scene().string();
+  expect_refusals(
+      folder.path(),
+      {
+          {"all IPv4", "tendond", {demo, "--listen", "0.0.0.0:0"}, {"refusing to listen on 0.0.0.0:0", reason}},
+          {"all IPv6", "tendond", {demo, "--listen", "[::]:0"}, {"refusing to listen on [::]:0", reason}},
+          {"another's", "tendond", {demo, "--listen", "192.0.2.1:0"}, {"refusing to listen on 192.0.2.1:0", reason}},
+          {"in the scene", "tendond", {scene}, {scene + ":5: network.listen: expected", "loopback"}},
+          {"the injector's",
+           "tendon-inject",
+           {"--listen", "0.0.0.0:0", "--to", "127.0.0.1:9"},
+           {"refusing to listen on 0.0.0.0:0", reason}},
+      });
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "demo.mcap"));
+}
+
+TEST(Help, OfEveryProgramHasAnExample) {
+  const ScratchFolder folder;
+  std::vector<std::string> programs = {"tendond", "tendon-inject", "virtual_wall", "echo_motion"};
+  if (std::filesystem::exists(program("tendon-lab"))) programs.emplace_back("tendon-lab");
+  for (const std::string& name : programs) {
+    SCOPED_TRACE(name);
+    Process process(program(name), {"--help"}, folder.path());
+    EXPECT_EQ(process.wait(), 0);
+    EXPECT_EQ(process.err(), "");
+    std::string help = process.out();
+    std::transform(help.begin(), help.end(), help.begin(), [](unsigned char c) { return std::tolower(c); });
+    EXPECT_NE(help.find("example"), std::string::npos) << help;
+  }
+}
+
+}  // namespace
+}  // namespace tendon::e2e

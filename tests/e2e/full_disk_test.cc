@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A disk that is full ends the recording, not the run.
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <string>
+#include <system_error>
+
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+/// A file system of 1 MB in memory; needs the right to mount. Gone at the end of the test.
+class SmallDisk {
+ public:
+  explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
+    std::filesystem::create_directory(path_);
+    if (::mount("tendon-test", path_.c_str(), "tmpfs", 0, "size=1m") != 0) error_ = errno;
+  }
+  ~SmallDisk() {
+    // Lazily, so that it goes even when a program that was not stopped still writes to it.
+    if (error_ == 0) ::umount2(path_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+  int error() const noexcept { return error_; }
+
+ private:
+  std::filesystem::path path_;
+  int error_ = 0;
+};
+
+void expect_the_device_to_run_on(Server& server, Process& echo, std::uint64_t after_tick) {
+  while (count_in(echo.wait_for_line(R"("tick")"), "tick") < after_tick + 500) {
+  }
+  const std::string end = server.stop();
+  EXPECT_NE(end.find(R"("recording_ended_early":true)"), std::string::npos) << end;
+  EXPECT_EQ(count_in(end, "recorded_steps") + count_in(end, "lost_steps"), count_in(end, "steps"));
+  EXPECT_EQ(count_in(end, "fault"), 0U);
+}
+
+TEST(FullDisk, EndsTheRecordingAndNotTheRunAndTheFileStillReads) {
+  const ScratchFolder folder;
+  const SmallDisk disk(folder.path() / "disk");
+  if (disk.error() != 0) {
+    GTEST_SKIP() << "may not mount a small tmpfs here (" << std::system_category().message(disk.error())
+                 << "); run as root to test what a full disk does";
+  }
+  const auto file = disk.path() / "run.mcap";
+  Server server(folder.path(), demo_scene(), {"--record", file.string()});
+  Client wall("virtual_wall", server.address(), folder.path());
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  const std::string told = server.process().wait_for_line("recording has ended, the device runs on");
+  EXPECT_NE(told.find("cannot write recording " + file.string() + ": No space left on device"), std::string::npos)
+      << told;
+
+  const Recording recording = read_recording(file);
+  expect_passive(recording, read_scene(demo_scene()));
+  EXPECT_TRUE(recording.truncated);
+  ASSERT_FALSE(recording.steps.empty());
+  expect_the_device_to_run_on(server, echo, recording.steps.back().tick);
+  EXPECT_EQ(read_recording(file).steps.size(), recording.steps.size());
+}
+
+TEST(FullDisk, FromTheFirstByteIsToldAtOnce) {
+  const ScratchFolder folder;
+  Server server(folder.path(), demo_scene(), {"--record", "/dev/full"});
+  server.process().wait_for_line("recording has ended, the device runs on: cannot write recording /dev/full: No space");
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  expect_the_device_to_run_on(server, echo, count_in(echo.wait_for_line(R"("tick")"), "tick"));
+}
+
+}  // namespace
+}  // namespace tendon::e2e

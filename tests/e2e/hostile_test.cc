@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Whatever is sent to the server's port is counted, and changes nothing. The server's own counters are compared with
+// what its recording says has arrived, so that a datagram which the kernel dropped breaks no claim.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <set>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "protocol/codec.h"
+#include "server/udp_link.h"
+#include "tests/e2e/relay.h"
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+constexpr int kGarbage = 200;
+constexpr int kOversized = 5;
+constexpr std::size_t kOversizedBytes = 60'000;
+constexpr int kCut = 10;
+
+std::size_t below(std::mt19937_64& bits, std::size_t end) { return static_cast<std::size_t>(bits() % end); }
+
+Datagram garbage(std::mt19937_64& bits, std::size_t size) {
+  Datagram datagram(size);
+  for (std::byte& byte : datagram) byte = static_cast<std::byte>(bits() & 0xFFU);
+  return datagram;
+}
+
+/// Lets the server read before its socket's buffer is full; where this is not enough, the kernel drops.
+void breathe() { std::this_thread::sleep_for(std::chrono::milliseconds(1)); }
+
+void wait_until_said(const Relay& relay, std::size_t count) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (relay.said().size() < count) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "the client has fallen silent";
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+/// What the server must have counted, from what has arrived.
+struct Expected {
+  std::uint64_t malformed = 0;   ///< of nobody's conversation
+  std::uint64_t duplicated = 0;  ///< of the client's, with a number that was there before
+  std::uint64_t oversized = 0;   ///< of the malformed
+};
+
+Expected expected_of(const std::vector<DatagramRecord>& arrived, const Address& client) {
+  Expected expected;
+  std::set<std::uint64_t> numbers;
+  for (const DatagramRecord& record : arrived) {
+    if (record.size > kMaxDatagram) {
+      ++expected.oversized;
+      ++expected.malformed;
+      continue;
+    }
+    const auto header = decode_header(std::span(record.bytes).first(record.size));
+    if (header && header->type == DatagramType::kHello) continue;
+    if (!header || header->type != DatagramType::kData || record.peer != client) {
+      ++expected.malformed;
+    } else if (!numbers.insert(header->packet_number).second) {
+      ++expected.duplicated;
+    }
+  }
+  return expected;
+}
+
+TEST(HostileDatagrams, AreCountedAndChangeNothing) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "run.mcap";
+  Server server(folder.path(), demo_scene(), {"--record", file.string()});
+  const Address address = parse_address(server.address());
+  Relay relay(address);
+  Client wall("virtual_wall", to_string(relay.address()), folder.path());
+  wall.wait_for_line("connected to falcon");
+  ASSERT_NO_FATAL_FAILURE(wait_until_said(relay, 100));
+
+  std::mt19937_64 bits(7);
+  UdpLink stranger(parse_address("127.0.0.1:0"));
+  for (int i = 0; i < kGarbage; ++i) {
+    const Datagram datagram = garbage(bits, 1 + below(bits, kMaxDatagram));
+    i % 2 == 0 ? stranger.send(address, datagram) : relay.forge(datagram);
+    breathe();
+  }
+  for (int i = 0; i < kOversized; ++i) {
+    const Datagram datagram = garbage(bits, kOversizedBytes);
+    i % 2 == 0 ? stranger.send(address, datagram) : relay.forge(datagram);
+    breathe();
+  }
+  const std::vector<Datagram> said = relay.said();
+  for (const Datagram& datagram : said) {
+    relay.forge(datagram);             // once more, from its own place
+    stranger.send(address, datagram);  // and from a stranger's
+    relay.forge(std::span(datagram).first(below(bits, kHeaderSize)));
+    breathe();
+  }
+  relay.cut_next(kCut);
+  ASSERT_NO_FATAL_FAILURE(wait_until_said(relay, relay.said().size() + 200));
+  wall.signal(SIGTERM);
+  EXPECT_EQ(wall.wait(), 0);
+  const std::string end = server.stop();
+
+  const Recording recording = read_recording(file);
+  expect_passive(recording, read_scene(demo_scene()));
+  ASSERT_EQ(recording.losses, 0U);
+  const Expected expected = expected_of(recording.arrived, relay.clients_address());
+  EXPECT_GE(expected.malformed, static_cast<std::uint64_t>(kGarbage) / 2);
+  EXPECT_GE(expected.duplicated, said.size() / 2);
+  EXPECT_GE(expected.oversized, 1U);
+  EXPECT_GE(count_in(end, "malformed"), expected.malformed);
+  EXPECT_EQ(count_in(end, "duplicated"), expected.duplicated);
+  EXPECT_GE(count_in(end, "lost"), static_cast<std::uint64_t>(kCut));  // the cut ones were not taken for whole ones
+
+  // And nothing else: one guest, who stayed; its forces went on, each newer than the one before.
+  EXPECT_EQ(count_in(end, "welcomed"), 1U);
+  EXPECT_EQ(count_in(end, "refused"), 0U);
+  EXPECT_EQ(wall.err().find("lost 127"), std::string::npos) << wall.err();
+  std::uint64_t newest = 0;
+  for (const StepRecord& step : recording.steps) {
+    ASSERT_GE(step.force_sequence, newest);
+    newest = step.force_sequence;
+  }
+  const auto last_stranger = std::find_if(recording.arrived.rbegin(), recording.arrived.rend(),
+                                          [&](const DatagramRecord& d) { return d.peer == stranger.local_address(); });
+  ASSERT_NE(last_stranger, recording.arrived.rend());
+  const auto after = std::find_if(recording.steps.begin(), recording.steps.end(),
+                                  [&](const StepRecord& step) { return step.hand.at >= last_stranger->at; });
+  ASSERT_NE(after, recording.steps.end());
+  EXPECT_GT(newest, after->force_sequence + 100);
+}
+
+}  // namespace
+}  // namespace tendon::e2e

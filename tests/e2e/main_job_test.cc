@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A hand, a server, a bad network and a remote wall, each a process of its own, and what becomes of the others when one
+// of them is killed. Nothing here measures a time: virtual machines pause. What is claimed is in the recordings.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+/// A hand that goes into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
+/// every stage of the age policy is seen.
+constexpr std::string_view kPressingHand = R"([device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 300
+
+[force]
+hold_ms = 200
+safe_stop_ms = 1000
+)";
+
+bool felt(double force) { return force < -0.5; }  // N along x, away from the wall
+
+struct Stretch {
+  Mode mode;
+  std::size_t begin;  ///< index of its first step
+};
+
+/// The steps as stretches of one mode each.
+std::vector<Stretch> stretches_of(const std::vector<StepRecord>& steps) {
+  std::vector<Stretch> stretches;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (stretches.empty() || stretches.back().mode != steps[i].mode) stretches.push_back({steps[i].mode, i});
+  }
+  return stretches;
+}
+
+TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "run.mcap";
+  const Scene scene = read_scene(demo_scene());
+  Server server(folder.path(), demo_scene(), {"--record", file.string()});
+  Service network("tendon-inject",
+                  {"--to", server.address(), "--delay-ms", "20", "--jitter-ms", "5", "--loss", "2%", "--seed", "7"},
+                  folder.path(), "start", "listen");
+  Process wall(program("virtual_wall"), {"--server", network.address(), "--duration-s", "3", "--json"}, folder.path());
+  EXPECT_EQ(wall.wait(), 0) << wall.err();
+  const std::string network_end = network.stop();
+  const std::string server_end = server.stop();
+
+  EXPECT_EQ(count_in(server_end, "welcomed"), 1U);
+  EXPECT_EQ(count_in(network_end, "seed"), 7U);
+  const auto down = network_end.find(R"("down")");
+  ASSERT_NE(down, std::string::npos);
+  EXPECT_GT(count_in(std::string_view(network_end).substr(down), "lost"), 0U);  // 2 % of 3000
+  EXPECT_GE(number_in(wall.out(), "round_trip_ms"), 2 * 15.0);
+
+  const Recording recording = read_recording(file);
+  expect_passive(recording, scene);
+  std::size_t in_time = 0;
+  double peak = 0;
+  for (const StepRecord& step : recording.steps) {
+    peak = std::max(peak, step.applied.norm());
+    in_time += step.reasons.has(Reason::kOverrun) ? 0 : 1;
+    if (step.force_sequence == 0) continue;
+    ASSERT_GE(step.loop_age, 2 * std::chrono::milliseconds(15)) << "tick " << step.tick;
+  }
+  EXPECT_GT(peak, 1);         // N: it is felt
+  EXPECT_GT(in_time, 1000U);  // steps of which the claim holds without exception
+
+  EXPECT_FALSE(recording.truncated);
+  EXPECT_EQ(recording.losses, 0U);
+  EXPECT_EQ(recording.steps.size(), count_in(server_end, "steps"));
+  EXPECT_EQ(recording.steps.size(), count_in(server_end, "recorded_steps"));
+  EXPECT_EQ(count_in(server_end, "lost_steps"), 0U);
+  EXPECT_NE(server_end.find(R"("recording_ended_early":false)"), std::string::npos) << server_end;
+}
+
+TEST(MainJob, WhenThePhysicsIsKilledInContactItsForceIsHeldFadesAndStopsAndItsSuccessorIsRampedIn) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "run.mcap";
+  const std::string scene_file = write(folder.path() / "scene.toml", kPressingHand);
+  const Scene scene = read_scene(scene_file);
+  Server server(folder.path(), scene_file, {"--record", file.string()});
+  Client echo("echo_motion", server.address(), folder.path(), {"--json", "--rate-hz", "100"});
+  {
+    Client wall("virtual_wall", server.address(), folder.path());
+    watch_force(echo, felt);
+    wall.signal(SIGKILL);
+    EXPECT_EQ(wall.wait(), -SIGKILL);
+  }
+  watch_force(echo, [](double force) { return force == 0; });
+  Client successor("virtual_wall", server.address(), folder.path());
+  watch_force(echo, felt);
+  const std::string end = server.stop();
+  EXPECT_EQ(count_in(end, "welcomed"), 3U);
+
+  const Recording recording = read_recording(file);
+  expect_passive(recording, scene);
+  const std::vector<StepRecord>& steps = recording.steps;
+  const std::vector<Stretch> stretches = stretches_of(steps);
+  const auto stop = std::find_if(stretches.begin(), stretches.end(),
+                                 [](const Stretch& stretch) { return stretch.mode == Mode::kSafeStop; });
+  ASSERT_GE(stop - stretches.begin(), 3);
+  ASSERT_GE(stretches.end() - stop, 2);
+  EXPECT_EQ((stop - 3)->mode, Mode::kActive);
+  EXPECT_EQ((stop - 2)->mode, Mode::kHolding);
+  EXPECT_EQ((stop - 1)->mode, Mode::kDecaying);
+  EXPECT_EQ((stop + 1)->mode, Mode::kActive);
+
+  EXPECT_GT(steps[(stop - 2)->begin].hand.position.x(), 0);  // in contact
+  EXPECT_GT(steps[(stop - 2)->begin].applied.norm(), 0);
+  EXPECT_EQ(steps[(stop + 1)->begin - 1].applied.norm(), 0);
+  EXPECT_TRUE(steps[(stop + 1)->begin].reasons.has(Reason::kRampIn));
+  const double max_growth = scene.loop.control.max_slew * tendon::seconds(scene.loop.control.longest_hold) + 1e-9;
+  for (std::size_t i = 1; i < steps.size(); ++i) {
+    ASSERT_LE(steps[i].applied.norm() - steps[i - 1].applied.norm(), max_growth) << "tick " << steps[i].tick;
+  }
+}
+
+TEST(MainJob, AKilledServerLeavesARecordingThatReadsUpToItsLastSecond) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "run.mcap";
+  Server server(folder.path(), demo_scene(), {"--record", file.string()});
+  Client wall("virtual_wall", server.address(), folder.path());
+  Client echo("echo_motion", server.address(), folder.path(), {"--json", "--rate-hz", "100"});
+  while (count_in(echo.wait_for_line(R"("tick")"), "tick") < 2000) {
+  }
+  server.process().signal(SIGKILL);
+  EXPECT_EQ(server.process().wait(), -SIGKILL);
+
+  echo.signal(SIGTERM);
+  EXPECT_EQ(echo.wait(), 0) << echo.err();
+  const std::uint64_t last_seen = count_in(std::string_view(echo.out()).substr(echo.out().rfind(R"("tick")")), "tick");
+  const Recording recording = read_recording(file);
+  expect_passive(recording, read_scene(demo_scene()));
+  EXPECT_TRUE(recording.truncated);
+  ASSERT_FALSE(recording.steps.empty());
+  // Steps are 1 ms apart, or more.
+  EXPECT_GE(recording.steps.back().tick + 1000, last_seen);
+  EXPECT_FALSE(recording.arrived.empty());
+}
+
+TEST(MainJob, ASignalEndsTheServerCleanlyAndItsGuestsAreTold) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+    SCOPED_TRACE(signal);
+    const ScratchFolder folder;
+    const auto file = folder.path() / "run.mcap";
+    Server server(folder.path(), demo_scene(), {"--record", file.string()});
+    Client wall("virtual_wall", server.address(), folder.path());
+    Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+    wall.wait_for_line("connected to falcon");
+    echo.wait_for_line(R"("tick")");
+    const std::string end = server.stop(signal);
+    EXPECT_EQ(text_in(end, "event"), "stopped");
+    EXPECT_NE(server.process().err().find("signal " + std::to_string(signal)), std::string::npos);
+    for (Process* guest : {static_cast<Process*>(&wall), static_cast<Process*>(&echo)}) {
+      guest->wait_for_line("lost " + server.address() + ": the server is going down");
+      guest->signal(SIGTERM);
+      EXPECT_EQ(guest->wait(), 0);
+    }
+    const Recording recording = read_recording(file);
+    EXPECT_FALSE(recording.truncated);
+    EXPECT_EQ(recording.losses, 0U);
+    EXPECT_EQ(recording.steps.size(), count_in(end, "steps"));
+  }
+}
+
+}  // namespace
+}  // namespace tendon::e2e

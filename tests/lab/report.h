@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace tendon::lab {
+
+/// `tendon-lab report`: what some recorded runs come down to, side by side.
+struct ReportOptions {
+  std::vector<std::filesystem::path> recordings = {};  ///< one or more
+  /// One for each recording. Left out: "limiter on" or "limiter off", as the recorded steps show.
+  std::vector<std::string> labels = {};
+  std::optional<std::filesystem::path> picture = {};  ///< .svg or .png
+  bool json = false;                                  ///< one object for each recording instead of the table
+};
+
+/// Reads the recordings, writes the table (or JSON) to `out`, and draws the picture.
+///
+/// A recording that was cut off is read as far as it goes, and the report says so. Throws std::invalid_argument when
+/// the options make no sense, before anything is read; std::runtime_error when a recording cannot be read, is corrupt
+/// or holds no step (then nothing has been written), or when the picture cannot be drawn.
+void report(const ReportOptions& options, std::ostream& out);
+
+}  // namespace tendon::lab
