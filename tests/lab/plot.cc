@@ -38,6 +38,7 @@ constexpr double kAbovePanel = 0.018;
 // Okabe and Ito's colours, which people with any colour vision can tell apart.
 constexpr const char* kInk = "#222222";
 constexpr const char* kPale = "#666666";
+constexpr const char* kGrey = "#E8E8E8";
 constexpr const char* kBlue = "#0072B2";
 constexpr const char* kSky = "#56B4E9";
 constexpr const char* kOrange = "#E69F00";
@@ -268,7 +269,7 @@ class Script {
          << "set tmargin at screen " << top << "\nset bmargin at screen " << top - kPanelHeight << "\n"
          << "set yrange [" << scale.least << ":" << scale.most << "]\n"
          << "set key at screen " << right(i) << "," << top + kAbovePanel
-         << " right center horizontal samplen 1.5 noenhanced textcolor rgb '" << kInk << "'\n";
+         << " right center horizontal samplen 1.5 width -1.8 noenhanced textcolor rgb '" << kInk << "'\n";
     label(left(i), top + kAbovePanel, title) << "font ':Bold' tc rgb '" << kInk << "'\n";
     if (row + 1 == kPanelTops.size()) {
       out_ << "set format x '%g'\nset xlabel 'time, s' offset 0,0.4 textcolor rgb '" << kPale << "'\n";
@@ -297,36 +298,34 @@ class Script {
   void draw_position(std::size_t i) {
     const RunSummary& run = drawings_[i].summary;
     begin_panel(i, 0, "Where the hand is, along " + axis_name(run.axis) + ", mm", position_);
-    const auto wall = [this](double at, bool above) {
-      std::ostringstream edge;
-      edge << "first " << at * 1e3;
-      shade(edge.str(), above ? "graph 1" : "graph 0", "#eeeeee");
-      out_ << "set label 'in contact' at graph 0.988, graph " << (above ? 0.86 : 0.07) << " right front tc rgb '"
-           << kPale << "'\n";
+    const auto shade_from = [this](double edge, const char* end) {
+      std::ostringstream from;
+      from << "first " << edge * 1e3;
+      shade(from.str(), end, kGrey);
     };
-    if (run.contact && run.contact->above) wall(*run.contact->above, true);
-    if (run.contact && run.contact->below) wall(*run.contact->below, false);
+    if (run.contact && run.contact->above) shade_from(*run.contact->above, "graph 1");
+    if (run.contact && run.contact->below) shade_from(*run.contact->below, "graph 0");
     out_ << "plot $run" << i << " using 1:2 with lines lw 1.6 lc rgb '" << kInk << "' notitle";
+    if (run.contact) out_ << ", keyentry with boxes fs solid noborder fc rgb '" << kGrey << "' title 'in contact'";
     end_panel(i, position_, true);
   }
 
   void draw_force(std::size_t i) {
-    const Trace& trace = drawings_[i].trace;
-    begin_panel(i, 1, "Force on the hand along " + axis_name(drawings_[i].summary.axis) + ", N", force_);
-    zero_line();
     Extremes wanted;
-    for (const Trace::Column& column : trace.columns()) wanted.observe(column.wanted);
+    for (const Trace::Column& column : drawings_[i].trace.columns()) wanted.observe(column.wanted);
     const double farthest = -wanted.least > wanted.most ? wanted.least : wanted.most;
-    std::string title = "wanted";
+    std::string title = "Force on the hand, N";
     if (!wanted.empty() && (farthest < force_.least || farthest > force_.most))
-      title += " (to " + with_unit(farthest, "N") + ")";
+      title += " (wanted to " + with_unit(farthest, "N") + ")";
+    begin_panel(i, 1, title, force_);
+    zero_line();
     out_ << "plot ";
     if (drawings_[i].summary.limiter_on) {
       out_ << "$bound" << i << " using 1:(-$2):2 with filledcurves lc rgb '" << kSky
            << "' fs solid 0.35 noborder title 'permitted', ";
     }
-    out_ << "$run" << i << " using 1:3 with lines lw 1.4 lc rgb '" << kOrange << "' title " << literal(title)
-         << ", $run" << i << " using 1:4 with lines lw 2 lc rgb '" << kBlue << "' title 'applied'";
+    out_ << "$run" << i << " using 1:3 with lines lw 1.4 lc rgb '" << kOrange << "' title 'wanted', $run" << i
+         << " using 1:4 with lines lw 2 lc rgb '" << kBlue << "' title 'applied'";
     end_panel(i, force_, false);
   }
 

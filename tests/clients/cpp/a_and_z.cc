@@ -103,6 +103,7 @@ void Server::hello(LocalTime now, const Address& from, std::span<const std::byte
   }
   Welcome welcome;
   welcome.version = kProtocolVersion;
+  if (features) welcome.features = reply.guest->hello.features;
   welcome.role = reply.guest->hello.role;
   welcome.device_name = "hand at Z";
   welcome.max_force = 10;

@@ -88,6 +88,7 @@ class Server {
   void say_bye(LocalTime now, Code code);
 
   std::optional<Refused> refusal;  ///< set: everybody is refused with it
+  bool features = true;            ///< agree to whatever is offered, or to nothing
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
 

@@ -203,6 +203,19 @@ TEST(ForceClient, TheStiffnessIsThatAtThePositionTheForceWasComputedFor) {
   EXPECT_EQ(command.model->stiffness, Mat3(Vec3(100, 100, 100).asDiagonal()));
 }
 
+TEST(ForceClient, KeepsTheStiffnessToItselfWhenTheServerDoesNotKnowLocalModels) {
+  World world(11);
+  world.z->features = false;
+  world.connect({.rate_hz = 100}, [](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    touch.stiffness = Vec3(100, 100, 100).asDiagonal();
+    return touch;
+  });
+  world.run(kSecond);
+  ASSERT_FALSE(world.z->forces.empty());
+  for (const auto& [at, command] : world.z->forces) EXPECT_FALSE(command.model);
+}
+
 TEST(ForceClient, DoesNotSendAForceThatIsNoForce) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInf = std::numeric_limits<double>::infinity();
