@@ -132,7 +132,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     if (!(duration_s >= 0 && duration_s <= kLongestRun_s)) {  // NaN is neither
-      throw CLI::ValidationError("--duration-s", "expected 0 to 31536000 seconds");
+      throw CLI::ValidationError("--duration-s", "expected 0 to 31536000 seconds, got " + std::to_string(duration_s));
     }
     if (scene_option->count() == 0) throw CLI::RequiredError("scene");
   } catch (const CLI::ParseError& problem) {

@@ -24,7 +24,10 @@ int complain(const std::exception& error, int code) {
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
   app.require_subcommand(1);
-  app.footer("\ntendon-lab VERB --help tells more.\n\nExit: 0 done; 1 failed; 2 wrong usage.");
+  app.footer(
+      "\nExample: the same motion without and with the limiter, as a table and a picture\n"
+      "  tendon-lab report off.mcap on.mcap --out runs.png\n"
+      "\ntendon-lab VERB --help tells more.\n\nExit: 0 done; 1 failed; 2 wrong usage.");
 
   ReportOptions options;
   std::vector<std::string> recordings;
