@@ -137,9 +137,12 @@ Step HapticController::step(const Motion& hand, const Vec3& applied) noexcept {
   const Duration elapsed = std::min(step.held, config_.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   step.force = slewed.force;
-  step.reasons |= saturated.reasons;
-  step.reasons |= slewed.reasons;
   limit(step);
+  // The tightest bound is the reason: one that was met before the limiter cut further did not matter.
+  if (!step.reasons.has(Reason::kEnergy)) {
+    step.reasons |= saturated.reasons;
+    step.reasons |= slewed.reasons;
+  }
   return step;
 }
 

@@ -9,12 +9,17 @@ cd "$root"
 say() { printf '[%4d s] %s\n' "$SECONDS" "$*"; }
 
 # step NAME COMMAND…: one line on the terminal, all that COMMAND prints in build/log. When it fails, the end of that too.
+# COMMAND stops at its first error: bash would overlook `set -e` in a condition, so it does not run in one.
 step() {
-  local name=$1 started=$SECONDS log
-  log=$logs/${name//[^a-z0-9]/-}.log
+  local name=$1 started=$SECONDS log status
+  log=$logs/${name//[^a-zA-Z0-9]/-}.log
   shift
-  printf '[%4d s] %-34s ' "$SECONDS" "$name"
-  if (set -e; "$@") >"$log" 2>&1 </dev/null; then
+  printf '[%4d s] %-24s ' "$SECONDS" "$name"
+  set +e
+  (set -e; "$@") >"$log" 2>&1 </dev/null
+  status=$?
+  set -e
+  if [ $status = 0 ]; then
     printf '%4d s\n' $((SECONDS - started))
   else
     printf 'FAILED after %d s\n' $((SECONDS - started))

@@ -186,7 +186,7 @@ void Server::report_trouble() {
               std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now.longest_interval).count()) +
               " µs");
   }
-  if (now.fault != HapticController::Fault::kNone && told_.fault != now.fault) {
+  if (mail_->flight.frozen()) {  // each fault freezes it once, and saving thaws it
     log::error(std::string("fault: ") + describe(now.fault) + "; force is zero until a controller rearms");
     save_flight();
   }
@@ -194,7 +194,6 @@ void Server::report_trouble() {
 }
 
 void Server::save_flight() {
-  if (!mail_->flight.frozen()) return;
   std::filesystem::path path = scene_.recording.value_or("tendon.mcap");
   path.replace_extension(".fault-" + std::to_string(++flights_) + ".mcap");
   try {

@@ -245,6 +245,19 @@ TEST(HapticController, StaysWithinTheDevicesForceAndSaysSo) {
   EXPECT_FALSE(step.reasons.has(Reason::kEnergy));
 }
 
+TEST(HapticController, NamesTheBoundThatDecidedAndNotTheLooserOnes) {
+  HapticController::Config c = config();
+  c.max_force = 2;
+  c.max_slew = 100;
+  Bench bench(c);
+  bench.move_to(0);
+  bench.want(-100);
+  const Step step = bench.move_to(1e-6);
+  EXPECT_TRUE(step.reasons.has(Reason::kEnergy));  // 0.06 N, where the slew limit allows 0.1 N and the device 2 N
+  EXPECT_FALSE(step.reasons.has(Reason::kSlew));
+  EXPECT_FALSE(step.reasons.has(Reason::kMaxForce));
+}
+
 TEST(HapticController, WithoutALimiterTheLedgerIsStillKept) {
   HapticController::Config c = config();
   c.limiter = HapticController::Limiter::kNone;

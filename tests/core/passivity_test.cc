@@ -10,9 +10,9 @@
 #include <cmath>
 #include <limits>
 #include <ostream>
-#include <random>
 
 #include "core/haptic_controller.h"
+#include "tests/support/dice.h"
 
 namespace tendon {
 
@@ -21,25 +21,6 @@ void PrintTo(HapticController::Limiter limiter, std::ostream* out) {
 }
 
 namespace {
-
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
-  double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
-  double within(double low, double high) { return low + (high - low) * uniform(); }
-  double decades(double low, double high) { return std::pow(10, within(low, high)); }
-  bool chance(double p) { return uniform() < p; }
-  Vec3 direction() {
-    Vec3 v;
-    do {
-      v = Vec3(within(-1, 1), within(-1, 1), within(-1, 1));
-    } while (v.squaredNorm() < 1e-3 || v.squaredNorm() > 1);
-    return v.normalized();
-  }
-
- private:
-  std::mt19937_64 random_;
-};
 
 struct Outcome {
   double least_energy = 0;

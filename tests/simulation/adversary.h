@@ -4,35 +4,12 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <random>
 
 #include "core/friction.h"
 #include "devices/device.h"
+#include "tests/support/dice.h"
 
 namespace tendon::simulation {
-
-/// Random numbers for worlds: own inverse CDFs, the same on every standard library.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
-  std::uint64_t bits() { return random_(); }
-  double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
-  double within(double low, double high) { return low + (high - low) * uniform(); }
-  /// 10^within(low, high)
-  double decades(double low, double high) { return std::pow(10, within(low, high)); }
-  bool chance(double p) { return uniform() < p; }
-  Duration milliseconds(double low, double high) { return from_seconds(within(low, high) * 1e-3); }
-  Vec3 direction() {
-    Vec3 v;
-    do {
-      v = Vec3(within(-1, 1), within(-1, 1), within(-1, 1));
-    } while (v.squaredNorm() < 1e-3 || v.squaredNorm() > 1);
-    return v.normalized();
-  }
-
- private:
-  std::mt19937_64 random_;
-};
 
 /// A device in the hand of an adversary, who knows the law and the force, senses positions exactly, and
 /// moves so as to get the most energy out: a mixture of random motion and of the worst motion there is,

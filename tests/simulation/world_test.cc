@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -12,6 +13,7 @@
 
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
+#include "protocol/codec.h"
 #include "server/flight_file.h"
 #include "server/recording_reader.h"
 #include "tests/simulation/adversary.h"
@@ -323,10 +325,46 @@ TEST(World, GarbageTruncatedOversizedAndReplayedDatagramsAreCountedAndChangeNoth
   EXPECT_EQ(log.modes(), std::vector{Mode::kActive});
 }
 
-TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) {
+TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
   SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(2));
+  // No client of ours sends such a force: an attacker who has seen the session writes it.
+  const std::uint64_t sent = world.client(z).stats().link.datagrams_sent;
+  const std::uint64_t invalid = world.server().stats().controller.invalid;
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  std::uint64_t number = sent;
+  for (const double bad : {std::nan(""), kInf, -kInf, 1e300}) {
+    std::array<std::byte, kMaxDatagram> buffer;
+    DataWriter writer;
+    writer.begin(buffer, 1, number++, world.now(), std::nullopt);
+    ForceCommand command;
+    command.sequence = 1'000'000;
+    command.based_on_tick = 2000;
+    command.force = Vec3(bad, 0, 0);
+    command.valid_for = milliseconds(30);
+    writer.add(command);
+    world.network().forge(world.client_address(z), world.server_address(),
+                          {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())});
+  }
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(1));
+  EXPECT_EQ(world.server().stats().controller.invalid, invalid + 4);
+  for (const StepRecord& step : log.steps) {
+    ASSERT_TRUE(step.applied.allFinite());
+    ASSERT_LE(step.applied.norm(), device.info().max_force);
+  }
+  EXPECT_EQ(log.steps.back().mode, Mode::kActive);
+}
+
+TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) {
+  SimulatedDevice::Config hand = pressing_hand();
+  hand.watchdog = milliseconds(5);
+  SimulatedDevice device(hand);
   World::Config config = world_config(device);
-  config.loop.control.watchdog = *pressing_hand().watchdog;
+  config.loop.control.watchdog = milliseconds(5);
   config.pause_probability = 5e-3;
   config.pause = milliseconds(30);
   World world(config, device);
