@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <iostream>
 #include <limits>
+#include <ostream>
 
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/recorded_motion.h"
@@ -34,6 +35,8 @@ struct Hand {
   const char* recording;
   double wall;  ///< m, where the wall is: so that the motion goes in and out of it
 };
+
+void PrintTo(const Hand& hand, std::ostream* out) { *out << hand.recording << ", wall at " << hand.wall << " m"; }
 
 Outcome run(const std::filesystem::path& data, const Hand& hand, HapticController::Limiter limiter,
             const std::filesystem::path& out) {
