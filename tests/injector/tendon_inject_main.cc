@@ -22,8 +22,8 @@
 #include <system_error>
 #include <vector>
 
-#include "server/doorbell.h"
 #include "server/clock.h"
+#include "server/doorbell.h"
 #include "server/udp_link.h"
 #include "tests/injector/proxy.h"
 #include "tests/injector/release_error.h"

@@ -144,7 +144,7 @@ World::~World() = default;
 
 double World::uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
 
-std::size_t World::add(std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)> make) {
+std::size_t World::add(const std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)>& make) {
   Client client;
   client.address = address_of(static_cast<std::uint16_t>(50000 + clients_.size()));
   client.client = make(network_.open(client.address), now_);

@@ -122,7 +122,7 @@ class World {
     std::unique_ptr<ForceClient> client;  ///< null once killed
     LocalTime due{};
   };
-  std::size_t add(std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)> make);
+  std::size_t add(const std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)>& make);
   void step_haptic();
   void drain();
   double uniform();
