@@ -5,10 +5,10 @@
 
 // glibc's own allocator, below the names that are replaced here.
 extern "C" {
-void* __libc_malloc(std::size_t size);                     // NOLINT(bugprone-reserved-identifier)
-void* __libc_calloc(std::size_t count, std::size_t size);  // NOLINT(bugprone-reserved-identifier)
-void* __libc_realloc(void* block, std::size_t size);       // NOLINT(bugprone-reserved-identifier)
-void __libc_free(void* block);                             // NOLINT(bugprone-reserved-identifier)
+void* __libc_malloc(std::size_t size);                     // NOLINT(readability-identifier-naming)
+void* __libc_calloc(std::size_t count, std::size_t size);  // NOLINT(readability-identifier-naming)
+void* __libc_realloc(void* block, std::size_t size);       // NOLINT(readability-identifier-naming)
+void __libc_free(void* block);                             // NOLINT(readability-identifier-naming)
 }
 
 namespace {
