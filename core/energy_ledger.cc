@@ -8,15 +8,25 @@
 
 namespace tendon {
 
+namespace {
+
+bool possible(double friction) noexcept { return std::isfinite(friction) && friction >= 0; }
+
+}  // namespace
+
 EnergyLedger::EnergyLedger(const Friction& friction) : friction_(friction) {
   const auto check = [](double value, const char* name) {
-    if (!(std::isfinite(value) && value >= 0)) {
+    if (!possible(value)) {
       throw std::invalid_argument(std::string(name) + " friction must be finite and not negative, got " +
                                   std::to_string(value));
     }
   };
   check(friction.coulomb, "Coulomb");
   check(friction.viscous, "viscous");
+}
+
+void EnergyLedger::adapt(const Friction& friction) noexcept {
+  if (possible(friction.coulomb) && possible(friction.viscous)) friction_ = friction;
 }
 
 double EnergyLedger::book(double work, double squared_displacement, Duration held) noexcept {

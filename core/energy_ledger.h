@@ -50,6 +50,10 @@ class EnergyLedger {
   /// then nothing is booked (the limiter never lets it be above f_c).
   double observe_unseen(double applied, Duration at_most) noexcept;
 
+  /// From the next interval on friction has these lower bounds. Throws nothing: values that are not finite
+  /// or negative change nothing.
+  void adapt(const Friction& friction) noexcept;
+
   /// E, J. Negative only after an interval longer than the limiter was told to expect.
   double energy() const noexcept { return energy_; }
 

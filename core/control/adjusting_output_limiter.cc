@@ -8,12 +8,15 @@
 
 namespace tendon {
 
+void check_longest_hold(Duration longest_hold) {
+  if (longest_hold <= Duration::zero()) {
+    throw std::invalid_argument("longest hold must be above zero, got " + std::to_string(longest_hold.count()) + " ns");
+  }
+}
+
 AdjustingOutputLimiter::AdjustingOutputLimiter(const Config& config)
     : coulomb_(config.friction.coulomb), viscous_per_hold_(config.friction.viscous / seconds(config.longest_hold)) {
-  if (config.longest_hold <= Duration::zero()) {
-    throw std::invalid_argument("longest hold must be above zero, got " + std::to_string(config.longest_hold.count()) +
-                                " ns");
-  }
+  check_longest_hold(config.longest_hold);
 }
 
 double AdjustingOutputLimiter::permitted(double energy) const noexcept {

@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "core/control/stability_controller.h"
 #include "core/friction.h"
-#include "core/motion.h"
-#include "core/reason.h"
 
 namespace tendon {
 
-/// A force, and why it is not the one that was wanted.
-template <int N>
-struct LimitedForce {
-  Eigen::Matrix<double, N, 1> force;  ///< N, on the hand
-  double permitted;                   ///< N, the bound on ‖force‖ at this step
-  Reasons reasons;
-};
+/// Throws std::invalid_argument unless `longest_hold` is above zero.
+void check_longest_hold(Duration longest_hold);
 
 /// Bounds a force so that the device can never give out more energy than it took in, whatever is
 /// upstream of it: late, slow, wrong or hostile.
@@ -33,6 +27,8 @@ struct LimitedForce {
 ///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, eqs (7)–(9), Table I; vector form: control.md 8.5.
 ///
+/// This is the bound alone; the controllers that keep the account with it are in core/control/aol.h.
+///
 /// Thread-safe: yes (no state). Realtime-safe: yes.
 class AdjustingOutputLimiter {
  public:
@@ -49,9 +45,9 @@ class AdjustingOutputLimiter {
 
   /// Bounds `wanted` (N, on the hand). A wanted force that is not finite becomes zero, with the reason.
   template <int N>
-  LimitedForce<N> limit(const Eigen::Matrix<double, N, 1>& wanted, double energy) const noexcept {
+  LimitedForce<N> limit(const Vec<N>& wanted, double energy) const noexcept {
     const double bound = permitted(energy);
-    if (!wanted.allFinite()) return {Eigen::Matrix<double, N, 1>::Zero(), bound, Reason::kNotFinite};
+    if (!wanted.allFinite()) return {Vec<N>::Zero(), bound, Reason::kNotFinite};
     const double size = wanted.norm();
     if (size <= bound) return {wanted, bound, {}};
     return {wanted * (bound / size), bound, Reason::kEnergy};

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/control/aol.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+namespace tendon {
+
+namespace {
+
+template <std::size_t Count, std::size_t... I>
+std::array<EnergyLedger, Count> ledgers_of(const std::array<Friction, Count>& friction, std::index_sequence<I...>) {
+  return {EnergyLedger(friction[I])...};
+}
+
+template <std::size_t Count>
+std::array<EnergyLedger, Count> ledgers_of(const std::array<Friction, Count>& friction) {
+  return ledgers_of(friction, std::make_index_sequence<Count>());
+}
+
+template <int N>
+std::array<Friction, N> repeated(const Friction& friction) {
+  std::array<Friction, N> all;
+  all.fill(friction);
+  return all;
+}
+
+}  // namespace
+
+template <int Blocks, int Size>
+Aol<Blocks, Size>::Aol(const Config& config) : ledgers_(ledgers_of(config.friction)) {
+  check_longest_hold(config.longest_hold);
+  for (std::size_t i = 0; i < losses_.size(); ++i) {
+    losses_[i] = {.coulomb = config.friction[i].coulomb,
+                  .viscous_per_hold = config.friction[i].viscous / seconds(config.longest_hold)};
+  }
+}
+
+template <int Blocks, int Size>
+void Aol<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
+  if (!interval.applied.allFinite() || !interval.dx.allFinite()) return;
+  for (int i = 0; i < Blocks; ++i) {
+    ledgers_[static_cast<std::size_t>(i)].observe(Vec<Size>(interval.applied.template segment<Size>(i * Size)),
+                                                  Vec<Size>(interval.dx.template segment<Size>(i * Size)),
+                                                  interval.held);
+  }
+}
+
+template <int Blocks, int Size>
+void Aol<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration at_most) noexcept {
+  for (int i = 0; i < Blocks; ++i) {
+    ledgers_[static_cast<std::size_t>(i)].observe_unseen(applied.template segment<Size>(i * Size).norm(), at_most);
+  }
+}
+
+template <int Blocks, int Size>
+auto Aol<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> LimitedForce<kSize> {
+  const double size = wanted.force.norm();
+  std::array<double, Blocks> sizes{};
+  for (int i = 0; i < Blocks; ++i) {
+    sizes[static_cast<std::size_t>(i)] = wanted.force.template segment<Size>(i * Size).norm();
+  }
+  if constexpr (Blocks == 1) {
+    const double permitted = losses_[0].largest(energy());
+    if (!wanted.force.allFinite()) return {Vec<kSize>::Zero(), permitted, Reason::kNotFinite};
+    if (size <= permitted) return {wanted.force, permitted, {}};
+    return {wanted.force * (permitted / size), permitted, Reason::kEnergy};
+  } else {
+    if (!wanted.force.allFinite()) return {Vec<kSize>::Zero(), 0, Reason::kNotFinite};
+    const double scale = largest_scale(losses_, sizes, energy());
+    const double permitted = size > 0 ? scale * size : 0;
+    if (scale >= 1) return {wanted.force, permitted, {}};
+    return {wanted.force * scale, permitted, Reason::kEnergy};
+  }
+}
+
+template <int Blocks, int Size>
+double Aol<Blocks, Size>::energy() const noexcept {
+  double sum = ledgers_[0].energy();
+  for (std::size_t i = 1; i < ledgers_.size(); ++i) sum += ledgers_[i].energy();
+  return sum;
+}
+
+template class Aol<1>;
+template class Aol<1, 3>;
+template class Aol<3>;
+template class Aol<6>;
+template class Aol<2, 3>;
+
+template <int N>
+PerAxisAol<N>::PerAxisAol(const Config& config)
+    : limiter_({config.friction, config.longest_hold}), ledgers_(ledgers_of(repeated<N>(config.friction))) {}
+
+template <int N>
+void PerAxisAol<N>::observe(const Interval<N>& interval) noexcept {
+  if (!interval.applied.allFinite() || !interval.dx.allFinite()) return;
+  for (int i = 0; i < N; ++i) {
+    ledgers_[static_cast<std::size_t>(i)].observe(Vec<1>(interval.applied[i]), Vec<1>(interval.dx[i]), interval.held);
+  }
+}
+
+template <int N>
+void PerAxisAol<N>::observe_unseen(const Vec<N>& applied, Duration at_most) noexcept {
+  for (int i = 0; i < N; ++i) {
+    ledgers_[static_cast<std::size_t>(i)].observe_unseen(std::abs(applied[i]), at_most);
+  }
+}
+
+template <int N>
+LimitedForce<N> PerAxisAol<N>::limit(const Demand<N>& wanted) noexcept {
+  LimitedForce<N> result{wanted.force, 0, {}};
+  for (int i = 0; i < N; ++i) {
+    const auto axis = limiter_.limit(Vec<1>(wanted.force[i]), ledgers_[static_cast<std::size_t>(i)].energy());
+    result.force[i] = axis.force[0];
+    result.permitted = std::max(result.permitted, axis.permitted);
+    result.reasons |= axis.reasons;
+  }
+  return result;
+}
+
+template <int N>
+double PerAxisAol<N>::energy() const noexcept {
+  double sum = ledgers_[0].energy();
+  for (std::size_t i = 1; i < ledgers_.size(); ++i) sum += ledgers_[i].energy();
+  return sum;
+}
+
+template <int N>
+double PerAxisAol<N>::least_energy() const noexcept {
+  double least = ledgers_[0].energy();
+  for (const EnergyLedger& ledger : ledgers_) least = std::min(least, ledger.energy());
+  return least;
+}
+
+template class PerAxisAol<1>;
+template class PerAxisAol<3>;
+template class PerAxisAol<6>;
+
+}  // namespace tendon

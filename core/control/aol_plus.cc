@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/control/aol_plus.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace tendon {
+
+namespace {
+
+void demand(bool met, const char* name, const std::string& expected, double found) {
+  if (!met) throw std::invalid_argument(std::string(name) + " must be " + expected + ", got " + std::to_string(found));
+}
+
+template <class Ledger, std::size_t Count, class Make, std::size_t... I>
+std::array<Ledger, Count> each(const Make& make, std::index_sequence<I...>) {
+  return {Ledger(make(I))...};
+}
+
+template <int Blocks, int Size>
+void check(const typename AolPlus<Blocks, Size>::Config& config) {
+  check_longest_hold(config.longest_hold);
+  if (const auto& cap = config.energy_cap) {
+    demand(cap->energy >= 0, "energy_cap.energy", "0 J or more", cap->energy);
+    demand(cap->most_contact >= 0, "energy_cap.most_contact", "0 J or more", cap->most_contact);
+    demand(cap->contact_leak > Duration::zero(), "energy_cap.contact_leak", "above 0 s", seconds(cap->contact_leak));
+  }
+  if (const auto& knee = config.knee) {
+    demand(knee->start > 0 && knee->start < 1, "knee.start", "between 0 and 1", knee->start);
+  }
+  if (const auto& reserve = config.latency_reserve) {
+    constexpr int kMost = AolPlus<Blocks, Size>::kMostHolds;
+    demand(reserve->holds >= 1 && reserve->holds <= kMost, "latency_reserve.holds", "1 to " + std::to_string(kMost),
+           reserve->holds);
+  }
+  if (const auto& bounded = config.bounded_acceleration) {
+    for (std::size_t i = 0; i < Blocks; ++i) {
+      demand(bounded->most[i] > 0, "bounded_acceleration.most", "above 0", bounded->most[i]);
+      demand(bounded->shaping_viscous[i] >= config.friction[i].viscous, "bounded_acceleration.shaping_viscous",
+             "the viscous friction or more", bounded->shaping_viscous[i]);
+    }
+    if (config.latency_reserve) {
+      throw std::invalid_argument(
+          "bounded_acceleration is not proved for forces that are held late: not together with latency_reserve");
+    }
+  }
+  if (const auto& adaptive = config.adaptive_friction) {
+    demand(adaptive->rise > Duration::zero(), "adaptive_friction.rise", "above 0 s", seconds(adaptive->rise));
+  }
+}
+
+}  // namespace
+
+template <int Blocks, int Size>
+AolPlus<Blocks, Size>::AolPlus(const Config& config) : config_(config), target_(config.friction) {
+  check<Blocks, Size>(config);
+  constexpr auto kEach = std::make_index_sequence<Blocks>();
+  if (const auto& robust = config.robust_ledger) {
+    robust_ = each<RobustLedger<Size>, Blocks>(
+        [&](std::size_t i) {
+          return typename RobustLedger<Size>::Config{
+              .friction = config.friction[i], .encoder_step = robust->encoder_step[i], .window = robust->window};
+        },
+        kEach);
+  } else {
+    exact_ = each<EnergyLedger, Blocks>([&](std::size_t i) { return config.friction[i]; }, kEach);
+  }
+  for (std::size_t i = 0; i < losses_.size(); ++i) use(i, config.friction[i]);
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noexcept {
+  config_.friction[block] = friction;
+  losses_[block].coulomb = friction.coulomb;
+  losses_[block].viscous_per_hold = friction.viscous / seconds(config_.longest_hold);
+}
+
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::account() const noexcept {
+  double sum = exact_ ? (*exact_)[0].energy() : (*robust_)[0].spendable();
+  for (std::size_t i = 1; i < losses_.size(); ++i) sum += exact_ ? (*exact_)[i].energy() : (*robust_)[i].spendable();
+  return sum;
+}
+
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::energy() const noexcept {
+  return account() - discarded_;
+}
+
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::reserved() const noexcept {
+  double sum = 0;
+  if (config_.latency_reserve) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(config_.latency_reserve->holds); ++i) sum += under_way_[i];
+  }
+  return sum;
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) noexcept {
+  const double held = seconds(interval.held);
+  acceleration_holds_ = false;
+  if (held <= 0) {
+    velocity_.reset();
+    return;
+  }
+  const Vec<kSize> velocity = interval.dx / held;
+  if (velocity_) {
+    // The mean velocities of neighbouring intervals cannot differ by more than a times the distance of their middles,
+    // but for the counts that three positions may be off.
+    acceleration_holds_ = true;
+    const double before = seconds(last_held_);
+    for (int i = 0; i < Blocks; ++i) {
+      const auto block = static_cast<std::size_t>(i);
+      const double count = config_.robust_ledger ? config_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
+      const double change = (velocity - *velocity_).template segment<Size>(i * Size).norm();
+      const double most = config_.bounded_acceleration->most[block] * (held + before) / 2;
+      // Rounding must not call a hand at the very limit a liar.
+      if (!(change <= most * (1 + 1e-9) + count * (1 / held + 1 / before))) acceleration_holds_ = false;
+    }
+    if (!acceleration_holds_) ++broken_;
+  }
+  velocity_ = velocity;
+  last_held_ = interval.held;
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
+  if (!interval.applied.allFinite() || !interval.dx.allFinite()) return;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    const Vec<Size> applied = interval.applied.template segment<Size>(i * Size);
+    const Vec<Size> dx = interval.dx.template segment<Size>(i * Size);
+    if (exact_) {
+      (*exact_)[block].observe(applied, dx, interval.held);
+    } else {
+      (*robust_)[block].observe({.applied = applied, .dx = dx, .held = interval.held});
+    }
+  }
+  if (config_.energy_cap) {
+    const auto& cap = *config_.energy_cap;
+    const double kept = std::max(0.0, 1 - seconds(interval.held) / seconds(cap.contact_leak));
+    contact_ = std::min(cap.most_contact, std::max(0.0, contact_ - interval.applied.dot(interval.dx))) * kept;
+  }
+  if (config_.bounded_acceleration) watch_acceleration(interval);
+  if (config_.adaptive_friction) {
+    const double step = std::min(1.0, std::max(0.0, seconds(interval.held) / seconds(config_.adaptive_friction->rise)));
+    for (std::size_t i = 0; i < losses_.size(); ++i) {
+      Friction now = config_.friction[i];
+      now.coulomb += (target_[i].coulomb - now.coulomb) * step;
+      now.viscous += (target_[i].viscous - now.viscous) * step;
+      use(i, now);
+      if (robust_) {
+        (*robust_)[i].adapt(now);
+      } else {
+        (*exact_)[i].adapt(now);
+      }
+    }
+  }
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration at_most) noexcept {
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    const Vec<Size> part = applied.template segment<Size>(i * Size);
+    if (exact_) {
+      (*exact_)[block].observe_unseen(part.norm(), at_most);
+    } else {
+      (*robust_)[block].observe_unseen(part, at_most);
+    }
+  }
+  contact_ = 0;
+  velocity_.reset();
+  acceleration_holds_ = false;
+}
+
+template <int Blocks, int Size>
+auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> LimitedForce<kSize> {
+  const bool finite = wanted.force.allFinite();
+  const Vec<kSize> force = finite ? wanted.force : Vec<kSize>(Vec<kSize>::Zero());
+  const double size = force.norm();
+
+  if (config_.energy_cap) {
+    if (size == 0) contact_ = 0;
+    discarded_ = std::max(discarded_, account() - (config_.energy_cap->energy + contact_));
+  }
+  const double spendable = energy() - reserved();
+
+  std::array<double, Blocks> sizes{};
+  std::array<WorstLoss, Blocks> losses = losses_;
+  std::array<WorstLoss, Blocks> shaping = losses_;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    const Vec<Size> part = force.template segment<Size>(i * Size);
+    sizes[block] = part.norm();
+    if (!acceleration_holds_ || sizes[block] == 0) continue;
+    const auto& bounded = *config_.bounded_acceleration;
+    const double hold = seconds(config_.longest_hold);
+    const double towards = velocity_->template segment<Size>(i * Size).dot(part) / sizes[block];
+    const double count = config_.robust_ledger ? config_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
+    losses[block].reach =
+        hold * (towards + bounded.most[block] * (seconds(last_held_) + hold) / 2) + count * hold / seconds(last_held_);
+    shaping[block].viscous_per_hold = bounded.shaping_viscous[block] / hold;
+  }
+  double scale = 0;
+  double permitted = 0;
+  if constexpr (Blocks == 1) {
+    permitted = losses[0].largest(spendable);
+    if (acceleration_holds_) permitted = std::min(permitted, shaping[0].largest(spendable));
+    scale = size > 0 ? permitted / size : 1;
+  } else {
+    scale = largest_scale(losses, sizes, spendable);
+    if (acceleration_holds_) scale = std::min(scale, largest_scale(shaping, sizes, spendable));
+    permitted = size > 0 ? scale * size : 0;
+  }
+
+  LimitedForce<kSize> result{force, permitted, {}};
+  if (!finite) {
+    result.reasons = Reason::kNotFinite;
+  } else if (config_.knee) {
+    const double start = config_.knee->start;
+    if (scale * start < 1) {
+      const double excess = (1 / scale - start) / (1 - start);  // ∞ when nothing is permitted: tanh is 1
+      result.force = force * (scale * (start + (1 - start) * std::tanh(excess)));
+      result.reasons = Reason::kEnergy;
+    }
+  } else if (size > permitted) {
+    result.force = force * (permitted / size);
+    result.reasons = Reason::kEnergy;
+  }
+
+  if (config_.latency_reserve) {
+    double loss = 0;
+    for (int i = 0; i < Blocks; ++i) {
+      loss += losses_[static_cast<std::size_t>(i)].at(result.force.template segment<Size>(i * Size).norm());
+    }
+    under_way_[next_under_way_] = loss;
+    next_under_way_ = (next_under_way_ + 1) % static_cast<std::size_t>(config_.latency_reserve->holds);
+  }
+  return result;
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::adapt(const std::array<Friction, Blocks>& friction) noexcept {
+  if (!config_.adaptive_friction) return;
+  target_ = friction;
+  for (std::size_t i = 0; i < losses_.size(); ++i) {
+    const Friction now{.coulomb = std::min(config_.friction[i].coulomb, friction[i].coulomb),
+                       .viscous = std::min(config_.friction[i].viscous, friction[i].viscous)};
+    use(i, now);
+    if (robust_) {
+      (*robust_)[i].adapt(now);
+    } else {
+      (*exact_)[i].adapt(now);
+    }
+  }
+}
+
+template class AolPlus<1>;
+template class AolPlus<1, 3>;
+template class AolPlus<3>;
+template class AolPlus<6>;
+template class AolPlus<2, 3>;
+
+}  // namespace tendon

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <limits>
+
+#include "core/control/stability_controller.h"
+#include "core/energy_ledger.h"
+
+namespace tendon {
+
+/// No law at all: every finite force goes through, and the ledger shows what that costs. For simulated devices only.
+template <int N>
+class Unlimited {
+ public:
+  struct Config {
+    Friction friction;  ///< for the ledger
+  };
+
+  /// Throws std::invalid_argument when a friction bound is negative or not finite.
+  explicit Unlimited(const Config& config) : ledger_(config.friction) {}
+
+  void observe(const Interval<N>& interval) noexcept { ledger_.observe(interval.applied, interval.dx, interval.held); }
+  void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept {
+    ledger_.observe_unseen(applied.norm(), at_most);
+  }
+  LimitedForce<N> limit(const Demand<N>& wanted) noexcept {
+    constexpr double kNoBound = std::numeric_limits<double>::infinity();
+    if (!wanted.force.allFinite()) return {Vec<N>::Zero(), kNoBound, Reason::kNotFinite};
+    return {wanted.force, kNoBound, {}};
+  }
+  double energy() const noexcept { return ledger_.energy(); }
+
+ private:
+  EnergyLedger ledger_;
+};
+
+}  // namespace tendon
