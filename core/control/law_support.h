@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "core/control/stability_controller.h"
+
+/// What the laws of core/control do in the same way. A part of their implementation, not of their interface.
+namespace tendon::law_support {
+
+/// Throws std::invalid_argument "<field> must be <expected>, got <value>" unless `ok`.
+inline void require(bool ok, std::string_view field, double value, std::string_view expected) {
+  if (ok) return;
+  throw std::invalid_argument(std::string(field) + " must be " + std::string(expected) + ", got " +
+                              std::to_string(value));
+}
+
+/// T_max in seconds, if it is above zero.
+inline double checked_hold(Duration longest_hold) {
+  require(longest_hold > Duration::zero(), "longest_hold", seconds(longest_hold), "above 0 s");
+  return seconds(longest_hold);
+}
+
+/// b, if it is above zero: what a law that lives on viscous friction alone needs.
+inline double checked_viscous(double viscous) {
+  require(std::isfinite(viscous) && viscous > 0, "friction.viscous", viscous, "above 0 N·s/m for this law");
+  return viscous;
+}
+
+template <int N>
+bool finite(const Interval<N>& interval) noexcept {
+  return interval.applied.allFinite() && interval.dx.allFinite();
+}
+
+template <int N>
+bool finite(const Demand<N>& demand) noexcept {
+  return demand.force.allFinite() && demand.stiffness.allFinite();
+}
+
+/// The answer to a demand that is not finite.
+template <int N>
+LimitedForce<N> refused(double permitted) noexcept {
+  return {Vec<N>::Zero(), permitted, Reason::kNotFinite};
+}
+
+/// `v`, shortened to `length` if it is longer; its direction is kept.
+template <int N>
+Vec<N> shortened(const Vec<N>& v, double length) noexcept {
+  const double size = v.stableNorm();
+  return size <= length ? v : Vec<N>(v * (length / size));
+}
+
+/// The wanted force within `bound`, with the reason if that changed it.
+template <int N>
+LimitedForce<N> bounded(const Vec<N>& wanted, double bound, Reason reason) noexcept {
+  if (wanted.stableNorm() <= bound) return {wanted, bound, {}};
+  return {shortened<N>(wanted, bound), bound, reason};
+}
+
+/// Eigenvalues (ascending) and eigenvectors of the symmetric part of a stiffness: its potential energy has no other.
+template <int N>
+Eigen::SelfAdjointEigenSolver<Mat<N>> principal_stiffness(const Mat<N>& stiffness) noexcept {
+  return Eigen::SelfAdjointEigenSolver<Mat<N>>(Mat<N>((stiffness + stiffness.transpose()) / 2));
+}
+
+/// The largest singular value of a stiffness, N/m: no displacement changes the force faster.
+template <int N>
+double spectral_norm(const Mat<N>& stiffness) noexcept {
+  const double scale = stiffness.cwiseAbs().maxCoeff();
+  if (!(scale > 0)) return 0;
+  const Mat<N> unit = stiffness / scale;
+  const Eigen::SelfAdjointEigenSolver<Mat<N>> squares(Mat<N>(unit.transpose() * unit), Eigen::EigenvaluesOnly);
+  return scale * std::sqrt(std::max(squares.eigenvalues()[N - 1], 0.0));
+}
+
+}  // namespace tendon::law_support

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "core/control/stability_controller.h"
+#include "core/energy_ledger.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+
+template <int N>
+Vec<N> random_direction(Dice& dice) {
+  Vec<N> v;
+  do {
+    for (int i = 0; i < N; ++i) v[i] = dice.within(-1, 1);
+  } while (v.squaredNorm() < 1e-3 || v.squaredNorm() > 1);
+  return v.normalized();
+}
+
+/// The motion that takes most out of the ledger while `force` is held, eq. (7): it follows the force.
+template <int N>
+Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held) {
+  const double size = force.norm();
+  if (size <= friction.coulomb) return Vec<N>::Zero();
+  return force / size * (seconds(held) * (size - friction.coulomb) / (2 * friction.viscous));
+}
+
+/// What is demanded at a place. A law that is passive only in static worlds is given one.
+template <int N>
+using World = std::function<Demand<N>(const Vec<N>& position)>;
+
+/// −∇ of a convex potential: springs to random planes with random stiffness up to `stiffest`, pushing or bilateral.
+/// Together they are no steeper than `stiffest`.
+template <int N>
+World<N> static_world(Dice& dice, double stiffest) {
+  struct Wall {
+    Vec<N> normal;
+    double place, stiffness;
+    bool bilateral;
+  };
+  std::array<Wall, 3> walls;
+  double left = stiffest;
+  for (Wall& wall : walls) {
+    wall = {random_direction<N>(dice), dice.within(-3e-3, 3e-3), left * dice.uniform(), dice.chance(0.4)};
+    left -= wall.stiffness;
+  }
+  walls.back().stiffness += left;
+  return [walls](const Vec<N>& x) {
+    Demand<N> demand{Vec<N>::Zero(), Mat<N>::Zero()};
+    for (const Wall& wall : walls) {
+      const double depth = wall.normal.dot(x) - wall.place;
+      if (depth < 0 && !wall.bilateral) continue;
+      demand.force -= wall.stiffness * depth * wall.normal;
+      demand.stiffness += wall.stiffness * wall.normal * wall.normal.transpose();
+    }
+    return demand;
+  };
+}
+
+/// The energy that such a world holds at a place is above zero by this much when a run starts: what may come out of it.
+template <int N>
+Vec<N> place_at_rest(const World<N>& world, double stiffest) {
+  Vec<N> x = Vec<N>::Zero();
+  for (int i = 0; i < 20000; ++i) x += world(x).force / stiffest;
+  return x;
+}
+
+/// Demands nothing sensible: huge, tiny, zero, not a number, along and against the motion, now soft and now hard.
+template <int N>
+World<N> hostile_world(Dice& dice) {
+  return [&dice, last = Vec<N>(Vec<N>::Zero())](const Vec<N>& x) mutable {
+    Demand<N> demand;
+    const Vec<N> dx = x - last;
+    last = x;
+    switch (static_cast<int>(dice.within(0, 8))) {
+      case 0:
+        demand.force = random_direction<N>(dice) * dice.decades(-3, 6);
+        break;
+      case 1:
+        demand.force.setZero();
+        break;
+      case 2:
+        demand.force.setConstant(dice.chance(0.5) ? std::numeric_limits<double>::quiet_NaN()
+                                                  : std::numeric_limits<double>::infinity());
+        break;
+      case 3:
+        demand.force = dx * 1e9;
+        break;
+      case 4:
+        demand.force = -dx * 1e9;
+        break;
+      case 5:
+        demand.force = random_direction<N>(dice) * dice.decades(-3, 1);
+        break;
+      default: {
+        const double stiffness = dice.decades(1, 5);
+        demand.force = -stiffness * x;
+        demand.stiffness = Mat<N>::Identity() * stiffness;
+      }
+    }
+    return demand;
+  };
+}
+
+/// An operator who knows the law and the force and wants energy: random motion of all sizes, the worst motion there is,
+/// and slowly in, then out in one go.
+struct Adversary {
+  Friction friction;  ///< what the device really has
+  Duration longest_hold = std::chrono::milliseconds(1);
+  double hostility = 0.5;
+  double largest_move = 1e-3;  ///< m, of a random motion
+  int steps = 400;
+  bool jitter = true;     ///< holds of ¼ … 1 × longest_hold
+  bool clamps = true;     ///< the device sometimes writes less than it was told to
+  bool overlooks = true;  ///< intervals that nobody saw
+};
+
+struct Fate {
+  double least_energy = 0;  ///< J, of the true ledger, relative to the energy that went to and fro (at least 1 J)
+  bool all_finite = true;
+  bool within_permitted = true;
+};
+
+template <int N, class Law>
+requires StabilityController<Law, N> Fate run_adversary(Law& law, const Adversary& adversary, World<N> world, Vec<N> x,
+                                                        Dice& dice) {
+  EnergyLedger truth(adversary.friction);
+  double turnover = 1;
+  Fate fate;
+  Vec<N> force = Vec<N>::Zero();
+  int creeping = 0;
+  Vec<N> creep = Vec<N>::Zero();
+  for (int step = 0; step < adversary.steps; ++step) {
+    if (step > 0) {
+      const Duration held = adversary.jitter ? from_seconds(seconds(adversary.longest_hold) * dice.within(0.25, 1))
+                                             : adversary.longest_hold;
+      Vec<N> dx = Vec<N>::Zero();
+      if (creeping > 0) {
+        dx = --creeping > 0 ? creep : Vec<N>(force.normalized() * creep.norm() * 30);
+      } else if (dice.chance(adversary.hostility)) {
+        dx = worst_motion<N>(force, adversary.friction, held);
+      } else if (dice.chance(0.1)) {
+        creeping = 40;
+        creep = random_direction<N>(dice) * adversary.largest_move * dice.decades(-3, -1);
+      } else if (!dice.chance(0.1)) {
+        dx = random_direction<N>(dice) * adversary.largest_move * dice.decades(-4, 0);
+      }
+      if (adversary.overlooks && dice.chance(0.02)) {
+        truth.observe_unseen(force.norm(), held);
+        law.observe_unseen(force, held);
+      } else {
+        truth.observe(force, dx, held);
+        law.observe(Interval<N>{force, dx, held});
+        turnover += std::abs(force.dot(dx));
+      }
+      x += dx;
+      fate.least_energy = std::min(fate.least_energy, truth.energy() / turnover);
+    }
+    const LimitedForce<N> limited = law.limit(world(x));
+    fate.all_finite = fate.all_finite && limited.force.allFinite() && std::isfinite(law.energy());
+    fate.within_permitted = fate.within_permitted && limited.force.norm() <= limited.permitted * (1 + 1e-9) + 1e-9;
+    force = limited.force;
+    if (adversary.clamps && dice.chance(0.05)) force *= dice.uniform();
+  }
+  return fate;
+}
+
+/// The friction of a random device.
+inline Friction random_friction(Dice& dice) {
+  return {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2, 0.3)};
+}
+
+/// Runs `make(claimed friction, longest hold)` in worlds that obey no rule, for `seeds` seeds, and counts the runs in
+/// which the port gave out energy. `overclaim` above 1 is the sabotage: the law believes in so much more viscous
+/// friction.
+template <int N, class Make>
+int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
+  int broken = 0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Dice dice(static_cast<std::uint64_t>(seed));
+    Adversary adversary;
+    adversary.friction = random_friction(dice);
+    adversary.hostility = dice.uniform();
+    auto law =
+        make(Friction{adversary.friction.coulomb, adversary.friction.viscous * overclaim}, adversary.longest_hold);
+    const Fate fate = run_adversary<N>(law, adversary, hostile_world<N>(dice), Vec<N>::Zero(), dice);
+    EXPECT_TRUE(fate.all_finite) << "seed " << seed;
+    EXPECT_TRUE(fate.within_permitted) << "seed " << seed;
+    if (fate.least_energy < -1e-12) ++broken;
+  }
+  return broken;
+}
+
+/// Holds for every law: what is not finite becomes zero with the reason and is not booked, and the ledger is the
+/// port's.
+template <int N, class Law>
+requires StabilityController<Law, N>
+void expect_the_common_promises(Law law, const Friction& friction) {
+  const std::array<double, 3> bad = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+                                     -std::numeric_limits<double>::infinity()};
+  const auto held = std::chrono::milliseconds(1);
+  EnergyLedger ledger(friction);
+  const Vec<N> force = Vec<N>::Constant(-0.25);
+  const Vec<N> dx = Vec<N>::Constant(1e-4);
+  law.observe({force, dx, held});
+  ledger.observe(force, dx, held);
+  EXPECT_DOUBLE_EQ(law.energy(), ledger.energy());
+  for (const double value : bad) {
+    Demand<N> demand{Vec<N>::Constant(0.1), Mat<N>::Identity()};
+    demand.force[N - 1] = value;
+    const LimitedForce<N> of_force = law.limit(demand);
+    EXPECT_EQ(of_force.force, Vec<N>::Zero().eval());
+    EXPECT_TRUE(of_force.reasons.has(Reason::kNotFinite));
+    law.observe({Vec<N>::Constant(value), dx, held});
+    law.observe({force, Vec<N>::Constant(value), held});
+    EXPECT_DOUBLE_EQ(law.energy(), ledger.energy());
+    EXPECT_TRUE(law.limit({Vec<N>::Constant(0.1), Mat<N>::Zero()}).force.allFinite());
+  }
+  law.observe_unseen(force, held);
+  ledger.observe_unseen(force.norm(), held);
+  EXPECT_DOUBLE_EQ(law.energy(), ledger.energy());
+  for (const double size : {1e6, 1e100, 1e300}) {
+    law.observe({force, dx, held});
+    EXPECT_TRUE(law.limit({Vec<N>::Constant(size), Mat<N>::Identity() * 1e3}).force.allFinite()) << size;
+  }
+}
+
+/// The message of the std::invalid_argument that `make` throws, or empty.
+template <class Make>
+std::string complaint(Make make) {
+  try {
+    make();
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return {};
+}
+
+}  // namespace tendon
