@@ -20,10 +20,12 @@ struct DeviceInfo {
 struct PositionSample {
   LocalTime at{};
   Vec3 position = Vec3::Zero();  ///< m, device base frame
+  /// N, of the hand **on the handle** (not the other way round): what a device with a force sensor measures.
+  std::optional<Vec3> hand_force = std::nullopt;
 };
 
-/// A haptic device of impedance type: position out, force in. Counts and transfers end here; above
-/// this interface everything is SI.
+/// A haptic device: position out, force in; a device of admittance type also measures the force of the hand.
+/// Counts and transfers end here; above this interface everything is SI.
 ///
 /// Thread-safe: no; the haptic thread owns it.
 /// Realtime-safe: `read` and `apply` must neither allocate, lock, log nor block longer than the

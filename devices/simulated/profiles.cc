@@ -96,6 +96,16 @@ const DeviceProfile* find_device_profile(std::string_view name) noexcept {
   return found == kProfiles.end() ? nullptr : found;
 }
 
+SimulatedDevice::Config admittance_device() {
+  SimulatedDevice::Config config;
+  config.name = "admittance";
+  config.mass = 2;
+  config.viscous_friction = 20;
+  config.coulomb_friction = 1;
+  config.force_sensor.emplace();
+  return config;
+}
+
 std::string provenance_table(const DeviceProfile& profile) {
   std::ostringstream table;
   const auto line = [&table](std::string_view what, const KnownNumber& number, std::string_view unit) {

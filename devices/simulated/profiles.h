@@ -54,6 +54,10 @@ std::span<const DeviceProfile> device_profiles() noexcept;
 /// The one of that name, or null.
 const DeviceProfile* find_device_profile(std::string_view name) noexcept;
 
+/// A heavy device of admittance type, without a hand: 2 kg, 20 N·s/m, 1 N, a force sensor, no other effect. It is
+/// no real device: the numbers are those for which control.md 1.5 tried the admittance form of the limiter.
+SimulatedDevice::Config admittance_device();
+
 /// Every number of the profile, one per line: what, value with unit, provenance, source.
 std::string provenance_table(const DeviceProfile& profile);
 

@@ -44,6 +44,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   expect_effect(config_.encoder_step, "encoder_step");
   expect_effect(config_.max_force, "max_force");
   expect_effect(config_.amplifier_bandwidth, "amplifier_bandwidth");
+  if (config_.force_sensor) expect_effect(config_.force_sensor->resolution, "force_sensor.resolution");
   if (config_.watchdog) {
     expect(*config_.watchdog > Duration::zero(), "watchdog", seconds(*config_.watchdog),
            "a duration above 0 s (left out when there is none)");
@@ -71,7 +72,12 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
     last_read_ = now;
     settle_energies();
   }
-  return PositionSample{now, config_.encoder_step ? counted(truth_.position, *config_.encoder_step) : truth_.position};
+  PositionSample sample{now, config_.encoder_step ? counted(truth_.position, *config_.encoder_step) : truth_.position};
+  if (config_.force_sensor) {
+    const auto& resolution = config_.force_sensor->resolution;
+    sample.hand_force = resolution ? counted(truth_.hand_force, *resolution) : truth_.hand_force;
+  }
+  return sample;
 }
 
 Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {

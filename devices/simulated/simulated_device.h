@@ -10,8 +10,7 @@
 
 namespace tendon {
 
-/// A haptic device of impedance type that exists only as its equation of motion, with an operator's
-/// hand on its handle:
+/// A haptic device that exists only as its equation of motion, with an operator's hand on its handle:
 ///
 ///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      sgn(v) = v/|v|;  any |sgn| ≤ 1 at v = 0
 ///
@@ -60,6 +59,12 @@ class SimulatedDevice final : public Device {
     std::optional<double> max_force;  ///< N, norm of the force vector; its direction is kept
     /// Hz, −3 dB, first order. The motors follow the force that `apply` returned with this lag.
     std::optional<double> amplifier_bandwidth;
+    /// A sensor between handle and hand: what makes it a device of admittance type. It measures the mean of F_hand
+    /// over the last substep, without noise. Keeps the energy balance: it only looks.
+    struct ForceSensor {
+      std::optional<double> resolution;  ///< N, one count per axis; the sample is the centre of the count
+    };
+    std::optional<ForceSensor> force_sensor;
     std::optional<Duration> watchdog;  ///< without an `apply` for so long the force is zero until the next one
 
     std::optional<OperatorHand::Config> hand;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -414,6 +415,7 @@ TEST(SimulatedDevice, TakesTheSamePathToTheLastBitWithEffectsThatNeverBite) {
   auto listed = plain;
   listed.max_force = 1e9;
   listed.watchdog = 1h;
+  listed.force_sensor.emplace();
   Bench a(plain);
   Bench z(listed);
   Dice dice(5);
@@ -439,6 +441,41 @@ TEST(SimulatedDevice, EncoderStepChangesWhatIsSeenAndNotWhatHappens) {
     z.wait(1ms);
     ASSERT_EQ(a.truth().position, z.truth().position);
   }
+}
+
+TEST(SimulatedDevice, MeasuresTheForceOfTheHandWhenItHasASensorForIt) {
+  auto config = bare();
+  config.hand = waving_hand(Vec3(1, 2, 0));
+  EXPECT_FALSE(SimulatedDevice(config).read(LocalTime(0s))->hand_force);
+  config.force_sensor.emplace();
+  SimulatedDevice exact(config);
+  config.force_sensor->resolution = 0.25;
+  SimulatedDevice coarse(config);
+  double largest = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const LocalTime now(i * 1ms);
+    const auto sample = exact.read(now);
+    ASSERT_EQ(*sample->hand_force, exact.truth().hand_force);
+    const Vec3 counts = *coarse.read(now)->hand_force / 0.25;
+    ASSERT_EQ(counts, counts.array().round().matrix());
+    ASSERT_LE((counts * 0.25 - *sample->hand_force).lpNorm<Eigen::Infinity>(), 0.125);
+    largest = std::max(largest, sample->hand_force->norm());
+  }
+  EXPECT_GT(largest, 0.5);
+}
+
+TEST(SimulatedDevice, AHandThatPushesAlongTheAxisIsMeasuredWithThatSign) {
+  auto config = bare();
+  config.force_sensor.emplace();
+  config.start_position = Vec3::Zero();
+  config.hand = OperatorHand::Config{.stiffness = 100,
+                                     .damping = 0,
+                                     .mass = 0,
+                                     .motion = ScriptedMotion(ScriptedMotion::RampHold{
+                                         .from = {0.01, 0, 0}, .to = {0.01, 0, 0}, .ramp = 1s, .hold = std::nullopt})};
+  SimulatedDevice device(config);
+  device.read(LocalTime(0s));
+  EXPECT_NEAR(device.read(LocalTime(50us))->hand_force->x(), 1, 1e-3);
 }
 
 TEST(SimulatedDevice, RepeatsItselfToTheLastBit) {
@@ -505,6 +542,7 @@ TEST(SimulatedDevice, RefusesImpossibleValuesNamingFieldValueAndWhatWasExpected)
       {[](Config& c) { c.viscous_friction = -1; }, "viscous_friction = -1: expected"},
       {[](Config& c) { c.coulomb_friction = 0; }, "coulomb_friction = 0: expected a number above 0 (left out when"},
       {[](Config& c) { c.encoder_step = kNan; }, "encoder_step = nan: expected"},
+      {[](Config& c) { c.force_sensor.emplace().resolution = 0; }, "force_sensor.resolution = 0"},
       {[](Config& c) { c.max_force = -8.5; }, "max_force = -8.5: expected"},
       {[](Config& c) { c.amplifier_bandwidth = kInf; }, "amplifier_bandwidth = inf: expected"},
       {[](Config& c) { c.watchdog = Duration(0); }, "watchdog = 0: expected a duration above 0 s"},
