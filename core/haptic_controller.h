@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 
-#include "core/control/adjusting_output_limiter.h"
-#include "core/energy_ledger.h"
+#include "core/control/limiter.h"
 #include "core/held_force.h"
 #include "core/mode.h"
 #include "core/motion.h"
@@ -23,7 +21,7 @@ struct Step {
   Vec3 wanted = Vec3::Zero();       ///< N, what the remote environment asks for, after hold or local model
   double permitted = 0;  ///< N, the limiter's bound on ‖force‖ (per axis: on the largest component); ∞ when off
   Vec3 force = Vec3::Zero();  ///< N, to be applied now
-  double energy = 0;          ///< J, the ledger after the interval (per axis: the sum)
+  double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
   std::uint64_t force_sequence = 0;  ///< the remote force in use; 0 = none
@@ -33,11 +31,11 @@ struct Step {
 
 /// The heart: from one look at the hand to the force it is to feel.
 ///
-///     ledger ← the interval just ended, with the force really held          (EnergyLedger)
+///     account ← the interval just ended, with the force really held         (Limiter::observe)
 ///     F ← newest remote force, held, faded or stopped by its age            (HeldForce)
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
-///     F ← ‖F‖ ≤ f_c + 2 √(b E / T_max)                                      (AdjustingOutputLimiter)
+///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
 ///
 /// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
 /// faster than the slew limit allows, because energy is a matter of safety and smoothness is not.
@@ -52,12 +50,6 @@ struct Step {
 /// Thread-safe: no. Realtime-safe: yes.
 class HapticController {
  public:
-  enum class Limiter : std::uint8_t {
-    kNone,     ///< no bound on energy; the ledger is kept all the same. For simulated devices only
-    kPerAxis,  ///< the paper's form: an account and a bound per axis. Depends on the frame
-    kJoint,    ///< one account, direction kept, the same in every frame
-  };
-
   enum class Fault : std::uint8_t {
     kNone,
     kPositionNotFinite,  ///< the device measured NaN or infinity
@@ -65,12 +57,10 @@ class HapticController {
   };
 
   struct Config {
-    Limiter limiter = Limiter::kJoint;
-    Friction friction;        ///< lower bounds (kPerAxis: of each axis by itself, see control.md 1.6 (a))
-    Duration longest_hold{};  ///< T_max; > 0
-    Duration watchdog{};      ///< the device's own; 0 = it has none
-    double max_force = 0;     ///< N; > 0
-    double max_slew = 0;      ///< N/s; > 0, may be infinite
+    LimiterConfig limiter;
+    Duration watchdog{};   ///< the device's own; 0 = it has none
+    double max_force = 0;  ///< N; > 0
+    double max_slew = 0;   ///< N/s; > 0, may be infinite
     HeldForce::Config hold;
     /// Readings that may fail in a row before it is a fault: 20 ms at 1 kHz, what libfranka allows.
     std::uint32_t max_missed = 20;
@@ -95,19 +85,12 @@ class HapticController {
   /// Clears the fault. Forces start again from idle: the next fresh one is ramped in.
   void rearm() noexcept;
 
-  /// The least of the accounts (joint form: the only one), J.
-  double least_energy() const noexcept;
-
  private:
   void book(const Motion& hand, const Vec3& applied, Step& step) noexcept;
   void book_unseen(const Vec3& applied, Duration held) noexcept;
-  void limit(Step& step) const noexcept;
-  double energy() const noexcept;
 
   Config config_;
-  AdjustingOutputLimiter limiter_;
-  EnergyLedger ledger_;               ///< the joint account
-  std::array<EnergyLedger, 3> axes_;  ///< the accounts of the per-axis form
+  Limiter limiter_;
   HeldForce held_;
   Fault fault_ = Fault::kNone;
   std::uint32_t missed_ = 0;

@@ -69,7 +69,10 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
 
   result.mode = mode_;
   result.force = newest_->force;
-  if (newest_->model) result.force -= newest_->model->stiffness * (hand.position - newest_->model->at);
+  if (newest_->model) {
+    result.force -= newest_->model->stiffness * (hand.position - newest_->model->at);
+    result.stiffness = newest_->model->stiffness * gain;
+  }
   result.force *= gain;
   return result;
 }

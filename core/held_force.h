@@ -42,7 +42,8 @@ class HeldForce {
   };
 
   struct Wanted {
-    Vec3 force = Vec3::Zero();  ///< N, on the hand
+    Vec3 force = Vec3::Zero();      ///< N, on the hand
+    Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m; zero without a local model
     Mode mode = Mode::kIdle;
     Reasons reasons;
     Duration age{};  ///< since it was received; 0 when idle

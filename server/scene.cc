@@ -42,9 +42,19 @@ constexpr Unit kNoUnit = {"", "", 1};
 
 /// Longest suffix first.
 constexpr std::array kUnits = {
-    Unit{"_n_s_per_m", "N·s/m", 1}, Unit{"_n_per_m", "N/m", 1}, Unit{"_n_per_s", "N/s", 1}, Unit{"_hz", "Hz", 1},
-    Unit{"_kg", "kg", 1},           Unit{"_mm", "mm", 1e3},     Unit{"_ms", "ms", 1e3},     Unit{"_um", "µm", 1e6},
-    Unit{"_us", "µs", 1e6},         Unit{"_m", "m", 1},         Unit{"_n", "N", 1},
+    Unit{"_n_s_per_m", "N·s/m", 1},
+    Unit{"_m_per_s2", "m/s²", 1},
+    Unit{"_n_per_m", "N/m", 1},
+    Unit{"_n_per_s", "N/s", 1},
+    Unit{"_hz", "Hz", 1},
+    Unit{"_kg", "kg", 1},
+    Unit{"_mj", "mJ", 1e3},
+    Unit{"_mm", "mm", 1e3},
+    Unit{"_ms", "ms", 1e3},
+    Unit{"_um", "µm", 1e6},
+    Unit{"_us", "µs", 1e6},
+    Unit{"_m", "m", 1},
+    Unit{"_n", "N", 1},
 };
 
 const Unit& unit_of(std::string_view key) {
@@ -203,20 +213,25 @@ struct OrFalse {
 };
 
 struct Count {
-  std::size_t most;
+  std::int64_t most;
+  std::int64_t least = 0;
 
-  std::string expected(const Unit&) const { return "a whole number from 0 to " + std::to_string(most); }
+  std::string expected(const Unit&) const {
+    return "a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+  }
 
-  Verdict take(const toml::node& node, const Unit& unit, std::size_t& to) const {
+  template <class Whole>
+  Verdict take(const toml::node& node, const Unit& unit, Whole& to) const {
     const auto* count = node.as_integer();
-    if (count == nullptr || **count < 0 || static_cast<std::uint64_t>(**count) > most) {
-      return Refusal{&node, expected(unit)};
-    }
-    to = static_cast<std::size_t>(**count);
+    if (count == nullptr || **count < least || **count > most) return Refusal{&node, expected(unit)};
+    to = static_cast<Whole>(**count);
     return {};
   }
 
-  static std::string shown(const Unit&, std::size_t value) { return std::to_string(value); }
+  template <class Whole>
+  static std::string shown(const Unit&, Whole value) {
+    return std::to_string(value);
+  }
 };
 
 /// A point or a direction.
@@ -396,6 +411,11 @@ struct Draft {
   std::optional<double> coulomb_bound;
   std::optional<double> viscous_bound;
   std::optional<double> max_force;
+  std::optional<double> ledger_step;
+  /// 8.5 N on a handle of 75 g that nobody holds are 113 m/s²; a tap is some 200 (control.md 8.7).
+  double most_acceleration = 300;
+  /// With more, delayed walls stay passive but buzz (control.md 8.7).
+  double shaping_viscous = 0.3;
 };
 
 /// What holds when a key is not there, where that is not simply the value of the target.
@@ -426,9 +446,10 @@ Names<ScriptedMotion::Recorded::AtEnd> at_end_names() {
   return {{{"hold", kHold}, {"repeat", kRepeat}}};
 }
 
-Names<HapticController::Limiter> limiter_names() {
-  using enum HapticController::Limiter;
-  return {{{"adjusting-output-limiter", kJoint}, {"adjusting-output-limiter-per-axis", kPerAxis}, {"none", kNone}}};
+Names<Law> law_names() {
+  Names<Law> names;
+  for (const LawInfo& law : laws()) names.all.emplace_back(law.name, law.law);
+  return names;
 }
 
 template <class Table>
@@ -508,6 +529,39 @@ void declare_device(Table& device, Draft& draft) {
   });
 }
 
+/// The parts of AOL+: each is there when its table is.
+template <class Table>
+void declare_parts(Table& limiter, Draft& draft) {
+  using Plus = AolPlus<1, 3>;
+  Plus::Parts& parts = draft.scene.loop.control.limiter.parts;
+  limiter.part("energy_cap", parts.energy_cap, [](Table& keys, Plus::EnergyCap& cap) {
+    keys.key("energy_mj", cap.energy, kZeroOrMore, "credit that outlasts the contact in which it was earned");
+    keys.key("most_contact_mj", cap.most_contact, kZeroOrMore, "the most that one contact adds to that");
+  });
+  limiter.part("robust_ledger", parts.robust_ledger, [&draft](Table& keys, Plus::Robust& robust) {
+    keys.key("encoder_step_um", draft.ledger_step, kZeroOrMore, "one encoder count: credit is never due to rounding",
+             Absent{.text = "the device's; required when the device has none"});
+    keys.key("window", robust.window, Count{1000, 1}, "haptic periods for each credit of viscous friction");
+  });
+  limiter.part("knee", parts.knee, [](Table& keys, Plus::Knee& knee) {
+    keys.key("start", knee.start, Number{.least = 0.01, .most = 0.99},
+             "share of the bound from which on forces are compressed instead of clipped");
+  });
+  limiter.part("latency_reserve", parts.latency_reserve, [](Table& keys, Plus::LatencyReserve& reserve) {
+    keys.key("holds", reserve.holds, Count{Plus::kMostHolds, 1},
+             "periods from when a force is chosen to when the device begins to hold it. Not with bounded_acceleration");
+  });
+  limiter.part("bounded_acceleration", parts.bounded_acceleration, [&draft](Table& keys, Plus::BoundedAcceleration&) {
+    keys.key("most_m_per_s2", draft.most_acceleration, kAboveZero,
+             "the handle never accelerates harder: the largest forces of hand and motors, over the apparent mass");
+    keys.key("shaping_viscous_n_s_per_m", draft.shaping_viscous, kAboveZero,
+             "stiffness stays below twice this over the longest hold. Not below the viscous friction");
+  });
+  limiter.part("adaptive_friction", parts.adaptive_friction, [](Table& keys, Plus::AdaptiveFriction& adaptive) {
+    keys.key("rise_ms", adaptive.rise, kAboveZero, "time constant with which the bounds may rise; they fall at once");
+  });
+}
+
 /// The wire tells the loop's rate in whole Hz, so a period is 1 s or less.
 constexpr Number kPeriod{.least = 1e6 / limits::kMaxLoopHz, .most = 1e6};
 /// The wire tells timeouts in whole ms.
@@ -527,13 +581,16 @@ void declare_scene(Table& scene, Draft& draft) {
   });
 
   scene.table("limiter", [&draft](Table& limiter) {
+    LimiterConfig& config = draft.scene.loop.control.limiter;
     constexpr Absent kProfiles{.text = "the profile's; required without a profile, unless kind is \"none\""};
-    limiter.key("kind", draft.scene.loop.control.limiter, limiter_names(),
+    limiter.key("kind", config.law, law_names(),
                 "keeps the device from giving out energy. \"none\" is for simulated devices only");
     limiter.key("coulomb_friction_n", draft.coulomb_bound, kZeroOrMore,
-                "lower bound of the device's Coulomb friction (per axis: of each axis by itself)", kProfiles);
+                "lower bound of the device's Coulomb friction (aol-per-axis, aol-box: of each axis by itself)",
+                kProfiles);
     limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
                 "lower bound of the device's viscous friction", kProfiles);
+    if (config.law == Law::kAolPlus) declare_parts(limiter, draft);
   });
 
   scene.table("force", [&draft](Table& force) {
@@ -711,6 +768,12 @@ class Reader {
     return there;
   }
 
+  /// An effect that is there when its table is.
+  template <class T, class Declare>
+  void part(std::string_view name, std::optional<T>& target, const Declare& declare) {
+    optional_table(name, [&](Reader& keys) { declare(keys, target.emplace()); });
+  }
+
   void refuse_unknown() const {
     if (table_ == nullptr || !kind_known_) return;
     for (const auto& [name, node] : *table_) {
@@ -781,6 +844,14 @@ class Reference {
     return true;
   }
 
+  template <class T, class Declare>
+  void part(std::string_view name, std::optional<T>&, const Declare& declare) {
+    table(name, [&](Reference& keys) {
+      T defaults;
+      declare(keys, defaults);
+    });
+  }
+
  private:
   std::string& text_;
   std::string path_;
@@ -800,6 +871,7 @@ class Settlement {
     Scene& scene = draft_.scene;
     if (draft_.has_hand) scene.device.hand = draft_.hand;
     build("device", [&scene] { SimulatedDevice{scene.device}; });
+    build("limiter", [&scene] { Limiter{scene.loop.control.limiter}; });
     build("loop", [&scene] { HapticController{scene.loop.control}; });
     return std::move(scene);
   }
@@ -851,9 +923,9 @@ class Settlement {
     HapticController::Config& control = loop.control;
 
     // A loop without real-time priority is late by up to a period now and then; each time is an overrun beyond this.
-    control.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
-    if (control.longest_hold < loop.period) {
-      blame("loop.longest_hold_us", {}, at_least(loop.period, "the period", control.longest_hold, "_us"));
+    control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
+    if (control.limiter.longest_hold < loop.period) {
+      blame("loop.longest_hold_us", {}, at_least(loop.period, "the period", control.limiter.longest_hold, "_us"));
     }
     if (control.hold.safe_stop < control.hold.hold) {
       blame("force.safe_stop_ms", {"force.safe_stop_ms", "force.hold_ms"},
@@ -868,14 +940,32 @@ class Settlement {
 
     // Friction that is isotropic as a vector is less on each axis by itself: Σ f |dx_i| ≤ √3 f ‖dx‖ (control.md 1.6
     // (a)).
-    const bool per_axis = control.limiter == HapticController::Limiter::kPerAxis;
+    const bool per_axis = control.limiter.law == Law::kAolPerAxis || control.limiter.law == Law::kAolBox;
     const DeviceProfile* profile = draft_.profile;
-    control.friction.coulomb =
+    control.limiter.friction.coulomb =
         friction_bound("coulomb_friction_n", draft_.coulomb_bound, profile ? &profile->coulomb_bound : nullptr,
                        device.coulomb_friction.value_or(0), per_axis ? 1 / std::numbers::sqrt3 : 1);
-    control.friction.viscous =
+    control.limiter.friction.viscous =
         friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound, profile ? &profile->viscous_bound : nullptr,
                        device.viscous_friction.value_or(0), 1);
+    settle_parts(control.limiter);
+  }
+
+  void settle_parts(LimiterConfig& limiter) const {
+    if (limiter.parts.robust_ledger) {
+      const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.scene.device.encoder_step;
+      if (!step) {
+        blame("limiter.robust_ledger.encoder_step_um", {},
+              "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
+                  ", because the device has no encoder_step_um");
+      }
+      limiter.parts.robust_ledger->encoder_step = {*step};
+    }
+    if (limiter.parts.bounded_acceleration) {
+      limiter.parts.bounded_acceleration->most = {draft_.most_acceleration};
+      limiter.parts.bounded_acceleration->shaping_viscous = {
+          std::max(draft_.shaping_viscous, limiter.friction.viscous)};
+    }
   }
 
   static std::string at_least(Duration least, const std::string& what, Duration found, std::string_view suffix) {
@@ -890,7 +980,7 @@ class Settlement {
     const std::string full = "limiter." + key;
     const Unit& unit = unit_of(key);
     if (!given && profiles == nullptr) {
-      if (draft_.scene.loop.control.limiter == HapticController::Limiter::kNone) return 0;
+      if (draft_.scene.loop.control.limiter.law == Law::kNone) return 0;
       blame(full, {}, "missing, expected " + kZeroOrMore.expected(unit) + ", because there is no profile");
     }
     const double bound = given ? *given : profiles->value * axis_share;

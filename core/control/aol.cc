@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 namespace tendon {
@@ -122,13 +121,6 @@ LimitedForce<N> PerAxisAol<N>::limit(const Demand<N>& wanted) noexcept {
 
 template <int N>
 double PerAxisAol<N>::energy() const noexcept {
-  double sum = ledgers_[0].energy();
-  for (std::size_t i = 1; i < ledgers_.size(); ++i) sum += ledgers_[i].energy();
-  return sum;
-}
-
-template <int N>
-double PerAxisAol<N>::least_energy() const noexcept {
   double least = ledgers_[0].energy();
   for (const EnergyLedger& ledger : ledgers_) least = std::min(least, ledger.energy());
   return least;

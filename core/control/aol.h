@@ -73,10 +73,8 @@ class PerAxisAol {
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
   /// `permitted` is that of the axis with the largest bound.
   LimitedForce<N> limit(const Demand<N>& wanted) noexcept;
-  /// The sum of the accounts, J.
-  double energy() const noexcept;
   /// The least of the accounts, J: none may be negative.
-  double least_energy() const noexcept;
+  double energy() const noexcept;
 
  private:
   AdjustingOutputLimiter limiter_;

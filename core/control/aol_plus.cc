@@ -23,31 +23,30 @@ std::array<Ledger, Count> each(const Make& make, std::index_sequence<I...>) {
 template <int Blocks, int Size>
 void check(const typename AolPlus<Blocks, Size>::Config& config) {
   check_longest_hold(config.longest_hold);
-  if (const auto& cap = config.energy_cap) {
+  if (const auto& cap = config.parts.energy_cap) {
     demand(cap->energy >= 0, "energy_cap.energy", "0 J or more", cap->energy);
     demand(cap->most_contact >= 0, "energy_cap.most_contact", "0 J or more", cap->most_contact);
-    demand(cap->contact_leak > Duration::zero(), "energy_cap.contact_leak", "above 0 s", seconds(cap->contact_leak));
   }
-  if (const auto& knee = config.knee) {
+  if (const auto& knee = config.parts.knee) {
     demand(knee->start > 0 && knee->start < 1, "knee.start", "between 0 and 1", knee->start);
   }
-  if (const auto& reserve = config.latency_reserve) {
+  if (const auto& reserve = config.parts.latency_reserve) {
     constexpr int kMost = AolPlus<Blocks, Size>::kMostHolds;
     demand(reserve->holds >= 1 && reserve->holds <= kMost, "latency_reserve.holds", "1 to " + std::to_string(kMost),
            reserve->holds);
   }
-  if (const auto& bounded = config.bounded_acceleration) {
+  if (const auto& bounded = config.parts.bounded_acceleration) {
     for (std::size_t i = 0; i < Blocks; ++i) {
       demand(bounded->most[i] > 0, "bounded_acceleration.most", "above 0", bounded->most[i]);
       demand(bounded->shaping_viscous[i] >= config.friction[i].viscous, "bounded_acceleration.shaping_viscous",
              "the viscous friction or more", bounded->shaping_viscous[i]);
     }
-    if (config.latency_reserve) {
+    if (config.parts.latency_reserve) {
       throw std::invalid_argument(
           "bounded_acceleration is not proved for forces that are held late: not together with latency_reserve");
     }
   }
-  if (const auto& adaptive = config.adaptive_friction) {
+  if (const auto& adaptive = config.parts.adaptive_friction) {
     demand(adaptive->rise > Duration::zero(), "adaptive_friction.rise", "above 0 s", seconds(adaptive->rise));
   }
 }
@@ -55,10 +54,11 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
 }  // namespace
 
 template <int Blocks, int Size>
-AolPlus<Blocks, Size>::AolPlus(const Config& config) : config_(config), target_(config.friction) {
+AolPlus<Blocks, Size>::AolPlus(const Config& config)
+    : parts_(config.parts), friction_(config.friction), longest_hold_(config.longest_hold), target_(config.friction) {
   check<Blocks, Size>(config);
   constexpr auto kEach = std::make_index_sequence<Blocks>();
-  if (const auto& robust = config.robust_ledger) {
+  if (const auto& robust = config.parts.robust_ledger) {
     robust_ = each<RobustLedger<Size>, Blocks>(
         [&](std::size_t i) {
           return typename RobustLedger<Size>::Config{
@@ -73,9 +73,9 @@ AolPlus<Blocks, Size>::AolPlus(const Config& config) : config_(config), target_(
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noexcept {
-  config_.friction[block] = friction;
+  friction_[block] = friction;
   losses_[block].coulomb = friction.coulomb;
-  losses_[block].viscous_per_hold = friction.viscous / seconds(config_.longest_hold);
+  losses_[block].viscous_per_hold = friction.viscous / seconds(longest_hold_);
 }
 
 template <int Blocks, int Size>
@@ -93,8 +93,8 @@ double AolPlus<Blocks, Size>::energy() const noexcept {
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::reserved() const noexcept {
   double sum = 0;
-  if (config_.latency_reserve) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(config_.latency_reserve->holds); ++i) sum += under_way_[i];
+  if (parts_.latency_reserve) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(parts_.latency_reserve->holds); ++i) sum += under_way_[i];
   }
   return sum;
 }
@@ -115,9 +115,9 @@ void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) 
     const double before = seconds(last_held_);
     for (int i = 0; i < Blocks; ++i) {
       const auto block = static_cast<std::size_t>(i);
-      const double count = config_.robust_ledger ? config_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
+      const double count = parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
       const double change = (velocity - *velocity_).template segment<Size>(i * Size).norm();
-      const double most = config_.bounded_acceleration->most[block] * (held + before) / 2;
+      const double most = parts_.bounded_acceleration->most[block] * (held + before) / 2;
       // Rounding must not call a hand at the very limit a liar.
       if (!(change <= most * (1 + 1e-9) + count * (1 / held + 1 / before))) acceleration_holds_ = false;
     }
@@ -140,16 +140,15 @@ void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
       (*robust_)[block].observe({.applied = applied, .dx = dx, .held = interval.held});
     }
   }
-  if (config_.energy_cap) {
-    const auto& cap = *config_.energy_cap;
-    const double kept = std::max(0.0, 1 - seconds(interval.held) / seconds(cap.contact_leak));
-    contact_ = std::min(cap.most_contact, std::max(0.0, contact_ - interval.applied.dot(interval.dx))) * kept;
+  if (parts_.energy_cap) {
+    contact_ = std::max(0.0, contact_ - interval.applied.dot(interval.dx));
+    travel_ += interval.dx;
   }
-  if (config_.bounded_acceleration) watch_acceleration(interval);
-  if (config_.adaptive_friction) {
-    const double step = std::min(1.0, std::max(0.0, seconds(interval.held) / seconds(config_.adaptive_friction->rise)));
+  if (parts_.bounded_acceleration) watch_acceleration(interval);
+  if (parts_.adaptive_friction) {
+    const double step = std::min(1.0, std::max(0.0, seconds(interval.held) / seconds(parts_.adaptive_friction->rise)));
     for (std::size_t i = 0; i < losses_.size(); ++i) {
-      Friction now = config_.friction[i];
+      Friction now = friction_[i];
       now.coulomb += (target_[i].coulomb - now.coulomb) * step;
       now.viscous += (target_[i].viscous - now.viscous) * step;
       use(i, now);
@@ -174,8 +173,25 @@ void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration a
     }
   }
   contact_ = 0;
+  travel_.setZero();
   velocity_.reset();
   acceleration_holds_ = false;
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
+  double most = 0;
+  for (int i = 0; i < Blocks; ++i) {
+    most += wanted.template segment<Size>(i * Size).norm() * travel_.template segment<Size>(i * Size).norm();
+  }
+  if (wanted.dot(last_wanted_) <= 0) {
+    contact_ = 0;
+    travel_.setZero();
+  } else {
+    contact_ = std::min({contact_, most, parts_.energy_cap->most_contact});
+  }
+  last_wanted_ = wanted;
+  discarded_ = std::max(discarded_, account() - (parts_.energy_cap->energy + contact_));
 }
 
 template <int Blocks, int Size>
@@ -184,10 +200,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   const Vec<kSize> force = finite ? wanted.force : Vec<kSize>(Vec<kSize>::Zero());
   const double size = force.norm();
 
-  if (config_.energy_cap) {
-    if (size == 0) contact_ = 0;
-    discarded_ = std::max(discarded_, account() - (config_.energy_cap->energy + contact_));
-  }
+  if (parts_.energy_cap) cap(force);
   const double spendable = energy() - reserved();
 
   std::array<double, Blocks> sizes{};
@@ -198,10 +211,10 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     const Vec<Size> part = force.template segment<Size>(i * Size);
     sizes[block] = part.norm();
     if (!acceleration_holds_ || sizes[block] == 0) continue;
-    const auto& bounded = *config_.bounded_acceleration;
-    const double hold = seconds(config_.longest_hold);
+    const auto& bounded = *parts_.bounded_acceleration;
+    const double hold = seconds(longest_hold_);
     const double towards = velocity_->template segment<Size>(i * Size).dot(part) / sizes[block];
-    const double count = config_.robust_ledger ? config_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
+    const double count = parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
     losses[block].reach =
         hold * (towards + bounded.most[block] * (seconds(last_held_) + hold) / 2) + count * hold / seconds(last_held_);
     shaping[block].viscous_per_hold = bounded.shaping_viscous[block] / hold;
@@ -221,8 +234,8 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   LimitedForce<kSize> result{force, permitted, {}};
   if (!finite) {
     result.reasons = Reason::kNotFinite;
-  } else if (config_.knee) {
-    const double start = config_.knee->start;
+  } else if (parts_.knee) {
+    const double start = parts_.knee->start;
     if (scale * start < 1) {
       const double excess = (1 / scale - start) / (1 - start);  // ∞ when nothing is permitted: tanh is 1
       result.force = force * (scale * (start + (1 - start) * std::tanh(excess)));
@@ -233,24 +246,24 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     result.reasons = Reason::kEnergy;
   }
 
-  if (config_.latency_reserve) {
+  if (parts_.latency_reserve) {
     double loss = 0;
     for (int i = 0; i < Blocks; ++i) {
       loss += losses_[static_cast<std::size_t>(i)].at(result.force.template segment<Size>(i * Size).norm());
     }
     under_way_[next_under_way_] = loss;
-    next_under_way_ = (next_under_way_ + 1) % static_cast<std::size_t>(config_.latency_reserve->holds);
+    next_under_way_ = (next_under_way_ + 1) % static_cast<std::size_t>(parts_.latency_reserve->holds);
   }
   return result;
 }
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::adapt(const std::array<Friction, Blocks>& friction) noexcept {
-  if (!config_.adaptive_friction) return;
+  if (!parts_.adaptive_friction) return;
   target_ = friction;
   for (std::size_t i = 0; i < losses_.size(); ++i) {
-    const Friction now{.coulomb = std::min(config_.friction[i].coulomb, friction[i].coulomb),
-                       .viscous = std::min(config_.friction[i].viscous, friction[i].viscous)};
+    const Friction now{.coulomb = std::min(friction_[i].coulomb, friction[i].coulomb),
+                       .viscous = std::min(friction_[i].viscous, friction[i].viscous)};
     use(i, now);
     if (robust_) {
       (*robust_)[i].adapt(now);

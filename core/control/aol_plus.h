@@ -17,19 +17,22 @@ namespace tendon {
 /// AOL+: the Adjusting Output-Limiter with what it needs on real devices. Each part is there when it is listed; with
 /// none it is Aol<Blocks, Size>, bit for bit.
 ///
-///     E ← E + interval just ended                              EnergyLedger, or RobustLedger when encoder counts
-///     matter E ← min(E, E_cap + C)                                    energy_cap: credit is spent in the contact that
-///     earned it Ē = max(0, E − (Δ/2)‖F_held‖₁ − Σ ℓ(forces under way))    robust_ledger, latency_reserve γ = the
-///     largest with Σ_i ℓ_i(γ ‖F_wanted,i‖) ≤ Ē          WorstLoss: with the travel that bounded_acceleration allows F
-///     = κ(1/γ) γ F_wanted                                    knee: κ(r) = min(r, 1) without it
+///     E ← E + the interval just ended               exactly, or as robust_ledger does
+///     E ← min(E, E_cap + C)                         energy_cap
+///     Ē = E − (Δ/2)‖F_held‖₁ − Σ ℓ(under way)       robust_ledger, latency_reserve
+///     γ : the largest with Σ_i ℓ_i(γ ‖F_i‖) ≤ Ē     ℓ: WorstLoss; bounded_acceleration
+///     F = κ(1/γ) γ F_wanted                         knee; κ(r) = min(r, 1) without it
 ///
 /// Why it stays passive: E never exceeds the true ledger (discarding credit is safe, Theorem A of control.md 8), and
 /// any force of the same direction below the bound is safe (Theorem B).
 ///
 /// **energy_cap** Waving about in free space earns friction credit without end, and with enough of it the limiter is
-/// off: 30 s pay for 18 N. The cap keeps E ≤ E_cap + C, where C = max(0, C + work) is the work that the hand has put
-/// into the present contact: it pays for springs that are let go. C is 0 when nothing is wanted and leaks with τ_C, or
-/// a dissipative object would pump it up.
+/// off: 30 s pay for 18 N. The cap keeps E ≤ E_cap + C, where C is what the hand has put into the present contact and
+/// may get back from it: that pays for springs which are let go.
+///     C ← max(0, C + work),  C ≤ ‖F_wanted‖ · ‖travel since the contact began‖,  C ≤ C_most
+/// A contact ends when nothing is wanted or what is wanted turns round: friction that is dragged to and fro gives
+/// nothing back. (Of a spring whose force grows with its travel d no more than F·d can come back. The leak in time of
+/// control.md 8.1 would take from a hand that just holds a spring the force that it feels.)
 ///
 /// **robust_ledger** For positions in counts of Δ.
 ///
@@ -61,7 +64,6 @@ class AolPlus {
   struct EnergyCap {
     double energy = 0.005;       ///< E_cap, J: with it a 20 kN/m wall after 10 s of waving is quiet (control.md 8.1)
     double most_contact = 0.13;  ///< J, the most C may be: F_max · 30 mm / 2 for 8.5 N
-    Duration contact_leak = std::chrono::seconds(2);  ///< τ_C
   };
   struct Robust {
     std::array<double, Blocks> encoder_step{};  ///< Δ, m or rad
@@ -81,15 +83,20 @@ class AolPlus {
     Duration rise = std::chrono::seconds(10);  ///< time constant with which a bound may go up
   };
 
+  /// What is empty is not there.
+  struct Parts {
+    std::optional<EnergyCap> energy_cap{};
+    std::optional<Robust> robust_ledger{};
+    std::optional<Knee> knee{};
+    std::optional<LatencyReserve> latency_reserve{};
+    std::optional<BoundedAcceleration> bounded_acceleration{};
+    std::optional<AdaptiveFriction> adaptive_friction{};
+  };
+
   struct Config {
-    std::array<Friction, Blocks> friction;
+    std::array<Friction, Blocks> friction{};
     Duration longest_hold{};  ///< T_max; > 0
-    std::optional<EnergyCap> energy_cap;
-    std::optional<Robust> robust_ledger;
-    std::optional<Knee> knee;
-    std::optional<LatencyReserve> latency_reserve;
-    std::optional<BoundedAcceleration> bounded_acceleration;
-    std::optional<AdaptiveFriction> adaptive_friction;
+    Parts parts{};
   };
 
   /// Throws std::invalid_argument naming the part and its field.
@@ -113,15 +120,20 @@ class AolPlus {
   using Robusts = std::array<RobustLedger<Size>, Blocks>;
 
   double account() const noexcept;
+  void cap(const Vec<kSize>& wanted) noexcept;
   double reserved() const noexcept;
   void watch_acceleration(const Interval<kSize>& interval) noexcept;
   void use(std::size_t block, const Friction& friction) noexcept;
 
-  Config config_;
+  Parts parts_;
+  std::array<Friction, Blocks> friction_;  ///< in use
+  Duration longest_hold_;
   std::optional<Ledger> exact_;  ///< one of these two keeps the account
   std::optional<Robusts> robust_;
-  double discarded_ = 0;  ///< J, credit above the cap
-  double contact_ = 0;    ///< C, J
+  double discarded_ = 0;                         ///< J, credit above the cap
+  double contact_ = 0;                           ///< C, J
+  Vec<kSize> travel_ = Vec<kSize>::Zero();       ///< m, since the contact began
+  Vec<kSize> last_wanted_ = Vec<kSize>::Zero();  ///< N
   std::array<Friction, Blocks> target_;
   std::array<WorstLoss, Blocks> losses_;
 

@@ -69,15 +69,16 @@ double largest_scale(const std::array<WorstLoss, Parts>& losses, const std::arra
   double curvature = 0;
   for (std::size_t i = 0; i < Parts; ++i) {
     const WorstLoss& loss = losses[i];
-    // The quotient, as among the corners: `from` times the size may round to just below Coulomb friction.
+    // The quotients, as among the corners: `from` times the size may round to just below one.
     if (!(sizes[i] > 0) || loss.reach <= 0 || from < loss.coulomb / sizes[i]) continue;
     if (loss.viscous_per_hold == 0) {
       if (std::isfinite(loss.reach)) slope += loss.reach * sizes[i];
       continue;
     }
-    const double travel = loss.slope(from * sizes[i]);
-    slope += travel * sizes[i];
-    if (travel < loss.reach) curvature += sizes[i] * sizes[i] / (4 * loss.viscous_per_hold);
+    slope += loss.slope(from * sizes[i]) * sizes[i];
+    if (from < (loss.coulomb + 2 * loss.viscous_per_hold * loss.reach) / sizes[i]) {
+      curvature += sizes[i] * sizes[i] / (4 * loss.viscous_per_hold);
+    }
   }
   const double left = budget - loss_at(from);
   if (left <= 0) return std::min(from, ceiling);

@@ -90,8 +90,8 @@ BENCHMARK(velocity_estimator)->Name("VelocityEstimator::observe, 3 DOF");
 
 void controller_step(benchmark::State& state) {
   HapticController::Config config;
-  config.friction = kFriction;
-  config.longest_hold = milliseconds(1);
+  config.limiter.friction = kFriction;
+  config.limiter.longest_hold = milliseconds(1);
   config.max_force = 8.5;
   config.max_slew = 1000;
   HapticController controller(config);

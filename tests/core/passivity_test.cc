@@ -16,9 +16,7 @@
 
 namespace tendon {
 
-void PrintTo(HapticController::Limiter limiter, std::ostream* out) {
-  *out << (limiter == HapticController::Limiter::kJoint ? "joint form" : "per-axis form");
-}
+void PrintTo(Law limiter, std::ostream* out) { *out << (limiter == Law::kAol ? "joint form" : "per-axis form"); }
 
 namespace {
 
@@ -30,12 +28,12 @@ struct Outcome {
 
 // One run of 600 steps of a random controller against a random adversary. `bound_scale` above 1 is the
 // sabotage that must be found out: the force applied is allowed to exceed the bound by so much.
-Outcome run(std::uint64_t seed, HapticController::Limiter limiter, double bound_scale) {
+Outcome run(std::uint64_t seed, Law limiter, double bound_scale) {
   Dice dice(seed);
   HapticController::Config config;
-  config.limiter = limiter;
-  config.friction = {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2.5, 0.3)};
-  config.longest_hold = std::chrono::microseconds(2000);
+  config.limiter.law = limiter;
+  config.limiter.friction = {dice.chance(0.3) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2.5, 0.3)};
+  config.limiter.longest_hold = std::chrono::microseconds(2000);
   config.max_force = dice.decades(0, 2);
   config.max_slew = dice.chance(0.5) ? std::numeric_limits<double>::infinity() : dice.decades(2, 5);
   config.hold.ramp_in = dice.chance(0.5) ? Duration::zero() : std::chrono::milliseconds(50);
@@ -89,19 +87,18 @@ Outcome run(std::uint64_t seed, HapticController::Limiter limiter, double bound_
     const double force = applied.norm();
     if (dice.chance(hostility)) {  // the worst motion there is, eq. (7): it follows the force
       for (int axis = 0; axis < 3; ++axis) {
-        const double size = limiter == HapticController::Limiter::kPerAxis ? std::abs(applied[axis]) : force;
-        if (size <= config.friction.coulomb) continue;
-        x[axis] +=
-            applied[axis] / size * seconds(held) * (size - config.friction.coulomb) / (2 * config.friction.viscous);
+        const double size = limiter == Law::kAolPerAxis ? std::abs(applied[axis]) : force;
+        if (size <= config.limiter.friction.coulomb) continue;
+        x[axis] += applied[axis] / size * seconds(held) * (size - config.limiter.friction.coulomb) /
+                   (2 * config.limiter.friction.viscous);
       }
     } else {
       x += dice.direction() * dice.decades(-7, -2);
     }
     Step step = controller.step({now, x, Vec3::Zero()}, applied);
     outcome.all_finite = outcome.all_finite && step.force.allFinite() && std::isfinite(step.energy);
-    outcome.least_energy = std::min(outcome.least_energy, controller.least_energy());
-    const double size =
-        limiter == HapticController::Limiter::kPerAxis ? step.force.cwiseAbs().maxCoeff() : step.force.norm();
+    outcome.least_energy = std::min(outcome.least_energy, step.energy);
+    const double size = limiter == Law::kAolPerAxis ? step.force.cwiseAbs().maxCoeff() : step.force.norm();
     outcome.worst_excess = std::max(outcome.worst_excess, size - step.permitted * (1 + 1e-12));
     applied = step.force;
     if (step.reasons.has(Reason::kEnergy)) applied *= bound_scale;
@@ -110,7 +107,7 @@ Outcome run(std::uint64_t seed, HapticController::Limiter limiter, double bound_
   return outcome;
 }
 
-class Passivity : public testing::TestWithParam<HapticController::Limiter> {};
+class Passivity : public testing::TestWithParam<Law> {};
 
 TEST_P(Passivity, NoHandNoForceAndNoTimingMakesTheLedgerNegative) {
   const auto limiter = GetParam();
@@ -132,11 +129,8 @@ TEST_P(Passivity, TheSamePropertyFailsWhenTheBoundIsOnePercentTooHigh) {
   EXPECT_GT(broken, 20);
 }
 
-INSTANTIATE_TEST_SUITE_P(Forms, Passivity,
-                         testing::Values(HapticController::Limiter::kJoint, HapticController::Limiter::kPerAxis),
-                         [](const auto& form) {
-                           return form.param == HapticController::Limiter::kJoint ? "Joint" : "PerAxis";
-                         });
+INSTANTIATE_TEST_SUITE_P(Forms, Passivity, testing::Values(Law::kAol, Law::kAolPerAxis),
+                         [](const auto& form) { return form.param == Law::kAol ? "Joint" : "PerAxis"; });
 
 }  // namespace
 }  // namespace tendon

@@ -133,7 +133,8 @@ TEST(MainJob, WhenThePhysicsIsKilledInContactItsForceIsHeldFadesAndStopsAndItsSu
   EXPECT_GT(steps[(stop - 2)->begin].applied.norm(), 0);
   EXPECT_EQ(steps[(stop + 1)->begin - 1].applied.norm(), 0);
   EXPECT_TRUE(steps[(stop + 1)->begin].reasons.has(Reason::kRampIn));
-  const double max_growth = scene.loop.control.max_slew * tendon::seconds(scene.loop.control.longest_hold) + 1e-9;
+  const double max_growth =
+      scene.loop.control.max_slew * tendon::seconds(scene.loop.control.limiter.longest_hold) + 1e-9;
   for (std::size_t i = 1; i < steps.size(); ++i) {
     ASSERT_LE(steps[i].applied.norm() - steps[i - 1].applied.norm(), max_growth) << "tick " << steps[i].tick;
   }

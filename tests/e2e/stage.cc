@@ -102,7 +102,7 @@ Recording read_recording(const std::filesystem::path& file) {
 }
 
 void expect_passive(const Recording& recording, const Scene& scene) {
-  const double coulomb = scene.loop.control.friction.coulomb;
+  const double coulomb = scene.loop.control.limiter.friction.coulomb;
   double energy = 0;
   std::uint64_t tick = 0;
   for (const StepRecord& step : recording.steps) {

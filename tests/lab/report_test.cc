@@ -31,7 +31,7 @@ std::string contents(const std::filesystem::path& file) {
 }
 
 /// Of the pictures of a run, what they are made of.
-Drawing drawing_of(HapticController::Limiter limiter, const std::string& label) {
+Drawing drawing_of(Law limiter, const std::string& label) {
   const auto steps = toy_run(limiter, 6000);
   const RunSummary summary = summarise(steps);
   Trace trace({.start = summary.start, .span = summary.span, .columns = trace_columns(1), .axis = summary.axis});
@@ -42,8 +42,8 @@ Drawing drawing_of(HapticController::Limiter limiter, const std::string& label) 
 class Report : public ::testing::Test {
  protected:
   Report() {
-    record(off_, toy_run(HapticController::Limiter::kNone, 6000));
-    record(on_, toy_run(HapticController::Limiter::kJoint, 6000));
+    record(off_, toy_run(Law::kNone, 6000));
+    record(on_, toy_run(Law::kAol, 6000));
   }
 
   std::string error_of(const ReportOptions& options) {
@@ -80,7 +80,7 @@ TEST_F(Report, JsonIsOneLineForEachRecordingAndNothingElse) {
 }
 
 TEST_F(Report, ReadsWhatAKilledServerLeftAndSaysSo) {
-  record(on_, toy_run(HapticController::Limiter::kJoint, 3000), false);
+  record(on_, toy_run(Law::kAol, 3000), false);
   report({.recordings = {on_}}, out_);
   EXPECT_NE(out_.str().find("on.mcap: has no end mark"), std::string::npos);
 }
@@ -136,7 +136,7 @@ TEST_F(Report, SaysWhenThePictureCannotBeDrawn) {
 TEST(Plot, WithoutGnuplotItNamesThePackage) {
   const std::string path = std::getenv("PATH");  // NOLINT(concurrency-mt-unsafe): one thread
   ::setenv("PATH", "/nowhere", 1);               // NOLINT(concurrency-mt-unsafe)
-  const Drawing drawing = drawing_of(HapticController::Limiter::kJoint, "on");
+  const Drawing drawing = drawing_of(Law::kAol, "on");
   std::string error;
   try {
     draw("a.svg", std::span(&drawing, 1));
@@ -148,15 +148,14 @@ TEST(Plot, WithoutGnuplotItNamesThePackage) {
 }
 
 TEST(Plot, NoNameBecomesACommand) {
-  const Drawing drawing = drawing_of(HapticController::Limiter::kJoint, "x'\n!touch owned\n`touch owned`");
+  const Drawing drawing = drawing_of(Law::kAol, "x'\n!touch owned\n`touch owned`");
   const std::string script = plot_script("|touch owned.svg", std::span(&drawing, 1));
   EXPECT_NE(script.find("set output '/"), std::string::npos) << "an absolute path cannot begin with a |";
   EXPECT_NE(script.find("'x'' !touch owned `touch owned`'"), std::string::npos) << "one line, one quoted text";
 }
 
 TEST(Plot, SaysWhenEnergiesAreDrawnToScalesOfTheirOwn) {
-  std::vector drawings = {drawing_of(HapticController::Limiter::kNone, "off"),
-                          drawing_of(HapticController::Limiter::kJoint, "on")};
+  std::vector drawings = {drawing_of(Law::kNone, "off"), drawing_of(Law::kAol, "on")};
   EXPECT_NE(plot_script("a.svg", drawings).find("× finer)"), std::string::npos);
   drawings[0] = drawings[1];
   EXPECT_EQ(plot_script("a.svg", drawings).find("× finer)"), std::string::npos);

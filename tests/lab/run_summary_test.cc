@@ -259,12 +259,12 @@ TEST(RunSummary, SpanIntervalAndPeaksAreThoseOfTheSteps) {
 }
 
 TEST(RunSummary, TheRealControlLawKeepsThePromiseAndWithoutALimiterItIsBroken) {
-  const RunSummary on = summarise(toy_run(HapticController::Limiter::kJoint, 6000));
+  const RunSummary on = summarise(toy_run(Law::kAol, 6000));
   EXPECT_TRUE(on.passive());
   EXPECT_TRUE(on.limiter_on);
   EXPECT_TRUE(on.stable);
   EXPECT_GT(on.share_limited(Reason::kEnergy), 0.05);
-  const RunSummary off = summarise(toy_run(HapticController::Limiter::kNone, 6000));
+  const RunSummary off = summarise(toy_run(Law::kNone, 6000));
   EXPECT_GT(off.energy_given_out, 0.1);
   EXPECT_FALSE(off.passive());
   EXPECT_FALSE(off.limiter_on);

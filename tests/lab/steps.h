@@ -61,16 +61,15 @@ inline std::vector<StepRecord> spring_run(std::uint64_t steps, double stiffness,
 
 /// The real control law on a toy: a mass of 0.1 kg with viscous friction, pulled through a wall at x = 0 by a spring to
 /// a hand that swings; forces of the wall are 20 steps late and come every 10.
-inline std::vector<StepRecord> toy_run(HapticController::Limiter limiter, std::uint64_t steps) {
+inline std::vector<StepRecord> toy_run(Law law, std::uint64_t steps) {
   constexpr double kMass = 0.1;
   constexpr double kFriction = 1;
-  HapticController controller({.limiter = limiter,
-                               .friction = {.coulomb = 0.1, .viscous = 0.9},
-                               .longest_hold = kPeriod,
-                               .watchdog = {},
-                               .max_force = 8,
-                               .max_slew = 1000,
-                               .hold = {}});
+  HapticController controller(
+      {.limiter = {.law = law, .friction = {.coulomb = 0.1, .viscous = 0.9}, .longest_hold = kPeriod},
+       .watchdog = {},
+       .max_force = 8,
+       .max_slew = 1000,
+       .hold = {}});
   std::vector<StepRecord> run;
   double x = -0.01;
   double v = 0;

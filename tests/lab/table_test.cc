@@ -14,7 +14,7 @@
 namespace tendon::lab {
 namespace {
 
-Run run_of(HapticController::Limiter limiter, const std::string& label) {
+Run run_of(Law limiter, const std::string& label) {
   Run run;
   run.label = label;
   run.recording = label + ".mcap";
@@ -39,8 +39,7 @@ TEST(WithUnit, HasThreeDigitsAndAPrefix) {
 }
 
 TEST(Table, TellsANewcomerWhichRunWasStable) {
-  const std::vector runs = {run_of(HapticController::Limiter::kNone, "off"),
-                            run_of(HapticController::Limiter::kJoint, "on")};
+  const std::vector runs = {run_of(Law::kNone, "off"), run_of(Law::kAol, "on")};
   const std::string table = to_table(runs);
   for (const char* text :
        {"off.mcap", "on.mcap", "not stable", "N/m", "NO", "yes", "the limiter: energy was not earned"})
@@ -50,8 +49,7 @@ TEST(Table, TellsANewcomerWhichRunWasStable) {
 }
 
 TEST(Table, ColumnsAreAlignedThoughSomeLettersHaveSeveralBytes) {
-  std::vector runs = {run_of(HapticController::Limiter::kNone, "größer"),
-                      run_of(HapticController::Limiter::kJoint, "µ")};
+  std::vector runs = {run_of(Law::kNone, "größer"), run_of(Law::kAol, "µ")};
   std::istringstream table(to_table(runs));
   std::string line;
   std::getline(table, line);
@@ -63,7 +61,7 @@ TEST(Table, ColumnsAreAlignedThoughSomeLettersHaveSeveralBytes) {
 }
 
 TEST(Table, SaysWhatIsMissingFromARecording) {
-  lab::Run run = run_of(HapticController::Limiter::kJoint, "on");
+  lab::Run run = run_of(Law::kAol, "on");
   run.truncated = true;
   run.lost_steps = 1234;
   const std::string table = to_table(std::vector{run});
@@ -72,7 +70,7 @@ TEST(Table, SaysWhatIsMissingFromARecording) {
 }
 
 TEST(Json, IsOneObjectWithTheUnitInEachKeyAndNullForWhatIsNotKnown) {
-  lab::Run run = run_of(HapticController::Limiter::kNone, "a \"b\"\n\\");
+  lab::Run run = run_of(Law::kNone, "a \"b\"\n\\");
   const std::string json = to_json(run);
   EXPECT_EQ(json.front(), '{');
   EXPECT_EQ(json.back(), '}');

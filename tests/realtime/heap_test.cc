@@ -33,8 +33,8 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
                            .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5})};
   SimulatedDevice device(hand);
   HapticLoop::Config config;
-  config.control.friction = {0.3, 0.8};
-  config.control.longest_hold = milliseconds(2);
+  config.control.limiter.friction = {0.3, 0.8};
+  config.control.limiter.longest_hold = milliseconds(2);
   config.control.max_force = 8;
   config.control.max_slew = 1000;
   const auto mail = std::make_unique<Mailboxes>();

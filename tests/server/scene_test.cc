@@ -85,11 +85,11 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
 
   const HapticController::Config& control = scene.loop.control;
   EXPECT_EQ(scene.loop.period, HapticLoop::Config{}.period);
-  EXPECT_EQ(control.longest_hold, 2 * scene.loop.period);
+  EXPECT_EQ(control.limiter.longest_hold, 2 * scene.loop.period);
   EXPECT_EQ(control.watchdog, 0ns);
-  EXPECT_EQ(control.limiter, HapticController::Limiter::kJoint);
-  EXPECT_EQ(control.friction.coulomb, falcon.coulomb_bound.value);
-  EXPECT_EQ(control.friction.viscous, falcon.viscous_bound.value);
+  EXPECT_EQ(control.limiter.law, Law::kAolPlus);
+  EXPECT_EQ(control.limiter.friction.coulomb, falcon.coulomb_bound.value);
+  EXPECT_EQ(control.limiter.friction.viscous, falcon.viscous_bound.value);
   EXPECT_EQ(control.max_force, falcon.max_force.value);
   EXPECT_EQ(control.max_slew, 1000);
   EXPECT_EQ(control.max_missed, HapticController::Config{}.max_missed);
@@ -135,7 +135,7 @@ direction = [0, 0, 2]
 period_us = 500
 longest_hold_us = 1500
 [limiter]
-kind = "adjusting-output-limiter-per-axis"
+kind = "aol-per-axis"
 coulomb_friction_n = 0.1
 viscous_friction_n_s_per_m = 0.15
 [force]
@@ -171,11 +171,11 @@ path = "run.mcap"
 
   const HapticController::Config& control = scene.loop.control;
   EXPECT_EQ(scene.loop.period, 500us);
-  EXPECT_EQ(control.longest_hold, 1500us);
+  EXPECT_EQ(control.limiter.longest_hold, 1500us);
   EXPECT_EQ(control.watchdog, 5500us);
-  EXPECT_EQ(control.limiter, HapticController::Limiter::kPerAxis);
-  EXPECT_EQ(control.friction.coulomb, 0.1);
-  EXPECT_EQ(control.friction.viscous, 0.15);
+  EXPECT_EQ(control.limiter.law, Law::kAolPerAxis);
+  EXPECT_EQ(control.limiter.friction.coulomb, 0.1);
+  EXPECT_EQ(control.limiter.friction.viscous, 0.15);
   EXPECT_EQ(control.max_force, 5);
   EXPECT_EQ(control.max_slew, std::numeric_limits<double>::infinity());
   EXPECT_EQ(control.hold.hold, 10ms);
@@ -240,7 +240,7 @@ TEST(Scene, ConvertsUnitsWithoutAnErrorInTheLastDigit) {
   EXPECT_EQ(scene.device.encoder_step, 0.000043);
   EXPECT_EQ(scene.device.watchdog, 4'350'000ns);
   EXPECT_EQ(scene.loop.period, 1001ns);
-  EXPECT_EQ(scene.loop.control.longest_hold, 1'000'001ns);
+  EXPECT_EQ(scene.loop.control.limiter.longest_hold, 1'000'001ns);
   EXPECT_EQ(scene.loop.control.hold.hold, 100'000ns);
   EXPECT_EQ(scene.loop.control.hold.decay, 290'000ns);
 }
@@ -262,23 +262,53 @@ TEST(Scene, WithoutAProfileOnlyTheListedEffectsExist) {
   EXPECT_FALSE(scene.device.max_force);
   EXPECT_FALSE(scene.device.amplifier_bandwidth);
   EXPECT_FALSE(scene.device.watchdog);
-  EXPECT_EQ(scene.loop.control.limiter, HapticController::Limiter::kNone);
-  EXPECT_EQ(scene.loop.control.friction.coulomb, 0);
-  EXPECT_EQ(scene.loop.control.friction.viscous, 0);
+  EXPECT_EQ(scene.loop.control.limiter.law, Law::kNone);
+  EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0);
+  EXPECT_EQ(scene.loop.control.limiter.friction.viscous, 0);
   EXPECT_EQ(scene.loop.control.max_force, 5);
 }
 
 TEST(Scene, PerAxisTheProfilesCoulombFrictionIsSharedByTheAxes) {
-  const Scene scene = minimal_and("[limiter]\nkind = \"adjusting-output-limiter-per-axis\"\n");
+  const Scene scene = minimal_and("[limiter]\nkind = \"aol-per-axis\"\n");
   const DeviceProfile& falcon = *find_device_profile("falcon");
-  EXPECT_DOUBLE_EQ(scene.loop.control.friction.coulomb * std::sqrt(3), falcon.coulomb_bound.value);
-  EXPECT_EQ(scene.loop.control.friction.viscous, falcon.viscous_bound.value);
+  EXPECT_DOUBLE_EQ(scene.loop.control.limiter.friction.coulomb * std::sqrt(3), falcon.coulomb_bound.value);
+  EXPECT_EQ(scene.loop.control.limiter.friction.viscous, falcon.viscous_bound.value);
 }
 
 TEST(Scene, ABoundMayBeTheTrueFrictionItself) {
   EXPECT_EQ(minimal_and("[limiter]\ncoulomb_friction_n = 0.4\nviscous_friction_n_s_per_m = 1\n")
-                .loop.control.friction.coulomb,
+                .loop.control.limiter.friction.coulomb,
             0.4);
+}
+
+TEST(Scene, APartOfAolPlusIsThereWhenItsTableIs) {
+  const auto parts = minimal_and("[limiter]\n[limiter.knee]\nstart = 0.7\n[limiter.energy_cap]\nenergy_mj = 3\n")
+                         .loop.control.limiter.parts;
+  ASSERT_TRUE(parts.knee);
+  EXPECT_EQ(parts.knee->start, 0.7);
+  ASSERT_TRUE(parts.energy_cap);
+  EXPECT_EQ(parts.energy_cap->energy, 0.003);
+  EXPECT_EQ(parts.energy_cap->most_contact, 0.13);
+  EXPECT_FALSE(parts.robust_ledger || parts.latency_reserve || parts.bounded_acceleration || parts.adaptive_friction);
+  const auto none = minimal_and("").loop.control.limiter.parts;
+  EXPECT_FALSE(none.knee || none.energy_cap || none.robust_ledger || none.latency_reserve ||
+               none.bounded_acceleration || none.adaptive_friction);
+}
+
+TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
+  const DeviceProfile& falcon = *find_device_profile("falcon");
+  const auto step = [](const std::string& more) {
+    return minimal_and("[limiter.robust_ledger]\n" + more).loop.control.limiter.parts.robust_ledger->encoder_step[0];
+  };
+  EXPECT_EQ(step(""), falcon.encoder_step.value);
+  EXPECT_EQ(step("encoder_step_um = 100\n"), 1e-4);
+}
+
+TEST(Scene, BoundedAccelerationNeverShapesBelowTheFrictionItself) {
+  const auto parts = minimal_and("[limiter.bounded_acceleration]\nmost_m_per_s2 = 200\n").loop.control.limiter.parts;
+  EXPECT_EQ(parts.bounded_acceleration->most[0], 200);
+  EXPECT_EQ(parts.bounded_acceleration->shaping_viscous[0],
+            std::max(0.3, find_device_profile("falcon")->viscous_bound.value));
 }
 
 // --- Broken scenes ------------------------------------------------------------------------------------
@@ -448,10 +478,25 @@ TEST(SceneError, NamesTheKindsAndProfilesThatThereAre) {
   EXPECT_EQ(error_of(std::string(kHand) + "kind = \"cosine\"\n"),
             "s.toml:10: device.hand.motion.kind: expected one of \"sine\", \"ramp-hold\", \"minimum-jerk\", "
             "\"recorded\", found \"cosine\"");
+  std::string names;
+  for (const LawInfo& law : laws()) names += (names.empty() ? "\"" : ", \"") + std::string(law.name) + '"';
+  EXPECT_EQ(error_of_minimal_and("[limiter]\nkind = \"off\"\n"),
+            "s.toml:5: limiter.kind: expected one of " + names + ", found \"off\"");
+}
+
+TEST(SceneError, RefusesPartsThatCannotBe) {
   expect_errors({
-      {"[limiter]\nkind = \"off\"\n",
-       "s.toml:5: limiter.kind: expected one of \"adjusting-output-limiter\", \"adjusting-output-limiter-per-axis\", "
-       "\"none\", found \"off\""},
+      {"[limiter]\nkind = \"aol\"\n[limiter.knee]\n",
+       "s.toml:6: limiter.knee: unknown table; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m"},
+      {"[limiter.knee]\nstart = 1\n", "s.toml:5: limiter.knee.start: expected a number from 0.01 to 0.99, found 1"},
+      {"[limiter.latency_reserve]\nholds = 17\n",
+       "s.toml:5: limiter.latency_reserve.holds: expected a whole number from 1 to 16, found 17"},
+      {"[device.effects]\nencoder_step_um = false\n[limiter.robust_ledger]\n",
+       "s.toml:6: limiter.robust_ledger.encoder_step_um: missing, expected a number of 0 µm or more, because the "
+       "device has no encoder_step_um"},
+      {"[limiter.latency_reserve]\n[limiter.bounded_acceleration]\n",
+       "s.toml:4: limiter: bounded_acceleration is not proved for forces that are held late: not together with "
+       "latency_reserve"},
   });
 }
 
@@ -509,8 +554,7 @@ TEST(SceneError, ABoundAboveTheTrueFrictionVoidsTheProof) {
        "device" +
            why + "0.5 (the profile's)"},
   });
-  const std::string per_axis =
-      error_of_minimal_and("[limiter]\nkind = \"adjusting-output-limiter-per-axis\"\ncoulomb_friction_n = 0.3\n");
+  const std::string per_axis = error_of_minimal_and("[limiter]\nkind = \"aol-per-axis\"\ncoulomb_friction_n = 0.3\n");
   EXPECT_TRUE(per_axis.starts_with("s.toml:6: limiter.coulomb_friction_n: expected at most 0.2309")) << per_axis;
   EXPECT_NE(per_axis.find("(an axis by itself has 1/√3 of it)"), std::string::npos) << per_axis;
 }
@@ -581,7 +625,7 @@ TEST(ShippedScenes, DemoIsAHandAtAWallWithTheLimiterOn) {
   EXPECT_EQ(scene.device.hand->damping, 3);
   EXPECT_EQ(scene.device.hand->mass, 0.05);
   EXPECT_EQ(target(scene, 0.5).position, Vec3(0.015, 0, 0));
-  EXPECT_EQ(scene.loop.control.limiter, HapticController::Limiter::kJoint);
+  EXPECT_EQ(scene.loop.control.limiter.law, Law::kAolPlus);
   EXPECT_EQ(scene.recording, "demo.mcap");
 }
 

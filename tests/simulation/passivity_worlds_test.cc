@@ -88,18 +88,18 @@ Physics with_bad_days(Physics physics, std::uint64_t seed) {
 Outcome run_world(std::uint64_t seed, double force_scale = 1) {
   Dice dice(seed);
   Outcome outcome;
-  const auto limiter = dice.chance(0.75) ? HapticController::Limiter::kJoint : HapticController::Limiter::kPerAxis;
+  const auto limiter = dice.chance(0.75) ? Law::kAol : Law::kAolPerAxis;
 
   World::Config config;
   config.seed = seed;
   auto& control = config.loop.control;
-  control.limiter = limiter;
-  control.friction = {dice.chance(0.2) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2.5, 0.3)};
+  control.limiter.law = limiter;
+  control.limiter.friction = {dice.chance(0.2) ? 0.0 : dice.decades(-3, -0.3), dice.decades(-2.5, 0.3)};
   // Periods of 0.5–2 ms: each interval is a period and up to as much again, less what the step before was late.
   config.loop.period = std::chrono::microseconds(1000);
   const bool punctual = dice.chance(0.3) || force_scale != 1;
   config.latest_wake = std::chrono::microseconds(punctual ? 0 : 1000);
-  control.longest_hold = std::chrono::microseconds(punctual ? 1000 : 2000);
+  control.limiter.longest_hold = std::chrono::microseconds(punctual ? 1000 : 2000);
   control.max_force = dice.decades(0, 2);
   control.max_slew = dice.chance(0.3) ? kInf : dice.decades(2, 5);
   for (injector::Profile* way : {&config.to_server, &config.from_server}) {
@@ -120,7 +120,7 @@ Outcome run_world(std::uint64_t seed, double force_scale = 1) {
   SimulatedDevice* simulated = nullptr;
   if (adversary) {
     AdversaryDevice::Config c;
-    c.friction = control.friction;
+    c.friction = control.limiter.friction;
     c.hostility = dice.uniform();
     c.largest_move = dice.decades(-4, -2);
     if (dice.chance(0.5)) c.clamp = control.max_force * dice.uniform();
@@ -133,8 +133,9 @@ Outcome run_world(std::uint64_t seed, double force_scale = 1) {
     SimulatedDevice::Config c;
     c.mass = dice.decades(-1.5, 0);
     // True friction: what the limiter assumes, or more.
-    if (control.friction.coulomb > 0) c.coulomb_friction = control.friction.coulomb * (1 + dice.uniform());
-    c.viscous_friction = control.friction.viscous * (1 + dice.uniform());
+    if (control.limiter.friction.coulomb > 0)
+      c.coulomb_friction = control.limiter.friction.coulomb * (1 + dice.uniform());
+    c.viscous_friction = control.limiter.friction.viscous * (1 + dice.uniform());
     if (dice.chance(0.5)) c.max_force = control.max_force * dice.within(0.1, 1);
     OperatorHand::Config hand{
         .stiffness = dice.decades(1, 3),
@@ -162,23 +163,22 @@ Outcome run_world(std::uint64_t seed, double force_scale = 1) {
   world.watch_steps([&](const StepRecord& step) {
     outcome.only_finite = outcome.only_finite && step.force.allFinite() && step.applied.allFinite() &&
                           std::isfinite(step.energy) && step.hand.velocity.allFinite();
-    const double size =
-        limiter == HapticController::Limiter::kPerAxis ? step.force.cwiseAbs().maxCoeff() : step.force.norm();
+    const double size = limiter == Law::kAolPerAxis ? step.force.cwiseAbs().maxCoeff() : step.force.norm();
     outcome.worst_excess = std::max(outcome.worst_excess, size - step.permitted * (1 + 1e-12));
     last_energy = step.energy;
     if (step.mode == Mode::kActive) outcome.felt = true;
     if (step.reasons.has(Reason::kEnergy)) outcome.limited = true;
     if (config.pause_probability == 0) outcome.least_energy = std::min(outcome.least_energy, step.energy);
     // After an overrun the ledger may be below zero; it must then permit friction only, until it has recovered.
-    if (step.energy < 0 && limiter == HapticController::Limiter::kJoint) {
-      outcome.worst_excess = std::max(outcome.worst_excess, size - control.friction.coulomb * (1 + 1e-12));
+    if (step.energy < 0 && limiter == Law::kAol) {
+      outcome.worst_excess = std::max(outcome.worst_excess, size - control.limiter.friction.coulomb * (1 + 1e-12));
     }
   });
   // Long enough to shake hands over this network, and to be felt for half a second.
   const Duration round_trip = config.to_server.delay + config.from_server.delay;
   world.run_for(4 * round_trip + std::chrono::milliseconds(700));
   if (hostile != nullptr) outcome.only_finite = outcome.only_finite && hostile->saw_only_finite_forces();
-  if (simulated != nullptr && limiter == HapticController::Limiter::kJoint) {
+  if (simulated != nullptr && limiter == Law::kAol) {
     outcome.true_margin = simulated->truth().hand_work - last_energy;
   }
   return outcome;

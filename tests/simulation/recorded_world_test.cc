@@ -38,8 +38,7 @@ struct Hand {
 
 void PrintTo(const Hand& hand, std::ostream* out) { *out << hand.recording << ", wall at " << hand.wall << " m"; }
 
-Outcome run(const std::filesystem::path& data, const Hand& hand, HapticController::Limiter limiter,
-            const std::filesystem::path& out) {
+Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, const std::filesystem::path& out) {
   const std::string recording = std::string(hand.recording) + ".csv";
   const DeviceProfile& falcon = *find_device_profile("falcon");
   SimulatedDevice::Config config = falcon.device();
@@ -53,11 +52,11 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, HapticControlle
   World::Config world_config;
   world_config.seed = 5;
   world_config.record = true;
-  world_config.scene_text = "recorded hand " + recording + " over 5G mid-band, " +
-                            (limiter == HapticController::Limiter::kNone ? "no limiter" : "AOL");
-  world_config.loop.control.limiter = limiter;
-  world_config.loop.control.friction = {falcon.coulomb_bound.value, falcon.viscous_bound.value};
-  world_config.loop.control.longest_hold = std::chrono::milliseconds(1);
+  world_config.scene_text =
+      "recorded hand " + recording + " over 5G mid-band, " + (limiter == Law::kNone ? "no limiter" : "AOL");
+  world_config.loop.control.limiter.law = limiter;
+  world_config.loop.control.limiter.friction = {falcon.coulomb_bound.value, falcon.viscous_bound.value};
+  world_config.loop.control.limiter.longest_hold = std::chrono::milliseconds(1);
   world_config.loop.control.max_force = device.info().max_force;
   world_config.loop.control.max_slew = 1000;
   const auto hist = data / "d6g-tsn-5g" / "hist";
@@ -92,8 +91,8 @@ TEST_P(RecordedWorld, ARecordedHumanHandOnAWallBehindAMeasured5GNetworkIsPassive
   const std::filesystem::path out = TENDON_RECORDED_WORLDS;
   std::filesystem::create_directories(out);
   const std::string name = GetParam().recording;
-  const Outcome off = run(data, GetParam(), HapticController::Limiter::kNone, out / (name + "-off.mcap"));
-  const Outcome aol = run(data, GetParam(), HapticController::Limiter::kJoint, out / (name + "-aol.mcap"));
+  const Outcome off = run(data, GetParam(), Law::kNone, out / (name + "-off.mcap"));
+  const Outcome aol = run(data, GetParam(), Law::kAol, out / (name + "-aol.mcap"));
   for (const auto& [label, o] : {std::pair("off", off), std::pair("AOL", aol)}) {
     std::cout << name << ", limiter " << label << ": least energy " << o.least_energy << " J, peak force "
               << o.peak_force << " N, peak speed " << o.peak_speed << " m/s, limited in "

@@ -51,8 +51,8 @@ SimulatedDevice::Config pressing_hand() {
 World::Config world_config(const SimulatedDevice& device, std::uint64_t seed = 7) {
   World::Config config;
   config.seed = seed;
-  config.loop.control.friction = {0.3, 0.8};  // below the falcon's own
-  config.loop.control.longest_hold = milliseconds(2);
+  config.loop.control.limiter.friction = {0.3, 0.8};  // below the falcon's own
+  config.loop.control.limiter.longest_hold = milliseconds(2);
   config.loop.control.max_force = device.info().max_force;
   config.loop.control.max_slew = 1000;
   return config;
@@ -104,7 +104,7 @@ TEST(World, WithoutTheLimiterTheSameWallMakesThePortActive) {
   SimulatedDevice::Config hand = pressing_hand();
   SimulatedDevice device(hand);
   World::Config config = world_config(device);
-  config.loop.control.limiter = HapticController::Limiter::kNone;
+  config.loop.control.limiter.law = Law::kNone;
   World world(config, device);
   world.add_controller(at_100_hz(), wall());
   Log log;
@@ -382,7 +382,7 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) 
     // Between overruns it never falls below zero, and from below zero it only rises.
     EXPECT_GE(step.energy, std::min(-1e-9, log.steps[i - 1].energy - 1e-15));
     if (step.energy < 0) {
-      EXPECT_LE(step.applied.norm(), config.loop.control.friction.coulomb * (1 + 1e-9));
+      EXPECT_LE(step.applied.norm(), config.loop.control.limiter.friction.coulomb * (1 + 1e-9));
     }
   }
   EXPECT_GT(overruns, 10U);
