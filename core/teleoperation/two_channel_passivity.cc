@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/teleoperation/two_channel_passivity.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/teleoperation/expect.h"
+
+namespace tendon {
+
+template <int N>
+PassivityLeader<N>::PassivityLeader(const Config& config) : config_(config) {
+  expect_above_zero(config.max_damping, "max_damping");
+  expect_above_zero(seconds(config.period), "period");
+}
+
+template <int N>
+void PassivityLeader<N>::receive(const FollowerMessage<N>& message) noexcept {
+  if (message.sequence <= newest_.sequence) return;
+  if (message.force.allFinite() && std::isfinite(message.energy_in)) newest_ = message;
+}
+
+template <int N>
+Demand<N> PassivityLeader<N>::command(const Vec<N>& velocity) noexcept {
+  const double excess = newest_.force.dot(velocity) - energy() / seconds(config_.period);  // W
+  if (excess <= 0) return {newest_.force};
+  const double squared = velocity.squaredNorm();
+  // Written so that a velocity of zero needs no division.
+  const double damping = excess < config_.max_damping * squared ? excess / squared : config_.max_damping;
+  return {newest_.force - damping * velocity};
+}
+
+template <int N>
+LeaderMessage<N> PassivityLeader<N>::observe(const Interval<N>& interval) noexcept {
+  ++sent_.sequence;
+  sent_.velocity.setZero();
+  if (interval.held <= Duration::zero() || !interval.applied.allFinite() || !interval.dx.allFinite()) return sent_;
+  const double out = interval.applied.dot(interval.dx);
+  (out > 0 ? out_ : sent_.energy_in) += std::abs(out);
+  sent_.velocity = interval.dx / seconds(interval.held);
+  sent_.displacement += interval.dx;
+  return sent_;
+}
+
+template <int N>
+PassivityFollower<N>::PassivityFollower(const Config& config) : config_(config) {
+  expect_not_negative(config.drift_rate, "drift_rate");
+  expect_above_zero(seconds(config.period), "period");
+}
+
+template <int N>
+void PassivityFollower<N>::receive(const LeaderMessage<N>& message) noexcept {
+  if (message.sequence <= newest_.sequence) return;
+  if (!message.velocity.allFinite() || !message.displacement.allFinite() || !std::isfinite(message.energy_in)) return;
+  newest_ = message;
+  fresh_ = true;
+}
+
+template <int N>
+auto PassivityFollower<N>::step(const Vec<N>& force) noexcept -> Command {
+  const double T = seconds(config_.period);
+  ++sent_.sequence;
+  if (!force.allFinite()) return {Vec<N>::Zero(), sent_};
+
+  Vec<N> velocity = fresh_ ? newest_.velocity : Vec<N>::Zero();
+  fresh_ = false;
+  velocity += config_.drift_rate * (newest_.displacement - displacement_ - T * velocity);
+  const double excess = force.dot(velocity) - std::max(energy(), 0.0) / T;  // W
+  if (excess > 0 && force.squaredNorm() > 0) velocity -= excess / force.squaredNorm() * force;
+
+  const double out = T * force.dot(velocity);
+  (out > 0 ? out_ : sent_.energy_in) += std::abs(out);
+  displacement_ += T * velocity;
+  sent_.force = -force;
+  return {velocity, sent_};
+}
+
+template class PassivityLeader<1>;
+template class PassivityLeader<3>;
+template class PassivityLeader<6>;
+template class PassivityFollower<1>;
+template class PassivityFollower<3>;
+template class PassivityFollower<6>;
+
+}  // namespace tendon

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "tests/support/dice.h"
+
+namespace tendon {
+
+/// What one direction of a bad network does, in whole periods of the loop.
+struct Network {
+  int delay = 0;
+  int jitter = 0;   ///< 0 … jitter is added to the delay of each message by itself: they overtake each other
+  double loss = 0;  ///< probability
+  std::uint64_t seed = 1;
+};
+
+/// One direction of a bad network between two loops that run in step. Virtual time: the number of the period.
+template <class Message>
+class Link {
+ public:
+  explicit Link(const Network& network) : network_(network), dice_(network.seed) {}
+
+  void send(int now, const Message& message) {
+    const bool lost = dice_.chance(network_.loss);
+    const int extra = static_cast<int>(dice_.within(0, network_.jitter + 1));
+    if (!lost) under_way_.push_back({now + network_.delay + extra, message});
+  }
+
+  /// Calls `receive` with every message that arrives in period `now`.
+  template <class Receive>
+  void deliver(int now, Receive receive) {
+    for (const auto& [at, message] : under_way_) {
+      if (at <= now) receive(message);
+    }
+    std::erase_if(under_way_, [now](const Parcel& parcel) { return parcel.at <= now; });
+  }
+
+ private:
+  struct Parcel {
+    int at;
+    Message message;
+  };
+  Network network_;
+  Dice dice_;
+  std::vector<Parcel> under_way_;
+};
+
+}  // namespace tendon
