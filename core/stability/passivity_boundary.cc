@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/stability/passivity_boundary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+namespace tendon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// What the condition demands of b at the angle θ.
+double demand(const SampledSpring& spring, double theta) {
+  const double half = theta / 2;
+  const double d = spring.delay_samples;
+  // sin((2d+1)θ/2)/sin(θ/2), with its limit at θ = 0.
+  const double kernel = half < 1e-9 ? 2 * d + 1 : std::sin((2 * d + 1) * half) / std::sin(half);
+  return spring.stiffness * seconds(spring.period) / 2 * kernel - spring.damping * std::cos((d + 1) * theta);
+}
+
+/// Between `low` and `high` the demand has one maximum: golden section.
+double refined_maximum(const SampledSpring& spring, double low, double high) {
+  constexpr double kGolden = 0.6180339887498949;
+  for (int i = 0; i < 60; ++i) {
+    const double left = high - kGolden * (high - low);
+    const double right = low + kGolden * (high - low);
+    (demand(spring, left) > demand(spring, right) ? high : low) =
+        demand(spring, left) > demand(spring, right) ? right : left;
+  }
+  return demand(spring, (low + high) / 2);
+}
+
+}  // namespace
+
+double passive_viscous_friction(const SampledSpring& spring) {
+  check(spring);
+  // 32 points for each half wave of the fastest term: the grid finds the hill, the section its top.
+  const int points = 32 * (spring.delay_samples + 1);
+  int best = 0;
+  double most = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= points; ++i) {
+    const double here = demand(spring, kPi * i / points);
+    if (here > most) {
+      most = here;
+      best = i;
+    }
+  }
+  const double low = kPi * std::max(best - 1, 0) / points;
+  const double high = kPi * std::min(best + 1, points) / points;
+  return std::max(most, refined_maximum(spring, low, high));
+}
+
+double passive_viscous_friction(const std::function<std::complex<double>(std::complex<double>)>& environment,
+                                Duration period, int points) {
+  if (!(period > Duration::zero())) throw std::invalid_argument("period: expected more than 0 s");
+  if (points < 2) throw std::invalid_argument("points = " + std::to_string(points) + ": expected 2 or more");
+  double most = -std::numeric_limits<double>::infinity();
+  for (int i = 1; i <= points; ++i) {
+    const double theta = kPi * i / points;
+    const std::complex<double> z = std::polar(1.0, theta);
+    const double sine = std::sin(theta / 2);
+    // 1 − cos θ = 2 sin²(θ/2)
+    const double here = seconds(period) / (4 * sine * sine) * ((1.0 - 1.0 / z) * environment(z)).real();
+    if (!std::isfinite(here)) {
+      throw std::invalid_argument("environment: expected a finite value at θ = " + std::to_string(theta));
+    }
+    most = std::max(most, here);
+  }
+  return most;
+}
+
+double largest_passive_stiffness(const SampledSpring& spring) {
+  check(spring);
+  if (spring.damping == 0) return spring.viscous / mean_age(spring);
+  SampledSpring tried = spring;
+  const auto demanded = [&tried](double stiffness) {
+    tried.stiffness = stiffness;
+    return passive_viscous_friction(tried);
+  };
+  if (demanded(0) > spring.viscous) return 0;
+  // The demand is convex in K, and at θ → 0 it is K (T/2 + dT) − B.
+  double passive = 0;
+  double active = 2 * (spring.viscous + std::abs(spring.damping)) / mean_age(spring);
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (passive + active) / 2;
+    (demanded(middle) <= spring.viscous ? passive : active) = middle;
+  }
+  return passive;
+}
+
+double passive_viscous_friction_of_field(double steepest, Duration period, int delay_samples) {
+  return steepest * mean_age({.stiffness = steepest, .period = period, .delay_samples = delay_samples});
+}
+
+double felt_stiffness(double coupling, double environment) {
+  if (!(coupling > 0) || !(environment >= 0) || !std::isfinite(coupling)) {
+    throw std::invalid_argument("felt_stiffness: expected a finite coupling > 0 and an environment ≥ 0, in N/m");
+  }
+  return std::isinf(environment) ? coupling : coupling * environment / (coupling + environment);
+}
+
+}  // namespace tendon
