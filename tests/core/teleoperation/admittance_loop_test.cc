@@ -203,6 +203,19 @@ TEST(AdmittanceLoop, TheIntegralKeepsNoMoreThanWasAppliedWhenTheBoundShrinks) {
   EXPECT_GT(wanted, -1);
 }
 
+TEST(AdmittanceLoop, TheIntegralDoesNotGrowWhileTheForceIsClipped) {
+  AdmittanceLoop<1> loop(tool<1>(1, 200, 1000, 1000));
+  Vec<1> applied = Vec<1>::Zero();
+  for (int i = 0; i < 2000; ++i) {
+    if (i > 0) loop.observe({applied, Vec<1>::Zero(), kPeriod});
+    applied[0] = std::clamp(loop.command({Vec<1>(20), Vec<1>::Zero(), Vec<1>::Zero()}).force[0], -2.0, 2.0);
+  }
+  ASSERT_EQ(applied[0], 2);
+  // The handle now moves as the tool does, 0.1 m/s: no error is left, and what is commanded is the integral.
+  loop.observe({applied, Vec<1>(0.1 * kT), kPeriod});
+  EXPECT_NEAR(loop.command({Vec<1>(20), Vec<1>::Zero(), Vec<1>(0.1)}).force[0], 0, 0.1);
+}
+
 TEST(AdmittanceLoop, ClippingOneDirectionLeavesTheIntegralOfTheOthersAlone) {
   AdmittanceLoop<3> clipped(tool<3>(1, 10, 10, 1000));
   AdmittanceLoop<3> free(tool<3>(1, 10, 10, 1000));

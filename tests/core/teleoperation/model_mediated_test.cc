@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/teleoperation/model_mediated.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "core/energy_ledger.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Duration kPeriod = 1ms;
+constexpr double kT = 1e-3;
+constexpr Friction kFriction = {.coulomb = 0.02, .viscous = 0.26};
+
+SurfaceModel<3> surface(std::uint64_t sequence, double offset, double stiffness, const Vec3& normal = Vec3::UnitX()) {
+  return {sequence, normal, offset, stiffness};
+}
+
+// ---- the gate --------------------------------------------------------------------------------------------------
+
+// A hand that moves about near surfaces that change all the time. ½ K depth² is convex and its slope changes by no more
+// than K, so that a held force gives out at most what the surface loses of it plus ½ K ‖Δx‖², which the friction of
+// the device pays for K ≤ 2b/T. With this leak of sampling taken off, what the model gives out and still holds is
+// never more than what hand and budget have put in.
+TEST(ModelMediated, NoUpdateOfTheModelPutsEnergyIn) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Dice dice(seed);
+    SurfaceRenderer<3> renderer;
+    const double budget_size = dice.chance(0.5) ? 0.0 : 1e-4;
+    Vec3 x = Vec3::Zero();
+    double balance = 0;  // J
+    double stiffness = 0;
+    for (std::uint64_t i = 1; i <= 2000; ++i) {
+      if (dice.chance(0.1)) {
+        stiffness = dice.decades(0, 4);
+        const double size = dice.chance(0.1) ? 1e3 : 0.01;
+        renderer.receive(surface(i, dice.within(-size, size), stiffness, dice.direction()));
+      }
+      const double budget = budget_size * dice.uniform();
+      const auto rendered = renderer.command(x, budget);
+      ASSERT_GE(rendered.paid, 0);
+      ASSERT_LE(rendered.paid, budget + 1e-12);
+      const Vec3 dx = dice.direction() * dice.decades(-6, -3);
+      x += dx;
+      balance += rendered.paid - rendered.demand.force.dot(dx) + stiffness / 2 * dx.squaredNorm();
+      ASSERT_GE(balance, renderer.energy(x) - 1e-9) << "seed " << seed << " period " << i;
+    }
+  }
+}
+
+// The same against the ledger: with K ≤ 2b/T and the budget that the account can spare the ledger pays everything.
+TEST(ModelMediated, WithTheSparePartOfTheAccountAsBudgetTheLedgerNeverGoesNegative) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Dice dice(seed);
+    SurfaceRenderer<3> renderer;
+    EnergyLedger ledger(kFriction);
+    const double greed = dice.uniform();
+    Vec3 x = Vec3::Zero();
+    for (std::uint64_t i = 1; i <= 2000; ++i) {
+      if (dice.chance(0.1)) {
+        const double stiffness = 2 * kFriction.viscous / kT * dice.uniform();
+        renderer.receive(surface(i, dice.within(-0.02, 0.02), stiffness, dice.direction()));
+      }
+      const Vec3 force = renderer.command(x, ledger.energy() - renderer.energy(x)).demand.force;
+      const double excess = force.norm() - kFriction.coulomb;
+      Vec3 dx = dice.direction() * dice.decades(-6, -3);
+      if (excess > 0 && dice.chance(greed)) dx = kT * excess / (2 * kFriction.viscous) * force.normalized();
+      ledger.observe(force, dx, kPeriod);
+      x += dx;
+      ASSERT_GE(ledger.energy(), renderer.energy(x) - 1e-12) << "seed " << seed << " period " << i;
+    }
+  }
+}
+
+TEST(ModelMediated, ASurfaceThatWouldPushIsPutDeeperAndRisesAsTheHandWithdraws) {
+  SurfaceRenderer<1> renderer;
+  renderer.receive({1, Vec<1>(1), 0.0, 100});
+  EXPECT_EQ(renderer.command(Vec<1>(-0.01), 0).demand.force[0], 0)
+      << "the hand is 10 mm inside a surface it never entered";
+  EXPECT_NEAR(renderer.command(Vec<1>(-0.012), 0).demand.force[0], 0.2, 1e-12) << "2 mm deeper costs the hand";
+  EXPECT_EQ(renderer.command(Vec<1>(0.001), 0).demand.force[0], 0);
+  EXPECT_NEAR(renderer.command(Vec<1>(-0.01), 0).demand.force[0], 1, 1e-12)
+      << "it was outside; the surface is in place";
+}
+
+TEST(ModelMediated, ABudgetPaysForAJumpAndIsToldWhatItCost) {
+  SurfaceRenderer<1> renderer;
+  renderer.receive({1, Vec<1>(1), 0.0, 100});
+  const auto half = renderer.command(Vec<1>(-0.01), 2e-3);
+  EXPECT_NEAR(half.paid, 2e-3, 1e-12);
+  EXPECT_NEAR(half.demand.force[0], std::sqrt(2 * 100 * 2e-3), 1e-12);
+  const auto rest = renderer.command(Vec<1>(-0.01), 1);
+  EXPECT_NEAR(rest.paid, 3e-3, 1e-12);
+  EXPECT_NEAR(rest.demand.force[0], 1, 1e-12);
+  EXPECT_EQ(rest.demand.stiffness(0, 0), 100);
+}
+
+TEST(ModelMediated, PassesOverWhatCannotBeASurface) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  SurfaceRenderer<3> renderer;
+  renderer.receive(surface(5, 0.01, 100));
+  ASSERT_NEAR(renderer.command(Vec3(0.02, 0, 0), 0).demand.force.norm(), 0, 0);
+  renderer.receive(surface(4, 0.5, 100));
+  renderer.receive(surface(6, kNan, 100));
+  renderer.receive(surface(7, 0.5, -1));
+  renderer.receive(surface(8, 0.5, kNan));
+  renderer.receive(surface(9, 0.5, 100, Vec3(1, 1, 0)));
+  renderer.receive(surface(10, 0.5, 100, Vec3(kNan, 0, 0)));
+  EXPECT_FALSE(renderer.command(Vec3(kNan, 0, 0), 0).demand.force.allFinite());
+  EXPECT_NEAR(renderer.command(Vec3(0, 0, 0), 0).demand.force.x(), 1, 1e-12);
+}
+
+// ---- the estimator -----------------------------------------------------------------------------------------------
+
+constexpr SurfaceEstimator<3>::Config kEstimator = {
+    .contact_force = 0.05, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 200};
+
+TEST(ModelMediated, FindsTheSurfaceThatTheToolTouches) {
+  for (const double stiffness : {80.0, 1500.0}) {
+    SurfaceEstimator<3> estimator(kEstimator);
+    const Vec3 normal = Vec3(1, -2, 2) / 3;
+    SurfaceModel<3> found;
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3 x = normal * (0.03 - 0.005 * std::sin(i * 5e-3)) + Vec3(2, 1, 0) * 1e-3 * std::cos(i * 3e-3);
+      const double depth = 0.03 - normal.dot(x);
+      found = estimator.observe(x, std::max(stiffness * depth, 0.0) * normal);
+    }
+    EXPECT_NEAR(found.stiffness, stiffness, 1e-3 * stiffness);
+    EXPECT_NEAR(found.offset, 0.03, 1e-6);
+    EXPECT_NEAR(found.normal.dot(normal), 1, 1e-12);
+  }
+}
+
+TEST(ModelMediated, TheSurfaceFoundFeelsLikeTheRealOneAtTheToolEvenBeforeItsStiffnessIsKnown) {
+  SurfaceEstimator<3> estimator(kEstimator);
+  const Vec3 x(0, 0.004, 0);
+  const auto found = estimator.observe(x, Vec3(0, 1.7, 0));
+  EXPECT_EQ(found.stiffness, 200);
+  EXPECT_NEAR(found.stiffness * found.depth(x), 1.7, 1e-12);
+}
+
+TEST(ModelMediated, TheSurfaceStaysWhereItWasFoundWhenTheToolLeavesIt) {
+  SurfaceEstimator<1> estimator(
+      {.contact_force = 0.05, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 200});
+  const auto touched = estimator.observe(Vec<1>(-0.001), Vec<1>(0.2));
+  const auto left = estimator.observe(Vec<1>(0.01), Vec<1>(0));
+  EXPECT_GT(left.sequence, touched.sequence);
+  EXPECT_EQ(left.offset, touched.offset);
+  EXPECT_EQ(left.stiffness, touched.stiffness);
+  EXPECT_EQ(estimator.observe(Vec<1>(std::numeric_limits<double>::quiet_NaN()), Vec<1>(1)).offset, touched.offset);
+}
+
+TEST(ModelMediated, SaysWhatIsWrongWithItsConfiguration) {
+  auto bad = kEstimator;
+  bad.max_stiffness = 100;
+  EXPECT_THROW(SurfaceEstimator<3>{bad}, std::invalid_argument);
+  bad = kEstimator;
+  bad.contact_force = 0;
+  EXPECT_THROW(SurfaceEstimator<3>{bad}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon
