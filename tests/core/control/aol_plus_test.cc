@@ -78,6 +78,7 @@ struct Outcome {
   double scale = 0;         // J, the largest it was: what rounding may be measured by
   double worst_excess = 0;  // N above what the law itself said it permits
   double felt = 0;          // N, the largest force
+  double over_credit = 0;   // J, by which the law's account was above the true ledger
 };
 
 template <int Blocks, int Size>
@@ -139,6 +140,7 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
     if (c.encoder_step > 0) counted = (x / c.encoder_step).array().round().matrix() * c.encoder_step;
     law.observe({.applied = applied, .dx = counted - seen, .held = interval});
     seen = counted;
+    outcome.over_credit = std::max(outcome.over_credit, law.energy() - energy);
 
     if (c.config.parts.adaptive_friction && dice.chance(0.02)) {
       for (std::size_t i = 0; i < Blocks; ++i) {  // the true friction changes, and the law is told a bound of it
@@ -176,6 +178,7 @@ void expect_passive(const std::string& listed, int seeds = 150) {
     const auto c = random_case<Blocks, Size>(dice, listed);
     const Outcome outcome = run(dice, c, 400);
     ASSERT_GE(outcome.least, -1e-11 * std::max(1.0, outcome.scale)) << "parts " << listed << ", seed " << seed;
+    ASSERT_LE(outcome.over_credit, 1e-11 * std::max(1.0, outcome.scale)) << "parts " << listed << ", seed " << seed;
     ASSERT_LE(outcome.worst_excess, 1e-12) << "parts " << listed << ", seed " << seed;
     felt = std::max(felt, outcome.felt);
   }
@@ -356,6 +359,16 @@ TEST(AolPlus, AHandAtRestOnTheEdgeOfACountEarnsNothing) {
   }
   EXPECT_EQ(robust.energy(), 0);
   EXPECT_GT(naive.energy(), 0.05);
+}
+
+TEST(AolPlus, AFlickeringCountCostsAMovingHandNoMoreThanTheFlicker) {
+  auto config = one_axis(0, 0.05);
+  config.parts.robust_ledger.emplace().encoder_step = {30e-6};
+  AolPlus<1> law(config);
+  for (int n = 0; n < 3000; ++n) {  // two counts forth, one back
+    law.observe({.applied = Vec<1>(0), .dx = Vec<1>(n % 3 == 2 ? -30e-6 : 30e-6), .held = kPeriod});
+  }
+  EXPECT_NEAR(law.energy(), 0.05 * 1000 * 30e-6, 0.05 * 2 * 30e-6);
 }
 
 TEST(AolPlus, TheKneeIsSmoothNeverAboveTheBoundAndSparesTheFirstEightyPercent) {
