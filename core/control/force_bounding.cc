@@ -48,7 +48,7 @@ void MemorylessForceBounding<N>::observe(const Interval<N>& interval) noexcept {
   const double credited = viscous_ / std::max(seconds(interval.held), longest_hold_);
   const double stored = interval.applied.squaredNorm() / (4 * per_hold) - interval.applied.dot(interval.dx) +
                         credited * interval.dx.squaredNorm();
-  if (stored > 0 && std::isfinite(stored)) permitted_ = 2 * std::sqrt(per_hold * stored);
+  if (stored > 0) permitted_ = 2 * std::sqrt(per_hold * stored);
 }
 
 template <int N>

@@ -32,9 +32,10 @@ inline double checked_viscous(double viscous) {
   return viscous;
 }
 
+/// Finite, and its squares too.
 template <int N>
 bool finite(const Interval<N>& interval) noexcept {
-  return interval.applied.allFinite() && interval.dx.allFinite();
+  return std::isfinite(interval.applied.squaredNorm()) && std::isfinite(interval.dx.squaredNorm());
 }
 
 template <int N>

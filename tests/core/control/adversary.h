@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <functional>
 #include <limits>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "core/control/stability_controller.h"
 #include "core/energy_ledger.h"
@@ -37,25 +40,34 @@ Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held
 template <int N>
 using World = std::function<Demand<N>(const Vec<N>& position)>;
 
-/// −∇ of a convex potential: springs to random planes with random stiffness up to `stiffest`, pushing or bilateral.
-/// Together they are no steeper than `stiffest`.
+/// Of what a static world is made.
+struct Walls {
+  std::size_t count = 3;   ///< 1 … 3
+  double bilateral = 0.4;  ///< share of them that pull too
+};
+
+/// −∇ of a convex potential, least at the origin: springs to random planes with random stiffness, together no steeper
+/// than `stiffest`. Those that pull too go through the origin; the others lie around it.
 template <int N>
-World<N> static_world(Dice& dice, double stiffest) {
+World<N> static_world(Dice& dice, double stiffest, const Walls& of) {
   struct Wall {
     Vec<N> normal;
-    double place, stiffness;
-    bool bilateral;
+    double place = 0;
+    double stiffness = 0;
+    bool bilateral = false;
   };
   std::array<Wall, 3> walls;
   double left = stiffest;
-  for (Wall& wall : walls) {
-    wall = {random_direction<N>(dice), dice.within(-3e-3, 3e-3), left * dice.uniform(), dice.chance(0.4)};
-    left -= wall.stiffness;
+  for (std::size_t i = 0; i < of.count; ++i) {
+    const double stiffness = i + 1 < of.count ? left * dice.uniform() : left;
+    const bool bilateral = dice.chance(of.bilateral);
+    walls[i] = {random_direction<N>(dice), bilateral ? 0 : dice.within(0, 3e-3), stiffness, bilateral};
+    left -= stiffness;
   }
-  walls.back().stiffness += left;
-  return [walls](const Vec<N>& x) {
+  return [walls, count = of.count](const Vec<N>& x) {
     Demand<N> demand{Vec<N>::Zero(), Mat<N>::Zero()};
-    for (const Wall& wall : walls) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Wall& wall = walls[i];
       const double depth = wall.normal.dot(x) - wall.place;
       if (depth < 0 && !wall.bilateral) continue;
       demand.force -= wall.stiffness * depth * wall.normal;
@@ -65,12 +77,16 @@ World<N> static_world(Dice& dice, double stiffest) {
   };
 }
 
-/// The energy that such a world holds at a place is above zero by this much when a run starts: what may come out of it.
+/// `world`, answering the position of `periods` periods ago.
 template <int N>
-Vec<N> place_at_rest(const World<N>& world, double stiffest) {
-  Vec<N> x = Vec<N>::Zero();
-  for (int i = 0; i < 20000; ++i) x += world(x).force / stiffest;
-  return x;
+World<N> delayed(World<N> world, int periods) {
+  return [world = std::move(world),
+          past = std::deque<Vec<N>>(static_cast<std::size_t>(periods), Vec<N>::Zero())](const Vec<N>& x) mutable {
+    past.push_back(x);
+    const Demand<N> demand = world(past.front());
+    past.pop_front();
+    return demand;
+  };
 }
 
 /// Demands nothing sensible: huge, tiny, zero, not a number, along and against the motion, now soft and now hard.
@@ -130,11 +146,12 @@ struct Fate {
 };
 
 template <int N, class Law>
-requires StabilityController<Law, N> Fate run_adversary(Law& law, const Adversary& adversary, World<N> world, Vec<N> x,
+requires StabilityController<Law, N> Fate run_adversary(Law& law, const Adversary& adversary, World<N> world,
                                                         Dice& dice) {
   EnergyLedger truth(adversary.friction);
   double turnover = 1;
   Fate fate;
+  Vec<N> x = Vec<N>::Zero();
   Vec<N> force = Vec<N>::Zero();
   int creeping = 0;
   Vec<N> creep = Vec<N>::Zero();
@@ -191,9 +208,33 @@ int broken_by_hostile_worlds(Make make, int seeds, double overclaim = 1) {
     adversary.hostility = dice.uniform();
     auto law =
         make(Friction{adversary.friction.coulomb, adversary.friction.viscous * overclaim}, adversary.longest_hold);
-    const Fate fate = run_adversary<N>(law, adversary, hostile_world<N>(dice), Vec<N>::Zero(), dice);
+    const Fate fate = run_adversary<N>(law, adversary, hostile_world<N>(dice), dice);
     EXPECT_TRUE(fate.all_finite) << "seed " << seed;
     EXPECT_TRUE(fate.within_permitted) << "seed " << seed;
+    if (fate.least_energy < -1e-12) ++broken;
+  }
+  return broken;
+}
+
+/// The same for laws that are passive in static, convex worlds: `make(friction, longest hold, stiffest)`, where
+/// `stiffest`, N/m, is the slope of the world.
+template <int N, class Make>
+int broken_by_static_worlds(Make make, int seeds, const Walls& walls = {}, int periods_late = 0) {
+  int broken = 0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Dice dice(static_cast<std::uint64_t>(seed));
+    Adversary adversary;
+    adversary.friction = random_friction(dice);
+    adversary.hostility = dice.uniform() / 2;
+    adversary.jitter = periods_late == 0;
+    adversary.clamps = false;
+    adversary.overlooks = false;
+    const double stiffest = dice.decades(1, 4.5);
+    auto law = make(adversary.friction, adversary.longest_hold, stiffest);
+    World<N> world = static_world<N>(dice, stiffest, walls);
+    if (periods_late > 0) world = delayed<N>(std::move(world), periods_late);
+    const Fate fate = run_adversary<N>(law, adversary, std::move(world), dice);
+    EXPECT_TRUE(fate.all_finite) << "seed " << seed;
     if (fate.least_energy < -1e-12) ++broken;
   }
   return broken;

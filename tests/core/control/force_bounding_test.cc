@@ -115,7 +115,6 @@ TEST(ForceBounding, NoAdversaryDrawsEnergy) {
 }
 
 TEST(MemorylessForceBounding, NoAdversaryDrawsEnergy) {
-  using std::chrono::milliseconds;
   EXPECT_EQ(broken_by_hostile_worlds<1>(
                 [](Friction f, Duration t) {
                   return MemorylessForceBounding<1>({f, t});
@@ -144,7 +143,7 @@ double least_energy(double overclaim) {
     Dice dice(seed);
     Adversary adversary{.friction = {0, 0.26}, .jitter = false, .clamps = false, .overlooks = false};
     Law law({{0, 0.26 * overclaim}, adversary.longest_hold});
-    least = std::min(least, run_adversary<3>(law, adversary, hostile_world<3>(dice), Vec3(0, 0, 0), dice).least_energy);
+    least = std::min(least, run_adversary<3>(law, adversary, hostile_world<3>(dice), dice).least_energy);
   }
   return least;
 }

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/control/passivity_controller.h"
+
+#include <Eigen/Geometry>
+
+#include "tests/core/control/adversary.h"
+#include "tests/core/control/press.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+using enum PassivityObserver;
+
+static_assert(StabilityController<PassivityController<1>, 1>);
+static_assert(StabilityController<PassivityController<3>, 3>);
+static_assert(StabilityController<PassivityController<6>, 6>);
+static_assert(StabilityController<ParallelPassivityController<1>, 1>);
+static_assert(StabilityController<ParallelPassivityController<3>, 3>);
+static_assert(StabilityController<ParallelPassivityController<6>, 6>);
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr Friction kFriction{0.05, 0.26};
+
+TEST(PassivityController, KeepsTheCommonPromises) {
+  for (const auto observer : {kSameSample, kZohExact}) {
+    expect_the_common_promises<1>(PassivityController<1>({kFriction, observer, 20}), kFriction);
+    expect_the_common_promises<3>(PassivityController<3>({kFriction, observer, 20}), kFriction);
+    expect_the_common_promises<6>(PassivityController<6>({kFriction, observer, kInf}), kFriction);
+    expect_the_common_promises<1>(ParallelPassivityController<1>({kFriction, observer, 0.1}), kFriction);
+    expect_the_common_promises<3>(ParallelPassivityController<3>({kFriction, observer, 0.1}), kFriction);
+    expect_the_common_promises<6>(ParallelPassivityController<6>({kFriction, observer, kInf}), kFriction);
+  }
+}
+
+// What a law observes of a plain spring on random motion, and what there was to observe.
+struct Seen {
+  double worst_of_sum = 0;  // J, |observed − (K x²/2 ± K/2 Σ Δx²)|
+  double least_observed = 0;
+  double least_ledger = 0;
+  int interventions = 0;
+};
+
+template <class Law>
+Seen watch_a_spring(Law law, double sign_of_leak) {
+  constexpr double kStiffness = 20000;
+  Dice dice(11);
+  Seen seen;
+  Vec<1> force(0);
+  double x = 0;
+  double squares = 0;
+  for (int step = 0; step < 3000; ++step) {
+    const double dx = dice.within(-1e-3, 1e-3) - 0.3 * x;
+    law.observe({force, Vec<1>(dx), milliseconds(1)});
+    x += dx;
+    squares += dx * dx;
+    const LimitedForce<1> limited = law.limit({Vec<1>(-kStiffness * x), Mat<1>(kStiffness)});
+    if (!limited.reasons.empty()) ++seen.interventions;
+    force = Vec<1>(-kStiffness * x);  // the spring itself, whatever the law says
+    seen.worst_of_sum =
+        std::max(seen.worst_of_sum, std::abs(law.observed() - kStiffness * (x * x + sign_of_leak * squares) / 2));
+    seen.least_observed = std::min(seen.least_observed, law.observed());
+    seen.least_ledger = std::min(seen.least_ledger, law.energy());
+  }
+  return seen;
+}
+
+TEST(PassivityController, AsPublishedItNeverSeesTheLeakOfASampledSpringAndNeverActs) {
+  const Seen seen = watch_a_spring(PassivityController<1>({kFriction, kSameSample, kInf}), +1);
+  EXPECT_LT(seen.worst_of_sum, 1e-9);
+  EXPECT_GE(seen.least_observed, 0);
+  EXPECT_EQ(seen.interventions, 0);
+  EXPECT_LT(seen.least_ledger, -1);
+}
+
+TEST(PassivityController, TheZohExactObserverSeesTheLeakAndActs) {
+  const Seen seen = watch_a_spring(PassivityController<1>({kFriction, kZohExact, 1e-9}), -1);
+  EXPECT_LT(seen.worst_of_sum, 1e-9);
+  EXPECT_LT(seen.least_observed, -1);
+  EXPECT_GT(seen.interventions, 100);
+}
+
+TEST(PassivityController, DampsAsMuchAsIsMissing) {
+  PassivityController<3> law({kFriction, kZohExact, kInf});
+  const Vec3 dx(1e-3, -2e-3, 0.5e-3);
+  const Vec3 held(0.3, 0.1, 0);
+  const Vec3 wanted(0.7, -0.2, 0.4);
+  law.observe({held, dx, milliseconds(2)});
+  const double predicted = -held.dot(dx) - wanted.dot(dx);
+  ASSERT_LT(predicted, 0);
+  const LimitedForce<3> limited = law.limit({wanted});
+  // One more such interval leaves the observed energy at zero.
+  EXPECT_NEAR(law.observed() - limited.force.dot(dx), 0, 1e-15);
+  EXPECT_NEAR((limited.force - wanted).cross(dx).norm(), 0, 1e-15);
+  EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));
+}
+
+TEST(PassivityController, NeitherDividesByASpeedOfNothingNorDampsMoreThanItMay) {
+  PassivityController<1> law({kFriction, kZohExact, 5, 1e-3});
+  law.observe({Vec<1>(100.0), Vec<1>(0.99e-6), milliseconds(1)});
+  EXPECT_EQ(law.limit({Vec<1>(1.0)}).force[0], 1);
+  law.observe({Vec<1>(100.0), Vec<1>(1e-3), milliseconds(1)});
+  EXPECT_DOUBLE_EQ(law.limit({Vec<1>(1.0)}).force[0], 1 - 5 * 1.0);
+  EXPECT_EQ(series_damping(1, 0, milliseconds(1), 0, kInf), 0);
+  EXPECT_EQ(series_damping(1, 1, Duration::zero(), 0, kInf), 0);
+}
+
+TEST(PassivityController, AsPublishedAStiffWallThrowsTheHandOffAsIfItWereNotThere) {
+  const Press published = press(PassivityController<1>({kPressFriction, kSameSample, kInf}), 20000);
+  EXPECT_GT(published.unrest, 0.5);
+  EXPECT_LT(published.least_work, -0.1);
+}
+
+TEST(PassivityController, ZohExactWithADamperWellBelowTwoMOverTItShowsStiffWallsAsTheyAre) {
+  for (const double wall : {800.0, 3000.0, 20000.0}) {
+    const Press result = press(PassivityController<1>({kPressFriction, kZohExact, 100}), wall);
+    EXPECT_NEAR(result.stiffness / wall, 1, 0.01) << wall;
+    EXPECT_LT(result.unrest, 2e-3) << wall;
+  }
+}
+
+// 2m/T = 250 N·s/m for device and hand.
+TEST(PassivityController, ADamperWithoutLimitGivesBurstsUpToTheLimitOfTheDevice) {
+  const Press result = press(PassivityController<1>({kPressFriction, kZohExact, kInf}), 20000);
+  EXPECT_GT(result.peak_force, 50);
+  EXPECT_GT(result.unrest, 0.02);
+}
+
+TEST(PassivityController, ActsOneIntervalLateSoAnAdversaryDrawsEnergy) {
+  const auto make = [](Friction friction, Duration) { return PassivityController<3>({friction, kZohExact, kInf}); };
+  EXPECT_GT(broken_by_hostile_worlds<3>(make, 50), 25);
+}
+
+TEST(ParallelPassivityController, TheEnvironmentIsLeftBehindByWhatIsMissing) {
+  ParallelPassivityController<1> law({kFriction, kZohExact, kInf});
+  law.observe({Vec<1>(1.0), Vec<1>(1e-3), milliseconds(1)});  // 1 mJ given out
+  const LimitedForce<1> limited = law.limit({Vec<1>(-4.0), Mat<1>(1000.0)});
+  // Σ f Δx is −1 mJ; one more such interval at 4 N brings +4 mJ: nothing is missing.
+  EXPECT_EQ(limited.force[0], -4);
+  law.observe({Vec<1>(-4.0), Vec<1>(-0.5e-3), milliseconds(1)});  // −3 mJ
+  const double missing = 3e-3 + 3.5 * 0.5e-3;
+  const LimitedForce<1> leaving = law.limit({Vec<1>(-3.5), Mat<1>(1000.0)});
+  EXPECT_NEAR(law.offset()[0], missing / 3.5, 1e-12);
+  EXPECT_NEAR(leaving.force[0], -3.5 + 1000 * law.offset()[0], 1e-12);
+  EXPECT_TRUE(leaving.reasons.has(Reason::kEnergy));
+}
+
+TEST(ParallelPassivityController, AsPublishedItIsAsBlindAsTheSeriesForm) {
+  const Seen seen = watch_a_spring(ParallelPassivityController<1>({kFriction, kSameSample, kInf}), +1);
+  EXPECT_LT(seen.worst_of_sum, 1e-9);
+  EXPECT_EQ(seen.interventions, 0);
+}
+
+TEST(ParallelPassivityController, HandAndEnvironmentDriftApartUntilTheContactEnds) {
+  ParallelPassivityController<1> law({kFriction, kZohExact, kInf});
+  Vec<1> force(0);
+  const auto move = [&](double dx, double x) {
+    law.observe({force, Vec<1>(dx), milliseconds(1)});
+    force = law.limit({Vec<1>(-20000 * x), Mat<1>(x > 0 ? 20000.0 : 0.0)}).force;
+  };
+  for (int i = 0; i < 200; ++i) move(i % 2 == 0 ? 1e-3 : -0.9e-3, i % 2 == 0 ? 1e-3 : 1e-4);
+  EXPECT_GT(law.offset()[0], 1e-5);
+  move(-2e-4, 0);
+  EXPECT_EQ(law.offset()[0], 0);
+  EXPECT_EQ(force[0], 0);
+}
+
+TEST(ParallelPassivityController, WithoutAStiffnessItChangesNothing) {
+  ParallelPassivityController<3> law({kFriction, kZohExact, kInf});
+  law.observe({Vec3(5, 0, 0), Vec3(1e-3, 0, 0), milliseconds(1)});
+  EXPECT_EQ(law.limit({Vec3(5, 1, 0)}).force, Vec3(5, 1, 0));
+}
+
+TEST(PassivityController, RefusesADamperThatIsNone) {
+  const std::string why = complaint([] { PassivityController<1>({kFriction, kZohExact, 0}); });
+  EXPECT_NE(why.find("max_damping must be above 0"), std::string::npos) << why;
+  EXPECT_THROW(PassivityController<1>({kFriction, kZohExact, 5, -1}), std::invalid_argument);
+  EXPECT_NE(complaint([] {
+              ParallelPassivityController<1>({kFriction, kZohExact, -1});
+            }).find("max_mobility"),
+            std::string::npos);
+  EXPECT_THROW(ParallelPassivityController<1>({kFriction, kZohExact, 1, kInf}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon
