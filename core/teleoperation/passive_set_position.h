@@ -33,9 +33,11 @@ struct SetPosition {
 /// b ‖Δx‖²/T + f_c ‖Δx‖, whose sum is never less (Cauchy–Schwarz); and no energy is passed on between the two
 /// ends, because the limiter at the port would not count it.
 ///
-/// One at each end: the other end's position is the set position of this one. A message or an interval that is not
-/// finite is passed over; when `position` is not finite, neither is the demand. Before the first message there is no
-/// force.
+/// For the end that a hand moves. An end that only its spring moves earns nothing and would stay where it is: it
+/// follows the other's position with an ordinary position controller.
+///
+/// A message or an interval that is not finite is passed over; when `position` is not finite, neither is the demand.
+/// Before the first message there is no force.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
