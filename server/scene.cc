@@ -562,6 +562,36 @@ void declare_parts(Table& limiter, Draft& draft) {
   });
 }
 
+/// What one law wants to know and others do not.
+template <class Table>
+void declare_law(Table& limiter, Draft& draft) {
+  LimiterConfig& config = draft.scene.loop.control.limiter;
+  const auto used_by = [&config](std::initializer_list<Law> users) {
+    return Table::kDocuments || std::find(users.begin(), users.end(), config.law) != users.end();
+  };
+  if (used_by({Law::kClamp})) {
+    limiter.key("clamp_n", config.max_force, kZeroOrMore, "of \"clamp\": no force is longer than this", kRequired);
+  }
+  if (used_by({Law::kReferenceEnergy, Law::kPortHamiltonian, Law::kPassiveSynthesis})) {
+    limiter.key(
+        "environment_stiffness_n_per_m", config.environment_stiffness, kAboveZero,
+        "of \"reference-energy\", \"port-hamiltonian\", \"passive-synthesis\": of an environment that sends no "
+        "stiffness of its own",
+        Absent{.required = info(config.law).needs_stiffness,
+               .text = "required, but for \"passive-synthesis\", which then learns it from forces that bring one"});
+  }
+  if (used_by({Law::kPassiveSynthesis})) {
+    limiter.key("environment_delay_ms", config.environment_delay, kZeroOrMore,
+                "of \"passive-synthesis\": from a position to the force that answers it");
+  }
+  if (used_by({Law::kPassivityController, Law::kPassivityControllerPublished, Law::kReferenceEnergy})) {
+    limiter.key("max_damping_n_s_per_m", config.max_damping, kAboveZero,
+                "of \"tdpa\", \"tdpa-2002\", \"reference-energy\": the most damping that is injected. Far below twice "
+                "the device's mass over the period");
+  }
+  if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
+}
+
 /// The wire tells the loop's rate in whole Hz, so a period is 1 s or less.
 constexpr Number kPeriod{.least = 1e6 / limits::kMaxLoopHz, .most = 1e6};
 /// The wire tells timeouts in whole ms.
@@ -590,7 +620,7 @@ void declare_scene(Table& scene, Draft& draft) {
                 kProfiles);
     limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
                 "lower bound of the device's viscous friction", kProfiles);
-    if (config.law == Law::kAolPlus) declare_parts(limiter, draft);
+    declare_law(limiter, draft);
   });
 
   scene.table("force", [&draft](Table& force) {
@@ -719,6 +749,8 @@ class Findings {
 /// Fills the targets of one table's declarations from the file; `table` is null where the file has none.
 class Reader {
  public:
+  static constexpr bool kDocuments = false;
+
   Reader(Findings& findings, const toml::table* table, std::string path, Place place)
       : findings_(findings), table_(table), path_(std::move(path)), place_(place) {}
 
@@ -800,6 +832,8 @@ class Reader {
 /// Writes the declarations down for people.
 class Reference {
  public:
+  static constexpr bool kDocuments = true;  ///< declare all there is, whatever depends on what
+
   explicit Reference(std::string& text, std::string path = {}) : text_(text), path_(std::move(path)) {}
 
   template <class T, class Rule>

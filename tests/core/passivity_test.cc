@@ -7,16 +7,20 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <ostream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/haptic_controller.h"
 #include "tests/support/dice.h"
 
 namespace tendon {
 
-void PrintTo(Law limiter, std::ostream* out) { *out << (limiter == Law::kAol ? "joint form" : "per-axis form"); }
+void PrintTo(Law law, std::ostream* out) { *out << info(law).name; }
 
 namespace {
 
@@ -26,9 +30,8 @@ struct Outcome {
   bool all_finite = true;
 };
 
-// One run of 600 steps of a random controller against a random adversary. `bound_scale` above 1 is the
-// sabotage that must be found out: the force applied is allowed to exceed the bound by so much.
-Outcome run(std::uint64_t seed, Law limiter, double bound_scale) {
+// One run of 600 steps of a random controller against a random adversary.
+Outcome run(std::uint64_t seed, Law limiter) {
   Dice dice(seed);
   HapticController::Config config;
   config.limiter.law = limiter;
@@ -101,7 +104,6 @@ Outcome run(std::uint64_t seed, Law limiter, double bound_scale) {
     const double size = limiter == Law::kAolPerAxis ? step.force.cwiseAbs().maxCoeff() : step.force.norm();
     outcome.worst_excess = std::max(outcome.worst_excess, size - step.permitted * (1 + 1e-12));
     applied = step.force;
-    if (step.reasons.has(Reason::kEnergy)) applied *= bound_scale;
     if (applied.norm() > device_clamp) applied *= device_clamp / applied.norm();
   }
   return outcome;
@@ -113,24 +115,109 @@ TEST_P(Passivity, NoHandNoForceAndNoTimingMakesTheLedgerNegative) {
   const auto limiter = GetParam();
   EXPECT_TRUE(rc::check([limiter] {
     const auto seed = *rc::gen::arbitrary<std::uint64_t>();
-    const Outcome outcome = run(seed, limiter, 1.0);
+    const Outcome outcome = run(seed, limiter);
     RC_ASSERT(outcome.least_energy >= -1e-9);
     RC_ASSERT(outcome.worst_excess <= 0.0);
     RC_ASSERT(outcome.all_finite);
   }));
 }
 
-// That the property above can fail: the same adversaries, the bound 1 % too high.
-TEST_P(Passivity, TheSamePropertyFailsWhenTheBoundIsOnePercentTooHigh) {
-  int broken = 0;
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    if (run(seed, GetParam(), 1.01).least_energy < -1e-9) ++broken;
+// The adversary who searches: hand and environment are a list of genes, and hill climbing from random starts looks for
+// the list with which the device gives out the most energy for what ever was in the ledger.
+struct Gene {
+  double follow = 0;           // the hand moves by this times the worst motion of eq. (7)
+  Vec3 move = Vec3::Zero();    // m, … and by this
+  Vec3 wanted = Vec3::Zero();  // N
+};
+
+class Search {
+ public:
+  Search(Law law, double bound_scale, std::uint64_t seed) : law_(law), bound_scale_(bound_scale), dice_(seed) {}
+
+  /// The least that the ledger was, as a share of the most that it was.
+  double worst() {
+    double worst = 0;
+    for (int start = 0; start < 20; ++start) {
+      std::vector<Gene> genes(kSteps);
+      for (Gene& gene : genes) gene = random_gene();
+      double best = objective(genes);
+      for (int climb = 0; climb < 200; ++climb) {
+        std::vector<Gene> next = genes;
+        for (int i = 0; i < 3; ++i) next[static_cast<std::size_t>(dice_.within(0, kSteps))] = random_gene();
+        if (dice_.chance(0.3)) {  // a gene that was good may be good again
+          const auto from = static_cast<std::size_t>(dice_.within(0, kSteps - 1));
+          next[from + 1] = next[from];
+        }
+        const double found = objective(next);
+        if (found <= best) {
+          best = found;
+          genes = std::move(next);
+        }
+      }
+      worst = std::min(worst, best);
+    }
+    return worst;
   }
-  EXPECT_GT(broken, 20);
+
+ private:
+  static constexpr std::size_t kSteps = 30;
+  static constexpr double kViscous = 0.26;
+  static constexpr double kPeriod = 1e-3;
+
+  Gene random_gene() {
+    return {.follow = dice_.chance(0.5) ? 1 : dice_.within(-2, 2),
+            .move = dice_.chance(0.5) ? Vec3(Vec3::Zero()) : Vec3(dice_.direction() * dice_.decades(-6, -3)),
+            .wanted = dice_.chance(0.2) ? Vec3(Vec3::Zero()) : Vec3(dice_.direction() * dice_.decades(-1, 6))};
+  }
+
+  double objective(const std::vector<Gene>& genes) const {
+    // No Coulomb friction: laws that do not count on it would be given a margin.
+    const Friction friction{0, kViscous};
+    Limiter limiter({.law = law_, .friction = friction, .longest_hold = std::chrono::milliseconds(1)});
+    double energy = 0;
+    double least = 0;
+    double most = 1e-12;
+    Vec3 applied = Vec3::Zero();
+    for (const Gene& gene : genes) {
+      const Vec3 dx = gene.move + gene.follow * kPeriod / (2 * kViscous) * applied;
+      energy += -applied.dot(dx) + kViscous * dx.squaredNorm() / kPeriod;
+      least = std::min(least, energy);
+      most = std::max(most, energy);
+      limiter.observe({.applied = applied, .dx = dx, .held = std::chrono::milliseconds(1)});
+      const LimitedForce<3> limited = limiter.limit({.force = gene.wanted});
+      applied = limited.force * (limited.reasons.has(Reason::kEnergy) ? bound_scale_ : 1.0);
+    }
+    return least / most;
+  }
+
+  Law law_;
+  double bound_scale_;
+  Dice dice_;
+};
+
+TEST_P(Passivity, ASearchForTheMotionThatBreaksItFindsNone) {
+  EXPECT_GE(Search(GetParam(), 1.0, 2009).worst(), -1e-12);
 }
 
-INSTANTIATE_TEST_SUITE_P(Forms, Passivity, testing::Values(Law::kAol, Law::kAolPerAxis),
-                         [](const auto& form) { return form.param == Law::kAol ? "Joint" : "PerAxis"; });
+TEST_P(Passivity, TheSameSearchFindsOneWhenTheBoundIsOnePercentTooHigh) {
+  EXPECT_LT(Search(GetParam(), 1.01, 2009).worst(), -1e-4);
+}
+
+std::vector<Law> passive_laws() {
+  std::vector<Law> passive;
+  for (const LawInfo& law : laws()) {
+    if (law.passive) passive.push_back(law.law);
+  }
+  return passive;
+}
+
+std::string name_for_test(const testing::TestParamInfo<Law>& law) {
+  std::string name;  // GoogleTest takes letters and digits only
+  for (const char c : info(law.param).name) name += c == '-' ? "_" : c == '+' ? "Plus" : std::string(1, c);
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, Passivity, testing::ValuesIn(passive_laws()), name_for_test);
 
 }  // namespace
 }  // namespace tendon

@@ -295,6 +295,17 @@ TEST(Scene, APartOfAolPlusIsThereWhenItsTableIs) {
                none.bounded_acceleration || none.adaptive_friction);
 }
 
+TEST(Scene, EveryLawOfTheCatalogueCanBeChosenByName) {
+  for (const LawInfo& law : laws()) {
+    std::string text = "[limiter]\nkind = \"" + std::string(law.name) + "\"\n";
+    if (law.needs_stiffness) text += "environment_stiffness_n_per_m = 1000\n";
+    if (law.law == Law::kClamp) text += "clamp_n = 2\n";
+    EXPECT_EQ(minimal_and(text).loop.control.limiter.law, law.law) << law.name;
+    EXPECT_EQ(&info(law.law), &law);
+    EXPECT_NE(scene_reference().find('"' + std::string(law.name) + '"'), std::string::npos) << law.name;
+  }
+}
+
 TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
   const DeviceProfile& falcon = *find_device_profile("falcon");
   const auto step = [](const std::string& more) {
@@ -486,6 +497,10 @@ TEST(SceneError, NamesTheKindsAndProfilesThatThereAre) {
 
 TEST(SceneError, RefusesPartsThatCannotBe) {
   expect_errors({
+      {"[limiter]\nkind = \"port-hamiltonian\"\n",
+       "s.toml:4: limiter.environment_stiffness_n_per_m: missing, expected a number above 0 N/m"},
+      {"[limiter]\nkind = \"aol\"\nclamp_n = 1\n",
+       "s.toml:6: limiter.clamp_n: unknown key; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m"},
       {"[limiter]\nkind = \"aol\"\n[limiter.knee]\n",
        "s.toml:6: limiter.knee: unknown table; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m"},
       {"[limiter.knee]\nstart = 1\n", "s.toml:5: limiter.knee.start: expected a number from 0.01 to 0.99, found 1"},
