@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/estimation/recursive_least_squares.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tests/core/estimation/regressors.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+namespace {
+
+/// The recursion of the textbooks: what the library does not do, to show why.
+template <int M, class Scalar>
+struct Textbook {
+  using Vector = Eigen::Matrix<Scalar, M, 1>;
+  using Matrix = Eigen::Matrix<Scalar, M, M>;
+  Matrix p;
+  Scalar forgetting;
+  Vector estimate = Vector::Zero();
+
+  void observe(const Vector& phi, Scalar y) {
+    const Vector p_phi = p * phi;
+    const Vector gain = p_phi / (forgetting + phi.dot(p_phi));
+    estimate += gain * (y - phi.dot(estimate));
+    p = ((p - gain * p_phi.transpose()) / forgetting).eval();
+  }
+  bool definite() const {
+    if (!p.allFinite()) return false;
+    const Eigen::Matrix<double, M, M> symmetric = (p + p.transpose()).template cast<double>() / 2;
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, M, M>>(symmetric).eigenvalues().minCoeff() >= 0;
+  }
+};
+
+const Vec3 kTruth(1, -2, 0.5);
+
+template <class Estimator>
+void expect_equals_batch(std::uint64_t seed) {
+  constexpr int kSamples = 300;
+  constexpr double kForgetting = 0.97;
+  constexpr double kPrior = 1e3;
+  Dice dice(seed);
+  Estimator estimator({.forgetting = kForgetting, .prior_variance = kPrior});
+  Eigen::Matrix<double, kSamples, 3> regressors;
+  Eigen::Matrix<double, kSamples, 1> outputs;
+  Eigen::Matrix<double, kSamples, 1> forgotten;
+  for (int i = 0; i < kSamples; ++i) {
+    const Vec3 phi(gaussian(dice), gaussian(dice), gaussian(dice));
+    regressors.row(i) = phi;
+    outputs[i] = phi.dot(kTruth) + 0.1 * gaussian(dice);
+    // The cap on forgetting, as the header gives it, is at work during the first samples.
+    forgotten[i] = std::max(kForgetting, std::min(1.0, estimator.trace() / (3 * kPrior)));
+    ASSERT_TRUE(estimator.observe(phi, outputs[i]));
+  }
+  EXPECT_LT((forgotten.array() > kForgetting).count(), 5);
+  Mat3 information = forgotten.prod() / kPrior * Mat3::Identity();
+  Vec3 moment = Vec3::Zero();
+  double weight = 1;
+  for (int i = kSamples - 1; i >= 0; --i) {
+    information += weight * regressors.row(i).transpose() * regressors.row(i);
+    moment += weight * outputs[i] * regressors.row(i).transpose();
+    weight *= forgotten[i];
+  }
+  EXPECT_LT((estimator.estimate() - information.llt().solve(moment)).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((estimator.covariance() * information - Mat3::Identity()).norm(), 1e-10);
+}
+
+TEST(RecursiveLeastSquares, EqualsBatchWeightedLeastSquaresInBothForms) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    expect_equals_batch<UdLeastSquares<3>>(seed);
+    expect_equals_batch<QrLeastSquares<3>>(seed);
+  }
+}
+
+TEST(RecursiveLeastSquares, BothFormsAgreeThroughResetsProjectionsAndTheDeadZone) {
+  const LeastSquaresConfig config{.forgetting = 0.95, .prior_variance = 1e4, .dead_zone = 0.02};
+  UdLeastSquares<3> ud(config);
+  QrLeastSquares<3> qr(config);
+  Dice dice(3);
+  int taught = 0;
+  for (int i = 0; i < 5000; ++i) {
+    if (dice.chance(0.01)) {
+      ud.reset();
+      qr.reset();
+    }
+    if (dice.chance(0.01)) {
+      const Vec3 projected = ud.estimate().cwiseMax(0);
+      ud.set_estimate(projected);
+      qr.set_estimate(projected);
+    }
+    const Vec3 phi(gaussian(dice), gaussian(dice), 1);
+    const double y = phi.dot(kTruth) + 0.05 * gaussian(dice);
+    const bool learned = ud.observe(phi, y);
+    ASSERT_EQ(qr.observe(phi, y), learned);
+    taught += learned;
+    ASSERT_LT((ud.estimate() - qr.estimate()).norm(), 1e-9);
+    ASSERT_LT((ud.pivots() - qr.pivots()).norm(), 1e-8 * ud.pivots().norm());
+    ASSERT_GT(ud.pivots().minCoeff(), 0);
+  }
+  EXPECT_GT(taught, 2000);
+  EXPECT_LT(taught, 4900);
+}
+
+TEST(RecursiveLeastSquares, TheTextbookUpdateIsIndefiniteInFloat32WhereBothFormsAreNot) {
+  constexpr int kSamples = 20000;
+  Textbook<3, float> textbook{1e6F * Eigen::Matrix3f::Identity(), 0.999F};
+  UdLeastSquares<3, float> ud({.forgetting = 0.999, .prior_variance = 1e6});
+  QrLeastSquares<3, float> qr({.forgetting = 0.999, .prior_variance = 1e6});
+  Dice dice(1);
+  int indefinite = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const Eigen::Vector3f phi = nearly_collinear<float>(dice);
+    const float y = phi.dot(kTruth.cast<float>()) + 1e-3F * static_cast<float>(gaussian(dice));
+    textbook.observe(phi, y);
+    indefinite += !textbook.definite();
+    ASSERT_TRUE(ud.observe(phi, y));
+    ASSERT_TRUE(qr.observe(phi, y));
+    ASSERT_GT(ud.pivots().minCoeff(), 0);
+    ASSERT_GT(qr.pivots().minCoeff(), 0);
+  }
+  EXPECT_GT(indefinite, kSamples / 2);
+  // The sum of the two is what such regressors can tell.
+  const auto told = [](const Eigen::Vector3f& theta) { return theta[0] + theta[1]; };
+  EXPECT_NEAR(told(ud.estimate()), -1, 2e-3);
+  EXPECT_NEAR(told(qr.estimate()), -1, 2e-3);
+  EXPECT_NEAR(ud.estimate()[0], qr.estimate()[0], 0.2);
+}
+
+template <class Estimator, class Scalar>
+void expect_definite() {
+  Estimator estimator({.forgetting = 0.999, .prior_variance = 1e6});
+  Dice dice(7);
+  for (int i = 0; i < 200'000; ++i) {
+    const Eigen::Matrix<Scalar, 3, 1> phi = nearly_collinear<Scalar>(dice);
+    ASSERT_TRUE(estimator.observe(phi, phi.dot(kTruth.cast<Scalar>()))) << i;
+    ASSERT_GT(estimator.pivots().minCoeff(), 0) << i;
+    ASSERT_LE(estimator.trace(), Scalar(3e6 * (1 + 1e-3))) << i;
+  }
+}
+
+TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat32) { expect_definite<UdLeastSquares<3, float>, float>(); }
+TEST(RecursiveLeastSquares, UdStaysDefiniteInFloat64) { expect_definite<UdLeastSquares<3>, double>(); }
+TEST(RecursiveLeastSquares, QrStaysDefiniteInFloat32) { expect_definite<QrLeastSquares<3, float>, float>(); }
+TEST(RecursiveLeastSquares, QrStaysDefiniteInFloat64) { expect_definite<QrLeastSquares<3>, double>(); }
+
+/// 1200 of 2000 samples excite one of two directions. The largest error of θ once both are excited again.
+struct Return {
+  double trace;
+  double error;
+};
+template <class Estimator, class Trace>
+Return wind_up(Estimator estimator, Trace trace, std::uint64_t seed) {
+  const Eigen::Vector2d truth(500, 20);
+  Dice dice(seed);
+  Return result{};
+  for (int i = 0; i < 2000; ++i) {
+    const bool rich = i < 300 || i >= 1500;
+    const Eigen::Vector2d phi = rich ? Eigen::Vector2d(gaussian(dice), gaussian(dice)) : Eigen::Vector2d(1, 0);
+    if (i == 1500) result.trace = trace(estimator);
+    estimator.observe(phi, phi.dot(truth) + 5 * gaussian(dice));
+    if (i >= 1500) {
+      const Eigen::Vector2d theta = estimator.estimate;
+      result.error = std::max(result.error, (theta - truth).cwiseAbs().maxCoeff());
+    }
+  }
+  return result;
+}
+
+/// Gives UdLeastSquares the look of Textbook.
+struct Capped {
+  UdLeastSquares<2> fit{{.forgetting = 0.98, .prior_variance = 100}};
+  Eigen::Vector2d estimate = Eigen::Vector2d::Zero();
+  void observe(const Eigen::Vector2d& phi, double y) {
+    fit.observe(phi, y);
+    estimate = fit.estimate();
+  }
+};
+
+TEST(RecursiveLeastSquares, TheCapOnForgettingEndsCovarianceWindUp) {
+  std::vector<double> plain;
+  std::vector<double> capped;
+  for (std::uint64_t seed = 0; seed < 101; ++seed) {
+    const Return wound = wind_up(
+        Textbook<2, double>{100 * Eigen::Matrix2d::Identity(), 0.98}, [](const auto& t) { return t.p.trace(); }, seed);
+    const Return bounded = wind_up(
+        Capped(), [](const auto& c) { return c.fit.trace(); }, seed);
+    EXPECT_GT(wound.trace, 1e7);
+    EXPECT_LE(bounded.trace, 200 * (1 + 1e-9));
+    plain.push_back(wound.error);
+    capped.push_back(bounded.error);
+  }
+  std::sort(plain.begin(), plain.end());
+  std::sort(capped.begin(), capped.end());
+  EXPECT_GT(plain[50], 500);  // of a parameter of 500
+  EXPECT_LT(capped[50], 8);
+  EXPECT_LT(capped[100], 60);  // √(tr P)/2 of gain at most, on noise of 5
+}
+
+TEST(RecursiveLeastSquares, AResetKeepsTheEstimateAndBelievesWhatComesNext) {
+  UdLeastSquares<2> ud({.forgetting = 1, .prior_variance = 1e8});
+  QrLeastSquares<2> qr({.forgetting = 1, .prior_variance = 1e8});
+  Dice dice(5);
+  const auto teach = [&](const Eigen::Vector2d& truth, int samples) {
+    for (int i = 0; i < samples; ++i) {
+      const Eigen::Vector2d phi(gaussian(dice), gaussian(dice));
+      ud.observe(phi, phi.dot(truth));
+      qr.observe(phi, phi.dot(truth));
+    }
+  };
+  teach({300, 150}, 200);
+  const Eigen::Vector2d before = qr.estimate();
+  ud.reset();
+  qr.reset();
+  EXPECT_EQ(qr.estimate(), before);
+  teach({700, 150}, 3);
+  EXPECT_NEAR(ud.estimate()[0], 700, 1e-3);
+  EXPECT_NEAR(qr.estimate()[0], 700, 1e-3);
+}
+
+TEST(RecursiveLeastSquares, WhatIsNotANumberOrTooLargeChangesNothing) {
+  UdLeastSquares<2, float> ud;
+  QrLeastSquares<2, float> qr;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto refuse = [](auto& estimator, const Eigen::Vector2f& phi, float y) {
+    const Eigen::Vector2f theta = estimator.estimate();
+    const Eigen::Vector2f pivots = estimator.pivots();
+    EXPECT_FALSE(estimator.observe(phi, y));
+    EXPECT_EQ(estimator.estimate(), theta);
+    EXPECT_EQ(estimator.pivots(), pivots);
+  };
+  EXPECT_TRUE(ud.observe({1, 2}, 3));
+  EXPECT_TRUE(qr.observe({1, 2}, 3));
+  refuse(ud, {nan, 1}, 1);
+  refuse(qr, {nan, 1}, 1);
+  refuse(ud, {1, 1}, nan);
+  refuse(qr, {1, 1}, nan);
+  refuse(ud, {3e38F, 3e38F}, 1);
+  refuse(qr, {3e38F, 3e38F}, 1);
+}
+
+TEST(RecursiveLeastSquares, RefusesAConfigThatCannotBeMeant) {
+  EXPECT_THROW(UdLeastSquares<2>({.forgetting = 0}), std::invalid_argument);
+  EXPECT_THROW(UdLeastSquares<2>({.forgetting = 1.01}), std::invalid_argument);
+  EXPECT_THROW(QrLeastSquares<2>({.prior_variance = 0}), std::invalid_argument);
+  EXPECT_THROW(QrLeastSquares<2>({.dead_zone = -1}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon
