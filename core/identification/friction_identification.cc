@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/identification/friction_identification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+constexpr double kSigmas = 3;
+constexpr double kAgreement = 0.1;
+constexpr double kOtherSlope = 1.5;
+constexpr std::size_t kEnoughRuns = 3;
+
+using Runs = std::vector<const RunEstimate*>;
+
+RunEstimate estimate_of(const RampRun& run, const IdentificationConfig& config) {
+  const Slide slide = slide_of(run, config.encoder_step);
+  RunEstimate estimate;
+  estimate.place = run.place;
+  estimate.direction = slide.direction;
+  estimate.travel = slide.samples.back().position;
+  estimate.integral = integral_fit(slide, config.mass);
+  if (!(estimate.integral.mass > 0)) {
+    throw std::invalid_argument("the mass cannot be told from friction in this run: give it");
+  }
+  estimate.kelly = kelly_fit(slide, estimate.integral.mass);
+  return estimate;
+}
+
+struct Mean {
+  double value = 0;
+  double error = 0;  ///< one standard deviation
+};
+
+/// Weighted by the errors; wider when the runs scatter more than their errors say.
+Mean mean_of(const Runs& runs, double Friction::*which) {
+  double weights = 0;
+  double sum = 0;
+  const auto weight = [which](const RunEstimate& run) {
+    return 1 / std::max(run.integral_error.*which * run.integral_error.*which, std::numeric_limits<double>::min());
+  };
+  for (const RunEstimate* run : runs) {
+    weights += weight(*run);
+    sum += weight(*run) * run->integral.friction.*which;
+  }
+  Mean mean{sum / weights, 1 / std::sqrt(weights)};
+  double scatter = 0;
+  for (const RunEstimate* run : runs) {
+    const double off = run->integral.friction.*which - mean.value;
+    scatter += weight(*run) * off * off;
+  }
+  if (runs.size() > 1) mean.error *= std::sqrt(std::max(1.0, scatter / static_cast<double>(runs.size() - 1)));
+  return mean;
+}
+
+struct KellyVerdict {
+  Friction friction;
+  std::string flaw;  ///< empty: valid
+};
+
+/// Of the runs of one direction at one place.
+KellyVerdict kelly_verdict(const Runs& runs) {
+  const KellyFit& slow =
+      (*std::ranges::min_element(runs, {}, [](const RunEstimate* run) { return run->kelly.rate; }))->kelly;
+  // Of several runs at that slope, the mean.
+  KellyVerdict verdict;
+  std::ostringstream flaw;
+  flaw << std::setprecision(3);
+  double count = 0;
+  const KellyFit* fast = nullptr;
+  for (const RunEstimate* run : runs) {
+    const KellyFit& kelly = run->kelly;
+    if (kelly.rate < 1.1 * slow.rate) {
+      verdict.friction.viscous += kelly.friction.viscous;
+      verdict.friction.coulomb += kelly.friction.coulomb;
+      ++count;
+    } else if (kelly.rate >= kOtherSlope * slow.rate && (fast == nullptr || kelly.rate < fast->rate)) {
+      fast = &kelly;
+    }
+  }
+  verdict.friction.viscous /= count;
+  verdict.friction.coulomb /= count;
+
+  const double b = verdict.friction.viscous;
+  if (!slow.long_enough()) {
+    flaw << "the slide of " << slow.slide_time << " s is shorter than 4 m/b = " << 4 * slow.time_constant << " s";
+  } else if (!(slow.friction.coulomb > 0)) {
+    flaw << "its f_c = " << slow.friction.coulomb << " N is not positive";
+  } else if (fast == nullptr) {
+    flaw << "there is no second slope, 1.5 times as steep or more, to compare with";
+  } else if (!fast->plausible()) {
+    flaw << "at the second slope the slide of " << fast->slide_time
+         << " s is shorter than 4 m/b = " << 4 * fast->time_constant << " s or f_c is not positive";
+  } else if (std::abs(fast->friction.viscous - b) > kAgreement * b) {
+    flaw << "two slopes do not agree, b = " << b << " and " << fast->friction.viscous << " N·s/m";
+  }
+  verdict.flaw = flaw.str();
+  return verdict;
+}
+
+PlaceEstimate place_estimate(const std::string& place, const std::vector<RunEstimate>& all) {
+  PlaceEstimate result;
+  result.place = place;
+  result.kelly_valid = true;
+  result.integral.viscous = result.kelly.viscous = std::numeric_limits<double>::infinity();
+  double lowest = std::numeric_limits<double>::infinity();
+  double directions = 0;
+  double coulomb_variance = 0;
+  for (const double direction : {1.0, -1.0}) {
+    Runs runs;
+    for (const RunEstimate& run : all) {
+      if (run.place == place && run.direction == direction) runs.push_back(&run);
+    }
+    if (runs.empty()) continue;
+    ++directions;
+    const Mean viscous = mean_of(runs, &Friction::viscous);
+    const Mean coulomb = mean_of(runs, &Friction::coulomb);
+    if (viscous.value - kSigmas * viscous.error < lowest) {
+      lowest = viscous.value - kSigmas * viscous.error;
+      result.integral.viscous = viscous.value;
+      result.integral_error.viscous = viscous.error;
+    }
+    result.integral.coulomb += coulomb.value;
+    coulomb_variance += coulomb.error * coulomb.error;
+    const KellyVerdict kelly = kelly_verdict(runs);
+    result.kelly.viscous = std::min(result.kelly.viscous, kelly.friction.viscous);
+    result.kelly.coulomb += kelly.friction.coulomb;
+    if (!kelly.flaw.empty() && result.kelly_valid) {
+      result.kelly_valid = false;
+      result.kelly_flaw = kelly.flaw;
+    }
+  }
+  result.both_directions = directions == 2;
+  result.integral.coulomb /= directions;
+  result.integral_error.coulomb = std::sqrt(coulomb_variance) / directions;
+  result.kelly.coulomb /= directions;
+  return result;
+}
+
+std::string at(const PlaceEstimate& place) { return place.place.empty() ? "" : " at " + place.place; }
+
+/// Sets `trust` and `reason`; where Kelly's fit is valid no more than it says is published.
+void judge(Identification& result) {
+  std::ostringstream reason;
+  reason << std::setprecision(3);
+  const auto flawed = std::ranges::find(result.places, false, &PlaceEstimate::kelly_valid);
+  const auto apart = std::ranges::find_if(result.places, [](const PlaceEstimate& place) {
+    return std::abs(place.kelly.viscous - place.integral.viscous) > kAgreement * place.integral.viscous;
+  });
+  if (flawed != result.places.end()) {
+    result.trust = Trust::kIntegral;
+    reason << "Kelly's line is no asymptote yet" << at(*flawed) << ": " << flawed->kelly_flaw
+           << " (it says b = " << flawed->kelly.viscous << ", the integral " << flawed->integral.viscous << " N·s/m)";
+  } else if (apart != result.places.end()) {
+    result.trust = Trust::kNeither;
+    reason << "Kelly's validity test passed, yet the two differ" << at(*apart) << ": b = " << apart->kelly.viscous
+           << " and " << apart->integral.viscous << " N·s/m. Is the mass right? Published is the lesser of both";
+  } else {
+    result.trust = Trust::kBoth;
+    reason << "Kelly's validity test passed and the integral agrees. Published is the lesser of both";
+  }
+  result.reason = reason.str();
+  for (const PlaceEstimate& place : result.places) {
+    if (!place.kelly_valid) continue;
+    result.lower_bound.viscous = std::min(result.lower_bound.viscous, place.kelly.viscous);
+    result.lower_bound.coulomb = std::min(result.lower_bound.coulomb, place.kelly.coulomb);
+  }
+}
+
+void warn(Identification& result) {
+  for (const PlaceEstimate& place : result.places) {
+    if (!place.both_directions) {
+      result.warnings.push_back("one direction only" + at(place) + ": a constant force would be taken for friction");
+    }
+    const auto runs = std::ranges::count(result.runs, place.place, &RunEstimate::place);
+    if (static_cast<std::size_t>(runs) < 2 * kEnoughRuns) {
+      result.warnings.push_back(std::to_string(runs) + " runs" + at(place) +
+                                ": 3 slopes, repeated, in both directions " + "would show what scatters");
+    }
+  }
+  if (result.places.size() == 1) {
+    result.warnings.emplace_back("one place only: friction differs between axes and poses, and the least counts");
+  }
+  if (result.lower_bound.viscous == 0) {
+    result.warnings.emplace_back("viscous friction cannot be told from none: its bound is 0");
+  }
+  if (result.lower_bound.coulomb == 0) {
+    result.warnings.emplace_back("Coulomb friction cannot be told from none: its bound is 0");
+  }
+}
+
+}  // namespace
+
+Identification identify_friction(std::span<const RampRun> runs, const IdentificationConfig& config) {
+  if (runs.empty()) throw std::invalid_argument("expected one run or more, found none");
+  Identification result;
+  double squares = 0;
+  double unit = 0;
+  for (const RampRun& run : runs) {
+    try {
+      result.runs.push_back(estimate_of(run, config));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("run " + std::to_string(result.runs.size() + 1) + ": " + error.what());
+    }
+    const IntegralFit& fit = result.runs.back().integral;
+    squares += fit.residual_squares;
+    unit += fit.unit_residual;
+    result.mass += fit.mass / static_cast<double>(runs.size());
+  }
+  // One device, one noise: a single run knows its own only roughly.
+  result.force_noise = std::sqrt(squares / unit);
+  for (RunEstimate& run : result.runs) {
+    run.integral_error.viscous = result.force_noise * std::sqrt(run.integral.unit_covariance(0, 0));
+    run.integral_error.coulomb = result.force_noise * std::sqrt(run.integral.unit_covariance(1, 1));
+    if (std::ranges::find(result.places, run.place, &PlaceEstimate::place) == result.places.end()) {
+      result.places.emplace_back().place = run.place;
+    }
+  }
+  for (PlaceEstimate& place : result.places) place = place_estimate(place.place, result.runs);
+
+  const auto least = [&result](double Friction::*which, double sigmas) {
+    double value = std::numeric_limits<double>::infinity();
+    for (const PlaceEstimate& place : result.places) {
+      value = std::min(value, place.integral.*which - sigmas * place.integral_error.*which);
+    }
+    return value;
+  };
+  result.estimate = {.coulomb = least(&Friction::coulomb, 0), .viscous = least(&Friction::viscous, 0)};
+  result.lower_bound = {.coulomb = std::max(0.0, least(&Friction::coulomb, kSigmas)),
+                        .viscous = std::max(0.0, least(&Friction::viscous, kSigmas))};
+  judge(result);
+  warn(result);
+  return result;
+}
+
+}  // namespace tendon

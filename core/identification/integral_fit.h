@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "core/friction.h"
+#include "core/identification/ramp_run.h"
+
+namespace tendon {
+
+/// Friction from a slide of any length: the equation of motion integrated twice from the first sample of the slide, so
+/// that nothing is differentiated and no steady state is waited for,
+///
+///     m X + b ∫X dt + f_c τ²/2 + c τ = ∬F dt²,       τ = t − t_a,  X = x − x(t_a)
+///
+/// linear in b, f_c (and m, when it is not known) and the unknown momentum c at t_a. Solved by least squares with
+/// Huber's weights, so that single wrong samples do not count.
+///
+/// **Its covariance** takes the disturbance for white noise of the force, ε with ∬ε dt² in the equation: residuals are
+/// then a random walk's integral. The textbook's σ²(AᵀA)⁻¹ takes them for independent and is far too small
+/// (`IntegralFit.StatesItsErrorAsItIs`), so the bounds published from it would not be bounds.
+///
+/// Source: control.md 2 (derived), covariance here.
+struct IntegralFit {
+  Friction friction;  ///< not a lower bound; may be negative
+  double mass = 0;    ///< kg, given or fitted
+  /// Covariance of (b, f_c) per N² of force noise: multiply by the variance of one sample's noise.
+  Eigen::Matrix2d unit_covariance = Eigen::Matrix2d::Zero();
+  double residual_squares = 0;  ///< Σ residual², (N·s²)²
+  double unit_residual = 0;     ///< what that is expected to be per N² of force noise
+
+  /// Force noise that explains the residuals, N (standard deviation of one sample). Of one run: a rough figure.
+  double force_noise() const noexcept;
+};
+
+/// `mass`: kg, of handle and mechanism; left out: fitted too, which needs a slide long enough to show both mass and
+/// friction and widens the errors. Throws std::invalid_argument for a mass that is not a number > 0.
+/// Thread-safe: yes. Realtime-safe: no.
+IntegralFit integral_fit(const Slide& slide, std::optional<double> mass);
+
+}  // namespace tendon
