@@ -58,19 +58,19 @@ void PassivityFollower<N>::receive(const LeaderMessage<N>& message) noexcept {
 
 template <int N>
 auto PassivityFollower<N>::step(const Vec<N>& force) noexcept -> Command {
-  const double T = seconds(config_.period);
+  const double period = seconds(config_.period);
   ++sent_.sequence;
   if (!force.allFinite()) return {Vec<N>::Zero(), sent_};
 
   Vec<N> velocity = fresh_ ? newest_.velocity : Vec<N>::Zero();
   fresh_ = false;
-  velocity += config_.drift_rate * (newest_.displacement - displacement_ - T * velocity);
-  const double excess = force.dot(velocity) - std::max(energy(), 0.0) / T;  // W
+  velocity += config_.drift_rate * (newest_.displacement - displacement_ - period * velocity);
+  const double excess = force.dot(velocity) - std::max(energy(), 0.0) / period;  // W
   if (excess > 0 && force.squaredNorm() > 0) velocity -= excess / force.squaredNorm() * force;
 
-  const double out = T * force.dot(velocity);
+  const double out = period * force.dot(velocity);
   (out > 0 ? out_ : sent_.energy_in) += std::abs(out);
-  displacement_ += T * velocity;
+  displacement_ += period * velocity;
   sent_.force = -force;
   return {velocity, sent_};
 }

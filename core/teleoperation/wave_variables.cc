@@ -25,37 +25,37 @@ void WavePort<N>::receive(const WaveMessage<N>& message) noexcept {
 
 template <int N>
 Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
-  const double T = seconds(config_.period);
+  const double period = seconds(config_.period);
   wave_ = fresh_ ? newest_.wave : Vec<N>::Zero();
   fresh_ = false;
-  wave_ += config_.drift_rate * (newest_.integral - used_integral_ - T * wave_);
+  wave_ += config_.drift_rate * (newest_.integral - used_integral_ - period * wave_);
 
   const double left = std::max(newest_.energy - used_energy_, 0.0);
   const double power = wave_.squaredNorm() / 2;
-  if (T * power > left) wave_ *= std::sqrt(left / (T * power));
+  if (period * power > left) wave_ *= std::sqrt(left / (period * power));
   return {root_ * wave_ - config_.impedance * velocity};
 }
 
 template <int N>
 WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval) noexcept {
-  const double T = seconds(interval.held);
+  const double held = seconds(interval.held);
   ++sent_.sequence;
   sent_.wave.setZero();
-  if (!(T > 0) || !interval.applied.allFinite() || !interval.dx.allFinite()) return sent_;
+  if (!(held > 0) || !interval.applied.allFinite() || !interval.dx.allFinite()) return sent_;
 
   // A period that was longer than planned can have used no more than there was.
-  const double used = std::min(T * wave_.squaredNorm() / 2, std::max(newest_.energy - used_energy_, 0.0));
+  const double used = std::min(held * wave_.squaredNorm() / 2, std::max(newest_.energy - used_energy_, 0.0));
   used_energy_ += used;
-  used_integral_ += T * wave_;
+  used_integral_ += held * wave_;
   account_ += used - interval.applied.dot(interval.dx);
 
-  sent_.wave = (config_.impedance / T * interval.dx - interval.applied) / root_;
-  const double cost = T * sent_.wave.squaredNorm() / 2;
+  sent_.wave = (config_.impedance / held * interval.dx - interval.applied) / root_;
+  const double cost = held * sent_.wave.squaredNorm() / 2;
   const double affordable = std::clamp(account_, 0.0, cost);
   if (affordable < cost) sent_.wave *= std::sqrt(affordable / cost);
   account_ -= affordable;
   sent_.energy += affordable;
-  sent_.integral += T * sent_.wave;
+  sent_.integral += held * sent_.wave;
   return sent_;
 }
 

@@ -146,7 +146,7 @@ class TwoChannel final : public Connection {
 
  private:
   PassivityLeader<3> leader_{{.max_damping = 20, .period = kPeriod}};
-  PassivityFollower<3> follower_{{.drift_rate = 2, .period = kPeriod}};
+  PassivityFollower<3> follower_{{.drift_rate = 5, .period = kPeriod}};
   Sight wanted_{Vec3::Zero(), Vec3::Zero()};
   FollowerMessage<3> message_;
   Link<LeaderMessage<3>> there_;
