@@ -162,6 +162,22 @@ TEST(OutputEstimator, PassesThroughTheNewestAnswer) {
   }
 }
 
+TEST(OutputEstimator, ALateAnswerToAnOlderMotionDoesNotTakeTheAnchorFromTheNewest) {
+  for (const Model model : {Model::kPolynomial, Model::kSpringAndBias, Model::kOutputError}) {
+    OutputEstimator estimator({.model = model});
+    for (int k = 1; k <= 100; ++k) estimator.observe({at(k), Vec3(hand(k), 0, 0), Vec3::Zero()});
+    ASSERT_TRUE(estimator.correct(answer_to(at(100), Vec3(-3, 0, 0))));
+    ASSERT_TRUE(estimator.correct(answer_to(at(60), Vec3(2, 0, 0))));
+    const Prediction prediction = *estimator.predict({at(101), Vec3(hand(100), 0, 0), Vec3::Zero()});
+    if (model != Model::kOutputError) {
+      EXPECT_NEAR(prediction.force.x(), -3, 1e-9);
+    } else {
+      const Eigen::Vector2d theta = estimator.parameters(0);
+      EXPECT_NEAR(prediction.force.x(), theta[0] * -3 - theta[1] * hand(100), 1e-9);
+    }
+  }
+}
+
 TEST(OutputEstimator, SaysThePhysicalStiffnessOfEachAxisAndPushesTheHandBack) {
   OutputEstimator estimator({.origin = Vec3(0.01, 0, 0)});
   const Vec3 stiffness(200, 900, 0);
