@@ -20,12 +20,22 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
   at_least(config.safe_stop, config.hold, "safe_stop");
   at_least(config.ramp_in, Duration::zero(), "ramp_in");
   at_least(config.max_valid_for, Duration(1), "max_valid_for");
+  if (config.adaptive_local_model && config.output_estimator) {
+    throw std::invalid_argument("adaptive_local_model and output_estimator both say what lies between two forces");
+  }
+  if (config.adaptive_local_model) local_model_.emplace(*config.adaptive_local_model);
+  if (config.output_estimator) estimator_ = std::make_unique<OutputEstimator>(*config.output_estimator);
 }
 
 bool HeldForce::observe(const RemoteForce& force) noexcept {
   if (!force.force.allFinite()) return false;
   if (force.model && !(force.model->at.allFinite() && force.model->stiffness.allFinite())) return false;
-  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop) engaged_ = force.received;
+  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop) {
+    engaged_ = force.received;
+    if (local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
+  }
+  if (local_model_) local_model_->observe(force);
+  if (estimator_) estimator_->correct(force);
   newest_ = force;
   mode_ = Mode::kActive;
   return true;
@@ -37,7 +47,23 @@ void HeldForce::release(LocalTime now) noexcept {
 
 Duration HeldForce::validity() const noexcept { return std::min(newest_->valid_for, config_.max_valid_for); }
 
+Prediction HeldForce::follow(const Motion& hand) const noexcept {
+  if (local_model_) {
+    if (const auto blended = local_model_->predict(hand)) return *blended;
+  }
+  if (estimator_) {
+    if (const auto learned = estimator_->predict(hand)) return *learned;
+  }
+  Prediction sent{.force = newest_->force, .stiffness = Mat3::Zero()};
+  if (newest_->model && !estimator_) {
+    sent.force -= newest_->model->stiffness * (hand.position - newest_->model->at);
+    sent.stiffness = newest_->model->stiffness;
+  }
+  return sent;
+}
+
 HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
+  if (estimator_) estimator_->observe(hand);
   if (!newest_) return {};
   Wanted result;
   result.age = hand.at - newest_->received;
@@ -68,12 +94,9 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   }
 
   result.mode = mode_;
-  result.force = newest_->force;
-  if (newest_->model) {
-    result.force -= newest_->model->stiffness * (hand.position - newest_->model->at);
-    result.stiffness = newest_->model->stiffness * gain;
-  }
-  result.force *= gain;
+  const Prediction environment = follow(hand);
+  result.force = environment.force * gain;
+  result.stiffness = environment.stiffness * gain;
   return result;
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 
+#include "core/estimation/adaptive_local_model.h"
+#include "core/estimation/output_estimator.h"
 #include "core/mode.h"
 #include "core/motion.h"
 #include "core/reason.h"
@@ -19,8 +22,13 @@ namespace tendon {
 ///     age < v + safe_stop            Decaying   F(x) · e^(−(age − v − hold)/decay)
 ///     otherwise                      SafeStop   0, until a fresh force comes
 ///
-/// F(x) = force, or force − K (x − at) when the remote environment sent a local model. The first force
-/// ever, and the first one after a safe stop, is ramped in linearly over `ramp_in`: the hand is never
+/// F(x) follows the hand between two arrivals:
+///
+///     without a part         force, or force − K (x − at) when the remote environment sent a local model
+///     adaptive_local_model   the same, but a new model is blended in          (AdaptiveLocalModel)
+///     output_estimator       a model of the environment, learned on the way   (OutputEstimator)
+///
+/// The first force ever, and the first one after a safe stop, is ramped in linearly over `ramp_in`: the hand is never
 /// kicked by an engine that comes back. A force that is not finite is refused, and the one before it
 /// ages on.
 ///
@@ -39,6 +47,9 @@ class HeldForce {
     Duration ramp_in = std::chrono::milliseconds(100);
     /// No engine can ask to be believed for longer.
     Duration max_valid_for = std::chrono::milliseconds(500);
+    /// At most one of these. What is empty is not there and costs nothing.
+    std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
+    std::optional<OutputEstimator::Config> output_estimator{};
   };
 
   struct Wanted {
@@ -49,8 +60,8 @@ class HeldForce {
     Duration age{};  ///< since it was received; 0 when idle
   };
 
-  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive
-  /// or safe_stop is shorter than hold.
+  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive,
+  /// safe_stop is shorter than hold, a part cannot be, or both are there.
   explicit HeldForce(const Config& config);
 
   /// Takes a newer force. Returns false, and changes nothing, when it is not finite.
@@ -65,19 +76,22 @@ class HeldForce {
     mode_ = Mode::kIdle;
   }
 
-  /// What is wanted at `hand.position` at `hand.at`.
+  /// What is wanted at `hand.position` at `hand.at`. Once in each haptic step: an estimator learns from it.
   Wanted wanted(const Motion& hand) noexcept;
 
   /// The force that is held; empty when idle.
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
 
  private:
+  Prediction follow(const Motion& hand) const noexcept;
   Duration validity() const noexcept;
 
   Config config_;
   std::optional<RemoteForce> newest_;
   Mode mode_ = Mode::kIdle;
   LocalTime engaged_{};  ///< start of the ramp
+  std::optional<AdaptiveLocalModel> local_model_;
+  std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB that only those pay who list it
 };
 
 }  // namespace tendon

@@ -562,6 +562,34 @@ void declare_parts(Table& limiter, Draft& draft) {
   });
 }
 
+Names<OutputEstimator::Model> estimator_models() {
+  using enum OutputEstimator::Model;
+  return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
+}
+
+/// How the force follows the hand between two arrivals, when not as the engine said. One table or none.
+template <class Table>
+void declare_between(Table& force, HeldForce::Config& hold) {
+  force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
+    keys.key("share", config.share, Number{.least = 0.01, .most = 1},
+             "of the stiffness that the engine sends; below 1 when that is an estimate itself");
+    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "whatever the engine says");
+    keys.key("max_blend_ms", config.max_blend, kAboveZero, "a new model is blended in for one engine period, or this");
+  });
+  force.part("output_estimator", hold.output_estimator, [](Table& keys, OutputEstimator::Config& config) {
+    keys.key("model", config.model, estimator_models(), "what the environment is taken for, on each axis");
+    keys.key("origin_mm", config.origin, Vector{}, "where the environment is at rest");
+    keys.key("scale_mm", config.scale, kAboveZero, "about the travel in the environment");
+    keys.key("forgetting", config.forgetting, Number{.least = 0.5, .most = 1}, "what is left of a weight per answer");
+    keys.key("dead_zone_n", config.dead_zone, kZeroOrMore, "smaller errors teach nothing: the noise of the engine");
+    keys.key("reset_error_n", config.reset_error, kAboveZero, "a larger error is another environment");
+    keys.key("reset_cooldown", config.reset_cooldown, Count{1000, 1}, "answers before the next one can be");
+    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "nothing stiffer is believed");
+    keys.key("largest_n", config.max_force, kAboveZero, "no estimate is larger, on each axis");
+    keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: less motion teaches nothing");
+  });
+}
+
 /// What one law wants to know and others do not.
 template <class Table>
 void declare_law(Table& limiter, Draft& draft) {
@@ -635,6 +663,7 @@ void declare_scene(Table& scene, Draft& draft) {
     force.key("ramp_in_ms", control.hold.ramp_in, kZeroOrMore, "the first force is ramped in for this long");
     force.key("max_valid_for_ms", control.hold.max_valid_for, kAboveZero,
               "a force is valid for no longer than this, whatever its sender asks for");
+    declare_between(force, control.hold);
   });
 
   scene.table("network", [&draft](Table& keys) {
@@ -905,6 +934,7 @@ class Settlement {
     Scene& scene = draft_.scene;
     if (draft_.has_hand) scene.device.hand = draft_.hand;
     build("device", [&scene] { SimulatedDevice{scene.device}; });
+    build("force", [&scene] { HeldForce{scene.loop.control.hold}; });
     build("limiter", [&scene] { Limiter{scene.loop.control.limiter}; });
     build("loop", [&scene] { HapticController{scene.loop.control}; });
     return std::move(scene);

@@ -77,6 +77,69 @@ TEST(HeldForce, FollowsTheHandWithTheLocalModel) {
   EXPECT_NEAR((held.wanted(at(milliseconds(1), Vec3(0.02, 0.5, 0))).force - Vec3(-2, 0, 0)).norm(), 0, 1e-12);
 }
 
+RemoteForce spring_at(Duration answers, Duration received, double x, double stiffness) {
+  RemoteForce remote = force_at(received, Vec3(-stiffness * x, 0, 0), milliseconds(400));
+  remote.answers = LocalTime(answers);
+  remote.model = LocalModel{Vec3(x, 0, 0), Mat3(Vec3(stiffness, 0, 0).asDiagonal())};
+  return remote;
+}
+
+TEST(HeldForce, TellsTheLimiterHowStiffTheEnvironmentIsAndFadesThatToo) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(Duration::zero(), Vec3(-1, 0, 0)));
+  EXPECT_EQ(held.wanted(at(milliseconds(1))).stiffness, Mat3::Zero());
+  held.observe(spring_at(Duration::zero(), Duration::zero(), 0.001, 800));
+  EXPECT_EQ(held.wanted(at(milliseconds(1))).stiffness(0, 0), 800);
+  const HeldForce::Wanted fading = held.wanted(at(milliseconds(470)));
+  EXPECT_EQ(fading.mode, Mode::kDecaying);
+  EXPECT_NEAR(fading.stiffness(0, 0), 800 * std::exp(-1.0), 1e-9);
+}
+
+TEST(HeldForce, WithTheAdaptiveLocalModelANewStiffnessIsBlendedInButTheFirstAfterASafeStopIsNot) {
+  HeldForce::Config config = without_ramp();
+  config.adaptive_local_model.emplace();
+  HeldForce held(config);
+  const Vec3 hand(0.01, 0, 0);
+  held.observe(spring_at(Duration::zero(), milliseconds(5), 0, 100));
+  EXPECT_DOUBLE_EQ(held.wanted(at(milliseconds(5), hand)).force.x(), -1);
+  held.observe(spring_at(milliseconds(40), milliseconds(45), 0, 300));
+  EXPECT_DOUBLE_EQ(held.wanted(at(milliseconds(45), hand)).force.x(), -1);
+  EXPECT_DOUBLE_EQ(held.wanted(at(milliseconds(65), hand)).force.x(), -2);
+  EXPECT_DOUBLE_EQ(held.wanted(at(milliseconds(85), hand)).force.x(), -3);
+  EXPECT_EQ(held.wanted(at(std::chrono::seconds(2), hand)).mode, Mode::kSafeStop);
+  held.observe(spring_at(milliseconds(2040), milliseconds(2045), 0, 500));
+  EXPECT_DOUBLE_EQ(held.wanted(at(milliseconds(2045), hand)).force.x(), -5);
+}
+
+TEST(HeldForce, WithTheOutputEstimatorASlowEnginesSpringIsFollowedAtTheLoopsRate) {
+  const auto error = [](bool estimate) {
+    HeldForce::Config config = without_ramp();
+    if (estimate) config.output_estimator.emplace();
+    HeldForce held(config);
+    double square = 0;
+    for (int n = 0; n < 4000; ++n) {  // 25 Hz, 40 ms late
+      const auto position = [](int step) { return 0.01 * std::sin(0.006 * step); };
+      if (n >= 40 && n % 40 == 0) {
+        RemoteForce remote = force_at(milliseconds(n), Vec3(-700 * position(n - 40), 0, 0), milliseconds(100));
+        remote.answers = LocalTime(milliseconds(n - 40));
+        held.observe(remote);
+      }
+      const double wanted = held.wanted(at(milliseconds(n), Vec3(position(n), 0, 0))).force.x();
+      if (n >= 1000) square += std::pow(wanted + 700 * position(n), 2) / 3000;
+    }
+    return std::sqrt(square);
+  };
+  EXPECT_GT(error(false), 1);
+  EXPECT_LT(error(true), 0.02);
+}
+
+TEST(HeldForce, RefusesTwoWaysAtOnceToFollowTheHand) {
+  HeldForce::Config config;
+  config.adaptive_local_model.emplace();
+  config.output_estimator.emplace();
+  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
+}
+
 TEST(HeldForce, RefusesWhatIsNotFiniteAndAgesTheForceBefore) {
   HeldForce held(without_ramp());
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));

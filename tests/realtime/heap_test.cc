@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -69,6 +70,48 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   }
   EXPECT_EQ(calls, 0U);
   EXPECT_GT(limited, 500U);
+}
+
+// Every law of the catalogue, every part of AOL+, every way to follow the hand between two forces.
+TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
+  for (const LawInfo& law : laws()) {
+    for (int between = 0; between < 3; ++between) {
+      HapticController::Config config;
+      config.limiter = {.law = law.law, .friction = {0.05, 0.26}, .longest_hold = milliseconds(1)};
+      config.limiter.max_force = 3;
+      config.limiter.environment_stiffness = 2000;
+      config.limiter.parts = {.energy_cap = {{}},
+                              .robust_ledger = {{.encoder_step = {30e-6}}},
+                              .knee = {{}},
+                              .bounded_acceleration = {{.most = {300}, .shaping_viscous = {0.3}}},
+                              .adaptive_friction = {{}}};
+      config.max_force = 8;
+      config.max_slew = 1000;
+      if (between == 1) config.hold.adaptive_local_model.emplace();
+      if (between == 2) config.hold.output_estimator.emplace();
+      HapticController controller(config);
+      Vec3 applied = Vec3::Zero();
+      const HeapGuard guard;
+      for (int n = 1; n <= 5000; ++n) {
+        const LocalTime now{milliseconds(n)};
+        const Vec3 x(0.015 * std::sin(0.01 * n), 0.001 * std::sin(0.07 * n), 0);
+        if (n % 10 == 0) {
+          RemoteForce force;
+          force.sequence = static_cast<std::uint64_t>(n);
+          force.answers = now - milliseconds(1);
+          force.received = now;
+          force.force = -2000 * x;
+          if (n % 20 == 0) force.model = LocalModel{x, Mat3::Identity() * 2000};
+          force.valid_for = milliseconds(30);
+          controller.observe(force);
+        }
+        const Step step = n % 777 == 0 ? controller.step_unseen(now, applied)
+                                       : controller.step({.at = now, .position = x, .velocity = Vec3::Zero()}, applied);
+        applied = step.force;
+      }
+      EXPECT_EQ(guard.calls(), 0U) << law.name << ", between " << between;
+    }
+  }
 }
 
 }  // namespace

@@ -306,6 +306,19 @@ TEST(Scene, EveryLawOfTheCatalogueCanBeChosenByName) {
   }
 }
 
+TEST(Scene, AnEstimatorIsThereWhenItsTableIs) {
+  const auto learned =
+      minimal_and("[force.output_estimator]\nmodel = \"spring-and-bias\"\nscale_mm = 5\n").loop.control.hold;
+  ASSERT_TRUE(learned.output_estimator && !learned.adaptive_local_model);
+  EXPECT_EQ(learned.output_estimator->model, OutputEstimator::Model::kSpringAndBias);
+  EXPECT_EQ(learned.output_estimator->scale, 0.005);
+  const auto sent = minimal_and("[force.adaptive_local_model]\nshare = 0.8\n").loop.control.hold;
+  ASSERT_TRUE(sent.adaptive_local_model && !sent.output_estimator);
+  EXPECT_EQ(sent.adaptive_local_model->share, 0.8);
+  EXPECT_EQ(error_of_minimal_and("[force.output_estimator]\n[force.adaptive_local_model]\n"),
+            "s.toml:4: force: adaptive_local_model and output_estimator both say what lies between two forces");
+}
+
 TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
   const DeviceProfile& falcon = *find_device_profile("falcon");
   const auto step = [](const std::string& more) {
