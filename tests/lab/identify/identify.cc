@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/lab/identify/identify.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -133,7 +134,7 @@ std::string_view name_of(Trust trust) {
 void write_table(const Source& source, const Identification& result, std::ostream& out) {
   std::size_t width = 3;
   for (const std::string& name : source.names) width = std::max(width, name.size());
-  const auto padded = [width](std::string text) {
+  const auto padded = [width](const std::string& text) {
     return text + std::string(width - std::min(width, text.size()), ' ');
   };
   out << padded("run") << "   slope N/s  travel m  b integral ± 1σ      Kelly b   f_c integral ± 1σ    Kelly f_c\n";
