@@ -93,7 +93,7 @@ double energy_after_creeping_in_and_stepping_out(double overclaim) {
     for (int i = 0; i < 250; ++i) move(1e-6);
     move(-2.5e-4);
   }
-  while (force[0] < -1e-6) move(-1e-5);
+  for (int i = 0; i < 5000 && force[0] < -1e-6; ++i) move(-1e-5);
   return truth.energy();
 }
 

@@ -67,6 +67,12 @@ TEST(MemorylessForceBounding, PermitsTheForceBeforePlusTwoBOverTTimesTheMotion) 
   EXPECT_NEAR(law.limit({Vec3(9, 9, 9)}).permitted, (force - 520 * dx).norm(), 1e-14);
 }
 
+TEST(MemorylessForceBounding, AHoldLongerThanAgreedIsCreditedWithWhatFrictionTookInIt) {
+  MemorylessForceBounding<1> law({kFriction, milliseconds(1)});
+  law.observe({Vec<1>(0.0), Vec<1>(1e-3), milliseconds(4)});
+  EXPECT_NEAR(law.limit({Vec<1>(9.0)}).permitted, 2 * std::sqrt(260 * 0.26 * 1e-6 / 4e-3), 1e-12);
+}
+
 // The invariant of its proof, with jitter.
 TEST(MemorylessForceBounding, TheLedgerCoversTheWorstThatTheNextHoldCanDo) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {

@@ -151,6 +151,16 @@ TEST(ParallelPassivityController, AsPublishedItIsAsBlindAsTheSeriesForm) {
   EXPECT_EQ(seen.interventions, 0);
 }
 
+TEST(ParallelPassivityController, AsPublishedItCountsTheEnvironmentsOwnMotionAndWhatItDissipated) {
+  ParallelPassivityController<1> law({kFriction, kSameSample, kInf});
+  law.observe({Vec<1>(0.0), Vec<1>(1e-3), milliseconds(1)});
+  EXPECT_NEAR(law.limit({Vec<1>(4.0), Mat<1>(1000.0)}).force[0], 3, 1e-12);
+  EXPECT_NEAR(law.observed(), -4e-3, 1e-15);
+  law.observe({Vec<1>(3.0), Vec<1>(1e-3), milliseconds(1)});
+  EXPECT_NEAR(law.limit({Vec<1>(0.0), Mat<1>(1000.0)}).force[0], -1, 1e-12);
+  EXPECT_NEAR(law.observed(), -4e-3 + 1 * (1e-3 + 1e-3) + 4e-3, 1e-15);
+}
+
 TEST(ParallelPassivityController, HandAndEnvironmentDriftApartUntilTheContactEnds) {
   ParallelPassivityController<1> law({kFriction, kZohExact, kInf});
   Vec<1> force(0);
