@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-lab: experiments with recorded runs. Here is its command line; each verb is a function of its own.
+// tendon-lab: experiments with recorded and simulated runs. Here is its command line; each verb is a function of its
+// own.
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "tests/lab/filter.h"
+#include "tests/lab/paper.h"
 #include "tests/lab/report.h"
 
 namespace tendon::lab {
@@ -21,6 +25,114 @@ int complain(const std::exception& error, int code) {
   return code;
 }
 
+void add_report(CLI::App& app) {
+  struct Arguments {
+    ReportOptions options;
+    std::vector<std::string> recordings;
+    std::string picture;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* const verb = app.add_subcommand("report", "What recorded runs come down to: a table and a picture");
+  verb->add_option("RECORDING", arguments->recordings, "recordings of tendond, one column each")
+      ->type_name("FILE.mcap")
+      ->required()
+      ->check(CLI::ExistingFile.description(""));
+  verb->add_option("--out", arguments->picture, "draw the runs side by side (needs gnuplot)")
+      ->type_name("FILE.svg|FILE.png");
+  verb->add_option("--label", arguments->options.labels, "what a run is called; once for each recording, in order")
+      ->type_name("TEXT")
+      ->allow_extra_args(false);
+  verb->add_flag("--json", arguments->options.json,
+                 "one JSON object for each recording on stdout instead of the table");
+  verb->footer(
+      "\nExample: the same motion without and with the limiter\n"
+      "  tendon-lab report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
+      "\nExit: 0 done; 1 a recording is corrupt or gnuplot failed; 2 wrong usage.");
+  verb->callback([arguments] {
+    ReportOptions& options = arguments->options;
+    options.recordings.assign(arguments->recordings.begin(), arguments->recordings.end());
+    if (!arguments->picture.empty()) options.picture = arguments->picture;
+    report(options, std::cout);
+  });
+}
+
+void add_paper(CLI::App& app) {
+  const auto options = std::make_shared<PaperOptions>();
+  CLI::App* const verb =
+      app.add_subcommand("paper", "The experiments of Lee & Lee 2009 without control, with AOL and with AOL+");
+  verb->add_option("--out", options->out, "draw a figure of each experiment there, SVG and PNG (needs gnuplot)")
+      ->type_name("DIR");
+  verb->add_flag("--json", options->json, "one JSON object for each experiment and law instead of the table");
+  verb->footer(
+      "\nExample: table and figures\n  tendon-lab paper --out figures\n"
+      "\nNothing in it is random.\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+  verb->callback([options] { paper(*options, std::cout); });
+}
+
+void add_filter(CLI::App& app, int& exit) {
+  struct Arguments {
+    FilterOptions options;
+    std::string law = "aol+";
+    double period_us = 1000;
+    double delay_ms = 0;
+    bool energy_cap = false;
+    bool knee = false;
+    double encoder_um = 0;
+    double acceleration = 0;
+    double shaping = 0.3;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  std::string names;
+  for (const LawInfo& law : laws()) names += (names.empty() ? "" : "|") + std::string(law.name);
+  CLI::App* const verb = app.add_subcommand("filter", "Any stability controller on a recording of your own, on a pipe");
+  verb->add_option("--law", arguments->law, names)->type_name("NAME")->capture_default_str();
+  verb->add_option("--b", arguments->options.limiter.friction.viscous, "lower bound of viscous friction, N s/m")
+      ->required();
+  verb->add_option("--fc", arguments->options.limiter.friction.coulomb, "lower bound of Coulomb friction, N")
+      ->required();
+  verb->add_option("--period-us", arguments->period_us, "the longest that a force is held, microseconds")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--max-force", arguments->options.limiter.max_force, "of the law clamp, N");
+  verb->add_option("--stiffness", arguments->options.limiter.environment_stiffness,
+                   "of the environment, N/m, for laws that have to know it");
+  verb->add_option("--delay-ms", arguments->delay_ms, "of the environment, for laws that have to know it");
+  verb->add_flag("--energy-cap", arguments->energy_cap, "part of aol+: forget what free motion has earned");
+  verb->add_flag("--knee", arguments->knee, "part of aol+: compress forces near the bound instead of clipping them");
+  verb->add_option("--encoder-um", arguments->encoder_um,
+                   "part of aol+: robust ledger for counts of so many micrometres");
+  verb->add_option("--acceleration", arguments->acceleration,
+                   "part of aol+: the hand never accelerates by more than this, m/s^2");
+  verb->add_option("--shaping-b", arguments->shaping, "… and the bound is kept below that of this friction, N s/m")
+      ->capture_default_str();
+  verb->add_flag("--json", arguments->options.json, "one JSON object for each row instead of CSV");
+  verb->footer(
+      "\nIn: t_s,x_m,wanted_n or t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n; forces on the hand.\n"
+      "Out: the same and applied_n,permitted_n,energy_j,reason.\n"
+      "\nExample\n  tendon-lab filter --law aol --b 0.26 --fc 0.005 --period-us 1000 < in.csv > out.csv\n"
+      "\nNothing in it is random.\nExit: 0 done; 1 a row was bad (its line is named, nothing is written for it); 2 "
+      "wrong "
+      "usage.");
+  verb->callback([arguments, names, &exit] {
+    LimiterConfig& limiter = arguments->options.limiter;
+    const auto law = law_named(arguments->law);
+    if (!law) throw std::invalid_argument("--law " + arguments->law + ": expected " + names);
+    limiter.law = *law;
+    limiter.longest_hold = from_seconds(arguments->period_us * 1e-6);
+    limiter.environment_delay = from_seconds(arguments->delay_ms * 1e-3);
+    if (arguments->energy_cap) limiter.parts.energy_cap.emplace();
+    if (arguments->knee) limiter.parts.knee.emplace();
+    if (arguments->encoder_um > 0) limiter.parts.robust_ledger.emplace().encoder_step = {arguments->encoder_um * 1e-6};
+    if (arguments->acceleration > 0) {
+      auto& bounded = limiter.parts.bounded_acceleration.emplace();
+      bounded.most = {arguments->acceleration};
+      bounded.shaping_viscous = {arguments->shaping};
+    }
+    std::ios::sync_with_stdio(false);
+    if (filter(arguments->options, std::cin, std::cout, std::cerr) > 0) exit = kFailed;
+  });
+}
+
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
   app.require_subcommand(1);
@@ -28,31 +140,13 @@ int main(int argc, char** argv) {
       "\nExample: the same motion without and with the limiter, as a table and a picture\n"
       "  tendon-lab report off.mcap on.mcap --out runs.png\n"
       "\ntendon-lab VERB --help tells more.\n\nExit: 0 done; 1 failed; 2 wrong usage.");
-
-  ReportOptions options;
-  std::vector<std::string> recordings;
-  std::string picture;
-  CLI::App* const report_verb = app.add_subcommand("report", "What recorded runs come down to: a table and a picture");
-  report_verb->add_option("RECORDING", recordings, "recordings of tendond, one column each")
-      ->type_name("FILE.mcap")
-      ->required()
-      ->check(CLI::ExistingFile.description(""));
-  report_verb->add_option("--out", picture, "draw the runs side by side (needs gnuplot)")
-      ->type_name("FILE.svg|FILE.png");
-  report_verb->add_option("--label", options.labels, "what a run is called; once for each recording, in order")
-      ->type_name("TEXT")
-      ->allow_extra_args(false);
-  report_verb->add_flag("--json", options.json, "one JSON object for each recording on stdout instead of the table");
-  report_verb->footer(
-      "\nExample: the same motion without and with the limiter\n"
-      "  tendon-lab report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
-      "\nExit: 0 done; 1 a recording is corrupt or gnuplot failed; 2 wrong usage.");
+  int exit = kDone;
+  add_report(app);
+  add_paper(app);
+  add_filter(app, exit);
 
   try {
     app.parse(argc, argv);
-    options.recordings.assign(recordings.begin(), recordings.end());
-    if (!picture.empty()) options.picture = picture;
-    report(options, std::cout);
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
@@ -62,7 +156,7 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     return complain(error, kFailed);
   }
-  return kDone;
+  return exit;
 }
 
 }  // namespace

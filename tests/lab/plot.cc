@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/lab/plot.h"
 
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <csignal>
 #include <cstdint>
-#include <cstdio>
 #include <sstream>
 #include <stdexcept>
-#include <string_view>
-#include <system_error>
 #include <vector>
 
+#include "tests/lab/gnuplot.h"
 #include "tests/lab/table.h"
 
 namespace tendon::lab {
@@ -35,32 +29,10 @@ constexpr double kPanelHeight = 0.225;
 constexpr std::array kPanelTops = {0.840, 0.565, 0.290};
 constexpr double kAbovePanel = 0.018;
 
-// Okabe and Ito's colours, which people with any colour vision can tell apart.
-constexpr const char* kInk = "#222222";
-constexpr const char* kPale = "#666666";
-constexpr const char* kGrey = "#E8E8E8";
-constexpr const char* kBlue = "#0072B2";
-constexpr const char* kSky = "#56B4E9";
-constexpr const char* kOrange = "#E69F00";
-constexpr const char* kGreen = "#009E73";
-constexpr const char* kVermilion = "#D55E00";
-constexpr const char* kPurple = "#CC79A7";
-
 /// Energies of two runs that differ by more than this are drawn to scales of their own: one would be a flat line.
 constexpr double kTooDifferent = 20;
 /// What is wanted may be any number; what is applied has to stay visible.
 constexpr double kMostWanted = 3;
-
-/// In single quotes, where gnuplot takes everything as it is but the quote itself.
-std::string literal(std::string_view text) {
-  std::string result = "'";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    result += byte < 0x20 || byte == 0x7F ? ' ' : c;
-    if (c == '\'') result += '\'';
-  }
-  return result + "'";
-}
 
 double picture_width(std::size_t drawings) { return kColumn * static_cast<double>(std::max<std::size_t>(drawings, 2)); }
 
@@ -181,15 +153,7 @@ class Script {
 
  private:
   void begin(const std::filesystem::path& path) {
-    out_ << "set encoding utf8\n";
-    if (path.extension() == ".svg") {
-      out_ << "set terminal svg size " << width_ << "," << kHeight << " font 'sans-serif,15' background '#ffffff'\n";
-    } else {
-      out_ << "set terminal pngcairo size " << width_ << "," << kHeight << " font 'sans,11.5'\n";
-    }
-    // Absolute, so that no name begins with the | after which gnuplot takes a command.
-    out_ << "set output " << literal(std::filesystem::absolute(path).string()) << "\n"
-         << "set border 3 lc rgb '" << kPale << "'\n"
+    out_ << begin_picture(path, static_cast<int>(width_), kHeight) << "set border 3 lc rgb '" << kPale << "'\n"
          << "set tics nomirror out scale 0.6 textcolor rgb '" << kPale << "'\n"
          << "set grid ytics lc rgb '#e4e4e4' lt 1 lw 1\n"
          << "set xrange [0:" << span_ << "]\n"
@@ -356,32 +320,13 @@ class Script {
   std::ostringstream out_;
 };
 
-/// While it lives, writing to a process that has ended is an error and not our end.
-class IgnoreBrokenPipe {
- public:
-  IgnoreBrokenPipe() {
-    struct sigaction ignore {};
-    ignore.sa_handler = SIG_IGN;
-    ::sigaction(SIGPIPE, &ignore, &before_);
-  }
-  ~IgnoreBrokenPipe() { ::sigaction(SIGPIPE, &before_, nullptr); }
-  IgnoreBrokenPipe(const IgnoreBrokenPipe&) = delete;
-  IgnoreBrokenPipe& operator=(const IgnoreBrokenPipe&) = delete;
-
- private:
-  struct sigaction before_ {};
-};
-
 }  // namespace
 
 void check_picture(const std::filesystem::path& path, std::size_t drawings) {
   if (drawings == 0 || drawings > kMostDrawings)
     throw std::invalid_argument("a picture holds 1 to " + std::to_string(kMostDrawings) + " runs, got " +
                                 std::to_string(drawings));
-  if (path.extension() != ".svg" && path.extension() != ".png")
-    throw std::invalid_argument(path.string() + ": expected a name that ends with .svg or .png");
-  if (std::ranges::any_of(path.string(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }))
-    throw std::invalid_argument("the name of the picture has control characters in it");
+  check_picture_name(path);
 }
 
 std::size_t trace_columns(std::size_t drawings) {
@@ -395,20 +340,7 @@ std::string plot_script(const std::filesystem::path& path, std::span<const Drawi
 }
 
 void draw(const std::filesystem::path& path, std::span<const Drawing> drawings) {
-  const std::string script = plot_script(path, drawings);
-  const IgnoreBrokenPipe ignore;
-  // -d: whatever the user has in ~/.gnuplot, the picture is the same. A script that is a file ends at its first error;
-  // one that is typed in goes on.
-  std::FILE* const gnuplot =
-      ::popen("command -v gnuplot >/dev/null || exit 127; exec gnuplot -d /dev/stdin >/dev/null", "w");
-  if (gnuplot == nullptr) throw std::system_error(errno, std::generic_category(), "cannot start gnuplot");
-  // A gnuplot that ends early shows in its status.
-  std::fwrite(script.data(), 1, script.size(), gnuplot);
-  const int status = ::pclose(gnuplot);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
-    throw std::runtime_error("cannot draw " + path.string() + ": gnuplot is not installed (package gnuplot-nox)");
-  throw std::runtime_error("cannot draw " + path.string() + ": gnuplot failed; what it says is above");
+  run_gnuplot(plot_script(path, drawings), path);
 }
 
 }  // namespace tendon::lab
