@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -20,11 +21,13 @@ HapticController::HapticController(const Config& config)
   positive(config.max_slew, "max_slew");
   if (!std::isfinite(config.max_force)) throw std::invalid_argument("max_force must be finite");
   if (config.watchdog < Duration::zero()) throw std::invalid_argument("watchdog must not be negative");
+  if (config.admittance) admittance_.emplace(*config.admittance);
 }
 
 void HapticController::book_unseen(const Vec3& applied, Duration held) noexcept {
   const Duration at_most = config_.watchdog > Duration::zero() ? std::min(held, config_.watchdog) : held;
   limiter_.observe_unseen(applied, at_most);
+  if (admittance_) admittance_->observe_unseen();
 }
 
 void HapticController::book(const Motion& hand, const Vec3& applied, Step& step) noexcept {
@@ -35,12 +38,27 @@ void HapticController::book(const Motion& hand, const Vec3& applied, Step& step)
     step.reasons |= Reason::kWatchdog;
     book_unseen(applied, step.held);
   } else if (last_) {
-    limiter_.observe({.applied = applied, .dx = hand.position - last_->position, .held = step.held});
+    const Interval<3> interval{.applied = applied, .dx = hand.position - last_->position, .held = step.held};
+    limiter_.observe(interval);
+    if (admittance_) admittance_->observe(interval);
   }
   step.energy = limiter_.energy();
 }
 
-Step HapticController::step(const Motion& hand, const Vec3& applied) noexcept {
+void HapticController::follow_tool(Step& step) noexcept {
+  const Vec3 unknown = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  step.force = admittance_
+                   ->command({.hand_force = step.hand_force.value_or(unknown),
+                              .environment = step.force,
+                              .velocity = step.hand.velocity})
+                   .force;
+  if (!step.force.allFinite()) {
+    step.force.setZero();
+    step.reasons |= Reason::kNotFinite;
+  }
+}
+
+Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force) noexcept {
   if (!hand.position.allFinite()) {
     fault_ = Fault::kPositionNotFinite;
     Step blind = step_unseen(hand.at, applied);
@@ -50,6 +68,7 @@ Step HapticController::step(const Motion& hand, const Vec3& applied) noexcept {
 
   Step step;
   step.hand = hand;
+  step.hand_force = hand_force;
   book(hand, applied, step);
   last_ = hand;
   last_at_ = hand.at;
@@ -71,6 +90,7 @@ Step HapticController::step(const Motion& hand, const Vec3& applied) noexcept {
     step.force.setZero();
     step.reasons |= Reason::kNotFinite;
   }
+  if (admittance_) follow_tool(step);
   if (fault_ != Fault::kNone) {
     step.force.setZero();
     step.mode = Mode::kFault;
@@ -81,7 +101,8 @@ Step HapticController::step(const Motion& hand, const Vec3& applied) noexcept {
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   // What bounds a force bends the environment: how it goes on from there is not known any more.
-  const bool as_wanted = saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
+  const bool as_wanted =
+      !admittance_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
   const LimitedForce<3> limited =
       limiter_.limit({.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero())});
   step.force = limited.force;

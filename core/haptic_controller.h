@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/control/admittance_loop.h"
 #include "core/control/limiter.h"
 #include "core/held_force.h"
 #include "core/mode.h"
@@ -15,10 +16,11 @@ namespace tendon {
 
 /// What one haptic step found and decided. Enough to take the step again.
 struct Step {
-  Motion hand;                      ///< the motion it saw; hand.at = when
-  Duration held{};                  ///< T_act: length of the interval that this step ended; 0 in the first
-  Vec3 was_applied = Vec3::Zero();  ///< N, the force held during it
-  Vec3 wanted = Vec3::Zero();       ///< N, what the remote environment asks for, after hold or local model
+  Motion hand;                       ///< the motion it saw; hand.at = when
+  Duration held{};                   ///< T_act: length of the interval that this step ended; 0 in the first
+  Vec3 was_applied = Vec3::Zero();   ///< N, the force held during it
+  std::optional<Vec3> hand_force{};  ///< N, of the hand on the handle, as measured; empty without a force sensor
+  Vec3 wanted = Vec3::Zero();        ///< N, what the remote environment asks for, after hold or local model
   double permitted = 0;  ///< N, the limiter's bound on ‖force‖ (per axis: on the largest component); ∞ when off
   Vec3 force = Vec3::Zero();  ///< N, to be applied now
   double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
@@ -33,6 +35,7 @@ struct Step {
 ///
 ///     account ← the interval just ended, with the force really held         (Limiter::observe)
 ///     F ← newest remote force, held, faded or stopped by its age            (HeldForce)
+///     F ← the force that makes the handle follow a tool which F acts on     (AdmittanceLoop, when listed)
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
 ///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
@@ -58,6 +61,8 @@ class HapticController {
 
   struct Config {
     LimiterConfig limiter;
+    /// For a device that measures the hand's force; without it the device is of impedance type.
+    std::optional<AdmittanceLoop<3>::Config> admittance{};
     Duration watchdog{};   ///< the device's own; 0 = it has none
     double max_force = 0;  ///< N; > 0
     double max_slew = 0;   ///< N/s; > 0, may be infinite
@@ -75,8 +80,10 @@ class HapticController {
   /// The remote environment has left.
   void release(LocalTime now) noexcept { held_.release(now); }
 
-  /// One haptic step. `applied` is the force that the device has really held since the step before.
-  Step step(const Motion& hand, const Vec3& applied) noexcept;
+  /// One haptic step. `applied` is the force that the device has really held since the step before, `hand_force`
+  /// (N, of the hand on the handle) what its force sensor measured; with `admittance` a step without one gives no
+  /// force.
+  Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {}) noexcept;
 
   /// A haptic step in which the device gave no position: the force to apply is zero.
   Step step_unseen(LocalTime now, const Vec3& applied) noexcept;
@@ -88,9 +95,11 @@ class HapticController {
  private:
   void book(const Motion& hand, const Vec3& applied, Step& step) noexcept;
   void book_unseen(const Vec3& applied, Duration held) noexcept;
+  void follow_tool(Step& step) noexcept;
 
   Config config_;
   Limiter limiter_;
+  std::optional<AdmittanceLoop<3>> admittance_;
   HeldForce held_;
   Fault fault_ = Fault::kNone;
   std::uint32_t missed_ = 0;

@@ -56,7 +56,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   StepRecord record;
   if (const auto sample = device_.read(now)) {
     const Motion hand{sample->at, sample->position, velocity_.observe(sample->at, sample->position)};
-    static_cast<Step&>(record) = controller_.step(hand, applied_);
+    static_cast<Step&>(record) = controller_.step(hand, applied_, sample->hand_force);
   } else {
     static_cast<Step&>(record) = controller_.step_unseen(now, applied_);
   }

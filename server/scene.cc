@@ -300,6 +300,26 @@ struct YesNo {
   static std::string shown(const Unit&, bool value) { return value ? "true" : "false"; }
 };
 
+/// A force sensor: there or not, with the size of one count.
+struct Sensor {
+  static std::string expected(const Unit&) {
+    return "the size of one count in N, 0 for an exact one, or false for none";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit,
+                      std::optional<SimulatedDevice::Config::ForceSensor>& to) {
+    std::optional<double> count;
+    if (OrFalse{kZeroOrMore}.take(node, unit, count)) return Refusal{&node, expected(unit)};
+    to.reset();
+    if (!count) return {};
+    to.emplace();
+    if (*count > 0) to->resolution = *count;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::optional<SimulatedDevice::Config::ForceSensor>&) { return "false"; }
+};
+
 struct Path {
   static std::string expected(const Unit&) { return "a path in quotes"; }
 
@@ -464,6 +484,8 @@ void declare_effects(Table& effects, const DeviceProfile* profile, SimulatedDevi
   effects.key("max_force_n", device.max_force, kEffect, "the device clamps the force vector to this length", kProfiles);
   effects.key("amplifier_bandwidth_hz", device.amplifier_bandwidth, kEffect,
               "the motors follow the command with this bandwidth (-3 dB, first order)", kProfiles);
+  effects.key("force_sensor", device.force_sensor, Sensor{},
+              "measures the force of the hand: what a device of admittance type has", kProfiles);
   effects.key("watchdog_ms", device.watchdog, kEffect,
               "the device drops the force when it gets no command for this long", kProfiles);
 }
@@ -649,6 +671,23 @@ void declare_scene(Table& scene, Draft& draft) {
     limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
                 "lower bound of the device's viscous friction", kProfiles);
     declare_law(limiter, draft);
+  });
+
+  scene.part("admittance", draft.scene.loop.control.admittance, [](Table& keys, AdmittanceLoop<3>::Config& tool) {
+    // The tool is the same in every direction.
+    const auto each = [&keys](const char* name, Vec3& target, const Number& rule, const char* meaning, Absent absent) {
+      double value = target.x();
+      keys.key(name, value, rule, meaning, absent);
+      target.setConstant(value);
+    };
+    tool.mass.setZero();
+    tool.proportional.setZero();
+    each("mass_kg", tool.mass, kAboveZero, "of the tool that the hand is to feel", kRequired);
+    each("damping_n_s_per_m", tool.damping, kZeroOrMore, "of the tool", {});
+    each("stiffness_n_per_m", tool.stiffness, kZeroOrMore, "ties the tool to where it was at the start", {});
+    each("proportional_n_s_per_m", tool.proportional, kZeroOrMore, "gain of the loop that makes the handle follow",
+         kRequired);
+    each("integral_n_per_m", tool.integral, kZeroOrMore, "its integral gain", {});
   });
 
   scene.table("force", [&draft](Table& force) {
@@ -996,6 +1035,10 @@ class Settlement {
             at_least(control.hold.hold, "hold_ms", control.hold.safe_stop, "_ms"));
     }
     control.watchdog = device.watchdog.value_or(Duration::zero());
+    if (control.admittance && !device.force_sensor) {
+      blame("admittance", {},
+            "expected a device with force_sensor among its effects: the tool is driven by the hand's force");
+    }
 
     if (!draft_.max_force && !device.max_force) {
       blame("force.max_force_n", {}, "missing, expected a number above 0 N, because the device has no max_force_n");

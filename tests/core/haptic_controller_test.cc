@@ -318,5 +318,44 @@ TEST(HapticController, RefusesImpossibleLimits) {
   EXPECT_THROW(HapticController{c}, std::invalid_argument);
 }
 
+HapticController::Config tool_config() {
+  HapticController::Config c = config();
+  c.limiter.law = Law::kNone;
+  c.admittance = AdmittanceLoop<3>::Config{.mass = Vec3::Constant(2), .proportional = Vec3::Constant(100)};
+  return c;
+}
+
+TEST(HapticController, OfAdmittanceTypeItPushesTheHandleAfterTheToolThatTheHandPushes) {
+  HapticController controller(tool_config());
+  controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
+  const Vec3 push(3, 0, 0);
+  const Step step = controller.step({LocalTime(milliseconds(2)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), push);
+  // The tool has got 3 N for 1 ms: 1.5 mm/s, and the handle stands still.
+  EXPECT_NEAR(step.force.x(), 100 * 3 * 1e-3 / 2, 1e-9);
+  EXPECT_EQ(step.hand_force, push);
+}
+
+TEST(HapticController, OfAdmittanceTypeTheRemoteForceActsOnTheTool) {
+  HapticController controller(tool_config());
+  RemoteForce wall;
+  wall.sequence = 1;
+  wall.force = Vec3(-4, 0, 0);
+  wall.valid_for = milliseconds(50);
+  controller.observe(wall);
+  controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
+  const Step step =
+      controller.step({LocalTime(milliseconds(2)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3(4, 0, 0));
+  EXPECT_EQ(step.wanted.x(), -4);
+  EXPECT_NEAR(step.force.x(), 0, 1e-12);
+}
+
+TEST(HapticController, OfAdmittanceTypeThereIsNoForceWithoutAMeasurementOfTheHand) {
+  HapticController controller(tool_config());
+  controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3(3, 0, 0));
+  const Step step = controller.step({LocalTime(milliseconds(2)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero());
+  EXPECT_EQ(step.force, Vec3::Zero());
+  EXPECT_TRUE(step.reasons.has(Reason::kNotFinite));
+}
+
 }  // namespace
 }  // namespace tendon

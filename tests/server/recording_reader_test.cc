@@ -57,6 +57,7 @@ StepRecord any_step() {
   step.hand = {.at = LocalTime(any_duration()), .position = any_vec3(), .velocity = any_vec3()};
   step.held = any_duration();
   step.was_applied = any_vec3();
+  step.hand_force = any_vec3();
   step.wanted = any_vec3();
   step.permitted = any_double();
   step.force = any_vec3();

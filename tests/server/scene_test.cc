@@ -319,6 +319,20 @@ TEST(Scene, AnEstimatorIsThereWhenItsTableIs) {
             "s.toml:4: force: adaptive_local_model and output_estimator both say what lies between two forces");
 }
 
+TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {
+  const std::string tool = "[admittance]\nmass_kg = 3\nproportional_n_s_per_m = 400\n";
+  const Scene scene = minimal_and("[device.effects]\nforce_sensor = 0.1\n" + tool);
+  ASSERT_TRUE(scene.loop.control.admittance);
+  EXPECT_EQ(scene.loop.control.admittance->mass, Vec3(3, 3, 3));
+  EXPECT_EQ(scene.device.force_sensor->resolution, 0.1);
+  EXPECT_EQ(error_of_minimal_and(tool),
+            "s.toml:4: admittance: expected a device with force_sensor among its effects: the tool is driven by the "
+            "hand's force");
+  EXPECT_EQ(error_of_minimal_and("[device.effects]\nforce_sensor = true\n"),
+            "s.toml:5: device.effects.force_sensor: expected the size of one count in N, 0 for an exact one, or false "
+            "for none, found true");
+}
+
 TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
   const DeviceProfile& falcon = *find_device_profile("falcon");
   const auto step = [](const std::string& more) {
@@ -410,7 +424,7 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
         << error_of(text);
   }
   EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
-            "s.toml:4: other: unknown table; known here: device, loop, limiter, force, network, recording");
+            "s.toml:4: other: unknown table; known here: device, loop, limiter, admittance, force, network, recording");
 }
 
 TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
@@ -639,7 +653,7 @@ TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
   std::string deep = "[a";
   while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
   EXPECT_EQ(error_of(deep + "]\n"),
-            "s.toml:1: a: unknown table; known here: device, loop, limiter, force, network, recording");
+            "s.toml:1: a: unknown table; known here: device, loop, limiter, admittance, force, network, recording");
   EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
 }
 
@@ -655,6 +669,12 @@ TEST(ShippedScenes, DemoIsAHandAtAWallWithTheLimiterOn) {
   EXPECT_EQ(target(scene, 0.5).position, Vec3(0.015, 0, 0));
   EXPECT_EQ(scene.loop.control.limiter.law, Law::kAolPlus);
   EXPECT_EQ(scene.recording, "demo.mcap");
+}
+
+TEST(ShippedScenes, AdmittanceIsAHeavyDeviceThatMovesAsATool) {
+  const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "admittance.toml");
+  EXPECT_TRUE(scene.device.force_sensor);
+  EXPECT_TRUE(scene.loop.control.admittance);
 }
 
 TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {
