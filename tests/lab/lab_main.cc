@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-lab: experiments with recorded and simulated runs. Here is its command line; each verb is a function of its
 // own.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
@@ -9,6 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "tests/lab/boundary.h"
+#include "tests/lab/compare.h"
+#include "tests/lab/cost.h"
 #include "tests/lab/filter.h"
 #include "tests/lab/paper.h"
 #include "tests/lab/report.h"
@@ -133,6 +138,52 @@ void add_filter(CLI::App& app, int& exit) {
   });
 }
 
+void add_compare(CLI::App& app) {
+  const auto options = std::make_shared<CompareOptions>();
+  CLI::App* const verb =
+      app.add_subcommand("compare", "Every stability controller in every situation: which one to use");
+  verb->add_option("--every", options->every, "take every so-manieth situation of the grid")->capture_default_str();
+  verb->add_option("--seed", options->seed, "of the network; the same for all laws")->capture_default_str();
+  verb->add_option("--out", options->out, "write compare.csv and a figure there, SVG and PNG (needs gnuplot)")
+      ->type_name("DIR");
+  verb->add_flag("--json", options->json, "one JSON object for each cell instead of the table");
+  verb->footer(
+      "\nExample: all of it, some minutes\n  tendon-lab compare --out comparison\n"
+      "\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+  verb->callback([options] {
+    options->progress = isatty(STDERR_FILENO) != 0;
+    compare(*options, std::cout);
+  });
+}
+
+void add_boundary(CLI::App& app) {
+  const auto options = std::make_shared<BoundaryOptions>();
+  CLI::App* const verb =
+      app.add_subcommand("boundary", "How stiff a spring may be over delay and rate: simulated, and as theory says");
+  verb->add_option("--mass", options->mass, "of the device, kg")->capture_default_str();
+  verb->add_option("--b", options->viscous, "viscous friction of the device, N s/m")->capture_default_str();
+  verb->add_option("--out", options->out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  verb->add_flag("--json", options->json, "one JSON object for each point instead of the table");
+  verb->footer(
+      "\nExample\n  tendon-lab boundary --b 0.26 --out figures\n"
+      "\nNothing in it is random.\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+  verb->callback([options] { boundary(*options, std::cout); });
+}
+
+void add_cost(CLI::App& app) {
+  const auto options = std::make_shared<CostOptions>();
+  CLI::App* const verb = app.add_subcommand("cost", "What accuracy costs in time inside the loop");
+  verb->add_option("--batches", options->batches, "measured for each line; the median counts")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--out", options->out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  verb->add_flag("--json", options->json, "one JSON object for each line instead of the table");
+  verb->footer(
+      "\nExample\n  tendon-lab cost --out figures\n"
+      "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+  verb->callback([options] { cost(*options, std::cout); });
+}
+
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
   app.require_subcommand(1);
@@ -144,6 +195,9 @@ int main(int argc, char** argv) {
   add_report(app);
   add_paper(app);
   add_filter(app, exit);
+  add_compare(app);
+  add_boundary(app);
+  add_cost(app);
 
   try {
     app.parse(argc, argv);

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/lab/compare.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <stdexcept>
+
+#include "server/build_info.h"
+#include "tests/lab/gnuplot.h"
+#include "tests/lab/json.h"
+#include "tests/lab/panels.h"
+#include "tests/lab/paper.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr Friction kDamped{.coulomb = 0.02, .viscous = 0.26};
+constexpr Friction kUndamped{.coulomb = 0.04, .viscous = 0.005};
+constexpr Duration kLength = std::chrono::seconds(2);
+
+std::string text(const char* format, double value) {
+  std::array<char, 64> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), format, value);
+  return buffer.data();
+}
+
+double relative_error(const Cell& cell) {
+  return cell.outcome.true_force > 0 ? cell.outcome.force_error / cell.outcome.true_force : 0;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+constexpr const char* kColumns =
+    "law,stiffness_n_per_m,delay_ms,rate_hz,loss,b_n_s_per_m,fc_n,hand,passive,energy_given_out_j,k_op_n_per_m,"
+    "force_error_n,true_force_n,hf_velocity_m_s,limited_share,latency_s,max_force_n,seed,commit";
+
+void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
+  const Situation& s = cell.situation;
+  const Outcome& o = cell.outcome;
+  const Friction friction = s.damped ? kDamped : kUndamped;
+  out << info(cell.law).name;
+  for (const double value : {s.stiffness, s.delay_ms, s.rate_hz, s.loss, friction.viscous, friction.coulomb}) {
+    out << "," << JsonLine::number(value);
+  }
+  out << "," << (s.firm ? "firm" : "loose") << "," << (cell.passive() ? 1 : 0);
+  for (const double value : {std::max(0.0, -o.least_energy), o.operational_stiffness, o.force_error, o.true_force,
+                             o.late_vibration, o.limited_share, o.latency, o.largest_force}) {
+    out << "," << JsonLine::number(value);
+  }
+  out << "," << seed << "," << kCommit << "\n";
+}
+
+std::string to_json(const Cell& cell, std::uint64_t seed) {
+  const Situation& s = cell.situation;
+  const Outcome& o = cell.outcome;
+  const Friction friction = s.damped ? kDamped : kUndamped;
+  return JsonLine()
+      .add("law", info(cell.law).name)
+      .add("stiffness_n_per_m", s.stiffness)
+      .add("delay_ms", s.delay_ms)
+      .add("rate_hz", s.rate_hz)
+      .add("loss", s.loss)
+      .add("b_n_s_per_m", friction.viscous)
+      .add("fc_n", friction.coulomb)
+      .add("hand", s.firm ? "firm" : "loose")
+      .add("passive", cell.passive())
+      .add("energy_given_out_j", std::max(0.0, -o.least_energy))
+      .add("k_op_n_per_m", o.operational_stiffness)
+      .add("force_error_n", o.force_error)
+      .add("true_force_n", o.true_force)
+      .add("hf_velocity_m_s", o.late_vibration)
+      .add("limited_share", o.limited_share)
+      .add("latency_s", o.latency)
+      .add("max_force_n", o.largest_force)
+      .add("seed", seed)
+      .add("commit", kCommit)
+      .str();
+}
+
+/// Some of the cells by law: what they come down to.
+struct Summary {
+  Law law;
+  std::size_t cells = 0;
+  double passive = 0;    ///< share
+  double stable = 0;     ///< share
+  double error = 0;      ///< median of the relative force error
+  double vibration = 0;  ///< m/s, median
+  double given_out = 0;  ///< J, the most
+  double limited = 0;    ///< median share
+  double latency = 0;    ///< s, median
+};
+
+std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::function<bool(const Situation&)>& where) {
+  std::vector<Summary> result;
+  for (const LawInfo& law : laws()) {
+    Summary summary{.law = law.law};
+    std::vector<double> errors;
+    std::vector<double> vibrations;
+    std::vector<double> limited;
+    std::vector<double> latencies;
+    for (const Cell& cell : cells) {
+      if (cell.law != law.law || !where(cell.situation)) continue;
+      summary.passive += cell.passive() ? 1 : 0;
+      summary.stable += cell.outcome.stable ? 1 : 0;
+      summary.given_out = std::max(summary.given_out, -cell.outcome.least_energy);
+      errors.push_back(relative_error(cell));
+      vibrations.push_back(cell.outcome.late_vibration);
+      limited.push_back(cell.outcome.limited_share);
+      latencies.push_back(cell.outcome.latency);
+    }
+    summary.cells = errors.size();
+    if (errors.empty()) continue;
+    const auto n = static_cast<double>(errors.size());
+    summary.passive /= n;
+    summary.stable /= n;
+    summary.error = median(errors);
+    summary.vibration = median(vibrations);
+    summary.limited = median(limited);
+    summary.latency = median(latencies);
+    result.push_back(summary);
+  }
+  return result;
+}
+
+/// A sentence: the law with the least force error of those that were passive and stable throughout.
+void recommend(std::ostream& out, const std::string& where, const std::vector<Summary>& laws) {
+  const Summary* best = nullptr;
+  for (const bool strictly : {true, false}) {
+    for (const Summary& law : laws) {
+      const bool safe = law.passive == 1 && (!strictly || law.stable == 1);
+      if (safe && (best == nullptr || law.error < best->error)) best = &law;
+    }
+    if (best != nullptr) break;
+  }
+  out << "  " << where << ": ";
+  if (best == nullptr) {
+    out << "none of them is passive throughout.\n";
+    return;
+  }
+  out << info(best->law).name << " (force error " << text("%.0f", best->error * 100)
+      << " % of the true force, stable in " << text("%.0f", best->stable * 100) << " % of the cells).\n";
+}
+
+void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
+  constexpr std::array kColours = {kOrange, kBlue, kGreen, kVermilion, kPurple, kSky};
+  constexpr std::array kDrawn = {Law::kPassivityController, Law::kAol, Law::kAolPlus, Law::kEnergyBounding,
+                                 Law::kPassiveSynthesis};
+  std::vector<Panel> panels;
+  for (const bool damped : {true, false}) {
+    Panel error{.title = damped ? "Force error, % of the true force: damped device" : "… device without damping",
+                .x_label = "stiffness, N/m",
+                .log_x = true};
+    Panel vibration{.title = damped ? "Vibration, mm/s: damped device" : "… device without damping",
+                    .x_label = "stiffness, N/m",
+                    .log_x = true,
+                    .log_y = true};
+    for (std::size_t i = 0; i < kDrawn.size(); ++i) {
+      Curve errors{.name = std::string(info(kDrawn[i]).name), .colour = kColours[i]};
+      Curve vibrations = errors;
+      for (const double k : {100.0, 500.0, 2000.0, 8000.0}) {
+        const auto at = summaries(cells, [&](const Situation& s) { return s.damped == damped && s.stiffness == k; });
+        for (const Summary& summary : at) {
+          if (summary.law != kDrawn[i]) continue;
+          errors.points.emplace_back(k, summary.error * 100);
+          vibrations.points.emplace_back(k, std::max(summary.vibration * 1e3, 1e-3));
+        }
+      }
+      error.curves.push_back(errors);
+      vibration.curves.push_back(vibrations);
+    }
+    panels.push_back(error);
+    panels.push_back(vibration);
+  }
+  for (const auto& file :
+       draw_panels(folder / "compare", "Laws compared: medians over delay, rate, loss and hand",
+                   std::to_string(cells.size()) + " cells; commit " + std::string(kCommit), panels)) {
+    pictures.push_back(file.string());
+  }
+}
+
+}  // namespace
+
+std::vector<Situation> comparison_grid() {
+  std::vector<Situation> grid;
+  for (const double stiffness : {100.0, 500.0, 2000.0, 8000.0}) {
+    for (const double delay : {0.0, 5.0, 20.0, 80.0}) {
+      for (const double rate : {1000.0, 200.0, 50.0, 25.0}) {
+        for (const double loss : {0.0, 0.2}) {
+          for (const bool damped : {true, false}) {
+            for (const bool firm : {false, true}) {
+              grid.push_back({stiffness, delay, rate, loss, damped, firm});
+            }
+          }
+        }
+      }
+    }
+  }
+  return grid;
+}
+
+Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
+  const Friction friction = situation.damped ? kDamped : kUndamped;
+  FreeHand hand = paper_hand(friction);
+  hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
+  if (situation.firm) {
+    hand.hand->stiffness = 800;
+    hand.hand->damping = 3;
+    hand.hand->mass = 0.1;
+  }
+  Experiment set;
+  set.environment = {.force = [k = situation.stiffness](double, const Vec3& x) { return Vec3(-k * x); },
+                     .period = from_seconds(1 / situation.rate_hz),
+                     .delay = from_seconds(situation.delay_ms * 1e-3),
+                     .loss = situation.loss};
+  set.hand = hand;
+  set.limiter.law = law;
+  set.limiter.friction = friction;
+  set.limiter.parts = situation.damped ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
+  set.limiter.environment_stiffness = situation.stiffness;
+  set.limiter.environment_delay = set.environment.delay;
+  set.length = kLength;
+  set.max_force = kPaperMaxForce;
+  set.seed = seed;
+  return {situation, law, outcome(run(set), set.period)};
+}
+
+Verdict verdict(const std::vector<Cell>& cells) {
+  Verdict result;
+  const std::size_t each = laws().size();
+  // The laws of one situation stand together.
+  for (std::size_t first = 0; first + each <= cells.size(); first += each) {
+    const auto begin = cells.begin() + static_cast<std::ptrdiff_t>(first);
+    const auto end = begin + static_cast<std::ptrdiff_t>(each);
+    const auto plus = std::find_if(begin, end, [](const Cell& cell) { return cell.law == Law::kAolPlus; });
+    ++result.cells;
+    if (plus->passive()) ++result.passive;
+    const Cell* best = nullptr;
+    for (auto cell = begin; cell != end; ++cell) {
+      if (cell == plus || !info(cell->law).passive || !cell->passive()) continue;
+      if (best == nullptr || cell->outcome.force_error < best->outcome.force_error) best = &*cell;
+    }
+    if (best == nullptr || best->outcome.force_error >= plus->outcome.force_error) continue;
+    ++result.beaten;
+    if (best->outcome.force_error < 0.95 * plus->outcome.force_error) ++result.beaten_clearly;
+    if (best->outcome.late_vibration > plus->outcome.late_vibration) ++result.noisier;
+  }
+  return result;
+}
+
+void compare(const CompareOptions& options, std::ostream& out) {
+  if (options.every == 0) throw std::invalid_argument("--every must be 1 or more");
+  const std::vector<Situation> grid = comparison_grid();
+  std::vector<Cell> cells;
+  for (std::size_t i = 0; i < grid.size(); i += options.every) {
+    for (const LawInfo& law : laws()) {
+      cells.push_back(compare_cell(grid[i], law.law, options.seed + i));
+      if (options.json) out << to_json(cells.back(), options.seed + i) << "\n";
+    }
+    if (options.progress) std::cerr << "\r" << i + 1 << " of " << grid.size() << " situations" << std::flush;
+  }
+  if (options.progress) std::cerr << "\n";
+
+  std::vector<std::string> written;
+  if (options.out) {
+    std::filesystem::create_directories(*options.out);
+    std::ofstream csv(*options.out / "compare.csv");
+    csv << kColumns << "\n";
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      write_csv(csv, cells[i], options.seed + i / laws().size() * options.every);
+    }
+    if (!csv.flush()) throw std::runtime_error("cannot write " + (*options.out / "compare.csv").string());
+    written.push_back((*options.out / "compare.csv").string());
+    draw(*options.out, cells, written);
+  }
+  if (options.json) {
+    if (!out.flush()) throw std::runtime_error("cannot write the cells: is the disk full?");
+    return;
+  }
+
+  out << cells.size() << " cells: " << cells.size() / laws().size() << " situations, " << laws().size()
+      << " laws; seed " << options.seed << ", commit " << kCommit << "\n\n";
+  std::array<char, 200> line{};
+  std::snprintf(line.data(), line.size(), "%-26s %8s %8s %12s %10s %12s %9s %9s\n", "law", "passive", "stable",
+                "given out J", "error", "vibration", "limited", "latency");
+  out << line.data();
+  for (const Summary& s : summaries(cells, [](const Situation&) { return true; })) {
+    std::snprintf(line.data(), line.size(), "%-26s %6.1f %% %6.1f %% %12.2g %8.0f %% %7.1f mm/s %7.0f %% %6.0f ms\n",
+                  std::string(info(s.law).name).c_str(), s.passive * 100, s.stable * 100, std::max(0.0, s.given_out),
+                  s.error * 100, s.vibration * 1e3, s.limited * 100, s.latency * 1e3);
+    out << line.data();
+  }
+  out << "\npassive: the true ledger never below -1 nJ; given out: the most in any cell; error (rms, of the true "
+         "force), "
+         "vibration (last\nsecond), limited and latency: medians. Stable: vibration at most 8 mm/s.\n";
+
+  out << "\nWhich one to use (the least force error among those passive and stable in all cells of the kind):\n";
+  for (const bool damped : {true, false}) {
+    const std::string device = damped ? "device with damping, " : "device without damping, ";
+    for (const bool soft : {true, false}) {
+      const std::string object = device + (soft ? "up to 500 N/m, " : "2000 N/m and more, ");
+      const auto here = [&](const Situation& s) { return s.damped == damped && (s.stiffness <= 500) == soft; };
+      recommend(out, object + "on this machine (no delay, 1 kHz)",
+                summaries(cells, [&](const Situation& s) { return here(s) && s.delay_ms == 0 && s.rate_hz == 1000; }));
+      recommend(out, object + "near (to 5 ms, from 200 Hz)",
+                summaries(cells, [&](const Situation& s) { return here(s) && s.delay_ms <= 5 && s.rate_hz >= 200; }));
+      recommend(out, object + "far or slow (20 ms and more, or 50 Hz and less)",
+                summaries(cells, [&](const Situation& s) { return here(s) && (s.delay_ms >= 20 || s.rate_hz <= 50); }));
+    }
+  }
+
+  const Verdict v = verdict(cells);
+  const auto share = [&](std::size_t n) {
+    return std::to_string(n) + " (" + text("%.1f", 100.0 * static_cast<double>(n) / static_cast<double>(v.cells)) +
+           " %)";
+  };
+  out << "\naol+ is passive in " << v.passive << " of its " << v.cells << " cells. In " << share(v.beaten)
+      << " of them another law that promises to be passive, and was, has a lower force\nerror; in "
+      << share(v.beaten_clearly) << " by more than 5 %. In " << v.noisier
+      << " of those the other one vibrates more: the knee, the cap and the robust ledger of aol+\ngive away force to "
+         "be "
+         "quiet and to be right about an encoder; in the others they cost force and bring nothing.\n";
+  for (const std::string& file : written) out << "written: " << file << "\n";
+  if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
+}
+
+}  // namespace tendon::lab

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "tests/lab/experiment.h"
+
+namespace tendon::lab {
+
+/// One situation: a spring that pulls and pushes, a network, a device and a hand that is free to move.
+struct Situation {
+  double stiffness = 0;  ///< N/m
+  double delay_ms = 0;
+  double rate_hz = 0;
+  double loss = 0;     ///< share
+  bool damped = true;  ///< b 0.26 N·s/m, f_c 0.02 N; else 0.005 and 0.04
+  bool firm = false;   ///< hand 800 N/m, 3 N·s/m, 100 g; else 400, 0.3, 50
+};
+
+/// The grid: every combination, the same for every law, fixed before anything is run.
+std::vector<Situation> comparison_grid();
+
+struct Cell {
+  Situation situation;
+  Law law;
+  Outcome outcome;
+
+  /// The device gave out nothing that had not been put in; rounding aside. Exact positions, true friction.
+  bool passive() const noexcept { return outcome.least_energy >= -1e-9; }
+};
+
+/// `law` in a situation: 2 s of a hand that swings 15 mm at 0.5 Hz, a device with counts of 30 µm and 8.5 N. Laws that
+/// have to know the environment are told the truth. AOL+ has its default parts, and bounded acceleration where the
+/// device has no damping.
+Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
+
+/// What AOL+ has against every other law that promises to be passive.
+struct Verdict {
+  std::size_t cells = 0;    ///< of AOL+
+  std::size_t passive = 0;  ///< … in which it was
+  std::size_t beaten = 0;   ///< … in which another law that promises passivity, and keeps it, has a lower force error
+  std::size_t beaten_clearly = 0;  ///< … by more than 5 %
+  std::size_t noisier = 0;         ///< of the beaten: the other vibrates more
+};
+Verdict verdict(const std::vector<Cell>& cells);
+
+struct CompareOptions {
+  std::size_t every = 1;  ///< take every so-manieth situation of the grid
+  std::uint64_t seed = 1;
+  std::optional<std::filesystem::path> out{};  ///< folder for compare.csv and the figures
+  bool json = false;
+  bool progress = false;  ///< on standard error
+};
+
+/// `tendon-lab compare`: every law in every situation, with the same seeds, and which one to use where.
+void compare(const CompareOptions& options, std::ostream& out);
+
+}  // namespace tendon::lab
