@@ -55,7 +55,12 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
 
 template <int Blocks, int Size>
 AolPlus<Blocks, Size>::AolPlus(const Config& config)
-    : parts_(config.parts), friction_(config.friction), longest_hold_(config.longest_hold), target_(config.friction) {
+    : parts_(config.parts),
+      friction_(config.friction),
+      longest_hold_(config.longest_hold),
+      ledgers_(each<EnergyLedger, Blocks>([&config](std::size_t i) { return config.friction[i]; },
+                                          std::make_index_sequence<Blocks>())),
+      target_(config.friction) {
   check<Blocks, Size>(config);
   constexpr auto kEach = std::make_index_sequence<Blocks>();
   if (const auto& robust = config.parts.robust_ledger) {
@@ -65,8 +70,6 @@ AolPlus<Blocks, Size>::AolPlus(const Config& config)
               .friction = config.friction[i], .encoder_step = robust->encoder_step[i], .window = robust->window};
         },
         kEach);
-  } else {
-    exact_ = each<EnergyLedger, Blocks>([&](std::size_t i) { return config.friction[i]; }, kEach);
   }
   for (std::size_t i = 0; i < losses_.size(); ++i) use(i, config.friction[i]);
 }
@@ -76,17 +79,27 @@ void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noe
   friction_[block] = friction;
   losses_[block].coulomb = friction.coulomb;
   losses_[block].viscous_per_hold = friction.viscous / seconds(longest_hold_);
-}
-
-template <int Blocks, int Size>
-double AolPlus<Blocks, Size>::account() const noexcept {
-  double sum = exact_ ? (*exact_)[0].energy() : (*robust_)[0].spendable();
-  for (std::size_t i = 1; i < losses_.size(); ++i) sum += exact_ ? (*exact_)[i].energy() : (*robust_)[i].spendable();
-  return sum;
+  ledgers_[block].adapt(friction);
+  if (robust_) (*robust_)[block].adapt(friction);
 }
 
 template <int Blocks, int Size>
 double AolPlus<Blocks, Size>::energy() const noexcept {
+  double sum = ledgers_[0].energy();
+  for (std::size_t i = 1; i < ledgers_.size(); ++i) sum += ledgers_[i].energy();
+  return sum;
+}
+
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::account() const noexcept {
+  if (!robust_) return energy();
+  double sum = (*robust_)[0].spendable();
+  for (std::size_t i = 1; i < robust_->size(); ++i) sum += (*robust_)[i].spendable();
+  return sum;
+}
+
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::spendable() const noexcept {
   return account() - discarded_;
 }
 
@@ -134,11 +147,8 @@ void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
     const auto block = static_cast<std::size_t>(i);
     const Vec<Size> applied = interval.applied.template segment<Size>(i * Size);
     const Vec<Size> dx = interval.dx.template segment<Size>(i * Size);
-    if (exact_) {
-      (*exact_)[block].observe(applied, dx, interval.held);
-    } else {
-      (*robust_)[block].observe({.applied = applied, .dx = dx, .held = interval.held});
-    }
+    ledgers_[block].observe(applied, dx, interval.held);
+    if (robust_) (*robust_)[block].observe({.applied = applied, .dx = dx, .held = interval.held});
   }
   if (parts_.energy_cap) {
     contact_ = std::max(0.0, contact_ - interval.applied.dot(interval.dx));
@@ -152,11 +162,6 @@ void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
       now.coulomb += (target_[i].coulomb - now.coulomb) * step;
       now.viscous += (target_[i].viscous - now.viscous) * step;
       use(i, now);
-      if (robust_) {
-        (*robust_)[i].adapt(now);
-      } else {
-        (*exact_)[i].adapt(now);
-      }
     }
   }
 }
@@ -166,11 +171,8 @@ void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration a
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
     const Vec<Size> part = applied.template segment<Size>(i * Size);
-    if (exact_) {
-      (*exact_)[block].observe_unseen(part.norm(), at_most);
-    } else {
-      (*robust_)[block].observe_unseen(part, at_most);
-    }
+    ledgers_[block].observe_unseen(part.norm(), at_most);
+    if (robust_) (*robust_)[block].observe_unseen(part, at_most);
   }
   contact_ = 0;
   travel_.setZero();
@@ -201,7 +203,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   const double size = force.norm();
 
   if (parts_.energy_cap) cap(force);
-  const double spendable = energy() - reserved();
+  const double budget = spendable() - reserved();
 
   std::array<double, Blocks> sizes{};
   std::array<WorstLoss, Blocks> losses = losses_;
@@ -222,12 +224,12 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   double scale = 0;
   double permitted = 0;
   if constexpr (Blocks == 1) {
-    permitted = losses[0].largest(spendable);
-    if (acceleration_holds_) permitted = std::min(permitted, shaping[0].largest(spendable));
+    permitted = losses[0].largest(budget);
+    if (acceleration_holds_) permitted = std::min(permitted, shaping[0].largest(budget));
     scale = size > 0 ? permitted / size : 1;
   } else {
-    scale = largest_scale(losses, sizes, spendable);
-    if (acceleration_holds_) scale = std::min(scale, largest_scale(shaping, sizes, spendable));
+    scale = largest_scale(losses, sizes, budget);
+    if (acceleration_holds_) scale = std::min(scale, largest_scale(shaping, sizes, budget));
     permitted = size > 0 ? scale * size : 0;
   }
 
@@ -265,11 +267,6 @@ void AolPlus<Blocks, Size>::adapt(const std::array<Friction, Blocks>& friction) 
     const Friction now{.coulomb = std::min(friction_[i].coulomb, friction[i].coulomb),
                        .viscous = std::min(friction_[i].viscous, friction[i].viscous)};
     use(i, now);
-    if (robust_) {
-      (*robust_)[i].adapt(now);
-    } else {
-      (*exact_)[i].adapt(now);
-    }
   }
 }
 

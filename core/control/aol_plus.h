@@ -106,8 +106,11 @@ class AolPlus {
   void observe_unseen(const Vec<kSize>& applied, Duration at_most) noexcept;
   LimitedForce<kSize> limit(const Demand<kSize>& wanted) noexcept;
 
-  /// What may be spent: Ē before it is cut off at zero, without the reserve. J; a lower bound of the true ledger.
+  /// The ledger of eq. (5) with the positions as they were measured, J: the same account that every law keeps.
   double energy() const noexcept;
+  /// What may be spent: Ē before it is cut off at zero, without the reserve. J; a lower bound of the **true** ledger,
+  /// below zero by no more than rounding may have hidden.
+  double spendable() const noexcept;
 
   /// The device's friction is now at least this. Without the part adaptive_friction nothing changes.
   void adapt(const std::array<Friction, Blocks>& friction) noexcept;
@@ -116,9 +119,6 @@ class AolPlus {
   std::uint64_t broken_assumptions() const noexcept { return broken_; }
 
  private:
-  using Ledger = std::array<EnergyLedger, Blocks>;
-  using Robusts = std::array<RobustLedger<Size>, Blocks>;
-
   double account() const noexcept;
   void cap(const Vec<kSize>& wanted) noexcept;
   double reserved() const noexcept;
@@ -128,8 +128,8 @@ class AolPlus {
   Parts parts_;
   std::array<Friction, Blocks> friction_;  ///< in use
   Duration longest_hold_;
-  std::optional<Ledger> exact_;  ///< one of these two keeps the account
-  std::optional<Robusts> robust_;
+  std::array<EnergyLedger, Blocks> ledgers_;
+  std::optional<std::array<RobustLedger<Size>, Blocks>> robust_;
   double discarded_ = 0;                         ///< J, credit above the cap
   double contact_ = 0;                           ///< C, J
   Vec<kSize> travel_ = Vec<kSize>::Zero();       ///< m, since the contact began

@@ -140,7 +140,7 @@ Outcome run(Dice& dice, const Case<Blocks, Size>& c, int steps) {
     if (c.encoder_step > 0) counted = (x / c.encoder_step).array().round().matrix() * c.encoder_step;
     law.observe({.applied = applied, .dx = counted - seen, .held = interval});
     seen = counted;
-    outcome.over_credit = std::max(outcome.over_credit, law.energy() - energy);
+    outcome.over_credit = std::max(outcome.over_credit, law.spendable() - energy);
 
     if (c.config.parts.adaptive_friction && dice.chance(0.02)) {
       for (std::size_t i = 0; i < Blocks; ++i) {  // the true friction changes, and the law is told a bound of it
@@ -342,7 +342,7 @@ TEST(AolPlus, DryFrictionDoesNotPumpUpTheCap) {
     law.observe({.applied = Vec<1>(applied), .dx = Vec<1>(dx), .held = kPeriod});
     applied = law.limit({.force = Vec<1>(dx > 0 ? -2 : 2)}).force[0];
     if (n % 500 == 0) {
-      ASSERT_LE(law.energy(), 0.005 + 1e-9) << "after stroke " << n / 500;
+      ASSERT_LE(law.spendable(), 0.005 + 1e-9) << "after stroke " << n / 500;
     }
   }
 }
@@ -357,7 +357,7 @@ TEST(AolPlus, AHandAtRestOnTheEdgeOfACountEarnsNothing) {
     robust.observe(flicker);
     naive.observe(flicker);
   }
-  EXPECT_EQ(robust.energy(), 0);
+  EXPECT_EQ(robust.spendable(), 0);
   EXPECT_GT(naive.energy(), 0.05);
 }
 
@@ -368,7 +368,7 @@ TEST(AolPlus, AFlickeringCountCostsAMovingHandNoMoreThanTheFlicker) {
   for (int n = 0; n < 3000; ++n) {  // two counts forth, one back
     law.observe({.applied = Vec<1>(0), .dx = Vec<1>(n % 3 == 2 ? -30e-6 : 30e-6), .held = kPeriod});
   }
-  EXPECT_NEAR(law.energy(), 0.05 * 1000 * 30e-6, 0.05 * 2 * 30e-6);
+  EXPECT_NEAR(law.spendable(), 0.05 * 1000 * 30e-6, 0.05 * 2 * 30e-6);
 }
 
 TEST(AolPlus, TheKneeIsSmoothNeverAboveTheBoundAndSparesTheFirstEightyPercent) {
@@ -433,7 +433,7 @@ TEST(AolPlus, ABrokenAssumptionIsCountedAndThePlainBoundHoldsForThatStep) {
   EXPECT_EQ(law.broken_assumptions(), 0U);
   const double broken = move(1e-3 + 3e-4);  // 200 m/s²
   EXPECT_EQ(law.broken_assumptions(), 1U);
-  EXPECT_NEAR(broken, 0.04 + 2 * std::sqrt(0.005 * law.energy() / 1e-3), 1e-9);
+  EXPECT_NEAR(broken, 0.04 + 2 * std::sqrt(0.005 * law.spendable() / 1e-3), 1e-9);
   EXPECT_GT(kept, broken);
 }
 
