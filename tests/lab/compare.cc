@@ -132,23 +132,35 @@ std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::functi
   return result;
 }
 
-/// A sentence: the law with the least force error of those that were passive and stable throughout.
+/// A sentence: the law with the least force error of those that promise to be passive, and were, and were stable
+/// throughout; and what would have been better still here, without a promise.
 void recommend(std::ostream& out, const std::string& where, const std::vector<Summary>& laws) {
-  const Summary* best = nullptr;
-  for (const bool strictly : {true, false}) {
-    for (const Summary& law : laws) {
-      const bool safe = law.passive == 1 && (!strictly || law.stable == 1);
-      if (safe && (best == nullptr || law.error < best->error)) best = &law;
+  const auto best_of = [&](bool promised) {
+    const Summary* best = nullptr;
+    for (const bool stable : {true, false}) {
+      for (const Summary& law : laws) {
+        if (law.law == Law::kNone || info(law.law).passive != promised || law.passive < 1) continue;
+        if (stable && law.stable < 1) continue;
+        if (best == nullptr || law.error < best->error) best = &law;
+      }
+      if (best != nullptr) break;
     }
-    if (best != nullptr) break;
-  }
+    return best;
+  };
+  const auto percent = [](double share) { return text("%.1f", share * 100) + " %"; };
+  const Summary* const safe = best_of(true);
+  const Summary* const lucky = best_of(false);
   out << "  " << where << ": ";
-  if (best == nullptr) {
-    out << "none of them is passive throughout.\n";
+  if (safe == nullptr) {
+    out << "none that keeps its promise.\n";
     return;
   }
-  out << info(best->law).name << " (force error " << text("%.0f", best->error * 100)
-      << " % of the true force, stable in " << text("%.0f", best->stable * 100) << " % of the cells).\n";
+  out << info(safe->law).name << " (force error " << percent(safe->error) << ", stable in " << percent(safe->stable)
+      << " of " << safe->cells << " cells)";
+  if (lucky != nullptr && lucky->error < safe->error && lucky->stable >= safe->stable) {
+    out << "; without a promise for every object: " << info(lucky->law).name << " (" << percent(lucky->error) << ")";
+  }
+  out << ".\n";
 }
 
 void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
@@ -209,6 +221,11 @@ std::vector<Situation> comparison_grid() {
 }
 
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
+  return compare_cell(situation, law, seed,
+                      situation.damped ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder));
+}
+
+Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts) {
   const Friction friction = situation.damped ? kDamped : kUndamped;
   FreeHand hand = paper_hand(friction);
   hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
@@ -225,7 +242,7 @@ Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
   set.hand = hand;
   set.limiter.law = law;
   set.limiter.friction = friction;
-  set.limiter.parts = situation.damped ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
+  set.limiter.parts = parts;
   set.limiter.environment_stiffness = situation.stiffness;
   set.limiter.environment_delay = set.environment.delay;
   set.length = kLength;
@@ -234,10 +251,9 @@ Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
   return {situation, law, outcome(run(set), set.period)};
 }
 
-Verdict verdict(const std::vector<Cell>& cells) {
+Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every) {
   Verdict result;
   const std::size_t each = laws().size();
-  // The laws of one situation stand together.
   for (std::size_t first = 0; first + each <= cells.size(); first += each) {
     const auto begin = cells.begin() + static_cast<std::ptrdiff_t>(first);
     const auto end = begin + static_cast<std::ptrdiff_t>(each);
@@ -252,7 +268,25 @@ Verdict verdict(const std::vector<Cell>& cells) {
     if (best == nullptr || best->outcome.force_error >= plus->outcome.force_error) continue;
     ++result.beaten;
     if (best->outcome.force_error < 0.95 * plus->outcome.force_error) ++result.beaten_clearly;
-    if (best->outcome.late_vibration > plus->outcome.late_vibration) ++result.noisier;
+
+    const auto without = [&](auto drop) {
+      auto parts = plus->situation.damped ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
+      drop(parts);
+      const Cell cell = compare_cell(plus->situation, Law::kAolPlus, seed + first / each * every, parts);
+      return cell.outcome.force_error <= best->outcome.force_error;
+    };
+    using Parts = AolPlus<1, 3>::Parts;
+    if (without([](Parts& parts) { parts.robust_ledger.reset(); })) {
+      ++result.robust_ledger;
+    } else if (without([](Parts& parts) { parts.knee.reset(); })) {
+      ++result.knee;
+    } else if (without([](Parts& parts) { parts.energy_cap.reset(); })) {
+      ++result.energy_cap;
+    } else if (without([](Parts& parts) { parts.bounded_acceleration.reset(); })) {
+      ++result.bounded_acceleration;
+    } else {
+      ++result.no_single_part;
+    }
   }
   return result;
 }
@@ -303,7 +337,8 @@ void compare(const CompareOptions& options, std::ostream& out) {
          "force), "
          "vibration (last\nsecond), limited and latency: medians. Stable: vibration at most 8 mm/s.\n";
 
-  out << "\nWhich one to use (the least force error among those passive and stable in all cells of the kind):\n";
+  out << "\nWhich one to use (the least median force error among the laws that promise to be passive and were, if "
+         "possible stable\nthroughout):\n";
   for (const bool damped : {true, false}) {
     const std::string device = damped ? "device with damping, " : "device without damping, ";
     for (const bool soft : {true, false}) {
@@ -318,17 +353,17 @@ void compare(const CompareOptions& options, std::ostream& out) {
     }
   }
 
-  const Verdict v = verdict(cells);
+  const Verdict v = verdict(cells, options.seed, options.every);
   const auto share = [&](std::size_t n) {
     return std::to_string(n) + " (" + text("%.1f", 100.0 * static_cast<double>(n) / static_cast<double>(v.cells)) +
            " %)";
   };
   out << "\naol+ is passive in " << v.passive << " of its " << v.cells << " cells. In " << share(v.beaten)
       << " of them another law that promises to be passive, and was, has a lower force\nerror; in "
-      << share(v.beaten_clearly) << " by more than 5 %. In " << v.noisier
-      << " of those the other one vibrates more: the knee, the cap and the robust ledger of aol+\ngive away force to "
-         "be "
-         "quiet and to be right about an encoder; in the others they cost force and bring nothing.\n";
+      << share(v.beaten_clearly) << " by more than 5 %. Run again without one part at a time, it would not have been "
+      << "beaten without its robust\nledger (which pays for the counts of the encoder) in " << v.robust_ledger
+      << ", its knee in " << v.knee << ", its energy cap in " << v.energy_cap << ", bounded acceleration in "
+      << v.bounded_acceleration << "; in " << v.no_single_part << " no\nsingle part is the reason.\n";
   for (const std::string& file : written) out << "written: " << file << "\n";
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
 }

@@ -39,6 +39,8 @@ struct Cell {
 /// have to know the environment are told the truth. AOL+ has its default parts, and bounded acceleration where the
 /// device has no damping.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
+/// … or those of `parts`.
+Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts);
 
 /// What AOL+ has against every other law that promises to be passive.
 struct Verdict {
@@ -46,9 +48,12 @@ struct Verdict {
   std::size_t passive = 0;  ///< … in which it was
   std::size_t beaten = 0;   ///< … in which another law that promises passivity, and keeps it, has a lower force error
   std::size_t beaten_clearly = 0;  ///< … by more than 5 %
-  std::size_t noisier = 0;         ///< of the beaten: the other vibrates more
+  /// Why, in the beaten cells: the part without which AOL+ would not have been. Run again, part by part.
+  std::size_t robust_ledger = 0, knee = 0, energy_cap = 0, bounded_acceleration = 0;
+  std::size_t no_single_part = 0;
 };
-Verdict verdict(const std::vector<Cell>& cells);
+/// The cells of one situation stand together, in the order of laws(); situation i had the seed `seed` + i · `every`.
+Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every);
 
 struct CompareOptions {
   std::size_t every = 1;  ///< take every so-manieth situation of the grid

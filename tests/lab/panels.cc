@@ -12,7 +12,7 @@ namespace tendon::lab {
 namespace {
 
 constexpr int kWidth = 1600;
-constexpr int kRow = 440;      ///< pixels for a row of panels
+constexpr int kRow = 470;      ///< pixels for a row of panels
 constexpr int kHeading = 110;  ///< … and for what is above all of them
 constexpr std::size_t kMostPoints = 1200;
 
@@ -83,13 +83,13 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
     const double left = p % 2 == 0 ? 0.045 : 0.545;
-    const double right = left + 0.44;
-    const double top = kHeading + static_cast<double>(p / 2) * kRow + 50;
+    const double right = left + 0.435;
+    const double top = kHeading + static_cast<double>(p / 2) * kRow + 74;
     out << "set lmargin at screen " << left << "\nset rmargin at screen " << right << "\nset tmargin at screen "
-        << up(top) << "\nset bmargin at screen " << up(top + kRow - 120) << "\n";
-    out << "set label " << literal(panel.title) << " at screen " << left << "," << up(top - 32)
+        << up(top) << "\nset bmargin at screen " << up(top + kRow - 144) << "\n";
+    out << "set label " << literal(panel.title) << " at screen " << left << "," << up(top - 54)
         << " noenhanced font ':Bold' tc rgb '" << kInk << "'\n";
-    out << "set key at screen " << right << "," << up(top - 12)
+    out << "set key at screen " << right << "," << up(top - 20)
         << " right center horizontal samplen 1.5 noenhanced textcolor rgb '" << kInk << "'\n";
     out << "set xlabel " << literal(panel.x_label) << " noenhanced offset 0,0.4 textcolor rgb '" << kPale << "'\n";
     out << (panel.log_x ? "set logscale x\n" : "unset logscale x\n")
