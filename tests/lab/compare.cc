@@ -19,9 +19,20 @@
 namespace tendon::lab {
 namespace {
 
-constexpr Friction kDamped{.coulomb = 0.02, .viscous = 0.26};
-constexpr Friction kUndamped{.coulomb = 0.04, .viscous = 0.005};
+struct TestDevice {
+  const char* name;
+  Friction friction;
+};
+constexpr std::array kDevices = {TestDevice{"0.26 N s/m", {.coulomb = 0.02, .viscous = 0.26}},
+                                 TestDevice{"0.05 N s/m", {.coulomb = 0.04, .viscous = 0.05}},
+                                 TestDevice{"0.005 N s/m", {.coulomb = 0.04, .viscous = 0.005}}};
+constexpr std::array kStiffnesses = {100.0, 300.0, 500.0, 1000.0, 2000.0, 8000.0};  // N/m
 constexpr Duration kLength = std::chrono::seconds(2);
+
+/// Bounded acceleration where 2b/T is less than what objects are made of.
+AolPlus<1, 3>::Parts parts_for(const Friction& friction) {
+  return friction.viscous >= 0.1 ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
+}
 
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
@@ -41,15 +52,16 @@ double median(std::vector<double> values) {
 }
 
 constexpr const char* kColumns =
-    "law,stiffness_n_per_m,delay_ms,rate_hz,loss,b_n_s_per_m,fc_n,hand,passive,energy_given_out_j,k_op_n_per_m,"
+    "law,stiffness_n_per_m,delay_ms,jitter_ms,rate_hz,loss,b_n_s_per_m,fc_n,hand,passive,energy_given_out_j,k_op_n_per_"
+    "m,"
     "force_error_n,true_force_n,hf_velocity_m_s,limited_share,latency_s,max_force_n,seed,commit";
 
 void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
   const Situation& s = cell.situation;
   const Outcome& o = cell.outcome;
-  const Friction friction = s.damped ? kDamped : kUndamped;
   out << info(cell.law).name;
-  for (const double value : {s.stiffness, s.delay_ms, s.rate_hz, s.loss, friction.viscous, friction.coulomb}) {
+  for (const double value :
+       {s.stiffness, s.delay_ms, s.jitter_ms, s.rate_hz, s.loss, s.friction.viscous, s.friction.coulomb}) {
     out << "," << JsonLine::number(value);
   }
   out << "," << (s.firm ? "firm" : "loose") << "," << (cell.passive() ? 1 : 0);
@@ -63,15 +75,15 @@ void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
 std::string to_json(const Cell& cell, std::uint64_t seed) {
   const Situation& s = cell.situation;
   const Outcome& o = cell.outcome;
-  const Friction friction = s.damped ? kDamped : kUndamped;
   return JsonLine()
       .add("law", info(cell.law).name)
       .add("stiffness_n_per_m", s.stiffness)
       .add("delay_ms", s.delay_ms)
+      .add("jitter_ms", s.jitter_ms)
       .add("rate_hz", s.rate_hz)
       .add("loss", s.loss)
-      .add("b_n_s_per_m", friction.viscous)
-      .add("fc_n", friction.coulomb)
+      .add("b_n_s_per_m", s.friction.viscous)
+      .add("fc_n", s.friction.coulomb)
       .add("hand", s.firm ? "firm" : "loose")
       .add("passive", cell.passive())
       .add("energy_given_out_j", std::max(0.0, -o.least_energy))
@@ -168,7 +180,8 @@ void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, s
   constexpr std::array kDrawn = {Law::kPassivityController, Law::kAol, Law::kAolPlus, Law::kEnergyBounding,
                                  Law::kPassiveSynthesis};
   std::vector<Panel> panels;
-  for (const bool damped : {true, false}) {
+  for (const TestDevice& device : {kDevices.front(), kDevices.back()}) {
+    const bool damped = device.friction.viscous == kDevices.front().friction.viscous;
     Panel error{.title = damped ? "Force error, % of the true force: damped device" : "… device without damping",
                 .x_label = "stiffness, N/m",
                 .log_x = true};
@@ -179,8 +192,10 @@ void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, s
     for (std::size_t i = 0; i < kDrawn.size(); ++i) {
       Curve errors{.name = std::string(info(kDrawn[i]).name), .colour = kColours[i]};
       Curve vibrations = errors;
-      for (const double k : {100.0, 500.0, 2000.0, 8000.0}) {
-        const auto at = summaries(cells, [&](const Situation& s) { return s.damped == damped && s.stiffness == k; });
+      for (const double k : kStiffnesses) {
+        const auto at = summaries(cells, [&](const Situation& s) {
+          return s.friction.viscous == device.friction.viscous && s.stiffness == k;
+        });
         for (const Summary& summary : at) {
           if (summary.law != kDrawn[i]) continue;
           errors.points.emplace_back(k, summary.error * 100);
@@ -204,13 +219,21 @@ void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, s
 
 std::vector<Situation> comparison_grid() {
   std::vector<Situation> grid;
-  for (const double stiffness : {100.0, 500.0, 2000.0, 8000.0}) {
+  for (const double stiffness : kStiffnesses) {
     for (const double delay : {0.0, 5.0, 20.0, 80.0}) {
-      for (const double rate : {1000.0, 200.0, 50.0, 25.0}) {
-        for (const double loss : {0.0, 0.2}) {
-          for (const bool damped : {true, false}) {
-            for (const bool firm : {false, true}) {
-              grid.push_back({stiffness, delay, rate, loss, damped, firm});
+      for (const double jitter : {0.0, 10.0}) {
+        for (const double rate : {1000.0, 200.0, 50.0, 25.0}) {
+          for (const double loss : {0.0, 0.2}) {
+            for (const TestDevice& device : kDevices) {
+              for (const bool firm : {false, true}) {
+                grid.push_back({.stiffness = stiffness,
+                                .delay_ms = delay,
+                                .jitter_ms = jitter,
+                                .rate_hz = rate,
+                                .loss = loss,
+                                .friction = device.friction,
+                                .firm = firm});
+              }
             }
           }
         }
@@ -221,13 +244,11 @@ std::vector<Situation> comparison_grid() {
 }
 
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
-  return compare_cell(situation, law, seed,
-                      situation.damped ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder));
+  return compare_cell(situation, law, seed, parts_for(situation.friction));
 }
 
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts) {
-  const Friction friction = situation.damped ? kDamped : kUndamped;
-  FreeHand hand = paper_hand(friction);
+  FreeHand hand = paper_hand(situation.friction);
   hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
   if (situation.firm) {
     hand.hand->stiffness = 800;
@@ -238,10 +259,11 @@ Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const
   set.environment = {.force = [k = situation.stiffness](double, const Vec3& x) { return Vec3(-k * x); },
                      .period = from_seconds(1 / situation.rate_hz),
                      .delay = from_seconds(situation.delay_ms * 1e-3),
+                     .jitter = from_seconds(situation.jitter_ms * 1e-3),
                      .loss = situation.loss};
   set.hand = hand;
   set.limiter.law = law;
-  set.limiter.friction = friction;
+  set.limiter.friction = situation.friction;
   set.limiter.parts = parts;
   set.limiter.environment_stiffness = situation.stiffness;
   set.limiter.environment_delay = set.environment.delay;
@@ -270,7 +292,7 @@ Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t 
     if (best->outcome.force_error < 0.95 * plus->outcome.force_error) ++result.beaten_clearly;
 
     const auto without = [&](auto drop) {
-      auto parts = plus->situation.damped ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
+      auto parts = parts_for(plus->situation.friction);
       drop(parts);
       const Cell cell = compare_cell(plus->situation, Law::kAolPlus, seed + first / each * every, parts);
       return cell.outcome.force_error <= best->outcome.force_error;
@@ -339,13 +361,16 @@ void compare(const CompareOptions& options, std::ostream& out) {
 
   out << "\nWhich one to use (the least median force error among the laws that promise to be passive and were, if "
          "possible stable\nthroughout):\n";
-  for (const bool damped : {true, false}) {
-    const std::string device = damped ? "device with damping, " : "device without damping, ";
+  for (const TestDevice& device : kDevices) {
     for (const bool soft : {true, false}) {
-      const std::string object = device + (soft ? "up to 500 N/m, " : "2000 N/m and more, ");
-      const auto here = [&](const Situation& s) { return s.damped == damped && (s.stiffness <= 500) == soft; };
-      recommend(out, object + "on this machine (no delay, 1 kHz)",
-                summaries(cells, [&](const Situation& s) { return here(s) && s.delay_ms == 0 && s.rate_hz == 1000; }));
+      const std::string object =
+          std::string("device of ") + device.name + (soft ? ", up to 500 N/m, " : ", 1000 N/m and more, ");
+      const auto here = [&](const Situation& s) {
+        return s.friction.viscous == device.friction.viscous && (s.stiffness <= 500) == soft;
+      };
+      recommend(out, object + "on this machine (no delay, 1 kHz)", summaries(cells, [&](const Situation& s) {
+                  return here(s) && s.delay_ms == 0 && s.jitter_ms == 0 && s.rate_hz == 1000;
+                }));
       recommend(out, object + "near (to 5 ms, from 200 Hz)",
                 summaries(cells, [&](const Situation& s) { return here(s) && s.delay_ms <= 5 && s.rate_hz >= 200; }));
       recommend(out, object + "far or slow (20 ms and more, or 50 Hz and less)",

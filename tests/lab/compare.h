@@ -17,10 +17,11 @@ namespace tendon::lab {
 struct Situation {
   double stiffness = 0;  ///< N/m
   double delay_ms = 0;
+  double jitter_ms = 0;  ///< at most so much later; later forces overtake earlier ones
   double rate_hz = 0;
-  double loss = 0;     ///< share
-  bool damped = true;  ///< b 0.26 N·s/m, f_c 0.02 N; else 0.005 and 0.04
-  bool firm = false;   ///< hand 800 N/m, 3 N·s/m, 100 g; else 400, 0.3, 50
+  double loss = 0;    ///< share
+  Friction friction;  ///< of the device
+  bool firm = false;  ///< hand 800 N/m, 3 N·s/m, 100 g; else 400, 0.3, 50
 };
 
 /// The grid: every combination, the same for every law, fixed before anything is run.
@@ -37,7 +38,7 @@ struct Cell {
 
 /// `law` in a situation: 2 s of a hand that swings 15 mm at 0.5 Hz, a device with counts of 30 µm and 8.5 N. Laws that
 /// have to know the environment are told the truth. AOL+ has its default parts, and bounded acceleration where the
-/// device has no damping.
+/// device has little damping.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed);
 /// … or those of `parts`.
 Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts);

@@ -9,11 +9,11 @@
 namespace tendon::lab {
 namespace {
 
-TEST(Compare, TheGridHasAtLeastTwoThousandCells) { EXPECT_GE(comparison_grid().size() * laws().size(), 2000U); }
+TEST(Compare, TheGridHasAtLeastTwoThousandCellsForEachLaw) { EXPECT_GE(comparison_grid().size(), 2000U); }
 
 TEST(Compare, AolPlusGivesOutNothingInASampleOfTheGrid) {
   const auto grid = comparison_grid();
-  for (std::size_t i = 0; i < grid.size(); i += 17) {
+  for (std::size_t i = 0; i < grid.size(); i += 61) {
     const Cell cell = compare_cell(grid[i], Law::kAolPlus, i);
     EXPECT_TRUE(cell.passive()) << i << ": " << cell.outcome.least_energy << " J";
   }
@@ -29,7 +29,7 @@ TEST(Compare, TheSameSeedGivesTheSameCell) {
 
 TEST(Compare, AnswersWhichOneToUse) {
   std::ostringstream out;
-  compare({.every = 257}, out);
+  compare({.every = 1153}, out);
   EXPECT_NE(out.str().find("Which one to use"), std::string::npos);
   EXPECT_NE(out.str().find("aol+ is passive in 2 of its 2 cells"), std::string::npos) << out.str();
 }
