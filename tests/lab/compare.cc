@@ -306,6 +306,8 @@ Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t 
       ++result.energy_cap;
     } else if (without([](Parts& parts) { parts.bounded_acceleration.reset(); })) {
       ++result.bounded_acceleration;
+    } else if (!plus->outcome.stable) {
+      ++result.vibrating;
     } else {
       ++result.no_single_part;
     }
@@ -388,7 +390,9 @@ void compare(const CompareOptions& options, std::ostream& out) {
       << share(v.beaten_clearly) << " by more than 5 %. Run again without one part at a time, it would not have been "
       << "beaten without its robust\nledger (which pays for the counts of the encoder) in " << v.robust_ledger
       << ", its knee in " << v.knee << ", its energy cap in " << v.energy_cap << ", bounded acceleration in "
-      << v.bounded_acceleration << "; in " << v.no_single_part << " no\nsingle part is the reason.\n";
+      << v.bounded_acceleration << "; in " << v.vibrating
+      << " it vibrates with an\nobject that the other law shows softer; in " << v.no_single_part
+      << " no single part is the reason.\n";
   for (const std::string& file : written) out << "written: " << file << "\n";
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
 }

@@ -51,6 +51,7 @@ struct Verdict {
   std::size_t beaten_clearly = 0;  ///< … by more than 5 %
   /// Why, in the beaten cells: the part without which AOL+ would not have been. Run again, part by part.
   std::size_t robust_ledger = 0, knee = 0, energy_cap = 0, bounded_acceleration = 0;
+  std::size_t vibrating = 0;  ///< no single part, but it vibrates there: the other is too soft to
   std::size_t no_single_part = 0;
 };
 /// The cells of one situation stand together, in the order of laws(); situation i had the seed `seed` + i · `every`.
