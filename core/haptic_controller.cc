@@ -22,6 +22,12 @@ HapticController::HapticController(const Config& config)
   if (!std::isfinite(config.max_force)) throw std::invalid_argument("max_force must be finite");
   if (config.watchdog < Duration::zero()) throw std::invalid_argument("watchdog must not be negative");
   if (config.admittance) admittance_.emplace(*config.admittance);
+  if (config.friction_map) {
+    if (!config.limiter.parts.adaptive_friction) {
+      throw std::invalid_argument("friction_map is of use only to a limiter with adaptive_friction");
+    }
+    friction_map_.emplace(*config.friction_map);
+  }
 }
 
 void HapticController::book_unseen(const Vec3& applied, Duration held) noexcept {
@@ -100,6 +106,7 @@ Step HapticController::step(const Motion& hand, const Vec3& applied, const std::
   // After a pause the force may not have grown for as long as the pause lasted.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
+  if (friction_map_) limiter_.adapt(friction_map_->at(hand.position));
   // What bounds a force bends the environment: how it goes on from there is not known any more.
   const bool as_wanted =
       !admittance_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;

@@ -6,6 +6,7 @@
 
 #include "core/control/admittance_loop.h"
 #include "core/control/limiter.h"
+#include "core/friction_map.h"
 #include "core/held_force.h"
 #include "core/mode.h"
 #include "core/motion.h"
@@ -61,6 +62,8 @@ class HapticController {
 
   struct Config {
     LimiterConfig limiter;
+    /// Friction by place, for a limiter with adaptive_friction; limiter.friction holds until the first step.
+    std::optional<FrictionMap::Config> friction_map{};
     /// For a device that measures the hand's force; without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
     Duration watchdog{};   ///< the device's own; 0 = it has none
@@ -100,6 +103,7 @@ class HapticController {
   Config config_;
   Limiter limiter_;
   std::optional<AdmittanceLoop<3>> admittance_;
+  std::optional<FrictionMap> friction_map_;
   HeldForce held_;
   Fault fault_ = Fault::kNone;
   std::uint32_t missed_ = 0;

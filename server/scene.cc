@@ -436,6 +436,10 @@ struct Draft {
   double most_acceleration = 300;
   /// With more, delayed walls stay passive but buzz (control.md 8.7).
   double shaping_viscous = 0.3;
+  std::vector<Vec3> places;
+  std::vector<double> place_coulomb;
+  std::vector<double> place_viscous;
+  double reach = 0.05;
 };
 
 /// What holds when a key is not there, where that is not simply the value of the target.
@@ -579,8 +583,14 @@ void declare_parts(Table& limiter, Draft& draft) {
     keys.key("shaping_viscous_n_s_per_m", draft.shaping_viscous, kAboveZero,
              "stiffness stays below twice this over the longest hold. Not below the viscous friction");
   });
-  limiter.part("adaptive_friction", parts.adaptive_friction, [](Table& keys, Plus::AdaptiveFriction& adaptive) {
+  limiter.part("adaptive_friction", parts.adaptive_friction, [&draft](Table& keys, Plus::AdaptiveFriction& adaptive) {
     keys.key("rise_ms", adaptive.rise, kAboveZero, "time constant with which the bounds may rise; they fall at once");
+    keys.key("places_mm", draft.places, ListOf<Vector>{}, "where the friction was identified", kRequired);
+    keys.key("coulomb_friction_n", draft.place_coulomb, ListOf<Number>{kZeroOrMore},
+             "lower bound at each of the places", kRequired);
+    keys.key("viscous_friction_n_s_per_m", draft.place_viscous, ListOf<Number>{kZeroOrMore}, "the same", kRequired);
+    keys.key("reach_mm", draft.reach, kZeroOrMore,
+             "in use is the least of the nearest place and of all within this distance of the hand");
   });
 }
 
@@ -1056,6 +1066,33 @@ class Settlement {
         friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound, profile ? &profile->viscous_bound : nullptr,
                        device.viscous_friction.value_or(0), 1);
     settle_parts(control.limiter);
+    settle_places(control);
+  }
+
+  /// The bounds by place may not be above the truth either, and the limiter's own hold wherever they are lower.
+  void settle_places(HapticController::Config& control) const {
+    if (!control.limiter.parts.adaptive_friction) return;
+    const std::string table = "limiter.adaptive_friction";
+    const std::size_t count = draft_.places.size();
+    if (draft_.place_coulomb.size() != count || draft_.place_viscous.size() != count) {
+      blame(table + ".places_mm", {}, "expected as many places as friction bounds of each kind");
+    }
+    const SimulatedDevice::Config& device = draft_.scene.device;
+    const auto check = [&](const char* key, const std::vector<double>& bounds, double most) {
+      const auto high = std::find_if(bounds.begin(), bounds.end(), [most](double bound) { return bound > most; });
+      if (high == bounds.end()) return;
+      blame(table + "." + key, {},
+            "expected at most " + with_symbol(digits(most), unit_of(key)) +
+                ", the true friction of the simulated device, found " + digits(*high));
+    };
+    check("coulomb_friction_n", draft_.place_coulomb, device.coulomb_friction.value_or(0));
+    check("viscous_friction_n_s_per_m", draft_.place_viscous, device.viscous_friction.value_or(0));
+    auto& map = control.friction_map.emplace();
+    map.reach = draft_.reach;
+    for (std::size_t i = 0; i < count; ++i) {
+      map.places.push_back(
+          {draft_.places[i], {.coulomb = draft_.place_coulomb[i], .viscous = draft_.place_viscous[i]}});
+    }
   }
 
   void settle_parts(LimiterConfig& limiter) const {

@@ -357,5 +357,34 @@ TEST(HapticController, OfAdmittanceTypeThereIsNoForceWithoutAMeasurementOfTheHan
   EXPECT_TRUE(step.reasons.has(Reason::kNotFinite));
 }
 
+TEST(FrictionMap, TheLeastOfTheNearestPlaceAndOfAllWithinReachHolds) {
+  const FrictionMap map({.places = {{Vec3(0, 0, 0), {.coulomb = 0.3, .viscous = 0.1}},
+                                    {Vec3(0.1, 0, 0), {.coulomb = 0.2, .viscous = 0.4}}},
+                         .reach = 0.06});
+  EXPECT_EQ(map.at(Vec3(0.01, 0, 0)).coulomb, 0.3);
+  EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).coulomb, 0.2);  // both
+  EXPECT_EQ(map.at(Vec3(0.05, 0, 0)).viscous, 0.1);
+  EXPECT_EQ(map.at(Vec3(0.09, 0, 0)).viscous, 0.4);
+  EXPECT_EQ(map.at(Vec3(5, 0, 0)).coulomb, 0.2);  // far from all: the nearest
+  EXPECT_THROW(FrictionMap({.places = {}, .reach = 0}), std::invalid_argument);
+}
+
+TEST(HapticController, WhereFrictionIsLessTheFirstForceIsLessAtOnce) {
+  HapticController::Config c = config();
+  c.limiter.friction = {.coulomb = 0.3, .viscous = 0.26};
+  c.limiter.parts.adaptive_friction.emplace();
+  c.friction_map = FrictionMap::Config{.places = {{Vec3(0, 0, 0), {.coulomb = 0.3, .viscous = 0.26}},
+                                                  {Vec3(0.1, 0, 0), {.coulomb = 0.05, .viscous = 0.26}}},
+                                       .reach = 0.03};
+  const auto permitted_at = [&c](double x) {
+    HapticController controller(c);
+    return controller.step({LocalTime(milliseconds(1)), Vec3(x, 0, 0), Vec3::Zero()}, Vec3::Zero()).permitted;
+  };
+  EXPECT_EQ(permitted_at(0), 0.3);
+  EXPECT_EQ(permitted_at(0.1), 0.05);
+  c.limiter.parts.adaptive_friction.reset();
+  EXPECT_THROW(HapticController{c}, std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace tendon

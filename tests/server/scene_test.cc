@@ -333,6 +333,25 @@ TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {
             "for none, found true");
 }
 
+TEST(Scene, FrictionCanDifferByPlace) {
+  const std::string map =
+      "[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0], [80, 0, 0]]\ncoulomb_friction_n = [0.3, 0.2]\n"
+      "viscous_friction_n_s_per_m = [0.5, 0.4]\nreach_mm = 30\n";
+  const auto control = minimal_and(map).loop.control;
+  ASSERT_TRUE(control.friction_map);
+  ASSERT_EQ(control.friction_map->places.size(), 2U);
+  EXPECT_EQ(control.friction_map->places[1].position, Vec3(0.08, 0, 0));
+  EXPECT_EQ(control.friction_map->places[1].friction.coulomb, 0.2);
+  EXPECT_EQ(control.friction_map->reach, 0.03);
+  EXPECT_EQ(error_of_minimal_and("[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0]]\ncoulomb_friction_n = [0.3, 0.2]"
+                                 "\nviscous_friction_n_s_per_m = [0.5]\n"),
+            "s.toml:5: limiter.adaptive_friction.places_mm: expected as many places as friction bounds of each kind");
+  EXPECT_EQ(error_of_minimal_and("[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0]]\ncoulomb_friction_n = [0.5]"
+                                 "\nviscous_friction_n_s_per_m = [0.5]\n"),
+            "s.toml:6: limiter.adaptive_friction.coulomb_friction_n: expected at most 0.4 N, the true friction of the "
+            "simulated device, found 0.5");
+}
+
 TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
   const DeviceProfile& falcon = *find_device_profile("falcon");
   const auto step = [](const std::string& more) {
