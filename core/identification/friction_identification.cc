@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <iomanip>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
+
+#include "core/expect.h"
 
 namespace tendon {
 namespace {
@@ -59,6 +59,8 @@ Mean mean_of(const Runs& runs, double Friction::*which) {
   return mean;
 }
 
+std::string number(double value) { return rounded(value, 3); }
+
 struct KellyVerdict {
   Friction friction;
   std::string flaw;  ///< empty: valid
@@ -70,8 +72,6 @@ KellyVerdict kelly_verdict(const Runs& runs) {
       (*std::ranges::min_element(runs, {}, [](const RunEstimate* run) { return run->kelly.rate; }))->kelly;
   // Of several runs at that slope, the mean.
   KellyVerdict verdict;
-  std::ostringstream flaw;
-  flaw << std::setprecision(3);
   double count = 0;
   const KellyFit* fast = nullptr;
   for (const RunEstimate* run : runs) {
@@ -89,18 +89,18 @@ KellyVerdict kelly_verdict(const Runs& runs) {
 
   const double b = verdict.friction.viscous;
   if (!slow.long_enough()) {
-    flaw << "the slide of " << slow.slide_time << " s is shorter than 4 m/b = " << 4 * slow.time_constant << " s";
+    verdict.flaw = "the slide of " + number(slow.slide_time) +
+                   " s is shorter than 4 m/b = " + number(4 * slow.time_constant) + " s";
   } else if (!(slow.friction.coulomb > 0)) {
-    flaw << "its f_c = " << slow.friction.coulomb << " N is not positive";
+    verdict.flaw = "its f_c = " + number(slow.friction.coulomb) + " N is not positive";
   } else if (fast == nullptr) {
-    flaw << "there is no second slope, 1.5 times as steep or more, to compare with";
+    verdict.flaw = "there is no second slope, 1.5 times as steep or more, to compare with";
   } else if (!fast->plausible()) {
-    flaw << "at the second slope the slide of " << fast->slide_time
-         << " s is shorter than 4 m/b = " << 4 * fast->time_constant << " s or f_c is not positive";
+    verdict.flaw = "at the second slope the slide of " + number(fast->slide_time) +
+                   " s is shorter than 4 m/b = " + number(4 * fast->time_constant) + " s or f_c is not positive";
   } else if (std::abs(fast->friction.viscous - b) > kAgreement * b) {
-    flaw << "two slopes do not agree, b = " << b << " and " << fast->friction.viscous << " N·s/m";
+    verdict.flaw = "two slopes do not agree, b = " + number(b) + " and " + number(fast->friction.viscous) + " N·s/m";
   }
-  verdict.flaw = flaw.str();
   return verdict;
 }
 
@@ -147,25 +147,24 @@ std::string at(const PlaceEstimate& place) { return place.place.empty() ? "" : "
 
 /// Sets `trust` and `reason`; where Kelly's fit is valid no more than it says is published.
 void judge(Identification& result) {
-  std::ostringstream reason;
-  reason << std::setprecision(3);
   const auto flawed = std::ranges::find(result.places, false, &PlaceEstimate::kelly_valid);
   const auto apart = std::ranges::find_if(result.places, [](const PlaceEstimate& place) {
     return std::abs(place.kelly.viscous - place.integral.viscous) > kAgreement * place.integral.viscous;
   });
   if (flawed != result.places.end()) {
     result.trust = Trust::kIntegral;
-    reason << "Kelly's line is no asymptote yet" << at(*flawed) << ": " << flawed->kelly_flaw
-           << " (it says b = " << flawed->kelly.viscous << ", the integral " << flawed->integral.viscous << " N·s/m)";
+    result.reason = "Kelly's line is no asymptote yet" + at(*flawed) + ": " + flawed->kelly_flaw +
+                    " (it says b = " + number(flawed->kelly.viscous) + ", the integral " +
+                    number(flawed->integral.viscous) + " N·s/m)";
   } else if (apart != result.places.end()) {
     result.trust = Trust::kNeither;
-    reason << "Kelly's validity test passed, yet the two differ" << at(*apart) << ": b = " << apart->kelly.viscous
-           << " and " << apart->integral.viscous << " N·s/m. Is the mass right? Published is the lesser of both";
+    result.reason = "Kelly's validity test passed, yet the two differ" + at(*apart) +
+                    ": b = " + number(apart->kelly.viscous) + " and " + number(apart->integral.viscous) +
+                    " N·s/m. Is the mass right? Published is the lesser of both";
   } else {
     result.trust = Trust::kBoth;
-    reason << "Kelly's validity test passed and the integral agrees. Published is the lesser of both";
+    result.reason = "Kelly's validity test passed and the integral agrees. Published is the lesser of both";
   }
-  result.reason = reason.str();
   for (const PlaceEstimate& place : result.places) {
     if (!place.kelly_valid) continue;
     result.lower_bound.viscous = std::min(result.lower_bound.viscous, place.kelly.viscous);

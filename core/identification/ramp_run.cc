@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 #include <stdexcept>
+#include <string>
+
+#include "core/expect.h"
 
 namespace tendon {
 namespace {
@@ -16,11 +18,13 @@ constexpr double kFewestCounts = 50;
 constexpr std::size_t kFewestSamples = 50;
 constexpr double kRampTolerance = 0.02;
 
+std::string text(const char* part) { return part; }
+std::string text(double number) { return rounded(number, 6); }
+std::string text(std::size_t count) { return std::to_string(count); }
+
 template <typename... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  std::ostringstream text;
-  (text << ... << parts);
-  throw std::invalid_argument(text.str());
+  throw std::invalid_argument((text(parts) + ...));
 }
 
 void check(const RampRun& run, double encoder_step) {

@@ -2,19 +2,12 @@
 #include "core/stability/sampled_spring.h"
 
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
 #include <string_view>
+
+#include "core/expect.h"
 
 namespace tendon {
 namespace {
-
-void expect(bool holds, std::string_view field, double value, std::string_view expected) {
-  if (holds) return;
-  std::ostringstream text;
-  text << field << " = " << value << ": expected " << expected;
-  throw std::invalid_argument(text.str());
-}
 
 void expect_amount(std::string_view field, double value) {
   expect(value >= 0 && std::isfinite(value), field, value, "a finite number ≥ 0");

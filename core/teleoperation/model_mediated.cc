@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/teleoperation/expect.h"
+#include "core/expect.h"
 
 namespace tendon {
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/teleoperation/expect.h"
+#include "core/expect.h"
 
 namespace tendon {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/teleoperation/expect.h"
+#include "core/expect.h"
 
 namespace tendon {
 

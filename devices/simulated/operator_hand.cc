@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "devices/simulated/expect.h"
+#include "core/expect.h"
 
 namespace tendon {
 

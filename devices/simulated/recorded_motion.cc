@@ -10,7 +10,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "devices/simulated/expect.h"
+#include "core/expect.h"
 
 namespace tendon {
 namespace {

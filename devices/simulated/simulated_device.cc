@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "devices/simulated/expect.h"
+#include "core/expect.h"
 
 namespace tendon {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "devices/simulated/expect.h"
+#include "core/expect.h"
 
 #include <array>
 #include <charconv>
@@ -8,19 +8,30 @@
 #include <string>
 
 namespace tendon {
-namespace {
-
 std::string shortest(double value) {
   std::array<char, 32> text{};  // the longest shortest form of a double has 24 characters
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return {text.data(), end};
 }
 
-}  // namespace
+std::string rounded(double value, int significant) {
+  std::array<char, 32> text{};
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, significant).ptr;
+  return {text.data(), end};
+}
 
 void expect(bool holds, std::string_view field, double value, std::string_view expected) {
   if (holds) return;
   throw std::invalid_argument(std::string(field) + " = " + shortest(value) + ": expected " + std::string(expected));
+}
+
+void expect_above_zero(double value, std::string_view field) {
+  expect(value > 0 && std::isfinite(value), field, value, "a finite number above 0");
+}
+
+void expect_not_negative(double value, std::string_view field) {
+  expect(value >= 0 && std::isfinite(value), field, value, "a finite number of 0 or more");
 }
 
 void expect_finite(const Vec3& value, std::string_view field) {
