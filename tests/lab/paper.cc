@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "server/build_info.h"
+#include "tests/lab/friction_tables.h"
 #include "tests/lab/gnuplot.h"
 #include "tests/lab/json.h"
 #include "tests/lab/panels.h"
@@ -278,7 +279,11 @@ void paper(const PaperOptions& options, std::ostream& out) {
       pictures.insert(pictures.end(), drawn.begin(), drawn.end());
     }
   }
-  if (!options.json) {
+  const std::vector<FrictionTable> friction = friction_tables();
+  if (options.json) {
+    for (const FrictionTable& table : friction) out << to_json(table) << "\n";
+  } else {
+    write(out, friction);
     out << "\nK_op, largest force and share limited on the prescribed motion; vibration (rms faster than 50 ms, last "
            "second) and stable on a\nhand that is free to move (400 N/m, 0.3 N s/m). Stable: at most 8 mm/s.\n";
     for (const auto& picture : pictures) out << "picture: " << picture.string() << "\n";
