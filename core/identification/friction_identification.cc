@@ -196,6 +196,18 @@ void warn(Identification& result) {
 
 }  // namespace
 
+std::string_view to_string(Trust trust) noexcept {
+  switch (trust) {
+    case Trust::kIntegral:
+      return "integral";
+    case Trust::kBoth:
+      return "both";
+    case Trust::kNeither:
+      return "neither";
+  }
+  return "unknown";
+}
+
 Identification identify_friction(std::span<const RampRun> runs, const IdentificationConfig& config) {
   if (runs.empty()) throw std::invalid_argument("expected one run or more, found none");
   Identification result;

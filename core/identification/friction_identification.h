@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/friction.h"
@@ -42,6 +43,9 @@ enum class Trust {
   kBoth,      ///< it passed, and the two agree: the lesser of the two is published
   kNeither,   ///< it passed, and they do not agree: the mass may be wrong; the lesser is published
 };
+
+/// "integral", "both" or "neither".
+std::string_view to_string(Trust trust) noexcept;
 
 struct Identification {
   std::vector<RunEstimate> runs;      ///< in the order given

@@ -51,12 +51,12 @@ std::optional<std::string> parse(std::string_view line, std::span<double> cells)
   return "expected " + std::to_string(cells.size()) + " cells, got " + std::to_string(n);
 }
 
-Row row_of(std::span<const double> cells, int axes) {
+Row row_of(std::span<const double> cells, std::size_t axes) {
   Row row;
   row.t = cells[0];
-  for (int i = 0; i < axes; ++i) {
-    row.position[i] = cells[static_cast<std::size_t>(1 + i)];
-    row.wanted[i] = cells[static_cast<std::size_t>(1 + axes + i)];
+  for (std::size_t i = 0; i < axes; ++i) {
+    row.position[static_cast<Eigen::Index>(i)] = cells[1 + i];
+    row.wanted[static_cast<Eigen::Index>(i)] = cells[1 + axes + i];
   }
   return row;
 }
@@ -113,7 +113,7 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
   int bad = 0;
   for (std::size_t number_of_line = 2; read_line(in, line); ++number_of_line) {
     auto wrong = parse(line, cells);
-    const Row row = row_of(cells, format->axes);
+    const Row row = row_of(cells, static_cast<std::size_t>(format->axes));
     if (!wrong && before && row.t <= before->t) wrong = "time does not go on";
     if (wrong) {
       errors << "line " << number_of_line << ": " << *wrong << "\n";

@@ -15,18 +15,6 @@ constexpr double kMass = 0.075;         // kg
 constexpr double kEncoderStep = 30e-6;  // m
 constexpr std::uint64_t kSeed = 1;
 
-const char* name(Trust trust) {
-  switch (trust) {
-    case Trust::kIntegral:
-      return "integral";
-    case Trust::kBoth:
-      return "both";
-    case Trust::kNeither:
-      return "neither";
-  }
-  return "";
-}
-
 }  // namespace
 
 std::vector<FrictionTable> friction_tables() {
@@ -55,7 +43,8 @@ void write(std::ostream& out, const std::vector<FrictionTable>& tables) {
     std::array<char, 160> line{};
     std::snprintf(line.data(), line.size(), "%20.3f %9.4f %12.4f %10.4f %13.3f %11.4f %14.4f   %s\n",
                   table.truth.viscous, place.kelly.viscous, place.integral.viscous, table.found.lower_bound.viscous,
-                  table.truth.coulomb, place.kelly.coulomb, place.integral.coulomb, name(table.found.trust));
+                  table.truth.coulomb, place.kelly.coulomb, place.integral.coulomb,
+                  std::string(to_string(table.found.trust)).c_str());
     out << line.data() << "       " << table.found.reason << "\n";
   }
   out << "     assumed: Tables II and III are lost; ramps, travel, encoder and noise are control.md 2's\n";
@@ -73,7 +62,7 @@ std::string to_json(const FrictionTable& table) {
       .add("fc_kelly_n", place.kelly.coulomb)
       .add("fc_integral_n", place.integral.coulomb)
       .add("fc_at_least_n", table.found.lower_bound.coulomb)
-      .add("trust", name(table.found.trust))
+      .add("trust", to_string(table.found.trust))
       .add("reason", table.found.reason)
       .add("seed", table.seed)
       .add("scene", "ramps of 0.05, 0.1, 0.5 N/s, 5 each way, 0.25 m, 75 g, 30 um, 5 mN")

@@ -84,7 +84,8 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
     const Panel& panel = panels[p];
     const double left = p % 2 == 0 ? 0.045 : 0.545;
     const double right = left + 0.435;
-    const double top = kHeading + static_cast<double>(p / 2) * kRow + 74;
+    const std::size_t row = p / 2;
+    const double top = kHeading + static_cast<double>(row) * kRow + 74;
     out << "set lmargin at screen " << left << "\nset rmargin at screen " << right << "\nset tmargin at screen "
         << up(top) << "\nset bmargin at screen " << up(top + kRow - 144) << "\n";
     out << "set label " << literal(panel.title) << " at screen " << left << "," << up(top - 54)

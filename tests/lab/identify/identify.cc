@@ -119,18 +119,6 @@ std::string rounded_down(double value) {
                    std::floor(value / unit) * unit);
 }
 
-std::string_view name_of(Trust trust) {
-  switch (trust) {
-    case Trust::kIntegral:
-      return "integral";
-    case Trust::kBoth:
-      return "both";
-    case Trust::kNeither:
-      return "neither";
-  }
-  return "?";
-}
-
 void write_table(const Source& source, const Identification& result, std::ostream& out) {
   std::size_t width = 3;
   for (const std::string& name : source.names) width = std::max(width, name.size());
@@ -155,7 +143,7 @@ void write_table(const Source& source, const Identification& result, std::ostrea
   }
   out << formatted("mass %.4f kg%s, force noise %.2g N\n\n", result.mass, source.config.mass ? " (given)" : " (fitted)",
                    result.force_noise)
-      << "Trusted: " << name_of(result.trust) << ". " << result.reason << ".\n";
+      << "Trusted: " << to_string(result.trust) << ". " << result.reason << ".\n";
   for (const std::string& warning : result.warnings) out << "Warning: " << warning << ".\n";
   out << "\n# Lower bounds (3 standard deviations) for a scene:\n[limiter]\ncoulomb_friction_n = "
       << rounded_down(result.lower_bound.coulomb)
@@ -199,7 +187,7 @@ void write_json(const Source& source, const Identification& result, std::ostream
         << pair("kelly_", run.kelly.friction)
         << ",\"kelly_long_enough\":" << (run.kelly.long_enough() ? "true" : "false") << "}\n";
   }
-  out << "{\"result\":" << quoted(name_of(result.trust)) << ",\"reason\":" << quoted(result.reason) << ','
+  out << "{\"result\":" << quoted(to_string(result.trust)) << ",\"reason\":" << quoted(result.reason) << ','
       << pair("estimate_", result.estimate) << ',' << pair("lower_bound_", result.lower_bound)
       << ",\"mass_kg\":" << number(result.mass) << ",\"force_noise_n\":" << number(result.force_noise)
       << ",\"warnings\":[";
