@@ -8,6 +8,7 @@
 #include <deque>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/stability/passivity_boundary.h"
@@ -58,18 +59,34 @@ Point point(const SampledSpring& spring) {
           largest_passive_stiffness(spring)};
 }
 
+/// What SimulatedDevice does below and above the boundary: the map over which the curves are drawn.
+std::pair<Curve, Curve> field(const std::vector<Point>& points, double (*x)(const SampledSpring&)) {
+  Curve rests{.name = "comes to rest", .colour = kSky, .style = Curve::Style::kPoints};
+  Curve swings{.name = "swings up", .colour = kOrange, .style = Curve::Style::kPoints};
+  for (const Point& p : points) {
+    SampledSpring spring = p.spring;
+    for (int i = -6; i <= 6; ++i) {  // a quarter to four times the exact limit
+      spring.stiffness = p.eigenvalues * std::pow(4, i / 6.0);
+      (grows(spring) ? swings : rests).points.emplace_back(x(spring), spring.stiffness);
+    }
+  }
+  return {rests, swings};
+}
+
 Panel panel(const std::string& title, const std::string& label, const std::vector<Point>& points,
             double (*x)(const SampledSpring&)) {
   Panel result{.title = title, .x_label = label, .log_x = true, .log_y = true};
+  const auto [rests, swings] = field(points, x);
+  result.curves = {rests, swings};
   const auto curve = [&](const char* name, const char* colour, double Point::*member, Curve::Style style) {
     Curve drawn{.name = name, .colour = colour, .style = style};
     for (const Point& p : points) drawn.points.emplace_back(x(p.spring), p.*member);
     result.curves.push_back(drawn);
   };
   curve("eigenvalues", kBlue, &Point::eigenvalues, Curve::Style::kLine);
-  curve("(b + B)/(T/2 + t_d)", kOrange, &Point::linear, Curve::Style::kDashed);
+  curve("(b + B)/(T/2 + t_d)", kPurple, &Point::linear, Curve::Style::kDashed);
   curve("passive (Colgate)", kGreen, &Point::passive, Curve::Style::kLine);
-  curve("simulated", kVermilion, &Point::simulated, Curve::Style::kPoints);
+  curve("simulated limit", kVermilion, &Point::simulated, Curve::Style::kPoints);
   return result;
 }
 
