@@ -143,8 +143,7 @@ int main(int argc, char** argv) {
     Scene scene = read_scene(scene_file);
     if (!record.empty()) scene.recording = record;
     if (!listen.empty()) scene.network.listen = parse_address(listen);
-    if (without_limiter)
-      scene.loop.control.limiter = {.law = Law::kNone, .longest_hold = scene.loop.control.limiter.longest_hold};
+    if (without_limiter) scene.loop.control.limiter.law = Law::kNone;
     return run(std::move(scene), duration_s, json);
   } catch (const std::exception& problem) {
     log::error(problem.what());

@@ -238,7 +238,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     result.reasons = Reason::kNotFinite;
   } else if (parts_.knee) {
     const double start = parts_.knee->start;
-    if (scale * start < 1) {
+    if (size > 0 && scale * start < 1) {
       const double excess = (1 / scale - start) / (1 - start);  // ∞ when nothing is permitted: tanh is 1
       result.force = force * (scale * (start + (1 - start) * std::tanh(excess)));
       result.reasons = Reason::kEnergy;

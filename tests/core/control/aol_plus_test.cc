@@ -398,6 +398,13 @@ TEST(AolPlus, TheKneeIsSmoothNeverAboveTheBoundAndSparesTheFirstEightyPercent) {
   }
 }
 
+TEST(AolPlus, WhereNothingIsWantedNothingIsLimited) {
+  auto config = one_axis(0.26, 0);
+  config.parts.knee.emplace();
+  AolPlus<1> law(config);
+  EXPECT_TRUE(law.limit({.force = Vec<1>(0)}).reasons.empty());
+}
+
 TEST(AolPlus, WithBoundedAccelerationADeviceWithoutDampingCanShowAStiffWall) {
   const auto pushed = [](bool bounded) {
     auto config = one_axis(0.005, 0.04);
