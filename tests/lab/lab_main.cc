@@ -79,6 +79,7 @@ struct FilterArguments {
   bool energy_cap = false;
   bool knee = false;
   double encoder_um = 0;
+  int latency_reserve = 0;
   double acceleration = 0;
   double shaping = 0.3;
 };
@@ -103,6 +104,9 @@ void add_filter(CLI::App& app, FilterArguments& arguments, int& exit) {
   verb->add_flag("--knee", arguments.knee, "part of aol+: compress forces near the bound instead of clipping them");
   verb->add_option("--encoder-um", arguments.encoder_um,
                    "part of aol+: robust ledger for counts of so many micrometres");
+  verb->add_option("--latency-reserve", arguments.latency_reserve,
+                   "part of aol+: hold back the friction of so many intervals")
+      ->check(CLI::PositiveNumber);
   verb->add_option("--acceleration", arguments.acceleration,
                    "part of aol+: the hand never accelerates by more than this, m/s^2");
   verb->add_option("--shaping-b", arguments.shaping, "… and the bound is kept below that of this friction, N s/m")
@@ -125,6 +129,7 @@ void add_filter(CLI::App& app, FilterArguments& arguments, int& exit) {
     if (arguments.energy_cap) limiter.parts.energy_cap.emplace();
     if (arguments.knee) limiter.parts.knee.emplace();
     if (arguments.encoder_um > 0) limiter.parts.robust_ledger.emplace().encoder_step = {arguments.encoder_um * 1e-6};
+    if (arguments.latency_reserve > 0) limiter.parts.latency_reserve.emplace().holds = arguments.latency_reserve;
     if (arguments.acceleration > 0) {
       auto& bounded = limiter.parts.bounded_acceleration.emplace();
       bounded.most = {arguments.acceleration};
