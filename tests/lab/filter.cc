@@ -81,7 +81,9 @@ std::vector<std::string_view> names(std::string_view header) {
   }
 }
 
-bool read_line(std::istream& in, std::string& line) {
+/// The next line. Before it waits for one, `out` is flushed: someone may be waiting at the other end of the pipe.
+bool read_line(std::istream& in, std::ostream& out, std::string& line) {
+  if (in.rdbuf()->in_avail() <= 0) out.flush();
   if (!std::getline(in, line)) return false;
   if (!line.empty() && line.back() == '\r') line.pop_back();
   return true;
@@ -92,7 +94,7 @@ bool read_line(std::istream& in, std::string& line) {
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors) {
   std::string line;
   const Format* format = nullptr;
-  if (read_line(in, line)) {
+  if (read_line(in, out, line)) {
     for (const Format& known : kFormats) {
       if (line == known.header) format = &known;
     }
@@ -111,7 +113,7 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
   std::optional<Row> before;
   Vec3 applied = Vec3::Zero();
   int bad = 0;
-  for (std::size_t number_of_line = 2; read_line(in, line); ++number_of_line) {
+  for (std::size_t number_of_line = 2; read_line(in, out, line); ++number_of_line) {
     auto wrong = parse(line, cells);
     const Row row = row_of(cells, static_cast<std::size_t>(format->axes));
     if (!wrong && before && row.t <= before->t) wrong = "time does not go on";
@@ -145,7 +147,6 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
       for (int i = 0; i < format->axes; ++i) out << "," << number(applied[i]);
       out << "," << number(limited.permitted) << "," << number(energy) << "," << reasons_cell(reasons) << "\n";
     }
-    if (in.rdbuf()->in_avail() <= 0) out.flush();  // someone may be waiting at the other end of the pipe
   }
   if (!out.flush()) throw std::runtime_error("cannot write the result: is the disk full?");
   return bad;

@@ -136,7 +136,7 @@ void add_filter(CLI::App& app, FilterArguments& arguments, int& exit) {
       bounded.shaping_viscous = {arguments.shaping};
     }
     std::ios::sync_with_stdio(false);
-    std::cin.tie(nullptr);  // filter() flushes when nothing more waits to be read, not for every row
+    std::cin.tie(nullptr);  // filter() flushes when nothing waits to be read, not for every row
     if (filter(arguments.options, std::cin, std::cout, std::cerr) > 0) exit = kFailed;
   });
 }
