@@ -26,7 +26,7 @@
 #include "server/doorbell.h"
 #include "server/udp_link.h"
 #include "tests/injector/proxy.h"
-#include "tests/injector/release_error.h"
+#include "tests/injector/duration_histogram.h"
 
 namespace tendon::injector {
 namespace {
@@ -273,7 +273,7 @@ class Runner {
 
   std::string direction_json(Direction direction) const {
     const ProxyCounters& n = proxy_.counters(direction);
-    const ReleaseError& error = release_errors_[static_cast<std::size_t>(direction)];
+    const DurationHistogram& error = release_errors_[static_cast<std::size_t>(direction)];
     std::ostringstream out;
     out << R"({"received":)" << n.received << R"(,"forwarded":)" << n.forwarded << R"(,"lost":)" << n.lost
         << R"(,"duplicated":)" << n.duplicated << R"(,"refused":)" << n.refused << R"(,"release_error_us":{"p50":)"
@@ -284,7 +284,7 @@ class Runner {
 
   std::string direction_text(Direction direction) const {
     const ProxyCounters& n = proxy_.counters(direction);
-    const ReleaseError& error = release_errors_[static_cast<std::size_t>(direction)];
+    const DurationHistogram& error = release_errors_[static_cast<std::size_t>(direction)];
     std::ostringstream out;
     out << n.received << " in, " << n.forwarded << " forwarded, " << n.lost << " lost, " << n.duplicated
         << " duplicated, " << n.refused << " refused; released late by p50 " << us(error.quantile(0.5)) << ", p99 "
@@ -311,7 +311,7 @@ class Runner {
                 << " down " << std::flush;
     }
     if (event == "end") {
-      for (const ReleaseError& error : release_errors_) {
+      for (const DurationHistogram& error : release_errors_) {
         if (error.quantile(0.99) <= kAlarmingReleaseError) continue;
         log("warning: one datagram in a hundred left more than 1 ms late, so the network was not the one asked for");
         break;
@@ -326,7 +326,7 @@ class Runner {
   Doorbell stop_bell_;
   std::vector<std::byte> buffer_;
   std::vector<pollfd> fds_;
-  std::array<ReleaseError, 2> release_errors_;  // by Direction
+  std::array<DurationHistogram, 2> release_errors_;  // by Direction
   std::uint64_t closed_send_failures_ = 0;
   LocalTime start_{};
   bool stderr_is_terminal_ = ::isatty(STDERR_FILENO) == 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/injector/release_error.h"
+#include "tests/injector/duration_histogram.h"
 
 #include <algorithm>
 #include <bit>
@@ -22,14 +22,24 @@ std::uint64_t upper_edge(std::size_t bucket) noexcept {
 
 }  // namespace
 
-void ReleaseError::observe(Duration error) noexcept {
-  const Duration late = std::max(error, Duration::zero());
-  ++buckets_[bucket_of(static_cast<std::uint64_t>(late.count()))];
+void DurationHistogram::observe(Duration length) noexcept {
+  const Duration positive = std::max(length, Duration::zero());
+  ++buckets_[bucket_of(static_cast<std::uint64_t>(positive.count()))];
   ++count_;
-  max_ = std::max(max_, late);
+  max_ = std::max(max_, positive);
 }
 
-Duration ReleaseError::quantile(double q) const noexcept {
+DurationHistogram DurationHistogram::since(const DurationHistogram& earlier) const noexcept {
+  DurationHistogram result;
+  for (std::size_t i = 0; i < kBuckets; ++i) {
+    result.buckets_[i] = buckets_[i] - earlier.buckets_[i];
+    result.count_ += result.buckets_[i];
+    if (result.buckets_[i] > 0) result.max_ = std::min(max_, Duration(static_cast<std::int64_t>(upper_edge(i))));
+  }
+  return result;
+}
+
+Duration DurationHistogram::quantile(double q) const noexcept {
   const double wanted = q * static_cast<double>(count_);
   std::uint64_t seen = 0;
   for (std::size_t i = 0; i < kBuckets; ++i) {
