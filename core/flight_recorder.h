@@ -1,24 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <atomic>
+#include <bit>
 #include <cstddef>
+#include <memory>
+#include <stdexcept>
 
 namespace tendon {
 
-/// Keeps the last N values of a loop that must not stop to write anything down. A fault freezes it;
-/// then another thread can read what led to the fault, at leisure, and thaw it.
+/// Keeps the last values of a loop that must not stop to write anything down. A fault freezes it;
+/// then another thread can read what led to the fault, at leisure, and thaw it. Memory is taken when it is made,
+/// and never again.
 ///
 /// Thread-safe: one thread records and freezes; another reads and thaws, only while it is frozen.
 /// Realtime-safe when copying T is.
-template <typename T, std::size_t N>
+template <typename T>
 class FlightRecorder {
  public:
+  /// Keeps the last `capacity` values. Throws std::invalid_argument unless it is a power of two.
+  explicit FlightRecorder(std::size_t capacity) : values_(std::make_unique<T[]>(capacity)), capacity_(capacity) {
+    if (!std::has_single_bit(capacity)) {
+      throw std::invalid_argument("capacity of a flight recorder must be a power of two");
+    }
+  }
+
   /// Recording thread. Does nothing while frozen.
   void record(const T& value) {
     if (frozen()) return;
-    values_[count_ % N] = value;
+    values_[count_ & (capacity_ - 1)] = value;
     ++count_;
   }
 
@@ -33,14 +43,17 @@ class FlightRecorder {
     frozen_.store(false, std::memory_order_release);
   }
 
-  /// How many values are kept, at most N. Only while frozen (or on the recording thread).
-  std::size_t size() const noexcept { return count_ < N ? count_ : N; }
+  /// How many values are kept, at most the capacity. Only while frozen (or on the recording thread).
+  std::size_t size() const noexcept { return count_ < capacity_ ? count_ : capacity_; }
 
   /// The i-th oldest kept value, i < size(). Only while frozen (or on the recording thread).
-  const T& operator[](std::size_t i) const noexcept { return values_[count_ < N ? i : (count_ + i) % N]; }
+  const T& operator[](std::size_t i) const noexcept {
+    return values_[count_ < capacity_ ? i : (count_ + i) & (capacity_ - 1)];
+  }
 
  private:
-  std::array<T, N> values_{};
+  std::unique_ptr<T[]> values_;
+  std::size_t capacity_;
   std::size_t count_ = 0;
   std::atomic<bool> frozen_{false};
 };

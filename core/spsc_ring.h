@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <atomic>
+#include <bit>
 #include <cstddef>
+#include <memory>
+#include <stdexcept>
 
 namespace tendon {
 
@@ -11,21 +13,36 @@ namespace tendon {
 /// too slow, `try_push` says so and the value is not taken. For what must not be lost unnoticed: steps
 /// and datagrams on their way to the recording, commands to the haptic thread.
 ///
-/// Holds up to N values; N is a power of two.
+/// Memory is taken when it is made, and never again.
 ///
 /// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
-template <typename T, std::size_t N>
+template <typename T>
 class SpscRing {
-  static_assert(N > 0 && (N & (N - 1)) == 0, "N must be a power of two");
   static_assert(std::atomic<std::size_t>::is_always_lock_free);
 
  public:
+  /// Holds up to `capacity` values. Throws std::invalid_argument unless it is a power of two.
+  explicit SpscRing(std::size_t capacity) : slots_(std::make_unique<T[]>(capacity)), mask_(capacity - 1) {
+    if (!std::has_single_bit(capacity)) throw std::invalid_argument("capacity of a ring must be a power of two");
+  }
+
+  /// Writer only: the place of the next value, or null when the ring is full. What is in it is some earlier value;
+  /// nobody else sees it until `push`. For values so large that they are written in place.
+  T* back() {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;
+    return &slots_[head & mask_];
+  }
+
+  /// Writer only, and only after `back` was not null.
+  void push() { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+
   /// Writer only. False, and nothing is taken, when the ring is full.
   bool try_push(const T& value) {
-    const std::size_t head = head_.load(std::memory_order_relaxed);
-    if (head - tail_.load(std::memory_order_acquire) == N) return false;
-    slots_[head % N] = value;
-    head_.store(head + 1, std::memory_order_release);
+    T* const slot = back();
+    if (slot == nullptr) return false;
+    *slot = value;
+    push();
     return true;
   }
 
@@ -33,14 +50,15 @@ class SpscRing {
   const T* front() const {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail == head_.load(std::memory_order_acquire)) return nullptr;
-    return &slots_[tail % N];
+    return &slots_[tail & mask_];
   }
 
   /// Reader only, and only after `front` was not null.
   void pop() { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
  private:
-  std::array<T, N> slots_{};
+  std::unique_ptr<T[]> slots_;
+  std::size_t mask_;
   alignas(64) std::atomic<std::size_t> head_{0};  ///< next to write
   alignas(64) std::atomic<std::size_t> tail_{0};  ///< next to read
 };

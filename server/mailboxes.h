@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/flight_recorder.h"
@@ -28,15 +29,26 @@ enum class HapticOrder : std::uint8_t {
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
 ///     network ─datagrams▶ log        all of them; what does not fit is counted
 ///
-/// Large (some 9 MB): make it on the heap, before the loops run.
+/// Takes its memory when it is made, before the loops run: some 14 MB with the default capacities.
 struct Mailboxes {
+  /// In values; powers of two.
+  struct Capacities {
+    std::size_t steps = 16384;  ///< 16 s at 1 kHz: the log thread may wait that long for a slow disk
+    std::size_t flight = 2048;  ///< the last 2 s at 1 kHz
+    std::size_t datagrams = 4096;
+  };
+
+  explicit Mailboxes(const Capacities& capacities)
+      : steps(capacities.steps), flight(capacities.flight), datagrams(capacities.datagrams) {}
+  Mailboxes() : Mailboxes(Capacities{}) {}
+
   Latest<RemoteForce> force;
-  SpscRing<HapticOrder, 16> orders;
+  SpscRing<HapticOrder> orders{16};
   Latest<DeviceState> state;
-  SpscRing<StepRecord, 16384> steps;  ///< 16 s at 1 kHz: the log thread may wait that long for a slow disk
+  SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
-  FlightRecorder<StepRecord, 2048> flight;  ///< the last 2 s at 1 kHz
-  SpscRing<DatagramRecord, 4096> datagrams;
+  FlightRecorder<StepRecord> flight;
+  SpscRing<DatagramRecord> datagrams;
   std::atomic<std::uint64_t> datagrams_lost{0};
 };
 

@@ -265,12 +265,17 @@ void NetworkLoop::send(LocalTime now, const Address& to, std::span<const std::by
 
 void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer,
                       std::span<const std::byte> datagram, std::size_t size) {
-  tapped_.at = now;
-  tapped_.direction = direction;
-  tapped_.peer = peer;
-  tapped_.size = static_cast<std::uint32_t>(std::min<std::size_t>(size, std::numeric_limits<std::uint32_t>::max()));
-  std::copy(datagram.begin(), datagram.end(), tapped_.bytes.begin());
-  if (!mail_.datagrams.try_push(tapped_)) mail_.datagrams_lost.fetch_add(1, std::memory_order_relaxed);
+  DatagramRecord* const record = mail_.datagrams.back();
+  if (record == nullptr) {
+    mail_.datagrams_lost.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  record->at = now;
+  record->direction = direction;
+  record->peer = peer;
+  record->size = static_cast<std::uint32_t>(std::min<std::size_t>(size, std::numeric_limits<std::uint32_t>::max()));
+  std::copy(datagram.begin(), datagram.end(), record->bytes.begin());
+  mail_.datagrams.push();
 }
 
 void NetworkLoop::notice(bool warning, std::string text) {

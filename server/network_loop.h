@@ -108,7 +108,6 @@ class NetworkLoop {
   Doorman doorman_;
   std::vector<Guest> guests_;
   std::uint32_t next_connection_id_;
-  DatagramRecord tapped_;  ///< kept: 1200 bytes
 
   /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.
   struct Sampled {

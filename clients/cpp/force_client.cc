@@ -141,7 +141,7 @@ void ForceClient::end(LocalTime now, Phase phase, Code code, std::string reason)
 /// True when there may be more in the link.
 bool ForceClient::drain(LocalTime now) {
   // One byte more than the largest datagram: one that is too large stays too large after the cut.
-  std::array<std::byte, kMaxDatagram + 1> buffer{};
+  std::array<std::byte, kMaxDatagram + 1> buffer;
   for (int i = 0; i < config_.max_datagrams; ++i) {
     Address from;
     const std::size_t size = link_.receive(from, buffer);
@@ -194,7 +194,7 @@ void ForceClient::take_events(LocalTime now) {
 }
 
 void ForceClient::flush(LocalTime now) {
-  std::array<std::byte, kMaxDatagram> buffer{};
+  std::array<std::byte, kMaxDatagram> buffer;
   const auto next = [&] {
     if (session_) return session_->next_datagram(now, buffer);
     if (handshake_) return handshake_->next_datagram(now, buffer);

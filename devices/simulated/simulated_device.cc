@@ -49,6 +49,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
     expect(*config_.watchdog > Duration::zero(), "watchdog", seconds(*config_.watchdog),
            "a duration above 0 s (left out when there is none)");
   }
+  expect(config_.max_substep > Duration::zero(), "max_substep", seconds(config_.max_substep), "a duration above 0 s");
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
 
@@ -103,7 +104,7 @@ void SimulatedDevice::advance(Duration gap) noexcept {
 
 void SimulatedDevice::integrate(Duration span) noexcept {
   if (span <= Duration::zero()) return;
-  const auto substeps = (span + kMaxSubstep - Duration(1)) / kMaxSubstep;
+  const auto substeps = (span + config_.max_substep - Duration(1)) / config_.max_substep;
   const double h = seconds(span) / static_cast<double>(substeps);
   const double begin = seconds(lived_);
   lived_ += span;
@@ -113,9 +114,14 @@ void SimulatedDevice::integrate(Duration span) noexcept {
   if (config_.viscous_friction) resistance += h / 2 * *config_.viscous_friction;
   if (hand_) resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
 
+  Lag lag;
+  if (config_.amplifier_bandwidth) {
+    lag.h_over_tau = h * 2 * std::numbers::pi * *config_.amplifier_bandwidth;
+    lag.reached = -std::expm1(-lag.h_over_tau);
+  }
   for (Duration::rep i = 0; i < substeps; ++i) {
     const Vec3 v0 = truth_.velocity;
-    truth_.device_force = force_over(h);
+    truth_.device_force = force_over(lag);
     Vec3 push = truth_.device_force;
     Vec3 drive;
     if (hand_) {
@@ -145,15 +151,13 @@ void SimulatedDevice::integrate(Duration span) noexcept {
   }
 }
 
-/// The mean force of the motors over the next h seconds: the command, or the exact mean of the first-order
+/// The mean force of the motors over the next substep: the command, or the exact mean of the first-order
 /// response to it.
-Vec3 SimulatedDevice::force_over(double h) noexcept {
+Vec3 SimulatedDevice::force_over(const Lag& lag) noexcept {
   if (!amplifier_force_) return command_;
-  const double h_over_tau = h * 2 * std::numbers::pi * *config_.amplifier_bandwidth;
-  const double reached = -std::expm1(-h_over_tau);  // 1 − e^(−h/τ)
   const Vec3 missing = command_ - *amplifier_force_;
-  *amplifier_force_ += missing * reached;
-  return command_ - missing * (reached / h_over_tau);
+  *amplifier_force_ += missing * lag.reached;
+  return command_ - missing * (lag.reached / lag.h_over_tau);
 }
 
 /// The hand's mass moves with the handle: what it has gained in kinetic energy did not go through the

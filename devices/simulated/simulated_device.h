@@ -23,7 +23,7 @@ namespace tendon {
 /// the same instant, that of the last `read`. Time that goes backwards moves nothing. Of a gap longer
 /// than kMaxGap only that much is lived through: to the simulated world, the rest did not happen.
 ///
-/// **Integration.** Substeps of equal length h ≤ kMaxSubstep; each is one implicit midpoint rule with
+/// **Integration.** Substeps of equal length h ≤ max_substep; each is one implicit midpoint rule with
 /// set-valued friction (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
 ///
 ///     m (v₁ − v₀)/h = F_device + F_hand − b v̄ − f_c sgn(v̄),      x₁ = x₀ + h v̄
@@ -68,6 +68,11 @@ class SimulatedDevice final : public Device {
     std::optional<Duration> watchdog;  ///< without an `apply` for so long the force is zero until the next one
 
     std::optional<OperatorHand::Config> hand;
+
+    /// > 0. 50 µs is 20 substeps per haptic period at 1 kHz. It puts the stiffness at which a sampled spring loses
+    /// stability (75 g, 1 kHz) within 1.4e-6 of the exact one at 0.26 N·s/m, and 2.8e-5 at 5. The error goes with the
+    /// square of this, the cost with its inverse; the balance of energy is exact for any.
+    Duration max_substep = std::chrono::microseconds(50);
   };
 
   /// What really happens, for tests: nothing in production may look at it.
@@ -80,11 +85,6 @@ class SimulatedDevice final : public Device {
     double kinetic_energy = 0;         ///< J, of the device alone (the hand's mass is the hand's)
     bool watchdog_fired = false;       ///< it took the force away during the last interval
   };
-
-  /// 50 µs is 20 substeps per haptic period at 1 kHz. It puts the stiffness at which a sampled spring loses
-  /// stability (75 g, 1 kHz) within 1.4e-6 of the exact one at 0.26 N·s/m, and 2.8e-5 at 5. The error goes
-  /// with the square of this, the cost with its inverse.
-  static constexpr Duration kMaxSubstep = std::chrono::microseconds(50);
 
   /// 10 s is far beyond any pause that a loop survives, and bounds what one `read` may cost (200 000
   /// substeps, some 10 ms).
@@ -105,9 +105,14 @@ class SimulatedDevice final : public Device {
   const Truth& truth() const noexcept { return truth_; }
 
  private:
+  /// Of the amplifier, over one substep of length h with the time constant τ.
+  struct Lag {
+    double reached = 1;     ///< 1 − e^(−h/τ)
+    double h_over_tau = 0;  ///< h/τ
+  };
   void advance(Duration gap) noexcept;
   void integrate(Duration span) noexcept;
-  Vec3 force_over(double h) noexcept;
+  Vec3 force_over(const Lag& lag) noexcept;
   void settle_energies() noexcept;
 
   Config config_;

@@ -7,7 +7,7 @@ namespace tendon {
 namespace {
 
 TEST(FlightRecorder, KeepsTheLastValuesOldestFirst) {
-  FlightRecorder<int, 4> recorder;
+  FlightRecorder<int> recorder(4);
   recorder.record(1);
   recorder.record(2);
   EXPECT_EQ(recorder.size(), 2U);
@@ -18,7 +18,7 @@ TEST(FlightRecorder, KeepsTheLastValuesOldestFirst) {
 }
 
 TEST(FlightRecorder, AFaultFreezesWhatLedToIt) {
-  FlightRecorder<int, 4> recorder;
+  FlightRecorder<int> recorder(4);
   for (int i = 1; i <= 6; ++i) recorder.record(i);
   recorder.freeze();
   recorder.record(99);

@@ -4,13 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <stdexcept>
 #include <thread>
 
 namespace tendon {
 namespace {
 
 TEST(SpscRing, GivesBackEverythingInOrder) {
-  SpscRing<int, 4> ring;
+  SpscRing<int> ring(4);
   EXPECT_EQ(ring.front(), nullptr);
   for (int round = 0; round < 3; ++round) {
     for (int i = 0; i < 4; ++i) EXPECT_TRUE(ring.try_push(i));
@@ -24,11 +25,27 @@ TEST(SpscRing, GivesBackEverythingInOrder) {
 }
 
 TEST(SpscRing, SaysSoWhenItIsFullAndKeepsWhatItHas) {
-  SpscRing<int, 2> ring;
+  SpscRing<int> ring(2);
   EXPECT_TRUE(ring.try_push(1));
   EXPECT_TRUE(ring.try_push(2));
   EXPECT_FALSE(ring.try_push(3));
   EXPECT_EQ(*ring.front(), 1);
+}
+
+TEST(SpscRing, AValueWrittenInPlaceIsNotThereBeforeItIsPushed) {
+  SpscRing<int> ring(2);
+  *ring.back() = 1;
+  EXPECT_EQ(ring.front(), nullptr);
+  ring.push();
+  ASSERT_NE(ring.front(), nullptr);
+  EXPECT_EQ(*ring.front(), 1);
+  EXPECT_TRUE(ring.try_push(2));
+  EXPECT_EQ(ring.back(), nullptr);
+}
+
+TEST(SpscRing, RefusesACapacityThatIsNoPowerOfTwo) {
+  EXPECT_THROW(SpscRing<int>(0), std::invalid_argument);
+  EXPECT_THROW(SpscRing<int>(3), std::invalid_argument);
 }
 
 TEST(SpscRing, BetweenThreadsNothingIsLostTornOrReordered) {
@@ -36,7 +53,7 @@ TEST(SpscRing, BetweenThreadsNothingIsLostTornOrReordered) {
     std::uint64_t a, b;
   };
   constexpr std::uint64_t kLast = 200000;
-  SpscRing<Pair, 64> ring;
+  SpscRing<Pair> ring(64);
   std::jthread writer([&ring] {
     for (std::uint64_t i = 1; i <= kLast;) {
       if (ring.try_push({i, ~i})) ++i;

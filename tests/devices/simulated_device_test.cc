@@ -162,7 +162,7 @@ TEST(CoulombFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
   // Braked by F + f_c until it stops, then pulled back by F − f_c. What is left of the 50 µs in which it turns
   // may have the wrong sign of friction; a pause of that length would cost 3 mm/s.
   const double m = 0.075;
-  const double error = 2 * 0.04 / m * seconds(SimulatedDevice::kMaxSubstep);
+  const double error = 2 * 0.04 / m * seconds(SimulatedDevice::Config{}.max_substep);
   for (const double v0 : {0.1, 0.1003, 0.1011, 0.1017, 0.1026}) {
     auto config = bare(m);
     config.coulomb_friction = 0.04;

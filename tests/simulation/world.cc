@@ -11,7 +11,13 @@ namespace tendon::simulation {
 namespace {
 
 /// The log thread's period.
-constexpr Duration kDrainPeriod = std::chrono::milliseconds(20);
+constexpr Duration kRecordPeriod = std::chrono::milliseconds(20);
+
+Mailboxes::Capacities capacities(const World::Config& config) {
+  Mailboxes::Capacities mail = config.mail;
+  if (config.record) mail.datagrams = Mailboxes::Capacities{}.datagrams;
+  return mail;
+}
 
 Address address_of(std::uint16_t port) {
   Address address;
@@ -117,7 +123,7 @@ World::World(const Config& config, Device& device)
       random_(config.seed),
       server_address_(address_of(47100)),
       network_(config.seed, config.to_server, config.from_server, server_address_),
-      mail_(std::make_unique<Mailboxes>()),
+      mail_(std::make_unique<Mailboxes>(capacities(config))),
       haptic_(config.loop, device, *mail_),
       network_loop_(
           [&] {
@@ -133,7 +139,7 @@ World::World(const Config& config, Device& device)
           network_.open(server_address_), *mail_),
       haptic_due_(now_),
       network_due_(now_),
-      drain_due_(now_) {
+      record_due_(config.record ? now_ : LocalTime::max()) {
   recorder_config_.scene.text = config.scene_text;
   recorder_config_.scene.seed = config.seed;
   recorder_config_.started = now_;
@@ -174,25 +180,33 @@ void World::step_haptic() {
   }
   if (config_.pause_probability > 0 && uniform() < config_.pause_probability) haptic_due_ = now_ + config_.pause;
   network_due_ = now_;  // the doorbell
+  drain_steps();
 }
 
-void World::drain() {
+void World::drain_steps() {
   while (const StepRecord* step = mail_->steps.front()) {
     if (watch_steps_) watch_steps_(*step);
     if (recorder_) recorder_->record(*step);
     mail_->steps.pop();
   }
+}
+
+void World::drain_datagrams() {
   while (const DatagramRecord* datagram = mail_->datagrams.front()) {
-    if (recorder_) recorder_->record(*datagram);
+    recorder_->record(*datagram);
     mail_->datagrams.pop();
   }
-  if (recorder_) recorder_->tick(now_);
+}
+
+void World::turn_server() {
+  network_due_ = std::max(network_loop_.turn(now_), now_ + Duration(1));
+  if (recorder_) drain_datagrams();
 }
 
 void World::run_for(Duration duration) {
   const LocalTime end = now_ + duration;
   for (;;) {
-    LocalTime next = std::min({haptic_due_, network_due_, drain_due_});
+    LocalTime next = std::min({haptic_due_, network_due_, record_due_});
     if (const auto arrival = network_.next_arrival()) next = std::min(next, *arrival);
     for (const Client& client : clients_) {
       if (client.client) next = std::min(next, client.due);
@@ -207,21 +221,19 @@ void World::run_for(Duration duration) {
       }
     }
     if (haptic_due_ <= now_) step_haptic();
-    if (network_due_ <= now_) network_due_ = std::max(network_loop_.turn(now_), now_ + Duration(1));
+    if (network_due_ <= now_) turn_server();
     for (Client& client : clients_) {
       if (client.client && client.due <= now_) client.due = std::max(client.client->turn(now_), now_ + Duration(1));
     }
-    if (drain_due_ <= now_) {
-      drain();
-      drain_due_ = now_ + kDrainPeriod;
+    if (record_due_ <= now_) {
+      recorder_->tick(now_);
+      record_due_ = now_ + kRecordPeriod;
     }
   }
   now_ = end;
-  drain();
 }
 
 const std::vector<std::byte>& World::finish_recording() {
-  drain();
   recorder_->close();
   return sink_.bytes();
 }

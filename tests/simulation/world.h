@@ -83,6 +83,8 @@ class World {
     Duration pause{};
     std::string scene_text;
     bool record = false;
+    /// Steps are taken out as they are made. Datagrams only go to a recording.
+    Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
 
     static injector::Profile bad();
@@ -100,7 +102,7 @@ class World {
   /// SIGKILL: it neither says Bye nor anything else, ever again.
   void kill(std::size_t handle);
 
-  /// Called with every haptic step, in order, at most 20 ms of virtual time after it.
+  /// Called with every haptic step, in order, at once.
   void watch_steps(std::function<void(const StepRecord&)> watch) { watch_steps_ = std::move(watch); }
 
   void run_for(Duration duration);
@@ -124,7 +126,9 @@ class World {
   };
   std::size_t add(const std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)>& make);
   void step_haptic();
-  void drain();
+  void turn_server();
+  void drain_steps();
+  void drain_datagrams();
   double uniform();
 
   Config config_;
@@ -137,7 +141,7 @@ class World {
   NetworkLoop network_loop_;
   LocalTime haptic_due_;
   LocalTime network_due_;
-  LocalTime drain_due_;
+  LocalTime record_due_;  ///< never, when nobody records
   std::vector<Client> clients_;
   std::function<void(const StepRecord&)> watch_steps_;
   MemorySink sink_;
