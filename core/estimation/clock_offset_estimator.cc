@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/estimation/clock_offset_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+double ns_between(LocalTime from, LocalTime to) noexcept { return static_cast<double>((to - from).count()); }
+
+}  // namespace
+
+ClockOffsetEstimator::ClockOffsetEstimator(double fastest_drift) : fastest_drift_(fastest_drift) {
+  if (!(fastest_drift >= 0 && fastest_drift <= 0.01)) {
+    throw std::invalid_argument("clock offset: fastest_drift must be within 0 to 0.01 s/s");
+  }
+}
+
+std::optional<ClockOffsetEstimator::Sample> ClockOffsetEstimator::sample_of(const ClockExchange& e) const noexcept {
+  const Duration ours = e.answered_at - e.sent;
+  const Duration theirs = e.answered - e.received;
+  if (ours < Duration::zero() || theirs < Duration::zero()) return std::nullopt;
+  Duration round_trip = ours - theirs;
+  // An answer held for long by a peer with a faster clock.
+  if (seconds(round_trip) < -fastest_drift_ * seconds(theirs)) return std::nullopt;
+  round_trip = std::max(round_trip, Duration::zero());
+  const std::int64_t there = (e.received.time_since_epoch() - e.sent.time_since_epoch()).count();
+  const std::int64_t back = (e.answered.time_since_epoch() - e.answered_at.time_since_epoch()).count();
+  return Sample{e.sent + ours / 2, there + (back - there) / 2, round_trip.count()};
+}
+
+template <class Visit>
+void ClockOffsetEstimator::for_each(Visit visit) const noexcept {
+  for (std::size_t i = 0; i < std::min(finished_, kBlocks); ++i) visit(blocks_[i]);
+  if (best_) visit(*best_);
+}
+
+ClockOffsetEstimator::Interval ClockOffsetEstimator::permitted(LocalTime at, std::int64_t reference) const noexcept {
+  Interval interval{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  for_each([&](const Sample& sample) {
+    // Both clocks may have moved against each other within the exchange, too.
+    const double slack =
+        static_cast<double>(sample.round_trip) / 2 +
+        fastest_drift_ * (std::abs(ns_between(sample.at, at)) + static_cast<double>(sample.round_trip));
+    const auto offset = static_cast<double>(sample.offset_ns - reference);
+    interval.low = std::max(interval.low, offset - slack);
+    interval.high = std::min(interval.high, offset + slack);
+  });
+  return interval;
+}
+
+void ClockOffsetEstimator::observe(const ClockExchange& exchange) noexcept {
+  const auto sample = sample_of(exchange);
+  if (!sample) return;
+
+  const Interval before = permitted(sample->at, sample->offset_ns);
+  const double slack = static_cast<double>(sample->round_trip) * (0.5 + fastest_drift_);
+  if (before.low > slack || before.high < -slack) {
+    ++steps_;
+    finished_ = 0;
+    best_.reset();
+  }
+
+  if (!best_) {
+    block_started_ = sample->at;
+    exchanges_ = 0;
+  }
+  if (!best_ || sample->round_trip < best_->round_trip) best_ = sample;
+  ++exchanges_;
+  if (exchanges_ >= kExchangesPerBlock && sample->at - block_started_ >= kLeastBlock) {
+    blocks_[finished_++ % kBlocks] = *best_;
+    best_.reset();
+  }
+}
+
+std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(LocalTime at) const noexcept {
+  std::int64_t least = std::numeric_limits<std::int64_t>::max();
+  const Sample* anchor = nullptr;
+  for_each([&](const Sample& sample) {
+    if (sample.round_trip >= least) return;
+    least = sample.round_trip;
+    anchor = &sample;
+  });
+  if (anchor == nullptr) return std::nullopt;
+
+  // Everything relative to the best sample: offsets themselves may be beyond what a double holds to the nanosecond.
+  double weights = 0;
+  double sum_t = 0;
+  double sum_o = 0;
+  const auto weight = [&](const Sample& sample) {
+    return 1 / static_cast<double>(kResolution.count() + sample.round_trip - least);
+  };
+  for_each([&](const Sample& sample) {
+    weights += weight(sample);
+    sum_t += weight(sample) * ns_between(anchor->at, sample.at);
+    sum_o += weight(sample) * static_cast<double>(sample.offset_ns - anchor->offset_ns);
+  });
+  const double mean_t = sum_t / weights;
+  const double mean_o = sum_o / weights;
+  double tt = 0;
+  double to = 0;
+  for_each([&](const Sample& sample) {
+    const double t = ns_between(anchor->at, sample.at) - mean_t;
+    tt += weight(sample) * t * t;
+    to += weight(sample) * t * static_cast<double>(sample.offset_ns - anchor->offset_ns);
+  });
+  const double drift = tt > 0 ? std::clamp(to / tt, -fastest_drift_, fastest_drift_) : 0;
+
+  const Interval interval = permitted(at, anchor->offset_ns);
+  const double line = mean_o + drift * (ns_between(anchor->at, at) - mean_t);
+  // Not std::clamp: samples that contradict each other (a step not noticed yet) leave an empty interval.
+  const double offset = std::max(interval.low, std::min(interval.high, line));
+  const double bound = std::max({offset - interval.low, interval.high - offset, 0.0});
+  return Estimate{.offset = Duration(anchor->offset_ns + std::llround(offset)),
+                  .drift = drift,
+                  .error_bound = Duration(std::llround(std::ceil(bound))),
+                  .least_round_trip = Duration(least)};
+}
+
+}  // namespace tendon
