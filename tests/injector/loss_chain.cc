@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace tendon::injector {
@@ -70,6 +71,33 @@ LossChain LossChain::gilbert(double p, double r, double loss_in_bad, double loss
 LossChain LossChain::four_state(double p13, double p31, double p32, double p23, double p14) {
   return {{{1 - p13 - p14, 0, p13, p14}, {0, 1 - p23, p23, 0}, {p31, p32, 1 - p31 - p32, 0}, {1, 0, 0, 0}},
           {0, 0, 1, 1}};
+}
+
+LossChain LossChain::regimes(const std::vector<double>& dwell, double period, std::vector<double> loss) {
+  const std::size_t n = dwell.size();
+  // exp(A) = exp(A / 2ᵏ)^(2ᵏ), with so small an A / 2ᵏ that eight terms of the series are exact.
+  constexpr int kHalvings = 8;
+  std::vector<Row> rate(n, Row(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      rate[i][j] = std::ldexp(period / dwell[i], -kHalvings) * (i == j ? -1 : 1 / static_cast<double>(n - 1));
+    }
+  }
+  std::vector<Row> power(n, Row(n));
+  for (std::size_t i = 0; i < n; ++i) power[i][i] = 1;
+  std::vector<Row> step = power;
+  for (int term = 1; term <= 8; ++term) {
+    for (std::size_t i = 0; i < n; ++i) {
+      power[i] = times(power[i], rate);
+      for (std::size_t j = 0; j < n; ++j) step[i][j] += power[i][j] /= term;
+    }
+  }
+  for (int k = 0; k < kHalvings; ++k) {
+    std::vector<Row> square;
+    for (const Row& row : step) square.push_back(times(row, step));
+    step = square;
+  }
+  return {step, std::move(loss)};
 }
 
 std::vector<double> LossChain::shares() const {

@@ -27,6 +27,11 @@ struct LossChain {
   /// alone in a gap, after which always 1.
   static LossChain four_state(double p13, double p31, double p32, double p23, double p14);
 
+  /// A Markov chain in continuous time, looked at every `period`: state i lasts for an exponential time of mean
+  /// dwell[i], then each of the others follows with the same probability. step = exp(Q · period), exactly, with the
+  /// changes that happen between two looks.
+  static LossChain regimes(const std::vector<double>& dwell, double period, std::vector<double> loss);
+
   /// Shares of time in the states: π = π · step.
   std::vector<double> shares() const;
 

@@ -63,6 +63,20 @@ TEST(LossChain, FourStatesShareTheTimeAsTheClosedFormSays) {
   EXPECT_NEAR(shares[3], p14 * p23 * p31 / d, 1e-15);
 }
 
+// Two states: P(stay in 0) = π₀ + π₁ exp(−(a + b) t) for rates a out of 0 and b out of 1.
+TEST(LossChain, TwoRegimesLookedAtNowAndThenMeetTheirClosedForm) {
+  const auto chain = LossChain::regimes({50, 20}, 3, {0, 1});
+  EXPECT_NEAR(chain.step[0][0], 5.0 / 7 + 2.0 / 7 * std::exp(-3 * (1.0 / 50 + 1.0 / 20)), 1e-12);
+  EXPECT_NEAR(chain.rate(), 2.0 / 7, 1e-12);
+}
+
+TEST(LossChain, RegimesShareTheTimeByTheirDwellTimes) {
+  const auto shares = LossChain::regimes({50, 20, 5}, 1, {0, 0, 0}).shares();
+  EXPECT_NEAR(shares[0], 50.0 / 75, 1e-12);
+  EXPECT_NEAR(shares[1], 20.0 / 75, 1e-12);
+  EXPECT_NEAR(shares[2], 5.0 / 75, 1e-12);
+}
+
 TEST(LossChain, IndependentLossesHaveTheVarianceOfIndependentLosses) {
   EXPECT_NEAR(LossChain::bernoulli(0.03).variance_factor(), 1, 1e-12);
   // Gilbert: the indicator is the state, a two-state chain with eigenvalue λ = 1 − p − r: (1 + λ) / (1 − λ).
