@@ -323,7 +323,7 @@ std::vector<Finding> check(const std::vector<File>& tree) {
 }
 
 std::vector<File> read_tree(const std::filesystem::path& root) {
-  static const std::set<std::string> kMadeHere = {".git", ".cache", "build", "node_modules"};
+  static const std::set<std::string> kMadeHere = {".git", ".cache", "build", "dist", "node_modules"};
   std::vector<File> tree;
   for (auto entry = std::filesystem::recursive_directory_iterator(root); entry != std::filesystem::end(entry);
        ++entry) {
