@@ -84,10 +84,11 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
       {
           {"no argument", "tendon-inject", {}, {"--listen", "required"}},
           {"no server", "tendon-inject", {"--listen", "127.0.0.1:0"}, {"--to", "required"}},
-          {"loss of 150 %", "tendon-inject", with("--loss", "150%"), {"loss", "150%"}},
-          {"negative delay", "tendon-inject", with("--delay-ms", "-5"), {"delay", "-5"}},
-          {"jitter that is no number", "tendon-inject", with("--jitter-ms", "some"), {"--jitter-ms", "some"}},
-          {"no such histogram", "tendon-inject", with("--histogram", "none.csv"), {"none.csv"}},
+          {"loss of 150 %", "tendon-inject", with("--profile", "loss=150%"), {"--profile: loss", "150%"}},
+          {"negative delay", "tendon-inject", with("--up", "delay=-5ms"), {"--up: delay", "-5ms"}},
+          {"delay that is no number", "tendon-inject", with("--down", "delay=some"), {"--down: delay", "some"}},
+          {"no such histogram", "tendon-inject", with("--profile", "delay=histogram(none.csv)"), {"none.csv"}},
+          {"no such name", "tendon-inject", with("--profile", "wifi-ugly"), {"wifi-ugly", "wifi-bad"}},
           {"unknown option", "tendon-inject", with("--lose", "2%"), {"--lose"}},
       });
 }

@@ -2,14 +2,22 @@
 #include "tests/injector/injector.h"
 
 #include <algorithm>
+#include <cassert>
+#include <utility>
 
 namespace tendon::injector {
 namespace {
 
-__extension__ typedef unsigned __int128 Uint128;  // NOLINT(modernize-use-using): `using` cannot carry __extension__
+constexpr std::array<std::string_view, 3> kVerdicts = {"pass", "drop", "dup"};
+constexpr std::array<std::string_view, 12> kCauses = {"delay",  "queue",    "stall", "fifo",   "reorder", "queue-full",
+                                                      "outage", "handover", "rule",  "regime", "loss",    "replay"};
 
-constexpr double kTwo64 = 18446744073709551616.0;
-constexpr std::uint64_t kTwo63 = std::uint64_t{1} << 63;
+template <typename Enum, std::size_t n>
+std::optional<Enum> find(const std::array<std::string_view, n>& names, std::string_view text) noexcept {
+  const auto found = std::ranges::find(names, text);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<Enum>(found - names.begin());
+}
 
 const Profile& checked(const Profile& profile) {
   check(profile);
@@ -18,55 +26,197 @@ const Profile& checked(const Profile& profile) {
 
 }  // namespace
 
-// Scaling by 2⁶⁴ is exact: only the exponent changes.
-Injector::Chance::Chance(double probability)
-    : certain(probability >= 1), below(certain ? 0 : static_cast<std::uint64_t>(probability * kTwo64)) {}
+std::string_view to_string(Verdict verdict) noexcept { return kVerdicts[static_cast<std::size_t>(verdict)]; }
+std::string_view to_string(Cause cause) noexcept { return kCauses[static_cast<std::size_t>(cause)]; }
+std::optional<Verdict> parse_verdict(std::string_view text) noexcept { return find<Verdict>(kVerdicts, text); }
+std::optional<Cause> parse_cause(std::string_view text) noexcept { return find<Cause>(kCauses, text); }
 
-std::vector<Injector::Piece> Injector::inverse_cdf(const Profile& profile) {
-  const auto ns = [](Duration d) { return static_cast<std::uint64_t>(d.count()); };
-  const std::vector<Profile::Bin>& bins = profile.histogram;
-  if (bins.empty()) return {{kTwo63, (profile.delay - profile.jitter).count(), 2 * ns(profile.jitter) + 1}};
-
-  double total = 0;
-  for (const Profile::Bin& bin : bins) total += bin.weight;
-  std::vector<Piece> pieces;
-  double sum = 0;
-  std::uint64_t width_ns = 1;
-  for (std::size_t i = 0; i < bins.size(); ++i) {
-    if (i + 1 < bins.size()) width_ns = ns(bins[i + 1].lower - bins[i].lower);
-    sum += bins[i].weight;
-    if (bins[i].weight == 0) continue;
-    const auto below = static_cast<std::uint64_t>(sum / total * static_cast<double>(kTwo63));
-    pieces.push_back({below, (profile.delay + bins[i].lower).count(), width_ns});
+Injector::Network::Network(const Profile& p)
+    : profile(checked(p)),
+      delay(delay_table(p.delay)),
+      copula(p.rho, p.memory),
+      regime_copula(p.rho, p.memory),
+      loss(p.loss, Purpose::kLoss, Purpose::kLossState),
+      duplicate(p.duplicate),
+      replay(p.replay.probability),
+      flip(p.flip),
+      truncate(p.truncate),
+      jump(p.jump.probability),
+      has_events(!p.steps.empty() || !p.ramps.empty() || !p.spikes.empty() || !p.handovers.empty()) {
+  for (const Regime& regime : p.regimes) {
+    regime_delays.push_back(delay_table(regime.delay));
+    regime_losses.emplace_back();
+    if (regime.loss) regime_losses.back().emplace(*regime.loss, Purpose::kRegimeLoss, Purpose::kRegimeLossState);
   }
-  return pieces;  // the last `below` is exactly 2⁶³: the last `sum` is the very same sum as `total`
+  for (const DropRule& rule : p.rules) rules.emplace_back(rule.probability);
 }
 
-Injector::Injector(const Profile& profile, std::uint64_t seed)
-    : loss_(checked(profile).loss), duplicate_(profile.duplicate), inverse_cdf_(inverse_cdf(profile)), random_(seed) {}
+Injector::Injector(const Profile& profile, std::uint64_t seed, std::uint32_t link, Direction direction,
+                   std::optional<LocalTime> start)
+    : draws_(seed, link, direction), seed_(seed), direction_(direction), network_(profile), given_start_(start) {}
 
-Duration Injector::drawn_delay(std::uint64_t draw) const {
-  const std::uint64_t u = draw >> 1;  // 0 … 2⁶³ − 1
-  const auto piece = std::upper_bound(inverse_cdf_.begin(), inverse_cdf_.end(), u,
-                                      [](std::uint64_t value, const Piece& p) { return value < p.below; });
-  const std::uint64_t from = piece == inverse_cdf_.begin() ? 0 : std::prev(piece)->below;
-  const auto offset_ns = static_cast<std::int64_t>(Uint128{u - from} * piece->width_ns / (piece->below - from));
-  return Duration(std::max<std::int64_t>(0, piece->lower_ns + offset_ns));
+Injector Injector::for_link(std::uint32_t link) const {
+  assert(!begun_);
+  Injector other(*this);
+  other.draws_ = Draws(seed_, link, direction_);
+  return other;
 }
 
-Fate Injector::next(LocalTime arrival) {
-  // All four, in this order, for every datagram: see the header.
-  const std::uint64_t loss_draw = random_();
-  const std::uint64_t delay_draw = random_();
-  const std::uint64_t duplicate_draw = random_();
-  const std::uint64_t second_delay_draw = random_();
+Injector Injector::for_link(std::uint32_t link, LocalTime start) const {
+  Injector other = for_link(link);
+  other.given_start_ = start;
+  return other;
+}
 
-  last_release_ = std::max(last_release_, arrival + drawn_delay(delay_draw));
-  Fate fate{.lost = loss_.happens(loss_draw), .delay = last_release_ - arrival, .duplicate = std::nullopt};
-  if (!fate.lost && duplicate_.happens(duplicate_draw)) {
-    fate.duplicate = std::max(fate.delay, drawn_delay(second_delay_draw));
+std::uint64_t Injector::table_hash() const noexcept {
+  std::uint64_t hash = network_.delay.hash();
+  for (const QuantileTable& table : network_.regime_delays) hash = hash * 0x100000001b3 ^ table.hash();
+  return hash;
+}
+
+void Injector::begin(LocalTime start) {
+  begun_ = true;
+  start_ = start;
+  const Profile& p = network_.profile;
+  std::optional<BottleneckQueue> queue;
+  if (p.bottleneck.exists()) {
+    queue.emplace(p.bottleneck, start);
+    if (bottleneck_) queue->continue_from(std::move(*bottleneck_));
   }
-  return fate;
+  bottleneck_ = std::move(queue);
+  const std::uint64_t visits = regimes_ ? regimes_->visits() : 0;
+  regimes_.reset();
+  if (!p.regimes.empty()) regimes_.emplace(p.regimes, draws_, start, visits);
+}
+
+void Injector::change(const Profile& profile, LocalTime now) { adopt(Network(profile), now); }
+
+void Injector::change(const Injector& prepared, LocalTime now) { adopt(prepared.network_, now); }
+
+void Injector::adopt(Network next, LocalTime now) {
+  next.copula.continue_from(network_.copula);
+  next.regime_copula.continue_from(network_.regime_copula);
+  next.loss.continue_from(network_.loss);
+  if (network_.profile.rebind > Duration::zero() && begun_) {
+    rebinds_before_ += static_cast<std::uint32_t>(std::max(Duration::zero(), now - start_) / network_.profile.rebind);
+  }
+  network_ = std::move(next);
+  begin(now);
+}
+
+LocalTime Injector::past_stalls(LocalTime at) const {
+  if (network_.profile.stalls.empty()) return at;
+  return start_ + injector::past_stalls(network_.profile, at - start_);
+}
+
+std::optional<Cause> Injector::cause_of_loss(const Packet& packet, std::uint64_t index,
+                                             std::optional<std::size_t> regime) {
+  const Profile& p = network_.profile;
+  // Chains go on whatever else happens.
+  LossModel* const special = regime && network_.regime_losses[*regime] ? &*network_.regime_losses[*regime] : nullptr;
+  const bool plain_lost = network_.loss.lost(draws_, index);
+  const bool lost = special != nullptr ? special->lost(draws_, index) : plain_lost;
+
+  const Duration since = packet.arrival - start_;
+  if (in_outage(p, since)) return Cause::kOutage;
+  if (in_handover(p, since)) return Cause::kHandover;
+  for (std::size_t i = 0; i < p.rules.size(); ++i) {
+    const DropRule& rule = p.rules[i];
+    if (packet.bytes.size() <= rule.byte) continue;
+    if ((std::to_integer<std::uint8_t>(packet.bytes[rule.byte]) & rule.mask) != rule.value) continue;
+    const auto purpose = static_cast<Purpose>(static_cast<std::uint32_t>(Purpose::kRule) + i);
+    if (network_.rules[i].happens(draws_(purpose, index))) return Cause::kRule;
+  }
+  if (!lost) return std::nullopt;
+  return special != nullptr ? Cause::kRegime : Cause::kLoss;
+}
+
+Decision Injector::decide(const Packet& packet) {
+  if (!begun_) begin(given_start_.value_or(packet.arrival));
+  const Profile& p = network_.profile;
+  const std::uint64_t index = next_index_++;
+  const LocalTime arrival = packet.arrival;
+  Decision d;
+  d.index = index;
+  d.arrival = d.release = arrival;
+  d.size = packet.size;
+
+  // Delays are drawn before the queue may refuse: a bottleneck shifts no draw.
+  const std::optional<std::size_t> regime = regimes_ ? std::optional(regimes_->at(arrival)) : std::nullopt;
+  const auto drawn = [&](const QuantileTable& table, Copula& copula, Purpose purpose) {
+    if (table.constant()) return Duration(table(0));
+    const std::uint64_t draw = draws_(purpose, index);
+    return Duration(table(copula.trivial() ? draw : copula.next(draw, arrival)));
+  };
+  const Duration own = drawn(network_.delay, network_.copula, Purpose::kDelay);
+  Duration common = p.base;
+  if (regime) common += drawn(network_.regime_delays[*regime], network_.regime_copula, Purpose::kRegimeDelay);
+  if (network_.has_events) common += extra_delay(p, arrival - start_, draws_);
+  const std::optional<Cause> loss = cause_of_loss(packet, index, regime);
+  if (p.rebind > Duration::zero()) {
+    d.rebinds = static_cast<std::uint32_t>(std::max(Duration::zero(), arrival - start_) / p.rebind);
+  }
+  d.rebinds += rebinds_before_;
+
+  LocalTime sent = arrival;
+  if (bottleneck_) {
+    const std::optional<LocalTime> passed = bottleneck_->pass(arrival, packet.size);
+    if (!passed) {
+      d.verdict = Verdict::kDrop;
+      d.cause = Cause::kQueueFull;
+      releases_[index % kMaxJump] = last_release_;
+      return d;
+    }
+    sent = *passed;
+    d.cause = Cause::kQueue;
+  }
+  const auto leaves = [&](Duration delay) { return sent + std::clamp(common + delay, Duration::zero(), kMaxDelay); };
+
+  d.release = leaves(own);
+  if (const LocalTime later = past_stalls(d.release); later > d.release) {
+    d.release = later;
+    d.cause = Cause::kStall;
+  }
+  if (p.order == Order::kFifo && last_release_ > d.release) {
+    d.release = last_release_;
+    d.cause = Cause::kFifo;
+  }
+  last_release_ = std::max(last_release_, d.release);
+  releases_[index % kMaxJump] = d.release;
+  if (p.jump.places > 0 && index >= p.jump.places && network_.jump.happens(draws_(Purpose::kJump, index))) {
+    const LocalTime ahead = releases_[(index - p.jump.places) % kMaxJump] - Duration(1);
+    const LocalTime earliest = std::max(ahead, sent + p.base);
+    if (earliest < d.release) {
+      d.release = earliest;
+      d.cause = Cause::kReorder;
+    }
+  }
+
+  if (p.replay.depth > 0 && index > 0 && network_.replay.happens(draws_(Purpose::kReplay, index))) {
+    const std::uint64_t reach = std::min<std::uint64_t>(index, p.replay.depth);
+    const auto back = static_cast<std::uint32_t>(1 + one_of(reach, draws_(Purpose::kReplayAge, index)));
+    d.stale = Decision::Stale{d.release, back};
+  }
+  if (loss) {
+    d.verdict = Verdict::kDrop;
+    d.cause = *loss;
+    return d;
+  }
+  if (network_.duplicate.possible() && network_.duplicate.happens(draws_(Purpose::kDuplicate, index))) {
+    d.verdict = Verdict::kDuplicate;
+    const Duration again(network_.delay(draws_(Purpose::kDuplicateDelay, index)));
+    d.duplicate = std::max(d.release, past_stalls(leaves(again)));
+  }
+  if (packet.size > 0) {
+    if (network_.flip.possible() && network_.flip.happens(draws_(Purpose::kFlip, index))) {
+      d.flipped_bit =
+          static_cast<std::uint32_t>(one_of(std::uint64_t{packet.size} * 8, draws_(Purpose::kFlipWhere, index)));
+    }
+    if (network_.truncate.possible() && network_.truncate.happens(draws_(Purpose::kTruncate, index))) {
+      d.truncated_to = static_cast<std::uint32_t>(one_of(packet.size, draws_(Purpose::kTruncateWhere, index)));
+    }
+  }
+  return d;
 }
 
 }  // namespace tendon::injector

@@ -1,69 +1,173 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <random>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "core/time.h"
+#include "tests/injector/bottleneck.h"
+#include "tests/injector/delay_model.h"
+#include "tests/injector/draws.h"
+#include "tests/injector/loss_model.h"
 #include "tests/injector/profile.h"
+#include "tests/injector/quantile_table.h"
+#include "tests/injector/timeline.h"
 
 namespace tendon::injector {
 
-/// The fate of one datagram.
-struct Fate {
-  bool lost = false;
-  Duration delay{};                   ///< from arrival to release; a lost datagram has one too, see below
-  std::optional<Duration> duplicate;  ///< from arrival to the release of the second copy, when there is one
+/// A datagram that enters the network.
+struct Packet {
+  LocalTime arrival{};
+  std::uint32_t size = 0;              ///< bytes of UDP payload
+  std::span<const std::byte> bytes{};  ///< the payload, for drop rules; may be empty: then no rule matches
 };
 
-/// A replayable bad network in one direction: the same seed and the same arrivals give the same
-/// fates, on every machine and compiler (integer arithmetic over std::mt19937_64, no libm).
+enum class Verdict : std::uint8_t { kPass, kDrop, kDuplicate };
+
+/// Why a datagram met its fate: for a dropped one what dropped it, for one that passed what decided its release last.
+enum class Cause : std::uint8_t {
+  // passed
+  kDelay,    ///< its own delay
+  kQueue,    ///< besides, it waited at the bottleneck
+  kStall,    ///< … and for the end of a stall
+  kFifo,     ///< … and for the one ahead
+  kReorder,  ///< it left ahead of its place
+  // dropped
+  kQueueFull,
+  kOutage,
+  kHandover,
+  kRule,
+  kRegime,  ///< the loss of the regime
+  kLoss,
+  // either
+  kReplay,  ///< a trace says so
+};
+
+/// "pass", "drop", "dup".
+std::string_view to_string(Verdict verdict) noexcept;
+/// "delay", "queue", "stall", "fifo", "reorder", "queue-full", "outage", "handover", "rule", "regime", "loss",
+/// "replay".
+std::string_view to_string(Cause cause) noexcept;
+std::optional<Verdict> parse_verdict(std::string_view text) noexcept;
+std::optional<Cause> parse_cause(std::string_view text) noexcept;
+
+/// The fate of one datagram, final when it is decided: at its arrival.
+struct Decision {
+  std::uint64_t index = 0;  ///< counts the datagrams of this direction of this link from 0
+  LocalTime arrival{};
+  std::uint32_t size = 0;
+  Verdict verdict = Verdict::kPass;
+  Cause cause = Cause::kDelay;
+  LocalTime release{};                 ///< of the first copy; a dropped one has one too: when it would have left
+  std::optional<LocalTime> duplicate;  ///< release of the second copy, never before the first
+  /// Besides, whatever happens to this one, the payload of the datagram `back` before it (1, 2, …) leaves once more.
+  struct Stale {
+    LocalTime release{};
+    std::uint32_t back = 0;
+    bool operator==(const Stale&) const = default;
+  };
+  std::optional<Stale> stale;
+  std::optional<std::uint32_t> flipped_bit;   ///< of the payload: bit n % 8 of byte n/8; before it is cut
+  std::optional<std::uint32_t> truncated_to;  ///< bytes
+  std::uint32_t rebinds = 0;                  ///< how often the source port has changed so far
+  bool operator==(const Decision&) const = default;
+};
+
+/// Decides the fate of each datagram of one direction of one link. Two kinds: Injector (a profile and a seed) and
+/// TracePlayer (recorded decisions).
+class Decider {
+ public:
+  virtual ~Decider() = default;
+  virtual Decision decide(const Packet& packet) = 0;
+};
+
+/// A replayable bad network in one direction: the same seed and the same arrivals give the same decisions, on every
+/// machine and compiler (integers over counter-based random numbers; no floating point, no libm).
 ///
-/// FIFO: releaseₙ = max(releaseₙ₋₁, arrivalₙ + drawn delayₙ), because a route does not reorder. So
-/// when datagrams follow each other more closely than their delays vary, some wait for the one
-/// ahead, and their delays lie above the profile's.
+///     bottleneck  t₁ = when the queue has sent it                          — or kQueueFull, and nothing else happens
+///     delay       t₂ = t₁ + max(0, base + F⁻¹(u) + regime + step, ramp, spike, handover)
+///     stall       t₃ = t₂, or the end of the stall that t₂ falls into
+///     order       releaseₙ = max(releaseₙ₋₁, t₃)                           — fifo; free: t₃; a jump: earlier
+///     loss        outage, handover, drop rules, the loss of the regime or else of the profile
+///     copies      duplicate, stale replay; damage: flip, truncate
 ///
-/// The fields of a profile do not disturb each other. Every datagram takes the same four random
-/// draws whatever happens to it, a lost one is lost at the end of the route (those behind it wait as
-/// if it had come through), and nobody waits for a second copy: so adding loss or duplicates to a
-/// profile leaves the delays of all others as they were. A second copy draws its own delay and is
-/// never ahead of the first, but may come after newer datagrams: a stale duplicate, as on real routes.
+/// Fields of a profile do not disturb each other. Each draws its own numbers for each datagram (see Draws), a datagram
+/// that is lost is lost at the end of the route (those behind it wait as if it had come through), and nobody waits for
+/// a second copy or for one that jumped: so adding loss, duplicates or damage to a profile leaves all other decisions
+/// as they were.
 ///
 /// Thread-safe: no.
-class Injector {
+class Injector final : public Decider {
  public:
-  /// Throws std::invalid_argument as check(profile) does.
-  Injector(const Profile& profile, std::uint64_t seed);
+  /// Throws std::invalid_argument as check(profile) does. The times of the profile count from `start`; when it is not
+  /// given, from the first arrival. Building the tables takes up to some milliseconds; copying an injector does not.
+  Injector(const Profile& profile, std::uint64_t seed, std::uint32_t link, Direction direction,
+           std::optional<LocalTime> start = std::nullopt);
 
-  /// `arrival` should not be earlier than that of the call before; if it is, FIFO still holds.
-  Fate next(LocalTime arrival);
+  /// The injector of another link, as if built for it, with the tables of this one. Only before the first decision.
+  Injector for_link(std::uint32_t link) const;
+  /// … and the times of the profile count from `start`.
+  Injector for_link(std::uint32_t link, LocalTime start) const;
+
+  /// Arrivals should not go back in time; when they do, FIFO still holds. What does not fit into a route of 60 s and
+  /// its queue is not delayed further.
+  Decision decide(const Packet& packet) override;
+
+  /// Another profile from now on, whose times count from `now`. Index, draws, queue, order and the states of correlated
+  /// delay and loss go on. Throws like the constructor, and then nothing has changed.
+  void change(const Profile& profile, LocalTime now);
+  /// The same with the profile and the tables of another injector: no table is built, and nothing is thrown.
+  void change(const Injector& prepared, LocalTime now);
+
+  const Profile& profile() const { return network_.profile; }
+
+  /// Over all quantile tables in use: what a trace records to say what it was made with.
+  std::uint64_t table_hash() const noexcept;
 
  private:
-  /// An event of the given probability, decided by one draw of 64 bits.
-  struct Chance {
-    explicit Chance(double probability);
-    bool happens(std::uint64_t draw) const { return certain || draw < below; }
-    bool certain;
-    std::uint64_t below = 0;
+  /// A profile made ready for deciding.
+  struct Network {
+    explicit Network(const Profile& profile);
+    Profile profile;
+    QuantileTable delay;
+    std::vector<QuantileTable> regime_delays;
+    Copula copula;
+    Copula regime_copula;
+    LossModel loss;
+    std::vector<std::optional<LossModel>> regime_losses;
+    std::vector<Chance> rules;
+    Chance duplicate;
+    Chance replay;
+    Chance flip;
+    Chance truncate;
+    Chance jump;
+    bool has_events;  ///< steps, ramps, spikes, handovers
   };
-  /// One straight piece of the inverse CDF of delays: draws in [`below` of the piece before, `below`)
-  /// of 2⁶³ map to `lower` … `lower + width − 1 ns`.
-  struct Piece {
-    std::uint64_t below = 0;
-    std::int64_t lower_ns = 0;
-    std::uint64_t width_ns = 1;
-  };
-  static std::vector<Piece> inverse_cdf(const Profile& profile);
 
-  Duration drawn_delay(std::uint64_t draw) const;
+  void adopt(Network next, LocalTime now);
+  void begin(LocalTime start);
+  std::optional<Cause> cause_of_loss(const Packet& packet, std::uint64_t index, std::optional<std::size_t> regime);
+  Duration since_start(LocalTime at) const { return at - start_; }
+  LocalTime past_stalls(LocalTime at) const;
 
-  Chance loss_;
-  Chance duplicate_;
-  std::vector<Piece> inverse_cdf_;
-  std::mt19937_64 random_;
+  Draws draws_;
+  std::uint64_t seed_;
+  Direction direction_;
+  Network network_;
+  std::optional<LocalTime> given_start_;
+  bool begun_ = false;
+  LocalTime start_{};
+  std::optional<BottleneckQueue> bottleneck_;
+  std::optional<RegimeChain> regimes_;
+  std::uint64_t next_index_ = 0;
+  std::uint32_t rebinds_before_ = 0;  ///< of profiles before this one
   LocalTime last_release_ = LocalTime::min();
+  std::array<LocalTime, kMaxJump> releases_{};  ///< in their places, of the last ones, by index
 };
 
 }  // namespace tendon::injector

@@ -11,17 +11,9 @@ namespace {
 /// What one datagram on its way costs besides its payload: the map node and two heap headers.
 constexpr std::size_t kBookkeepingBytes = 128;
 
-/// One step of SplitMix64 (Steele, Lea, Flood 2014): neighbouring inputs give unrelated outputs.
-std::uint64_t split_mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15U;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9U;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebU;
-  return x ^ (x >> 31);
-}
-
-void check_direction(const char* name, const Profile& profile) {
+Injector prototype(const char* name, const Profile& profile, std::uint64_t seed, Direction direction) {
   try {
-    check(profile);
+    return {profile, seed, 0, direction};
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(std::string(name) + ": " + error.what());
   }
@@ -29,14 +21,10 @@ void check_direction(const char* name, const Profile& profile) {
 
 }  // namespace
 
-std::uint64_t injector_seed(std::uint64_t seed, Direction direction, ClientIndex client) {
-  return split_mix(split_mix(split_mix(seed) + static_cast<std::uint64_t>(direction)) + client);
-}
-
-Proxy::Proxy(const ProxyOptions& options) : options_(options) {
-  check_direction("up", options_.up);
-  check_direction("down", options_.down);
-}
+Proxy::Proxy(const ProxyOptions& options)
+    : options_(options),
+      prototypes_{prototype("up", options.up, options.seed, Direction::kUp),
+                  prototype("down", options.down, options.seed, Direction::kDown)} {}
 
 Proxy::Client* Proxy::find(ClientIndex index) {
   const auto found = std::ranges::find(clients_, index, &Client::index);
@@ -56,8 +44,7 @@ std::optional<ClientIndex> Proxy::receive_from_client(const Address& client, std
     clients_.push_back({.index = index,
                         .address = client,
                         .last_heard = now,
-                        .injectors = {Injector(options_.up, injector_seed(options_.seed, Direction::kUp, index)),
-                                      Injector(options_.down, injector_seed(options_.seed, Direction::kDown, index))}});
+                        .injectors = {prototypes_[0].for_link(index), prototypes_[1].for_link(index)}});
     found = std::prev(clients_.end());
   }
   found->last_heard = now;
@@ -77,14 +64,15 @@ void Proxy::receive_from_server(ClientIndex client, const Address& from, std::sp
 }
 
 void Proxy::inject(Client& client, Direction direction, std::span<const std::byte> datagram, LocalTime now) {
-  // The fate comes first: a refusal must not shift the draws of later datagrams.
-  const Fate fate = client.injectors[static_cast<std::size_t>(direction)].next(now);
-  if (fate.lost) {
+  // The decision comes first: a refusal must not shift the decisions on later datagrams.
+  const Packet packet{.arrival = now, .size = static_cast<std::uint32_t>(datagram.size()), .bytes = datagram};
+  const Decision decision = client.injectors[static_cast<std::size_t>(direction)].decide(packet);
+  if (decision.verdict == Verdict::kDrop) {
     ++count(direction).lost;
     return;
   }
-  take_off(client, direction, datagram, now + fate.delay, false);
-  if (fate.duplicate) take_off(client, direction, datagram, now + *fate.duplicate, true);
+  take_off(client, direction, datagram, decision.release, false);
+  if (decision.duplicate) take_off(client, direction, datagram, *decision.duplicate, true);
 }
 
 void Proxy::take_off(Client& client, Direction direction, std::span<const std::byte> datagram, LocalTime due,

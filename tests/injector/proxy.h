@@ -16,18 +16,9 @@
 
 namespace tendon::injector {
 
-enum class Direction : std::uint8_t {
-  kUp,    ///< client to server
-  kDown,  ///< server to client
-};
-
 /// Counts the clients since the proxy started: 0, 1, 2, … in order of their first datagram. Never
-/// used again for another client.
+/// used again for another client. It is the link of the client's injectors.
 using ClientIndex = std::uint32_t;
-
-/// The seed of the injector of one client's datagrams in one direction: SplitMix64 steps over the
-/// three. With it, a run through the proxy can be replayed in process.
-std::uint64_t injector_seed(std::uint64_t seed, Direction direction, ClientIndex client);
 
 struct ProxyOptions {
   Address server;
@@ -59,7 +50,7 @@ struct ProxyCounters {
 
 /// A bad network between many clients and one server, without sockets and without a clock: datagrams
 /// go in with the time of their arrival, and come out when they are due. Each client and direction
-/// has an Injector of its own, seeded by injector_seed(), so that what one client sends does not
+/// has an Injector of its own (the link is the client's index), so that what one client sends does not
 /// change what happens to another.
 ///
 /// The driver owns one socket that clients send to, and one more for each client, from which the
@@ -124,7 +115,8 @@ class Proxy {
   ProxyCounters& count(Direction direction) { return counters_[static_cast<std::size_t>(direction)]; }
 
   ProxyOptions options_;
-  std::vector<Client> clients_;  // at most max_clients: searched one by one
+  std::array<Injector, 2> prototypes_;  // by Direction
+  std::vector<Client> clients_;         // at most max_clients: searched one by one
   ClientIndex next_index_ = 0;
   std::map<std::pair<LocalTime, std::uint64_t>, Flying> in_flight_;  // by due time, then by order of arrival
   std::uint64_t next_sequence_ = 0;

@@ -83,7 +83,7 @@ TEST(Proxy, BringsAnswersOnlyToTheClientTheyAreFor) {
 /// The fates of A's datagrams up, one each ms, while `disturb` does what it likes to the proxy.
 template <typename Disturb>
 Lines fates_of_a(Disturb disturb) {
-  Proxy proxy(options("delay=20ms jitter=15ms loss=20% duplicate=10%", "delay=20ms jitter=15ms loss=20%"));
+  Proxy proxy(options("delay=uniform(5ms,35ms) loss=20% duplicate=10%", "delay=uniform(5ms,35ms) loss=20%"));
   Lines result;
   for (int i = 0; i < 500; ++i) {
     const LocalTime now = kStart + i * 1ms;
@@ -124,15 +124,15 @@ TEST(Proxy, TheTwoDirectionsAndTwoClientsMeetDifferentFates) {
 }
 
 TEST(Proxy, CanBeReplayedInProcessFromItsSeed) {
-  const ProxyOptions o = options("delay=20ms jitter=5ms loss=20%", "");
+  const ProxyOptions o = options("delay=uniform(15ms,25ms) loss=20%", "");
   Proxy proxy(o);
-  Injector injector(o.up, injector_seed(o.seed, Direction::kUp, 0));
+  Injector injector(o.up, o.seed, 0, Direction::kUp);
   Lines expected;
   for (int i = 0; i < 200; ++i) {
     const LocalTime now = kStart + i * 1ms;
     proxy.receive_from_client(kA, bytes("a"), now);
-    const Fate fate = injector.next(now);
-    if (!fate.lost) expected.push_back("a@" + std::to_string((now + fate.delay - kStart) / 1ms) + ">server");
+    const Decision d = injector.decide({.arrival = now, .size = 1});
+    if (d.verdict == Verdict::kPass) expected.push_back("a@" + std::to_string((d.release - kStart) / 1ms) + ">server");
   }
   EXPECT_EQ(departures(proxy, kStart + 1s), expected);
 }
@@ -200,7 +200,7 @@ TEST(Proxy, RefusesWhatDoesNotFitIntoItsMemory) {
 }
 
 TEST(Proxy, EveryDatagramIsAccountedFor) {
-  Proxy proxy(options("delay=20ms jitter=15ms loss=20% duplicate=10%", ""));
+  Proxy proxy(options("delay=uniform(5ms,35ms) loss=20% duplicate=10%", ""));
   std::uint64_t left = 0;
   for (int i = 0; i < 1000; ++i) {
     proxy.receive_from_client(kA, bytes("a"), kStart + i * 1ms);
@@ -217,7 +217,7 @@ TEST(Proxy, EveryDatagramIsAccountedFor) {
 
 TEST(Proxy, NamesTheDirectionOfAnImpossibleProfile) {
   ProxyOptions o = options("", "");
-  o.down.loss = 2;
+  o.down.loss = RandomLoss{2};
   try {
     const Proxy proxy(o);
     FAIL() << "was accepted";

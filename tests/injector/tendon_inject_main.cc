@@ -25,8 +25,9 @@
 #include "server/clock.h"
 #include "server/doorbell.h"
 #include "server/udp_link.h"
-#include "tests/injector/proxy.h"
 #include "tests/injector/duration_histogram.h"
+#include "tests/injector/named_profiles.h"
+#include "tests/injector/proxy.h"
 
 namespace tendon::injector {
 namespace {
@@ -57,50 +58,6 @@ void request_stop(int /*signal*/) {
   stop_bell->ring();
 }
 
-/// The values of --delay-ms and its siblings, as text, for both directions or for one.
-struct ProfileArguments {
-  std::string delay_ms, jitter_ms, loss, duplicate, histogram;
-
-  void add_to(CLI::App& app, const std::string& prefix, const std::string& what) {
-    const CLI::Validator is_number = CLI::Validator(CLI::Number).description("");
-    const std::string group = prefix.empty() ? "The network, both directions" : "The network, " + what + " only";
-    app.add_option("--" + prefix + "delay-ms", delay_ms, "constant one-way delay")
-        ->check(is_number)
-        ->type_name("MS")
-        ->group(group);
-    app.add_option("--" + prefix + "jitter-ms", jitter_ms, "± uniform, added to the delay")
-        ->check(is_number)
-        ->type_name("MS")
-        ->group(group);
-    app.add_option("--" + prefix + "loss", loss, "probability, 2% or 0.02")->type_name("P")->group(group);
-    app.add_option("--" + prefix + "duplicate", duplicate, "probability of a second copy")
-        ->type_name("P")
-        ->group(group);
-    app.add_option("--" + prefix + "histogram", histogram,
-                   "measured delays (CSV: lower edge in ms, count), plus --delay-ms")
-        ->type_name("FILE")
-        ->group(group);
-  }
-
-  /// These where given, `both` elsewhere.
-  ProfileArguments over(const ProfileArguments& both) const {
-    const auto pick = [](const std::string& mine, const std::string& other) { return mine.empty() ? other : mine; };
-    return {pick(delay_ms, both.delay_ms), pick(jitter_ms, both.jitter_ms), pick(loss, both.loss),
-            pick(duplicate, both.duplicate), pick(histogram, both.histogram)};
-  }
-
-  Profile profile() const {
-    std::string line;
-    if (!delay_ms.empty()) line += " delay=" + delay_ms + "ms";
-    if (!jitter_ms.empty()) line += " jitter=" + jitter_ms + "ms";
-    if (!loss.empty()) line += " loss=" + loss;
-    if (!duplicate.empty()) line += " duplicate=" + duplicate;
-    Profile result = parse_profile(line);
-    if (!histogram.empty()) result.histogram = histogram_from_csv(histogram);
-    return result;
-  }
-};
-
 /// Not through CLI11: it takes -1 for 2⁶⁴ − 1.
 std::uint64_t parse_seed(const std::string& text) {
   std::uint64_t seed = 0;
@@ -120,7 +77,8 @@ Options parse_command_line(int argc, char** argv) {
       "tendon-inject");
   app.footer(
       "Example: 20 ms ± 5 ms each way, one datagram in fifty lost; clients connect to port 47101\n"
-      "  tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --delay-ms 20 --jitter-ms 5 --loss 2% --seed 7\n"
+      "  tendon-inject --listen 127.0.0.1:47101 --to 127.0.0.1:47100 --profile 'delay=uniform(15ms,25ms) loss=2%' "
+      "--seed 7\n"
       "\nExit: 0 stopped by --duration-s, SIGINT or SIGTERM; 1 failed while running; 2 wrong usage.");
   std::string listen;
   std::string to;
@@ -136,12 +94,14 @@ Options parse_command_line(int argc, char** argv) {
       ->type_name("S")
       ->check(CLI::Range(1e-3, 1e9).description(""));
   app.add_flag("--json", options.json, "one JSON object per line on stdout, each second and at the end");
-  ProfileArguments both;
-  ProfileArguments up;
-  ProfileArguments down;
-  both.add_to(app, "", "");
-  up.add_to(app, "up-", "client to server");
-  down.add_to(app, "down-", "server to client");
+  std::string both;
+  std::string up;
+  std::string down;
+  app.add_option("--profile", both,
+                 "the network: a name (" + names_of_profiles() + ") or a line like 'delay=20ms loss=2%'")
+      ->type_name("LINE|NAME");
+  app.add_option("--up", up, "client to server, where it differs")->type_name("LINE|NAME");
+  app.add_option("--down", down, "server to client, where it differs")->type_name("LINE|NAME");
 
   try {
     app.parse(argc, argv);
@@ -165,8 +125,15 @@ Options parse_command_line(int argc, char** argv) {
   if (options.listen == options.proxy.server) {
     throw std::invalid_argument("--to: expected another address than --listen, got " + to + " for both");
   }
-  options.proxy.up = up.over(both).profile();
-  options.proxy.down = down.over(both).profile();
+  const auto profile = [&](const char* option, const std::string& own, Direction direction) {
+    try {
+      return resolve_profile(own.empty() ? both : own, direction);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(std::string(own.empty() ? "--profile" : option) + ": " + error.what());
+    }
+  };
+  options.proxy.up = profile("--up", up, Direction::kUp);
+  options.proxy.down = profile("--down", down, Direction::kDown);
   options.proxy.seed = seed.empty() ? std::random_device{}() : parse_seed(seed);
   if (duration_s) options.duration = from_seconds(*duration_s);
   return options;

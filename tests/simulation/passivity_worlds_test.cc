@@ -102,11 +102,14 @@ Outcome run_world(std::uint64_t seed, double force_scale = 1) {
   control.limiter.longest_hold = std::chrono::microseconds(punctual ? 1000 : 2000);
   control.max_force = dice.decades(0, 2);
   control.max_slew = dice.chance(0.3) ? kInf : dice.decades(2, 5);
+  Duration round_trip{};
   for (injector::Profile* way : {&config.to_server, &config.from_server}) {
     *way = {};
-    way->delay = dice.milliseconds(0, dice.chance(0.2) ? 500 : 100);
-    way->jitter = from_seconds(seconds(way->delay) * dice.uniform());
-    way->loss = dice.chance(0.2) ? 0 : dice.within(0, 0.5);
+    const Duration mean = dice.milliseconds(0, dice.chance(0.2) ? 500 : 100);
+    const Duration jitter = from_seconds(seconds(mean) * dice.uniform());
+    way->delay = injector::UniformDelay{mean - jitter, mean + jitter};
+    round_trip += mean;
+    way->loss = injector::RandomLoss{dice.chance(0.2) ? 0 : dice.within(0, 0.5)};
     way->duplicate = dice.chance(0.5) ? 0 : dice.within(0, 0.3);
   }
   if (dice.chance(0.1)) {
@@ -175,7 +178,6 @@ Outcome run_world(std::uint64_t seed, double force_scale = 1) {
     }
   });
   // Long enough to shake hands over this network, and to be felt for half a second.
-  const Duration round_trip = config.to_server.delay + config.from_server.delay;
   world.run_for(4 * round_trip + std::chrono::milliseconds(700));
   if (hostile != nullptr) outcome.only_finite = outcome.only_finite && hostile->saw_only_finite_forces();
   if (simulated != nullptr && limiter == Law::kAol) {

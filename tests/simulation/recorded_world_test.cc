@@ -60,10 +60,11 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, co
   world_config.loop.control.max_force = device.info().max_force;
   world_config.loop.control.max_slew = 1000;
   const auto hist = data / "d6g-tsn-5g" / "hist";
-  world_config.to_server = {.histogram =
-                                injector::histogram_from_csv(hist / "5G-midband-Downlink_PD-Wireless-5G-2a.csv")};
-  world_config.from_server = {.histogram =
-                                  injector::histogram_from_csv(hist / "5G-midband-Uplink_PD-Wireless-5G-2a.csv")};
+  const auto measured = [&hist](const char* file) {
+    return injector::parse_profile("delay=histogram(" + (hist / file).string() + ")");
+  };
+  world_config.to_server = measured("5G-midband-Downlink_PD-Wireless-5G-2a.csv");
+  world_config.from_server = measured("5G-midband-Uplink_PD-Wireless-5G-2a.csv");
   World world(world_config, device);
   world.add_controller({.name = "wall", .rate_hz = 100}, [wall = hand.wall](const DeviceState& state) -> Touch {
     return Vec3(-2000 * std::max(0.0, state.position.x() - wall), 0, 0);

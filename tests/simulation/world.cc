@@ -26,14 +26,6 @@ Address address_of(std::uint16_t port) {
   return address;
 }
 
-/// SplitMix64: spreads neighbouring seeds over the whole range.
-std::uint64_t mix(std::uint64_t z) {
-  z += 0x9e3779b97f4a7c15;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-  return z ^ (z >> 31);
-}
-
 }  // namespace
 
 class Network::End final : public Link {
@@ -75,15 +67,19 @@ void Network::launch(const Address& from, const Address& to, std::span<const std
   const auto key = std::pair(from, to);
   auto route = routes_.find(key);
   if (route == routes_.end()) {
-    const std::uint64_t seed = mix(seed_ ^ mix(from.port * 65536ULL + to.port));
-    route = routes_.emplace(key, injector::Injector(to == server_ ? to_server_ : from_server_, seed)).first;
+    const bool up = to == server_;
+    const std::uint32_t link = up ? from.port : to.port;
+    const auto direction = up ? injector::Direction::kUp : injector::Direction::kDown;
+    route = routes_.emplace(key, injector::Injector(up ? to_server_ : from_server_, seed_, link, direction)).first;
   }
-  const injector::Fate fate = route->second.next(now_);
-  const auto take_off = [&](Duration delay) {
-    flying_.emplace(std::pair(now_ + delay, launched_++), Flying{from, to, {datagram.begin(), datagram.end()}});
+  const injector::Packet packet{
+      .arrival = now_, .size = static_cast<std::uint32_t>(datagram.size()), .bytes = datagram};
+  const injector::Decision decision = route->second.decide(packet);
+  const auto take_off = [&](LocalTime due) {
+    flying_.emplace(std::pair(due, launched_++), Flying{from, to, {datagram.begin(), datagram.end()}});
   };
-  if (!fate.lost) take_off(fate.delay);
-  if (fate.duplicate) take_off(*fate.duplicate);
+  if (decision.verdict != injector::Verdict::kDrop) take_off(decision.release);
+  if (decision.duplicate) take_off(*decision.duplicate);
 }
 
 void Network::forge(const Address& from, const Address& to, std::vector<std::byte> datagram) {
@@ -109,13 +105,7 @@ std::optional<LocalTime> Network::next_arrival() const {
   return flying_.begin()->first.first;
 }
 
-injector::Profile World::Config::bad() {
-  injector::Profile profile;
-  profile.delay = std::chrono::milliseconds(20);
-  profile.jitter = std::chrono::milliseconds(5);
-  profile.loss = 0.02;
-  return profile;
-}
+injector::Profile World::Config::bad() { return injector::parse_profile("delay=uniform(15ms,25ms) loss=2%"); }
 
 World::World(const Config& config, Device& device)
     : config_(config),

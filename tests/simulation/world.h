@@ -25,7 +25,7 @@
 namespace tendon::simulation {
 
 /// A network of simulated links: what one end sends, the other receives when its injector says so.
-/// Each ordered pair of addresses has an injector of its own, seeded from the world's seed.
+/// Each ordered pair of addresses has an injector of its own, seeded by the world; the link is the client's port.
 class Network {
  public:
   Network(std::uint64_t seed, const injector::Profile& to_server, const injector::Profile& from_server,
