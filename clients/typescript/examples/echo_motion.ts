@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prints where the hand is, what it feels, and how far away it is. It only looks on.
+import { commandLine, run, type Vec3 } from "tendon-client/node";
+
+const { options } = commandLine("Prints the hand's motion, the force it feels and the network's round trip.", {
+  name: "echo_motion",
+  rateHz: 10,
+});
+
+const row = ({ x, y, z }: Vec3, digits: number): string[] => [x, y, z].map((value) => value.toFixed(digits));
+
+process.exitCode = await run(options, {
+  watch({ tick, position, forceApplied }, link) {
+    const [x, f, rtt] = [row(position, 6), row(forceApplied, 4), link.smoothedRoundTripMs.toFixed(3)];
+    console.log(
+      options.json
+        ? `{"tick":${tick},"position_m":[${x}],"force_n":[${f}],"round_trip_ms":${rtt}}`
+        : `tick ${tick}   position ${x.join(" ")} m   force ${f.join(" ")} N   round trip ${rtt} ms`,
+    );
+  },
+});

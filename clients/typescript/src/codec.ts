@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+// Values to protobuf and back: the only file that knows the generated messages. Encoding trusts its input, except that
+// texts and lists are cut to their bounds. Decoding trusts nothing: undefined for what it refuses, and never throws.
+import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
+import * as pb from "./gen/tendon_pb.js";
+import * as limits from "./limits.js";
+import type { DeviceState, ForceCommand, Hello, LocalModel, Refused, Request, Stiffness, Vec3, Welcome } from "./messages.js";
+import type { Nanoseconds } from "./time.js";
+
+/** The newest datagram received from the peer, told back to it. */
+export interface Echo {
+  /** T1: when it was sent, on the clock of the one who sent it. */
+  readonly sent: Nanoseconds;
+  /** T2: when it arrived, on the clock of the one who tells. */
+  readonly received: Nanoseconds;
+  readonly packetNumber: bigint;
+  /** Bit i: packet (packetNumber − 1 − i) has arrived too. */
+  readonly receivedMask: number;
+}
+
+export interface Control {
+  readonly id: number;
+  /** Absent: a request that this version does not know. */
+  readonly request?: Request | undefined;
+}
+export interface ControlAck {
+  readonly id: number;
+  readonly code: pb.Code;
+  readonly detail: string;
+}
+export interface Bye {
+  readonly code: pb.Code;
+  readonly reason: string;
+}
+
+export type Frame =
+  | { readonly kind: "state"; readonly value: DeviceState }
+  | { readonly kind: "force"; readonly value: ForceCommand }
+  | { readonly kind: "control"; readonly value: Control }
+  | { readonly kind: "controlAck"; readonly value: ControlAck }
+  | { readonly kind: "bye"; readonly value: Bye };
+
+/** What a Data datagram holds. */
+export interface DataContent {
+  readonly sent: Nanoseconds;
+  readonly echo: Echo | undefined;
+  /** In the order of the datagram, every value within bounds. */
+  readonly frames: readonly Frame[];
+  /** Frames and echoes left out because a value was out of bounds. */
+  readonly invalid: number;
+}
+
+// ---- Data. Protobuf defines the concatenation of two messages as their merge, so a datagram is written piece by piece.
+
+/** The first piece of a Data body. */
+export function encodeHead(sent: Nanoseconds, echo: Echo | undefined): Uint8Array {
+  const head: pb.Datagram = create(pb.DatagramSchema, { txTimeNs: sent });
+  if (echo) {
+    head.echo = create(pb.EchoSchema, {
+      peerTxTimeNs: echo.sent,
+      rxTimeNs: echo.received,
+      peerPacketNumber: echo.packetNumber,
+      receivedMask: echo.receivedMask,
+    });
+  }
+  return toBinary(pb.DatagramSchema, head);
+}
+
+/** A further piece of a Data body: one frame. */
+export const encodeFrame = (frame: Frame): Uint8Array =>
+  toBinary(pb.DatagramSchema, create(pb.DatagramSchema, { frames: [{ body: writeBody(frame) }] }));
+
+/** Undefined when the body is malformed: not protobuf, too many frames, or without a usable time. */
+export function decodeData(body: Uint8Array): DataContent | undefined {
+  const datagram = parse(pb.DatagramSchema, body);
+  if (!datagram || datagram.frames.length > limits.kMaxFrames || !isTime(datagram.txTimeNs)) return undefined;
+  const frames: Frame[] = [];
+  let invalid = 0;
+  for (const { body } of datagram.frames) {
+    if (body.case === undefined) continue; // a frame of a newer peer
+    const frame = readBody(body);
+    if (frame) frames.push(frame);
+    else ++invalid;
+  }
+  const echo = datagram.echo && readEcho(datagram.echo);
+  if (datagram.echo && !echo) ++invalid;
+  return { sent: datagram.txTimeNs, echo, frames, invalid };
+}
+
+// ---- Handshake
+
+export const encodeHelloMessage = (hello: Hello): Uint8Array =>
+  toBinary(pb.HelloSchema, create(pb.HelloSchema, {
+    versionMin: hello.versionMin,
+    versionMax: hello.versionMax,
+    role: hello.role,
+    name: clip(hello.name, limits.kMaxName),
+    features: writeFeatures(hello.features),
+  }));
+
+export function decodeHelloMessage(bytes: Uint8Array): Hello | undefined {
+  const hello = parse(pb.HelloSchema, bytes);
+  if (!hello) return undefined;
+  const { versionMin, versionMax, role, name, features } = hello;
+  const good = versionMin >= 1 && versionMin <= versionMax && isEnum(role, pb.RoleSchema) &&
+    isText(name, limits.kMaxName) && areFeatures(features);
+  return good ? { versionMin, versionMax, role, name, features } : undefined;
+}
+
+export function encodeAnswerMessage(answer: Welcome | Refused): Uint8Array {
+  const body: pb.Answer["body"] = "code" in answer
+    ? { case: "refused", value: create(pb.RefusedSchema, { ...answer, detail: clip(answer.detail, limits.kMaxDetail) }) }
+    : { case: "welcome", value: writeWelcome(answer) };
+  return toBinary(pb.AnswerSchema, create(pb.AnswerSchema, { body }));
+}
+
+export function decodeAnswerMessage(bytes: Uint8Array): Welcome | Refused | undefined {
+  const body = parse(pb.AnswerSchema, bytes)?.body;
+  switch (body?.case) {
+    case "welcome":
+      return readWelcome(body.value);
+    case "refused": {
+      const { code, detail, versionMin, versionMax } = body.value;
+      const good = isEnum(code, pb.CodeSchema) && isText(detail, limits.kMaxDetail);
+      return good ? { code, detail, versionMin, versionMax } : undefined;
+    }
+    default:
+      return undefined;
+  }
+}
+
+// ---- Single values
+
+const isBounded = (value: number): boolean => Math.abs(value) <= limits.kMaxValue; // false for NaN
+const isMagnitude = (value: number): boolean => value >= 0 && value <= limits.kMaxValue;
+const isTime = (ns: bigint): boolean => ns >= -limits.kMaxTime && ns <= limits.kMaxTime;
+const isVec3 = (v: Vec3): boolean => isBounded(v.x) && isBounded(v.y) && isBounded(v.z);
+/** Number 0 of every enumeration is refused, as are those that this version does not know. */
+const isEnum = (value: number, schema: { readonly value: Record<number, unknown> }): boolean =>
+  value !== 0 && schema.value[value] !== undefined;
+
+const kEncoder = new TextEncoder();
+const isText = (text: string, limit: number): boolean => kEncoder.encode(text).length <= limit;
+const areFeatures = (features: readonly string[]): boolean =>
+  features.length <= limits.kMaxFeatures && features.every((feature) => isText(feature, limits.kMaxFeature));
+
+/** The front of `text`, in whole characters of at most `limit` bytes. */
+export function clip(text: string, limit: number): string {
+  const { read } = kEncoder.encodeInto(text, new Uint8Array(limit));
+  return text.slice(0, read);
+}
+
+const writeFeatures = (features: readonly string[]): string[] =>
+  features.slice(0, limits.kMaxFeatures).map((feature) => clip(feature, limits.kMaxFeature));
+
+const kZero: Vec3 = Object.freeze({ x: 0, y: 0, z: 0 });
+const readVec3 = (v: pb.Vec3 | undefined): Vec3 => (v ? { x: v.x, y: v.y, z: v.z } : kZero);
+const writeVec3 = (v: Vec3): pb.Vec3 => create(pb.Vec3Schema, { x: v.x, y: v.y, z: v.z });
+
+function parse<Schema extends DescMessage>(schema: Schema, bytes: Uint8Array): MessageShape<Schema> | undefined {
+  try {
+    return fromBinary(schema, bytes, { readUnknownFields: false });
+  } catch {
+    return undefined;
+  }
+}
+
+// ---- Messages
+
+type Body = Exclude<pb.Frame["body"], { case: undefined }>;
+
+function readBody(body: Body): Frame | undefined {
+  switch (body.case) {
+    case "state": {
+      const value = readState(body.value);
+      return value && { kind: "state", value };
+    }
+    case "force": {
+      const value = readForce(body.value);
+      return value && { kind: "force", value };
+    }
+    case "control": {
+      const { id, op } = body.value;
+      return id > 0 ? { kind: "control", value: { id, request: readRequest(op) } } : undefined;
+    }
+    case "controlAck": {
+      const { id, code, detail } = body.value;
+      const good = id > 0 && isEnum(code, pb.CodeSchema) && isText(detail, limits.kMaxDetail);
+      return good ? { kind: "controlAck", value: { id, code, detail } } : undefined;
+    }
+    case "bye": {
+      const { code, reason } = body.value;
+      const good = isEnum(code, pb.CodeSchema) && isText(reason, limits.kMaxDetail);
+      return good ? { kind: "bye", value: { code, reason } } : undefined;
+    }
+  }
+}
+
+function writeBody(frame: Frame): Body {
+  switch (frame.kind) {
+    case "state":
+      return { case: "state", value: writeState(frame.value) };
+    case "force":
+      return { case: "force", value: writeForce(frame.value) };
+    case "control":
+      return { case: "control", value: create(pb.ControlSchema, { id: frame.value.id, op: writeRequest(frame.value.request) }) };
+    case "controlAck": {
+      const { id, code, detail } = frame.value;
+      return { case: "controlAck", value: create(pb.ControlAckSchema, { id, code, detail: clip(detail, limits.kMaxDetail) }) };
+    }
+    case "bye": {
+      const { code, reason } = frame.value;
+      return { case: "bye", value: create(pb.ByeSchema, { code, reason: clip(reason, limits.kMaxDetail) }) };
+    }
+  }
+}
+
+function readEcho(from: pb.Echo): Echo | undefined {
+  if (!isTime(from.peerTxTimeNs) || !isTime(from.rxTimeNs)) return undefined;
+  return {
+    sent: from.peerTxTimeNs,
+    received: from.rxTimeNs,
+    packetNumber: from.peerPacketNumber,
+    receivedMask: from.receivedMask,
+  };
+}
+
+function readState(from: pb.DeviceState): DeviceState | undefined {
+  const state: DeviceState = {
+    tick: from.tick,
+    sampledNs: from.sampledNs,
+    position: readVec3(from.positionM),
+    velocity: readVec3(from.velocityMps),
+    forceApplied: readVec3(from.forceAppliedN),
+    energy: from.energyJ,
+    permittedForce: from.permittedForceN,
+    reasons: from.reasons,
+    forceSequence: from.forceSequence,
+    forceAgeNs: from.forceAgeNs,
+    mode: from.mode,
+  };
+  const good = isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
+    isVec3(state.forceApplied) && isBounded(state.energy) &&
+    (state.permittedForce === Infinity || isMagnitude(state.permittedForce)) && state.forceAgeNs <= limits.kMaxTime &&
+    isEnum(state.mode, pb.ModeSchema);
+  return good ? state : undefined;
+}
+
+const writeState = (from: DeviceState): pb.DeviceState =>
+  create(pb.DeviceStateSchema, {
+    tick: from.tick,
+    sampledNs: from.sampledNs,
+    positionM: writeVec3(from.position),
+    velocityMps: writeVec3(from.velocity),
+    forceAppliedN: writeVec3(from.forceApplied),
+    energyJ: from.energy,
+    permittedForceN: from.permittedForce,
+    reasons: from.reasons,
+    forceSequence: from.forceSequence,
+    forceAgeNs: from.forceAgeNs,
+    mode: from.mode,
+  });
+
+/** 1 entry, 3 or 9, all of them within bounds. */
+export const isStiffness = (stiffness: Stiffness): boolean =>
+  (stiffness.length === 1 || stiffness.length === 3 || stiffness.length === 9) && stiffness.every(isBounded);
+/** All of them within bounds. */
+export const isForce = isVec3;
+
+function readForce(from: pb.ForceCommand): ForceCommand | undefined {
+  const model: LocalModel | undefined = from.model && { at: readVec3(from.model.atM), stiffness: from.model.stiffnessNpm };
+  const command: ForceCommand = {
+    sequence: from.sequence,
+    basedOnTick: from.basedOnTick,
+    force: readVec3(from.forceN),
+    model,
+    validForUs: from.validForUs,
+  };
+  const good = command.sequence > 0n && isVec3(command.force) && command.validForUs >= 1 &&
+    command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || (isVec3(model.at) && isStiffness(model.stiffness)));
+  return good ? command : undefined;
+}
+
+const writeForce = (from: ForceCommand): pb.ForceCommand =>
+  create(pb.ForceCommandSchema, {
+    sequence: from.sequence,
+    basedOnTick: from.basedOnTick,
+    forceN: writeVec3(from.force),
+    ...(from.model && { model: { atM: writeVec3(from.model.at), stiffnessNpm: [...from.model.stiffness] } }),
+    validForUs: from.validForUs,
+  });
+
+function readRequest(op: pb.Control["op"]): Request | undefined {
+  switch (op.case) {
+    case "setStateRate":
+      return { kind: "setStateRate", hz: op.value.hz };
+    case "rearm":
+      return { kind: "rearm" };
+    default:
+      return undefined;
+  }
+}
+
+function writeRequest(request: Request | undefined): pb.Control["op"] {
+  switch (request?.kind) {
+    case "setStateRate":
+      return { case: "setStateRate", value: create(pb.SetStateRateSchema, { hz: request.hz }) };
+    case "rearm":
+      return { case: "rearm", value: create(pb.RearmSchema) };
+    case undefined:
+      return { case: undefined };
+  }
+}
+
+function readWelcome(from: pb.Welcome): Welcome | undefined {
+  const { version, features, role, deviceName, loopHz, timeoutMs, server } = from;
+  const good = version >= 1 && areFeatures(features) && isEnum(role, pb.RoleSchema) &&
+    isText(deviceName, limits.kMaxName) && isMagnitude(from.maxForceN) && isMagnitude(from.positionResolutionM) &&
+    loopHz >= 1 && loopHz <= limits.kMaxLoopHz && timeoutMs >= 1 && timeoutMs <= limits.kMaxTimeoutMs &&
+    isText(server, limits.kMaxName);
+  if (!good) return undefined;
+  return {
+    version, features, role, deviceName, maxForce: from.maxForceN, positionResolution: from.positionResolutionM, loopHz,
+    timeoutMs, server,
+  };
+}
+
+const writeWelcome = (from: Welcome): pb.Welcome =>
+  create(pb.WelcomeSchema, {
+    version: from.version,
+    features: writeFeatures(from.features),
+    role: from.role,
+    deviceName: clip(from.deviceName, limits.kMaxName),
+    maxForceN: from.maxForce,
+    positionResolutionM: from.positionResolution,
+    loopHz: from.loopHz,
+    timeoutMs: from.timeoutMs,
+    server: clip(from.server, limits.kMaxName),
+  });

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
+import type { Welcome } from "./messages.js";
+import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
+
+/** Where datagrams to one server leave. */
+export interface Transport {
+  /** Sends one datagram, or loses it. */
+  send(datagram: Uint8Array): void;
+  close(): void;
+}
+/** Opens a way to one server: udp() of "tendon-client/node", webSocket(), or your own. Never calls back at once. */
+export type OpenTransport = (receive: (datagram: Uint8Array) => void) => Transport;
+
+export interface ConnectConfig extends ClientConfig {
+  /** Told whenever the connection's phase has changed. */
+  readonly onPhase?: (guest: Guest) => void;
+}
+
+/** A guest in real time. */
+export interface Guest {
+  readonly phase: Phase;
+  readonly welcome: Welcome | undefined;
+  stats(): ClientStats;
+  rearm(): boolean;
+  /** Says Bye and ends. */
+  stop(): void;
+  /** Resolves after stop(); rejects with what a callback threw. */
+  readonly ended: Promise<void>;
+}
+
+/**
+ * Becomes a guest of a server: sees the hand, and with `physics` answers each state with a force. It waits for the server
+ * when it is not there yet, and finds it again when it was restarted.
+ *
+ *     connect(udp("127.0.0.1:47100"), { name: "spring" }, { physics: ({ position: p }) => ({ x: -500 * p.x, … }) });
+ */
+export function connect(
+  open: OpenTransport,
+  config: ConnectConfig,
+  callback: { readonly physics: Physics } | { readonly watch: Watch },
+): Guest {
+  return new RealTimeGuest(open, config, callback);
+}
+
+/** Rounds of the event loop that wait for a backlog to be read, before the callback must have its turn. */
+const kMaxRounds = 16;
+/** Longer ones overflow in some runtimes; it is only a reason to look again. */
+const kLongestTimerMs = 1000;
+
+const readClock = (): Nanoseconds => fromMilliseconds(performance.now());
+
+class RealTimeGuest implements Guest {
+  readonly ended: Promise<void>;
+  readonly #client: ForceClient;
+  readonly #transport: Transport;
+  readonly #onPhase: ((guest: Guest) => void) | undefined;
+  readonly #defer: (task: () => void) => void;
+  #resolve!: () => void;
+  #reject!: (error: unknown) => void;
+  #phase: Phase = "greeting";
+
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #timerDue: Nanoseconds = kNever;
+  #deferred = false;
+  /** Datagrams since the last round of the event loop, and how many rounds they have put the turn off. */
+  #arrived = 0;
+  #rounds = 0;
+
+  constructor(open: OpenTransport, config: ConnectConfig, callback: ConstructorParameters<typeof ForceClient>[1]) {
+    this.ended = new Promise((resolve, reject) => {
+      this.#resolve = resolve;
+      this.#reject = reject;
+    });
+    this.#onPhase = config.onPhase;
+    this.#defer = makeDefer();
+    this.#client = new ForceClient(config, callback, (datagram) => this.#transport.send(datagram), readClock());
+    this.#transport = open((datagram) => this.#receive(datagram));
+    this.#wake();
+  }
+
+  get phase(): Phase {
+    return this.#client.phase;
+  }
+  get welcome(): Welcome | undefined {
+    return this.#client.welcome;
+  }
+  stats(): ClientStats {
+    return this.#client.stats();
+  }
+  rearm(): boolean {
+    const asked = this.#client.rearm();
+    this.#wake();
+    return asked;
+  }
+  stop(): void {
+    this.#client.stop(readClock());
+    this.#end();
+    this.#resolve();
+  }
+
+  #receive(datagram: Uint8Array): void {
+    this.#client.receive(readClock(), datagram);
+    ++this.#arrived;
+    this.#wake();
+  }
+
+  #wake(): void {
+    if (this.#deferred) return;
+    this.#deferred = true;
+    this.#defer(() => this.#round());
+  }
+
+  /**
+   * Comes after the datagrams that this round of the event loop has read. When they were several, more may wait in the
+   * socket: the physics must see the newest state, not work through a queue of old ones.
+   */
+  #round(): void {
+    this.#deferred = false;
+    const backlog = this.#arrived > 1 && this.#rounds < kMaxRounds;
+    this.#arrived = 0;
+    this.#rounds = backlog ? this.#rounds + 1 : 0;
+    if (backlog) this.#wake();
+    else this.#turn();
+  }
+
+  #turn(): void {
+    try {
+      let now: Nanoseconds;
+      let next: Nanoseconds;
+      do {
+        now = readClock();
+        next = this.#client.turn(now);
+      } while (next <= now);
+      this.#arm(now, next);
+      this.#tellPhase();
+    } catch (error) {
+      this.#end();
+      this.#reject(error);
+    }
+  }
+
+  #tellPhase(): void {
+    if (this.#phase === this.phase) return;
+    this.#phase = this.phase;
+    this.#onPhase?.(this);
+  }
+
+  /** A timer that fires too early costs less than setting it anew with every datagram. */
+  #arm(now: Nanoseconds, next: Nanoseconds): void {
+    if (this.phase === "stopped" || (this.#timer !== undefined && this.#timerDue <= next)) return;
+    clearTimeout(this.#timer);
+    this.#timerDue = next;
+    const wait = Math.min(Math.ceil(toMilliseconds(next - now)), kLongestTimerMs);
+    this.#timer = setTimeout(() => {
+      this.#timer = undefined;
+      this.#wake();
+    }, wait);
+  }
+
+  #end(): void {
+    clearTimeout(this.#timer);
+    this.#transport.close();
+    this.#tellPhase();
+  }
+}
+
+/** Puts a task behind the input that is already there. */
+function makeDefer(): (task: () => void) => void {
+  if (typeof setImmediate === "function") return (task) => void setImmediate(task);
+  const channel = new MessageChannel(); // setTimeout(0) would wait for up to 4 ms
+  let next: () => void = () => {};
+  channel.port1.onmessage = () => next();
+  return (task) => {
+    next = task;
+    channel.port2.postMessage(undefined);
+  };
+}

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0
+import { randomBytes } from "@noble/hashes/utils";
+import { isForce, isStiffness } from "./codec.js";
+import { ClientHandshake } from "./handshake.js";
+import { kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
+import {
+  Code, kFeatureLocalModel, kProtocolVersion, Role, type DeviceState, type Stiffness, type Vec3, type Welcome,
+} from "./messages.js";
+import { kKeySize } from "./noise.js";
+import { Session, type LinkStats } from "./session.js";
+import { earliest, fromMilliseconds, kNever, type Nanoseconds } from "./time.js";
+
+/** What the physics answers to one device state: what the hand is to feel there. */
+export interface Touch {
+  /** N, on the hand: a wall that resists motion along +x sends −x. */
+  readonly force: Vec3;
+  /**
+   * N/m, −∂force/∂position at the state's position, so that the device loop can follow the hand until the next force;
+   * a wall with normal n: k·n·nᵀ. Used when the server has agreed to it.
+   */
+  readonly stiffness?: Stiffness | undefined;
+}
+
+/** The physics engine, seen from here. While it computes, newer states replace older ones. */
+export type Physics = (hand: DeviceState) => Vec3 | Touch;
+
+/** An onlooker: device state and the state of the link in, nothing out. */
+export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
+
+export interface ClientConfig {
+  /** For the server's log; at most 64 bytes. */
+  readonly name?: string;
+  /** The 32 bytes that the server knows too: everything is encrypted, and only loopback does without. */
+  readonly key?: Uint8Array | undefined;
+  /** Calls of the callback per second, 0.001 … 100 000; 0 = one for every new state. */
+  readonly rateHz?: number;
+  /** States per second to ask the server for; 0 = what the server gives by itself. */
+  readonly stateHz?: number;
+  /**
+   * How long the server may take a force as fresh, counted from its arrival; at most 10 s. 0 = derived from the period T
+   * at which forces really leave, that is the asked one or, when the physics is slower, the time between the states of
+   * the last two forces: max(3 T, 20 ms). Two forces in a row may be lost and the third is still in time.
+   */
+  readonly validForMs?: number;
+  /** The Hellos of one attempt go unanswered for so long before it is given up. */
+  readonly patienceMs?: number;
+  /** First wait before the next attempt. */
+  readonly retryMinMs?: number;
+  /** Longest wait before the next attempt. */
+  readonly retryMaxMs?: number;
+  /** So many random bytes, for the handshakes; the system's by itself. */
+  readonly random?: (size: number) => Uint8Array;
+}
+
+/**
+ * greeting: an attempt is under way. open: states come in, forces go out. unanswered, refused, lost: nobody answered, the
+ * server said no, the session has ended; waiting for the next attempt. stopped: for good.
+ */
+export type Phase = "greeting" | "open" | "unanswered" | "refused" | "lost" | "stopped";
+
+export interface ClientStats {
+  phase: Phase;
+  /** Why the last attempt or session ended: the server's words where it had any. */
+  code: Code;
+  reason: string;
+  /** Of the present session, or of the last one. */
+  link: LinkStats | undefined;
+  attempts: number;
+  /** Of these, answered with a Welcome. */
+  sessions: number;
+  /** States that came in. */
+  states: number;
+  /** Of these, replaced by a newer one before a callback was due. */
+  statesSkipped: number;
+  /** Forces sent. */
+  forces: number;
+  /** Forces not sent: not finite, or out of bounds. */
+  forcesUnusable: number;
+}
+
+const kValidPeriods = 3;
+const kMinValidForMs = 20;
+/** A gap is not a period; an engine slower than 10 Hz says so by rateHz. */
+const kMaxObservedPeriodMs = 100;
+
+const kDefaults: Required<Omit<ClientConfig, "key">> = {
+  name: "guest", rateHz: 0, stateHz: 0, validForMs: 0, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000,
+  random: randomBytes,
+};
+
+function checked(config: ClientConfig): Required<ClientConfig> {
+  const given = Object.fromEntries(Object.entries(config).filter(([, value]) => value !== undefined));
+  const full: Required<ClientConfig> = { key: undefined, ...kDefaults, ...given };
+  const require = (ok: boolean, sentence: string): void => {
+    if (!ok) throw new RangeError(sentence);
+  };
+  require(new TextEncoder().encode(full.name).length <= kMaxName, `name: at most ${kMaxName} bytes`);
+  require(!full.key || full.key.length === kKeySize, `key: expected ${kKeySize} bytes, got ${full.key?.length}`);
+  require(full.rateHz === 0 || (full.rateHz >= 1e-3 && full.rateHz <= 1e5), "rateHz: expected 0, or 0.001 to 100000");
+  require(Number.isInteger(full.stateHz) && full.stateHz >= 0 && full.stateHz <= kMaxLoopHz,
+    `stateHz: expected a whole number from 0 to ${kMaxLoopHz}`);
+  require(full.validForMs >= 0 && full.validForMs <= kMaxValidForMs, `validForMs: expected 0 to ${kMaxValidForMs}`);
+  require(full.patienceMs > 0, "patienceMs: must be above zero");
+  require(full.retryMinMs > 0, "retryMinMs: must be above zero");
+  require(full.retryMaxMs >= full.retryMinMs, "retryMaxMs: must not be below retryMinMs");
+  return full;
+}
+
+/**
+ * A guest at a Tendon server, without socket, clock or timer: it says Hello, keeps the session alive, hands the newest
+ * device state to one callback, sends the force that comes back, and begins again when the server is gone.
+ *
+ *     client.receive(now, datagram) for each that has come in; then client.turn(now), again when it says so.
+ *
+ * - Newest wins. Of the states that came in before a turn, the callback sees the newest one, once.
+ * - Rate. With rateHz = r the callback is called at multiples of 1/r, or as soon after as there is a state it has not
+ *   seen; after a delay of a whole period the grid starts anew. With 0 it is called once for every new state.
+ * - Force. It leaves in the turn after the one that computed it, which is due at once: the datagram's time stamp must not
+ *   be older than the physics' work. One that is not finite or beyond 10¹² is counted and not sent.
+ * - Reconnection. However an attempt or a session ends, the next attempt waits retryMinMs, then twice as long each time,
+ *   at most retryMaxMs. The first state of a new session resets that.
+ */
+export class ForceClient {
+  readonly #config: Required<ClientConfig>;
+  readonly #role: Role;
+  readonly #physics: Physics | undefined;
+  readonly #watch: Watch | undefined;
+  readonly #send: (datagram: Uint8Array) => void;
+  /** Of the callback; 0 = none. */
+  readonly #period: Nanoseconds;
+
+  #handshake: ClientHandshake | undefined;
+  #session: Session | undefined;
+  #welcome: Welcome | undefined;
+  /** End of the present attempt's patience. */
+  #giveUp = 0n;
+  /** When the next attempt begins. */
+  #retry = 0n;
+  /** Wait before the attempt after that. */
+  #backOff: Nanoseconds;
+
+  /** Newest state that the callback has not seen. */
+  #unseen: DeviceState | undefined;
+  #nextCall: Nanoseconds;
+  /** Of the newest force. */
+  #sequence = 0n;
+  /** The tick that it answers. */
+  #answeredTick = 0n;
+  readonly #stats: ClientStats = {
+    phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesSkipped: 0,
+    forces: 0, forcesUnusable: 0,
+  };
+
+  /**
+   * `send` takes one datagram, or loses it; it is called from within receive(), turn() and stop(). The first Hello leaves with
+   * the first turn. Throws RangeError naming the field when `config` is impossible.
+   */
+  constructor(
+    config: ClientConfig,
+    callback: { readonly physics: Physics } | { readonly watch: Watch },
+    send: (datagram: Uint8Array) => void,
+    now: Nanoseconds,
+  ) {
+    this.#config = checked(config);
+    this.#physics = "physics" in callback ? callback.physics : undefined;
+    this.#watch = "watch" in callback ? callback.watch : undefined;
+    this.#role = this.#physics ? Role.CONTROLLER : Role.OBSERVER;
+    this.#send = send;
+    this.#period = this.#config.rateHz > 0 ? fromMilliseconds(1000 / this.#config.rateHz) : 0n;
+    this.#backOff = fromMilliseconds(this.#config.retryMinMs);
+    this.#nextCall = now;
+    this.#greet(now);
+  }
+
+  /** Takes any bytes from the server. */
+  receive(now: Nanoseconds, datagram: Uint8Array): void {
+    if (this.#handshake) {
+      this.#handshake.receive(now, datagram);
+      this.#settle(now);
+    } else if (this.#session) {
+      this.#session.receive(now, datagram);
+      this.#takeEvents(now);
+    }
+  }
+
+  /**
+   * Does all there is to do at `now` and returns when it wants to be called again at the latest; a datagram is a reason to
+   * call it earlier. What the callback throws passes through, after a Bye to the server.
+   */
+  turn(now: Nanoseconds): Nanoseconds {
+    if (this.phase === "stopped") return kNever;
+    this.#tick(now);
+    this.#flush(now);
+    return this.#call(now) ? now : this.#nextTurn();
+  }
+
+  /**
+   * Asks the server to clear a latched fault of its device. Controllers only: an observer is refused. False when there is
+   * no session to ask in, or too many requests are open.
+   */
+  rearm(): boolean {
+    return this.#session?.request({ kind: "rearm" }) !== undefined;
+  }
+
+  /** Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing. */
+  stop(now: Nanoseconds): void {
+    if (this.phase === "stopped") return;
+    this.#session?.close(Code.OK, `${this.#config.name} stops`);
+    this.#flush(now);
+    this.#end(now, "stopped", Code.OK, "stopped");
+  }
+
+  /** As it is now; it does not change any more. */
+  stats(): ClientStats {
+    const link = this.#session?.stats ?? this.#stats.link;
+    return { ...this.#stats, link: link && { ...link } };
+  }
+  get phase(): Phase {
+    return this.#stats.phase;
+  }
+  /** What the server said of itself and its device when the newest session opened. */
+  get welcome(): Welcome | undefined {
+    return this.#welcome;
+  }
+
+  #greet(now: Nanoseconds): void {
+    const hello = {
+      versionMin: kProtocolVersion,
+      versionMax: kProtocolVersion,
+      role: this.#role,
+      name: this.#config.name,
+      features: [kFeatureLocalModel],
+    };
+    this.#handshake = new ClientHandshake(hello, this.#config.key, this.#config.random, now);
+    this.#giveUp = now + fromMilliseconds(this.#config.patienceMs);
+    this.#stats.phase = "greeting";
+    ++this.#stats.attempts;
+  }
+
+  /** Acts on the server's answer, once it is there. */
+  #settle(now: Nanoseconds): void {
+    const outcome = this.#handshake?.outcome;
+    if (!outcome) return;
+    if (outcome.kind === "refused") {
+      this.#end(now, "refused", outcome.refused.code, outcome.refused.detail);
+      return;
+    }
+    const { connectionId, welcome, seal } = outcome;
+    this.#handshake = undefined;
+    this.#welcome = welcome;
+    this.#session = new Session({ connectionId, seal }, now);
+    if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz });
+    this.#sequence = 0n;
+    this.#stats.phase = "open";
+    ++this.#stats.sessions;
+  }
+
+  #end(now: Nanoseconds, phase: Phase, code: Code, reason: string): void {
+    Object.assign(this.#stats, { phase, code, reason, link: this.#session?.stats ?? this.#stats.link });
+    this.#handshake = undefined;
+    this.#session = undefined;
+    this.#unseen = undefined;
+    this.#retry = now + this.#backOff;
+    this.#backOff = earliest(2n * this.#backOff, fromMilliseconds(this.#config.retryMaxMs));
+  }
+
+  /** What is due by time. */
+  #tick(now: Nanoseconds): void {
+    if (this.#session) {
+      this.#session.tick(now);
+      this.#takeEvents(now);
+    } else if (this.#handshake) {
+      if (now >= this.#giveUp) this.#end(now, "unanswered", Code.TIMED_OUT, "no answer");
+      else this.#handshake.tick(now);
+    } else if (now >= this.#retry) {
+      this.#greet(now);
+      this.#handshake!.tick(now);
+    }
+  }
+
+  #takeEvents(now: Nanoseconds): void {
+    for (let event; (event = this.#session?.nextEvent()); ) {
+      if (event.kind === "state") {
+        ++this.#stats.states;
+        if (this.#unseen) ++this.#stats.statesSkipped;
+        this.#unseen = event.state;
+        this.#backOff = fromMilliseconds(this.#config.retryMinMs);
+      } else if (event.kind === "closed") {
+        this.#flush(now); // our own Bye, when the session ends by its age
+        this.#end(now, "lost", event.code, event.reason);
+      }
+    }
+  }
+
+  #flush(now: Nanoseconds): void {
+    for (let datagram; (datagram = (this.#session ?? this.#handshake)?.nextDatagram(now)); ) this.#send(datagram);
+  }
+
+  /** True when a force now waits to be sent. */
+  #call(now: Nanoseconds): boolean {
+    const hand = this.#unseen;
+    if (!hand || now < this.#nextCall) return false;
+    this.#unseen = undefined;
+    this.#nextCall += this.#period;
+    if (this.#nextCall <= now) this.#nextCall = now + this.#period;
+    try {
+      this.#watch?.(hand, this.#session!.stats);
+      if (!this.#physics) return false;
+      const touch = this.#physics(hand);
+      if (!touch) throw new TypeError(`physics: expected {x, y, z} or {force: {x, y, z}}, got ${touch}`);
+      this.#answer("force" in touch ? touch : { force: touch }, hand);
+      return true;
+    } catch (error) {
+      this.stop(now);
+      throw error;
+    }
+  }
+
+  #answer({ force, stiffness }: Touch, hand: DeviceState): void {
+    if (!this.#session || !this.#welcome) return; // the callback has called stop()
+    if (!isForce(force) || (stiffness && !isStiffness(stiffness))) {
+      ++this.#stats.forcesUnusable;
+      return;
+    }
+    const withModel = stiffness && this.#welcome.features.includes(kFeatureLocalModel);
+    this.#session.sendForce({
+      validForUs: Math.ceil(1000 * this.#validForMs(hand.tick, this.#welcome.loopHz)),
+      sequence: ++this.#sequence,
+      basedOnTick: hand.tick,
+      force,
+      model: withModel ? { at: hand.position, stiffness } : undefined,
+    });
+    this.#answeredTick = hand.tick;
+    ++this.#stats.forces;
+  }
+
+  #validForMs(tick: bigint, loopHz: number): number {
+    if (this.#config.validForMs > 0) return this.#config.validForMs;
+    const asked = this.#config.rateHz > 0 ? 1000 / this.#config.rateHz : 0;
+    const seen = this.#sequence > 0n ? (1000 * Number(tick - this.#answeredTick)) / loopHz : 0;
+    const period = Math.max(asked, Math.min(seen, kMaxObservedPeriodMs));
+    return Math.min(Math.max(kValidPeriods * period, kMinValidForMs), kMaxValidForMs);
+  }
+
+  #nextTurn(): Nanoseconds {
+    if (this.#session) {
+      const next = this.#session.nextTick();
+      return this.#unseen ? earliest(this.#nextCall, next) : next;
+    }
+    if (this.#handshake) return earliest(this.#giveUp, this.#handshake.nextTick());
+    return this.phase === "stopped" ? kNever : this.#retry;
+  }
+}

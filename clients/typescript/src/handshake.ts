@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+import { decodeAnswerMessage, encodeHelloMessage } from "./codec.js";
+import {
+  CipherSuite, concat, decodeAnswer, decodeRetry, encodeHello, equal, helloHeader, type AnswerDatagram,
+} from "./datagram.js";
+import type { Hello, Refused, Welcome } from "./messages.js";
+import { Initiator, keyId } from "./noise.js";
+import { NoiseSeal, PlainSeal, type Seal } from "./seal.js";
+import { kMillisecond, kNever, type Nanoseconds } from "./time.js";
+
+/** How an attempt ended. */
+export type Outcome =
+  | { readonly kind: "accepted"; readonly connectionId: number; readonly welcome: Welcome; readonly seal: Seal }
+  | { readonly kind: "refused"; readonly refused: Refused };
+
+/**
+ * One attempt of a client to be let in: bytes and times in, bytes and the outcome out (sans-I/O, pull). It says Hello
+ * every 100 ms until it is answered; the one who calls it decides when to give up.
+ */
+export class ClientHandshake {
+  static readonly kResend = 100n * kMillisecond;
+
+  readonly #hello: Hello;
+  readonly #random: Uint8Array;
+  readonly #suite: CipherSuite;
+  readonly #content: Uint8Array;
+  readonly #initiator: Initiator | undefined;
+  #cookie: Uint8Array | undefined;
+  #due = false;
+  #nextTick: Nanoseconds;
+  #outcome: Outcome | undefined;
+
+  /**
+   * `random` gives so many bytes from a cryptographic source. With a `key` of 32 bytes the conversation is of suite 1,
+   * and whoever answers has proved to know it.
+   */
+  constructor(hello: Hello, key: Uint8Array | undefined, random: (size: number) => Uint8Array, now: Nanoseconds) {
+    this.#hello = hello;
+    this.#random = random(16);
+    this.#nextTick = now;
+    const message = encodeHelloMessage(hello);
+    if (key) {
+      const id = keyId(key);
+      this.#suite = CipherSuite.Noise;
+      const prologue = concat(new TextEncoder().encode("tendon-1"), helloHeader(this.#suite), id, this.#random);
+      this.#initiator = new Initiator(key, prologue, random(32), message);
+      this.#content = concat(id, this.#initiator.message1);
+    } else {
+      this.#suite = CipherSuite.Plain;
+      this.#content = message;
+    }
+  }
+
+  /** Takes any bytes; what is not an answer to this attempt changes nothing. */
+  receive(now: Nanoseconds, datagram: Uint8Array): void {
+    if (this.#outcome) return;
+    const retry = decodeRetry(datagram);
+    if (retry && retry.suite === this.#suite && equal(retry.random, this.#random)) {
+      // Only the first cookie is worth an immediate Hello. Were every Retry, a server that dislikes our cookies and we
+      // would play ping-pong.
+      if (!this.#cookie) {
+        this.#due = true;
+        this.#nextTick = now;
+      }
+      this.#cookie = retry.cookie;
+      return;
+    }
+    const answer = decodeAnswer(datagram);
+    if (!answer || answer.suite !== this.#suite || !equal(answer.random, this.#random)) return;
+    this.#outcome = this.#read(now, answer);
+    if (this.#outcome) {
+      this.#due = false;
+      this.#nextTick = kNever;
+    }
+  }
+
+  tick(now: Nanoseconds): void {
+    if (!this.#outcome && now >= this.#nextTick) this.#due = true;
+  }
+
+  /** The next datagram to send; undefined = nothing to send now. */
+  nextDatagram(now: Nanoseconds): Uint8Array | undefined {
+    if (!this.#due) return undefined;
+    this.#due = false;
+    this.#nextTick = now + ClientHandshake.kResend;
+    return encodeHello({
+      suite: this.#suite, random: this.#random, cookie: this.#cookie ?? new Uint8Array(16), content: this.#content,
+    });
+  }
+
+  /** When `tick` is due next. */
+  nextTick(): Nanoseconds {
+    return this.#nextTick;
+  }
+  get outcome(): Outcome | undefined {
+    return this.#outcome;
+  }
+
+  #read(now: Nanoseconds, answer: AnswerDatagram): Outcome | undefined {
+    const finished = this.#initiator?.readMessage2(answer.content);
+    if (this.#initiator && !finished) return undefined;
+    const message = decodeAnswerMessage(finished?.payload ?? answer.content);
+    if (!message) return undefined;
+    if ("code" in message) return { kind: "refused", refused: message };
+    if (message.version < this.#hello.versionMin || message.version > this.#hello.versionMax) return undefined;
+    const seal = finished ? new NoiseSeal(finished, now) : new PlainSeal();
+    return { kind: "accepted", connectionId: answer.connectionId, welcome: message, seal };
+  }
+}

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Works in every runtime. "tendon-client/node" adds UDP and the command line.
+export { connect, type ConnectConfig, type Guest, type OpenTransport, type Transport } from "./connect.js";
+export {
+  ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Touch, type Watch,
+} from "./force_client.js";
+export { parseKeyFile, type ClientKey } from "./key_file.js";
+export {
+  Code, Mode, reasonNames, Role, type DeviceState, type Stiffness, type Vec3, type Welcome,
+} from "./messages.js";
+export type { LinkStats } from "./session.js";
+export type { Nanoseconds } from "./time.js";
+export { webSocket } from "./websocket.js";

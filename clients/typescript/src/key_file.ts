@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+import { Role } from "./messages.js";
+import { kKeySize } from "./noise.js";
+
+export interface ClientKey {
+  /** The most that the server grants: a controller may also observe. */
+  readonly role: Role;
+  readonly key: Uint8Array;
+}
+
+/** Of 32 random bytes some 30 are different; that fewer than 18 are happens once in 10¹¹ keys. */
+const kFewestDifferent = 18;
+const kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
+
+/**
+ * Reads the text of a key file, which `tendond keygen` writes: empty lines and lines that begin with # are comments; one
+ * line is left, `controller` or `observer` and 64 hexadecimal digits. Throws a RangeError with a sentence, never with the
+ * key, when the text is no key file or the key is weak.
+ */
+export function parseKeyFile(text: string): ClientKey {
+  const lines = text.split("\n").map((line) => line.trim()).filter((line) => line !== "" && !line.startsWith("#"));
+  if (lines.length > 1) throw new RangeError(`${kExpected}, got several lines`);
+  const [word, digits, ...more] = (lines[0] ?? "").split(/[ \t]+/);
+  if (digits === undefined || more.length > 0) throw new RangeError(kExpected);
+  const role = word === "controller" ? Role.CONTROLLER : word === "observer" ? Role.OBSERVER : undefined;
+  if (role === undefined) throw new RangeError(`${kExpected}, but the line begins with neither`);
+  if (digits.length !== 2 * kKeySize) {
+    throw new RangeError(`the key is too ${digits.length < 2 * kKeySize ? "short" : "long"}: ${kExpected}`);
+  }
+  if (!/^[0-9a-f]*$/i.test(digits)) throw new RangeError("the key holds something else than hexadecimal digits");
+  const key = Uint8Array.from({ length: kKeySize }, (_, i) => Number.parseInt(digits.slice(2 * i, 2 * i + 2), 16));
+  const weak = weakness(key);
+  if (weak) throw new RangeError(`the key is weak: ${weak}; make one with \`tendond keygen NAME\``);
+  return { role, key };
+}
+
+/** Why nobody should use this key. */
+function weakness(key: Uint8Array): string | undefined {
+  if (new Set(key).size < kFewestDifferent) return "it repeats the same few bytes";
+  const steps = new Set(Array.from(key.subarray(1), (byte, i) => (byte - key[i]!) & 0xff));
+  if (steps.size < kFewestDifferent) return "its bytes follow a pattern";
+  if (key.every((byte) => byte >= 0x20 && byte < 0x7f)) return "it is text that somebody has typed";
+  return undefined;
+}

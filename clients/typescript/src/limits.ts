@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every bound of the wire; both ends have the same (protocol/WIRE.md, protocol/SESSION.md).
+
+/** Bytes; no datagram is larger: below every common path MTU, so it is never fragmented. */
+export const kMaxDatagram = 1200;
+/** Largest magnitude of any quantity, per component, in SI units. */
+export const kMaxValue = 1e12;
+/** ns; largest distance of any clock reading from its zero. */
+export const kMaxTime = 1n << 60n;
+/** ms; a force cannot be promised for longer. */
+export const kMaxValidForMs = 10_000;
+/** Packet numbers are below this: a nonce never comes near the one that renews a key. */
+export const kMaxPacketNumber = 1n << 60n;
+export const kMaxFrames = 64;
+/** Requests sent and not yet answered. */
+export const kRequestWindow = 16;
+/** Bytes of UTF-8 in a name. */
+export const kMaxName = 64;
+export const kMaxFeatures = 16;
+/** Bytes of UTF-8 in one feature. */
+export const kMaxFeature = 32;
+/** Bytes of UTF-8 in one sentence: the reason of a refusal, an answer or a Bye. */
+export const kMaxDetail = 128;
+export const kMaxLoopHz = 1_000_000;
+export const kMaxTimeoutMs = 3_600_000;
+/** How often a Bye is said. */
+export const kByes = 3;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
+// frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
+import { Code, Mode, Role } from "./gen/tendon_pb.js";
+import type { Nanoseconds } from "./time.js";
+
+export { Code, Mode, Role };
+
+/** The version of the wire that this client speaks. */
+export const kProtocolVersion = 1;
+/** A feature: the client may send a local model with its forces, and the server follows the hand with it. */
+export const kFeatureLocalModel = "local-model";
+
+/** Any object with x, y and z will do: the vector of your engine too. */
+export interface Vec3 {
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+}
+
+/** N/m, −∂force/∂position; a spring is positive. 1 entry k: k·I. 3: the diagonal. 9: the matrix, row by row. */
+export type Stiffness = readonly number[];
+
+/** The device at one haptic step. */
+export interface DeviceState {
+  /** Number of the haptic step. */
+  readonly tick: bigint;
+  /** When the position was sampled, on the server's clock: its differences are the dt to integrate with. */
+  readonly sampledNs: Nanoseconds;
+  /** m */
+  readonly position: Vec3;
+  /** m/s */
+  readonly velocity: Vec3;
+  /** N on the hand, what the device really gives out from this step on. */
+  readonly forceApplied: Vec3;
+  /** J, the energy ledger: what the device may still give out. */
+  readonly energy: number;
+  /** N, the limiter's bound on the norm; Infinity when there is none. */
+  readonly permittedForce: number;
+  /** Bits, why the force is not what was asked for; reasonNames() spells them out. */
+  readonly reasons: number;
+  /** Sequence number of the force rendered now; 0 = none. */
+  readonly forceSequence: bigint;
+  /** Time since that force arrived at the server. */
+  readonly forceAgeNs: Nanoseconds;
+  readonly mode: Mode;
+}
+
+/** F(x) = force − stiffness · (x − at): what the force becomes when the hand moves on. */
+export interface LocalModel {
+  /** m, the position that the force was computed for. */
+  readonly at: Vec3;
+  readonly stiffness: Stiffness;
+}
+
+/** The force that the physics wants. */
+export interface ForceCommand {
+  /** 1, 2, 3 … per session. */
+  readonly sequence: bigint;
+  /** The state it was computed from. */
+  readonly basedOnTick: bigint;
+  /** N on the hand */
+  readonly force: Vec3;
+  readonly model?: LocalModel | undefined;
+  /** Counted from its arrival; 1 … 10 000 000. */
+  readonly validForUs: number;
+}
+
+/** Reliable, client → server: how many states per second it wants, or: clear a latched fault. */
+export type Request = { readonly kind: "setStateRate"; readonly hz: number } | { readonly kind: "rearm" };
+
+/** The first words of a client. */
+export interface Hello {
+  readonly versionMin: number;
+  readonly versionMax: number;
+  readonly role: Role;
+  readonly name: string;
+  readonly features: readonly string[];
+}
+
+/** The server's yes. */
+export interface Welcome {
+  readonly version: number;
+  readonly features: readonly string[];
+  readonly role: Role;
+  readonly deviceName: string;
+  /** N, norm of the force that the device can give out. */
+  readonly maxForce: number;
+  /** m, one encoder count at the handle; 0 = exact. */
+  readonly positionResolution: number;
+  /** Haptic steps per second. */
+  readonly loopHz: number;
+  /** Silence after which the server forgets this client. */
+  readonly timeoutMs: number;
+  /** Name and version of the server. */
+  readonly server: string;
+}
+
+/** The server's no, with the reason. */
+export interface Refused {
+  readonly code: Code;
+  readonly detail: string;
+  readonly versionMin: number;
+  readonly versionMax: number;
+}
+
+const kReasons = [
+  "energy", "max force", "slew", "ramp-in", "held", "decaying", "safe stop", "not finite", "fault", "device clamp",
+  "overrun", "watchdog",
+] as const;
+
+/** The names of the bits of DeviceState.reasons. */
+export function reasonNames(reasons: number): string[] {
+  return kReasons.filter((_, bit) => (reasons & (1 << bit)) !== 0);
+}

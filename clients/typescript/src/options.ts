@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+import { parseArgs, type ParseArgsConfig } from "node:util";
+import type { ClientConfig } from "./force_client.js";
+import { parseAddress } from "./udp.js";
+
+/** What run() needs to know; commandLine() fills it. */
+export interface Options extends ClientConfig {
+  /** Where tendond listens. */
+  readonly server: string;
+  /** Ends after this time; 0 = at SIGINT or SIGTERM. */
+  readonly durationS: number;
+  /** The closing summary as one JSON object on stdout, not as text on stderr. */
+  readonly json: boolean;
+}
+
+/** A number ≥ 0 or a switch: its default and its meaning. */
+type Extra = readonly [number, string] | readonly [false, string];
+type ValueOf<E extends Extra> = E extends readonly [number, string] ? number : boolean;
+
+interface Shared {
+  readonly name: string;
+  readonly rateHz: number;
+}
+
+/** What is wrong with a command line, in a sentence. */
+class UsageError extends Error {}
+
+/** 0, or a number from `least` to `most`. */
+function number(option: string, text: string, least: number, most: number): number {
+  const value = text.trim() === "" ? NaN : Number(text);
+  if (value === 0 || (value >= least && value <= most)) return value;
+  throw new UsageError(`--${option}: expected ${least > 0 ? "0, or " : ""}${least} to ${most}, got "${text}"`);
+}
+
+/**
+ * The command line that all guests share, --server, --rate-hz, --duration-s, --json and --help, and what a program adds to
+ * it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. After --help and after a wrong usage, which stderr is told,
+ * the process ends, with 0 and 2.
+ */
+export function commandLine<Extras extends Record<string, Extra> = Record<never, never>>(
+  purpose: string,
+  defaults: Shared,
+  extras: Extras = {} as Extras,
+): { readonly options: Options; readonly values: { readonly [Name in keyof Extras]: ValueOf<Extras[Name]> } } {
+  const config: NonNullable<ParseArgsConfig["options"]> = {
+    help: { type: "boolean", short: "h" },
+    server: { type: "string", default: "127.0.0.1:47100" },
+    "rate-hz": { type: "string", default: String(defaults.rateHz) },
+    "duration-s": { type: "string", default: "0" },
+    json: { type: "boolean", default: false },
+  };
+  for (const [name, [value]] of Object.entries(extras)) {
+    config[name] = value === false ? { type: "boolean", default: false } : { type: "string", default: String(value) };
+  }
+  try {
+    const { values } = parseArgs({ options: config });
+    if (values.help) {
+      process.stdout.write(help(purpose, defaults, extras));
+      process.exit(0);
+    }
+    const text = (name: string): string => String(values[name]);
+    const server = text("server");
+    try {
+      parseAddress(server);
+    } catch (error) {
+      throw new UsageError(`--server: ${(error as Error).message}`);
+    }
+    const options: Options = {
+      name: defaults.name,
+      server,
+      rateHz: number("rate-hz", text("rate-hz"), 1e-3, 1e5),
+      durationS: number("duration-s", text("duration-s"), 0, 1e9),
+      json: values.json === true,
+    };
+    const more = Object.entries(extras).map(([name, [value]]) =>
+      [name, value === false ? values[name] : number(name, text(name), 0, Number.MAX_VALUE)]);
+    return { options, values: Object.fromEntries(more) };
+  } catch (error) {
+    process.stderr.write(`${(error as Error).message}\nRun with --help for more information.\n`);
+    process.exit(2);
+  }
+}
+
+function help(purpose: string, { name, rateHz }: Shared, extras: Record<string, Extra>): string {
+  const lines: [string, string][] = [
+    ["-h, --help", "Print this and leave"],
+    ["--server HOST:PORT", "Where tendond listens [127.0.0.1:47100]"],
+    ["--rate-hz NUMBER", `Times per second; 0 = for every device state that arrives [${rateHz}]`],
+    ["--duration-s NUMBER", "Leave after this time; 0 = at Ctrl-C [0]"],
+    ["--json", "One JSON object per line on stdout"],
+    ...Object.entries(extras).map(([option, [value, meaning]]): [string, string] =>
+      value === false ? [`--${option}`, meaning] : [`--${option} NUMBER`, `${meaning} [${value}]`]),
+  ];
+  const table = lines.map(([option, meaning]) => `  ${option.padEnd(30)}${meaning}\n`).join("");
+  return `${purpose}\n\nUsage: ${name} [OPTIONS]\n\n${table}\nExample: ${name} --server 127.0.0.1:47100 --duration-s 10\n`;
+}

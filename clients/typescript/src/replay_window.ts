@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+
+/** 2048 bits, of which the 64 being filled are not a full memory: 1984 numbers are always remembered. */
+const kWords = 32n;
+const kRemembered = (kWords - 1n) * 64n;
+
+/**
+ * Which packet numbers have arrived, as far back as it matters: a packet is let in once. A ring of bits as in RFC 6479:
+ * a number's bit never moves, advancing clears the words it runs over.
+ *
+ * Ask with `contains` before anything is believed of a packet, `insert` once it has proved good, so that a forged one
+ * cannot use up the number of a real one.
+ */
+export class ReplayWindow {
+  readonly #words = new BigUint64Array(Number(kWords));
+  #highest = -1n;
+  #count = 0n;
+
+  /** True when `number` was inserted, or is too old to know. */
+  contains(number: bigint): boolean {
+    if (number > this.#highest) return false;
+    return this.#highest - number >= kRemembered || this.#has(number);
+  }
+
+  /** `number` must not be contained. */
+  insert(number: bigint): void {
+    if (number > this.#highest) {
+      const from = this.#highest < 0n ? -1n : this.#highest / 64n;
+      const to = number / 64n;
+      const steps = to - from < kWords ? to - from : kWords;
+      for (let i = 0n; i < steps; ++i) this.#words[Number((to - i) % kWords)] = 0n;
+      this.#highest = number;
+    }
+    this.#words[word(number)]! |= bit(number);
+    ++this.#count;
+  }
+
+  /** Bit i: (number − 1 − i) is known to have been inserted. */
+  maskBefore(number: bigint): number {
+    let mask = 0;
+    for (let i = 0; i < 32; ++i) {
+      const earlier = number - 1n - BigInt(i);
+      if (earlier < 0n) break;
+      if (this.#highest - earlier < kRemembered && this.#has(earlier)) mask |= 1 << i;
+    }
+    return mask >>> 0;
+  }
+
+  /** −1 before the first. */
+  get highest(): bigint {
+    return this.#highest;
+  }
+  /** How many numbers from 0 to the highest were never inserted. */
+  get missing(): bigint {
+    return this.#highest + 1n - this.#count;
+  }
+
+  #has(number: bigint): boolean {
+    return (this.#words[word(number)]! & bit(number)) !== 0n;
+  }
+}
+
+const word = (number: bigint): number => Number((number / 64n) % kWords);
+const bit = (number: bigint): bigint => 1n << number % 64n;

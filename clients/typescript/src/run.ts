@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+import { connect, type Guest } from "./connect.js";
+import type { ClientStats, Physics, Watch } from "./force_client.js";
+import { Code } from "./messages.js";
+import type { Options } from "./options.js";
+import { udp } from "./udp.js";
+
+/** Refusals that another attempt does not change. */
+const isFinal = (code: Code): boolean => code !== Code.BUSY && code !== Code.SHUTDOWN;
+
+/** The connection's state in a sentence; empty when there is nothing to say. */
+function sentence(guest: Guest, server: string): string {
+  const { phase, code, reason } = guest.stats();
+  switch (phase) {
+    case "open": {
+      const { deviceName, loopHz, server: program } = guest.welcome!;
+      return `connected to ${deviceName} at ${server} (${program}, ${loopHz} Hz)`;
+    }
+    case "unanswered":
+      return `no answer from ${server}; is tendond running there? Trying on`;
+    case "refused":
+      return `${server} refuses: ${reason}${isFinal(code) ? "" : "; trying on"}`;
+    case "lost":
+      return `lost ${server}: ${reason}; trying on`;
+    case "greeting":
+    case "stopped":
+      return "";
+  }
+}
+
+function printSummary(stats: ClientStats, seconds: number, { name, json }: Options): void {
+  const { sessions, states, statesSkipped, forces, forcesUnusable, link } = stats;
+  if (json) {
+    const summary = {
+      duration_s: seconds, sessions, states, states_skipped: statesSkipped, forces, forces_unusable: forcesUnusable,
+      lost_incoming: link?.lost ?? 0, lost_outgoing: link?.lostOutgoing ?? 0,
+      round_trip_ms: link?.smoothedRoundTripMs ?? 0, round_trip_variation_ms: link?.roundTripVariationMs ?? 0,
+    };
+    console.log(JSON.stringify({ summary }));
+  } else if (!link) {
+    console.error(`${name}: was not connected`);
+  } else {
+    console.error(
+      `${name}: ${seconds.toFixed(1)} s, ${states} states came in (${statesSkipped} skipped for a newer one), ` +
+      `${forces} forces went out (${forcesUnusable} more were unusable), lost on the way: ${link.lost} in, ` +
+      `${link.lostOutgoing} out, round trip ${link.smoothedRoundTripMs.toFixed(2)} ± ` +
+      `${link.roundTripVariationMs.toFixed(2)} ms`);
+  }
+}
+
+/**
+ * Runs a guest over UDP until it is told to stop (durationS, SIGINT or SIGTERM); then it says Bye. The exit code comes
+ * back: 0 = it has been connected to the server, 1 = it could not connect, the server refused it for good, or the callback
+ * threw. Another controller at the device and a server that goes down are not for good: it keeps trying. stderr gets one
+ * sentence for each change of the connection, stdout nothing but the callback's own output and, with `json`, the summary.
+ */
+export async function run(
+  options: Options,
+  callback: { readonly physics: Physics } | { readonly watch: Watch },
+): Promise<0 | 1> {
+  const { name, server, durationS } = options;
+  const start = performance.now();
+  let refused = false;
+  let said = "";
+  const guest = connect(udp(server), {
+    ...options,
+    onPhase(changed) {
+      const text = sentence(changed, server);
+      if (text && text !== said) console.error(`${name}: ${(said = text)}`);
+      if (changed.phase !== "refused" || !isFinal(changed.stats().code)) return;
+      refused = true;
+      changed.stop();
+    },
+  }, callback);
+
+  const stop = (): void => guest.stop();
+  process.once("SIGINT", stop).once("SIGTERM", stop);
+  const timer = durationS > 0 ? setTimeout(stop, 1000 * durationS) : undefined;
+  try {
+    await guest.ended;
+    if (refused) return 1;
+    const stats = guest.stats();
+    printSummary(stats, (performance.now() - start) / 1000, options);
+    return stats.sessions > 0 ? 0 : 1;
+  } catch (error) {
+    console.error(`${name}:`, error);
+    return 1;
+  } finally {
+    clearTimeout(timer);
+    process.off("SIGINT", stop).off("SIGTERM", stop);
+  }
+}

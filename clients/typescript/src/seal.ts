@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the body of a Data datagram is closed and opened: in the clear, or sealed with keys that are renewed.
+import { CipherSuite, concat, DatagramType, encodeHeader, kHeaderSize, type Header } from "./datagram.js";
+import { decrypt, encrypt, rekey } from "./noise.js";
+import { kSecond, type Nanoseconds } from "./time.js";
+
+export interface Seal {
+  readonly suite: CipherSuite;
+  /** Bytes that closing adds to a body. */
+  readonly overhead: number;
+  /** The datagram. */
+  close(now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array;
+  /** The body, or why there is none: not sealed by the peer, or with a key that is over or far ahead. */
+  open(now: Nanoseconds, header: Header, datagram: Uint8Array): Uint8Array | "forged" | "oldKey";
+}
+
+/** Suite 0. */
+export class PlainSeal implements Seal {
+  readonly suite = CipherSuite.Plain;
+  readonly overhead = 0;
+
+  close(_now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array {
+    const header = { type: DatagramType.Data, epoch: 0, suite: this.suite, connectionId, packetNumber };
+    return concat(encodeHeader(header), body);
+  }
+  open(_now: Nanoseconds, _header: Header, datagram: Uint8Array): Uint8Array {
+    return datagram.subarray(kHeaderSize);
+  }
+}
+
+/** Suite 1: ChaCha20-Poly1305 with the packet number as nonce and the header as associated data. */
+export class NoiseSeal implements Seal {
+  /** The sender renews its key after so many datagrams or so much time, whichever comes first. */
+  static readonly kRenewAfter = { datagrams: 1n << 20n, time: 600n * kSecond };
+  /** The key before is still good for so long after moving on. */
+  static readonly kOverlap = 2n * kSecond;
+
+  readonly suite = CipherSuite.Noise;
+  readonly overhead = 16;
+
+  #sendKey: Uint8Array;
+  #sendEpoch = 0;
+  #renewed: Nanoseconds;
+  #closed = 0n;
+
+  #receiveKey: Uint8Array;
+  #nextReceiveKey: Uint8Array;
+  #receiveEpoch = 0;
+  #before: { readonly key: Uint8Array; readonly until: Nanoseconds } | undefined;
+
+  constructor(
+    keys: { readonly sendKey: Uint8Array; readonly receiveKey: Uint8Array },
+    opened: Nanoseconds,
+    private readonly renewAfter: { readonly datagrams: bigint; readonly time: Nanoseconds } = NoiseSeal.kRenewAfter,
+  ) {
+    this.#sendKey = keys.sendKey;
+    this.#receiveKey = keys.receiveKey;
+    this.#nextReceiveKey = rekey(keys.receiveKey);
+    this.#renewed = opened;
+  }
+
+  close(now: Nanoseconds, connectionId: number, packetNumber: bigint, body: Uint8Array): Uint8Array {
+    if (this.#closed >= this.renewAfter.datagrams || now - this.#renewed >= this.renewAfter.time) {
+      this.#sendKey = rekey(this.#sendKey);
+      this.#sendEpoch = (this.#sendEpoch + 1) % 256;
+      this.#renewed = now;
+      this.#closed = 0n;
+    }
+    ++this.#closed;
+    const header = encodeHeader({
+      type: DatagramType.Data, epoch: this.#sendEpoch, suite: this.suite, connectionId, packetNumber,
+    });
+    return concat(header, encrypt(this.#sendKey, packetNumber, header, body));
+  }
+
+  open(now: Nanoseconds, header: Header, datagram: Uint8Array): Uint8Array | "forged" | "oldKey" {
+    const opened = (key: Uint8Array): Uint8Array | "forged" =>
+      decrypt(key, header.packetNumber, datagram.subarray(0, kHeaderSize), datagram.subarray(kHeaderSize)) ?? "forged";
+    switch ((header.epoch - this.#receiveEpoch + 256) % 256) {
+      case 0:
+        return opened(this.#receiveKey);
+      case 1: {
+        const body = opened(this.#nextReceiveKey);
+        if (body !== "forged") {
+          this.#before = { key: this.#receiveKey, until: now + NoiseSeal.kOverlap };
+          this.#receiveKey = this.#nextReceiveKey;
+          this.#nextReceiveKey = rekey(this.#receiveKey);
+          this.#receiveEpoch = header.epoch;
+        }
+        return body;
+      }
+      case 255:
+        return this.#before && now < this.#before.until ? opened(this.#before.key) : "oldKey";
+      default:
+        return "oldKey";
+    }
+  }
+}

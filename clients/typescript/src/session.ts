@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: Apache-2.0
+import { decodeData, encodeFrame, encodeHead, type DataContent, type Echo, type Frame } from "./codec.js";
+import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
+import { kByes, kMaxDatagram, kMaxPacketNumber } from "./limits.js";
+import { Code, type DeviceState, type ForceCommand, type Request } from "./messages.js";
+import { ReplayWindow } from "./replay_window.js";
+import { IncomingRequests, OutgoingRequests } from "./requests.js";
+import { RoundTrip } from "./round_trip.js";
+import { PlainSeal, type Seal } from "./seal.js";
+import { earliest, kMillisecond, kNever, kSecond, toMilliseconds, type Nanoseconds } from "./time.js";
+
+/**
+ * Everything that is counted about one conversation. Each datagram received adds one to exactly one of `received`,
+ * `duplicated`, `malformed`, `forged` and `oldKey`.
+ */
+export interface LinkStats {
+  sent: number;
+  /** Accepted ones. */
+  received: number;
+  /** Numbers of the peer's packets never seen (so far). */
+  lost: number;
+  /** Ours that the peer had not seen, as far as its ack vectors reach. */
+  lostOutgoing: number;
+  /** Accepted, but older than one seen before. */
+  reordered: number;
+  /** Seen before, older than the window, or of the handshake: dropped. */
+  duplicated: number;
+  /** Not a datagram of this conversation: dropped. */
+  malformed: number;
+  /** Suite 1: did not open; forged, or damaged under way: dropped. */
+  forged: number;
+  /** Suite 1: of a key that is over, or far ahead: dropped. */
+  oldKey: number;
+  /** Well-formed, with a value out of bounds (NaN, Infinity …): frame dropped. */
+  invalid: number;
+  /** State or force not newer than the newest one: frame dropped. */
+  stale: number;
+  /** ms, newest sample; undefined before the first. */
+  roundTripMs: number | undefined;
+  /** ms, SRTT of RFC 6298. */
+  smoothedRoundTripMs: number;
+  /** ms, RTTVAR of RFC 6298. */
+  roundTripVariationMs: number;
+}
+
+/** What can be told to the owner of a session. */
+export type SessionEvent =
+  | { readonly kind: "state"; readonly state: DeviceState }
+  | { readonly kind: "force"; readonly command: ForceCommand }
+  | { readonly kind: "request"; readonly id: number; readonly request: Request }
+  | { readonly kind: "answered"; readonly id: number; readonly code: Code; readonly detail: string }
+  /** As the peer said Bye; Code.TIMED_OUT: it fell silent; Code.EXPIRED: too old. The last event. */
+  | { readonly kind: "closed"; readonly code: Code; readonly reason: string };
+
+export interface SessionConfig {
+  readonly connectionId: number;
+  readonly seal?: Seal;
+  /** Longest silence that we leave. */
+  readonly keepAlive?: Nanoseconds;
+  /** Silence of the peer after which it is gone. */
+  readonly timeout?: Nanoseconds;
+  /** A request is sent again after max(this, SRTT + 4 RTTVAR). */
+  readonly minResend?: Nanoseconds;
+  /** Suite 1: after this age a session ends, Code.EXPIRED: no key is older than a day. */
+  readonly life?: Nanoseconds;
+}
+
+/**
+ * One open conversation between a client and a server, seen from either end: bytes and times in, bytes and events out
+ * (sans-I/O, pull). protocol/SESSION.md describes the behaviour.
+ *
+ * State and force: newest wins. Requests: reliable and in order. Every datagram carries an echo, so each gives a round
+ * trip and an ack vector. Nothing queues without a bound.
+ *
+ * Use: `receive` what arrives and `tick` when `nextTick()` is due; then pull `nextEvent` and `nextDatagram` until they
+ * are empty.
+ */
+export class Session {
+  readonly stats: LinkStats = {
+    sent: 0, received: 0, lost: 0, lostOutgoing: 0, reordered: 0, duplicated: 0, malformed: 0, forged: 0, oldKey: 0,
+    invalid: 0, stale: 0, roundTripMs: undefined, smoothedRoundTripMs: 0, roundTripVariationMs: 0,
+  };
+  readonly #config: Required<SessionConfig>;
+  readonly #opened: Nanoseconds;
+  #latest: Nanoseconds;
+  #open = true;
+
+  // Out.
+  #nextPacket = 0n;
+  #lastSent: Nanoseconds | undefined;
+  #stateToSend: DeviceState | undefined;
+  #forceToSend: ForceCommand | undefined;
+  readonly #asked = new OutgoingRequests();
+  #bye: Frame | undefined;
+  #byesLeft = 0;
+
+  // In.
+  #lastHeard: Nanoseconds;
+  readonly #seen = new ReplayWindow();
+  #echo: Omit<Echo, "receivedMask"> | undefined;
+  #newestTick = -1n;
+  #newestSequence = -1n;
+  /** Newest packet of ours that the peer has told of. */
+  #newestEchoed = -1n;
+  readonly #answering = new IncomingRequests();
+  readonly #roundTrip = new RoundTrip();
+
+  // To tell.
+  #stateArrived: DeviceState | undefined;
+  #forceArrived: ForceCommand | undefined;
+  #closed: SessionEvent | undefined;
+
+  /** `opened` is the instant of the handshake's end. The first datagram is due at once. */
+  constructor(config: SessionConfig, opened: Nanoseconds) {
+    this.#config = {
+      seal: new PlainSeal(), keepAlive: 50n * kMillisecond, timeout: 2n * kSecond, minResend: 20n * kMillisecond,
+      life: 86_400n * kSecond, ...config,
+    };
+    this.#opened = this.#latest = this.#lastHeard = opened;
+  }
+
+  get open(): boolean {
+    return this.#open;
+  }
+
+  // ---- In
+
+  /** Takes any bytes. What is not a good datagram of this conversation is counted and dropped. */
+  receive(now: Nanoseconds, datagram: Uint8Array): void {
+    this.#latest = now;
+    if (!this.#open) return;
+    const header = decodeHeader(datagram);
+    if (header && header.type !== DatagramType.Data) {
+      ++this.stats.duplicated; // a copy of the handshake that took its time
+      return;
+    }
+    const { connectionId, seal } = this.#config;
+    const ours = header?.suite === seal.suite && header.connectionId === connectionId &&
+      header.packetNumber < kMaxPacketNumber;
+    if (!header || !ours) {
+      ++this.stats.malformed;
+      return;
+    }
+    if (this.#seen.contains(header.packetNumber)) {
+      ++this.stats.duplicated;
+      return;
+    }
+    const body = seal.open(now, header, datagram);
+    if (typeof body === "string") {
+      ++this.stats[body];
+      return;
+    }
+    const content = decodeData(body);
+    if (!content) {
+      ++this.stats.malformed;
+      // Its number is used up when it was authentic. In suite 0 nobody knows: a damaged copy must not shut out the good one.
+      if (seal.suite !== CipherSuite.Plain) this.#seen.insert(header.packetNumber);
+      return;
+    }
+    this.#accept(now, header.packetNumber, content);
+  }
+
+  sendState(state: DeviceState): void {
+    this.#stateToSend = state;
+  }
+  sendForce(command: ForceCommand): void {
+    this.#forceToSend = command;
+  }
+  /** Queues a reliable request and returns its id; undefined when 16 are open. */
+  request(request: Request): number | undefined {
+    return this.#asked.add(request);
+  }
+  /** Answers a request; an id that waits for no answer is ignored. */
+  answer(id: number, code: Code, detail: string): void {
+    this.#answering.answer(id, code, detail);
+  }
+  /** Says Bye and closes; what was not sent yet is dropped. No event comes: the owner knows. */
+  close(code: Code, reason: string): void {
+    if (!this.#open) return;
+    this.#open = false;
+    this.#bye = { kind: "bye", value: { code, reason } };
+    this.#byesLeft = kByes;
+  }
+  /** Notices the silence of the peer, and our age. */
+  tick(now: Nanoseconds): void {
+    this.#latest = now;
+    const { timeout, life, seal } = this.#config;
+    if (!this.#open) return;
+    if (now - this.#lastHeard >= timeout) {
+      this.#open = false;
+      this.#closed = { kind: "closed", code: Code.TIMED_OUT, reason: `nothing heard for ${toMilliseconds(timeout)} ms` };
+    } else if (seal.suite !== CipherSuite.Plain && now - this.#opened >= life) {
+      const reason = "the session has reached its age";
+      this.close(Code.EXPIRED, reason);
+      this.#closed = { kind: "closed", code: Code.EXPIRED, reason };
+    }
+  }
+
+  // ---- Out
+
+  /** The next datagram to send; undefined = nothing to send now. */
+  nextDatagram(now: Nanoseconds): Uint8Array | undefined {
+    this.#latest = now;
+    if (this.#byesLeft > 0) {
+      --this.#byesLeft;
+      return this.#write(now);
+    }
+    return this.#open && this.#somethingToSay(now) ? this.#write(now) : undefined;
+  }
+
+  /** The next thing to tell. */
+  nextEvent(): SessionEvent | undefined {
+    const request = this.#answering.next();
+    if (request) return { kind: "request", ...request };
+    const answer = this.#asked.nextAnswer();
+    if (answer) return { kind: "answered", ...answer };
+    const command = this.#forceArrived;
+    this.#forceArrived = undefined;
+    if (command) return { kind: "force", command };
+    const state = this.#stateArrived;
+    this.#stateArrived = undefined;
+    if (state) return { kind: "state", state };
+    const closed = this.#closed;
+    this.#closed = undefined;
+    return closed;
+  }
+
+  /** When `tick` and `nextDatagram` are due next; not in the future when something waits to be sent. */
+  nextTick(): Nanoseconds {
+    if (!this.#open) return this.#byesLeft > 0 ? this.#latest : kNever;
+    if (this.#lastSent === undefined || this.#somethingToSay(this.#latest)) return this.#latest;
+    const silence = earliest(this.#lastHeard + this.#config.timeout, this.#lastSent + this.#config.keepAlive);
+    return earliest(silence, this.#asked.nextDueTime());
+  }
+
+  // ---- Inside
+
+  #accept(now: Nanoseconds, number: bigint, content: DataContent): void {
+    ++this.stats.received;
+    this.stats.invalid += content.invalid;
+    this.#lastHeard = now;
+    if (number > this.#seen.highest) {
+      this.#echo = { sent: content.sent, received: now, packetNumber: number };
+    } else {
+      ++this.stats.reordered;
+    }
+    this.#seen.insert(number);
+    this.stats.lost = Number(this.#seen.missing);
+    if (content.echo) this.#observe(now, content.sent, content.echo);
+    for (const frame of content.frames) this.#take(frame);
+  }
+
+  #observe(now: Nanoseconds, sent: Nanoseconds, told: Echo): void {
+    const possible = told.packetNumber < this.#nextPacket && told.sent >= this.#opened && told.sent <= now &&
+      sent >= told.received;
+    if (!possible) {
+      ++this.stats.invalid;
+      return;
+    }
+    this.#countLostOutgoing(told);
+    const sample = now - told.sent - (sent - told.received);
+    if (sample < 0n) return; // two clocks of different rates, and a peer that held the echo for long
+    this.#roundTrip.observe(sample);
+    this.stats.roundTripMs = toMilliseconds(sample);
+    this.stats.smoothedRoundTripMs = toMilliseconds(this.#roundTrip.smoothed);
+    this.stats.roundTripVariationMs = toMilliseconds(this.#roundTrip.variation);
+  }
+
+  /** Of our packets since the last echo, those that the vector reaches: the echoed one and at most 32 before. */
+  #countLostOutgoing(told: Echo): void {
+    if (told.packetNumber <= this.#newestEchoed) return;
+    const between = told.packetNumber - this.#newestEchoed - 1n;
+    const reached = between < 32n ? Number(between) : 32;
+    for (let i = 0; i < reached; ++i) this.stats.lostOutgoing += (told.receivedMask >>> i) & 1 ? 0 : 1;
+    this.#newestEchoed = told.packetNumber;
+  }
+
+  #take(frame: Frame): void {
+    switch (frame.kind) {
+      case "state":
+        if (frame.value.tick > this.#newestTick) {
+          this.#newestTick = frame.value.tick;
+          this.#stateArrived = frame.value;
+        } else {
+          ++this.stats.stale;
+        }
+        return;
+      case "force":
+        if (frame.value.sequence > this.#newestSequence) {
+          this.#newestSequence = frame.value.sequence;
+          this.#forceArrived = frame.value;
+        } else {
+          ++this.stats.stale;
+        }
+        return;
+      case "control":
+        this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
+        return;
+      case "controlAck":
+        this.stats.invalid += this.#asked.acknowledge(frame.value) ? 0 : 1;
+        return;
+      case "bye":
+        this.#open = false;
+        this.#closed = { kind: "closed", ...frame.value };
+        return;
+    }
+  }
+
+  #somethingToSay(now: Nanoseconds): boolean {
+    const silentTooLong = this.#lastSent === undefined || now - this.#lastSent >= this.#config.keepAlive;
+    return silentTooLong || this.#stateToSend !== undefined || this.#forceToSend !== undefined ||
+      this.#answering.nextDue() !== undefined || this.#asked.nextDue(now) !== undefined;
+  }
+
+  /**
+   * As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; state and force always
+   * fit together.
+   */
+  #write(now: Nanoseconds): Uint8Array {
+    const { connectionId, seal, minResend } = this.#config;
+    const echo = this.#echo && { ...this.#echo, receivedMask: this.#seen.maskBefore(this.#echo.packetNumber) };
+    let body = encodeHead(now, echo);
+    const add = (frame: Frame): boolean => {
+      const piece = encodeFrame(frame);
+      if (kHeaderSize + body.length + piece.length + seal.overhead > kMaxDatagram) return false;
+      body = concat(body, piece);
+      return true;
+    };
+    if (this.#bye) {
+      add(this.#bye);
+    } else {
+      if (this.#stateToSend && add({ kind: "state", value: this.#stateToSend })) this.#stateToSend = undefined;
+      if (this.#forceToSend && add({ kind: "force", value: this.#forceToSend })) this.#forceToSend = undefined;
+      for (let ack; (ack = this.#answering.nextDue()) && add({ kind: "controlAck", value: ack }); ) {
+        this.#answering.sent(ack.id);
+      }
+      const timeout = this.#roundTrip.timeout(minResend);
+      for (let due; (due = this.#asked.nextDue(now)) && add({ kind: "control", value: due }); ) {
+        this.#asked.sent(due.id, now, timeout);
+      }
+    }
+    const datagram = seal.close(now, connectionId, this.#nextPacket, body);
+    ++this.#nextPacket;
+    ++this.stats.sent;
+    this.#lastSent = now;
+    return datagram;
+  }
+}

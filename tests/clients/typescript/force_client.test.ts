@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// ForceClient against a server on virtual time, over a network that a seed makes.
+import assert from "node:assert/strict";
+import { describe, it } from "node:test";
+import { encodeAnswer } from "../../../clients/typescript/src/datagram.js";
+import { ForceClient, type ClientConfig } from "../../../clients/typescript/src/force_client.js";
+import { Code, Role, type DeviceState } from "../../../clients/typescript/src/messages.js";
+import { fromMilliseconds, kSecond } from "../../../clients/typescript/src/time.js";
+import { flipped } from "./support/bytes.js";
+import { Random } from "./support/random.js";
+import { kFair, kFoul, World, type ServerConduct, type Weather } from "./support/world.js";
+
+const kPush = { x: -1, y: 0, z: 0 };
+const kKey = new Random(99).bytes(32);
+const kSuites = [["suite 0", undefined], ["suite 1", kKey]] as const;
+
+/** A controller that keeps the states it has seen. */
+function controller(seed: number, weather: Weather, config: ClientConfig = {}, conduct: Partial<ServerConduct> = {}) {
+  const seen: DeviceState[] = [];
+  const physics = (hand: DeviceState) => {
+    seen.push(hand);
+    return kPush;
+  };
+  return { seen, world: new World(seed, weather, config, { physics }, conduct) };
+}
+
+for (const [suite, key] of kSuites) {
+  describe(`over a fair network, ${suite}`, () => {
+    it("a controller sees every state once and answers each with a force that names it", () => {
+      const { seen, world } = controller(1, kFair, { name: "wall", key }, { key });
+      world.runMs(1000);
+      const { forces, hellos, session } = world.server;
+      assert.equal(hellos.length, 1);
+      assert.equal(hellos[0]!.hello.role, Role.CONTROLLER);
+      assert.equal(hellos[0]!.hello.name, "wall");
+      assert.ok(seen.length > 950, `${seen.length} states`);
+      seen.forEach((hand, i) => assert.equal(hand.tick, seen[0]!.tick + BigInt(i)));
+      forces.forEach(({ command }, i) => {
+        assert.equal(command.sequence, BigInt(i + 1));
+        assert.equal(command.basedOnTick, seen[i]!.tick);
+        assert.deepEqual(command.force, kPush);
+      });
+      assert.ok(forces.length >= seen.length - 10);
+      const { link } = world.client.stats();
+      assert.equal(link!.lost + link!.lostOutgoing + link!.duplicated + link!.malformed + link!.forged + link!.invalid, 0);
+      assert.ok(Math.abs(link!.smoothedRoundTripMs - 10) < 0.1, `${link!.smoothedRoundTripMs} ms`);
+      assert.equal(session!.stats.invalid + session!.stats.malformed + session!.stats.forged, 0);
+    });
+
+    it("an observer sees every state and sends no force", () => {
+      let seen = 0;
+      const world = new World(1, kFair, { key }, { watch: () => ++seen }, { key });
+      world.runMs(1000);
+      assert.equal(world.server.hellos[0]!.hello.role, Role.OBSERVER);
+      assert.ok(seen > 950);
+      assert.equal(world.server.forces.length, 0);
+    });
+  });
+
+  describe(`over a network that loses 30 %, reorders and doubles, ${suite}`, () => {
+    it("states and forces go on, the newest only, and every request is answered once and in order", () => {
+      for (let seed = 1; seed <= 10; ++seed) {
+        const renewAfter = { datagrams: 50n, time: 600n * kSecond };
+        const { seen, world } = controller(seed, kFoul, { key, stateHz: 1000 }, { key, renewAfter });
+        world.runMs(3000);
+        for (let i = 0; i < 10; ++i) assert.equal(world.client.rearm(), true);
+        world.runMs(3000);
+        const context = `seed ${seed}`;
+        assert.deepEqual([world.client.phase, world.client.stats().sessions], ["open", 1], context);
+        assert.ok(seen.length > 1000, `${context}: ${seen.length} states`);
+        seen.forEach((hand, i) => assert.ok(i === 0 || hand.tick > seen[i - 1]!.tick, context));
+        world.server.forces.forEach(({ command }, i, all) =>
+          assert.ok(i === 0 || command.sequence > all[i - 1]!.command.sequence, context));
+        assert.ok(world.server.forces.length > 500, `${context}: ${world.server.forces.length} forces`);
+        const rearms = new Array(10).fill({ kind: "rearm" });
+        assert.deepEqual(world.server.requests, [{ kind: "setStateRate", hz: 1000 }, ...rearms], context);
+        const link = world.client.stats().link!;
+        assert.ok(link.lost > 0 && link.lostOutgoing > 0 && link.duplicated > 0 && link.reordered > 0, context);
+        assert.equal(link.malformed + link.forged + link.invalid, 0, context);
+      }
+    });
+
+    it("a session outlives a silence of 1.5 s and ends after one of 2 s; then a new one opens", () => {
+      for (let seed = 1; seed <= 5; ++seed) {
+        const { world } = controller(seed, kFoul, { key }, { key });
+        assert.ok(world.runUntil(() => world.client.phase === "open", 10_000));
+        world.runMs(1000);
+        world.weather = { ...kFair, loss: 1 };
+        world.runMs(1500);
+        world.weather = kFoul;
+        world.runMs(1000);
+        assert.equal(world.client.stats().sessions, 1, `seed ${seed}`);
+        world.weather = { ...kFair, loss: 1 };
+        world.runMs(2500);
+        assert.equal(world.client.stats().code, Code.TIMED_OUT);
+        world.weather = kFoul;
+        world.server.restart();
+        assert.ok(world.runUntil(() => world.client.phase === "open", 20_000), `seed ${seed}`);
+        assert.equal(world.client.stats().sessions, 2);
+      }
+    });
+  });
+}
+
+describe("the same seed", () => {
+  it("gives the same run", () => {
+    const run = () => {
+      const { seen, world } = controller(7, kFoul, { key: kKey }, { key: kKey });
+      world.runMs(2000);
+      return [seen.map(({ tick }) => tick), world.client.stats()];
+    };
+    assert.deepEqual(run(), run());
+  });
+});
+
+describe("the handshake", () => {
+  it("keeps its random and its Noise message 1 through an attempt, and takes new ones for the next", () => {
+    const sent: Uint8Array[] = [];
+    const random = new Random(3);
+    const config = { key: kKey, random: (size: number) => random.bytes(size), patienceMs: 250 };
+    const client = new ForceClient(config, { watch: () => {} }, (datagram) => sent.push(datagram), 0n);
+    for (let ms = 0; ms < 500; ++ms) client.turn(fromMilliseconds(ms));
+    const [first, second, third, next] = sent;
+    assert.deepEqual(second, first);
+    assert.deepEqual(third, first);
+    assert.equal(sent.length, 5); // at 0, 100 and 200 ms; given up at 250, again at 350 and 450 ms
+    assert.ok(sent.every((datagram) => datagram.length === 1200));
+    const differs = (from: number, to: number): boolean => Buffer.compare(first!.subarray(from, to), next!.subarray(from, to)) !== 0;
+    assert.ok(differs(16, 32), "random");
+    assert.ok(!differs(50, 58), "key id");
+    assert.ok(differs(58, 90), "ephemeral key");
+  });
+
+  it("lets no forged Answer in, and takes the true one that comes after it", () => {
+    const { world } = controller(1, kFair, { key: kKey }, { key: kKey });
+    const forge = (datagram: Uint8Array): void => {
+      for (const at of [20, 40, datagram.length - 1]) world.client.receive(world.now, flipped(datagram, at));
+      const random = datagram.slice(16, 32);
+      world.client.receive(world.now, encodeAnswer({ suite: 0, connectionId: 9, random, content: new Uint8Array(0) }));
+      world.client.receive(world.now, encodeAnswer({ suite: 1, connectionId: 9, random, content: new Uint8Array(48) }));
+    };
+    const send = world.toClient.send.bind(world.toClient);
+    world.toClient.send = (datagram) => {
+      if (datagram[1] === 0x14) forge(datagram);
+      send(datagram);
+    };
+    assert.ok(world.runUntil(() => world.client.phase === "open", 200));
+  });
+
+  it("does not open without the server's key, nor in the clear when it has one", () => {
+    for (const [mine, theirs] of [[kKey, flipped(kKey, 0)], [kKey, undefined], [undefined, kKey]] as const) {
+      const { world } = controller(1, kFair, { key: mine }, { key: theirs });
+      world.runMs(5000);
+      assert.equal(world.client.stats().sessions, 0);
+      assert.equal(world.server.hellos.length, 0);
+    }
+  });
+
+  it("says Hello at once after the first Retry only", () => {
+    let now = 0n;
+    const retry = new Uint8Array(48);
+    retry.set([0x54, 0x12]);
+    const hellos: Uint8Array[] = [];
+    const config = { random: (size: number) => new Uint8Array(size) };
+    const client = new ForceClient(config, { watch: () => {} }, (datagram) => hellos.push(datagram), now);
+    client.turn(now);
+    for (let i = 0; i < 5; ++i) {
+      now += fromMilliseconds(1);
+      client.receive(now, retry);
+      client.turn(now);
+    }
+    assert.equal(hellos.length, 2);
+  });
+});
+
+describe("reconnection", () => {
+  it("waits 100 ms, then twice as long each time up to 2 s, and begins anew after a session that had states", () => {
+    const { world } = controller(1, kFair, { patienceMs: 100 }, { up: false });
+    const begins: number[] = [];
+    let attempts = 0;
+    world.runUntil(() => {
+      const now = world.client.stats().attempts;
+      if (now > attempts) begins.push(Number((world.now - kSecond) / 1_000_000n));
+      attempts = now;
+      return begins.length === 8;
+    }, 60_000);
+    const waits = begins.slice(1).map((at, i) => at - begins[i]! - 100);
+    assert.deepEqual(waits, [100, 200, 400, 800, 1600, 2000, 2000]);
+
+    world.server.conduct.up = true;
+    assert.ok(world.runUntil(() => world.client.stats().states > 0, 5000));
+    world.server.session!.close(Code.SHUTDOWN, "SIGTERM");
+    assert.ok(world.runUntil(() => world.client.phase === "lost", 100));
+    assert.deepEqual([world.client.stats().code, world.client.stats().reason], [Code.SHUTDOWN, "SIGTERM"]);
+    const lost = world.now;
+    world.server.restart();
+    assert.ok(world.runUntil(() => world.client.phase === "greeting", 1000));
+    assert.equal(world.now - lost, fromMilliseconds(100));
+  });
+
+  it("tells the server's reason of a refusal and asks again", () => {
+    const refused = { code: Code.BUSY, detail: "one controller", versionMin: 1, versionMax: 1 };
+    const { world } = controller(1, kFair, { key: kKey }, { key: kKey, refuse: refused });
+    assert.ok(world.runUntil(() => world.client.phase === "refused", 1000));
+    assert.equal(world.client.stats().reason, "one controller");
+    world.server.conduct.refuse = undefined;
+    assert.ok(world.runUntil(() => world.client.phase === "open", 1000));
+  });
+
+  it("numbers the forces of each session from 1", () => {
+    const { world } = controller(1, kFair);
+    world.runMs(500);
+    world.server.session!.close(Code.SHUTDOWN, "");
+    world.runMs(20);
+    world.server.restart();
+    world.server.forces.length = 0;
+    world.runMs(1000);
+    assert.equal(world.server.forces[0]!.command.sequence, 1n);
+  });
+});
+
+describe("the callback", () => {
+  it("sees the newest of the states that came in since its last call, at multiples of its period", () => {
+    const times: bigint[] = [];
+    const seen: DeviceState[] = [];
+    const world: World = new World(1, kFair, { rateHz: 100 }, {
+      physics: (hand) => {
+        times.push(world.now);
+        seen.push(hand);
+        return kPush;
+      },
+    });
+    world.runMs(1000);
+    const period = fromMilliseconds(10);
+    times.slice(1).forEach((at, i) => assert.equal((at - times[1]!) % period, 0n, `call ${i}`));
+    assert.ok(seen.length >= 96 && seen.length <= 100, `${seen.length} calls`);
+    seen.slice(2).forEach((hand, i) => assert.equal(hand.tick - seen[i + 1]!.tick, 10n));
+    const { states, statesSkipped } = world.client.stats();
+    assert.ok(states - statesSkipped - seen.length <= 1);
+  });
+
+  it("gets its forces out as fresh for three periods, 20 ms at least, or as asked for", () => {
+    const validity = (config: ClientConfig, stateEvery = 1): number => {
+      const { world } = controller(1, kFair, config);
+      const plain = world.server.conduct.state;
+      let skipped = 0n;
+      world.server.conduct.state = (tick) => plain(tick * BigInt(stateEvery) + skipped);
+      world.runMs(1000);
+      return world.server.forces.at(-1)!.command.validForUs;
+    };
+    assert.equal(validity({}), 20_000);
+    assert.equal(validity({ rateHz: 50 }), 60_000);
+    assert.equal(validity({}, 30), 90_000); // the physics answers states that are 30 ms apart
+    assert.equal(validity({}, 500), 300_000); // 100 ms at most count as a period
+    assert.equal(validity({ validForMs: 12.5, rateHz: 50 }), 12_500);
+  });
+
+  it("sends no force that is not finite or beyond 10¹², and counts it", () => {
+    for (const bad of [NaN, Infinity, -1.1e12]) {
+      const answers = [{ x: bad, y: 0, z: 0 }, { force: kPush, stiffness: [bad] }, { force: kPush, stiffness: [1, 2] }];
+      for (const touch of answers) {
+        const world = new World(1, kFair, {}, { physics: () => touch });
+        world.runMs(100);
+        assert.equal(world.server.forces.length, 0);
+        assert.ok(world.client.stats().forcesUnusable > 0);
+        assert.equal(world.client.phase, "open");
+      }
+    }
+  });
+
+  it("gets its stiffness to the server when the server knows the feature, and only then", () => {
+    for (const features of [["local-model"], []]) {
+      const world = new World(1, kFair, {}, { physics: () => ({ force: kPush, stiffness: [2000, 0, 0] }) }, { features });
+      world.runMs(100);
+      const { command } = world.server.forces.at(-1)!;
+      if (features.length === 0) assert.equal(command.model, undefined);
+      else assert.deepEqual(command.model!.stiffness, [2000, 0, 0]);
+    }
+  });
+
+  it("ends the session with a Bye when it throws, and what it threw comes out", () => {
+    const world = new World(1, kFair, { name: "wall" }, { physics: () => { throw new Error("no world"); } });
+    assert.throws(() => world.runMs(1000), /no world/);
+    assert.equal(world.client.phase, "stopped");
+    assert.ok(world.runUntil(() => world.server.session?.open === false, 100));
+  });
+});
+
+describe("stop()", () => {
+  it("says Bye three times and nothing after that", () => {
+    const { world } = controller(1, kFair, { name: "wall" });
+    world.runMs(500);
+    const before = world.client.stats().link!.sent;
+    world.client.stop(world.now);
+    world.runMs(1000);
+    assert.equal(world.client.stats().link!.sent, before + 3);
+    assert.equal(world.server.session!.open, false);
+    assert.equal(world.client.turn(world.now), 1n << 62n);
+  });
+});
+
+describe("an impossible configuration", () => {
+  it("is refused with the name of the field", () => {
+    const bad: [ClientConfig, RegExp][] = [
+      [{ name: "ä".repeat(33) }, /name/], [{ rateHz: -1 }, /rateHz/], [{ rateHz: NaN }, /rateHz/],
+      [{ stateHz: 1.5 }, /stateHz/], [{ validForMs: 10_001 }, /validForMs/], [{ patienceMs: 0 }, /patienceMs/],
+      [{ retryMinMs: 0 }, /retryMinMs/], [{ retryMaxMs: 50 }, /retryMaxMs/], [{ key: new Uint8Array(31) }, /key/],
+    ];
+    for (const [config, message] of bad) {
+      assert.throws(() => new ForceClient(config, { watch: () => {} }, () => {}, 0n), message);
+    }
+  });
+});

@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { kRoot } from "./paths.js";
+
+/** One of the files of protocol/vectors. */
+export const readVectors = (name: string): any => JSON.parse(readFileSync(join(kRoot, "protocol/vectors", name), "utf8"));

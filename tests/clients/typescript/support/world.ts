@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two ends and what lies between them, on virtual time: A is the guest under test, Z a server put together from the
+// protocol's own parts, and the network loses, delays, reorders and doubles by one seed.
+import { decodeHelloMessage, encodeAnswerMessage } from "../../../../clients/typescript/src/codec.js";
+import {
+  CipherSuite, concat, decodeHello, encodeAnswer, encodeRetry, equal, helloHeader, type HelloDatagram,
+} from "../../../../clients/typescript/src/datagram.js";
+import { ForceClient, type ClientConfig } from "../../../../clients/typescript/src/force_client.js";
+import {
+  Mode, type DeviceState, type ForceCommand, type Hello, type Refused, type Request, type Welcome,
+} from "../../../../clients/typescript/src/messages.js";
+import { keyId } from "../../../../clients/typescript/src/noise.js";
+import { NoiseSeal, PlainSeal, type Seal } from "../../../../clients/typescript/src/seal.js";
+import { Session } from "../../../../clients/typescript/src/session.js";
+import { fromMilliseconds, kNever, kSecond, type Nanoseconds } from "../../../../clients/typescript/src/time.js";
+import { ascii } from "./bytes.js";
+import { Random } from "./random.js";
+import { readMessage1 } from "./responder.js";
+
+export interface Weather {
+  readonly loss: number;
+  /** Above zero. */
+  readonly delayMs: number;
+  /** Uniform, added to the delay. */
+  readonly jitterMs: number;
+  readonly duplicates: number;
+}
+export const kFair: Weather = { loss: 0, delayMs: 5, jitterMs: 0, duplicates: 0 };
+export const kFoul: Weather = { loss: 0.3, delayMs: 5, jitterMs: 20, duplicates: 0.1 };
+
+/** One direction. */
+class Way {
+  #flying: { readonly at: Nanoseconds; readonly datagram: Uint8Array }[] = [];
+  constructor(readonly world: World) {}
+
+  send(datagram: Uint8Array): void {
+    const { weather, random, now } = this.world;
+    const copies = random.uniform() < weather.duplicates ? 2 : 1;
+    for (let i = 0; i < copies; ++i) {
+      const lost = random.uniform() < weather.loss;
+      const at = now + fromMilliseconds(weather.delayMs + weather.jitterMs * random.uniform());
+      if (!lost) this.#flying.push({ at, datagram: datagram.slice() });
+    }
+    this.#flying.sort((a, b) => (a.at < b.at ? -1 : a.at > b.at ? 1 : 0));
+  }
+  *arrivals(now: Nanoseconds): Iterable<Uint8Array> {
+    while (this.#flying[0] && this.#flying[0].at <= now) yield this.#flying.shift()!.datagram;
+  }
+  next(): Nanoseconds {
+    return this.#flying[0]?.at ?? kNever;
+  }
+}
+
+/** What the server does; a test may change it while it runs. */
+export interface ServerConduct {
+  /** Present at all. */
+  up: boolean;
+  refuse: Refused | undefined;
+  features: string[];
+  /** Suite 1 with this key; undefined: suite 0. */
+  key: Uint8Array | undefined;
+  /** When it renews its key, so often that a test sees it. */
+  renewAfter: { datagrams: bigint; time: Nanoseconds };
+  state: (tick: bigint) => DeviceState;
+}
+
+export const kWelcome: Omit<Welcome, "role" | "features"> = {
+  version: 1, deviceName: "simulated", maxForce: 8, positionResolution: 0, loopHz: 1000, timeoutMs: 2000, server: "Z",
+};
+
+const kCookie = ascii("sixteen byte jar");
+
+/** A server at 1 kHz. Its clock is another than ours: offset, and 200 ppm fast. */
+export class Server {
+  readonly conduct: ServerConduct = {
+    up: true,
+    refuse: undefined,
+    features: ["local-model"],
+    key: undefined,
+    renewAfter: NoiseSeal.kRenewAfter,
+    state: (tick) => ({
+      tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) / 1e6, y: 0, z: 0 },
+      velocity: { x: 0, y: 0, z: 0 }, forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0,
+      forceSequence: 0n, forceAgeNs: 0n, mode: Mode.ACTIVE,
+    }),
+  };
+  readonly hellos: { readonly datagram: HelloDatagram; readonly hello: Hello }[] = [];
+  readonly forces: { readonly at: Nanoseconds; readonly command: ForceCommand }[] = [];
+  readonly requests: Request[] = [];
+  session: Session | undefined;
+  #nextId = 1;
+  /** The answer to the attempt of this random, repeated when it comes again. */
+  #answered: { readonly random: Uint8Array; readonly datagram: Uint8Array } | undefined;
+  #tick = 1n;
+
+  constructor(private readonly random: Random) {}
+
+  clock(now: Nanoseconds): Nanoseconds {
+    return now + 12_345n * kSecond + now / 5000n;
+  }
+  restart(): void {
+    this.session = undefined;
+    this.#answered = undefined;
+  }
+
+  receive(now: Nanoseconds, datagram: Uint8Array, send: (datagram: Uint8Array) => void): void {
+    const hello = decodeHello(datagram);
+    if (!this.conduct.up) return;
+    if (!hello) this.session?.receive(this.clock(now), datagram);
+    else if (!equal(hello.cookie, kCookie)) send(encodeRetry({ suite: hello.suite, random: hello.random, cookie: kCookie }));
+    else this.#meet(now, hello, send);
+  }
+
+  /** Once each millisecond. */
+  step(now: Nanoseconds, send: (datagram: Uint8Array) => void): void {
+    const { session, conduct } = this;
+    const halfOpen = conduct.key !== undefined && session?.stats.received === 0;
+    if (!session || !conduct.up || halfOpen) return;
+    const time = this.clock(now);
+    session.tick(time);
+    session.sendState(conduct.state(this.#tick++));
+    for (let event; (event = session.nextEvent()); ) {
+      if (event.kind === "force") this.forces.push({ at: now, command: event.command });
+      if (event.kind === "request") {
+        this.requests.push(event.request);
+        session.answer(event.id, 1, "done");
+      }
+    }
+    for (let datagram; (datagram = session.nextDatagram(time)); ) send(datagram);
+  }
+
+  #meet(now: Nanoseconds, datagram: HelloDatagram, send: (datagram: Uint8Array) => void): void {
+    if (this.#answered && equal(this.#answered.random, datagram.random)) return send(this.#answered.datagram);
+    const { key, refuse, features, renewAfter } = this.conduct;
+    const id = key ? keyId(key) : new Uint8Array(0);
+    if (datagram.suite !== (key ? CipherSuite.Noise : CipherSuite.Plain)) return;
+    if (!equal(datagram.content.subarray(0, id.length), id)) return;
+    const message = datagram.content.slice(id.length);
+    const prologue = concat(ascii("tendon-1"), helloHeader(datagram.suite), id, datagram.random);
+    const noise = key && readMessage1(key, prologue, message);
+    if (key && !noise) return;
+    const hello = decodeHelloMessage(noise?.payload ?? message);
+    if (!hello) return;
+    this.hellos.push({ datagram, hello });
+
+    const answer = refuse ?? { ...kWelcome, features, role: hello.role };
+    const finished = noise?.answer(this.random.bytes(32), encodeAnswerMessage(answer));
+    const connectionId = refuse ? 0 : this.#nextId++;
+    const content = finished?.message2 ?? encodeAnswerMessage(answer);
+    this.#answered = {
+      random: datagram.random,
+      datagram: encodeAnswer({ suite: datagram.suite, connectionId, random: datagram.random, content }),
+    };
+    if (!refuse) {
+      const seal: Seal = finished ? new NoiseSeal(finished, this.clock(now), renewAfter) : new PlainSeal();
+      this.session = new Session({ connectionId, seal }, this.clock(now));
+    }
+    send(this.#answered.datagram);
+  }
+}
+
+export class World {
+  now: Nanoseconds = kSecond;
+  weather: Weather;
+  readonly random: Random;
+  readonly server: Server;
+  readonly client: ForceClient;
+  readonly toServer = new Way(this);
+  readonly toClient = new Way(this);
+  #nextTurn: Nanoseconds;
+  #nextStep: Nanoseconds;
+
+  constructor(
+    seed: number,
+    weather: Weather,
+    config: ClientConfig,
+    callback: ConstructorParameters<typeof ForceClient>[1],
+    conduct: Partial<ServerConduct> = {},
+  ) {
+    this.random = new Random(seed);
+    this.weather = weather;
+    this.server = new Server(this.random);
+    Object.assign(this.server.conduct, conduct);
+    const random = (size: number): Uint8Array => this.random.bytes(size);
+    this.client = new ForceClient({ random, ...config }, callback, (d) => this.toServer.send(d), this.now);
+    this.#nextTurn = this.#nextStep = this.now;
+  }
+
+  runMs(ms: number): void {
+    this.runUntil(() => false, ms);
+  }
+
+  /** Whether `done` came to be within `ms`. */
+  runUntil(done: () => boolean, ms: number): boolean {
+    const end = this.now + fromMilliseconds(ms);
+    const toClient = (datagram: Uint8Array): void => this.toClient.send(datagram);
+    while (!done()) {
+      const next = [this.#nextTurn, this.#nextStep, this.toServer.next(), this.toClient.next()]
+        .reduce((a, b) => (a < b ? a : b));
+      if (next > end) {
+        this.now = end;
+        return false;
+      }
+      this.now = next > this.now ? next : this.now;
+      for (const datagram of this.toServer.arrivals(this.now)) this.server.receive(this.now, datagram, toClient);
+      if (this.now >= this.#nextStep) {
+        this.server.step(this.now, toClient);
+        this.#nextStep = this.now + 1_000_000n;
+      }
+      for (const datagram of this.toClient.arrivals(this.now)) {
+        this.client.receive(this.now, datagram);
+        this.#nextTurn = this.now;
+      }
+      if (this.now >= this.#nextTurn) this.#nextTurn = this.client.turn(this.now);
+    }
+    return true;
+  }
+}

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// protocol/vectors: our own bytes for every message, in the clear and sealed.
+import assert from "node:assert/strict";
+import { describe, it } from "node:test";
+import { fromJson, toBinary, type JsonValue } from "@bufbuild/protobuf";
+import { decodeData, decodeHelloMessage, encodeFrame, encodeHead } from "../../../clients/typescript/src/codec.js";
+import { concat, decodeHeader, decodeHello, encodeAnswer, encodeHello, encodeRetry } from "../../../clients/typescript/src/datagram.js";
+import * as pb from "../../../clients/typescript/src/gen/tendon_pb.js";
+import { ClientHandshake } from "../../../clients/typescript/src/handshake.js";
+import { parseKeyFile } from "../../../clients/typescript/src/key_file.js";
+import { kFeatureLocalModel, Role } from "../../../clients/typescript/src/messages.js";
+import { keyId, rekey } from "../../../clients/typescript/src/noise.js";
+import { ReplayWindow } from "../../../clients/typescript/src/replay_window.js";
+import { NoiseSeal, PlainSeal, type Seal } from "../../../clients/typescript/src/seal.js";
+import { Session } from "../../../clients/typescript/src/session.js";
+import { kSecond } from "../../../clients/typescript/src/time.js";
+import { fromHex, toHex } from "./support/bytes.js";
+import { readMessage1 } from "./support/responder.js";
+import { readVectors } from "./support/vectors.js";
+
+const kHello = {
+  versionMin: 1, versionMax: 1, role: Role.CONTROLLER, name: "wall", features: [kFeatureLocalModel],
+};
+
+interface DataVector {
+  readonly name: string;
+  readonly direction: "client_to_server" | "server_to_client";
+  readonly packet_number: string;
+  readonly epoch?: number;
+  readonly key?: string;
+  readonly message: JsonValue;
+  readonly body: string;
+  readonly datagram: string;
+}
+
+for (const file of ["plain.json", "sealed.json"]) {
+  const vectors = readVectors(file);
+  const key: Uint8Array | undefined = vectors.psk && fromHex(vectors.psk);
+  /** The client's random numbers, in the order in which it asks for them. */
+  const random = (size: number): Uint8Array => fromHex(size === 16 ? vectors.client_random : vectors.client_ephemeral);
+  const datagram = (of: { readonly datagram: string }): Uint8Array => fromHex(of.datagram);
+
+  describe(file, () => {
+    it("the client says Hello, and again with the cookie, in the very bytes", () => {
+      const handshake = new ClientHandshake(kHello, key, random, 0n);
+      handshake.tick(0n);
+      const first = toHex(handshake.nextDatagram(0n)!);
+      if (vectors.hello.first_datagram) assert.equal(first, vectors.hello.first_datagram);
+      handshake.receive(1n, datagram(vectors.retry));
+      const again = handshake.nextDatagram(1n)!;
+      assert.equal(toHex(key ? again : fromHex(first)), vectors.hello.datagram);
+      if (key) assert.equal(toHex(keyId(key)), vectors.key_id);
+    });
+
+    for (const kind of ["welcome", "refused"] as const) {
+      it(`the client understands ${kind}, and the server's bytes are reproduced`, () => {
+        const handshake = new ClientHandshake(kHello, key, random, 0n);
+        handshake.receive(1n, datagram(vectors[kind]));
+        assert.equal(handshake.outcome?.kind, kind === "welcome" ? "accepted" : "refused");
+        if (handshake.outcome?.kind === "accepted") {
+          assert.equal(handshake.outcome.connectionId, vectors.connection_id);
+          assert.equal(handshake.outcome.welcome.deviceName, "simulated");
+        } else {
+          assert.equal(handshake.outcome!.refused.detail, "one controller");
+        }
+        const connectionId = kind === "welcome" ? vectors.connection_id : 0;
+        const payload = toBinary(pb.AnswerSchema, fromJson(pb.AnswerSchema, vectors[kind].message));
+        assert.equal(toHex(payload), vectors[kind].body);
+        let content: Uint8Array = payload;
+        if (key) {
+          const read = readMessage1(key, fromHex(vectors.hello.prologue), fromHex(vectors.hello.noise_message));
+          assert.deepEqual(decodeHelloMessage(read!.payload), kHello);
+          const answered = read!.answer(fromHex(vectors[kind].server_ephemeral), payload);
+          assert.equal(toHex(answered.hash), vectors[kind].handshake_hash);
+          assert.equal(toHex(answered.receiveKey), vectors[kind].client_to_server_key);
+          assert.equal(toHex(answered.sendKey), vectors[kind].server_to_client_key);
+          content = answered.message2;
+        }
+        const answer = { suite: vectors.suite, connectionId, random: fromHex(vectors.client_random), content };
+        assert.equal(toHex(encodeAnswer(answer)), vectors[kind].datagram);
+      });
+    }
+
+    it("retry and hello are reproduced", () => {
+      const random16 = fromHex(vectors.client_random);
+      const retry = encodeRetry({ suite: vectors.suite, random: random16, cookie: fromHex(vectors.cookie) });
+      assert.equal(toHex(retry), vectors.retry.datagram);
+      assert.equal(toHex(encodeHello(decodeHello(datagram(vectors.hello))!)), vectors.hello.datagram);
+    });
+
+    for (const vector of vectors.data as DataVector[]) {
+      it(`${vector.name}: closed and opened byte for byte`, () => {
+        const body = toBinary(pb.DatagramSchema, fromJson(pb.DatagramSchema, vector.message));
+        assert.equal(toHex(body), vector.body);
+        const content = decodeData(body)!;
+        assert.equal(content.invalid, 0);
+        assert.equal(toHex(concat(encodeHead(content.sent, content.echo), ...content.frames.map(encodeFrame))), vector.body);
+
+        const sealed = datagram(vector);
+        const header = decodeHeader(sealed)!;
+        assert.equal(header.packetNumber, BigInt(vector.packet_number));
+        const [close, open] = seals(vector);
+        assert.equal(toHex(close.close(0n, vectors.connection_id, header.packetNumber, body)), vector.datagram);
+        assert.deepEqual(open.open(0n, header, sealed), body);
+      });
+    }
+
+    /** One that is about to close the vector's datagram, and one that is to open it. */
+    function seals(vector: DataVector): [Seal, Seal] {
+      if (!key) return [new PlainSeal(), new PlainSeal()];
+      const first = fromHex(vectors.welcome[`${vector.direction}_key`]);
+      const present = vector.epoch === 1 ? rekey(first) : first;
+      assert.equal(toHex(present), vector.key);
+      const renewAfter = { datagrams: 1n, time: 600n * kSecond };
+      const closing = new NoiseSeal({ sendKey: first, receiveKey: first }, 0n, renewAfter);
+      if (vector.epoch === 1) closing.close(0n, 1, 0n, new Uint8Array(0));
+      return [closing, new NoiseSeal({ sendKey: first, receiveKey: first }, 0n)];
+    }
+
+    for (const dropped of vectors.dropped ?? []) {
+      it(`${dropped.name}: is dropped and counted as ${dropped.counter}`, () => {
+        const { client_to_server_key, server_to_client_key } = vectors.welcome;
+        const keys = { sendKey: fromHex(client_to_server_key), receiveKey: fromHex(server_to_client_key) };
+        const session = new Session({ connectionId: vectors.connection_id, seal: new NoiseSeal(keys, 0n) }, 0n);
+        session.receive(0n, datagram(dropped));
+        const { received, duplicated, malformed, forged, oldKey } = session.stats;
+        const expected = { received: 0, duplicated: 0, malformed: 0, forged: 0, oldKey: 0 };
+        expected[dropped.counter === "old_key" ? "oldKey" : (dropped.counter as "forged" | "malformed")] = 1;
+        assert.deepEqual({ received, duplicated, malformed, forged, oldKey }, expected);
+        assert.equal(session.nextEvent(), undefined);
+      });
+    }
+  });
+}
+
+describe("replay.json", () => {
+  for (const { name, packet_numbers, accept } of readVectors("replay.json").scripts) {
+    it(name, () => {
+      const window = new ReplayWindow();
+      const accepted = packet_numbers.map((number: number) => {
+        if (window.contains(BigInt(number))) return false;
+        window.insert(BigInt(number));
+        return true;
+      });
+      assert.deepEqual(accepted, accept);
+    });
+  }
+});
+
+describe("key_files.json", () => {
+  for (const { name, text, accept, role, key, key_id } of readVectors("key_files.json").files) {
+    it(`${accept ? "accepted" : "refused"}: ${name}`, () => {
+      if (accept) {
+        const read = parseKeyFile(text);
+        assert.equal(toHex(read.key), key);
+        assert.equal(toHex(keyId(read.key)), key_id);
+        assert.equal(read.role, role === "controller" ? Role.CONTROLLER : Role.OBSERVER);
+      } else {
+        assert.throws(() => parseKeyFile(text), (error: Error) => {
+          assert.ok(error instanceof RangeError);
+          for (const word of text.split(/\s+/)) assert.ok(word.length < 40 || !error.message.includes(word), "tells the key");
+          return true;
+        });
+      }
+    });
+  }
+});

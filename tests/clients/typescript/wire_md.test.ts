@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The golden datagrams of protocol/WIRE.md, read from the page itself, both ways.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { describe, it } from "node:test";
+import {
+  decodeAnswerMessage, decodeData, decodeHelloMessage, encodeAnswerMessage, encodeFrame, encodeHead, encodeHelloMessage,
+  type DataContent,
+} from "../../../clients/typescript/src/codec.js";
+import {
+  concat, DatagramType, decodeAnswer, decodeHeader, decodeHello, decodeRetry, encodeAnswer, encodeHello, encodeRetry,
+  kHeaderSize,
+} from "../../../clients/typescript/src/datagram.js";
+import { Code, Mode, reasonNames, Role } from "../../../clients/typescript/src/messages.js";
+import { PlainSeal } from "../../../clients/typescript/src/seal.js";
+import { toHex } from "./support/bytes.js";
+import { kRoot } from "./support/paths.js";
+
+/** The bytes of each block: "00 x9" is nine zeros, what follows ";" is for people. */
+function goldenDatagrams(page: string): Map<string, Uint8Array> {
+  const found = new Map<string, Uint8Array>();
+  for (const [, name, block] of page.matchAll(/^```golden (\S+)\n([\s\S]*?)^```$/gm)) {
+    const words = block!.replace(/;.*$/gm, "").trim().split(/\s+/);
+    const bytes: number[] = [];
+    for (const word of words) {
+      if (word.startsWith("x")) bytes.push(...new Array<number>(Number(word.slice(1)) - 1).fill(bytes.at(-1)!));
+      else bytes.push(Number.parseInt(word, 16));
+    }
+    found.set(name!, Uint8Array.from(bytes));
+  }
+  return found;
+}
+
+const kGolden = goldenDatagrams(readFileSync(join(kRoot, "protocol/WIRE.md"), "utf8"));
+
+function golden(name: string): Uint8Array {
+  const bytes = kGolden.get(name);
+  assert.ok(bytes, `WIRE.md has no golden datagram "${name}"`);
+  return bytes;
+}
+
+function contentOf(name: string): DataContent {
+  const content = decodeData(golden(name).subarray(kHeaderSize));
+  assert.ok(content, `${name} does not decode`);
+  assert.equal(content.invalid, 0);
+  return content;
+}
+
+/** Decodes the datagram and encodes what came out. */
+function roundTrip(datagram: Uint8Array): Uint8Array {
+  const header = decodeHeader(datagram);
+  assert.ok(header);
+  switch (header.type) {
+    case DatagramType.Hello: {
+      const hello = decodeHello(datagram);
+      const message = hello && decodeHelloMessage(hello.content);
+      assert.ok(message);
+      return encodeHello({ ...hello, content: encodeHelloMessage(message) });
+    }
+    case DatagramType.Retry: {
+      const retry = decodeRetry(datagram);
+      assert.ok(retry);
+      return encodeRetry(retry);
+    }
+    case DatagramType.Answer: {
+      const answer = decodeAnswer(datagram);
+      const message = answer && decodeAnswerMessage(answer.content);
+      assert.ok(message);
+      return encodeAnswer({ ...answer, content: encodeAnswerMessage(message) });
+    }
+    case DatagramType.Data: {
+      const content = decodeData(datagram.subarray(kHeaderSize));
+      assert.ok(content);
+      const body = concat(encodeHead(content.sent, content.echo), ...content.frames.map(encodeFrame));
+      return new PlainSeal().close(0n, header.connectionId, header.packetNumber, body);
+    }
+  }
+}
+
+describe("WIRE.md", () => {
+  it("has golden datagrams of every kind", () => {
+    const expected = ["hello", "retry", "welcome", "refused", "keep-alive", "state", "force", "control", "control-ack", "bye"];
+    for (const name of expected) golden(name);
+  });
+
+  for (const [name, datagram] of kGolden) {
+    if (decodeHeader(datagram)?.suite === 1) continue; // sealed: vectors.test.ts
+    it(`${name}: decoding and encoding gives the very bytes of the page`, () => {
+      assert.equal(toHex(roundTrip(datagram)), toHex(datagram));
+    });
+  }
+
+  it("hello says what the page says", () => {
+    const hello = decodeHello(golden("hello"))!;
+    assert.deepEqual(decodeHelloMessage(hello.content), {
+      versionMin: 1, versionMax: 1, role: Role.CONTROLLER, name: "wall", features: ["local-model"],
+    });
+  });
+
+  it("welcome and refused say what the page says", () => {
+    const welcome = decodeAnswer(golden("welcome"))!;
+    assert.equal(welcome.connectionId, 0x11223344);
+    assert.deepEqual(decodeAnswerMessage(welcome.content), {
+      version: 1, features: ["local-model"], role: Role.CONTROLLER, deviceName: "simulated", maxForce: 8,
+      positionResolution: 0, loopHz: 1000, timeoutMs: 2000, server: "tendond",
+    });
+    assert.deepEqual(decodeAnswerMessage(decodeAnswer(golden("refused"))!.content), {
+      code: Code.BUSY, detail: "one controller", versionMin: 1, versionMax: 1,
+    });
+  });
+
+  it("state says what the page says", () => {
+    const { sent, echo, frames } = contentOf("state");
+    assert.equal(sent, 1_000_100_000n);
+    assert.deepEqual(echo, { sent: 5_000_000n, received: 999_000_000n, packetNumber: 3n, receivedMask: 5 });
+    assert.deepEqual(frames, [{
+      kind: "state",
+      value: {
+        tick: 1000n, sampledNs: 1_000_000_000n, position: { x: 0.01, y: 0, z: -0.02 }, velocity: { x: 0.5, y: 0, z: 0 },
+        forceApplied: { x: -2, y: 0, z: 0 }, energy: 0.25, permittedForce: 8, reasons: 3, forceSequence: 99n,
+        forceAgeNs: 1_500_000n, mode: Mode.ACTIVE,
+      },
+    }]);
+    assert.deepEqual(reasonNames(3), ["energy", "max force"]);
+  });
+
+  it("force says what the page says", () => {
+    assert.deepEqual(contentOf("force").frames, [{
+      kind: "force",
+      value: {
+        sequence: 100n, basedOnTick: 1000n, force: { x: -2, y: 0, z: 0 },
+        model: { at: { x: 0.01, y: 0, z: 0 }, stiffness: [2000, 0, 0] }, validForUs: 20_000,
+      },
+    }]);
+  });
+
+  it("control, its answer and bye say what the page says", () => {
+    assert.deepEqual(contentOf("control").frames, [{ kind: "control", value: { id: 7, request: { kind: "setStateRate", hz: 500 } } }]);
+    assert.deepEqual(contentOf("control-ack").frames, [{ kind: "controlAck", value: { id: 7, code: Code.OK, detail: "500 Hz" } }]);
+    assert.deepEqual(contentOf("bye").frames, [{ kind: "bye", value: { code: Code.SHUTDOWN, reason: "SIGTERM" } }]);
+  });
+});
+
+describe("tendon_pb.ts", () => {
+  it("is what protoc makes of tendon.proto", (test) => {
+    const client = join(kRoot, "clients/typescript");
+    const folder = mkdtempSync(join(tmpdir(), "tendon-"));
+    try {
+      execFileSync("protoc", [
+        `-I${join(kRoot, "protocol")}`, `--plugin=${join(client, "node_modules/.bin/protoc-gen-es")}`, `--es_out=${folder}`,
+        "--es_opt=target=ts,import_extension=js", "tendon.proto",
+      ]);
+      const made = readFileSync(join(folder, "tendon_pb.ts"), "utf8");
+      const committed = readFileSync(join(client, "src/gen/tendon_pb.ts"), "utf8");
+      assert.ok(made === committed, "run `npm run generate` in clients/typescript");
+    } catch (error) {
+      if ((error as NodeJS.ErrnoException).code !== "ENOENT") throw error;
+      test.skip("protoc is not installed");
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
+  });
+});
