@@ -183,12 +183,13 @@ Decision Injector::decide(const Packet& packet) {
   }
   last_release_ = std::max(last_release_, d.release);
   releases_[index % kMaxJump] = d.release;
-  if (p.jump.places > 0 && index >= p.jump.places && network_.jump.happens(draws_(Purpose::kJump, index))) {
-    const LocalTime ahead = releases_[(index - p.jump.places) % kMaxJump] - Duration(1);
-    const LocalTime earliest = std::max(ahead, sent + p.base);
-    if (earliest < d.release) {
-      d.release = earliest;
+  if (p.jump.places > 0 && network_.jump.happens(draws_(Purpose::kJump, index))) {
+    for (std::uint64_t back = std::min<std::uint64_t>(index, p.jump.places); back > 0; --back) {
+      const LocalTime ahead = releases_[(index - back) % kMaxJump] - Duration(1);
+      if (ahead < sent + p.base || ahead >= d.release) continue;
+      d.release = ahead;
       d.cause = Cause::kReorder;
+      break;
     }
   }
 

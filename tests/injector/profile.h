@@ -169,8 +169,8 @@ struct Replay {  ///< replay(1%,64): with this probability one of the last 64 da
   std::uint32_t depth = 0;
   bool operator==(const Replay&) const = default;
 };
-/// jump(1%,3): with this probability a datagram leaves just ahead of the one 3 before it, if that is still on its way
-/// (else as early as `base` allows); jump(1%,1) swaps neighbours. The others are not moved by it.
+/// jump(1%,3): with this probability a datagram leaves just ahead of the one 3 before it, or of as many as it can still
+/// overtake when its own delay is `base` alone; jump(1%,1) swaps neighbours. The others are not moved by it.
 struct Jump {
   double probability = 0;
   std::uint32_t places = 0;
