@@ -3,6 +3,9 @@
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 logs=$root/build/log
 jobs=$(nproc)
+# ccache recognises what another clone of this repository has compiled: paths below the root do not count, and a
+# precompiled header is as good as what it was made from.
+export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1 CCACHE_SLOPPINESS=pch_defines,time_macros
 mkdir -p "$logs"
 cd "$root"
 
