@@ -25,7 +25,7 @@ export interface Guest {
   rearm(): boolean;
   /** Says Bye and ends. */
   stop(): void;
-  /** Resolves after stop(); rejects with what a callback threw. */
+  /** Resolves at the end; rejects with what a callback threw. */
   readonly ended: Promise<void>;
 }
 
@@ -63,6 +63,7 @@ class RealTimeGuest implements Guest {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #timerDue: Nanoseconds = kNever;
   #deferred = false;
+  #ended = false;
   /** Datagrams since the last round of the event loop, and how many rounds they have put the turn off. */
   #arrived = 0;
   #rounds = 0;
@@ -96,7 +97,6 @@ class RealTimeGuest implements Guest {
   stop(): void {
     this.#client.stop(readClock());
     this.#end();
-    this.#resolve();
   }
 
   #receive(datagram: Uint8Array): void {
@@ -106,7 +106,7 @@ class RealTimeGuest implements Guest {
   }
 
   #wake(): void {
-    if (this.#deferred) return;
+    if (this.#deferred || this.#ended) return;
     this.#deferred = true;
     this.#defer(() => this.#round());
   }
@@ -132,11 +132,15 @@ class RealTimeGuest implements Guest {
         now = readClock();
         next = this.#client.turn(now);
       } while (next <= now);
+      if (this.phase === "stopped") {
+        this.#end();
+        return;
+      }
       this.#arm(now, next);
       this.#tellPhase();
     } catch (error) {
-      this.#end();
       this.#reject(error);
+      this.#end();
     }
   }
 
@@ -148,7 +152,7 @@ class RealTimeGuest implements Guest {
 
   /** A timer that fires too early costs less than setting it anew with every datagram. */
   #arm(now: Nanoseconds, next: Nanoseconds): void {
-    if (this.phase === "stopped" || (this.#timer !== undefined && this.#timerDue <= next)) return;
+    if (this.#timer !== undefined && this.#timerDue <= next) return;
     clearTimeout(this.#timer);
     this.#timerDue = next;
     const wait = Math.min(Math.ceil(toMilliseconds(next - now)), kLongestTimerMs);
@@ -159,9 +163,12 @@ class RealTimeGuest implements Guest {
   }
 
   #end(): void {
+    if (this.#ended) return;
+    this.#ended = true;
     clearTimeout(this.#timer);
     this.#transport.close();
     this.#tellPhase();
+    this.#resolve();
   }
 }
 

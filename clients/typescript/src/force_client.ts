@@ -54,7 +54,8 @@ export interface ClientConfig {
 
 /**
  * greeting: an attempt is under way. open: states come in, forces go out. unanswered, refused, lost: nobody answered, the
- * server said no, the session has ended; waiting for the next attempt. stopped: for good.
+ * server said no, the session has ended; waiting for the next attempt. stopped: for good, by stop(), by what the callback
+ * threw, or because another program with the same key has taken this place.
  */
 export type Phase = "greeting" | "open" | "unanswered" | "refused" | "lost" | "stopped";
 
@@ -287,7 +288,8 @@ export class ForceClient {
         this.#backOff = fromMilliseconds(this.#config.retryMinMs);
       } else if (event.kind === "closed") {
         this.#flush(now); // our own Bye, when the session ends by its age
-        this.#end(now, "lost", event.code, event.reason);
+        // Two programs with one key would otherwise take the place from each other for ever.
+        this.#end(now, event.code === Code.REPLACED ? "stopped" : "lost", event.code, event.reason);
       }
     }
   }

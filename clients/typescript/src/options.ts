@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { parseArgs, type ParseArgsConfig } from "node:util";
+import { readClientKey } from "./client_key.js";
 import type { ClientConfig } from "./force_client.js";
 import { parseAddress } from "./udp.js";
 
@@ -22,18 +23,15 @@ interface Shared {
   readonly rateHz: number;
 }
 
-/** What is wrong with a command line, in a sentence. */
-class UsageError extends Error {}
-
 /** 0, or a number from `least` to `most`. */
 function number(option: string, text: string, least: number, most: number): number {
   const value = text.trim() === "" ? NaN : Number(text);
   if (value === 0 || (value >= least && value <= most)) return value;
-  throw new UsageError(`--${option}: expected ${least > 0 ? "0, or " : ""}${least} to ${most}, got "${text}"`);
+  throw new RangeError(`--${option}: expected ${least > 0 ? "0, or " : ""}${least} to ${most}, got "${text}"`);
 }
 
 /**
- * The command line that all guests share, --server, --rate-hz, --duration-s, --json and --help, and what a program adds to
+ * The command line that all guests share, --server, --key, --rate-hz, --duration-s, --json and --help, and what a program adds to
  * it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. After --help and after a wrong usage, which stderr is told,
  * the process ends, with 0 and 2.
  */
@@ -45,6 +43,7 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
   const config: NonNullable<ParseArgsConfig["options"]> = {
     help: { type: "boolean", short: "h" },
     server: { type: "string", default: "127.0.0.1:47100" },
+    key: { type: "string" },
     "rate-hz": { type: "string", default: String(defaults.rateHz) },
     "duration-s": { type: "string", default: "0" },
     json: { type: "boolean", default: false },
@@ -60,14 +59,19 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
     }
     const text = (name: string): string => String(values[name]);
     const server = text("server");
-    try {
-      parseAddress(server);
-    } catch (error) {
-      throw new UsageError(`--server: ${(error as Error).message}`);
-    }
+    const of = <Value>(option: string, read: () => Value): Value => {
+      try {
+        return read();
+      } catch (error) {
+        throw new RangeError(`--${option}: ${(error as Error).message}`);
+      }
+    };
+    of("server", () => parseAddress(server));
+    const key = typeof values.key === "string" ? of("key", () => readClientKey(text("key")).key) : undefined;
     const options: Options = {
       name: defaults.name,
       server,
+      key,
       rateHz: number("rate-hz", text("rate-hz"), 1e-3, 1e5),
       durationS: number("duration-s", text("duration-s"), 0, 1e9),
       json: values.json === true,
@@ -85,6 +89,7 @@ function help(purpose: string, { name, rateHz }: Shared, extras: Record<string, 
   const lines: [string, string][] = [
     ["-h, --help", "Print this and leave"],
     ["--server HOST:PORT", "Where tendond listens [127.0.0.1:47100]"],
+    ["--key FILE", "Key file (see `tendond keygen`); needed unless the server is here and has no keys"],
     ["--rate-hz NUMBER", `Times per second; 0 = for every device state that arrives [${rateHz}]`],
     ["--duration-s NUMBER", "Leave after this time; 0 = at Ctrl-C [0]"],
     ["--json", "One JSON object per line on stdout"],

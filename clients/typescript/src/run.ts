@@ -9,7 +9,7 @@ import { udp } from "./udp.js";
 const isFinal = (code: Code): boolean => code !== Code.BUSY && code !== Code.SHUTDOWN;
 
 /** The connection's state in a sentence; empty when there is nothing to say. */
-function sentence(guest: Guest, server: string): string {
+function sentence(guest: Guest, { server, key }: Options): string {
   const { phase, code, reason } = guest.stats();
   switch (phase) {
     case "open": {
@@ -17,13 +17,14 @@ function sentence(guest: Guest, server: string): string {
       return `connected to ${deviceName} at ${server} (${program}, ${loopHz} Hz)`;
     }
     case "unanswered":
-      return `no answer from ${server}; is tendond running there? Trying on`;
+      return `no answer from ${server}; is tendond running there${key ? ", and does it have this key" : ""}? Trying on`;
     case "refused":
       return `${server} refuses: ${reason}${isFinal(code) ? "" : "; trying on"}`;
     case "lost":
       return `lost ${server}: ${reason}; trying on`;
-    case "greeting":
     case "stopped":
+      return code === Code.OK ? "" : `${server} ends it: ${reason}`;
+    case "greeting":
       return "";
   }
 }
@@ -65,7 +66,7 @@ export async function run(
   const guest = connect(udp(server), {
     ...options,
     onPhase(changed) {
-      const text = sentence(changed, server);
+      const text = sentence(changed, options);
       if (text && text !== said) console.error(`${name}: ${(said = text)}`);
       if (changed.phase !== "refused" || !isFinal(changed.stats().code)) return;
       refused = true;

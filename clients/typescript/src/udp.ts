@@ -24,8 +24,11 @@ export function parseAddress(text: string): Address {
 
 export const addressText = ({ host, port }: Address): string => `${isIPv6(host) ? `[${host}]` : host}:${port}`;
 
-/** 127.0.0.0/8 and ::1: datagrams to it never leave this machine. */
-export const isLoopback = (host: string): boolean => /^(127\.|::1$|::ffff:127\.)/.test(host);
+/** 127.0.0.0/8 and ::1: datagrams to it never leave this machine. False for what is no numeric address. */
+export function isLoopback(host: string): boolean {
+  const ip = host.replace(/^::ffff:/i, "");
+  return isIPv4(ip) ? ip.startsWith("127.") : ip === "::1";
+}
 
 /**
  * A UDP socket that talks to one server, from a port that the system chooses. It is connected, so that the kernel drops

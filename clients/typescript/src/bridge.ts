@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+import { createSocket, type Socket as UdpSocket } from "node:dgram";
+import { createServer, type IncomingMessage, type Server } from "node:http";
+import { isIPv6, type AddressInfo } from "node:net";
+import type { Duplex } from "node:stream";
+import { WebSocketServer, type WebSocket } from "ws";
+import { CipherSuite, decodeHeader } from "./datagram.js";
+import { kMaxDatagram } from "./limits.js";
+import { addressText, isLoopback, parseAddress } from "./udp.js";
+
+export interface BridgeConfig {
+  /** HOST:PORT for WebSockets; port 0 lets the system choose. */
+  readonly listen: string;
+  /** HOST:PORT of tendond. */
+  readonly to: string;
+  /** Pages from there may connect, besides those from this machine: "https://lab.example". */
+  readonly origins: readonly string[];
+  /** WebSockets at once. */
+  readonly maxPeers: number;
+  /** Datagrams per second that one page may send; more are dropped. */
+  readonly maxRateHz: number;
+}
+
+export const kBridgeDefaults: BridgeConfig = {
+  listen: "127.0.0.1:47180", to: "127.0.0.1:47100", origins: [], maxPeers: 32, maxRateHz: 4000,
+};
+
+/** What has passed, and what has not. */
+export interface BridgeCounts {
+  /** WebSockets open now. */
+  peers: number;
+  opened: number;
+  /** WebSockets refused: a foreign origin, or too many. */
+  refusedOrigin: number;
+  refusedFull: number;
+  toServer: number;
+  toPage: number;
+  /** Not passed on: no datagram of Tendon. */
+  malformed: number;
+  /** Not passed on: not encrypted, and from another machine. */
+  plain: number;
+  /** Not passed on: more than maxRateHz. */
+  tooFast: number;
+  /** Not passed on: the page does not keep up, and a newer one follows. */
+  tooSlow: number;
+}
+
+/** Waiting in a WebSocket: some 60 ms of states at 1 kHz. */
+const kMaxWaitingBytes = 16 * 1024;
+/** A page that has said nothing for so long is gone; a session says something every 50 ms. */
+const kIdleMs = 30_000;
+
+/**
+ * Lets pages in browsers, which have no UDP, talk to tendond: one binary message of a WebSocket is one datagram, and each
+ * WebSocket has a UDP socket of its own. It has no key and reads only the header in the clear.
+ *
+ * To tendond all of this comes from the bridge's machine, and there it believes datagrams in the clear. So the bridge lets
+ * in only pages of this machine and of the origins it was told (a page from elsewhere that happens to be open here could
+ * otherwise move the hand), and passes datagrams in the clear on only from WebSockets that come from this machine, not
+ * through a proxy either.
+ */
+export class Bridge {
+  readonly counts: BridgeCounts = {
+    peers: 0, opened: 0, refusedOrigin: 0, refusedFull: 0, toServer: 0, toPage: 0, malformed: 0, plain: 0, tooFast: 0,
+    tooSlow: 0,
+  };
+  readonly #config: BridgeConfig;
+  readonly #http: Server;
+  readonly #webSockets = new WebSocketServer({ noServer: true, maxPayload: kMaxDatagram, perMessageDeflate: false });
+
+  private constructor(config: BridgeConfig) {
+    this.#config = config;
+    this.#http = createServer((_, response) => {
+      response.writeHead(426, { "Content-Type": "text/plain" }).end("This is tendon-bridge: it speaks WebSocket only.\n");
+    });
+    this.#http.on("upgrade", (request: IncomingMessage, socket: Duplex, head: Buffer) => this.#meet(request, socket, head));
+  }
+
+  /** Throws a sentence when an address is none, or the system refuses it. */
+  static async open(config: Partial<BridgeConfig> = {}): Promise<Bridge> {
+    const bridge = new Bridge({ ...kBridgeDefaults, ...config });
+    parseAddress(bridge.#config.to);
+    const { host, port } = parseAddress(bridge.#config.listen);
+    await new Promise<void>((resolve, reject) => {
+      const refused = ({ code }: NodeJS.ErrnoException): void =>
+        reject(new Error(`cannot listen on ${bridge.#config.listen}: ${code === "EADDRINUSE" ? "address already in use" : code}`));
+      bridge.#http.once("error", refused).listen({ host, port }, resolve);
+    });
+    return bridge;
+  }
+
+  /** Where it listens: HOST:PORT. */
+  get address(): string {
+    const { address, port } = this.#http.address() as AddressInfo;
+    return addressText({ host: address, port });
+  }
+
+  /** Ends all conversations. */
+  async close(): Promise<void> {
+    for (const page of this.#webSockets.clients) page.terminate();
+    await new Promise<void>((resolve) => {
+      this.#http.close(() => resolve());
+      this.#http.closeAllConnections();
+    });
+  }
+
+  #meet(request: IncomingMessage, socket: Duplex, head: Buffer): void {
+    const refuse = (status: string): void => {
+      socket.once("finish", () => socket.destroy()); // whatever the other end does
+      socket.end(`HTTP/1.1 ${status}\r\nConnection: close\r\n\r\n`);
+    };
+    socket.on("error", () => {}); // "close" follows
+    if (!this.#isWelcome(request.headers.origin)) {
+      ++this.counts.refusedOrigin;
+      refuse("403 Forbidden");
+    } else if (this.counts.peers >= this.#config.maxPeers) {
+      ++this.counts.refusedFull;
+      refuse("503 Service Unavailable");
+    } else {
+      this.#webSockets.handleUpgrade(request, socket, head, (page) => this.#serve(page, isLocal(request)));
+    }
+  }
+
+  /** A program that is no browser sends no origin. It could as well use UDP. */
+  #isWelcome(origin: string | undefined): boolean {
+    if (origin === undefined || this.#config.origins.includes(origin)) return true;
+    return URL.canParse(origin) && isLoopbackName(new URL(origin).hostname);
+  }
+
+  #serve(page: WebSocket, local: boolean): void {
+    const { counts } = this;
+    ++counts.peers;
+    ++counts.opened;
+    const udp = this.#openUdp((datagram) => {
+      if (page.bufferedAmount > kMaxWaitingBytes) {
+        ++counts.tooSlow;
+      } else {
+        ++counts.toPage;
+        page.send(datagram, { binary: true });
+      }
+    });
+    const rate = new RateLimit(this.#config.maxRateHz);
+    const idle = setTimeout(() => page.terminate(), kIdleMs);
+    page.on("message", (data, isBinary) => {
+      idle.refresh();
+      const datagram = data as Buffer;
+      const header = isBinary ? decodeHeader(datagram) : undefined;
+      if (!header) ++counts.malformed;
+      else if (header.suite === CipherSuite.Plain && !local) ++counts.plain;
+      else if (!rate.take(performance.now())) ++counts.tooFast;
+      else {
+        ++counts.toServer;
+        udp.send(datagram);
+      }
+    });
+    page.on("error", () => {}); // "close" follows
+    page.on("close", () => {
+      clearTimeout(idle);
+      udp.close();
+      --counts.peers;
+    });
+  }
+
+  #openUdp(receive: (datagram: Buffer) => void): { send: (datagram: Buffer) => void; close: () => void } {
+    const { host, port } = parseAddress(this.#config.to);
+    const socket: UdpSocket = createSocket(isIPv6(host) ? "udp6" : "udp4");
+    let ready = false;
+    socket.on("message", receive).on("error", () => {}); // nobody listens there (yet)
+    socket.connect(port, host, () => (ready = true));
+    return {
+      send: (datagram) => {
+        if (ready) socket.send(datagram, () => {});
+        else socket.once("connect", () => socket.send(datagram, () => {}));
+      },
+      close: () => socket.close(),
+    };
+  }
+}
+
+/** So many a second, and as many at once as a tenth of that. */
+class RateLimit {
+  #left: number;
+  #then = 0;
+  constructor(readonly rateHz: number) {
+    this.#left = this.#most;
+  }
+  take(nowMs: number): boolean {
+    this.#left = Math.min(this.#left + ((nowMs - this.#then) / 1000) * this.rateHz, this.#most);
+    this.#then = nowMs;
+    if (this.#left < 1) return false;
+    --this.#left;
+    return true;
+  }
+  get #most(): number {
+    return Math.max(this.rateHz / 10, 1);
+  }
+}
+
+const isLoopbackName = (name: string): boolean =>
+  name === "localhost" || name.endsWith(".localhost") || isLoopback(name.replace(/^\[|\]$/g, ""));
+
+/** From this machine, and not from another through a proxy on this one. */
+function isLocal(request: IncomingMessage): boolean {
+  const { headers, socket } = request;
+  const proxied = ["forwarded", "x-forwarded-for", "x-real-ip", "via"].some((name) => headers[name] !== undefined);
+  return !proxied && isLoopback(socket.remoteAddress ?? "");
+}

@@ -1,0 +1,78 @@
+#!/usr/bin/env node
+// SPDX-License-Identifier: Apache-2.0
+import { parseArgs } from "node:util";
+import { Bridge, kBridgeDefaults, type BridgeConfig } from "./bridge.js";
+
+const kHelp = `tendon-bridge: lets pages in browsers talk to tendond. One WebSocket message is one datagram; it has no key.
+
+Usage: tendon-bridge [OPTIONS]
+
+  -h, --help              Print this and leave
+  --listen HOST:PORT      For WebSockets; port 0 lets the system choose [${kBridgeDefaults.listen}]
+  --to HOST:PORT          Where tendond listens [${kBridgeDefaults.to}]
+  --origin URL            Pages from there may connect, besides those from this machine; may be repeated
+  --max-peers NUMBER      WebSockets at once [${kBridgeDefaults.maxPeers}]
+  --max-rate-hz NUMBER    Datagrams per second that one page may send [${kBridgeDefaults.maxRateHz}]
+  --json                  One JSON object per line on stdout: listening, stopped
+
+From another machine it passes encrypted datagrams on only.
+
+Example: tendon-bridge --to 127.0.0.1:47100 --origin https://lab.example
+`;
+
+function whole(option: string, text: string): number {
+  const value = Number(text);
+  if (text.trim() !== "" && Number.isInteger(value) && value >= 1 && value <= 1e6) return value;
+  throw new RangeError(`--${option}: expected a whole number from 1 to 1000000, got "${text}"`);
+}
+
+function origin(text: string): string {
+  if (URL.canParse(text) && new URL(text).origin === text) return text;
+  throw new RangeError(`--origin: expected an origin like https://lab.example, got "${text}"`);
+}
+
+function parse(): { readonly config: BridgeConfig; readonly json: boolean } {
+  const { values } = parseArgs({
+    options: {
+      help: { type: "boolean", short: "h", default: false },
+      listen: { type: "string", default: kBridgeDefaults.listen },
+      to: { type: "string", default: kBridgeDefaults.to },
+      origin: { type: "string", multiple: true, default: [] },
+      "max-peers": { type: "string", default: String(kBridgeDefaults.maxPeers) },
+      "max-rate-hz": { type: "string", default: String(kBridgeDefaults.maxRateHz) },
+      json: { type: "boolean", default: false },
+    },
+  });
+  if (values.help) {
+    process.stdout.write(kHelp);
+    process.exit(0);
+  }
+  const { listen, to, json } = values;
+  return {
+    config: {
+      listen, to, origins: values.origin.map(origin), maxPeers: whole("max-peers", values["max-peers"]),
+      maxRateHz: whole("max-rate-hz", values["max-rate-hz"]),
+    },
+    json,
+  };
+}
+
+async function main(): Promise<void> {
+  const { config, json } = parse();
+  const bridge = await Bridge.open(config);
+  if (json) console.log(JSON.stringify({ event: "listening", address: bridge.address }));
+  else console.error(`tendon-bridge: ws://${bridge.address} to ${config.to}`);
+  const stop = async (): Promise<void> => {
+    await bridge.close();
+    const counts = Object.entries(bridge.counts)
+      .map(([name, count]) => [name.replace(/[A-Z]/g, (letter) => `_${letter.toLowerCase()}`), count]);
+    if (json) console.log(JSON.stringify({ event: "stopped", ...Object.fromEntries(counts) }));
+    else console.error(`tendon-bridge: ${counts.map(([name, count]) => `${name} ${count}`).join(", ")}`);
+  };
+  process.once("SIGINT", () => void stop()).once("SIGTERM", () => void stop());
+}
+
+main().catch((error: Error) => {
+  process.stderr.write(`tendon-bridge: ${error.message}\n`);
+  process.exitCode = 2;
+});

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+import { readFileSync, statSync } from "node:fs";
+import { parseKeyFile, type ClientKey } from "./key_file.js";
+
+/**
+ * The key in this file, as `tendond keygen` writes it. Throws an Error, "FILE: what is wrong": it cannot be read, others may
+ * read it, it is no key file, or the key is weak.
+ */
+export function readClientKey(file: string): ClientKey {
+  try {
+    const text = readFileSync(file, "utf8");
+    // Windows has no such bits: they are all set there.
+    if (process.platform !== "win32" && (statSync(file).mode & 0o077) !== 0) {
+      throw new RangeError(`others may read this key: run \`chmod 600 ${file}\``);
+    }
+    return parseKeyFile(text);
+  } catch (error) {
+    throw new Error(`${file}: ${(error as Error).message}`);
+  }
+}

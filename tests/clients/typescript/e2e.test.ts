@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Real processes: tendond (TENDON_PROGRAMS names its folder), the examples as npm builds them, and the bridge.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { createSocket } from "node:dgram";
+import { chmodSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { describe, it, type TestContext } from "node:test";
+import { WebSocket } from "ws";
+import { Bridge } from "../../../clients/typescript/src/bridge.js";
+import { concat, decodeHello, encodeAnswer } from "../../../clients/typescript/src/datagram.js";
+import { encodeAnswerMessage, encodeFrame, encodeHead } from "../../../clients/typescript/src/codec.js";
+import { Role } from "../../../clients/typescript/src/messages.js";
+import { connect, readClientKey, udp, webSocket, type DeviceState, type Guest } from "../../../clients/typescript/src/node.js";
+import { PlainSeal } from "../../../clients/typescript/src/seal.js";
+import { startNode, startTendond, until } from "./support/program.js";
+import { Random } from "./support/random.js";
+import { kWelcome, Server } from "./support/world.js";
+
+/** A line of echo_motion in which the hand is inside the wall and pushed out of it. */
+function isPush(line: string): boolean {
+  if (!line.includes('"tick"')) return false;
+  const { position_m: position, force_n: force } = JSON.parse(line);
+  return position[0] > 0.0005 && force[0] < -0.5;
+}
+const wall = ({ position }: DeviceState) => ({ x: position.x > 0 ? -2000 * position.x : 0, y: 0, z: 0 });
+
+function guest(test: TestContext, made: Guest): Guest {
+  test.after(() => made.stop());
+  return made;
+}
+const inNode = (url: string) => webSocket(url, WebSocket as unknown as typeof globalThis.WebSocket);
+
+describe("a TypeScript wall", () => {
+  for (const options of [[], ["--rate-hz", "0", "--local-model"]]) {
+    it(`is felt over UDP: virtual_wall ${options.join(" ")}`, async (test) => {
+      const tendond = await startTendond(test);
+      if (!tendond) return;
+      const push = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--json", ...options);
+      const echo = startNode(test, "examples/echo_motion", "--server", tendond.address, "--json", "--rate-hz", "0");
+      await echo.line(isPush);
+      assert.equal(await echo.end("SIGINT"), 0);
+      assert.equal(await push.end("SIGINT"), 0);
+      const { summary } = JSON.parse(push.lines.at(-1)!);
+      assert.equal(summary.sessions, 1);
+      assert.ok(summary.forces > 0 && summary.forces <= summary.states);
+      assert.equal(await tendond.program.end("SIGINT"), 0);
+      const stopped = JSON.parse(tendond.program.lines.find((line) => line.includes('"stopped"'))!);
+      assert.deepEqual([stopped.welcomed, stopped.invalid, stopped.fault], [2, 0, 0]);
+      assert.ok(stopped.forces > 0);
+    });
+  }
+
+  it("is felt through the bridge, whose page is a WebSocket", async (test) => {
+    const tendond = await startTendond(test);
+    if (!tendond) return;
+    const bridge = startNode(test, "bridge_main", "--listen", "127.0.0.1:0", "--to", tendond.address, "--json");
+    const { address } = JSON.parse(await bridge.line((line) => line.includes('"listening"')));
+    const page = guest(test, connect(inNode(`ws://${address}`), { name: "page" }, { physics: wall }));
+    const echo = startNode(test, "examples/echo_motion", "--server", tendond.address, "--json", "--rate-hz", "0");
+    await echo.line(isPush);
+    assert.equal(page.phase, "open");
+    assert.equal(await bridge.end("SIGINT"), 0);
+    const { to_server, to_page, malformed } = JSON.parse(bridge.lines.at(-1)!);
+    assert.ok(to_server > 0 && to_page > 0 && malformed === 0);
+  });
+});
+
+describe("with a key", () => {
+  it("a TypeScript wall is felt over UDP and through the bridge, and without the key nobody answers", async (test) => {
+    const folder = mkdtempSync(join(tmpdir(), "tendon-"));
+    test.after(() => rmSync(folder, { recursive: true }));
+    const programs = process.env["TENDON_PROGRAMS"];
+    if (!programs) return test.skip("set TENDON_PROGRAMS to the folder that holds tendond");
+    const tool = join(programs, "tendond");
+    if (!execFileSync(tool, ["--help"], { encoding: "utf8" }).includes("keygen")) return test.skip("tendond has no keys yet");
+    const keys = join(folder, "wall.key");
+    execFileSync(tool, ["keygen", "wall", "--out", keys]);
+    const tendond = await startTendond(test, "--keys", folder);
+    if (!tendond) return;
+
+    const push = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--key", keys, "--json");
+    const look = ["--server", tendond.address, "--key", keys, "--json", "--rate-hz", "0"];
+    await startNode(test, "examples/echo_motion", ...look).line(isPush);
+    assert.equal(await push.end("SIGINT"), 0);
+
+    const bridge = await Bridge.open({ listen: "127.0.0.1:0", to: tendond.address });
+    test.after(() => bridge.close());
+    const { key } = readClientKey(keys);
+    guest(test, connect(inNode(`ws://${bridge.address}`), { name: "page", key }, { physics: wall }));
+    await startNode(test, "examples/echo_motion", ...look).line(isPush);
+
+    const stranger = startNode(test, "examples/echo_motion", "--server", tendond.address);
+    await stranger.line((line) => line.includes("no answer"));
+  });
+});
+
+describe("a guest", () => {
+  it("waits for the server, and finds it again after it was killed", async (test) => {
+    const first = await startTendond(test);
+    if (!first) return;
+    const here = guest(test, connect(udp(first.address), { retryMaxMs: 200 }, { watch: () => {} }));
+    await until("open", () => here.phase === "open" && here.stats().states > 0);
+    await first.program.end("SIGKILL");
+    await until("lost", () => here.phase !== "open");
+    await startTendond(test, "--listen", first.address);
+    await until("open again", () => here.phase === "open" && here.stats().sessions === 2);
+  });
+
+  it("whose physics was slow sees the newest state next, not the oldest that waits in its socket", async (test) => {
+    const server = createSocket("udp4");
+    await new Promise<void>((resolve) => server.bind(0, "127.0.0.1", resolve));
+    test.after(() => server.close());
+    let port = 0;
+    server.on("message", (datagram, from) => {
+      port = from.port;
+      const hello = decodeHello(datagram);
+      if (!hello) return;
+      const content = encodeAnswerMessage({ ...kWelcome, features: [], role: Role.CONTROLLER });
+      server.send(encodeAnswer({ suite: 0, connectionId: 1, random: hello.random, content }), from.port);
+    });
+    const { state } = new Server(new Random(1)).conduct;
+    let number = 0n;
+    const send = (): void => {
+      const body = concat(encodeHead(number, undefined), encodeFrame({ kind: "state", value: state(++number) }));
+      server.send(new PlainSeal().close(0n, 1, number, body), port, "127.0.0.1");
+    };
+    const seen: bigint[] = [];
+    const here = guest(test, connect(udp(`127.0.0.1:${server.address().port}`), {}, {
+      watch: ({ tick }) => {
+        seen.push(tick);
+        // While this takes its time, 100 more states come in. libuv reads 32 of them at once.
+        if (seen.length === 1) for (let i = 0; i < 100; ++i) send();
+      },
+    }));
+    await until("open", () => here.phase === "open");
+    send();
+    await until("it has seen all there is", () => here.stats().states >= 1 && seen.at(-1) === number);
+    assert.deepEqual(seen, [1n, 101n]);
+  });
+});
+
+describe("the programs", () => {
+  const programs = ["examples/virtual_wall", "examples/echo_motion", "bridge_main"];
+
+  it("have a --help with an example", async (test) => {
+    for (const name of programs) {
+      const program = startNode(test, name, "--help");
+      assert.equal(await program.end(), 0);
+      assert.match(program.lines.join("\n"), /Example: /);
+    }
+  });
+
+  it("answer a wrong command line with what is wrong, and exit code 2", async (test) => {
+    const folder = mkdtempSync(join(tmpdir(), "tendon-"));
+    test.after(() => rmSync(folder, { recursive: true }));
+    const open = join(folder, "open.key");
+    writeFileSync(open, "controller bc795700d5499e7507c56d6b31e4ecb5f7869bc746395172bfa650b552994153\n");
+    chmodSync(open, 0o644);
+    const wrong: [string, string[], RegExp][] = [
+      ["examples/virtual_wall", ["--server", "there"], /--server: expected HOST:PORT .* got "there"/],
+      ["examples/virtual_wall", ["--server", "127.0.0.1:70000"], /--server.*127.0.0.1:70000/],
+      ["examples/virtual_wall", ["--server", "127.0.0.1.evil.example:1"], /--server/],
+      ["examples/virtual_wall", ["--stiffness-n-per-m", "nan"], /--stiffness-n-per-m: expected 0 to .* got "nan"/],
+      ["examples/virtual_wall", ["--key", join(folder, "none")], /--key: .*none: .*no such file/],
+      ["examples/virtual_wall", ["--key", open], /--key: .*others may read this key/],
+      ["examples/echo_motion", ["--rate-hz", "-1"], /rate-hz/],
+      ["examples/echo_motion", ["--sevrer", "127.0.0.1:47100"], /--sevrer/],
+      ["bridge_main", ["--listen", "here"], /expected HOST:PORT .* got "here"/],
+      ["bridge_main", ["--listen", "192.0.2.1:0"], /cannot listen on 192.0.2.1:0/],
+      ["bridge_main", ["--origin", "lab.example/page"], /--origin: expected an origin/],
+      ["bridge_main", ["--max-peers", "0"], /--max-peers: expected a whole number/],
+    ];
+    for (const [name, args, says] of wrong) {
+      const program = startNode(test, name, ...args);
+      assert.equal(await program.end(), 2, `${name} ${args.join(" ")}: ${program.lines.join("\n")}`);
+      assert.match(program.lines.join("\n"), says);
+    }
+  });
+
+  it("leave with exit code 1 when nobody has answered", async (test) => {
+    const program = startNode(test, "examples/echo_motion", "--server", "127.0.0.1:9", "--duration-s", "0.2");
+    assert.equal(await program.end(), 1);
+    assert.match(program.lines.join("\n"), /was not connected/);
+  });
+});
+
+describe("what is published", () => {
+  it("imports by the package's names, and its index knows nothing of Node", () => {
+    const sources = ["index", "connect", "force_client", "websocket", "session", "handshake", "seal", "noise", "codec",
+      "datagram", "key_file", "messages", "replay_window", "requests", "round_trip", "time", "limits"];
+    for (const name of sources) {
+      const text = readFileSync(new URL(`../../../clients/typescript/src/${name}.js`, import.meta.url), "utf8");
+      assert.doesNotMatch(text, /from "(node:|ws")/, name);
+    }
+  });
+});

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+import { spawn, type ChildProcess } from "node:child_process";
+import { EventEmitter, once } from "node:events";
+import { join } from "node:path";
+import { createInterface } from "node:readline";
+import type { TestContext } from "node:test";
+import { kRoot } from "./paths.js";
+
+const kPatienceMs = 30_000;
+
+/** A running program, and every line that it says on either stream. Gone at the end of the test. */
+export class Program {
+  readonly lines: string[] = [];
+  readonly #process: ChildProcess;
+  readonly #news = new EventEmitter();
+  readonly #ended: Promise<number | null>;
+
+  constructor(test: TestContext, command: string, args: readonly string[]) {
+    this.#process = spawn(command, args, { stdio: ["ignore", "pipe", "pipe"] });
+    this.#news.setMaxListeners(0);
+    this.#ended = new Promise((resolve) => this.#process.once("close", resolve));
+    for (const stream of [this.#process.stdout!, this.#process.stderr!]) {
+      createInterface(stream).on("line", (line) => {
+        this.lines.push(line);
+        this.#news.emit("line");
+      });
+    }
+    test.after(async () => {
+      this.#process.kill("SIGKILL");
+      await this.#ended;
+    });
+  }
+
+  /** The first line, from now on or before, that `matches`. */
+  async line(matches: (line: string) => boolean): Promise<string> {
+    const signal = AbortSignal.timeout(kPatienceMs);
+    for (let i = 0; ; ++i) {
+      while (i >= this.lines.length) {
+        await once(this.#news, "line", { signal }).catch(() => {
+          throw new Error(`did not say it, but: ${this.lines.slice(-20).join("\n")}`);
+        });
+      }
+      if (matches(this.lines[i]!)) return this.lines[i]!;
+    }
+  }
+
+  /** Its exit code. */
+  async end(signal?: NodeJS.Signals): Promise<number | null> {
+    if (signal) this.#process.kill(signal);
+    return this.#ended;
+  }
+}
+
+/** tendond with the demo's scene, on a port of its own; undefined, and the test is skipped, without the programs. */
+export async function startTendond(
+  test: TestContext,
+  ...args: string[]
+): Promise<{ readonly program: Program; readonly address: string } | undefined> {
+  const programs = process.env["TENDON_PROGRAMS"];
+  if (!programs) {
+    test.skip("set TENDON_PROGRAMS to the folder that holds tendond");
+    return undefined;
+  }
+  const listen = args.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"];
+  const scene = join(kRoot, "deploy/scenes/demo.toml");
+  const program = new Program(test, join(programs, "tendond"), [scene, ...listen, "--record", "/dev/null", "--json", ...args]);
+  const said = await program.line((line) => line.includes('"listening"'));
+  return { program, address: JSON.parse(said).address };
+}
+
+/** One of the client's own programs, as npm builds it: "examples/virtual_wall". */
+export const startNode = (test: TestContext, name: string, ...args: string[]): Program =>
+  new Program(test, process.execPath, [join(kRoot, "clients/typescript/dist", `${name}.js`), ...args]);
+
+/** Waits for what another part of this process brings about. */
+export async function until(what: string, done: () => boolean): Promise<void> {
+  const deadline = performance.now() + kPatienceMs;
+  while (!done()) {
+    if (performance.now() > deadline) throw new Error(`never came to be: ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 5));
+  }
+}
