@@ -269,6 +269,7 @@ std::vector<Check> all_losses(const SelftestOptions& options) {
   append(checks, check_losses("loss=2%", LossChain::bernoulli(0.02), options));
   append(checks, check_losses("loss=30%", LossChain::bernoulli(0.3), options));
   append(checks, check_losses("loss=burst(2%,4)", LossChain::burst(0.02, 4), options));
+  append(checks, check_losses("loss=burst(20%,4)", LossChain::burst(0.2, 4), options));
   append(checks, check_losses("loss=burst(10%,20)", LossChain::burst(0.1, 20), options));
   append(checks, check_losses("loss=gilbert(0.01,0.25,1,0)", LossChain::gilbert(0.01, 0.25, 1, 0), options));
   append(checks, check_losses("loss=gilbert(0.02,0.1,0.7,0.01)", LossChain::gilbert(0.02, 0.1, 0.7, 0.01), options));
@@ -659,8 +660,16 @@ std::vector<Check> check_delays(std::string_view line, const Cdf& law, double rh
   const auto samples = delays(parse_profile(line), {}, options);
   std::vector<Check> checks = {kolmogorov(model, "Kolmogorov", samples, law, independent_samples(samples.size(), rho))};
   if (!continuous) return checks;
+  const auto n = static_cast<double>(samples.size());
+  if (rho == 0) {
+    // No distance sees far out; counting does. A hundred expected, so that their law is normal enough.
+    const double far = std::max(1e-4, 100 / n);
+    const auto high = std::ranges::count_if(samples, [&](double x) { return law(x) > 1 - far; });
+    const auto low = std::ranges::count_if(samples, [&](double x) { return law(x) < far; });
+    checks.push_back(rate(model, "share of the longest", static_cast<double>(high), n, far));
+    checks.push_back(rate(model, "share of the shortest", static_cast<double>(low), n, far));
+  }
   const auto z = normal_scores(samples, law);
-  const auto n = static_cast<double>(z.size());
   // Its standard deviation and its bias are those of AR(1): Bartlett 1946, Kendall 1954.
   checks.push_back({model, "autocorrelation of z against rho", std::abs(autocorrelation(z, 1) - rho),
                     most_deviations() * std::sqrt((1 - rho * rho) / n) + (1 + 3 * rho) / n});
