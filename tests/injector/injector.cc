@@ -84,9 +84,9 @@ void Injector::begin(LocalTime start) {
     if (bottleneck_) queue->continue_from(std::move(*bottleneck_));
   }
   bottleneck_ = std::move(queue);
-  const std::uint64_t visits = regimes_ ? regimes_->visits() : 0;
+  if (regimes_) next_visit_ = regimes_->next_visit();
   regimes_.reset();
-  if (!p.regimes.empty()) regimes_.emplace(p.regimes, draws_, start, visits);
+  if (!p.regimes.empty()) regimes_.emplace(p.regimes, draws_, start, next_visit_);
 }
 
 void Injector::change(const Profile& profile, LocalTime now) { adopt(Network(profile), now); }
@@ -112,7 +112,7 @@ LocalTime Injector::past_stalls(LocalTime at) const {
 std::optional<Cause> Injector::cause_of_loss(const Packet& packet, std::uint64_t index,
                                              std::optional<std::size_t> regime) {
   const Profile& p = network_.profile;
-  // Chains go on whatever else happens.
+  // Chains go on whatever else happens; that of a regime while it lasts.
   LossModel* const special = regime && network_.regime_losses[*regime] ? &*network_.regime_losses[*regime] : nullptr;
   const bool plain_lost = network_.loss.lost(draws_, index);
   const bool lost = special != nullptr ? special->lost(draws_, index) : plain_lost;

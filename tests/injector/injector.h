@@ -152,7 +152,6 @@ class Injector final : public Decider {
   void adopt(Network next, LocalTime now);
   void begin(LocalTime start);
   std::optional<Cause> cause_of_loss(const Packet& packet, std::uint64_t index, std::optional<std::size_t> regime);
-  Duration since_start(LocalTime at) const { return at - start_; }
   LocalTime past_stalls(LocalTime at) const;
 
   Draws draws_;
@@ -164,6 +163,7 @@ class Injector final : public Decider {
   LocalTime start_{};
   std::optional<BottleneckQueue> bottleneck_;
   std::optional<RegimeChain> regimes_;
+  std::uint64_t next_visit_ = 0;  ///< of a regime, after those of profiles before this one
   std::uint64_t next_index_ = 0;
   std::uint32_t rebinds_before_ = 0;  ///< of profiles before this one
   LocalTime last_release_ = LocalTime::min();

@@ -69,18 +69,13 @@ bool in_handover(const Profile& profile, Duration since) noexcept {
 }
 
 Duration past_stalls(const Profile& profile, Duration since) noexcept {
-  // One stall may end in another; two that take turns for ever are cut off by the longest delay.
-  const Duration latest = since + kMaxDelay;
-  for (bool moved = true; moved && since < latest;) {
-    moved = false;
-    for (const Stall& stall : profile.stalls) {
-      if (const WindowState state = state_of(stall.when, since); state.open) {
-        since += state.until_end;
-        moved = true;
-      }
-    }
+  for (int moves = 0; moves < 1000; ++moves) {
+    const auto open =
+        std::ranges::find_if(profile.stalls, [&](const Stall& s) { return state_of(s.when, since).open; });
+    if (open == profile.stalls.end()) break;
+    since += state_of(open->when, since).until_end;
   }
-  return std::min(since, latest);
+  return since;
 }
 
 RegimeChain::RegimeChain(const std::vector<Regime>& regimes, const Draws& draws, LocalTime start,
