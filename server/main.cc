@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
 #include <csignal>
 #include <ctime>
 #include <exception>
@@ -8,8 +10,11 @@
 #include <string>
 
 #include "devices/simulated/profiles.h"
+#include "protocol/limits.h"
 #include "server/build_info.h"
+#include "server/key_folder.h"
 #include "server/log.h"
+#include "server/randomness.h"
 #include "server/scene.h"
 #include "server/server.h"
 
@@ -57,9 +62,22 @@ void print_json(const Server::Summary& summary) {
   add("forces", network.forces);
   add("denied", network.denied);
   add("unanswerable", network.unanswerable);
-  add("malformed", network.malformed + network.controller.malformed);
-  add("invalid", network.controller.invalid);
-  add("duplicated", network.controller.duplicated);
+  add("replaced", network.replaced);
+  add("roamed", network.roamed);
+  add("half_open_forgotten", network.half_open_forgotten);
+  // What was dropped, and why.
+  add("malformed", network.malformed + network.hellos.malformed + network.dropped.malformed);
+  add("unknown_connection", network.unknown_connection);
+  add("retries", network.hellos.retries);
+  add("hellos_plain", network.hellos.plain);
+  add("hellos_limited", network.hellos.limited);
+  add("hellos_unknown_key", network.hellos.unknown_key);
+  add("hellos_forged", network.hellos.forged);
+  add("forged", network.dropped.forged);
+  add("old_key", network.dropped.old_key);
+  add("duplicated", network.dropped.duplicated);
+  add("invalid", network.dropped.invalid);
+  add("stale", network.dropped.stale);
   add("lost", network.controller.lost);
   add("round_trip_ms", seconds(network.controller.smoothed_round_trip) * 1e3);
   if (recording) {
@@ -97,6 +115,29 @@ int run(Scene scene, double duration_s, bool json) {
   return 0;
 }
 
+/// The name becomes a file's name and a word in the log.
+void check_key_name(const std::string& name) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
+  if (name.empty() || name.size() > limits::kMaxName || !std::all_of(name.begin(), name.end(), plain)) {
+    throw CLI::ValidationError("name", "expected 1 to 64 letters, digits, - or _, got \"" + name + "\"");
+  }
+}
+
+int make_key(const std::string& name, const std::string& file, bool observer) {
+  try {
+    ClientKey key{.name = name, .role = observer ? Role::kObserver : Role::kController, .key = {}};
+    fill_random(key.key.bytes());
+    write_key_file(file, key);
+    std::cerr << "Wrote " << file << ", a key for " << (observer ? "an observer" : "a controller")
+              << ". A copy goes into the server's folder of keys, one to the client (--key FILE), over a way that you "
+                 "trust.\n";
+    return 0;
+  } catch (const std::exception& problem) {
+    log::error(problem.what());
+    return 1;
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -120,6 +161,14 @@ int main(int argc, char** argv) {
   app.add_flag("--json", json, "One JSON object per line on stdout: listening, stopped");
   app.add_flag("--profiles", profiles, "Print the device profiles, and how each of their numbers is known");
   app.add_flag("--scene-help", scene_help, "Print every key that a scene may have");
+  std::string key_name;
+  std::string key_file;
+  bool observer = false;
+  auto* keygen = app.add_subcommand(
+      "keygen", "Make a key for one client: `tendond keygen wall` writes wall.key, which only you may read");
+  keygen->add_option("name", key_name, "Of the client, as it is to be called here")->required();
+  keygen->add_option("--out", key_file, "Write to this file instead of NAME.key");
+  keygen->add_flag("--observer", observer, "A key that may look, but not send forces");
   app.set_version_flag("--version", std::string(kVersion) + " (" + std::string(kCommit) + ")");
   try {
     app.parse(argc, argv);
@@ -133,6 +182,10 @@ int main(int argc, char** argv) {
     }
     if (!(duration_s >= 0 && duration_s <= kLongestRun_s)) {  // NaN is neither
       throw CLI::ValidationError("--duration-s", "expected 0 to 31536000 seconds, got " + std::to_string(duration_s));
+    }
+    if (*keygen) {
+      check_key_name(key_name);
+      return make_key(key_name, key_file.empty() ? key_name + ".key" : key_file, observer);
     }
     if (scene_option->count() == 0) throw CLI::RequiredError("scene");
   } catch (const CLI::ParseError& problem) {
