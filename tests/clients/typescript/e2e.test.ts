@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createSocket } from "node:dgram";
-import { chmodSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { chmodSync, existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { describe, it, type TestContext } from "node:test";
@@ -15,7 +15,8 @@ import { encodeAnswerMessage, encodeFrame, encodeHead } from "../../../clients/t
 import { Role } from "../../../clients/typescript/src/messages.js";
 import { connect, readClientKey, udp, webSocket, type DeviceState, type Guest } from "../../../clients/typescript/src/node.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
-import { startNode, startTendond, until } from "./support/program.js";
+import { findTendond, kDemoScene, startNode, startTendond, until } from "./support/program.js";
+import { kRoot } from "./support/paths.js";
 import { Random } from "./support/random.js";
 import { kWelcome, Server } from "./support/world.js";
 
@@ -69,16 +70,17 @@ describe("a TypeScript wall", () => {
 });
 
 describe("with a key", () => {
-  it("a TypeScript wall is felt over UDP and through the bridge, and without the key nobody answers", async (test) => {
+  it("a TypeScript wall is felt over UDP and through the bridge, and nobody else is let in", async (test) => {
     const folder = mkdtempSync(join(tmpdir(), "tendon-"));
     test.after(() => rmSync(folder, { recursive: true }));
-    const programs = process.env["TENDON_PROGRAMS"];
-    if (!programs) return test.skip("set TENDON_PROGRAMS to the folder that holds tendond");
-    const tool = join(programs, "tendond");
+    const tool = findTendond(test);
+    if (!tool) return;
     if (!execFileSync(tool, ["--help"], { encoding: "utf8" }).includes("keygen")) return test.skip("tendond has no keys yet");
     const keys = join(folder, "wall.key");
-    execFileSync(tool, ["keygen", "wall", "--out", keys]);
-    const tendond = await startTendond(test, "--keys", folder);
+    execFileSync(tool, ["keygen", "wall", "--out", keys], { stdio: "ignore" });
+    const scene = join(folder, "scene.toml");
+    writeFileSync(scene, `${readFileSync(kDemoScene, "utf8")}\n[network]\nkeys = "."\n`);
+    const tendond = await startTendond(test, { scene });
     if (!tendond) return;
 
     const push = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--key", keys, "--json");
@@ -92,8 +94,12 @@ describe("with a key", () => {
     guest(test, connect(inNode(`ws://${bridge.address}`), { name: "page", key }, { physics: wall }));
     await startNode(test, "examples/echo_motion", ...look).line(isPush);
 
-    const stranger = startNode(test, "examples/echo_motion", "--server", tendond.address);
+    const another = join(folder, "another.key.of_nobody");
+    execFileSync(tool, ["keygen", "another", "--out", another], { stdio: "ignore" });
+    const stranger = startNode(test, "examples/echo_motion", "--server", tendond.address, "--key", another);
     await stranger.line((line) => line.includes("no answer"));
+    const plain = startNode(test, "examples/echo_motion", "--server", tendond.address, "--duration-s", "3");
+    assert.equal(await plain.end(), 1);
   });
 });
 
@@ -105,7 +111,7 @@ describe("a guest", () => {
     await until("open", () => here.phase === "open" && here.stats().states > 0);
     await first.program.end("SIGKILL");
     await until("lost", () => here.phase !== "open");
-    await startTendond(test, "--listen", first.address);
+    await startTendond(test, { listen: first.address });
     await until("open again", () => here.phase === "open" && here.stats().sessions === 2);
   });
 
@@ -188,12 +194,39 @@ describe("the programs", () => {
 });
 
 describe("what is published", () => {
-  it("imports by the package's names, and its index knows nothing of Node", () => {
-    const sources = ["index", "connect", "force_client", "websocket", "session", "handshake", "seal", "noise", "codec",
-      "datagram", "key_file", "messages", "replay_window", "requests", "round_trip", "time", "limits"];
-    for (const name of sources) {
-      const text = readFileSync(new URL(`../../../clients/typescript/src/${name}.js`, import.meta.url), "utf8");
-      assert.doesNotMatch(text, /from "(node:|ws")/, name);
+  const client = join(kRoot, "clients/typescript");
+
+  it("has an index that knows nothing of Node", () => {
+    const seen = new Set<string>();
+    const check = (file: string): void => {
+      if (seen.has(file)) return;
+      seen.add(file);
+      const text = readFileSync(join(client, "dist", file), "utf8");
+      assert.doesNotMatch(text, /from "(node:|ws")/, file);
+      for (const [, next] of text.matchAll(/from "\.\/(.*?)"/g)) check(next!.replace(/^\.\//, ""));
+    };
+    check("index.js");
+    assert.ok(seen.size > 10);
+  });
+
+  it("has an example in its README that compiles, word for word", () => {
+    const [, example] = /```ts\n([\s\S]*?)```/.exec(readFileSync(join(client, "README.md"), "utf8"))!;
+    const file = join(client, "build/readme_example.ts");
+    writeFileSync(file, example!);
+    const options = ["--noEmit", "--strict", "--skipLibCheck", "--target", "es2022", "--module", "nodenext", "--types", "node"];
+    execFileSync(process.execPath, [join(client, "node_modules/typescript/bin/tsc"), ...options, file], { stdio: "inherit" });
+  });
+
+  it("is what a stranger needs, and names no registry", () => {
+    const lock = readFileSync(join(client, "package-lock.json"), "utf8");
+    assert.doesNotMatch(lock, /"resolved"|https?:\/\/[^"]*registry/);
+    const { name, exports, bin, scripts, files } = JSON.parse(readFileSync(join(client, "package.json"), "utf8"));
+    assert.equal(name, "tendon-client");
+    assert.ok(!("install" in scripts || "postinstall" in scripts || "preinstall" in scripts));
+    assert.deepEqual(files, ["dist", "src"]);
+    for (const { types, default: code } of Object.values<{ types: string; default: string }>(exports)) {
+      assert.ok(existsSync(join(client, types)) && existsSync(join(client, code)), code);
     }
+    assert.match(readFileSync(join(client, bin["tendon-bridge"]), "utf8"), /^#!\/usr\/bin\/env node\n/);
   });
 });

@@ -51,19 +51,23 @@ export class Program {
   }
 }
 
-/** tendond with the demo's scene, on a port of its own; undefined, and the test is skipped, without the programs. */
+/** The path of tendond; the empty text, and the test is skipped, where there is none. */
+export function findTendond(test: TestContext): string {
+  const programs = process.env["TENDON_PROGRAMS"];
+  if (!programs) test.skip("set TENDON_PROGRAMS to the folder that holds tendond");
+  return programs ? join(programs, "tendond") : "";
+}
+
+export const kDemoScene = join(kRoot, "deploy/scenes/demo.toml");
+
+/** tendond on a port of its own; undefined, and the test is skipped, where there is none. */
 export async function startTendond(
   test: TestContext,
-  ...args: string[]
+  { listen = "127.0.0.1:0", scene = kDemoScene } = {},
 ): Promise<{ readonly program: Program; readonly address: string } | undefined> {
-  const programs = process.env["TENDON_PROGRAMS"];
-  if (!programs) {
-    test.skip("set TENDON_PROGRAMS to the folder that holds tendond");
-    return undefined;
-  }
-  const listen = args.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"];
-  const scene = join(kRoot, "deploy/scenes/demo.toml");
-  const program = new Program(test, join(programs, "tendond"), [scene, ...listen, "--record", "/dev/null", "--json", ...args]);
+  const tendond = findTendond(test);
+  if (!tendond) return undefined;
+  const program = new Program(test, tendond, [scene, "--listen", listen, "--record", "/dev/null", "--json"]);
   const said = await program.line((line) => line.includes('"listening"'));
   return { program, address: JSON.parse(said).address };
 }
