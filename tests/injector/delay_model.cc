@@ -135,7 +135,7 @@ const std::vector<std::int64_t>& power_table() {
     std::vector<std::int64_t> table;
     for (int i = 0; i <= 1024; ++i) {
       const double power = exact::exp(-i / 1024.0 * 0.69314718055994530942);
-      table.push_back(static_cast<std::int64_t>(power * kOneRho + 0.5));
+      table.push_back(exact::round(power * kOneRho));
     }
     return table;
   }();
@@ -161,7 +161,7 @@ Copula::Copula(double rho, Duration memory) {
   if (memory > Duration::zero()) {
     per_ns_ = static_cast<std::uint64_t>(1.44269504088896340736 / ns(memory) * 0x1p64);
   } else {
-    set_rho(static_cast<std::int64_t>(rho * kOneRho + 0.5));
+    set_rho(exact::round(rho * kOneRho));
   }
 }
 

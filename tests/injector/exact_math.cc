@@ -106,6 +106,12 @@ Shares gamma_shares(double a, double x, double log_gamma_a) noexcept {
 
 }  // namespace
 
+std::int64_t round(double x) noexcept {
+  const auto whole = static_cast<std::int64_t>(x);
+  const double rest = x - static_cast<double>(whole);
+  return whole + (rest >= 0.5 ? 1 : rest <= -0.5 ? -1 : 0);
+}
+
 // ln(2ᵏm) = k ln 2 + 2 artanh(s), s = (m − 1)/(m + 1), m in √½…√2, so |s| ≤ 0.1716.
 double log(double x) noexcept {
   const auto bits = std::bit_cast<std::uint64_t>(x);
@@ -126,8 +132,7 @@ double log(double x) noexcept {
 
 // eˣ = 2ᵏ eʳ, |r| ≤ ½ ln 2.
 double exp(double x) noexcept {
-  const double scaled = x / std::numbers::ln2;
-  const auto k = static_cast<std::int64_t>(scaled + (scaled < 0 ? -0.5 : 0.5));
+  const std::int64_t k = round(x / std::numbers::ln2);
   const auto exponent = static_cast<double>(k);
   const double r = (x - exponent * kLn2High) - exponent * kLn2Low;
   double sum = 1;

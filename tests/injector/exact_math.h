@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 /// Functions of doubles that give the same bits with every compiler and C library. libm may differ in the last bit from
 /// one version to the next; these use only + − · ÷ and √, which IEEE 754 rounds correctly, in a fixed order. Compile
 /// with -ffp-contract=off: a fused multiply-add would round once less.
@@ -8,6 +10,9 @@
 /// They are for building tables, not for decisions. Errors are a few 1e-16 relative, unless stated. Arguments outside
 /// the stated range are a mistake of the caller.
 namespace tendon::injector::exact {
+
+/// The nearest whole number, halves away from zero; |x| below 2⁶².
+std::int64_t round(double x) noexcept;
 
 /// Natural logarithm; x above zero, normal and finite.
 double log(double x) noexcept;

@@ -11,6 +11,14 @@
 namespace tendon::injector::exact {
 namespace {
 
+TEST(ExactMath, RoundsToTheNearestWholeNumberEvenWhereAddingAHalfWouldNot) {
+  EXPECT_EQ(round(0.49999999999999994), 0);
+  EXPECT_EQ(round(0.5), 1);
+  EXPECT_EQ(round(-0.5), -1);
+  EXPECT_EQ(round(-2.4), -2);
+  EXPECT_EQ(round(4503599627370497.0), 4503599627370497);
+}
+
 TEST(ExactMath, LogarithmAndExponentialAgreeWithLibmInAllButTheLastBits) {
   for (double x = 1e-300; x < 1e300; x *= 1.37) {
     EXPECT_NEAR(log(x), std::log(x), 4e-16 * std::max(1.0, std::abs(std::log(x)))) << x;

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "tests/injector/exact_math.h"
 #include "tests/injector/units.h"
 
 namespace tendon::injector {
@@ -518,7 +519,7 @@ std::uint64_t rate(std::string_view text) {
     if (!text.ends_with(unit)) continue;
     const auto value = parse_number(text.substr(0, text.size() - unit.size()));
     if (value && *value * factor >= 1 && *value * factor <= static_cast<double>(kMaxRate)) {
-      return static_cast<std::uint64_t>(*value * factor + 0.5);
+      return static_cast<std::uint64_t>(exact::round(*value * factor));
     }
     break;
   }

@@ -5,6 +5,7 @@
 #include <bit>
 #include <iterator>
 
+#include "tests/injector/exact_math.h"
 #include "tests/injector/wide.h"
 
 namespace tendon::injector {
@@ -73,7 +74,7 @@ QuantileTable tabulate(const std::function<double(double p, double q)>& quantile
     const double x = quantile(p, q);
     if (!(x > static_cast<double>(least))) return least;
     if (x >= static_cast<double>(most)) return most;
-    return static_cast<std::int64_t>(x + (x < 0 ? -0.5 : 0.5));
+    return exact::round(x);
   };
   std::vector<double> tail;  // rising
   for (int octave = kTailTo; octave > kTailFrom; --octave) {

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <system_error>
 
+#include "tests/injector/exact_math.h"
+
 namespace tendon::injector {
 namespace {
 
@@ -32,7 +34,7 @@ std::optional<Duration> to_duration(double value, double unit_ns) {
   const double ns = value * unit_ns;
   // Beyond a day it would not be a delay, and beyond 2⁶³ ns not an integer.
   if (std::abs(ns) > 86'400e9) return std::nullopt;
-  return Duration(static_cast<std::int64_t>(ns + (ns < 0 ? -0.5 : 0.5)));
+  return Duration(exact::round(ns));
 }
 
 std::optional<Duration> parse_duration(std::string_view text) {
