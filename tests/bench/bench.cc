@@ -4,6 +4,7 @@
 // loop, a bare square root, a copy of the same size. Ratios travel from machine to machine; nanoseconds
 // do not.
 #include <benchmark/benchmark.h>
+#include <sodium.h>
 
 #include <array>
 #include <cmath>
@@ -15,6 +16,8 @@
 #include "core/estimation/velocity_estimator.h"
 #include "core/haptic_controller.h"
 #include "protocol/codec.h"
+#include "protocol/noise.h"
+#include "protocol/seal.h"
 
 namespace tendon {
 namespace {
@@ -151,7 +154,7 @@ void encode(benchmark::State& state, const Message& message) {
   std::array<std::byte, kMaxDatagram> buffer;
   std::uint64_t number = 0;
   for (auto _ : state) {
-    writer.begin(buffer, 7, ++number, LocalTime(std::chrono::seconds(7)), kEcho);
+    writer.begin(buffer, {.connection_id = 7, .packet_number = ++number}, LocalTime(std::chrono::seconds(7)), kEcho);
     writer.add(message);
     benchmark::DoNotOptimize(buffer.data());
     benchmark::ClobberMemory();
@@ -163,7 +166,7 @@ template <class Message>
 std::size_t encoded_size(const Message& message) {
   DataWriter writer;
   std::array<std::byte, kMaxDatagram> buffer;
-  writer.begin(buffer, 7, 1, LocalTime(std::chrono::seconds(7)), kEcho);
+  writer.begin(buffer, {.connection_id = 7, .packet_number = 1}, LocalTime(std::chrono::seconds(7)), kEcho);
   writer.add(message);
   return writer.size();
 }
@@ -173,7 +176,7 @@ void decode(benchmark::State& state, const Message& message) {
   DataWriter writer;
   DataReader reader;
   std::array<std::byte, kMaxDatagram> buffer;
-  writer.begin(buffer, 7, 1, LocalTime(std::chrono::seconds(7)), kEcho);
+  writer.begin(buffer, {.connection_id = 7, .packet_number = 1}, LocalTime(std::chrono::seconds(7)), kEcho);
   writer.add(message);
   const auto datagram = std::span<const std::byte>(buffer).first(writer.size());
   for (auto _ : state) {
@@ -187,6 +190,84 @@ void decode(benchmark::State& state, const Message& message) {
   }
 }
 
+/// libsodium's bare call over as many bytes as follow the header: what sealing cannot be cheaper than.
+void floor_aead(benchmark::State& state) {
+  std::array<unsigned char, kMaxDatagram> buffer{};
+  std::array<unsigned char, crypto_aead_chacha20poly1305_IETF_KEYBYTES> key{};
+  std::array<unsigned char, crypto_aead_chacha20poly1305_IETF_NPUBBYTES> nonce{};
+  const auto size = static_cast<unsigned long long>(state.range(0)) - kHeaderSize;
+  const bool opens = state.range(1) != 0;
+  std::array<unsigned char, kMaxDatagram> sealed{};
+  crypto_aead_chacha20poly1305_ietf_encrypt(sealed.data(), nullptr, buffer.data(), size, buffer.data(), kHeaderSize,
+                                            nullptr, nonce.data(), key.data());
+  for (auto _ : state) {
+    if (opens) {
+      benchmark::DoNotOptimize(crypto_aead_chacha20poly1305_ietf_decrypt(buffer.data(), nullptr, nullptr, sealed.data(),
+                                                                         size + crypto::kTagSize, buffer.data() + 1184,
+                                                                         kHeaderSize, nonce.data(), key.data()));
+    } else {
+      crypto_aead_chacha20poly1305_ietf_encrypt(buffer.data(), nullptr, buffer.data(), size, buffer.data() + 1184,
+                                                kHeaderSize, nullptr, nonce.data(), key.data());
+    }
+    benchmark::DoNotOptimize(buffer.data());
+    benchmark::ClobberMemory();
+  }
+}
+
+/// A datagram of `size` bytes in the clear, under the first key.
+void seal(benchmark::State& state, std::size_t size) {
+  const LocalTime now(std::chrono::seconds(7));
+  Sealer sealer(Key{}, {}, now);
+  std::array<std::byte, kMaxDatagram> buffer{};
+  Header header{.suite = Suite::kNoise, .connection_id = 7};
+  for (auto _ : state) {
+    header.epoch = sealer.next_epoch(now);
+    ++header.packet_number;
+    benchmark::DoNotOptimize(sealer.seal(header, buffer, size));
+    benchmark::ClobberMemory();
+  }
+}
+
+void open(benchmark::State& state, std::size_t size) {
+  const LocalTime now(std::chrono::seconds(7));
+  Sealer sealer(Key{}, {}, now);
+  Opener opener(Key{}, {});
+  std::array<std::byte, kMaxDatagram> buffer{};
+  std::array<std::byte, kMaxDatagram> body{};
+  const Header header{.suite = Suite::kNoise, .connection_id = 7};
+  const auto datagram = std::span<const std::byte>(buffer).first(sealer.seal(header, buffer, size));
+  for (auto _ : state) {
+    if (opener.open(now, header, datagram, body) != Opener::Verdict::kOpened) {
+      state.SkipWithError("the datagram did not open");
+      break;
+    }
+    benchmark::DoNotOptimize(body.data());
+    benchmark::ClobberMemory();
+  }
+}
+
+/// What a Hello with a good cookie costs the server, up to the Answer.
+void answer_a_handshake(benchmark::State& state) {
+  const Key psk = Ratchet(1).next();
+  Ratchet secrets(2);
+  const NoiseInitiator client(psk, secrets.next(), {},
+                              write_body(Hello{.role = Role::kController, .name = "bench", .features = {}}));
+  const auto welcome = write_body(Answer(Welcome{}));
+  for (auto _ : state) {
+    const auto hello = NoiseResponder::read(psk, {}, client.message());
+    benchmark::DoNotOptimize(hello->reply(secrets.next(), welcome));
+  }
+}
+
+void register_security(std::size_t size) {
+  const auto bytes = static_cast<std::int64_t>(size);
+  benchmark::RegisterBenchmark("floor/libsodium seals a state datagram", floor_aead)->Args({bytes, 0});
+  benchmark::RegisterBenchmark("seal a state datagram", [size](benchmark::State& state) { seal(state, size); });
+  benchmark::RegisterBenchmark("floor/libsodium opens a state datagram", floor_aead)->Args({bytes, 1});
+  benchmark::RegisterBenchmark("open a state datagram", [size](benchmark::State& state) { open(state, size); });
+  benchmark::RegisterBenchmark("read a Noise Hello and write the Answer", answer_a_handshake);
+}
+
 void register_datagrams() {
   const DeviceState device_state = some_state();
   const ForceCommand force = some_force();
@@ -196,6 +277,7 @@ void register_datagrams() {
                                [device_state](benchmark::State& state) { encode(state, device_state); });
   benchmark::RegisterBenchmark("decode a state datagram",
                                [device_state](benchmark::State& state) { decode(state, device_state); });
+  register_security(encoded_size(device_state));
   benchmark::RegisterBenchmark("floor/memcpy of a force datagram", floor_copy)
       ->Arg(static_cast<std::int64_t>(encoded_size(force)));
   benchmark::RegisterBenchmark("encode a force datagram", [force](benchmark::State& state) { encode(state, force); });
