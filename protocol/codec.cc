@@ -35,10 +35,11 @@ Unsigned get_le(const std::byte* from) noexcept {
   return value;
 }
 
-void encode_header(const Header& header, std::byte* to) noexcept {
+void put_header(const Header& header, std::byte* to) noexcept {
   to[0] = kMagic;
   to[1] = static_cast<std::byte>(kProtocolVersion << 4 | static_cast<std::uint32_t>(header.type));
-  to[2] = to[3] = std::byte{0};
+  to[2] = static_cast<std::byte>(header.epoch);
+  to[3] = static_cast<std::byte>(header.suite);
   put_le(header.connection_id, to + 4);
   put_le(header.packet_number, to + 8);
 }
@@ -113,7 +114,7 @@ bool read_enum(int from, Enum last, Enum& to) noexcept {
 }
 bool read(pb::Mode from, Mode& to) noexcept { return read_enum(from, Mode::kFault, to); }
 bool read(pb::Role from, Role& to) noexcept { return read_enum(from, Role::kController, to); }
-bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kTimedOut, to); }
+bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kReplaced, to); }
 
 bool read(const std::string& from, std::size_t limit, std::string& to) {
   if (from.size() > limit) return false;
@@ -355,6 +356,13 @@ bool parse(std::span<const std::byte> from, Message& to) {
   return to.ParseFromArray(from.data(), static_cast<int>(from.size()));
 }
 
+template <class Message>
+std::vector<std::byte> serialized(const Message& message) {
+  std::vector<std::byte> out(message.ByteSizeLong());
+  message.SerializeWithCachedSizesToArray(bytes(out.data()));
+  return out;
+}
+
 // Bytes of the handshake datagrams, after the header.
 constexpr std::size_t kRandomAt = kHeaderSize;
 constexpr std::size_t kCookieAt = kRandomAt + sizeof(ClientRandom);
@@ -383,14 +391,27 @@ std::optional<Header> handshake_header(std::span<const std::byte> datagram, Data
 
 }  // namespace
 
+std::array<std::byte, kHeaderSize> encode_header(const Header& header) noexcept {
+  std::array<std::byte, kHeaderSize> bytes;
+  put_header(header, bytes.data());
+  return bytes;
+}
+
 std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcept {
   if (datagram.size() < kHeaderSize || datagram.size() > kMaxDatagram) return {};
   const auto version = std::to_integer<std::uint32_t>(datagram[1] >> 4);
   const auto type = std::to_integer<std::uint8_t>(datagram[1] & std::byte{0x0F});
   if (datagram[0] != kMagic || version != kProtocolVersion) return {};
   if (type < 1 || type > static_cast<std::uint8_t>(DatagramType::kAnswer)) return {};
-  if (datagram[2] != std::byte{0} || datagram[3] != std::byte{0}) return {};
+  const auto epoch = std::to_integer<std::uint8_t>(datagram[2]);
+  const auto suite = std::to_integer<std::uint8_t>(datagram[3]);
+  if (suite > static_cast<std::uint8_t>(Suite::kNoise)) return {};
+  const bool renews_keys =
+      suite != static_cast<std::uint8_t>(Suite::kPlain) && type == static_cast<std::uint8_t>(DatagramType::kData);
+  if (epoch != 0 && !renews_keys) return {};
   return Header{.type = static_cast<DatagramType>(type),
+                .suite = static_cast<Suite>(suite),
+                .epoch = epoch,
                 .connection_id = get_le<std::uint32_t>(datagram.data() + 4),
                 .packet_number = get_le<std::uint64_t>(datagram.data() + 8)};
 }
@@ -417,16 +438,16 @@ DataWriter& DataWriter::operator=(DataWriter&&) noexcept = default;
 template <class Piece>
 bool DataWriter::append(const Piece& piece) {
   const std::size_t size = piece.ByteSizeLong();
-  if (size > kMaxDatagram - size_) return false;
-  piece.SerializeWithCachedSizesToArray(bytes(buffer_ + size_));
+  if (size > buffer_.size() - size_) return false;
+  piece.SerializeWithCachedSizesToArray(bytes(buffer_.data() + size_));
   size_ += size;
   return true;
 }
 
-void DataWriter::begin(std::span<std::byte, kMaxDatagram> buffer, std::uint32_t connection_id,
-                       std::uint64_t packet_number, LocalTime sent, const std::optional<OutgoingEcho>& echo) {
-  buffer_ = buffer.data();
-  encode_header({.type = DatagramType::kData, .connection_id = connection_id, .packet_number = packet_number}, buffer_);
+void DataWriter::begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
+                       const std::optional<OutgoingEcho>& echo) {
+  buffer_ = buffer;
+  put_header(header, buffer_.data());
   size_ = kHeaderSize;
 
   pb::Datagram& head = pieces_->head;
@@ -520,72 +541,90 @@ const DataContent* DataReader::read(std::span<const std::byte> body) {
 // ---- Handshake ----
 
 std::size_t encode(const HelloDatagram& hello, std::span<std::byte, kMaxDatagram> buffer) {
-  pb::Hello message;
-  write(hello.hello, message);
-  const std::size_t size = message.ByteSizeLong();
-
   std::byte* const to = buffer.data();
-  encode_header({.type = DatagramType::kHello}, to);
+  put_header({.type = DatagramType::kHello, .suite = hello.suite}, to);
   put16(hello.random, to + kRandomAt);
   put16(hello.cookie, to + kCookieAt);
-  put_le(static_cast<std::uint16_t>(size), to + kHelloLengthAt);
-  message.SerializeWithCachedSizesToArray(bytes(to + kHelloAt));
-  std::fill(to + kHelloAt + size, to + kMaxDatagram, std::byte{0});
+  put_le(static_cast<std::uint16_t>(hello.body.size()), to + kHelloLengthAt);
+  std::byte* const end = std::copy(hello.body.begin(), hello.body.end(), to + kHelloAt);
+  std::fill(end, to + kMaxDatagram, std::byte{0});
   return kMaxDatagram;
 }
 
 std::size_t encode(const RetryDatagram& retry, std::span<std::byte, kMaxDatagram> buffer) {
   std::byte* const to = buffer.data();
-  encode_header({.type = DatagramType::kRetry}, to);
+  put_header({.type = DatagramType::kRetry, .suite = retry.suite}, to);
   put16(retry.random, to + kRandomAt);
   put16(retry.cookie, to + kCookieAt);
   return kRetrySize;
 }
 
 std::size_t encode(const AnswerDatagram& answer, std::span<std::byte, kMaxDatagram> buffer) {
-  pb::Answer message;
-  std::visit([&](const auto& body) { write_answer(body, message); }, answer.answer);
-  const std::size_t size = message.ByteSizeLong();
-
   std::byte* const to = buffer.data();
-  encode_header({.type = DatagramType::kAnswer, .connection_id = answer.connection_id}, to);
+  put_header({.type = DatagramType::kAnswer, .suite = answer.suite, .connection_id = answer.connection_id}, to);
   put16(answer.random, to + kRandomAt);
-  message.SerializeWithCachedSizesToArray(bytes(to + kAnswerAt));
-  return kAnswerAt + size;
+  std::copy(answer.body.begin(), answer.body.end(), to + kAnswerAt);
+  return kAnswerAt + answer.body.size();
 }
 
-std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram) {
-  if (datagram.size() != kMaxDatagram || !handshake_header(datagram, DatagramType::kHello)) return {};
+std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram) noexcept {
+  const std::optional<Header> header = handshake_header(datagram, DatagramType::kHello);
+  if (!header || datagram.size() != kMaxDatagram) return {};
   const std::size_t size = get_le<std::uint16_t>(datagram.data() + kHelloLengthAt);
-  if (size > kMaxDatagram - kHelloAt) return {};
+  if (size > kMaxHandshakeBody) return {};
   const auto padding = datagram.subspan(kHelloAt + size);
   if (std::any_of(padding.begin(), padding.end(), [](std::byte b) { return b != std::byte{0}; })) return {};
+  return HelloDatagram{.suite = header->suite,
+                       .random = get16(datagram, kRandomAt),
+                       .cookie = get16(datagram, kCookieAt),
+                       .body = datagram.subspan(kHelloAt, size)};
+}
 
+std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram) noexcept {
+  const std::optional<Header> header = handshake_header(datagram, DatagramType::kRetry);
+  if (!header || datagram.size() != kRetrySize) return {};
+  return RetryDatagram{
+      .suite = header->suite, .random = get16(datagram, kRandomAt), .cookie = get16(datagram, kCookieAt)};
+}
+
+std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram) noexcept {
+  const std::optional<Header> header = handshake_header(datagram, DatagramType::kAnswer);
+  if (!header || datagram.size() < kAnswerAt) return {};
+  return AnswerDatagram{.suite = header->suite,
+                        .connection_id = header->connection_id,
+                        .random = get16(datagram, kRandomAt),
+                        .body = datagram.subspan(kAnswerAt)};
+}
+
+std::vector<std::byte> write_body(const Hello& hello) {
   pb::Hello message;
-  HelloDatagram hello{.random = get16(datagram, kRandomAt), .cookie = get16(datagram, kCookieAt), .hello = {}};
-  if (!parse(datagram.subspan(kHelloAt, size), message) || !read(message, hello.hello)) return {};
+  write(hello, message);
+  return serialized(message);
+}
+
+std::vector<std::byte> write_body(const Answer& answer) {
+  pb::Answer message;
+  std::visit([&](const auto& body) { write_answer(body, message); }, answer);
+  return serialized(message);
+}
+
+std::optional<Hello> read_hello(std::span<const std::byte> body) {
+  pb::Hello message;
+  Hello hello;
+  if (!parse(body, message) || !read(message, hello)) return {};
   return hello;
 }
 
-std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram) {
-  if (datagram.size() != kRetrySize || !handshake_header(datagram, DatagramType::kRetry)) return {};
-  return RetryDatagram{.random = get16(datagram, kRandomAt), .cookie = get16(datagram, kCookieAt)};
-}
-
-std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram) {
-  const std::optional<Header> header = handshake_header(datagram, DatagramType::kAnswer);
-  if (!header || datagram.size() < kAnswerAt) return {};
-
+std::optional<Answer> read_answer(std::span<const std::byte> body) {
   pb::Answer message;
-  if (!parse(datagram.subspan(kAnswerAt), message)) return {};
-  AnswerDatagram answer{
-      .connection_id = header->connection_id, .random = get16(datagram, kRandomAt), .answer = Welcome{}};
+  if (!parse(body, message)) return {};
+  Answer answer;
   switch (message.body_case()) {
     case pb::Answer::kWelcome:
-      if (!read(message.welcome(), std::get<Welcome>(answer.answer))) return {};
+      if (!read(message.welcome(), std::get<Welcome>(answer))) return {};
       return answer;
     case pb::Answer::kRefused:
-      if (!read(message.refused(), answer.answer.emplace<Refused>())) return {};
+      if (!read(message.refused(), answer.emplace<Refused>())) return {};
       return answer;
     case pb::Answer::BODY_NOT_SET:
       return {};

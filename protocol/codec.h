@@ -31,20 +31,30 @@ enum class DatagramType : std::uint8_t {
   kAnswer = 4,  ///< server → client: Welcome or Refused
 };
 
-/// The 16 bytes in the clear at the front of every datagram; they become the AEAD's associated data.
+/// How a conversation is protected, from the fourth byte. Chosen by the client in its first Hello.
+enum class Suite : std::uint8_t {
+  kPlain = 0,  ///< not at all: loopback only
+  kNoise = 1,  ///< Noise_NNpsk0_25519_ChaChaPoly_SHA256
+};
+
+/// The 16 bytes in the clear at the front of every datagram; suite 1 authenticates them.
 ///
-///     [0] 0x54 'T' · [1] version << 4 | type · [2] key epoch, 0 · [3] 0
+///     [0] 0x54 'T' · [1] version << 4 | type · [2] key epoch · [3] cipher suite
 ///     [4..8) connection id, LE · [8..16) packet number, LE
 struct Header {
   DatagramType type = DatagramType::kData;
+  Suite suite = Suite::kPlain;
+  std::uint8_t epoch = 0;           ///< how often the sender has renewed its key, modulo 256; Data of suite 1 only
   std::uint32_t connection_id = 0;  ///< 0 before the server has given one
   std::uint64_t packet_number = 0;  ///< 0, 1, 2 … per direction in Data, 0 in all others
   bool operator==(const Header&) const = default;
 };
 inline constexpr std::size_t kHeaderSize = 16;
 
-/// Empty when the datagram is too short, too long, of another protocol, version or unknown type, or has
-/// a byte set that must be 0.
+std::array<std::byte, kHeaderSize> encode_header(const Header& header) noexcept;
+
+/// Empty when the datagram is too short, too long, of another protocol or version, of an unknown type or
+/// suite, or has a byte set that must be 0.
 std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcept;
 
 // ---- Data ----------------------------------------------------------------------------------------
@@ -76,8 +86,8 @@ struct Bye {
 };
 using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye>;
 
-/// Writes one Data datagram after the other. Keeps its protobuf objects: after the first of its kind, a
-/// state or a force costs no heap call (a request, or a long text, does).
+/// Writes one Data datagram after the other, in the clear. Keeps its protobuf objects: after the first of
+/// its kind, a state or a force costs no heap call (a request, or a long text, does).
 ///
 /// Use: `begin`, `add` until it is false or nothing is left, then send `size()` bytes.
 ///
@@ -89,12 +99,12 @@ class DataWriter {
   DataWriter(DataWriter&&) noexcept;
   DataWriter& operator=(DataWriter&&) noexcept;
 
-  /// `buffer` must live until the last `add`.
-  void begin(std::span<std::byte, kMaxDatagram> buffer, std::uint32_t connection_id, std::uint64_t packet_number,
-             LocalTime sent, const std::optional<OutgoingEcho>& echo);
+  /// `buffer` must live until the last `add`; what is written stays within it.
+  void begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
+             const std::optional<OutgoingEcho>& echo);
 
-  /// Appends one frame; false when it does not fit any more (then the datagram is as before). A datagram
-  /// without other frames holds any frame.
+  /// Appends one frame; false when it does not fit any more (then the datagram is as before). A buffer of
+  /// kMaxDatagram − 16 bytes or more, without other frames, holds any frame.
   bool add(const DeviceState& state);
   bool add(const ForceCommand& command);
   bool add(const Control& control);
@@ -109,7 +119,7 @@ class DataWriter {
   bool append(const Piece& piece);
 
   std::unique_ptr<Pieces> pieces_;
-  std::byte* buffer_ = nullptr;
+  std::span<std::byte> buffer_;
   std::size_t size_ = 0;
 };
 
@@ -147,30 +157,49 @@ using ClientRandom = std::array<std::byte, 16>;
 /// Chosen by the server; all zeros in the first Hello.
 using Cookie = std::array<std::byte, 16>;
 
+/// The three as they travel. `body` is in the clear what write_body() gives, in suite 1 that and what
+/// the handshake adds: it points into the datagram.
 struct HelloDatagram {
+  Suite suite = Suite::kPlain;
   ClientRandom random{};
   Cookie cookie{};
-  Hello hello;
+  std::span<const std::byte> body;
 };
 struct RetryDatagram {
+  Suite suite = Suite::kPlain;
   ClientRandom random{};
   Cookie cookie{};
 };
 struct AnswerDatagram {
+  Suite suite = Suite::kPlain;
   std::uint32_t connection_id = 0;  ///< 0 with Refused
   ClientRandom random{};
-  std::variant<Welcome, Refused> answer;
+  std::span<const std::byte> body;
 };
 
+/// The longest body: of the largest Hello, 674 bytes, and of the largest Welcome, 746, with what suite 1
+/// adds to them, 56. A reply is never longer than the Hello it answers.
+inline constexpr std::size_t kMaxHandshakeBody = 1000;
+
 /// Each returns the size of the datagram. A Hello always fills kMaxDatagram bytes, so that no reply to
-/// it is larger.
+/// it is larger. A body has at most kMaxHandshakeBody bytes.
 std::size_t encode(const HelloDatagram& hello, std::span<std::byte, kMaxDatagram> buffer);
 std::size_t encode(const RetryDatagram& retry, std::span<std::byte, kMaxDatagram> buffer);
 std::size_t encode(const AnswerDatagram& answer, std::span<std::byte, kMaxDatagram> buffer);
 
-/// Each is empty when the datagram is of another type, malformed, or holds a value out of bounds.
-std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram);
-std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram);
-std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram);
+/// Each is empty when the datagram is of another type or its layout is not that of the type; the body is
+/// not looked into.
+std::optional<HelloDatagram> decode_hello(std::span<const std::byte> datagram) noexcept;
+std::optional<RetryDatagram> decode_retry(std::span<const std::byte> datagram) noexcept;
+std::optional<AnswerDatagram> decode_answer(std::span<const std::byte> datagram) noexcept;
+
+using Answer = std::variant<Welcome, Refused>;
+
+std::vector<std::byte> write_body(const Hello& hello);
+std::vector<std::byte> write_body(const Answer& answer);
+
+/// Each is empty when the bytes are not that message, or hold a value out of bounds.
+std::optional<Hello> read_hello(std::span<const std::byte> body);
+std::optional<Answer> read_answer(std::span<const std::byte> body);
 
 }  // namespace tendon

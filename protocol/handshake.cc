@@ -1,68 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/handshake.h"
 
-#include <sodium.h>
-
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 #include <string_view>
+#include <utility>
 
 namespace tendon {
 namespace {
 
-/// A message to be authenticated, of at most 64 bytes, put together piece by piece.
-class Message {
- public:
-  Message& operator<<(std::string_view text) noexcept {
-    for (const char c : text) put(static_cast<unsigned char>(c));
-    return *this;
-  }
-  Message& operator<<(std::span<const std::uint8_t> raw) noexcept {
-    for (const std::uint8_t b : raw) put(b);
-    return *this;
-  }
-  Message& operator<<(std::span<const std::byte> raw) noexcept {
-    for (const std::byte b : raw) put(std::to_integer<unsigned char>(b));
-    return *this;
-  }
-  template <class Unsigned>
-  Message& little_endian(Unsigned value) noexcept {
-    for (std::size_t i = 0; i < sizeof(Unsigned); ++i) put(static_cast<unsigned char>(value >> (8 * i) & 0xFFU));
-    return *this;
-  }
+std::span<const std::byte> text(std::string_view text) noexcept { return std::as_bytes(std::span(text)); }
 
-  using Tag = std::array<unsigned char, crypto_auth_BYTES>;
-  Tag authenticate(const unsigned char* key) const noexcept {
-    Tag tag;
-    crypto_auth(tag.data(), bytes_.data(), size_, key);
-    return tag;
+template <class Unsigned>
+std::array<std::byte, sizeof(Unsigned)> little_endian(Unsigned value) noexcept {
+  std::array<std::byte, sizeof(Unsigned)> bytes;
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
+  return bytes;
+}
+
+template <std::size_t Size>
+std::array<std::byte, Size> first_of(const Bytes32& bytes) noexcept {
+  std::array<std::byte, Size> first;
+  std::copy_n(bytes.begin(), Size, first.begin());
+  return first;
+}
+
+/// What both ends know before the first message of Noise. The cookie is not in it: one attempt has one
+/// message 1, whatever cookies it collects; with another prologue the same ephemeral key would
+/// authenticate two messages with one nonce.
+std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
+  const auto header = encode_header({.type = DatagramType::kHello, .suite = Suite::kNoise});
+  std::vector<std::byte> out;
+  for (const std::span<const std::byte> piece : {text("tendon-1"), std::span<const std::byte>(header),
+                                                 std::span<const std::byte>(id), std::span<const std::byte>(random)}) {
+    out.insert(out.end(), piece.begin(), piece.end());
   }
-
- private:
-  void put(unsigned char b) noexcept { bytes_[size_++] = b; }
-
-  std::array<unsigned char, 64> bytes_{};
-  std::size_t size_ = 0;
-};
-static_assert(sizeof(Doorman::Config::secret) == crypto_auth_KEYBYTES && crypto_auth_BYTES == crypto_auth_KEYBYTES);
+  return out;
+}
 
 std::int64_t floor_divide(std::int64_t a, std::int64_t b) noexcept { return a / b - (a % b < 0 ? 1 : 0); }
-
-/// The highest version that both speak; 0 when there is none.
-std::uint32_t common_version(const Hello& hello, const Doorman::Config& config) noexcept {
-  const std::uint32_t highest = std::min(hello.version_max, config.version_max);
-  return highest >= std::max(hello.version_min, config.version_min) ? highest : 0;
-}
 
 }  // namespace
 
 // ---- ClientHandshake ----
 
-ClientHandshake::ClientHandshake(const Config& config, LocalTime now) : config_(config), next_tick_(now) {}
+ClientHandshake::ClientHandshake(const Config& config, LocalTime now)
+    : version_min_(config.hello.version_min),
+      version_max_(config.hello.version_max),
+      random_(config.random),
+      resend_(config.resend),
+      body_(write_body(config.hello)),
+      next_tick_(now) {
+  if (!config.secret) return;
+  crypto::start();
+  const KeyId id = key_id(config.secret->key);
+  noise_.emplace(config.secret->key, config.secret->ephemeral, prologue(id, random_), body_);
+  body_.assign(id.begin(), id.end());
+  body_.insert(body_.end(), noise_->message().begin(), noise_->message().end());
+}
 
 void ClientHandshake::receive(LocalTime now, std::span<const std::byte> datagram) {
   if (outcome_) return;
-  if (const auto retry = decode_retry(datagram); retry && retry->random == config_.random) {
+  const Suite suite = noise_ ? Suite::kNoise : Suite::kPlain;
+  if (const auto retry = decode_retry(datagram); retry && retry->suite == suite && retry->random == random_) {
     // Only the first cookie is worth an immediate Hello. Were every Retry, a server that dislikes our
     // cookies and we would play ping-pong.
     if (!cookie_) {
@@ -70,17 +71,32 @@ void ClientHandshake::receive(LocalTime now, std::span<const std::byte> datagram
       next_tick_ = now;
     }
     cookie_ = retry->cookie;
-  } else if (const auto answer = decode_answer(datagram); answer && answer->random == config_.random) {
-    if (const auto* refused = std::get_if<Refused>(&answer->answer)) {
-      outcome_ = *refused;
-    } else {
-      const Welcome& welcome = std::get<Welcome>(answer->answer);
-      if (welcome.version < config_.hello.version_min || welcome.version > config_.hello.version_max) return;
-      outcome_ = Accepted{.connection_id = answer->connection_id, .welcome = welcome};
-    }
-    due_ = false;
-    next_tick_ = LocalTime::max();
+  } else if (const auto answer = decode_answer(datagram);
+             answer && answer->suite == suite && answer->random == random_) {
+    settle(*answer);
   }
+}
+
+void ClientHandshake::settle(const AnswerDatagram& datagram) {
+  std::optional<NoiseInitiator::Answer> opened;
+  if (noise_) {
+    opened = noise_->read(datagram.body);
+    if (!opened) return;
+  }
+  auto answer = read_answer(opened ? std::span<const std::byte>(opened->payload) : datagram.body);
+  if (!answer) return;
+  if (auto* refused = std::get_if<Refused>(&*answer)) {
+    outcome_ = std::move(*refused);
+  } else {
+    auto& welcome = std::get<Welcome>(*answer);
+    if (welcome.version < version_min_ || welcome.version > version_max_) return;
+    Accepted accepted{.connection_id = datagram.connection_id, .welcome = std::move(welcome), .keys = {}};
+    if (opened) accepted.keys = {opened->split.initiator_to_responder, opened->split.responder_to_initiator};
+    outcome_ = std::move(accepted);
+  }
+  noise_.reset();  // the ephemeral key has done its work
+  due_ = false;
+  next_tick_ = LocalTime::max();
 }
 
 void ClientHandshake::tick(LocalTime now) {
@@ -90,66 +106,132 @@ void ClientHandshake::tick(LocalTime now) {
 std::size_t ClientHandshake::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   if (!due_) return 0;
   due_ = false;
-  next_tick_ = now + config_.resend;
-  return encode({.random = config_.random, .cookie = cookie_.value_or(Cookie{}), .hello = config_.hello}, buffer);
+  next_tick_ = now + resend_;
+  return encode({.suite = noise_ ? Suite::kNoise : Suite::kPlain,
+                 .random = random_,
+                 .cookie = cookie_.value_or(Cookie{}),
+                 .body = body_},
+                buffer);
 }
 
 // ---- Doorman ----
 
-Doorman::Doorman(const Config& config) : config_(config) {
+Doorman::Doorman(const Config& config)
+    : version_min_(config.version_min),
+      version_max_(config.version_max),
+      key_lifetime_(config.key_lifetime),
+      cookie_secret_(crypto::hmac_sha256(config.secret, {text("tendon-cookies")})),
+      ephemerals_(Seed(crypto::hmac_sha256(config.secret, {text("tendon-ephemerals")}))),
+      limit_(first_of<16>(crypto::hmac_sha256(config.secret, {text("tendon-hello-limit")}))) {
   if (config.key_lifetime <= Duration::zero()) throw std::invalid_argument("doorman: key_lifetime must be positive");
   if (config.version_min < 1 || config.version_min > config.version_max) {
     throw std::invalid_argument("doorman: version_min must be at least 1 and at most version_max");
   }
-  if (sodium_init() < 0) throw std::runtime_error("libsodium cannot be initialised");
+  crypto::start();
+  for (const ClientKey& key : config.keys) {
+    const auto [present, added] = keys_.emplace(key_id(key.key), key);
+    if (!added) {
+      throw std::invalid_argument("the clients \"" + present->second.name + "\" and \"" + key.name +
+                                  "\" have the same key: each needs one of its own");
+    }
+  }
 }
 
 Cookie Doorman::cookie(std::int64_t key_number, const Address& from, const ClientRandom& random) const noexcept {
-  const auto* secret = reinterpret_cast<const unsigned char*>(config_.secret.data());
-  Message key_message;
-  key_message << std::string_view("tendon-cookie-key");
-  const Message::Tag key = key_message.little_endian(static_cast<std::uint64_t>(key_number)).authenticate(secret);
-
-  Message message;
-  message << std::string_view("tendon-cookie") << std::span<const std::uint8_t>(from.ip);
-  message.little_endian(from.port) << std::span<const std::byte>(random);
-  const Message::Tag tag = message.authenticate(key.data());
-
-  Cookie cookie;
-  std::transform(tag.begin(), tag.begin() + cookie.size(), cookie.begin(), [](auto b) { return std::byte{b}; });
-  return cookie;
+  const Key key(crypto::hmac_sha256(
+      cookie_secret_.bytes(), {text("tendon-cookie-key"), little_endian(static_cast<std::uint64_t>(key_number))}));
+  return first_of<sizeof(Cookie)>(crypto::hmac_sha256(
+      key.bytes(), {text("tendon-cookie"), std::as_bytes(std::span(from.ip)), little_endian(from.port), random}));
 }
 
 Doorman::Reply Doorman::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                                 std::span<std::byte, kMaxDatagram> answer) {
   const auto hello = decode_hello(datagram);
   if (!hello) {
-    ++malformed_;
+    ++stats_.malformed;
     return {};
   }
-  const std::int64_t key_number = floor_divide(now.time_since_epoch().count(), config_.key_lifetime.count());
-  const Cookie fresh = cookie(key_number, from, hello->random);
-  const Cookie previous = cookie(key_number - 1, from, hello->random);
-  // In constant time: how much of a guess was right must not show.
-  const auto is = [&](const Cookie& good) {
-    return sodium_memcmp(good.data(), hello->cookie.data(), good.size()) == 0;
-  };
-  if (!is(fresh) && !is(previous)) {
-    return {.size = encode(RetryDatagram{.random = hello->random, .cookie = fresh}, answer), .guest = {}};
+  if (hello->suite == Suite::kPlain && !is_loopback(from)) {
+    ++stats_.plain;
+    return {};
   }
+  const std::int64_t key_number = floor_divide(now.time_since_epoch().count(), key_lifetime_.count());
+  const Cookie fresh = cookie(key_number, from, hello->random);
+  if (!crypto::equal(fresh, hello->cookie) &&
+      !crypto::equal(cookie(key_number - 1, from, hello->random), hello->cookie)) {
+    ++stats_.retries;
+    const RetryDatagram retry{.suite = hello->suite, .random = hello->random, .cookie = fresh};
+    return {.size = encode(retry, answer), .guest = {}};
+  }
+  if (!limit_.admit(now, from)) {
+    ++stats_.limited;
+    return {};
+  }
+  Reply reply{.size = 0, .guest = Guest{.hello = {}, .random = hello->random, .version = 0, .key = {}, .noise = {}}};
+  if (!read(*hello, *reply.guest)) reply.guest.reset();
+  return reply;
+}
+
+bool Doorman::read(const HelloDatagram& datagram, Guest& guest) {
+  std::span<const std::byte> body = datagram.body;
+  if (datagram.suite == Suite::kNoise) {
+    KeyId id;
+    if (body.size() < id.size() + kNoiseOverhead) {
+      ++stats_.malformed;
+      return false;
+    }
+    std::copy_n(body.begin(), id.size(), id.begin());
+    const auto found = keys_.find(id);
+    if (found == keys_.end()) {
+      ++stats_.unknown_key;
+      return false;
+    }
+    guest.key = &found->second;
+    guest.noise = NoiseResponder::read(guest.key->key, prologue(id, guest.random), body.subspan(id.size()));
+    if (!guest.noise) {
+      ++stats_.forged;
+      return false;
+    }
+    body = guest.noise->payload();
+  }
+  auto hello = read_hello(body);
+  if (!hello) {
+    ++stats_.malformed;
+    return false;
+  }
+  guest.hello = std::move(*hello);
+  const std::uint32_t highest = std::min(guest.hello.version_max, version_max_);
+  guest.version = highest >= std::max(guest.hello.version_min, version_min_) ? highest : 0;
+  return true;
+}
+
+Doorman::Answered Doorman::answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
+                                  std::span<std::byte, kMaxDatagram> buffer) {
+  std::vector<std::byte> bytes = write_body(body);
+  AnswerDatagram datagram{.suite = guest.noise ? Suite::kNoise : Suite::kPlain,
+                          .connection_id = connection_id,
+                          .random = guest.random,
+                          .body = bytes};
+  if (!guest.noise) return {.size = encode(datagram, buffer), .keys = {}};
+  const auto reply = guest.noise->reply(ephemerals_.next(), bytes);
+  if (!reply) {
+    ++stats_.forged;
+    return {};
+  }
+  datagram.body = reply->message;
   return {
-      .size = 0,
-      .guest = Guest{.hello = hello->hello, .random = hello->random, .version = common_version(hello->hello, config_)}};
+      .size = encode(datagram, buffer),
+      .keys = SessionKeys{.send = reply->split.responder_to_initiator, .receive = reply->split.initiator_to_responder}};
 }
 
-std::size_t Doorman::welcome(std::uint32_t connection_id, const ClientRandom& random, const Welcome& welcome,
-                             std::span<std::byte, kMaxDatagram> buffer) {
-  return encode(AnswerDatagram{.connection_id = connection_id, .random = random, .answer = welcome}, buffer);
+Doorman::Answered Doorman::welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
+                                   std::span<std::byte, kMaxDatagram> buffer) {
+  return answer(guest, connection_id, welcome, buffer);
 }
 
-std::size_t Doorman::refuse(const ClientRandom& random, const Refused& refused,
-                            std::span<std::byte, kMaxDatagram> buffer) {
-  return encode(AnswerDatagram{.connection_id = 0, .random = random, .answer = refused}, buffer);
+Doorman::Answered Doorman::refuse(const Guest& guest, const Refused& refused,
+                                  std::span<std::byte, kMaxDatagram> buffer) {
+  return answer(guest, 0, refused, buffer);
 }
 
 }  // namespace tendon

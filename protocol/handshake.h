@@ -5,32 +5,47 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <variant>
+#include <vector>
 
 #include "core/time.h"
+#include "protocol/client_key.h"
 #include "protocol/codec.h"
+#include "protocol/crypto.h"
+#include "protocol/hello_limit.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
+#include "protocol/noise.h"
+#include "protocol/seal.h"
 
 namespace tendon {
 
 /// The client's half of the handshake: says Hello until a Retry brings a cookie, says Hello with the
 /// cookie until it is answered. It never gives up; its owner may. Sans-I/O.
 ///
-/// A datagram that is malformed, or does not carry this attempt's `random`, is ignored.
+/// A datagram that is malformed, of another suite, not authentic, or does not carry this attempt's
+/// `random`, is ignored.
 class ClientHandshake {
  public:
   struct Config {
     Hello hello;
-    ClientRandom random{};  ///< chosen by the caller; ties Retry and answer to this attempt
+    ClientRandom random{};  ///< from a cryptographic source, new for each attempt
+    /// Suite 1 when set, and only that: nobody can talk this client out of it.
+    struct Secret {
+      Key key;        ///< that of ClientKey
+      Key ephemeral;  ///< from a cryptographic source, new for each attempt
+    };
+    std::optional<Secret> secret{};
     /// 10 Hz: a lost Hello costs a person no noticeable wait, a dead server 12 kB/s.
     Duration resend = std::chrono::milliseconds(100);
   };
   struct Accepted {
     std::uint32_t connection_id;
     Welcome welcome;
+    std::optional<SessionKeys> keys;  ///< in suite 1
   };
   using Outcome = std::variant<Accepted, Refused>;
 
@@ -46,7 +61,14 @@ class ClientHandshake {
   LocalTime next_tick() const noexcept { return next_tick_; }
 
  private:
-  Config config_;
+  void settle(const AnswerDatagram& datagram);
+
+  std::uint32_t version_min_;
+  std::uint32_t version_max_;
+  ClientRandom random_;
+  Duration resend_;
+  std::optional<NoiseInitiator> noise_;  ///< in suite 1
+  std::vector<std::byte> body_;          ///< of the Hello: written once, whatever cookies come
   std::optional<Cookie> cookie_;
   std::optional<Outcome> outcome_;
   bool due_ = true;
@@ -56,53 +78,84 @@ class ClientHandshake {
 /// The server's half: answers a Hello without a valid cookie by a Retry, keeping no state and never
 /// sending more bytes than it got, so that a spoofed source can neither fill memory nor be flooded.
 ///
-///     key n  = HMAC-SHA-512-256(secret, "tendon-cookie-key" ‖ n as 8 bytes LE),  n = ⌊now / key_lifetime⌋
-///     cookie = HMAC-SHA-512-256(key n, "tendon-cookie" ‖ ip[16] ‖ port as 2 bytes LE ‖ client random)[0..16)
+///     key n  = HMAC-SHA-256(secret, "tendon-cookie-key" ‖ n as 8 bytes LE),  n = ⌊now / key_lifetime⌋
+///     cookie = HMAC-SHA-256(key n, "tendon-cookie" ‖ ip[16] ‖ port as 2 bytes LE ‖ client random)[0..16)
 ///
 /// Cookies of key n and n − 1 are valid, so one lives between one and two key lifetimes and no key has to
-/// be remembered. Silent on everything malformed. Sans-I/O, no randomness of its own.
+/// be remembered. Only then is anything counted against the source, and only then is a key tried. Silent
+/// on everything that fails. Sans-I/O; what is random comes from Config::secret.
 class Doorman {
  public:
   struct Config {
-    std::array<std::byte, 32> secret{};  ///< random at start; keys are derived from it and the time
+    /// Random at start. Cookie keys are derived from it and the time, ephemeral keys by a Ratchet. Wipe it
+    /// after the construction: what it was opens the handshakes to come.
+    Bytes32 secret{};
+    /// Who may come in by suite 1.
+    std::vector<ClientKey> keys{};
     std::uint32_t version_min = kProtocolVersion;
     std::uint32_t version_max = kProtocolVersion;
     /// Longer than any client takes to come back with its cookie, short enough that a stolen one is of little use.
     Duration key_lifetime = std::chrono::seconds(120);
   };
-  /// A Hello whose sender has proved to own its address.
+  /// A Hello whose sender has proved to own its address and, in suite 1, its key.
   struct Guest {
     Hello hello;
-    ClientRandom random;    ///< the same random from the same address is the same attempt, resent: answer it alike
-    std::uint32_t version;  ///< the highest both speak; 0 = none in common: refuse with our range
+    ClientRandom random;                  ///< the same random is the same attempt, resent: answer it alike
+    std::uint32_t version;                ///< the highest both speak; 0 = none in common: refuse with our range
+    const ClientKey* key = nullptr;       ///< null in suite 0
+    std::optional<NoiseResponder> noise;  ///< in suite 1
   };
   struct Reply {
     std::size_t size = 0;  ///< bytes of `answer` to send back; 0 = stay silent
     std::optional<Guest> guest;
   };
+  struct Answered {
+    std::size_t size = 0;             ///< of the Answer; 0 = stay silent
+    std::optional<SessionKeys> keys;  ///< in suite 1
+  };
+  /// Hellos that were not answered with what they wanted.
+  struct Stats {
+    std::uint64_t retries = 0;      ///< no cookie, or an old one
+    std::uint64_t malformed = 0;    ///< no Hello of ours
+    std::uint64_t plain = 0;        ///< in suite 0 from another machine
+    std::uint64_t limited = 0;      ///< too many from one source
+    std::uint64_t unknown_key = 0;  ///< of a key that nobody has here
+    std::uint64_t forged = 0;       ///< not sealed with the key they name
+  };
 
-  /// Throws std::invalid_argument when `key_lifetime` is not positive or the version range is empty, and
-  /// std::runtime_error when libsodium cannot start.
+  /// Throws std::invalid_argument when `key_lifetime` is not positive, the version range is empty or two
+  /// clients have one key, and std::runtime_error when libsodium cannot start.
   explicit Doorman(const Config& config);
+  // Guests point at our keys.
+  Doorman(const Doorman&) = delete;
+  Doorman& operator=(const Doorman&) = delete;
 
   /// Takes a datagram of type Hello. Writes a Retry into `answer`, or returns the guest.
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                 std::span<std::byte, kMaxDatagram> answer);
 
-  /// The bytes of yes and no. Both are shorter than a Hello.
-  static std::size_t welcome(std::uint32_t connection_id, const ClientRandom& random, const Welcome& welcome,
-                             std::span<std::byte, kMaxDatagram> buffer);
-  static std::size_t refuse(const ClientRandom& random, const Refused& refused,
-                            std::span<std::byte, kMaxDatagram> buffer);
+  /// The bytes of yes and no, both shorter than a Hello. In suite 1 each call makes other bytes and other
+  /// keys: keep them for when the guest asks again.
+  Answered welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
+                   std::span<std::byte, kMaxDatagram> buffer);
+  Answered refuse(const Guest& guest, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);
 
-  /// Datagrams that were no good Hello.
-  std::uint64_t malformed() const noexcept { return malformed_; }
+  const Stats& stats() const noexcept { return stats_; }
 
  private:
   Cookie cookie(std::int64_t key_number, const Address& from, const ClientRandom& random) const noexcept;
+  bool read(const HelloDatagram& datagram, Guest& guest);
+  Answered answer(const Guest& guest, std::uint32_t connection_id, const Answer& body,
+                  std::span<std::byte, kMaxDatagram> buffer);
 
-  Config config_;
-  std::uint64_t malformed_ = 0;
+  std::uint32_t version_min_;
+  std::uint32_t version_max_;
+  Duration key_lifetime_;
+  Key cookie_secret_;
+  Ratchet ephemerals_;
+  HelloLimit limit_;
+  std::map<KeyId, ClientKey> keys_;
+  Stats stats_;
 };
 
 }  // namespace tendon

@@ -46,6 +46,10 @@ inline constexpr std::uint32_t kMaxLoopHz = 1'000'000;
 /// The longest silence that a server may grant. An hour is far beyond any use; it keeps sums of times small.
 inline constexpr Duration kMaxTimeout = std::chrono::hours(1);
 
+/// Packet numbers are below this: the nonces of one key never come near the one that renews it, 2⁶⁴ − 1.
+/// At 1 MHz, 36 000 years.
+inline constexpr std::uint64_t kMaxPacketNumber = std::uint64_t{1} << 60;
+
 /// How often a Bye is said: at 10 % loss one conversation in a thousand ends by timeout instead.
 inline constexpr int kByes = 3;
 

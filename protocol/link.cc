@@ -14,10 +14,6 @@ namespace {
 /// RFC 4291, 2.5.5.2: ::ffff:a.b.c.d
 constexpr std::array<std::uint8_t, 12> kMappedPrefix = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff};
 
-bool is_ipv4(const Address& address) noexcept {
-  return std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), address.ip.begin());
-}
-
 std::optional<std::uint16_t> parse_port(std::string_view text) {
   std::uint16_t port = 0;
   const char* const end = text.data() + text.size();
@@ -66,6 +62,10 @@ Address parse_address(std::string_view text) {
     throw std::invalid_argument("expected HOST:PORT like 127.0.0.1:47100, got \"" + std::string(text) + "\"");
   }
   return *address;
+}
+
+bool is_ipv4(const Address& address) noexcept {
+  return std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), address.ip.begin());
 }
 
 bool is_loopback(const Address& address) noexcept {

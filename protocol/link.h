@@ -30,6 +30,9 @@ std::string to_string(const Address& address);
 /// 0…65535. Anything else throws std::invalid_argument: `expected HOST:PORT like 127.0.0.1:47100, got "…"`.
 Address parse_address(std::string_view text);
 
+/// True for an IPv4-mapped address.
+bool is_ipv4(const Address& address) noexcept;
+
 /// True for 127.0.0.0/8 and ::1: datagrams to it never leave this machine.
 bool is_loopback(const Address& address) noexcept;
 

@@ -35,6 +35,8 @@ enum class Code : std::uint8_t {
   kDenied = 5,       ///< not with this role
   kShutdown = 6,     ///< the server is going down
   kTimedOut = 7,     ///< nothing was heard for too long
+  kExpired = 8,      ///< a session of suite 1 has reached its age: shake hands again
+  kReplaced = 9,     ///< another program with the same key has taken this place: do not come back unasked
 };
 
 /// Server → client, unreliable, newest wins: the device at one haptic step.

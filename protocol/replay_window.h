@@ -13,9 +13,9 @@ namespace tendon {
 /// that a forged one cannot use up the number of a real one.
 class ReplayWindow {
  public:
-  /// 1024 bits, of which the word being filled is not a full memory: 960 numbers are always remembered,
-  /// about one second at 1 kHz. Anything later is of no use to a hand.
-  static constexpr std::uint64_t kBits = 1024;
+  /// 2048 bits, of which the word being filled is not a full memory: 1984 numbers are always remembered,
+  /// about two seconds at 1 kHz. Anything later is of no use to a hand.
+  static constexpr std::uint64_t kBits = 2048;
   static constexpr std::uint64_t kRemembered = kBits - 64;
 
   /// True when `number` was inserted, or is too old to know.

@@ -15,14 +15,23 @@
 namespace tendon {
 
 struct Session::State {
-  State(const Config& the_config, LocalTime the_opening)
-      : config(the_config), opened(the_opening), latest(the_opening), last_heard(the_opening) {}
+  State(const Config& the_config, const SessionKeys* keys, LocalTime the_opening)
+      : config(the_config), opened(the_opening), latest(the_opening), last_heard(the_opening) {
+    if (keys == nullptr) return;
+    sealer.emplace(keys->send, config.rekey, opened);
+    opener.emplace(keys->receive, config.rekey);
+  }
 
   Config config;
   LocalTime opened;
   LocalTime latest;  ///< the newest `now` we were told
   bool open = true;
   LinkStats stats;
+
+  // In suite 1.
+  std::optional<Sealer> sealer;
+  std::optional<Opener> opener;
+  std::array<std::byte, kMaxDatagram> opened_body{};
 
   // Out.
   DataWriter writer;
@@ -50,7 +59,10 @@ struct Session::State {
   std::optional<ForceCommand> force_arrived;
   std::optional<Closed> closed;
 
-  void accept(LocalTime now, std::uint64_t number, const DataContent& content);
+  Suite suite() const noexcept { return sealer ? Suite::kNoise : Suite::kPlain; }
+  std::optional<std::span<const std::byte>> open_body(LocalTime now, const Header& header,
+                                                      std::span<const std::byte> datagram);
+  bool accept(LocalTime now, std::uint64_t number, const DataContent& content);
   void observe(LocalTime now, PeerTime sent, const IncomingEcho& told);
   void count_lost_outgoing(const IncomingEcho& told);
 
@@ -64,19 +76,28 @@ struct Session::State {
   bool something_to_say(LocalTime now) const noexcept {
     return state_to_send || force_to_send || answering.next_due() || asked.next_due(now) || silent_too_long(now);
   }
-  void begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
-  std::size_t sent(LocalTime now) noexcept;
+  bool too_old(LocalTime now) const noexcept {
+    return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams);
+  }
+  void close(Code code, std::string reason);
+  Header begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
+  std::size_t sent(LocalTime now, const Header& header, std::span<std::byte, kMaxDatagram> buffer) noexcept;
   void fill(LocalTime now);
 };
 
-Session::Session(const Config& config, LocalTime opened) {
+Session::Session(const Config& config, LocalTime opened) : Session(config, nullptr, opened) {}
+Session::Session(const Config& config, const SessionKeys& keys, LocalTime opened) : Session(config, &keys, opened) {}
+Session::Session(const Config& config, const SessionKeys* keys, LocalTime opened) {
   const auto positive = [](Duration d, const char* message) {
     if (d <= Duration::zero()) throw std::invalid_argument(message);
   };
   positive(config.keep_alive, "session: keep_alive must be positive");
   positive(config.timeout, "session: timeout must be positive");
   positive(config.min_resend, "session: min_resend must be positive");
-  state_ = std::make_unique<State>(config, opened);
+  positive(config.life, "session: life must be positive");
+  positive(config.rekey.age, "session: rekey.age must be positive");
+  positive(config.rekey.overlap, "session: rekey.overlap must be positive");
+  state_ = std::make_unique<State>(config, keys, opened);
 }
 Session::~Session() = default;
 Session::Session(Session&&) noexcept = default;
@@ -84,33 +105,56 @@ Session& Session::operator=(Session&&) noexcept = default;
 
 // ---- In ----
 
-void Session::receive(LocalTime now, std::span<const std::byte> datagram) {
+bool Session::receive(LocalTime now, std::span<const std::byte> datagram) {
   State& my = *state_;
   my.latest = now;
-  if (!my.open) return;
+  if (!my.open) return false;
 
   const std::optional<Header> header = decode_header(datagram);
   if (header && header->type != DatagramType::kData) {
     ++my.stats.duplicated;  // a copy of the handshake that took its time
-    return;
+    return false;
   }
-  if (!header || header->connection_id != my.config.connection_id) {
+  if (!header || header->suite != my.suite() || header->connection_id != my.config.connection_id ||
+      header->packet_number >= limits::kMaxPacketNumber) {
     ++my.stats.malformed;
-    return;
+    return false;
   }
   if (my.seen.contains(header->packet_number)) {
     ++my.stats.duplicated;
-    return;
+    return false;
   }
-  const DataContent* content = my.reader.read(datagram.subspan(kHeaderSize));
+  const auto body = my.open_body(now, *header, datagram);
+  if (!body) return false;
+  const DataContent* content = my.reader.read(*body);
   if (!content) {
+    // Its number is used up when it was authentic. In suite 0 nobody knows: a damaged copy must not shut
+    // out the good one.
+    if (my.opener) my.seen.insert(header->packet_number);
     ++my.stats.malformed;
-    return;
+    return false;
   }
-  my.accept(now, header->packet_number, *content);
+  return my.accept(now, header->packet_number, *content);
 }
 
-void Session::State::accept(LocalTime now, std::uint64_t number, const DataContent& content) {
+/// What follows the header, in the clear; empty, and counted, when it is not authentic.
+std::optional<std::span<const std::byte>> Session::State::open_body(LocalTime now, const Header& header,
+                                                                    std::span<const std::byte> datagram) {
+  if (!opener) return datagram.subspan(kHeaderSize);
+  switch (opener->open(now, header, datagram, opened_body)) {
+    case Opener::Verdict::kOpened:
+      return std::span(opened_body).first(datagram.size() - kHeaderSize - crypto::kTagSize);
+    case Opener::Verdict::kForged:
+      ++stats.forged;
+      break;
+    case Opener::Verdict::kOldKey:
+      ++stats.old_key;
+      break;
+  }
+  return std::nullopt;
+}
+
+bool Session::State::accept(LocalTime now, std::uint64_t number, const DataContent& content) {
   ++stats.datagrams_received;
   stats.invalid += content.invalid;
   last_heard = now;
@@ -125,6 +169,7 @@ void Session::State::accept(LocalTime now, std::uint64_t number, const DataConte
   for (const Frame& frame : content.frames) {
     std::visit([this](const auto& body) { take(body); }, frame);
   }
+  return newest;
 }
 
 void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& told) {
@@ -186,34 +231,49 @@ void Session::answer(std::uint32_t id, Code code, std::string detail) {
   state_->answering.answer(id, code, std::move(detail));
 }
 
-void Session::close(Code code, std::string reason) {
-  if (!state_->open) return;
-  state_->open = false;
-  state_->bye = {.code = code, .reason = std::move(reason)};
-  state_->byes_left = limits::kByes;
+void Session::close(Code code, std::string reason) { state_->close(code, std::move(reason)); }
+
+void Session::State::close(Code code, std::string reason) {
+  if (!open) return;
+  open = false;
+  bye = {.code = code, .reason = std::move(reason)};
+  byes_left = limits::kByes;
 }
 
 void Session::tick(LocalTime now) {
   State& my = *state_;
   my.latest = now;
-  if (!my.open || now - my.last_heard < my.config.timeout) return;
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(my.config.timeout).count();
-  my.open = false;
-  my.closed = Closed{.code = Code::kTimedOut, .reason = "nothing heard for " + std::to_string(ms) + " ms"};
+  if (!my.open) return;
+  if (now - my.last_heard >= my.config.timeout) {
+    const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(my.config.timeout).count();
+    my.open = false;
+    my.closed = Closed{.code = Code::kTimedOut, .reason = "nothing heard for " + std::to_string(ms) + " ms"};
+  } else if (my.too_old(now)) {
+    const std::string reason = "the session has reached its age";
+    my.close(Code::kExpired, reason);
+    my.closed = Closed{.code = Code::kExpired, .reason = reason};
+  }
 }
 
 // ---- Out ----
 
-void Session::State::begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
+Header Session::State::begin(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
   if (echo) echo->received_mask = seen.mask_before(echo->packet_number);
-  writer.begin(buffer, config.connection_id, next_packet, now, echo);
+  const Header header{.type = DatagramType::kData,
+                      .suite = suite(),
+                      .epoch = sealer ? sealer->next_epoch(now) : std::uint8_t{0},
+                      .connection_id = config.connection_id,
+                      .packet_number = next_packet};
+  writer.begin(buffer.first(sealer ? kMaxDatagram - crypto::kTagSize : kMaxDatagram), header, now, echo);
+  return header;
 }
 
-std::size_t Session::State::sent(LocalTime now) noexcept {
+std::size_t Session::State::sent(LocalTime now, const Header& header,
+                                 std::span<std::byte, kMaxDatagram> buffer) noexcept {
   ++next_packet;
   ++stats.datagrams_sent;
   last_sent = now;
-  return writer.size();
+  return sealer ? sealer->seal(header, buffer, writer.size()) : writer.size();
 }
 
 /// As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; state
@@ -235,14 +295,14 @@ std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatag
   my.latest = now;
   if (my.byes_left > 0) {
     --my.byes_left;
-    my.begin(now, buffer);
+    const Header header = my.begin(now, buffer);
     my.writer.add(my.bye);
-    return my.sent(now);
+    return my.sent(now, header, buffer);
   }
   if (!my.open || !my.something_to_say(now)) return 0;
-  my.begin(now, buffer);
+  const Header header = my.begin(now, buffer);
   my.fill(now);
-  return my.sent(now);
+  return my.sent(now, header, buffer);
 }
 
 std::optional<Session::Event> Session::next_event() {
@@ -261,6 +321,7 @@ LocalTime Session::next_tick() const noexcept {
   const State& my = *state_;
   if (!my.open) return my.byes_left > 0 ? my.latest : LocalTime::max();
   if (my.something_to_say(my.latest)) return my.latest;
+  if (my.too_old(my.latest)) return my.latest;
   return std::min({my.last_heard + my.config.timeout, *my.last_sent + my.config.keep_alive, my.asked.next_due_time()});
 }
 

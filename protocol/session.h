@@ -10,14 +10,17 @@
 #include <variant>
 
 #include "core/time.h"
+#include "protocol/limits.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
+#include "protocol/seal.h"
 
 namespace tendon {
 
 /// Everything that is counted about one conversation. Bad input is counted here and nowhere else.
 ///
-/// Each datagram received adds one to exactly one of `datagrams_received`, `duplicated`, `malformed`.
+/// Each datagram received adds one to exactly one of `datagrams_received`, `duplicated`, `malformed`,
+/// `forged`, `old_key`.
 struct LinkStats {
   std::uint64_t datagrams_sent = 0;
   std::uint64_t datagrams_received = 0;  ///< accepted ones
@@ -26,6 +29,8 @@ struct LinkStats {
   std::uint64_t reordered = 0;           ///< accepted, but older than one seen before
   std::uint64_t duplicated = 0;          ///< seen before, older than the window, or of the handshake: dropped
   std::uint64_t malformed = 0;           ///< not a datagram of this conversation: dropped
+  std::uint64_t forged = 0;              ///< suite 1: did not open; forged, or damaged under way: dropped
+  std::uint64_t old_key = 0;             ///< suite 1: of a key that is over, or far ahead: dropped
   std::uint64_t invalid = 0;             ///< well-formed, with a value out of bounds (NaN, Inf …): frame dropped
   std::uint64_t stale = 0;               ///< state or force not newer than the newest one: frame dropped
   Duration round_trip{};                 ///< newest sample, (T4 − T1) − (T3 − T2); 0 = none yet
@@ -63,12 +68,21 @@ class Session {
     /// A request is sent again after max(this, SRTT + 4 RTTVAR). Below it a peer that is merely scheduled
     /// late (tens of ms on a virtual machine) would be asked twice.
     Duration min_resend = std::chrono::milliseconds(20);
+
+    // In suite 1:
+    Rekey rekey{};
+    /// After this age a session ends, kExpired: a new handshake, and no key is older than a day.
+    Duration life = std::chrono::hours(24);
+    /// … or when so many datagrams have left: a packet number is never used twice.
+    std::uint64_t max_datagrams = limits::kMaxPacketNumber;
   };
 
   /// Either end of a conversation. `opened` is the instant of the handshake's end. The first datagram is
   /// due at once, so that the peer knows us to be there and both have a round trip.
   /// Throws std::invalid_argument when a duration of `config` is not positive.
   Session(const Config& config, LocalTime opened);
+  /// … sealed, in suite 1.
+  Session(const Config& config, const SessionKeys& keys, LocalTime opened);
   ~Session();
   Session(Session&&) noexcept;
   Session& operator=(Session&&) noexcept;
@@ -90,14 +104,16 @@ class Session {
     std::string detail;
   };
   struct Closed {
-    Code code;  ///< as the peer said Bye: kOk, kShutdown …; kTimedOut: it fell silent
+    Code code;  ///< as the peer said Bye: kOk, kShutdown …; kTimedOut: it fell silent; kExpired: too old
     std::string reason;
   };
   using Event = std::variant<StateArrived, ForceArrived, RequestArrived, RequestAnswered, Closed>;
 
   // In.
-  /// Takes any bytes. What is not a good datagram of this conversation is counted and dropped.
-  void receive(LocalTime now, std::span<const std::byte> datagram);
+  /// Takes any bytes. What is not a good datagram of this conversation is counted and dropped. True when
+  /// it was good and the newest so far: where it came from is where the peer is now. That is proved in
+  /// suite 1 only.
+  bool receive(LocalTime now, std::span<const std::byte> datagram);
   void send(const DeviceState& state);
   void send(const ForceCommand& command);
   /// Queues a reliable request and returns its id; empty when limits::kRequestWindow are open, that is
@@ -108,7 +124,7 @@ class Session {
   /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. What was not sent yet is
   /// dropped. No Closed comes: the owner knows.
   void close(Code code, std::string reason);
-  /// Notices the silence of the peer.
+  /// Notices the silence of the peer, and our age.
   void tick(LocalTime now);
 
   // Out.
@@ -125,6 +141,7 @@ class Session {
 
  private:
   struct State;
+  Session(const Config& config, const SessionKeys* keys, LocalTime opened);
   std::unique_ptr<State> state_;
 };
 

@@ -32,15 +32,31 @@ struct Overloaded : Ts... {
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 does not deduce it
 
+void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
+  sum.duplicated += link.duplicated;
+  sum.malformed += link.malformed;
+  sum.forged += link.forged;
+  sum.old_key += link.old_key;
+  sum.invalid += link.invalid;
+  sum.stale += link.stale;
+}
+
+/// What a key lets its holder do.
+bool may(const ClientKey* key, Role role) {
+  return key == nullptr || key->role == Role::kController || role == Role::kObserver;
+}
+
 }  // namespace
 
 NetworkLoop::NetworkLoop(const Config& config, Link& link, Mailboxes& mail)
     : config_(config),
       link_(link),
       mail_(mail),
-      doorman_({.secret = config.secret}),
+      doorman_({.secret = config.secret, .keys = config.keys}),
       next_connection_id_(config.first_connection_id) {
   guests_.reserve(config.max_observers + 1);
+  half_open_.reserve(config.max_half_open);
+  config_.secret = {};  // the doorman has what it needs of it
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
@@ -51,6 +67,8 @@ LocalTime NetworkLoop::turn(LocalTime now) {
     serve(now, guest);
   }
   std::erase_if(guests_, [](const Guest& guest) { return guest.gone; });
+  stats_.half_open_forgotten +=
+      std::erase_if(half_open_, [&](const Guest& guest) { return now - guest.arrived >= config_.half_open_timeout; });
 
   if (more) return now;
   LocalTime next = LocalTime::max();
@@ -78,90 +96,155 @@ bool NetworkLoop::drain(LocalTime now) {
 void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   const auto header = decode_header(datagram);
   if (header && header->type == DatagramType::kHello) return greet(now, from, datagram);
-  if (header && header->type == DatagramType::kData) {
-    for (Guest& guest : guests_) {
-      if (guest.address != from || guest.session.connection_id() != header->connection_id) continue;
-      return guest.session.receive(now, datagram);
-    }
+  if (!header || header->type != DatagramType::kData) {
+    ++stats_.malformed;
+    return;
   }
-  ++stats_.malformed;
+  const auto is_meant = [&](const Guest& guest) {
+    return guest.session.connection_id() == header->connection_id && (guest.key != nullptr || guest.address == from);
+  };
+  if (const auto guest = std::find_if(guests_.begin(), guests_.end(), is_meant); guest != guests_.end()) {
+    const bool newest = guest->session.receive(now, datagram);
+    if (newest && guest->address != from) {
+      guest->address = from;
+      ++stats_.roamed;
+    }
+  } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
+             waiting != half_open_.end()) {
+    if (!waiting->session.receive(now, datagram)) return;
+    Guest arrived = std::move(*waiting);
+    half_open_.erase(waiting);
+    arrived.address = from;
+    open(now, std::move(arrived));
+  } else {
+    ++stats_.unknown_connection;
+  }
 }
 
 void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   std::array<std::byte, kMaxDatagram> answer;
-  const std::uint64_t malformed = doorman_.malformed();
   const Doorman::Reply reply = doorman_.receive(now, from, datagram, answer);
-  stats_.malformed += doorman_.malformed() - malformed;
   if (reply.guest) return admit(now, from, *reply.guest);
   if (reply.size > 0) send(now, from, std::span(answer).first(reply.size));
 }
 
-std::string NetworkLoop::reason_to_refuse(const Address& from, const Doorman::Guest& guest, Code& code) const {
-  if (guest.version == 0) {
-    code = Code::kUnsupported;
-    return "no protocol version in common";
+std::optional<NetworkLoop::Refusal> NetworkLoop::reason_to_refuse(const Address& from, const ClientKey* key,
+                                                                  Role role) const {
+  if (key == nullptr && !config_.keys.empty()) {
+    return Refusal{Code::kDenied, "this server lets in those who have a key: --key FILE"};
   }
-  code = Code::kBusy;
+  if (!may(key, role)) return Refusal{Code::kDenied, "the key \"" + key->name + "\" is an observer's"};
   std::size_t observers = 0;
   for (const Guest& present : guests_) {
-    if (present.address == from || present.gone) continue;  // the same program, started again: it takes its own place
+    if (present.gone) continue;
+    // The same program, started again: it takes its own place.
+    const bool itself = key == present.key && (present.address == from ||
+                                               (key != nullptr && role == present.role && role == Role::kController));
+    if (itself) continue;
     if (present.role == Role::kObserver) ++observers;
-    if (guest.hello.role == Role::kController && present.role == Role::kController) {
-      return "the device is controlled by \"" + present.name + "\" at " + to_string(present.address) +
-             "; observers are welcome";
+    if (role == Role::kController && present.role == Role::kController) {
+      return Refusal{Code::kBusy, "the device is controlled by \"" + present.name + "\" at " +
+                                      to_string(present.address) + "; observers are welcome"};
     }
   }
-  if (guest.hello.role == Role::kObserver && observers >= config_.max_observers) {
-    return "there are " + std::to_string(observers) + " observers already";
+  if (role == Role::kObserver && observers >= config_.max_observers) {
+    return Refusal{Code::kBusy, "there are " + std::to_string(observers) + " observers already"};
   }
-  return {};
+  return std::nullopt;
+}
+
+/// Our answer was lost and the guest asks again: the same answer. In suite 1 it may come from anywhere, it is of
+/// use to one who holds the ephemeral key only.
+bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest) {
+  for (const auto* list : {&guests_, &half_open_}) {
+    for (const Guest& present : *list) {
+      if (present.random != guest.random || present.key != guest.key || present.gone) continue;
+      if (present.key == nullptr && present.address != from) continue;
+      send(now, from, present.answer);
+      return true;
+    }
+  }
+  return false;
 }
 
 void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest) {
+  if (answer_again(now, from, guest)) return;
+
   std::array<std::byte, kMaxDatagram> answer;
-  // Our answer was lost and the guest asks again: the same answer.
-  for (const Guest& present : guests_) {
-    if (present.address != from || present.random != guest.random || present.gone) continue;
-    const std::size_t size = Doorman::welcome(present.session.connection_id(), guest.random, present.welcome, answer);
-    return send(now, from, std::span(answer).first(size));
-  }
-
-  Code code{};
-  if (std::string reason = reason_to_refuse(from, guest, code); !reason.empty()) {
+  const Role role = guest.hello.role;
+  std::optional<Refusal> refusal = guest.version == 0 ? Refusal{Code::kUnsupported, "no protocol version in common"}
+                                                      : reason_to_refuse(from, guest.key, role);
+  if (refusal) {
     ++stats_.refused;
-    notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + reason);
-    const Refused refused{code, std::move(reason), kProtocolVersion, kProtocolVersion};
-    const std::size_t size = Doorman::refuse(guest.random, refused, answer);
-    return send(now, from, std::span(answer).first(size));
+    notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal->reason);
+    const Refused refused{refusal->code, std::move(refusal->reason), kProtocolVersion, kProtocolVersion};
+    return send(now, from, std::span(answer).first(doorman_.refuse(guest, refused, answer).size));
   }
-  for (Guest& present : guests_) {
-    if (present.address == from && !present.gone) leave(present, "started again");
-  }
-  std::erase_if(guests_, [](const Guest& present) { return present.gone; });
 
-  const bool controller = guest.hello.role == Role::kController;
   Session::Config session;
   session.connection_id = next_connection_id_++;
   if (next_connection_id_ == 0) next_connection_id_ = 1;  // 0 means none
-  session.timeout = controller ? config_.controller_timeout : config_.observer_timeout;
+  session.timeout = role == Role::kController ? config_.controller_timeout : config_.observer_timeout;
+  session.rekey = config_.rekey;
+  session.life = config_.session_life;
   Welcome welcome;
   welcome.version = guest.version;
   welcome.features = in_common(guest.hello.features);
-  welcome.role = guest.hello.role;
+  welcome.role = role;
   welcome.device_name = config_.device_name;
   welcome.max_force = config_.max_force;
   welcome.position_resolution = config_.position_resolution;
   welcome.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(config_.haptic_period)));
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
-  const std::size_t size = Doorman::welcome(session.connection_id, guest.random, welcome, answer);
-  send(now, from, std::span(answer).first(size));
+  const Doorman::Answered answered = doorman_.welcome(guest, session.connection_id, welcome, answer);
+  if (answered.size == 0) return;
+  const auto bytes = std::span(answer).first(answered.size);
+  send(now, from, bytes);
 
+  Guest arrived{from,
+                guest.random,
+                guest.key,
+                guest.hello.name,
+                role,
+                welcome.loop_hz,
+                {bytes.begin(), bytes.end()},
+                answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
+                now};
+  if (!answered.keys) return open(now, std::move(arrived));
+  if (half_open_.size() >= config_.max_half_open) {
+    half_open_.erase(half_open_.begin());
+    ++stats_.half_open_forgotten;
+  }
+  half_open_.push_back(std::move(arrived));
+}
+
+/// From here on the guest is one of ours.
+void NetworkLoop::open(LocalTime now, Guest guest) {
+  // While it was half-open somebody else may have come.
+  if (const auto refusal = reason_to_refuse(guest.address, guest.key, guest.role)) {
+    ++stats_.refused;
+    notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
+    guest.session.close(refusal->code, refusal->reason);
+    return send_all(now, guest);
+  }
+  for (Guest& present : guests_) {
+    if (present.gone || present.key != guest.key) continue;
+    if (present.address == guest.address) {
+      leave(present, "started again");
+    } else if (guest.key != nullptr && guest.role == Role::kController && present.role == Role::kController) {
+      present.session.close(Code::kReplaced, "a program with the same key has taken this place");
+      send_all(now, present);
+      ++stats_.replaced;
+      leave(present, "replaced by a program with the same key");
+    }
+  }
+  std::erase_if(guests_, [](const Guest& present) { return present.gone; });
   ++stats_.welcomed;
-  notice(false, "welcomed " + std::string(controller ? "controller" : "observer") + " \"" + guest.hello.name +
-                    "\" at " + to_string(from));
-  guests_.push_back(
-      {from, guest.random, guest.hello.name, guest.hello.role, std::move(welcome), Session(session, now)});
+  notice(false, "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" +
+                    guest.name + "\" at " + to_string(guest.address) +
+                    (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""));
+  guests_.push_back(std::move(guest));
 }
 
 void NetworkLoop::publish() {
@@ -189,7 +272,10 @@ void NetworkLoop::serve(LocalTime now, Guest& guest) {
                *event);
   }
   if (guest.role == Role::kController) stats_.controller = guest.session.stats();
+  send_all(now, guest);
+}
 
+void NetworkLoop::send_all(LocalTime now, Guest& guest) {
   std::array<std::byte, kMaxDatagram> buffer;
   while (const std::size_t size = guest.session.next_datagram(now, buffer)) {
     send(now, guest.address, std::span(buffer).first(size));
@@ -221,7 +307,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
 void NetworkLoop::answer(Guest& guest, std::uint32_t id, const Request& request) {
   std::visit(Overloaded{
                  [&](const SetStateRate& rate) {
-                   const auto loop_hz = static_cast<double>(guest.welcome.loop_hz);
+                   const auto loop_hz = static_cast<double>(guest.loop_hz);
                    if (rate.hz == 0) return guest.session.answer(id, Code::kInvalid, "a state rate must be above zero");
                    guest.state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
                    guest.session.answer(id, Code::kOk, {});
@@ -241,6 +327,7 @@ void NetworkLoop::answer(Guest& guest, std::uint32_t id, const Request& request)
 
 void NetworkLoop::leave(Guest& guest, const std::string& how) {
   guest.gone = true;
+  add(stats_.dropped, guest.session.stats());
   notice(guest.role == Role::kController,
          "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how);
   // A full ring means 16 orders wait: the haptic thread stands still, and age will do the same a little later.
@@ -248,14 +335,20 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
 }
 
 void NetworkLoop::close(LocalTime now) {
-  std::array<std::byte, kMaxDatagram> buffer;
   for (Guest& guest : guests_) {
     guest.session.close(Code::kShutdown, "the server is going down");
-    while (const std::size_t size = guest.session.next_datagram(now, buffer)) {
-      send(now, guest.address, std::span(buffer).first(size));
-    }
+    send_all(now, guest);
+    add(stats_.dropped, guest.session.stats());
   }
   guests_.clear();
+  half_open_.clear();
+}
+
+NetworkLoop::Stats NetworkLoop::stats() const {
+  Stats stats = stats_;
+  stats.hellos = doorman_.stats();
+  for (const Guest& guest : guests_) add(stats.dropped, guest.session.stats());
+  return stats;
 }
 
 void NetworkLoop::send(LocalTime now, const Address& to, std::span<const std::byte> datagram) {

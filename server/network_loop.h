@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,11 +25,17 @@ namespace tendon {
 /// One controller and up to `max_observers` observers. The link is drained in every turn, so nothing
 /// waits behind what is old; forces are newest-wins, every request is answered.
 ///
+/// Without keys guests speak in the clear, from this machine only. With keys they speak suite 1 only: a guest
+/// is half-open until its first authentic Data, and until then nothing changes for anybody else; its address
+/// is where its newest authentic datagram came from; a controller that comes again with its key takes its own
+/// place.
+///
 /// Thread-safe: no. Realtime-safe: no.
 class NetworkLoop {
  public:
   struct Config {
-    std::array<std::byte, 32> secret{};     ///< of the cookies; random at start
+    Bytes32 secret{};                       ///< of cookies and ephemeral keys; random at start
+    std::vector<ClientKey> keys{};          ///< who may come in; empty: anybody on this machine, in the clear
     std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
     std::string device_name;
@@ -39,19 +46,41 @@ class NetworkLoop {
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
     Duration observer_timeout = std::chrono::seconds(10);
+    /// Handshakes answered whose guest has not shown yet that it holds the keys: anybody may have replayed its
+    /// Hello. 16 are more than start within a round trip; the oldest gives way.
+    std::size_t max_half_open = 16;
+    Duration half_open_timeout = std::chrono::seconds(5);
+    Rekey rekey{};  ///< of the sessions of suite 1, as their `life`
+    Duration session_life = Session::Config{}.life;
     /// Datagrams taken in one turn; a flood must not keep states from being sent. A 1 kHz engine sends 1 per turn.
     std::size_t max_datagrams = 256;
   };
 
+  /// What guests' links have dropped, of all guests that were and are; see LinkStats.
+  struct Dropped {
+    std::uint64_t duplicated = 0;
+    std::uint64_t malformed = 0;
+    std::uint64_t forged = 0;
+    std::uint64_t old_key = 0;
+    std::uint64_t invalid = 0;
+    std::uint64_t stale = 0;
+  };
+
   struct Stats {
-    std::uint64_t welcomed = 0;
+    std::uint64_t welcomed = 0;  ///< sessions that were opened
     std::uint64_t refused = 0;
     std::uint64_t timed_out = 0;
-    std::uint64_t malformed = 0;     ///< datagrams that belong to nobody
-    std::uint64_t forces = 0;        ///< handed to the haptic loop
-    std::uint64_t denied = 0;        ///< forces and requests that only a controller may send
-    std::uint64_t unanswerable = 0;  ///< forces that answer a step which never was, or long ago
-    LinkStats controller;            ///< the link of the present controller, or of the last one
+    std::uint64_t replaced = 0;  ///< by a guest with the same key
+    std::uint64_t roamed = 0;    ///< changes of a guest's address
+    std::uint64_t half_open_forgotten = 0;
+    std::uint64_t malformed = 0;           ///< datagrams too long, or not of this protocol
+    std::uint64_t unknown_connection = 0;  ///< Data that belongs to nobody, or comes from the wrong address
+    Doorman::Stats hellos;                 ///< Hellos that did not lead to an Answer
+    std::uint64_t forces = 0;              ///< handed to the haptic loop
+    std::uint64_t denied = 0;              ///< forces and requests that only a controller may send
+    std::uint64_t unanswerable = 0;        ///< forces that answer a step which never was, or long ago
+    Dropped dropped;
+    LinkStats controller;  ///< the link of the present controller, or of the last one
   };
 
   /// What the operator should read in the log.
@@ -69,7 +98,7 @@ class NetworkLoop {
   /// Says goodbye to every guest. The last thing the network thread does.
   void close(LocalTime now);
 
-  const Stats& stats() const noexcept { return stats_; }
+  Stats stats() const;
 
   /// What happened since the last call, for the log; at most 64 are kept.
   std::vector<Notice> take_notices();
@@ -77,25 +106,35 @@ class NetworkLoop {
  private:
   struct Guest {
     Address address;
-    ClientRandom random;  ///< of its Hello: the same one again is the same attempt
+    ClientRandom random;   ///< of its Hello: the same one again is the same attempt
+    const ClientKey* key;  ///< null in suite 0
     std::string name;
     Role role;
-    Welcome welcome;
+    std::uint32_t loop_hz;
+    std::vector<std::byte> answer;  ///< for when it was lost
     Session session;
+    LocalTime arrived;
     std::uint64_t state_every = 1;  ///< haptic steps
     std::uint64_t last_state = 0;   ///< tick
     bool gone = false;
+  };
+  struct Refusal {
+    Code code;
+    std::string reason;
   };
 
   bool drain(LocalTime now);
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);
-  std::string reason_to_refuse(const Address& from, const Doorman::Guest& guest, Code& code) const;
+  bool answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest);
+  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, Role role) const;
+  void open(LocalTime now, Guest guest);
   void serve(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
   void answer(Guest& guest, std::uint32_t id, const Request& request);
   void leave(Guest& guest, const std::string& how);
+  void send_all(LocalTime now, Guest& guest);
   void publish();
   void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
@@ -107,6 +146,7 @@ class NetworkLoop {
   Mailboxes& mail_;
   Doorman doorman_;
   std::vector<Guest> guests_;
+  std::vector<Guest> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
 
   /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.

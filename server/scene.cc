@@ -358,20 +358,15 @@ struct Column {
   }
 };
 
-/// Where this server listens. UdpLink refuses other addresses too, but has no line to name.
-struct LoopbackAddress {
-  static std::string expected(const Unit&) {
-    return "a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", because what is sent is not encrypted and "
-           "anyone on a network could command forces";
-  }
+/// Where this server listens.
+struct ListenAddress {
+  static std::string expected(const Unit&) { return "an address like \"127.0.0.1:47100\" or \"[::1]:47100\""; }
 
   static Verdict take(const toml::node& node, const Unit& unit, Address& to) {
     const auto* text = node.as_string();
     if (text == nullptr) return Refusal{&node, expected(unit)};
     try {
-      const Address address = parse_address(**text);
-      if (!is_loopback(address)) return Refusal{&node, expected(unit)};
-      to = address;
+      to = parse_address(**text);
       return {};
     } catch (const std::invalid_argument&) {
       return Refusal{&node, expected(unit)};
@@ -717,7 +712,10 @@ void declare_scene(Table& scene, Draft& draft) {
 
   scene.table("network", [&draft](Table& keys) {
     Scene::Network& network = draft.scene.network;
-    keys.key("listen", network.listen, LoopbackAddress{}, "port 0 lets the system choose one");
+    keys.key("listen", network.listen, ListenAddress{},
+             "port 0 lets the system choose one. Without keys a loopback address");
+    keys.key("keys", network.keys, Path{},
+             "folder with a file NAME.key for each client, relative to this file; only they are let in");
     keys.key("max_observers", network.max_observers, kObservers, "guests besides the controller");
     keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
     keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
@@ -978,6 +976,7 @@ class Settlement {
 
   Scene scene(const std::filesystem::path& directory) {
     settle_motion(directory);
+    settle_network(directory);
     settle_control();
     // Rules of the constructors that are not among ours yet.
     Scene& scene = draft_.scene;
@@ -1028,6 +1027,17 @@ class Settlement {
       }
       draft_.hand.motion = ScriptedMotion(std::move(draft_.motion));
     });
+  }
+
+  void settle_network(const std::filesystem::path& directory) {
+    Scene::Network& network = draft_.scene.network;
+    if (network.keys) network.keys = directory / *network.keys;
+    // UdpLink refuses it too, but has no line to name.
+    if (!network.keys && !is_loopback(network.listen)) {
+      blame("network.listen", {},
+            "expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a folder of keys besides: "
+            "without keys anyone on the network could command forces");
+    }
   }
 
   void settle_control() {

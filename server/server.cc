@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/server.h"
 
-#include <sys/random.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <span>
-#include <system_error>
 #include <utility>
 
 #include "devices/simulated/simulated_device.h"
 #include "server/build_info.h"
 #include "server/clock.h"
 #include "server/flight_file.h"
+#include "server/key_folder.h"
 #include "server/log.h"
+#include "server/randomness.h"
 #include "server/realtime.h"
 
 namespace tendon {
@@ -26,17 +24,12 @@ constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is told at most this often, with how much of it there was.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
 
-void fill_random(std::span<std::byte> bytes) {
-  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw std::system_error(errno, std::system_category(), "the system gives no random numbers");
-  }
-}
-
 NetworkLoop::Config network_config(const Scene& scene, const DeviceInfo& device) {
   NetworkLoop::Config config;
   fill_random(config.secret);
   fill_random(std::as_writable_bytes(std::span(&config.first_connection_id, 1)));
   config.first_connection_id |= 1;  // never 0
+  if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
   config.server_name = "tendond " + std::string(kVersion);
   config.device_name = device.name;
   config.max_force = scene.loop.control.max_force;
@@ -67,7 +60,7 @@ Server::Server(const Scene& scene)
       started_(clock::now()),
       device_(std::make_unique<SimulatedDevice>(scene.device)),
       mail_(std::make_unique<Mailboxes>()),
-      link_(scene.network.listen),
+      link_(scene.network.listen, scene.network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       haptic_(scene.loop, *device_, *mail_),
       network_(network_config(scene, device_->info()), link_, *mail_),
       tell_next_(started_ + kTellPeriod) {

@@ -46,11 +46,12 @@ struct UdpLink::Socket {
   asio::ip::udp::socket udp{context};
 };
 
-UdpLink::UdpLink(const Address& listen) : socket_(std::make_unique<Socket>()) {
-  if (!is_loopback(listen)) {
+UdpLink::UdpLink(const Address& listen, Reach reach) : socket_(std::make_unique<Socket>()) {
+  if (reach == Reach::kThisMachine && !is_loopback(listen)) {
     throw std::invalid_argument("refusing to listen on " + to_string(listen) +
-                                ": the only cipher suite so far is `plain`, so anyone on the network could command "
-                                "forces; use a loopback address (127.0.0.1 or [::1])");
+                                ": there are no keys, so anyone on the network could command forces; use a loopback "
+                                "address (127.0.0.1 or [::1]), or give each client a key (`tendond keygen NAME`, and "
+                                "`keys` in the scene's [network])");
   }
   const udp::endpoint endpoint = to_endpoint(listen);
   try {

@@ -10,7 +10,13 @@
 
 namespace tendon {
 
-/// The real link: one UDP socket on one loopback address of this machine, IPv4 or IPv6.
+/// Who may reach a socket.
+enum class Reach : std::uint8_t {
+  kThisMachine,  ///< loopback only
+  kAnywhere,     ///< for those who let in nobody without a key
+};
+
+/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6.
 ///
 /// send() and receive() never wait; wait() is the only place where the network thread sleeps.
 /// Datagrams are whatever anyone on this machine cares to send: nothing here looks inside them.
@@ -19,11 +25,11 @@ namespace tendon {
 class UdpLink : public Link {
  public:
   /// Opens and binds; port 0 lets the system choose one (see local_address()).
-  /// Throws std::invalid_argument when `listen` is not a loopback address: the only cipher suite so
-  /// far is `plain`, so anyone on a network could command forces.
+  /// Throws std::invalid_argument when `listen` is not a loopback address, unless the caller says that it is
+  /// meant: without keys anyone on a network could command forces.
   /// Throws std::runtime_error when the system refuses:
   /// "cannot listen on 127.0.0.1:47100: Address already in use".
-  explicit UdpLink(const Address& listen);
+  explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine);
   ~UdpLink() override;
 
   /// A datagram that the system does not take at once (full buffer, no route, other address family)

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -48,9 +47,10 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
       config_(checked(config)),
       role_(role),
       period_(config.rate_hz > 0 ? from_seconds(1 / config.rate_hz) : Duration::zero()),
-      random_(config.seed),
+      secrets_(config.seed),
       back_off_(config.retry_min),
       next_call_(now) {
+  config_.seed = {};  // from it, whoever reads our memory later could find every key again
   greet(now);
 }
 
@@ -97,9 +97,9 @@ void ForceClient::greet(LocalTime now) {
   config.hello.role = role_;
   config.hello.name = config_.name;
   config.hello.features = {std::string(kFeatureLocalModel)};
-  const std::array<std::uint64_t, 2> random = {random_(), random_()};
-  static_assert(sizeof random == sizeof config.random);
-  std::memcpy(config.random.data(), random.data(), sizeof random);
+  const Key random = secrets_.next();
+  std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
+  if (config_.key) config.secret = {.key = *config_.key, .ephemeral = secrets_.next()};
   handshake_.emplace(config, now);
   give_up_ = now + config_.patience;
   stats_.phase = Phase::kGreeting;
@@ -119,7 +119,11 @@ void ForceClient::settle(LocalTime now) {
   welcome_ = accepted.welcome;
   Session::Config config;
   config.connection_id = accepted.connection_id;
-  session_.emplace(config, now);
+  if (accepted.keys) {
+    session_.emplace(config, *accepted.keys, now);
+  } else {
+    session_.emplace(config, now);
+  }
   if (config_.state_hz > 0) session_->request(SetStateRate{config_.state_hz});
   sequence_ = 0;
   stats_.phase = Phase::kOpen;
@@ -188,7 +192,9 @@ void ForceClient::take_events(LocalTime now) {
       unseen_ = arrived->state;
       back_off_ = config_.retry_min;
     } else if (const auto* closed = std::get_if<Session::Closed>(&*event)) {
-      end(now, Phase::kLost, closed->code, closed->reason);
+      const bool for_good = closed->code == Code::kReplaced;
+      flush(now);  // a Bye of our own
+      end(now, for_good ? Phase::kStopped : Phase::kLost, closed->code, closed->reason);
     }
   }
 }

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <random>
 #include <string>
 
+#include "protocol/crypto.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
@@ -51,6 +51,8 @@ using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)
 ///   which is due at once: the datagram's time stamp must not be older than the physics' work.
 ///   A force or stiffness that is not finite, or beyond limits::kMaxValue, is counted and not sent;
 ///   the server then treats this client as one that is late.
+/// * **Taken over.** Where a program with the same key has taken our place we do not come back: the two would
+///   take turns for ever.
 /// * **Reconnection.** However an attempt or a session ends (no answer, refused, Bye, silence), the next
 ///   attempt waits retry_min, then twice as long each time, at most retry_max. The first state of a
 ///   new session resets that. Each attempt has a new random.
@@ -74,7 +76,9 @@ class ForceClient {
     /// would otherwise be late by a delay variation of 3 ms. 100 ms: a gap is not a period; an engine
     /// slower than 10 Hz says so by rate_hz.
     Duration valid_for{};
-    std::uint64_t seed = 0;  ///< of the randoms of the handshakes; take one from the system at each start
+    /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
+    std::optional<Key> key{};
+    Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
     /// Hellos of one attempt go unanswered for so long before it is given up: 20 of them at the
     /// handshake's 100 ms, enough for a round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(2);
@@ -95,7 +99,7 @@ class ForceClient {
     kUnanswered = 3,  ///< nobody answered; waiting for the next attempt
     kRefused = 4,     ///< the server said no; waiting for the next attempt
     kLost = 5,        ///< the session has ended; waiting for the next attempt
-    kStopped = 6,     ///< stop() was called, or the callback threw; for good
+    kStopped = 6,     ///< stop() was called, the callback threw, or another has our place (kReplaced); for good
   };
 
   struct Stats {
@@ -160,7 +164,7 @@ class ForceClient {
   Watch watch_;      ///< the observer's callback
   Duration period_;  ///< of the callback; 0 = none
 
-  std::mt19937_64 random_;
+  Ratchet secrets_;
   std::optional<ClientHandshake> handshake_;
   std::optional<Session> session_;
   std::optional<Welcome> welcome_;

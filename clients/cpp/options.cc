@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/cpp/key_file.h"
+
 namespace tendon {
 namespace {
 
@@ -18,6 +20,15 @@ std::string check_address(const std::string& text) {
     parse_address(text);
     return {};
   } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+}
+
+std::string check_key(const std::string& file) {
+  try {
+    read_client_key(file);
+    return {};
+  } catch (const std::runtime_error& error) {
     return error.what();
   }
 }
@@ -55,6 +66,11 @@ CommandLine::CommandLine(std::string purpose, Options& options)
       ->type_name("HOST:PORT")
       ->default_str(to_string(options.server))
       ->check(CLI::Validator(check_address, ""));
+  app.add_option_function<std::string>(
+         "--key", [&](const std::string& file) { options.client.key = read_client_key(file).key; },
+         "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
+      ->type_name("FILE")
+      ->check(CLI::Validator(check_key, ""));
   app.add_option("--rate-hz", options.client.rate_hz, "Times per second; 0 = for every device state that arrives")
       ->capture_default_str()
       ->check(number(ForceClient::kMinRateHz, ForceClient::kMaxRateHz));

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/cpp/run.h"
 
+#include <sys/random.h>
+
 #include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <random>
+#include <stdexcept>
 #include <utility>
 
 #include "clients/cpp/udp_transport.h"
@@ -45,9 +47,12 @@ class StopSignals {
 
 LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
 
-std::uint64_t seed_from_system() {
-  std::random_device device;
-  return (std::uint64_t{device()} << 32U) | device();
+Seed seed_from_system() {
+  Seed seed;
+  if (getrandom(seed.bytes.data(), seed.bytes.size(), 0) != static_cast<ssize_t>(seed.bytes.size())) {
+    throw std::runtime_error("the system gives no random numbers");
+  }
+  return seed;
 }
 
 double milliseconds(Duration d) { return 1e3 * seconds(d); }
@@ -64,13 +69,15 @@ std::string sentence(const ForceClient& client, const Options& options) {
       return "connected to " + client.welcome()->device_name + " at " + server + " (" + client.welcome()->server +
              ", " + std::to_string(client.welcome()->loop_hz) + " Hz)";
     case ForceClient::Phase::kUnanswered:
-      return "no answer from " + server + "; is tendond running there? Trying on";
+      return "no answer from " + server + "; is tendond running there" +
+             (options.client.key ? ", and does it have this key" : "") + "? Trying on";
     case ForceClient::Phase::kRefused:
       return server + " refuses: " + stats.reason + (final(stats.code) ? "" : "; trying on");
     case ForceClient::Phase::kLost:
       return "lost " + server + ": " + stats.reason + "; trying on";
-    case ForceClient::Phase::kGreeting:
     case ForceClient::Phase::kStopped:
+      return stats.code == Code::kReplaced ? server + " has ended this: " + stats.reason : "";
+    case ForceClient::Phase::kGreeting:
       return {};
   }
   return {};
@@ -117,6 +124,7 @@ int run_with(const Options& options, Callback callback) {
       const LocalTime next = std::min(client.turn(now), end);
       if (const std::string text = sentence(client, options); !text.empty() && text != said) say(said = text);
       if (client.phase() == ForceClient::Phase::kRefused && final(client.stats().code)) return 1;
+      if (client.phase() == ForceClient::Phase::kStopped) return 1;
       transport.wait(std::min(next - now, kLongestWait));
       now = read_clock();
     }

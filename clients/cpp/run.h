@@ -17,7 +17,7 @@ struct Options {
 /// SIGTERM); then it says Bye. This is all that `main` needs: an exit code comes back.
 ///
 ///     0   it has been connected to the server
-///     1   it could not connect, the server refused it for good, or the callback threw
+///     1   it could not connect, the server refused it for good, another has its place, or the callback threw
 ///
 /// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps
 /// trying. stderr gets one sentence for each change of the connection, stdout nothing but the callback's

@@ -167,7 +167,8 @@ void RunObserver::observe(const DatagramRecord& datagram) {
   if (datagram.direction != DatagramRecord::Direction::kIn || datagram.size > datagram.bytes.size()) return;
   const std::span<const std::byte> bytes = std::span(datagram.bytes).first(datagram.size);
   const auto header = decode_header(bytes);
-  if (!header || header->type != DatagramType::kData) return;
+  // What is sealed stays sealed: the keys are not in the recording.
+  if (!header || header->type != DatagramType::kData || header->suite != Suite::kPlain) return;
   const DataContent* content = reader_.read(bytes.subspan(kHeaderSize));
   if (content == nullptr || !content->echo) return;
   if (std::ranges::none_of(content->frames,

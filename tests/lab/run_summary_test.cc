@@ -208,7 +208,7 @@ TEST(RunSummary, TheRoundTripIsWhatTheEchoesOfTheControllerSay) {
   DataWriter writer;
   // Written by the peer, to whom its own clock is local.
   writer.begin(
-      datagram.bytes, 1, 0, LocalTime(7002500us),
+      datagram.bytes, {.connection_id = 1}, LocalTime(7002500us),
       OutgoingEcho{.sent = PeerTime(100ms), .received = LocalTime(7000ms), .packet_number = 0, .received_mask = 0});
   ASSERT_TRUE(writer.add(
       ForceCommand{.sequence = 1, .based_on_tick = 1, .force = Vec3(1, 0, 0), .model = {}, .valid_for = 50ms}));

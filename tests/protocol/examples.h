@@ -83,7 +83,8 @@ template <class... Frames>
 Bytes data(std::uint64_t packet_number, const std::optional<OutgoingEcho>& with_echo, const Frames&... frames) {
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
-  writer.begin(buffer, kConnection, packet_number, LocalTime{Duration{1'000'100'000}}, with_echo);
+  writer.begin(buffer, {.connection_id = kConnection, .packet_number = packet_number},
+               LocalTime{Duration{1'000'100'000}}, with_echo);
   (writer.add(frames), ...);
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())};
 }
@@ -93,6 +94,14 @@ Bytes encoded(const Handshake& message) {
   std::array<std::byte, kMaxDatagram> buffer;
   const std::size_t size = encode(message, buffer);
   return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
+}
+
+/// In suite 0.
+inline Bytes hello_datagram(const Hello& hello) {
+  return encoded(HelloDatagram{.random = random(), .cookie = {}, .body = write_body(hello)});
+}
+inline Bytes answer_datagram(std::uint32_t connection_id, const Answer& answer) {
+  return encoded(AnswerDatagram{.connection_id = connection_id, .random = random(), .body = write_body(answer)});
 }
 
 struct Named {
@@ -106,10 +115,10 @@ inline std::vector<Named> datagrams() {
   const ControlAck ack{.id = 7, .code = Code::kOk, .detail = "500 Hz"};
   const Bye bye{.code = Code::kShutdown, .reason = "SIGTERM"};
   return {
-      {"hello", encoded(HelloDatagram{.random = random(), .cookie = Cookie{}, .hello = hello()})},
+      {"hello", hello_datagram(hello())},
       {"retry", encoded(RetryDatagram{.random = random(), .cookie = cookie()})},
-      {"welcome", encoded(AnswerDatagram{.connection_id = kConnection, .random = random(), .answer = welcome()})},
-      {"refused", encoded(AnswerDatagram{.connection_id = 0, .random = random(), .answer = refused()})},
+      {"welcome", answer_datagram(kConnection, welcome())},
+      {"refused", answer_datagram(0, refused())},
       {"keep-alive", data(0, {})},
       {"state", data(42, echo(), state())},
       {"force", data(43, echo(), force())},

@@ -51,9 +51,9 @@ RC_GTEST_PROP(ReplayWindow, DecidesAsASetWithAHorizonDoes, ()) {
   ReplayWindow window;
   std::set<std::uint64_t> model;
   std::uint64_t highest = *rc::gen::inRange<std::uint64_t>(0, 10'000);
-  const auto steps = *rc::gen::container<std::vector<int>>(rc::gen::inRange(-1100, 200));
+  const auto steps = *rc::gen::container<std::vector<int>>(rc::gen::inRange(-2200, 200));
   for (const int step : steps) {
-    const std::uint64_t number = step < 0 && highest < 1100 ? 0 : highest + static_cast<std::uint64_t>(step);
+    const std::uint64_t number = step < 0 && highest < 2200 ? 0 : highest + static_cast<std::uint64_t>(step);
     const bool too_old = !model.empty() && number + ReplayWindow::kRemembered <= *model.rbegin();
     RC_ASSERT(window.contains(number) == (too_old || model.count(number) == 1));
     if (window.contains(number)) continue;

@@ -416,7 +416,7 @@ TEST_F(TwoEnds, AReplayedDatagramIsCountedAndNothingElse) {
 
 TEST_F(TwoEnds, ADatagramOlderThanTheWindowIsDropped) {
   const auto old = pull(a_, now_);
-  for (std::uint64_t n = 1; n <= 1024; ++n) {
+  for (std::uint64_t n = 1; n <= 2048; ++n) {
     a_.send(force(n));
     deliver(z_, now_, pull(a_, now_));
   }

@@ -75,10 +75,10 @@ TEST(WireMd, ShowsBytesThatTheCodeReads) {
   const auto golden = golden_datagrams(TENDON_WIRE_MD);
   const auto hello = decode_hello(golden.at("hello"));
   ASSERT_TRUE(hello.has_value());
-  EXPECT_EQ(hello->hello.name, "wall");
+  EXPECT_EQ(read_hello(hello->body)->name, "wall");
   EXPECT_EQ(decode_retry(golden.at("retry"))->cookie, examples::cookie());
-  EXPECT_EQ(std::get<Welcome>(decode_answer(golden.at("welcome"))->answer).loop_hz, 1000U);
-  EXPECT_EQ(std::get<Refused>(decode_answer(golden.at("refused"))->answer).code, Code::kBusy);
+  EXPECT_EQ(std::get<Welcome>(*read_answer(decode_answer(golden.at("welcome"))->body)).loop_hz, 1000U);
+  EXPECT_EQ(std::get<Refused>(*read_answer(decode_answer(golden.at("refused"))->body)).code, Code::kBusy);
 
   DataReader reader;
   const Bytes& state = golden.at("state");

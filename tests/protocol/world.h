@@ -64,6 +64,13 @@ class World {
       : World(weather, weather, seed, config) {}
   World(const Weather& there, const Weather& back, std::uint64_t seed, const Session::Config& config)
       : a(config, at_a()), z(config, at_z()), a_to_z(there, 2 * seed), z_to_a(back, 2 * seed + 1) {}
+  /// … in suite 1, with the keys as A has them.
+  World(const Weather& there, const Weather& back, std::uint64_t seed, const Session::Config& config,
+        const SessionKeys& keys)
+      : a(config, keys, at_a()),
+        z(config, {.send = keys.receive, .receive = keys.send}, at_z()),
+        a_to_z(there, 2 * seed),
+        z_to_a(back, 2 * seed + 1) {}
 
   /// Until `end`, takes every turn that is due. `each_turn` is called before anything is sent.
   void run(

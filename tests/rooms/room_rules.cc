@@ -60,7 +60,7 @@ const std::vector<Door>& front_doors() {
       {"Asio", {"asio.hpp", "asio/"}, {"server/udp_link.cc", "clients/cpp/udp_transport.cc"}},
       {"CLI11", {"CLI/"}, {"server/main.cc", "clients/cpp/options.cc", "*_main.cc"}},
       {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
-      {"libsodium", {"sodium.h", "sodium/"}, {"protocol/handshake.cc"}},
+      {"libsodium", {"sodium.h", "sodium/"}, {"protocol/crypto.cc"}},
       {"protobuf", {"google/protobuf/", "*.pb.h"}, {"protocol/codec.cc", "server/recording_codec.cc"}},
       {"spdlog", {"spdlog/"}, {"server/log.cc"}},
       {"toml++", {"toml++/"}, {"server/scene.cc"}},
@@ -93,7 +93,7 @@ const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
 /// told the time. tests/core/time_test.cc shows that the time types of core have no now().
 const Names kClockReaders = {"server/clock.h",    "server/clock.cc", "server/server.cc", "clients/cpp/run.cc",
                              "tests/bench/",      "tests/e2e/",      "tests/realtime/",  "tests/core/time_test.cc",
-                             "tests/lab/cost.cc", "*_main.cc"};
+                             "tests/lab/cost.cc", "tests/injector/real_time.cc", "*_main.cc"};
 
 // ---- Reading --------------------------------------------------------------------------------------------------------
 
@@ -323,7 +323,7 @@ std::vector<Finding> check(const std::vector<File>& tree) {
 }
 
 std::vector<File> read_tree(const std::filesystem::path& root) {
-  static const std::set<std::string> kMadeHere = {".git", ".cache", "build", "dist", "node_modules"};
+  static const std::set<std::string> kMadeHere = {".git", ".cache", "__pycache__", "build", "dist", "node_modules"};
   std::vector<File> tree;
   for (auto entry = std::filesystem::recursive_directory_iterator(root); entry != std::filesystem::end(entry);
        ++entry) {

@@ -91,7 +91,7 @@ TEST(Rooms, EveryLibraryHasOneFrontDoor) {
                                                       {"google/protobuf/arena.h", "protocol/codec.cc"},
                                                       {"tendon.pb.h", "protocol/codec.cc"},
                                                       {"recording.pb.h", "server/recording_codec.cc"},
-                                                      {"sodium.h", "protocol/handshake.cc"},
+                                                      {"sodium.h", "protocol/crypto.cc"},
                                                       {"spdlog/spdlog.h", "server/log.cc"},
                                                       {"toml++/toml.h", "server/scene.cc"},
                                                       {"zlib.h", "server/mcap_format.cc"}}) {

@@ -454,7 +454,7 @@ TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
 
 TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
   EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
-            "s.toml:5: network.zzzzzz: unknown key; known here: listen, max_observers, controller_timeout_ms, "
+            "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, max_observers, controller_timeout_ms, "
             "observer_timeout_ms");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found \"x\"");
@@ -620,13 +620,18 @@ TEST(SceneError, ABoundAboveTheTrueFrictionVoidsTheProof) {
   EXPECT_NE(per_axis.find("(an axis by itself has 1/√3 of it)"), std::string::npos) << per_axis;
 }
 
-TEST(SceneError, ListensOnThisMachineOnly) {
-  for (const std::string text :
-       {"0.0.0.0:47100", "192.168.1.20:47100", "127.0.0.1", "tendon.example:1", "[::1]:99999"}) {
-    const std::string error = error_of_minimal_and("[network]\nlisten = \"" + text + "\"\n");
-    EXPECT_EQ(error,
-              "s.toml:5: network.listen: expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", "
-              "because what is sent is not encrypted and anyone on a network could command forces, found \"" +
+TEST(SceneError, WithoutKeysItListensOnThisMachineOnly) {
+  for (const std::string text : {"0.0.0.0:47100", "192.168.1.20:47100", "[::]:47100"}) {
+    EXPECT_EQ(error_of_minimal_and("[network]\nlisten = \"" + text + "\"\n"),
+              "s.toml:5: network.listen: expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a "
+              "folder of keys besides: without keys anyone on the network could command forces");
+    const Scene scene = parse(std::string(kMinimal) + "[network]\nlisten = \"" + text + "\"\nkeys = \"keys\"\n", "lab");
+    EXPECT_EQ(to_string(scene.network.listen), text);
+    EXPECT_EQ(scene.network.keys, std::filesystem::path("lab/keys"));
+  }
+  for (const std::string text : {"127.0.0.1", "tendon.example:1", "[::1]:99999"}) {
+    EXPECT_EQ(error_of_minimal_and("[network]\nlisten = \"" + text + "\"\n"),
+              "s.toml:5: network.listen: expected an address like \"127.0.0.1:47100\" or \"[::1]:47100\", found \"" +
                   text + "\"");
   }
 }

@@ -112,9 +112,15 @@ TEST(UdpLink, RefusesAnAddressThatOthersCanReachAndSaysWhy) {
   for (const char* const text : {"0.0.0.0:47100", "[::]:47100", "192.168.1.20:47100"}) {
     EXPECT_EQ(complaint_about<std::invalid_argument>(parse_address(text)),
               "refusing to listen on " + std::string(text) +
-                  ": the only cipher suite so far is `plain`, so anyone on the network could command forces; use a "
-                  "loopback address (127.0.0.1 or [::1])");
+                  ": there are no keys, so anyone on the network could command forces; use a loopback address "
+                  "(127.0.0.1 or [::1]), or give each client a key (`tendond keygen NAME`, and `keys` in the scene's "
+                  "[network])");
   }
+}
+
+TEST(UdpLink, ListensWhereItIsToldToWhenThatIsMeant) {
+  const UdpLink link(parse_address("0.0.0.0:0"), Reach::kAnywhere);
+  EXPECT_NE(link.local_address().port, 0);
 }
 
 TEST(UdpLink, TheDoorbellEndsAWaitAndIsAnswered) {

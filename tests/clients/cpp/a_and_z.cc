@@ -98,7 +98,7 @@ void Server::hello(LocalTime now, const Address& from, std::span<const std::byte
     }
   }
   if (refusal) {
-    send(Doorman::refuse(reply.guest->random, *refusal, buffer));
+    send(doorman_.refuse(*reply.guest, *refusal, buffer).size);
     return;
   }
   Welcome welcome;
@@ -110,7 +110,7 @@ void Server::hello(LocalTime now, const Address& from, std::span<const std::byte
   welcome.loop_hz = kLoopHz;
   welcome.timeout = std::chrono::seconds(2);
   welcome.server = "Z";
-  send(Doorman::welcome(connection_id_, reply.guest->random, welcome, buffer));
+  send(doorman_.welcome(*reply.guest, connection_id_, welcome, buffer).size);
 }
 
 void Server::flush(LocalTime now) {

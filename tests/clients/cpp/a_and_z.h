@@ -22,8 +22,8 @@
 
 namespace tendon::a_and_z {
 
-inline const Address a_address = parse_address("192.0.2.1:50000");
-inline const Address z_address = parse_address("192.0.2.26:47100");
+inline const Address a_address = parse_address("127.0.0.2:50000");
+inline const Address z_address = parse_address("127.0.0.1:47100");
 
 /// Loses, delays and (by its jitter) reorders. The delay must be above zero.
 struct Weather {

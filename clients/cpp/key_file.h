@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "protocol/client_key.h"
+
+namespace tendon {
+
+/// The key in this file, as `tendond keygen` writes it. Throws std::runtime_error, "FILE: what is wrong": it
+/// cannot be read, others may read it, it is no key file, or the key is weak.
+ClientKey read_client_key(const std::string& file);
+
+}  // namespace tendon

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <optional>
+#include <random>
+#include <stdexcept>
+
+#include "protocol/handshake.h"
+#include "tests/protocol/examples.h"
+
+// The door in suite 1: who gets in, who hears nothing, and what it costs us.
+
+namespace tendon {
+namespace {
+
+using examples::Bytes;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+using Buffer = std::array<std::byte, kMaxDatagram>;
+
+Bytes first(const Buffer& buffer, std::size_t size) {
+  return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
+}
+
+/// A is a client with the key "wall", Z the door it stands before, far away.
+class SealedHandshake : public testing::Test {
+ protected:
+  ClientHandshake::Config client_config() {
+    ClientHandshake::Config config;
+    config.hello = examples::hello();
+    const Key random = secrets_.next();
+    std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
+    config.secret = {.key = key_.key, .ephemeral = secrets_.next()};
+    return config;
+  }
+  Doorman::Config door_config() {
+    Doorman::Config config;
+    config.secret.fill(std::byte{0x5A});
+    config.keys = {key_, {.name = "screen", .role = Role::kObserver, .key = secrets_.next()}};
+    return config;
+  }
+
+  Bytes said_by(ClientHandshake& client) { return first(buffer_, client.next_datagram(now_, buffer_)); }
+  Doorman::Reply knock(const Bytes& datagram) { return z_.receive(now_, from_, datagram, answer_); }
+  Bytes reply_to(const Bytes& datagram) { return first(answer_, knock(datagram).size); }
+
+  /// The Hello with a cookie that is good from `from_`.
+  Bytes hello_with_cookie(ClientHandshake& client) {
+    client.receive(now_, reply_to(said_by(client)));
+    return said_by(client);
+  }
+  Bytes hello_with_cookie() {
+    ClientHandshake client(client_config(), now_);
+    return hello_with_cookie(client);
+  }
+
+  Ratchet secrets_{1};
+  ClientKey key_{.name = "wall", .role = Role::kController, .key = secrets_.next()};
+  LocalTime now_{seconds(1000)};
+  Address from_ = parse_address("192.0.2.1:4000");
+  Buffer buffer_{};
+  Buffer answer_{};
+  Doorman z_{door_config()};
+  ClientHandshake a_{client_config(), now_};
+};
+
+TEST_F(SealedHandshake, EndsWithTheSameKeysAtBothEnds) {
+  const auto reply = knock(hello_with_cookie(a_));
+  EXPECT_EQ(reply.size, 0U);
+  ASSERT_TRUE(reply.guest.has_value());
+  EXPECT_EQ(reply.guest->hello.name, "wall");
+  EXPECT_EQ(reply.guest->key->name, "wall");
+  const auto answered = z_.welcome(*reply.guest, 77, examples::welcome(), answer_);
+  a_.receive(now_, first(answer_, answered.size));
+  ASSERT_TRUE(a_.outcome().has_value());
+  const auto& accepted = std::get<ClientHandshake::Accepted>(*a_.outcome());
+  EXPECT_EQ(accepted.connection_id, 77U);
+  EXPECT_EQ(accepted.welcome.device_name, "simulated");
+  ASSERT_TRUE(accepted.keys && answered.keys);
+  EXPECT_EQ(accepted.keys->send.bytes(), answered.keys->receive.bytes());
+  EXPECT_EQ(accepted.keys->receive.bytes(), answered.keys->send.bytes());
+}
+
+TEST_F(SealedHandshake, NoWordOfIt) {
+  const Bytes hello = hello_with_cookie(a_);
+  const auto reply = knock(hello);
+  const Bytes answer = first(answer_, z_.welcome(*reply.guest, 77, examples::welcome(), answer_).size);
+  const auto holds = [](const Bytes& bytes, std::string_view word) {
+    const auto raw = std::as_bytes(std::span(word));
+    return std::search(bytes.begin(), bytes.end(), raw.begin(), raw.end()) != bytes.end();
+  };
+  EXPECT_FALSE(holds(hello, "local-model"));
+  EXPECT_FALSE(holds(answer, "simulated"));
+}
+
+TEST_F(SealedHandshake, TwoSessionsOfOneKeyHaveNoKeyInCommon) {
+  std::optional<SessionKeys> before;
+  for (int i = 0; i < 2; ++i) {
+    const auto reply = knock(hello_with_cookie());
+    const auto answered = z_.welcome(*reply.guest, 77, examples::welcome(), answer_);
+    if (before) {
+      EXPECT_NE(before->send.bytes(), answered.keys->send.bytes());
+      EXPECT_NE(before->receive.bytes(), answered.keys->receive.bytes());
+    }
+    before = answered.keys;
+  }
+}
+
+TEST_F(SealedHandshake, OneAttemptHasOneNoiseMessageWhateverCookiesItCollects) {
+  const Bytes one = hello_with_cookie(a_);
+  now_ += seconds(500);
+  a_.receive(now_, reply_to(one));
+  now_ = std::max(now_, a_.next_tick());
+  a_.tick(now_);
+  const Bytes other = said_by(a_);
+  ASSERT_EQ(other.size(), one.size());
+  EXPECT_NE(Bytes(one.begin() + 32, one.begin() + 48), Bytes(other.begin() + 32, other.begin() + 48));
+  EXPECT_EQ(Bytes(one.begin() + 48, one.end()), Bytes(other.begin() + 48, other.end()));
+}
+
+TEST_F(SealedHandshake, AnUnknownKeyAForgedMessageAndPlaintextHearNothing) {
+  const Bytes good = hello_with_cookie();
+  const auto silent = [&](const Bytes& datagram) {
+    const auto reply = knock(datagram);
+    return reply.size == 0 && !reply.guest;
+  };
+  Bytes unknown = good;
+  unknown[50] ^= std::byte{1};
+  EXPECT_TRUE(silent(unknown));
+  EXPECT_EQ(z_.stats().unknown_key, 1U);
+  for (const std::size_t at : {std::size_t{58}, std::size_t{90}, std::size_t{120}}) {
+    Bytes forged = good;
+    forged[at] ^= std::byte{1};
+    EXPECT_TRUE(silent(forged)) << at;
+  }
+  EXPECT_EQ(z_.stats().forged, 3U);
+  Bytes shorter = good;
+  shorter[48] = std::byte{20};
+  std::fill(shorter.begin() + 70, shorter.end(), std::byte{0});
+  EXPECT_TRUE(silent(shorter));
+  EXPECT_EQ(z_.stats().malformed, 1U);
+  EXPECT_TRUE(silent(examples::hello_datagram(examples::hello())));
+  EXPECT_EQ(z_.stats().plain, 1U);
+  EXPECT_TRUE(knock(good).guest.has_value());
+}
+
+TEST_F(SealedHandshake, NothingSpokenInTheClearMovesAClientWithAKey) {
+  said_by(a_);
+  ClientHandshake::Config config = client_config();
+  a_ = ClientHandshake(config, now_);
+  said_by(a_);
+  const auto in_the_clear = [&](const Answer& answer) {
+    return examples::encoded(AnswerDatagram{.connection_id = 1, .random = config.random, .body = write_body(answer)});
+  };
+  a_.receive(now_, in_the_clear(examples::welcome()));
+  a_.receive(now_, in_the_clear(examples::refused()));
+  EXPECT_FALSE(a_.outcome().has_value());
+  a_.receive(now_, examples::encoded(RetryDatagram{.random = config.random, .cookie = examples::cookie()}));
+  EXPECT_EQ(said_by(a_).size(), 0U);
+}
+
+TEST_F(SealedHandshake, AnAnswerThatWasTamperedWithIsIgnoredAndTheTrueOneStillCounts) {
+  const auto reply = knock(hello_with_cookie(a_));
+  const Bytes good = first(answer_, z_.refuse(*reply.guest, examples::refused(), answer_).size);
+  for (std::size_t at = 16; at < good.size(); ++at) {
+    Bytes bad = good;
+    bad[at] ^= std::byte{1};
+    a_.receive(now_, bad);
+    ASSERT_FALSE(a_.outcome().has_value()) << at;
+  }
+  a_.receive(now_, good);
+  EXPECT_TRUE(a_.outcome().has_value());
+}
+
+TEST_F(SealedHandshake, AReplayedHelloIsWorthNothingFromAnotherAddress) {
+  const Bytes hello = hello_with_cookie();
+  from_ = parse_address("192.0.2.2:4000");
+  const auto reply = knock(hello);
+  EXPECT_FALSE(reply.guest.has_value());
+  EXPECT_EQ(reply.size, 48U);
+}
+
+TEST_F(SealedHandshake, TooManyHellosOfOneSourceAreDroppedAndAnotherSourceIsNot) {
+  const Bytes hello = hello_with_cookie();
+  for (int i = 0; i < 100; ++i) knock(hello);
+  EXPECT_EQ(z_.stats().limited, 100U - HelloLimit::kBurst);
+  from_ = parse_address("192.0.2.2:4000");
+  EXPECT_TRUE(knock(hello_with_cookie()).guest.has_value());
+}
+
+TEST_F(SealedHandshake, AMillionSpoofedHellosChangeNothingButACounter) {
+  Bytes spoofed = said_by(a_);
+  std::mt19937_64 random(1);
+  Address from;
+  from.ip[10] = from.ip[11] = 0xFF;
+  z_.receive(now_, from, spoofed, answer_);
+  const std::uint64_t before = z_.stats().retries;
+  const std::size_t memory = mallinfo2().uordblks;
+  for (int i = 0; i < 1'000'000; ++i) {
+    const std::uint64_t bits = random();
+    for (std::size_t b = 0; b < 4; ++b) from.ip[12 + b] = static_cast<std::uint8_t>(bits >> (8 * b));
+    from.port = static_cast<std::uint16_t>(bits >> 32U);
+    spoofed[16] = static_cast<std::byte>(bits >> 48U);
+    const auto reply = z_.receive(now_, from, spoofed, answer_);
+    ASSERT_TRUE(reply.size == 48 && !reply.guest);
+  }
+  EXPECT_EQ(mallinfo2().uordblks, memory);
+  EXPECT_EQ(z_.stats().retries, before + 1'000'000);
+  EXPECT_EQ(z_.stats().limited + z_.stats().unknown_key + z_.stats().forged + z_.stats().malformed, 0U);
+  // And whoever really is at one of these addresses gets in.
+  from_ = from;
+  EXPECT_TRUE(knock(hello_with_cookie()).guest.has_value());
+}
+
+TEST_F(SealedHandshake, NoReplyIsEverLongerThanWhatItAnswers) {
+  const Bytes hello = hello_with_cookie();
+  std::mt19937_64 random(2);
+  for (int i = 0; i < 20'000; ++i) {
+    Bytes bad = hello;
+    for (std::uint64_t changes = random() % 4; changes > 0; --changes) {
+      bad[random() % (changes % 2 == 0 ? bad.size() : 160)] = static_cast<std::byte>(random());
+    }
+    if (random() % 2 == 0) bad.resize(random() % bad.size());
+    now_ += milliseconds(50);
+    const auto reply = knock(bad);
+    ASSERT_LE(reply.size, bad.size());
+    if (!reply.guest) continue;
+    Welcome fullest = examples::welcome();
+    fullest.device_name.assign(1000, 'x');
+    fullest.server.assign(1000, 'x');
+    fullest.features.assign(100, std::string(100, 'f'));
+    Refused longest = examples::refused();
+    longest.detail.assign(1000, 'x');
+    ASSERT_LT(z_.welcome(*reply.guest, 1, fullest, answer_).size, bad.size());
+    ASSERT_LT(z_.refuse(*reply.guest, longest, answer_).size, bad.size());
+  }
+}
+
+TEST_F(SealedHandshake, TwoClientsWithOneKeyAreAMistakeThatIsToldAtOnce) {
+  Doorman::Config config = door_config();
+  config.keys.push_back({.name = "copy", .role = Role::kController, .key = key_.key});
+  try {
+    Doorman door(config);
+    FAIL();
+  } catch (const std::invalid_argument& refused) {
+    EXPECT_STREQ(refused.what(), "the clients \"wall\" and \"copy\" have the same key: each needs one of its own");
+  }
+}
+
+}  // namespace
+}  // namespace tendon

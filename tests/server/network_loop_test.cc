@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/network_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/cpp/force_client.h"
+
+// The server's network half against real clients and forgers, on virtual time, over a perfect network.
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+using Bytes = std::vector<std::byte>;
+struct Datagram {
+  Address from;
+  Address to;
+  Bytes bytes;
+};
+
+/// Everything that is under way; a test may look at it, change it and put things in.
+using Wire = std::deque<Datagram>;
+
+class End : public Link {
+ public:
+  End(Wire& wire, const Address& address) : self(address), wire_(wire) {}
+  void send(const Address& to, std::span<const std::byte> datagram) override {
+    wire_.push_back({self, to, {datagram.begin(), datagram.end()}});
+    sent += datagram.size();
+  }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    if (inbox.empty()) return 0;
+    const Datagram datagram = std::move(inbox.front());
+    inbox.pop_front();
+    from = datagram.from;
+    std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
+    return datagram.bytes.size();
+  }
+
+  Address self;
+  std::deque<Datagram> inbox;
+  std::size_t sent = 0;
+
+ private:
+  Wire& wire_;
+};
+
+ClientKey key_of(const std::string& name, Role role, std::uint64_t seed) {
+  return {.name = name, .role = role, .key = Ratchet(seed).next()};
+}
+
+/// Z, the server, and whoever a test lets come.
+class SealedServer : public testing::Test {
+ protected:
+  struct Client {
+    std::unique_ptr<End> end;
+    std::unique_ptr<ForceClient> client;
+  };
+
+  SealedServer() {
+    NetworkLoop::Config config;
+    config.keys = {wall_, other_, screen_};
+    restart(config);
+  }
+
+  void restart(NetworkLoop::Config config) {
+    config.secret.fill(std::byte{7});
+    config.device_name = "device";
+    loop_ = std::make_unique<NetworkLoop>(config, server_, *mail_);
+  }
+
+  static ForceClient::Config config_of(const std::optional<ClientKey>& key, std::uint64_t seed) {
+    ForceClient::Config config;
+    config.name = key ? key->name : "plain";
+    if (key) config.key = key->key;
+    config.seed = seed;
+    return config;
+  }
+  Client controller(const std::optional<ClientKey>& key, const std::string& address) {
+    Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
+    client.client = std::make_unique<ForceClient>(
+        *client.end, server_.self, config_of(key, ++seed_), [](const DeviceState&) { return Touch(Vec3(1, 0, 0)); },
+        now_);
+    return client;
+  }
+  Client observer(const std::optional<ClientKey>& key, const std::string& address) {
+    Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
+    client.client = std::make_unique<ForceClient>(
+        *client.end, server_.self, config_of(key, ++seed_), [](const DeviceState&, const LinkStats&) {}, now_);
+    return client;
+  }
+
+  /// Time passes, 1 ms at a time; the device makes a step in each. `on_the_way` may change or drop.
+  template <class OnTheWay>
+  void run(Duration length, std::vector<Client*> clients, OnTheWay on_the_way) {
+    for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
+      DeviceState state;
+      state.tick = ++tick_;
+      state.sampled = PeerTime(now_.time_since_epoch());
+      mail_->state.put(state);
+      loop_->turn(now_);
+      for (Client* client : clients) client->client->turn(now_);
+      for (const std::size_t count = wire_.size(); count_ < count; ++count_) {
+        Datagram datagram = wire_[count_];
+        if (!on_the_way(datagram)) continue;
+        if (datagram.to == server_.self) server_.inbox.push_back(datagram);
+        for (Client* client : clients) {
+          if (datagram.to == client->end->self) client->end->inbox.push_back(datagram);
+        }
+      }
+    }
+  }
+  void run(Duration length, std::vector<Client*> clients) {
+    run(length, std::move(clients), [](Datagram&) { return true; });
+  }
+  void deliver(const Address& from, const Bytes& bytes) { server_.inbox.push_back({from, server_.self, bytes}); }
+  static ForceClient::Phase phase(const Client& client) { return client.client->phase(); }
+
+  ClientKey wall_ = key_of("wall", Role::kController, 1);
+  ClientKey other_ = key_of("other", Role::kController, 2);
+  ClientKey screen_ = key_of("screen", Role::kObserver, 3);
+  LocalTime now_{seconds(1000)};
+  Wire wire_;
+  std::size_t count_ = 0;  ///< of the wire, delivered
+  End server_{wire_, parse_address("192.0.2.100:47100")};
+  std::unique_ptr<Mailboxes> mail_ = std::make_unique<Mailboxes>();
+  std::unique_ptr<NetworkLoop> loop_;
+  std::uint64_t tick_ = 0;
+  std::uint64_t seed_ = 10;
+};
+
+using Phase = ForceClient::Phase;
+
+TEST_F(SealedServer, LetsAClientWithAKeyInFromAnywhereAndItsForcesArrive) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(1), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_EQ(loop_->stats().welcomed, 1U);
+  EXPECT_GT(loop_->stats().forces, 500U);
+  EXPECT_EQ(loop_->stats().dropped.forged, 0U);
+}
+
+TEST_F(SealedServer, IsSilentForAKeyItDoesNotHave) {
+  Client a = controller(key_of("stranger", Role::kController, 99), "192.0.2.1:4000");
+  run(seconds(5), {&a});
+  EXPECT_NE(phase(a), Phase::kOpen);
+  EXPECT_EQ(a.client->stats().sessions, 0U);
+  EXPECT_GT(loop_->stats().hellos.unknown_key, 10U);
+  for (const Datagram& datagram : wire_) {
+    EXPECT_TRUE(datagram.from != server_.self || datagram.bytes.size() == 48);  // Retries
+  }
+}
+
+TEST_F(SealedServer, IsSilentForPlaintextFromAnotherMachine) {
+  Client a = controller(std::nullopt, "192.0.2.1:4000");
+  run(seconds(3), {&a});
+  EXPECT_EQ(server_.sent, 0U);
+  EXPECT_GT(loop_->stats().hellos.plain, 10U);
+}
+
+TEST_F(SealedServer, TellsAPlainClientOnThisMachineThatItWantsAKey) {
+  Client a = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(50), {&a});
+  EXPECT_EQ(phase(a), Phase::kRefused);
+  EXPECT_EQ(a.client->stats().code, Code::kDenied);
+  EXPECT_EQ(a.client->stats().reason, "this server lets in those who have a key: --key FILE");
+}
+
+TEST_F(SealedServer, AnObserversKeyDoesNotControl) {
+  Client a = controller(screen_, "192.0.2.1:4000");
+  Client b = observer(screen_, "192.0.2.2:4000");
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(phase(a), Phase::kRefused);
+  EXPECT_EQ(a.client->stats().code, Code::kDenied);
+  EXPECT_EQ(phase(b), Phase::kOpen);
+}
+
+TEST_F(SealedServer, ASecondControllerIsRefusedAndSaysWhoControls) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(100), {&a});
+  Client b = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_EQ(phase(b), Phase::kRefused);
+  EXPECT_NE(b.client->stats().reason.find("controlled by \"wall\""), std::string::npos);
+}
+
+TEST_F(SealedServer, TheSameKeyTakesItsPlaceAtOnceAndTheOneBeforeStaysAway) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(100), {&a});
+  Client b = controller(wall_, "192.0.2.2:4000");
+  run(milliseconds(100), {&a, &b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(phase(a), Phase::kStopped);
+  EXPECT_EQ(a.client->stats().code, Code::kReplaced);
+  EXPECT_EQ(loop_->stats().replaced, 1U);
+  run(seconds(30), {&a, &b});
+  EXPECT_EQ(b.client->stats().sessions, 1U);
+}
+
+TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(500), {&a});
+  // From its own address, where its cookie is good, and after the server has forgotten this attempt's Answer.
+  Bytes hello;
+  for (const Datagram& datagram : wire_) {
+    if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;
+  }
+  a.client->stop(now_);
+  run(milliseconds(10), {&a});
+  Client b = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(500), {&b});
+  const auto before = loop_->stats();
+  const std::uint64_t sessions = b.client->stats().sessions;
+  for (int i = 0; i < 10; ++i) {
+    deliver(a.end->self, hello);
+    run(milliseconds(100), {&b});
+  }
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(b.client->stats().sessions, sessions);
+  EXPECT_EQ(loop_->stats().welcomed, before.welcomed);
+  EXPECT_EQ(loop_->stats().replaced, 0U);
+}
+
+TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  // The Answer never arrives.
+  const auto no_answers = [&](Datagram& d) { return d.from != server_.self || d.bytes.size() == 48; };
+  run(milliseconds(300), {&a}, no_answers);
+  EXPECT_EQ(loop_->stats().welcomed, 0U);
+  std::set<std::size_t> sizes;
+  for (const Datagram& d : wire_) {
+    if (d.from == server_.self) sizes.insert(d.bytes.size());
+  }
+  EXPECT_EQ(sizes.size(), 2U);  // Retries, and one Answer again and again: no state
+  Client b = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(100), {&b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  run(seconds(6), {&b});
+  EXPECT_EQ(loop_->stats().half_open_forgotten, 1U);
+}
+
+TEST_F(SealedServer, ManyHalfOpenSessionsDoNotKeepANewOneOut) {
+  for (int i = 0; i < 100; ++i) {
+    Client a = controller(wall_, "192.0.2." + std::to_string(1 + i % 50) + ":" + std::to_string(4000 + i));
+    run(milliseconds(5), {&a}, [&](Datagram& d) { return d.from != server_.self || d.bytes.size() == 48; });
+  }
+  EXPECT_GE(loop_->stats().half_open_forgotten, 80U);
+  Client b = controller(wall_, "192.0.2.200:4000");
+  run(milliseconds(100), {&b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+}
+
+TEST_F(SealedServer, FollowsAClientWhoseAddressChanges) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(1), {&a});
+  a.end->self = parse_address("198.51.100.7:61000");
+  const std::uint64_t states = a.client->stats().states;
+  run(seconds(1), {&a});
+  EXPECT_EQ(loop_->stats().roamed, 1U);
+  EXPECT_EQ(a.client->stats().sessions, 1U);
+  EXPECT_GT(a.client->stats().states, states + 900);
+}
+
+TEST_F(SealedServer, AReplayFromElsewhereDoesNotLeadItsAnswersAway) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(1), {&a});
+  const Address thief = parse_address("203.0.113.9:9");
+  const std::size_t heard = wire_.size();
+  for (std::size_t i = 0; i < heard; ++i) {
+    if (wire_[i].to == server_.self) deliver(thief, wire_[i].bytes);
+  }
+  run(seconds(1), {&a});
+  EXPECT_EQ(loop_->stats().roamed, 0U);
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  std::size_t to_thief = 0;
+  for (std::size_t i = heard; i < wire_.size(); ++i) {
+    if (wire_[i].to == thief) to_thief += wire_[i].bytes.size() > 48 ? 1U : 0U;
+  }
+  EXPECT_EQ(to_thief, 0U);
+}
+
+TEST_F(SealedServer, ASessionThatHasReachedItsAgeIsBegunAgainByItsClient) {
+  NetworkLoop::Config config;
+  config.keys = {wall_};
+  config.rekey = {.datagrams = 500, .age = seconds(3)};
+  config.session_life = seconds(20);
+  restart(config);
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(50), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_EQ(a.client->stats().sessions, 3U);
+  EXPECT_EQ(loop_->stats().timed_out, 0U);
+  EXPECT_EQ(loop_->stats().dropped.forged + loop_->stats().dropped.old_key, 0U);
+}
+
+TEST_F(SealedServer, ObserversOfOneKeyMayBeMany) {
+  std::vector<Client> clients;
+  std::vector<Client*> all;
+  for (int i = 0; i < 8; ++i) clients.push_back(observer(screen_, "192.0.2." + std::to_string(1 + i) + ":4000"));
+  for (Client& client : clients) all.push_back(&client);
+  run(seconds(1), all);
+  for (const Client& client : clients) EXPECT_EQ(phase(client), Phase::kOpen);
+  Client ninth = observer(screen_, "192.0.2.9:4000");
+  all.push_back(&ninth);
+  run(milliseconds(50), all);
+  EXPECT_EQ(phase(ninth), Phase::kRefused);
+}
+
+}  // namespace
+}  // namespace tendon
