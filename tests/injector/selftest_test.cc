@@ -108,12 +108,12 @@ struct Fit {
   const char* profile;
   Direction direction;
   const char* histogram;
-  double bound;  ///< Kolmogorov's distance; what the fit reaches, rounded up: it shall not get worse unseen
+  double bound;  ///< Kolmogorov's distance; what the fit by mean and deviation reaches, rounded up: not worse unseen
 };
 
 void PrintTo(const Fit& fit, std::ostream* out) { *out << fit.profile << " against " << fit.histogram; }
 
-class NamedProfiles : public testing::TestWithParam<Fit> {};
+class NamedProfileFit : public testing::TestWithParam<Fit> {};
 
 /// Of 100 000 delays, each for itself: without order and without loss.
 double distance_from(const Fit& fit, const Cdf& law) {
@@ -130,7 +130,7 @@ double distance_from(const Fit& fit, const Cdf& law) {
   return kolmogorov_distance(delays, law);
 }
 
-TEST_P(NamedProfiles, AreAsCloseToTheMeasuredHistogramsAsTheySay) {
+TEST_P(NamedProfileFit, AreAsCloseToTheMeasuredHistogramsAsTheySay) {
   const char* const data = std::getenv("TENDON_DATA");
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no measured histograms";
   const auto law = histogram_law(std::filesystem::path(data) / "d6g-tsn-5g/hist" / GetParam().histogram);
@@ -142,11 +142,11 @@ TEST_P(NamedProfiles, AreAsCloseToTheMeasuredHistogramsAsTheySay) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    FiveG, NamedProfiles,
-    testing::Values(Fit{"5g-urllc", Direction::kUp, "5G-URLLC-mmW-Uplink_PD-Wireless-5G-3a.csv", 0.035},
-                    Fit{"5g-urllc", Direction::kDown, "5G-URLLC-mmW-Downlink_PD-Wireless-5G-3a.csv", 0.02},
-                    Fit{"5g-midband", Direction::kUp, "5G-midband-Uplink_PD-Wireless-5G-2a.csv", 0.065},
-                    Fit{"5g-midband", Direction::kDown, "5G-midband-Downlink_PD-Wireless-5G-2a.csv", 0.06}));
+    FiveG, NamedProfileFit,
+    testing::Values(Fit{"5g-urllc", Direction::kUp, "5G-URLLC-mmW-Uplink_PD-Wireless-5G-3a.csv", 0.075},
+                    Fit{"5g-urllc", Direction::kDown, "5G-URLLC-mmW-Downlink_PD-Wireless-5G-3a.csv", 0.03},
+                    Fit{"5g-midband", Direction::kUp, "5G-midband-Uplink_PD-Wireless-5G-2a.csv", 0.095},
+                    Fit{"5g-midband", Direction::kDown, "5G-midband-Downlink_PD-Wireless-5G-2a.csv", 0.18}));
 
 }  // namespace
 }  // namespace tendon::injector
