@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A physics engine in Python touches a real hand: the client of the Tendon haptics server.
+
+    import tendon
+
+    with tendon.Client("127.0.0.1:47100", tendon.Config(name="spring", rate_hz=200)) as client:
+        client.drive(lambda hand: [-500 * x for x in hand.position])
+
+`Client` waits; `tendon.aio.Client` is the same for asyncio; `ForceClient` is the whole behaviour without socket and
+clock, for a loop of your own. SI units, device base frame; a force is what the device exerts **on the hand**.
+"""
+
+from . import aio, cli
+from .client import Client
+from .force_client import Config, ForceClient, Phase, Stats
+from .guest import RefusedForGood
+from .keys import read_key
+from .messages import Code, DeviceState, LinkStats, Mode, Reason, Role, Touch, Welcome
+
+__all__ = [
+    "Client",
+    "Code",
+    "Config",
+    "DeviceState",
+    "ForceClient",
+    "LinkStats",
+    "Mode",
+    "Phase",
+    "Reason",
+    "RefusedForGood",
+    "Role",
+    "Stats",
+    "Touch",
+    "Welcome",
+    "aio",
+    "cli",
+    "read_key",
+]

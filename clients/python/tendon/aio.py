@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The asyncio client: the session lives in the event loop while your coroutine computes or waits."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from types import TracebackType
+from typing import Union
+
+from .force_client import Config, Stats
+from .guest import Guest
+from .messages import NEVER, DeviceState, Instant, Touch, Welcome
+
+Physics = Callable[[DeviceState], Awaitable[Union[Touch, Sequence[float]]]]
+
+
+class Client:
+    """A guest at a Tendon server, as tendon.Client, in an event loop that can watch sockets (on Windows
+    asyncio's SelectorEventLoop):
+
+        async with aio.Client("127.0.0.1:47100", Config(name="spring")) as client:
+            async for hand in client.states():
+                client.send(hand, force)
+
+    The session is kept alive for as long as the event loop turns. One task at a time asks for states.
+    """
+
+    def __init__(self, server: str, config: Config = Config()) -> None:
+        """`server`: HOST:PORT. Raises ValueError or OSError when there is no such address; nobody need listen
+        there yet."""
+        self._guest = Guest(server, config, time.monotonic_ns())
+        self._timer: asyncio.TimerHandle | None = None
+        self._waiter: asyncio.Future[None] | None = None
+        self._wake_at: Instant = NEVER
+
+    async def states(self, duration_s: float | None = None) -> AsyncIterator[DeviceState]:
+        """The newest state, at Config.rate_hz or as soon after as there is a new one; older ones are skipped.
+        Ends after `duration_s`, or never. Raises RefusedForGood."""
+        guest, core = self._guest, self._guest.core
+        now = time.monotonic_ns()
+        end = NEVER if duration_s is None else now + duration_s * 1e9
+        while now < end:
+            guest.turn(now)
+            guest.raise_if_refused()
+            state = core.next_state(now)
+            if state is not None:
+                yield state
+                await asyncio.sleep(0)  # however fast states come, the other tasks get their turn
+            else:
+                await self._wait_until(min(core.next_state_due(), end))
+            now = time.monotonic_ns()
+
+    def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
+        """Sends at once what the hand is to feel there: a force in N on the hand, or a Touch with the stiffness too."""
+        self._guest.send(hand, touch)
+        self._guest.flush(time.monotonic_ns())
+
+    async def drive(self, physics: Physics, duration_s: float | None = None) -> None:
+        """Answers every state with what `physics` makes of it. Raises RefusedForGood, and what `physics` raises."""
+        async for hand in self.states(duration_s):
+            self.send(hand, await physics(hand))
+
+    def rearm(self) -> bool:
+        """Asks the server to clear a latched fault of its device. False when there is no session to ask in."""
+        asked = self._guest.core.rearm()
+        self._guest.flush(time.monotonic_ns())
+        return asked
+
+    @property
+    def stats(self) -> Stats:
+        return self._guest.stats
+
+    @property
+    def welcome(self) -> Welcome | None:
+        """What the server said of itself and its device when the newest session opened; None before that."""
+        return self._guest.welcome
+
+    async def __aenter__(self) -> Client:
+        asyncio.get_running_loop().add_reader(self._guest.socket, self._turn)
+        self._turn()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Says Bye, so that the server need not wait for a timeout."""
+        asyncio.get_running_loop().remove_reader(self._guest.socket)
+        if self._timer is not None:
+            self._timer.cancel()
+        self._guest.end(time.monotonic_ns())
+
+    def _turn(self) -> None:
+        """Whenever something has come in or is due, whoever waits for a state looks for himself."""
+        self._guest.turn(time.monotonic_ns())
+        if self._waiter is not None and not self._waiter.done():
+            self._waiter.set_result(None)
+        self._set_timer()
+
+    async def _wait_until(self, instant: Instant) -> None:
+        """Until then, or until something happens."""
+        self._wake_at = instant
+        self._waiter = asyncio.get_running_loop().create_future()
+        self._set_timer()
+        try:
+            await self._waiter
+        finally:
+            self._waiter = None
+            self._wake_at = NEVER
+
+    def _set_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        due = min(self._guest.core.next_turn(), self._wake_at)
+        if due != NEVER:
+            delay_s = max(due - time.monotonic_ns(), 0) / 1e9
+            self._timer = asyncio.get_running_loop().call_later(delay_s, self._turn)

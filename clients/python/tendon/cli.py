@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line that all guests share, and run(), which is all that a program of one callback needs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import math
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from .client import Client, Physics
+from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
+from .guest import RefusedForGood, log, parse_address
+from .keys import read_key
+from .messages import DeviceState, LinkStats, Role
+
+Watch = Callable[[DeviceState, LinkStats], None]
+"""An onlooker: device state and the state of the link in, nothing out."""
+
+
+def number(least: float = 0, most: float = math.inf) -> Callable[[str], float]:
+    """For add_argument(type=…): 0, or a number from `least` to `most`."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if value == 0 or (math.isfinite(value) and least <= value <= most):
+            return value
+        expected = "0, or " if least > 0 else ""
+        expected += f"{least:g} to {most:g}" if most < math.inf else f"a number from {least:g} on"
+        raise argparse.ArgumentTypeError(f'expected {expected}, got "{text}"')
+
+    return parse
+
+
+def _address(text: str) -> str:
+    try:
+        parse_address(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.ArgumentParser:
+    """--server, --key, --rate-hz, --duration-s, --json and --help; add what your program has besides."""
+    example = f"Example: {name} --server 127.0.0.1:47100 --duration-s 10"
+    line = argparse.ArgumentParser(name, description=purpose, epilog=example)
+    line.add_argument(
+        "--server",
+        type=_address,
+        default="127.0.0.1:47100",
+        metavar="HOST:PORT",
+        help="Where tendond listens [%(default)s]",
+    )
+    line.add_argument(
+        "--key", type=Path, metavar="FILE", help="The key that tendond knows us by; without one only loopback is possible"
+    )
+    line.add_argument(
+        "--rate-hz",
+        type=number(MIN_RATE_HZ, MAX_RATE_HZ),
+        default=rate_hz,
+        metavar="HZ",
+        help="Times per second; 0 = for every device state that arrives [%(default)s]",
+    )
+    line.add_argument(
+        "--duration-s", type=number(0, 1e9), default=0.0, metavar="S", help="Leave after this time; 0 = at Ctrl-C"
+    )
+    line.add_argument("--json", action="store_true", help="One JSON object per line on stdout")
+    line.set_defaults(name=name)
+    return line
+
+
+def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: Watch | None = None) -> int:
+    """Runs a controller (`physics`) or an observer (`watch`) until it is told to stop: --duration-s, SIGINT or SIGTERM.
+    Then it says Bye. Returns an exit code:
+
+        0   it has been connected to the server
+        1   it could not connect, or the server refused it for good
+
+    stderr gets one sentence for each change of the connection, stdout nothing but the callback's own output and, with
+    --json, the summary: {"summary":{"duration_s":…, …}}. What the callback raises passes through, after a Bye.
+    """
+    if (physics is None) == (watch is None):
+        raise TypeError("run: expected physics or watch")
+    logging.basicConfig(format=f"{options.name}: %(message)s", level=logging.INFO)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    start = time.monotonic()
+    try:
+        config = Config(
+            name=options.name,
+            role=Role.CONTROLLER if physics else Role.OBSERVER,
+            key=options.key and read_key(options.key),
+            rate_hz=options.rate_hz,
+        )
+        with Client(options.server, config) as client:
+            try:
+                for hand in client.states(options.duration_s or None):
+                    if physics is not None:
+                        client.send(hand, physics(hand))
+                    elif watch is not None:
+                        watch(hand, client.stats.link)
+            except KeyboardInterrupt:
+                pass  # the way to stop it
+            stats = client.stats
+    except (RefusedForGood, OSError, ValueError) as error:
+        log.error(error)
+        return 1
+    _print_summary(stats, time.monotonic() - start, options.json)
+    return 0 if stats.sessions > 0 else 1
+
+
+def _print_summary(stats: Stats, duration_s: float, as_json: bool) -> None:
+    link = stats.link
+    round_trip_ms, variation_ms = link.smoothed_round_trip_ns / 1e6, link.round_trip_variation_ns / 1e6
+    if as_json:
+        summary = {
+            "duration_s": round(duration_s, 3),
+            "sessions": stats.sessions,
+            "states": stats.states,
+            "states_skipped": stats.states_skipped,
+            "forces": stats.forces,
+            "forces_unusable": stats.forces_unusable,
+            "lost_incoming": link.lost,
+            "lost_outgoing": link.lost_outgoing,
+            "round_trip_ms": round(round_trip_ms, 3),
+            "round_trip_variation_ms": round(variation_ms, 3),
+        }
+        print(json.dumps({"summary": summary}, separators=(",", ":")), flush=True)
+    elif stats.sessions == 0:
+        log.error("was not connected")
+    else:
+        log.info(
+            "%.1f s, %d states came in (%d skipped for a newer one), %d forces went out (%d more were unusable), "
+            "lost on the way: %d in, %d out, round trip %.2f ± %.2f ms",
+            duration_s,
+            stats.states,
+            stats.states_skipped,
+            stats.forces,
+            stats.forces_unusable,
+            link.lost,
+            link.lost_outgoing,
+            round_trip_ms,
+            variation_ms,
+        )

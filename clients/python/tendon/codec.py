@@ -1,0 +1,604 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values to bytes and back: the only module that knows the layout of the header and protobuf (WIRE.md).
+
+Encoding trusts its input, except that texts and lists are cut to their bounds. Decoding trusts nothing: it
+returns None for what it refuses.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from math import inf
+from typing import TypeVar, Union, cast
+
+from google.protobuf.message import DecodeError
+
+from . import limits
+from . import tendon_pb2 as pb
+from .messages import (
+    PROTOCOL_VERSION,
+    Bye,
+    Code,
+    Control,
+    ControlAck,
+    DeviceState,
+    ForceCommand,
+    Frame,
+    Hello,
+    LocalModel,
+    Mat3,
+    Mode,
+    Rearm,
+    Refused,
+    Request,
+    Role,
+    SetStateRate,
+    Vec3,
+    Welcome,
+)
+
+# ---- Header ----------------------------------------------------------------------------------------
+
+
+class DatagramType(IntEnum):
+    HELLO = 1  # client → server: may I come in?
+    RETRY = 2  # server → client: say it again with this cookie
+    DATA = 3  # either way, once connected
+    ANSWER = 4  # server → client: Welcome or Refused
+
+
+class Suite(IntEnum):
+    """How a conversation is protected; chosen by the client in its first Hello."""
+
+    PLAIN = 0  # not at all: loopback only
+    NOISE = 1  # Noise_NNpsk0_25519_ChaChaPoly_SHA256
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """The 16 bytes in the clear at the front of every datagram; suite 1 authenticates them."""
+
+    type: DatagramType
+    suite: Suite = Suite.PLAIN
+    epoch: int = 0  # how often the sender has renewed its key, modulo 256; Data of suite 1 only
+    connection_id: int = 0  # 0 before the server has given one
+    packet_number: int = 0  # 0, 1, 2 … per direction in Data, 0 in all others
+
+
+HEADER_SIZE = 16
+_HEADER = struct.Struct("<4BIQ")
+_MAGIC = 0x54  # 'T'
+_TYPES = {PROTOCOL_VERSION << 4 | kind: kind for kind in DatagramType}
+_SUITES = {int(suite): suite for suite in Suite}
+
+
+def encode_header(header: Header) -> bytes:
+    version_and_type = PROTOCOL_VERSION << 4 | header.type
+    return _HEADER.pack(
+        _MAGIC, version_and_type, header.epoch, header.suite, header.connection_id, header.packet_number
+    )
+
+
+def decode_header(datagram: bytes) -> Header | None:
+    if not HEADER_SIZE <= len(datagram) <= limits.MAX_DATAGRAM:
+        return None
+    magic, version_and_type, epoch, suite_number, connection_id, packet_number = _HEADER.unpack_from(datagram)
+    kind = _TYPES.get(version_and_type)
+    suite = _SUITES.get(suite_number)
+    if magic != _MAGIC or kind is None or suite is None:
+        return None
+    if epoch != 0 and (suite is Suite.PLAIN or kind is not DatagramType.DATA):
+        return None
+    return Header(kind, suite, epoch, connection_id, packet_number)
+
+
+# ---- Single values ---------------------------------------------------------------------------------
+
+
+class _OutOfBounds(Exception):
+    """A value that no correct peer sends."""
+
+
+def _number(value: float) -> float:
+    if not -limits.MAX_VALUE <= value <= limits.MAX_VALUE:  # nor is NaN
+        raise _OutOfBounds
+    return value
+
+
+def _magnitude(value: float) -> float:
+    if not 0 <= value <= limits.MAX_VALUE:
+        raise _OutOfBounds
+    return value
+
+
+def _vector(message: pb.Vec3) -> Vec3:
+    x, y, z = message.x, message.y, message.z
+    most = limits.MAX_VALUE
+    if not (-most <= x <= most and -most <= y <= most and -most <= z <= most):
+        raise _OutOfBounds
+    return (x, y, z)
+
+
+def _whole(value: int, least: int, most: int) -> int:
+    if not least <= value <= most:
+        raise _OutOfBounds
+    return value
+
+
+def _time(ns: int) -> int:
+    return _whole(ns, -limits.MAX_TIME_NS, limits.MAX_TIME_NS)
+
+
+def _text(text: str, limit: int) -> str:
+    if len(text) > limit or len(text.encode()) > limit:
+        raise _OutOfBounds
+    return text
+
+
+def _features(features: Sequence[str]) -> tuple[str, ...]:
+    if len(features) > limits.MAX_FEATURES:
+        raise _OutOfBounds
+    return tuple(_text(feature, limits.MAX_FEATURE) for feature in features)
+
+
+_Number = TypeVar("_Number", bound=IntEnum)
+_MODES: dict[int, Mode] = {int(mode): mode for mode in Mode}
+_CODES: dict[int, Code] = {int(code): code for code in Code}
+_ROLES: dict[int, Role] = {int(role): role for role in Role}
+
+
+def _enum(known: dict[int, _Number], number: int) -> _Number:
+    value = known.get(number)
+    if value is None:
+        raise _OutOfBounds
+    return value
+
+
+def _clip(text: str, limit: int) -> str:
+    """The front of `text`, at most `limit` bytes of UTF-8, and up to the first lone surrogate, which has no UTF-8."""
+    try:
+        encoded = text.encode()
+    except UnicodeEncodeError as error:
+        encoded = text[: error.start].encode()
+    return encoded[:limit].decode(errors="ignore")
+
+
+_Message = TypeVar("_Message", pb.Datagram, pb.Hello, pb.Answer)
+
+
+def _parsed(message: _Message, body: bytes) -> _Message:
+    """Raises DecodeError when the body is not protobuf."""
+    message.ParseFromString(body)
+    try:
+        whole = _is_whole(body)
+    except IndexError:
+        whole = False
+    if not whole:
+        raise DecodeError
+    return message
+
+
+def _is_whole(body: bytes) -> bool:
+    """Some versions of protobuf, Debian's among them, take a field 0, and the end of a group that has not begun, for the
+    end of the message, and do not look at what follows. Raises IndexError when that is nothing like protobuf."""
+    at, groups = 0, 0
+    while at < len(body):
+        tag, at = _varint(body, at)
+        field, kind = tag >> 3, tag & 7
+        if field == 0:
+            return False
+        if kind == 0:
+            at = _varint(body, at)[1]
+        elif kind == 1:
+            at += 8
+        elif kind == 2:
+            size, at = _varint(body, at)
+            at += size
+        elif kind == 5:
+            at += 4
+        else:
+            groups += 1 if kind == 3 else -1
+            if groups < 0:
+                return False
+    return True
+
+
+def _varint(body: bytes, at: int) -> tuple[int, int]:
+    """The integer at `at`, and where it ends."""
+    value = shift = 0
+    while True:
+        byte = body[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            return value, at
+
+
+# ---- Frames ----------------------------------------------------------------------------------------
+
+
+def _read_state(message: pb.DeviceState) -> DeviceState:
+    permitted = message.permitted_force_n
+    return DeviceState(
+        tick=message.tick,
+        sampled_ns=_time(message.sampled_ns),
+        position=_vector(message.position_m),
+        velocity=_vector(message.velocity_mps),
+        force_applied=_vector(message.force_applied_n),
+        energy=_number(message.energy_j),
+        permitted_force=permitted if permitted == inf else _magnitude(permitted),
+        reasons=message.reasons,
+        force_sequence=message.force_sequence,
+        force_age_ns=_whole(message.force_age_ns, 0, limits.MAX_TIME_NS),
+        mode=_enum(_MODES, message.mode),
+    )
+
+
+def _read_model(message: pb.LocalModel) -> LocalModel:
+    k = [_number(value) for value in message.stiffness_npm]
+    stiffness: Mat3
+    if len(k) == 1:
+        stiffness = ((k[0], 0.0, 0.0), (0.0, k[0], 0.0), (0.0, 0.0, k[0]))
+    elif len(k) == 3:
+        stiffness = ((k[0], 0.0, 0.0), (0.0, k[1], 0.0), (0.0, 0.0, k[2]))
+    elif len(k) == 9:
+        stiffness = ((k[0], k[1], k[2]), (k[3], k[4], k[5]), (k[6], k[7], k[8]))
+    else:
+        raise _OutOfBounds
+    return LocalModel(at=_vector(message.at_m), stiffness=stiffness)
+
+
+def _write_model(model: LocalModel) -> pb.LocalModel:
+    """The shortest of the three forms that says the same."""
+    (a, b, c), (d, e, f), (g, h, i) = model.stiffness
+    entries: list[float] = [a, b, c, d, e, f, g, h, i]
+    if not any((b, c, d, f, g, h)):
+        entries = [a] if a == e == i else [a, e, i]
+    return pb.LocalModel(at_m=_write_vector(model.at), stiffness_npm=entries)
+
+
+def _read_force(message: pb.ForceCommand) -> ForceCommand:
+    return ForceCommand(
+        sequence=_whole(message.sequence, 1, 2**64),
+        based_on_tick=message.based_on_tick,
+        force=_vector(message.force_n),
+        valid_for_us=_whole(message.valid_for_us, 1, limits.MAX_VALID_FOR_US),
+        model=_read_model(message.model) if message.HasField("model") else None,
+    )
+
+
+def _read_control(message: pb.Control) -> Control:
+    op = message.WhichOneof("op")
+    request: Request | None = None
+    if op == "set_state_rate":
+        request = SetStateRate(message.set_state_rate.hz)
+    elif op == "rearm":
+        request = Rearm()
+    return Control(id=_whole(message.id, 1, 2**32), request=request)
+
+
+def _read_ack(message: pb.ControlAck) -> ControlAck:
+    return ControlAck(
+        id=_whole(message.id, 1, 2**32),
+        code=_enum(_CODES, message.code),
+        detail=_text(message.detail, limits.MAX_DETAIL),
+    )
+
+
+def _read_bye(message: pb.Bye) -> Bye:
+    return Bye(code=_enum(_CODES, message.code), reason=_text(message.reason, limits.MAX_DETAIL))
+
+
+def _write_vector(vector: Vec3) -> pb.Vec3:
+    return pb.Vec3(x=vector[0], y=vector[1], z=vector[2])
+
+
+def _write_frame(frame: Frame) -> pb.Frame:
+    if isinstance(frame, ForceCommand):
+        force = pb.ForceCommand(
+            sequence=frame.sequence,
+            based_on_tick=frame.based_on_tick,
+            force_n=_write_vector(frame.force),
+            model=_write_model(frame.model) if frame.model else None,
+            valid_for_us=frame.valid_for_us,
+        )
+        return pb.Frame(force=force)
+    if isinstance(frame, DeviceState):
+        state = pb.DeviceState(
+            tick=frame.tick,
+            sampled_ns=frame.sampled_ns,
+            position_m=_write_vector(frame.position),
+            velocity_mps=_write_vector(frame.velocity),
+            force_applied_n=_write_vector(frame.force_applied),
+            energy_j=frame.energy,
+            permitted_force_n=frame.permitted_force,
+            reasons=frame.reasons,
+            force_sequence=frame.force_sequence,
+            force_age_ns=frame.force_age_ns,
+            mode=cast(pb.Mode, frame.mode),
+        )
+        return pb.Frame(state=state)
+    if isinstance(frame, Control):
+        control = pb.Control(id=frame.id)
+        if isinstance(frame.request, SetStateRate):
+            control.set_state_rate.hz = frame.request.hz
+        elif isinstance(frame.request, Rearm):
+            control.rearm.SetInParent()
+        return pb.Frame(control=control)
+    if isinstance(frame, ControlAck):
+        ack = pb.ControlAck(id=frame.id, code=cast(pb.Code, frame.code), detail=_clip(frame.detail, limits.MAX_DETAIL))
+        return pb.Frame(control_ack=ack)
+    bye = pb.Bye(code=cast(pb.Code, frame.code), reason=_clip(frame.reason, limits.MAX_DETAIL))
+    return pb.Frame(bye=bye)
+
+
+# ---- Data ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """The newest datagram that one end has received from the other, told back to it."""
+
+    sent_ns: int  # T1: when it was sent, on the clock of the one who sent it
+    received_ns: int  # T2: when it arrived, on the clock of the one who tells
+    packet_number: int
+    received_mask: int = 0  # bit i: packet (packet_number − 1 − i) has arrived too
+
+
+@dataclass(frozen=True, slots=True)
+class DataContent:
+    """What a Data datagram holds."""
+
+    sent_ns: int
+    echo: Echo | None
+    frames: list[Frame]  # in the order of the datagram, every value within bounds
+    invalid: int  # frames (and echoes) left out because a value was out of bounds
+
+
+def write_data_head(sent_ns: int, echo: Echo | None) -> bytes:
+    """The front of a Data datagram's body: what write_frame() gives follows, as often as wanted.
+
+    (Protobuf defines the concatenation of two messages as their merge.)
+    """
+    head = pb.Datagram(tx_time_ns=sent_ns)
+    if echo is not None:
+        told = head.echo
+        told.peer_tx_time_ns = echo.sent_ns
+        told.rx_time_ns = echo.received_ns
+        told.peer_packet_number = echo.packet_number
+        told.received_mask = echo.received_mask
+    return bytes(head.SerializeToString())
+
+
+def write_frame(frame: Frame) -> bytes:
+    return bytes(pb.Datagram(frames=[_write_frame(frame)]).SerializeToString())
+
+
+def _read_echo(message: pb.Echo) -> Echo:
+    return Echo(
+        sent_ns=_time(message.peer_tx_time_ns),
+        received_ns=_time(message.rx_time_ns),
+        packet_number=message.peer_packet_number,
+        received_mask=message.received_mask,
+    )
+
+
+def _read_frame(message: pb.Frame) -> Frame | None:
+    body = message.WhichOneof("body")
+    if body == "state":
+        return _read_state(message.state)
+    if body == "force":
+        return _read_force(message.force)
+    if body == "control":
+        return _read_control(message.control)
+    if body == "control_ack":
+        return _read_ack(message.control_ack)
+    if body == "bye":
+        return _read_bye(message.bye)
+    return None  # a frame of a newer peer
+
+
+def read_data(body: bytes) -> DataContent | None:
+    """None when the body is malformed: not protobuf, too many frames, or without a usable tx_time."""
+    try:
+        message = _parsed(pb.Datagram(), body)
+        sent_ns = _time(message.tx_time_ns)
+    except (DecodeError, _OutOfBounds):
+        return None
+    if len(message.frames) > limits.MAX_FRAMES:
+        return None
+    invalid = 0
+    echo = None
+    if message.HasField("echo"):
+        try:
+            echo = _read_echo(message.echo)
+        except _OutOfBounds:
+            invalid += 1
+    frames = []
+    for piece in message.frames:
+        try:
+            frame = _read_frame(piece)
+        except _OutOfBounds:
+            invalid += 1
+        else:
+            if frame is not None:
+                frames.append(frame)
+    return DataContent(sent_ns, echo, frames, invalid)
+
+
+# ---- Handshake -------------------------------------------------------------------------------------
+
+RANDOM_SIZE = 16
+NO_COOKIE = bytes(16)
+
+_HELLO = struct.Struct("<16s16sH")
+_BODY_AT = HEADER_SIZE + _HELLO.size
+_ANSWER_AT = HEADER_SIZE + RANDOM_SIZE
+_RETRY_SIZE = 48
+
+
+@dataclass(frozen=True, slots=True)
+class HelloDatagram:
+    """As it travels. `body` is in suite 0 what write_hello() gives, in suite 1 that and what the handshake adds."""
+
+    random: bytes  # chosen by the client; ties Retry and Answer to one attempt
+    body: bytes
+    cookie: bytes = NO_COOKIE
+    suite: Suite = Suite.PLAIN
+
+
+@dataclass(frozen=True, slots=True)
+class RetryDatagram:
+    random: bytes
+    cookie: bytes
+    suite: Suite = Suite.PLAIN
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerDatagram:
+    random: bytes
+    body: bytes
+    connection_id: int = 0  # 0 with Refused
+    suite: Suite = Suite.PLAIN
+
+
+Answer = Union[Welcome, Refused]
+
+
+def encode_hello(hello: HelloDatagram) -> bytes:
+    """Always MAX_DATAGRAM bytes, so that no reply to it is larger."""
+    header = encode_header(Header(DatagramType.HELLO, hello.suite))
+    datagram = header + _HELLO.pack(hello.random, hello.cookie, len(hello.body)) + hello.body
+    return datagram.ljust(limits.MAX_DATAGRAM, b"\0")
+
+
+def encode_retry(retry: RetryDatagram) -> bytes:
+    return encode_header(Header(DatagramType.RETRY, retry.suite)) + retry.random + retry.cookie
+
+
+def encode_answer(answer: AnswerDatagram) -> bytes:
+    header = Header(DatagramType.ANSWER, answer.suite, connection_id=answer.connection_id)
+    return encode_header(header) + answer.random + answer.body
+
+
+def _handshake_header(datagram: bytes, kind: DatagramType) -> Header | None:
+    header = decode_header(datagram)
+    if header is None or header.type is not kind or header.packet_number != 0:
+        return None
+    if header.connection_id != 0 and kind is not DatagramType.ANSWER:
+        return None
+    return header
+
+
+def decode_hello(datagram: bytes) -> HelloDatagram | None:
+    header = _handshake_header(datagram, DatagramType.HELLO)
+    if header is None or len(datagram) != limits.MAX_DATAGRAM:
+        return None
+    random, cookie, size = _HELLO.unpack_from(datagram, HEADER_SIZE)
+    if size > limits.MAX_HELLO_BODY or any(datagram[_BODY_AT + size :]):
+        return None
+    return HelloDatagram(random, datagram[_BODY_AT : _BODY_AT + size], cookie, header.suite)
+
+
+def decode_retry(datagram: bytes) -> RetryDatagram | None:
+    header = _handshake_header(datagram, DatagramType.RETRY)
+    if header is None or len(datagram) != _RETRY_SIZE:
+        return None
+    return RetryDatagram(datagram[HEADER_SIZE:_ANSWER_AT], datagram[_ANSWER_AT:], header.suite)
+
+
+def decode_answer(datagram: bytes) -> AnswerDatagram | None:
+    header = _handshake_header(datagram, DatagramType.ANSWER)
+    if header is None or len(datagram) < _ANSWER_AT:
+        return None
+    return AnswerDatagram(
+        datagram[HEADER_SIZE:_ANSWER_AT], datagram[_ANSWER_AT:], header.connection_id, header.suite
+    )
+
+
+def write_hello(hello: Hello) -> bytes:
+    message = pb.Hello(
+        version_min=hello.version_min,
+        version_max=hello.version_max,
+        role=cast(pb.Role, hello.role),
+        name=_clip(hello.name, limits.MAX_NAME),
+        features=[_clip(feature, limits.MAX_FEATURE) for feature in hello.features[: limits.MAX_FEATURES]],
+    )
+    return bytes(message.SerializeToString())
+
+
+def write_answer(answer: Answer) -> bytes:
+    if isinstance(answer, Refused):
+        refused = pb.Refused(
+            code=cast(pb.Code, answer.code),
+            detail=_clip(answer.detail, limits.MAX_DETAIL),
+            version_min=answer.version_min,
+            version_max=answer.version_max,
+        )
+        return bytes(pb.Answer(refused=refused).SerializeToString())
+    welcome = pb.Welcome(
+        version=answer.version,
+        features=[_clip(feature, limits.MAX_FEATURE) for feature in answer.features[: limits.MAX_FEATURES]],
+        role=cast(pb.Role, answer.role),
+        device_name=_clip(answer.device_name, limits.MAX_NAME),
+        max_force_n=answer.max_force,
+        position_resolution_m=answer.position_resolution,
+        loop_hz=answer.loop_hz,
+        timeout_ms=answer.timeout_ms,
+        server=_clip(answer.server, limits.MAX_NAME),
+    )
+    return bytes(pb.Answer(welcome=welcome).SerializeToString())
+
+
+def read_hello(body: bytes) -> Hello | None:
+    try:
+        message = _parsed(pb.Hello(), body)
+        return Hello(
+            role=_enum(_ROLES, message.role),
+            name=_text(message.name, limits.MAX_NAME),
+            features=_features(message.features),
+            version_min=_whole(message.version_min, 1, message.version_max),
+            version_max=message.version_max,
+        )
+    except (DecodeError, _OutOfBounds):
+        return None
+
+
+def read_answer(body: bytes) -> Answer | None:
+    try:
+        message = _parsed(pb.Answer(), body)
+        kind = message.WhichOneof("body")
+        if kind == "welcome":
+            return _read_welcome(message.welcome)
+        if kind == "refused":
+            return _read_refused(message.refused)
+    except (DecodeError, _OutOfBounds):
+        pass
+    return None
+
+
+def _read_welcome(message: pb.Welcome) -> Welcome:
+    return Welcome(
+        version=_whole(message.version, 1, 2**32),
+        features=_features(message.features),
+        role=_enum(_ROLES, message.role),
+        device_name=_text(message.device_name, limits.MAX_NAME),
+        max_force=_magnitude(message.max_force_n),
+        position_resolution=_magnitude(message.position_resolution_m),
+        loop_hz=_whole(message.loop_hz, 1, limits.MAX_LOOP_HZ),
+        timeout_ms=_whole(message.timeout_ms, 1, limits.MAX_TIMEOUT_MS),
+        server=_text(message.server, limits.MAX_NAME),
+    )
+
+
+def _read_refused(message: pb.Refused) -> Refused:
+    return Refused(
+        code=_enum(_CODES, message.code),
+        detail=_text(message.detail, limits.MAX_DETAIL),
+        version_min=message.version_min,
+        version_max=message.version_max,
+    )

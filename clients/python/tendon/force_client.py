@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A guest at a Tendon server, sans I/O: says Hello, keeps the session alive, hands out the newest device
+state, sends the force that comes back, and begins again when the server is gone.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import cast
+
+from . import limits
+from .handshake import ClientHandshake
+from .messages import (
+    FEATURE_LOCAL_MODEL,
+    NEVER,
+    Code,
+    DeviceState,
+    ForceCommand,
+    Hello,
+    Instant,
+    LinkStats,
+    LocalModel,
+    Mat3,
+    Rearm,
+    Refused,
+    Role,
+    SetStateRate,
+    Stiffness,
+    Touch,
+    Vec3,
+    Welcome,
+)
+from .noise import KEY_SIZE
+from .session import Closed, Session
+
+MIN_RATE_HZ = 1e-3
+MAX_RATE_HZ = 1e5
+
+# See Config.valid_for_s.
+_VALID_PERIODS = 3
+_MIN_VALID_FOR_NS = 20_000_000
+_MAX_OBSERVED_PERIOD_NS = 100_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    """How a guest behaves. Raises ValueError naming the field when that is impossible."""
+
+    name: str = "guest"
+    """For the server's log; at most 64 bytes."""
+    role: Role = Role.CONTROLLER
+    """A controller sees states and sends forces, one per device; an observer looks on."""
+    key: bytes | None = field(default=None, repr=False)
+    """32 bytes that the server knows too (`read_key`): suite 1. None: plain, which servers accept on loopback only."""
+    rate_hz: float = 0
+    """States handed out per second: at multiples of 1/rate_hz, or as soon after as there is a new one; after
+    a delay of a whole period the grid starts anew, it never catches up. 0 = every new state, once."""
+    state_hz: int = 0
+    """States per second to ask the server for; 0 = what the server gives by itself."""
+    valid_for_s: float = 0
+    """How long the server may take a force as fresh, counted from its arrival; at most 10. 0 = derived from
+    the period T at which forces really leave, that is the asked one or, when the physics is slower, the time
+    between the states of the last two forces:
+
+        T         = max(1 / rate_hz, min(Δtick / loop_hz, 0.1))      with rate_hz = 0: the second term
+        valid_for = max(3 T, 0.02)
+    """
+    patience_s: float = 2.0
+    """Hellos of one attempt go unanswered for so long before it is given up."""
+    retry_min_s: float = 0.1
+    """First wait before the next attempt; then twice as long each time …"""
+    retry_max_s: float = 2.0
+    """… up to this. The first state of a session resets it."""
+
+    def __post_init__(self) -> None:
+        def require(ok: bool, sentence: str) -> None:
+            if not ok:
+                raise ValueError(sentence)
+
+        require(len(self.name.encode(errors="replace")) <= limits.MAX_NAME, "name: at most 64 bytes")
+        require(self.key is None or len(self.key) == KEY_SIZE, "key: expected 32 bytes")
+        rate_possible = self.rate_hz == 0 or MIN_RATE_HZ <= self.rate_hz <= MAX_RATE_HZ
+        require(rate_possible, "rate_hz: expected 0, or 0.001 to 100000")
+        require(0 <= self.state_hz <= limits.MAX_LOOP_HZ, "state_hz: expected 0 to 1000000")
+        require(0 <= self.valid_for_s <= 10, "valid_for_s: expected 0 to 10")
+        require(self.patience_s > 0, "patience_s: must be above zero")
+        require(self.retry_min_s > 0, "retry_min_s: must be above zero")
+        require(self.retry_max_s >= self.retry_min_s, "retry_max_s: must not be below retry_min_s")
+
+
+class Phase(Enum):
+    GREETING = "greeting"  # an attempt is under way
+    OPEN = "open"  # states come in, forces go out
+    UNANSWERED = "unanswered"  # nobody answered; waiting for the next attempt
+    REFUSED = "refused"  # the server said no; waiting for the next attempt
+    LOST = "lost"  # the session has ended; waiting for the next attempt
+    STOPPED = "stopped"  # stop() was called, or another program has our place (Code.REPLACED); for good
+
+
+@dataclass
+class Stats:
+    phase: Phase = Phase.GREETING
+    code: Code = Code.OK  # why the last attempt or session ended: the server's words where it had any
+    reason: str = ""
+    link: LinkStats = field(default_factory=LinkStats)  # of the present session, or of the last one
+    attempts: int = 0
+    sessions: int = 0  # of these, answered with a Welcome
+    states: int = 0  # states that came in
+    states_skipped: int = 0  # of these, replaced by a newer one before they were due
+    forces: int = 0  # forces sent
+    forces_unusable: int = 0  # forces not sent: not finite, or out of bounds
+
+
+_WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
+
+
+class ForceClient:
+    """Use: `receive` what arrives; then, and whenever `next_turn()` is due, `tick`, and send what
+    `next_datagram` gives until it is None. When `next_state` gives one, `send` what the physics says to it.
+
+    Instants are nanoseconds of a monotonic clock; `now` never goes back.
+    """
+
+    def __init__(self, config: Config, now: int, random: Callable[[int], bytes] = os.urandom) -> None:
+        """`random(n)`: n bytes from a cryptographic source. The first Hello is due at once."""
+        self.welcome: Welcome | None = None
+        """What the server said of itself and its device when the newest session opened."""
+        self.config = config
+        self._random = random
+        self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
+        self._stats = Stats()
+        self._handshake: ClientHandshake | None = None
+        self._session: Session | None = None
+        self._ended: Session | None = None  # the last one, while it has a Bye to say
+        self._give_up = now  # end of the present attempt's patience
+        self._retry = now  # when the next attempt begins
+        self._back_off = _ns(config.retry_min_s)  # wait before the attempt after that
+        self._unseen: DeviceState | None = None  # newest state that was not handed out
+        self._next_call = now
+        self._sequence = 0  # of the newest force
+        self._answered_tick = 0  # the tick it answers
+        self._greet(now)
+
+    # ---- In ----
+
+    def receive(self, now: int, datagram: bytes) -> None:
+        """Takes any bytes from the server's address."""
+        if self._handshake is not None:
+            self._handshake.receive(now, datagram)
+            self._settle(now)
+        elif self._session is not None:
+            self._session.receive(now, datagram)
+            self._take_events(now)
+
+    def tick(self, now: int) -> None:
+        """Does what is due by time."""
+        if self._session is not None:
+            self._session.tick(now)
+            self._take_events(now)
+        elif self._handshake is not None:
+            if now >= self._give_up:
+                self._end(now, Phase.UNANSWERED, Code.TIMED_OUT, "no answer")
+        elif self.phase in _WAITING and now >= self._retry:
+            self._greet(now)
+
+    def send(self, hand: DeviceState, touch: Touch) -> None:
+        """Answers a state. A force or stiffness that is not finite, or out of bounds, is counted and not sent;
+        the server then treats this client as one that is late. Raises ValueError when it has a wrong shape,
+        PermissionError for an observer.
+
+        Take a fresh `now` before the next call: the datagram's time stamp must not be older than the physics' work.
+        """
+        if self.config.role is not Role.CONTROLLER:
+            raise PermissionError("an observer sends no force: role=Role.CONTROLLER")
+        force = _vector(touch.force)
+        stiffness = None if touch.stiffness is None else _matrix(touch.stiffness)
+        if self._session is None or self.welcome is None:
+            return
+        if not (_usable(force) and (stiffness is None or all(map(_usable, stiffness)))):
+            self._stats.forces_unusable += 1
+            return
+        model = None
+        if stiffness is not None and FEATURE_LOCAL_MODEL in self.welcome.features:
+            model = LocalModel(hand.position, stiffness)
+        valid_for_us = self._valid_for_us(hand.tick, self.welcome.loop_hz)
+        self._sequence += 1
+        self._answered_tick = hand.tick
+        self._session.send(ForceCommand(self._sequence, hand.tick, force, valid_for_us, model))
+        self._stats.forces += 1
+
+    def rearm(self) -> bool:
+        """Asks the server to clear a latched fault. False when there is no session to ask in, or too many
+        requests are open. Controllers only: the server refuses an observer."""
+        return self._session is not None and self._session.request(Rearm()) is not None
+
+    def stop(self, now: int) -> None:
+        """Ends for good. `next_datagram` then gives the Byes, so that the server need not wait for a timeout."""
+        if self.phase is Phase.STOPPED:
+            return
+        if self._session is not None:
+            self._session.close(Code.OK, f"{self.config.name} stops")
+        self._end(now, Phase.STOPPED, Code.OK, "stopped")
+
+    # ---- Out ----
+
+    def next_datagram(self, now: int) -> bytes | None:
+        """The next datagram to send; None = nothing to send now."""
+        if self._ended is not None:
+            bye = self._ended.next_datagram(now)
+            if bye is not None:
+                return bye
+            self._ended = None
+        if self._session is not None:
+            return self._session.next_datagram(now)
+        return None if self._handshake is None else self._handshake.next_datagram(now)
+
+    def next_state(self, now: int) -> DeviceState | None:
+        """The newest state, when it is due and was not handed out before."""
+        if self._unseen is None or now < self._next_call:
+            return None
+        self._next_call += self._period
+        if self._next_call <= now:
+            self._next_call = now + self._period
+        state, self._unseen = self._unseen, None
+        return state
+
+    def next_turn(self) -> Instant:
+        """When `tick` and `next_datagram` are due next at the latest."""
+        if self._ended is not None:
+            return self._ended.next_turn()
+        if self._session is not None:
+            return self._session.next_turn()
+        if self._handshake is not None:
+            return min(self._give_up, self._handshake.next_turn())
+        return self._retry if self.phase in _WAITING else NEVER
+
+    def next_state_due(self) -> Instant:
+        """When `next_state` gives one; NEVER = not before another has come in."""
+        return NEVER if self._unseen is None else self._next_call
+
+    @property
+    def phase(self) -> Phase:
+        return self._stats.phase
+
+    @property
+    def stats(self) -> Stats:
+        """A copy."""
+        link = self._stats.link if self._session is None else self._session.stats
+        return replace(self._stats, link=replace(link))
+
+    # ---- Inside ----
+
+    def _greet(self, now: int) -> None:
+        hello = Hello(self.config.role, self.config.name, (FEATURE_LOCAL_MODEL,))
+        key = self.config.key
+        ephemeral = b"" if key is None else self._random(KEY_SIZE)
+        self._handshake = ClientHandshake(hello, self._random(16), now, key=key, ephemeral=ephemeral)
+        self._give_up = now + _ns(self.config.patience_s)
+        self._stats.phase = Phase.GREETING
+        self._stats.attempts += 1
+
+    def _settle(self, now: int) -> None:
+        """Acts on the server's answer, once it is there."""
+        outcome = None if self._handshake is None else self._handshake.outcome
+        if outcome is None:
+            return
+        if isinstance(outcome, Refused):
+            self._end(now, Phase.REFUSED, outcome.code, outcome.detail)
+            return
+        self._handshake = None
+        self.welcome = outcome.welcome
+        self._session = Session(outcome.connection_id, now, outcome.cipher)
+        if self.config.state_hz > 0:
+            self._session.request(SetStateRate(self.config.state_hz))
+        self._sequence = 0
+        self._stats.phase = Phase.OPEN
+        self._stats.sessions += 1
+
+    def _end(self, now: int, phase: Phase, code: Code, reason: str) -> None:
+        if self._session is not None:
+            self._stats.link = self._session.stats
+        self._stats.phase = phase
+        self._stats.code = code
+        self._stats.reason = reason
+        self._handshake = None
+        self._ended, self._session = self._session, None
+        self._unseen = None
+        self._retry = now + self._back_off
+        self._back_off = min(2 * self._back_off, _ns(self.config.retry_max_s))
+
+    def _take_events(self, now: int) -> None:
+        while self._session is not None and (event := self._session.next_event()) is not None:
+            if isinstance(event, DeviceState):
+                self._stats.states += 1
+                self._stats.states_skipped += self._unseen is not None
+                self._unseen = event
+                self._back_off = _ns(self.config.retry_min_s)
+            elif isinstance(event, Closed):
+                taken_over = event.code is Code.REPLACED  # to come back would be to take turns for ever
+                self._end(now, Phase.STOPPED if taken_over else Phase.LOST, event.code, event.reason)
+
+    def _valid_for_us(self, tick: int, loop_hz: int) -> int:
+        valid_for = _ns(self.config.valid_for_s)
+        if valid_for == 0:
+            period = self._period
+            if self._sequence > 0:
+                period = max(period, min(_ns((tick - self._answered_tick) / loop_hz), _MAX_OBSERVED_PERIOD_NS))
+            valid_for = max(_VALID_PERIODS * period, _MIN_VALID_FOR_NS)
+        return min(-(-valid_for // 1000), limits.MAX_VALID_FOR_US)
+
+
+def _ns(seconds: float) -> int:
+    return round(seconds * 1e9)
+
+
+def _usable(vector: Vec3) -> bool:
+    return all(abs(component) <= limits.MAX_VALUE for component in vector)  # nor is NaN
+
+
+def _vector(numbers: Sequence[float], expected: str = "a force of three numbers") -> Vec3:
+    try:
+        x, y, z = map(float, numbers)
+    except (TypeError, ValueError):
+        raise ValueError(f"expected {expected}, got {numbers!r}") from None
+    return (x, y, z)
+
+
+def _matrix(stiffness: Stiffness) -> Mat3:
+    """3 × 3 from any of the forms that Touch.stiffness may have."""
+    expected = "a stiffness of one number, three, or 3 × 3"
+    if not hasattr(stiffness, "__len__"):
+        k = float(stiffness)
+        return ((k, 0.0, 0.0), (0.0, k, 0.0), (0.0, 0.0, k))
+    rows = cast("Sequence[Sequence[float]]", stiffness)
+    if len(rows) == 3 and all(hasattr(row, "__len__") for row in rows):
+        a, b, c = (_vector(row, expected) for row in rows)
+        return (a, b, c)
+    x, y, z = _vector(cast("Sequence[float]", stiffness), expected)
+    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))

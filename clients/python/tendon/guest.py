@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the blocking and the asyncio client share: a ForceClient, its socket, and a log of what happens to it."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from collections.abc import Sequence
+
+from . import limits
+from .force_client import Config, ForceClient, Phase, Stats
+from .messages import Code, DeviceState, Touch, Welcome
+
+log = logging.getLogger("tendon")
+
+MAX_DATAGRAMS = 256
+"""Taken from the socket in one turn: a flood must not keep us from sending. A 1 kHz server sends so many in a
+quarter of a second, the longest silence before it stops the device."""
+
+_KEEP_TRYING = (Code.BUSY, Code.SHUTDOWN)
+
+
+class RefusedForGood(ConnectionError):
+    """The server refuses, and another attempt would not change that."""
+
+    def __init__(self, sentence: str, code: Code) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+def parse_address(text: str) -> tuple[str, int]:
+    """127.0.0.1:47100, [::1]:47100, name:47100. Raises ValueError."""
+    host, colon, port = text.rpartition(":")
+    bracketed = host.startswith("[") and host.endswith("]")
+    if not colon or not port.isascii() or not port.isdigit() or not 0 < int(port) < 65536:
+        raise ValueError(f'expected HOST:PORT, got "{text}"')
+    if not host or (":" in host and not bracketed):
+        raise ValueError(f'expected HOST:PORT, [IPv6]:PORT for an IPv6 address, got "{text}"')
+    return (host[1:-1] if bracketed else host, int(port))
+
+
+class Guest:
+    """`turn(now)` does all there is to do. One thread, or one event loop, at a time."""
+
+    def __init__(self, server: str, config: Config, now: int) -> None:
+        """Raises ValueError when `server` is no HOST:PORT, OSError when the system cannot reach it."""
+        self.server = server
+        self.socket = _connected(server)
+        self.core = ForceClient(config, now)
+        self._doubt = "is tendond running there" + (", and does it know our key" if config.key else "")
+        self._said = ""
+
+    @property
+    def stats(self) -> Stats:
+        return self.core.stats
+
+    @property
+    def welcome(self) -> Welcome | None:
+        """What the server said of itself and its device when the newest session opened; None before that."""
+        return self.core.welcome
+
+    def turn(self, now: int) -> None:
+        """Takes what has come in, does what is due, sends what is to be sent."""
+        for _ in range(MAX_DATAGRAMS):
+            datagram = self._receive()
+            if datagram is None:
+                break
+            self.core.receive(now, datagram)
+        self.core.tick(now)
+        self.flush(now)
+        self._say()
+
+    def flush(self, now: int) -> None:
+        while (datagram := self.core.next_datagram(now)) is not None:
+            try:
+                self.socket.send(datagram)
+            except OSError:
+                pass  # lost: the network does that too
+
+    def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
+        """Answers a state: a force alone, or a Touch with the stiffness too."""
+        self.core.send(hand, touch if isinstance(touch, Touch) else Touch(touch))
+
+    def end(self, now: int) -> None:
+        """Says Bye and closes the socket."""
+        self.core.stop(now)
+        self.flush(now)
+        self.socket.close()
+
+    def raise_if_refused(self) -> None:
+        if self.core.phase not in (Phase.REFUSED, Phase.STOPPED):
+            return
+        stats = self.core.stats
+        if stats.phase is Phase.REFUSED and stats.code not in _KEEP_TRYING:
+            raise RefusedForGood(f"{self.server} refuses: {stats.reason}", stats.code)
+        if stats.phase is Phase.STOPPED and stats.code is Code.REPLACED:
+            raise RefusedForGood(f"{self.server} has ended this: {stats.reason}", stats.code)
+
+    def _receive(self) -> bytes | None:
+        while True:
+            try:
+                # One byte more than the largest datagram: one that is too large stays too large after the cut.
+                return self.socket.recv(limits.MAX_DATAGRAM + 1)
+            except BlockingIOError:
+                return None
+            except ConnectionError:
+                continue  # "port unreachable", while no server is up; each report is told once
+
+    def _say(self) -> None:
+        sentence = self._sentence()
+        if sentence and sentence != self._said:
+            self._said = sentence
+            log.log(logging.INFO if self.core.phase is Phase.OPEN else logging.WARNING, sentence)
+
+    def _sentence(self) -> str:
+        phase, welcome = self.core.phase, self.core.welcome
+        if phase is Phase.OPEN and welcome is not None:
+            return f"connected to {welcome.device_name} at {self.server} ({welcome.server}, {welcome.loop_hz} Hz)"
+        if phase is Phase.UNANSWERED:
+            return f"no answer from {self.server}; {self._doubt}? Trying on"
+        if phase is Phase.REFUSED:
+            return f"{self.server} refuses: {self.stats.reason}"
+        if phase is Phase.LOST:
+            return f"lost {self.server}: {self.stats.reason}"
+        return ""
+
+
+def _connected(server: str) -> socket.socket:
+    """From a port that the system chooses, and connected, so the kernel drops what others send to it."""
+    host, port = parse_address(server)
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+    connected = socket.socket(family, kind, protocol)
+    try:
+        connected.setblocking(False)
+        connected.connect(address)
+    except OSError:
+        connected.close()
+        raise
+    return connected

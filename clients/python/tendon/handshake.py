@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The client's half of the opening (SESSION.md, "Opening"), sans I/O."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Union
+
+from . import codec, noise
+from .cipher import Cipher, Plain, Sealed
+from .codec import Suite
+from .messages import NEVER, Hello, Instant, Refused, Welcome
+
+RESEND_NS = 100_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    connection_id: int
+    welcome: Welcome
+    cipher: Cipher
+
+
+Outcome = Union[Accepted, Refused]
+
+
+def key_id(key: bytes) -> bytes:
+    """Tells the server which key to try; it says nothing else."""
+    return sha256(b"tendon-key-id" + key).digest()[:8]
+
+
+def prologue(header: bytes, identity: bytes, random: bytes) -> bytes:
+    """What both ends of suite 1 must agree on besides the key."""
+    return b"tendon-1" + header + identity + random
+
+
+class ClientHandshake:
+    """Says Hello until a Retry brings a cookie, says Hello with the cookie until it is answered.
+
+    It never gives up; its owner may. What is malformed, not authentic, or not about this attempt is ignored.
+    """
+
+    def __init__(self, hello: Hello, random: bytes, now: int, *, key: bytes | None = None, ephemeral: bytes = b""):
+        """`random`: 16 bytes, new for each attempt. With `key`, suite 1; `ephemeral`: 32 bytes, new for each attempt."""
+        self._hello = hello
+        self._random = random
+        self._initiator: noise.Initiator | None = None
+        self._suite = Suite.PLAIN
+        self._body = codec.write_hello(hello)
+        if key is not None:
+            self._suite = Suite.NOISE
+            header = codec.encode_header(codec.Header(codec.DatagramType.HELLO, self._suite))
+            identity = key_id(key)
+            agreed = prologue(header, identity, random)
+            self._initiator = noise.Initiator(key, ephemeral, agreed, self._body)
+            self._body = identity + self._initiator.message
+        self._cookie: bytes | None = None
+        self._next_hello: Instant = now
+        self.outcome: Outcome | None = None
+        """Set once the server has answered; the handshake is then over."""
+
+    def receive(self, now: int, datagram: bytes) -> None:
+        if self.outcome is not None:
+            return
+        retry = codec.decode_retry(datagram)
+        if retry is not None:
+            if retry.random == self._random and retry.suite == self._suite:
+                if self._cookie is None:  # a later one is no reason to hurry: no ping-pong
+                    self._next_hello = now
+                self._cookie = retry.cookie
+            return
+        answer = codec.decode_answer(datagram)
+        if answer is not None and answer.random == self._random and answer.suite == self._suite:
+            self.outcome = self._read(now, answer)
+            if self.outcome is not None:
+                self._next_hello = NEVER
+
+    def next_datagram(self, now: int) -> bytes | None:
+        """The Hello, when it is due."""
+        if now < self._next_hello:
+            return None
+        self._next_hello = now + RESEND_NS
+        cookie = self._cookie or codec.NO_COOKIE
+        return codec.encode_hello(codec.HelloDatagram(self._random, self._body, cookie, self._suite))
+
+    def next_turn(self) -> Instant:
+        """When `next_datagram` is due next."""
+        return self._next_hello
+
+    def _read(self, now: int, answer: codec.AnswerDatagram) -> Outcome | None:
+        body = answer.body
+        cipher: Cipher = Plain()
+        if self._initiator is not None:
+            read = self._initiator.read(body)
+            if read is None:
+                return None
+            body, split = read
+            cipher = Sealed(split.initiator_to_responder, split.responder_to_initiator, now)
+        said = codec.read_answer(body)
+        if not isinstance(said, Welcome):
+            return said
+        if not self._hello.version_min <= said.version <= self._hello.version_max:
+            return None
+        return Accepted(answer.connection_id, said, cipher)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every bound that the wire has. They are part of the protocol (SESSION.md, "Limits"), not settings."""
+
+MAX_DATAGRAM = 1200
+"""Bytes in one UDP datagram, header included."""
+MAX_HELLO_BODY = 1000
+"""Bytes that follow the fixed part of a Hello; padding not counted."""
+MAX_VALUE = 1e12
+"""Largest magnitude of any physical quantity in SI units, per component."""
+MAX_TIME_NS = 1 << 60
+"""Largest distance of any clock reading from its zero."""
+MAX_VALID_FOR_US = 10_000_000
+"""A force cannot be promised for longer."""
+MAX_FRAMES = 64
+"""Frames in one datagram."""
+REQUEST_WINDOW = 16
+"""Requests sent and not yet answered, and answers kept."""
+MAX_NAME = 64
+"""Bytes of UTF-8 in a name."""
+MAX_FEATURE = 32
+MAX_FEATURES = 16
+MAX_DETAIL = 128
+"""Bytes of UTF-8 in the sentence of a refusal, an answer or a Bye."""
+MAX_LOOP_HZ = 1_000_000
+MAX_TIMEOUT_MS = 3_600_000
+BYES = 3
+"""How often a Bye is said."""
+PACKET_NUMBERS = 1 << 60
+"""Packet numbers are below this: a nonce is never used twice."""
+LIFE_NS = 24 * 3600 * 1_000_000_000
+"""Age of a session of suite 1."""

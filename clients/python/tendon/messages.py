@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What peers say to each other, as plain values.
+
+`codec` turns them into bytes and back. SI units, device base frame; a force is what the device exerts
+**on the hand**, so a wall that resists motion along +x sends −x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from math import inf
+from typing import Union
+
+Vec3 = tuple[float, float, float]
+Mat3 = tuple[Vec3, Vec3, Vec3]
+
+ZERO: Vec3 = (0.0, 0.0, 0.0)
+
+PROTOCOL_VERSION = 1
+"""The version of the wire that this package speaks."""
+
+FEATURE_LOCAL_MODEL = "local-model"
+"""The client may send a local model with its forces, and the server follows the hand with it."""
+
+
+class Role(IntEnum):
+    OBSERVER = 1  # sees device states
+    CONTROLLER = 2  # … and sends forces; one per device
+
+
+class Code(IntEnum):
+    """Why something was refused or ended."""
+
+    OK = 1
+    INVALID = 2  # the value makes no sense
+    UNSUPPORTED = 3  # this peer does not know that request or version
+    BUSY = 4  # somebody else has it: a second controller
+    DENIED = 5  # not with this role
+    SHUTDOWN = 6  # the server is going down
+    TIMED_OUT = 7  # nothing was heard for too long
+    EXPIRED = 8  # a session of suite 1 has reached its age: shake hands again
+    REPLACED = 9  # another program with the same key has taken this place: do not come back unasked
+
+
+class Mode(IntEnum):
+    """What becomes of the remote force at the device."""
+
+    IDLE = 1  # no force has come yet, or none since the last safe stop
+    ACTIVE = 2  # a fresh force is rendered
+    HOLDING = 3  # it has outlived its validity and is held a little longer
+    DECAYING = 4  # … and now fades
+    SAFE_STOP = 5  # … and is now zero; only a fresh force re-engages
+    FAULT = 6  # latched: zero force until `rearm`
+
+
+class Reason(IntFlag):
+    """Why the device does not give out the force that was asked for. Bits nobody knows yet are kept."""
+
+    ENERGY = 1
+    MAX_FORCE = 2
+    SLEW = 4
+    RAMP_IN = 8
+    HELD = 16
+    DECAYING = 32
+    SAFE_STOP = 64
+    NOT_FINITE = 128
+    FAULT = 256
+    DEVICE_CLAMP = 512
+    OVERRUN = 1024
+    WATCHDOG = 2048
+    UNSEEN = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceState:
+    """Server → client, newest wins: the device at one haptic step."""
+
+    tick: int  # number of the haptic step
+    sampled_ns: int  # when the position was sampled, server clock: its differences are the dt to integrate with
+    position: Vec3  # m
+    velocity: Vec3  # m/s
+    force_applied: Vec3  # N on the hand, what the device really gives out from this step on
+    energy: float  # J, the energy ledger: what the device may still give out
+    permitted_force: float  # N, the limiter's bound on the norm; inf when there is none
+    reasons: int  # bits of `Reason`
+    force_sequence: int  # of the ForceCommand rendered now; 0 = none
+    force_age_ns: int  # since it arrived
+    mode: Mode
+
+
+@dataclass(frozen=True, slots=True)
+class LocalModel:
+    """The remote environment near one position: F(x) = force − stiffness · (x − at)."""
+
+    at: Vec3  # m
+    stiffness: Mat3  # N/m, row by row
+
+
+@dataclass(frozen=True, slots=True)
+class ForceCommand:
+    """Client → server, newest wins: the force that the physics engine wants."""
+
+    sequence: int  # 1, 2, 3 … per session
+    based_on_tick: int  # `DeviceState.tick` it was computed from
+    force: Vec3  # N, on the hand
+    valid_for_us: int  # counted from arrival
+    model: LocalModel | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SetStateRate:
+    """Client → server, reliable: how many states per second this client wants."""
+
+    hz: int
+
+
+@dataclass(frozen=True, slots=True)
+class Rearm:
+    """Client → server, reliable: clears a latched fault. Only from the controller."""
+
+
+Request = Union[SetStateRate, Rearm]
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """A request on its way."""
+
+    id: int
+    request: Request | None  # None: one that this version does not know
+
+
+@dataclass(frozen=True, slots=True)
+class ControlAck:
+    """The answer to a request."""
+
+    id: int
+    code: Code
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Bye:
+    code: Code
+    reason: str = ""
+
+
+Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye]
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The first words of a client."""
+
+    role: Role
+    name: str = ""
+    features: Sequence[str] = ()
+    version_min: int = PROTOCOL_VERSION
+    version_max: int = PROTOCOL_VERSION
+
+
+@dataclass(frozen=True, slots=True)
+class Welcome:
+    """The server's yes."""
+
+    version: int
+    features: Sequence[str]  # those both ends know
+    role: Role
+    device_name: str
+    max_force: float  # N
+    position_resolution: float  # m
+    loop_hz: int  # haptic steps per second
+    timeout_ms: int  # silence after which the server forgets this client
+    server: str  # name and version of the server
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The server's no."""
+
+    code: Code
+    detail: str = ""
+    version_min: int = 0
+    version_max: int = 0
+
+
+Stiffness = Union[float, Sequence[float], Sequence[Sequence[float]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """What the physics answers to one device state: what the hand is to feel there.
+
+    `stiffness` is −∂force/∂position at the state's position, in N/m, a spring is positive: one number k
+    for k·I, three for the diagonal, or the 3 × 3 matrix. With it the device loop follows the hand until
+    the next force (when the server has agreed to FEATURE_LOCAL_MODEL). Any sequences will do, NumPy
+    arrays among them.
+    """
+
+    force: Sequence[float] = ZERO  # N on the hand
+    stiffness: Stiffness | None = None
+
+
+@dataclass(slots=True)
+class LinkStats:
+    """Everything that is counted about one conversation.
+
+    Each datagram received adds one to exactly one of `datagrams_received`, `duplicated`, `malformed`, `forged`,
+    `old_key`.
+    """
+
+    datagrams_sent: int = 0
+    datagrams_received: int = 0  # accepted ones
+    lost: int = 0  # peer packet numbers never seen (so far)
+    lost_outgoing: int = 0  # ours that the peer had not seen, as far as its ack vectors reach
+    reordered: int = 0  # accepted, but older than one seen before
+    duplicated: int = 0  # seen before, older than the window, or of the handshake: dropped
+    malformed: int = 0  # not a datagram of this conversation: dropped
+    forged: int = 0  # suite 1: did not open; forged, or damaged under way: dropped
+    old_key: int = 0  # suite 1: of a key that is over, or far ahead: dropped
+    invalid: int = 0  # well-formed, with a value out of bounds: frame dropped
+    stale: int = 0  # state or force not newer than the newest one: frame dropped
+    round_trip_ns: int = 0  # newest sample; 0 = none yet
+    smoothed_round_trip_ns: int = 0  # RFC 6298 SRTT
+    round_trip_variation_ns: int = 0  # RFC 6298 RTTVAR
+
+
+NEVER = inf
+"""An instant that does not come. All others are nanoseconds of a monotonic clock, as integers."""
+
+Instant = Union[int, float]

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How long to and fro takes, and how long to wait for an answer before asking again (RFC 6298)."""
+
+
+class RoundTrip:
+    """All times are nanoseconds."""
+
+    FIRST_TIMEOUT = 100_000_000
+    """What to wait before the first sample: a handshake has just gone through, so the peer is there."""
+
+    def __init__(self) -> None:
+        self.newest = 0
+        self.smoothed = 0
+        self.variation = 0
+        self._known = False
+
+    def observe(self, sample: int) -> None:
+        self.newest = sample
+        if self._known:
+            error = sample - self.smoothed
+            self.variation += (abs(error) - self.variation) // 4
+            self.smoothed += error // 8
+        else:
+            self.smoothed = sample
+            self.variation = sample // 2
+            self._known = True
+
+    def timeout(self, minimum: int) -> int:
+        return max(minimum, self.smoothed + 4 * self.variation if self._known else self.FIRST_TIMEOUT)

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One open conversation, seen from either end (SESSION.md): bytes and instants in, bytes and events out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Union
+
+from . import codec, limits
+from .cipher import Cipher, Forged, OldKey, Plain
+from .codec import DatagramType, Echo, Header, Suite
+from .messages import (
+    NEVER,
+    Bye,
+    Code,
+    Control,
+    ControlAck,
+    DeviceState,
+    ForceCommand,
+    Frame,
+    Instant,
+    LinkStats,
+    Request,
+)
+from .replay_window import ReplayWindow
+from .requests import IncomingRequests, OutgoingRequests
+from .round_trip import RoundTrip
+
+KEEP_ALIVE_NS = 50_000_000
+"""Longest silence we leave: five are lost before a server comes to its 250 ms safe stop."""
+TIMEOUT_NS = 2_000_000_000
+"""Silence of the peer after which it is gone: longer than a Wi-Fi roam, shorter than patience."""
+MIN_RESEND_NS = 20_000_000
+"""A request is sent again after max(this, SRTT + 4 RTTVAR)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """The end of the conversation, as the peer said Bye. Code.TIMED_OUT: it fell silent. Code.EXPIRED: too old."""
+
+    code: Code
+    reason: str
+
+
+Event = Union[DeviceState, ForceCommand, Control, ControlAck, Closed]
+"""A Control is a request that has arrived and wants an answer, a ControlAck the answer to one of ours."""
+
+
+class Session:
+    """Sans I/O, pull: no socket, clock, thread or randomness of its own.
+
+    Use: `receive` what arrives and `tick` when `next_turn()` is due; then pull `next_event` and
+    `next_datagram` until they are empty. `now` never goes back.
+
+    Nothing queues without a bound: there is room for one state, one force and limits.REQUEST_WINDOW
+    requests each way; what was not taken out is replaced by a newer one of its kind.
+    """
+
+    def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
+        """`opened` is the instant of the handshake's end. The first datagram is due at once."""
+        self.open = True
+        self.stats = LinkStats()
+        self._connection_id = connection_id
+        self._opened = opened
+        self._latest = opened  # the newest `now` we were told
+        self._cipher = cipher or Plain()
+        self._expires = NEVER if self._cipher.suite is Suite.PLAIN else opened + limits.LIFE_NS
+        self._room = limits.MAX_DATAGRAM - codec.HEADER_SIZE - self._cipher.overhead
+        # Out.
+        self._next_packet = 0
+        self._last_sent: int | None = None
+        self._state_to_send: DeviceState | None = None
+        self._force_to_send: ForceCommand | None = None
+        self._asked = OutgoingRequests()
+        self._bye: Bye | None = None
+        self._byes_left = 0
+        # In.
+        self._last_heard = opened
+        self._seen = ReplayWindow()
+        self._newest_sent_ns = 0  # T1 and T2 of the newest datagram received
+        self._newest_received_ns = 0
+        self._newest_tick = -1
+        self._newest_sequence = -1
+        self._newest_echoed = -1  # newest packet of ours that the peer has told of
+        self._answering = IncomingRequests()
+        self._round_trip = RoundTrip()
+        # To tell.
+        self._state_arrived: DeviceState | None = None
+        self._force_arrived: ForceCommand | None = None
+        self._closed: Closed | None = None
+
+    # ---- In ----
+
+    def receive(self, now: int, datagram: bytes) -> None:
+        """Takes any bytes. What is not a good datagram of this conversation is counted and dropped."""
+        self._latest = now
+        if not self.open:
+            return
+        header = codec.decode_header(datagram)
+        if header is not None and header.type is not DatagramType.DATA:
+            self.stats.duplicated += 1  # a copy of the handshake that took its time
+            return
+        if (
+            header is None
+            or header.connection_id != self._connection_id
+            or header.suite is not self._cipher.suite
+            or header.packet_number >= limits.PACKET_NUMBERS
+        ):
+            self.stats.malformed += 1
+            return
+        number = header.packet_number
+        if self._seen.contains(number):
+            self.stats.duplicated += 1
+            return
+        clear, sealed = datagram[: codec.HEADER_SIZE], datagram[codec.HEADER_SIZE :]
+        try:
+            body = self._cipher.open(now, header.epoch, number, clear, sealed)
+        except Forged:
+            self.stats.forged += 1
+            return
+        except OldKey:
+            self.stats.old_key += 1
+            return
+        content = codec.read_data(body)
+        if content is None:
+            self.stats.malformed += 1
+            if self._cipher.suite is not Suite.PLAIN:
+                self._seen.insert(number)  # it was authentic. In suite 0 a damaged copy must not shut out the good one
+            return
+        self._accept(now, number, content)
+
+    def send(self, frame: DeviceState | ForceCommand) -> None:
+        """Replaces what has not left yet."""
+        if isinstance(frame, ForceCommand):
+            self._force_to_send = frame
+        else:
+            self._state_to_send = frame
+
+    def request(self, request: Request) -> int | None:
+        """Queues a reliable request and returns its id; None when limits.REQUEST_WINDOW are open."""
+        return self._asked.add(request)
+
+    def answer(self, number: int, code: Code, detail: str) -> None:
+        """Answers a Control that has arrived. Every one must be answered; an id that waits for none is ignored."""
+        self._answering.answer(number, code, detail)
+
+    def close(self, code: Code, reason: str) -> None:
+        """Says Bye and closes. What was not sent yet is dropped. No Closed comes: the owner knows."""
+        if self.open:
+            self.open = False
+            self._bye = Bye(code, reason)
+            self._byes_left = limits.BYES
+
+    def tick(self, now: int) -> None:
+        """Notices the silence of the peer, and our age."""
+        self._latest = now
+        if not self.open:
+            return
+        if now - self._last_heard >= TIMEOUT_NS:
+            self.open = False
+            self._closed = Closed(Code.TIMED_OUT, f"nothing heard for {TIMEOUT_NS // 1_000_000} ms")
+        elif now >= self._expires:
+            self._closed = Closed(Code.EXPIRED, "the session has reached its age")
+            self.close(self._closed.code, self._closed.reason)
+
+    # ---- Out ----
+
+    def next_datagram(self, now: int) -> bytes | None:
+        """The next datagram to send; None = nothing to send now."""
+        self._latest = now
+        if self._byes_left > 0 and self._bye is not None:
+            self._byes_left -= 1
+            return self._seal(now, self._head(now) + codec.write_frame(self._bye))
+        if not self.open or not self._something_to_say(now):
+            return None
+        return self._seal(now, self._fill(now))
+
+    def next_event(self) -> Event | None:
+        """The next thing to tell; Closed is the last."""
+        event: Event | None = self._answering.next() or self._asked.next_answer()
+        if event is None:
+            event, self._force_arrived = self._force_arrived, None
+        if event is None:
+            event, self._state_arrived = self._state_arrived, None
+        if event is None:
+            event, self._closed = self._closed, None
+        return event
+
+    def next_turn(self) -> Instant:
+        """When `tick` and `next_datagram` are due next; not in the future when something waits to be sent."""
+        if not self.open:
+            return self._latest if self._byes_left > 0 else NEVER
+        if self._last_sent is None or self._something_to_say(self._latest):
+            return self._latest
+        silence = self._last_heard + TIMEOUT_NS
+        return min(silence, self._expires, self._last_sent + KEEP_ALIVE_NS, self._asked.next_due())
+
+    # ---- Inside ----
+
+    def _accept(self, now: int, number: int, content: codec.DataContent) -> None:
+        stats = self.stats
+        stats.datagrams_received += 1
+        stats.invalid += content.invalid
+        self._last_heard = now
+        newest = number > self._seen.highest
+        self._seen.insert(number)
+        stats.lost = self._seen.missing()
+        if newest:
+            self._newest_sent_ns = content.sent_ns
+            self._newest_received_ns = now
+        else:
+            stats.reordered += 1
+        if content.echo is not None:
+            self._observe(now, content.sent_ns, content.echo)
+        for frame in content.frames:
+            self._take(frame)
+
+    def _take(self, frame: Frame) -> None:
+        if isinstance(frame, DeviceState):
+            if frame.tick <= self._newest_tick:
+                self.stats.stale += 1
+                return
+            self._newest_tick = frame.tick
+            self._state_arrived = frame
+        elif isinstance(frame, ForceCommand):
+            if frame.sequence <= self._newest_sequence:
+                self.stats.stale += 1
+                return
+            self._newest_sequence = frame.sequence
+            self._force_arrived = frame
+        elif isinstance(frame, Control):
+            self.stats.invalid += not self._answering.take(frame)
+        elif isinstance(frame, ControlAck):
+            self.stats.invalid += not self._asked.acknowledge(frame)
+        else:
+            self.open = False
+            self._closed = Closed(frame.code, frame.reason)
+
+    def _observe(self, now: int, sent_ns: int, told: Echo) -> None:
+        possible = (
+            told.packet_number < self._next_packet
+            and self._opened <= told.sent_ns <= now
+            and sent_ns >= told.received_ns
+        )
+        if not possible:
+            self.stats.invalid += 1
+            return
+        self._count_lost_outgoing(told)
+        sample = (now - told.sent_ns) - (sent_ns - told.received_ns)
+        if sample < 0:  # two clocks of different rates, and a peer that held the echo for long
+            return
+        self._round_trip.observe(sample)
+        self.stats.round_trip_ns = self._round_trip.newest
+        self.stats.smoothed_round_trip_ns = self._round_trip.smoothed
+        self.stats.round_trip_variation_ns = self._round_trip.variation
+
+    def _count_lost_outgoing(self, told: Echo) -> None:
+        since = told.packet_number - self._newest_echoed
+        if since <= 0:
+            return
+        # Of the packets since the last echo, those the vector reaches: itself and at most 32 before.
+        before = min(since - 1, 32)
+        self.stats.lost_outgoing += before - (told.received_mask & ((1 << before) - 1)).bit_count()
+        self._newest_echoed = told.packet_number
+
+    def _something_to_say(self, now: int) -> bool:
+        return (
+            self._force_to_send is not None
+            or self._state_to_send is not None
+            or self._last_sent is None
+            or now - self._last_sent >= KEEP_ALIVE_NS
+            or self._asked.next_due() <= now
+            or bool(self._answering.due())
+        )
+
+    def _head(self, now: int) -> bytes:
+        echo = None
+        if self._seen.highest >= 0:
+            mask = self._seen.mask_before_highest()
+            echo = Echo(self._newest_sent_ns, self._newest_received_ns, self._seen.highest, mask)
+        return codec.write_data_head(now, echo)
+
+    def _fill(self, now: int) -> bytes:
+        """As much as fits, what ages fastest first. The rest stays due and goes into the next datagram."""
+        body = bytearray(self._head(now))
+
+        def add(frame: Frame) -> bool:
+            piece = codec.write_frame(frame)
+            fits = len(body) + len(piece) <= self._room
+            if fits:
+                body.extend(piece)
+            return fits
+
+        if self._state_to_send is not None and add(self._state_to_send):
+            self._state_to_send = None
+        if self._force_to_send is not None and add(self._force_to_send):
+            self._force_to_send = None
+        for ack in self._answering.due():
+            if not add(ack):
+                break
+            self._answering.sent(ack.id)
+        timeout = self._round_trip.timeout(MIN_RESEND_NS)
+        for control in self._asked.due(now):
+            if not add(control):
+                break
+            self._asked.sent(control.id, now, timeout)
+        return bytes(body)
+
+    def _seal(self, now: int, body: bytes) -> bytes:
+        number = self._next_packet
+        header = codec.encode_header(
+            Header(DatagramType.DATA, self._cipher.suite, self._cipher.next_epoch(now), self._connection_id, number)
+        )
+        self._next_packet += 1
+        self.stats.datagrams_sent += 1
+        self._last_sent = now
+        return header + self._cipher.seal(number, header, body)

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+from google.protobuf.internal import containers as _containers
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Mapping, Optional as _Optional, Union as _Union
+
+CODE_BUSY: Code
+CODE_DENIED: Code
+CODE_EXPIRED: Code
+CODE_INVALID: Code
+CODE_OK: Code
+CODE_REPLACED: Code
+CODE_SHUTDOWN: Code
+CODE_TIMED_OUT: Code
+CODE_UNSPECIFIED: Code
+CODE_UNSUPPORTED: Code
+DESCRIPTOR: _descriptor.FileDescriptor
+MODE_ACTIVE: Mode
+MODE_DECAYING: Mode
+MODE_FAULT: Mode
+MODE_HOLDING: Mode
+MODE_IDLE: Mode
+MODE_SAFE_STOP: Mode
+MODE_UNSPECIFIED: Mode
+ROLE_CONTROLLER: Role
+ROLE_OBSERVER: Role
+ROLE_UNSPECIFIED: Role
+
+class Answer(_message.Message):
+    __slots__ = ["refused", "welcome"]
+    REFUSED_FIELD_NUMBER: _ClassVar[int]
+    WELCOME_FIELD_NUMBER: _ClassVar[int]
+    refused: Refused
+    welcome: Welcome
+    def __init__(self, welcome: _Optional[_Union[Welcome, _Mapping]] = ..., refused: _Optional[_Union[Refused, _Mapping]] = ...) -> None: ...
+
+class Bye(_message.Message):
+    __slots__ = ["code", "reason"]
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    code: Code
+    reason: str
+    def __init__(self, code: _Optional[_Union[Code, str]] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class Control(_message.Message):
+    __slots__ = ["id", "rearm", "set_state_rate"]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    REARM_FIELD_NUMBER: _ClassVar[int]
+    SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
+    id: int
+    rearm: Rearm
+    set_state_rate: SetStateRate
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ...) -> None: ...
+
+class ControlAck(_message.Message):
+    __slots__ = ["code", "detail", "id"]
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    DETAIL_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    code: Code
+    detail: str
+    id: int
+    def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ...) -> None: ...
+
+class Datagram(_message.Message):
+    __slots__ = ["echo", "frames", "tx_time_ns"]
+    ECHO_FIELD_NUMBER: _ClassVar[int]
+    FRAMES_FIELD_NUMBER: _ClassVar[int]
+    TX_TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    echo: Echo
+    frames: _containers.RepeatedCompositeFieldContainer[Frame]
+    tx_time_ns: int
+    def __init__(self, tx_time_ns: _Optional[int] = ..., echo: _Optional[_Union[Echo, _Mapping]] = ..., frames: _Optional[_Iterable[_Union[Frame, _Mapping]]] = ...) -> None: ...
+
+class DeviceState(_message.Message):
+    __slots__ = ["energy_j", "force_age_ns", "force_applied_n", "force_sequence", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    ENERGY_J_FIELD_NUMBER: _ClassVar[int]
+    FORCE_AGE_NS_FIELD_NUMBER: _ClassVar[int]
+    FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
+    FORCE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    MODE_FIELD_NUMBER: _ClassVar[int]
+    PERMITTED_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    REASONS_FIELD_NUMBER: _ClassVar[int]
+    SAMPLED_NS_FIELD_NUMBER: _ClassVar[int]
+    TICK_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    energy_j: float
+    force_age_ns: int
+    force_applied_n: Vec3
+    force_sequence: int
+    mode: Mode
+    permitted_force_n: float
+    position_m: Vec3
+    reasons: int
+    sampled_ns: int
+    tick: int
+    velocity_mps: Vec3
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ...) -> None: ...
+
+class Echo(_message.Message):
+    __slots__ = ["peer_packet_number", "peer_tx_time_ns", "received_mask", "rx_time_ns"]
+    PEER_PACKET_NUMBER_FIELD_NUMBER: _ClassVar[int]
+    PEER_TX_TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    RECEIVED_MASK_FIELD_NUMBER: _ClassVar[int]
+    RX_TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    peer_packet_number: int
+    peer_tx_time_ns: int
+    received_mask: int
+    rx_time_ns: int
+    def __init__(self, peer_tx_time_ns: _Optional[int] = ..., rx_time_ns: _Optional[int] = ..., peer_packet_number: _Optional[int] = ..., received_mask: _Optional[int] = ...) -> None: ...
+
+class ForceCommand(_message.Message):
+    __slots__ = ["based_on_tick", "force_n", "model", "sequence", "valid_for_us"]
+    BASED_ON_TICK_FIELD_NUMBER: _ClassVar[int]
+    FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    MODEL_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    VALID_FOR_US_FIELD_NUMBER: _ClassVar[int]
+    based_on_tick: int
+    force_n: Vec3
+    model: LocalModel
+    sequence: int
+    valid_for_us: int
+    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ...) -> None: ...
+
+class Frame(_message.Message):
+    __slots__ = ["bye", "control", "control_ack", "force", "state"]
+    BYE_FIELD_NUMBER: _ClassVar[int]
+    CONTROL_ACK_FIELD_NUMBER: _ClassVar[int]
+    CONTROL_FIELD_NUMBER: _ClassVar[int]
+    FORCE_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    bye: Bye
+    control: Control
+    control_ack: ControlAck
+    force: ForceCommand
+    state: DeviceState
+    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
+
+class Hello(_message.Message):
+    __slots__ = ["features", "name", "role", "version_max", "version_min"]
+    FEATURES_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    VERSION_MAX_FIELD_NUMBER: _ClassVar[int]
+    VERSION_MIN_FIELD_NUMBER: _ClassVar[int]
+    features: _containers.RepeatedScalarFieldContainer[str]
+    name: str
+    role: Role
+    version_max: int
+    version_min: int
+    def __init__(self, version_min: _Optional[int] = ..., version_max: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ..., name: _Optional[str] = ..., features: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class LocalModel(_message.Message):
+    __slots__ = ["at_m", "stiffness_npm"]
+    AT_M_FIELD_NUMBER: _ClassVar[int]
+    STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    at_m: Vec3
+    stiffness_npm: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class Rearm(_message.Message):
+    __slots__ = []
+    def __init__(self) -> None: ...
+
+class Refused(_message.Message):
+    __slots__ = ["code", "detail", "version_max", "version_min"]
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    DETAIL_FIELD_NUMBER: _ClassVar[int]
+    VERSION_MAX_FIELD_NUMBER: _ClassVar[int]
+    VERSION_MIN_FIELD_NUMBER: _ClassVar[int]
+    code: Code
+    detail: str
+    version_max: int
+    version_min: int
+    def __init__(self, code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., version_min: _Optional[int] = ..., version_max: _Optional[int] = ...) -> None: ...
+
+class SetStateRate(_message.Message):
+    __slots__ = ["hz"]
+    HZ_FIELD_NUMBER: _ClassVar[int]
+    hz: int
+    def __init__(self, hz: _Optional[int] = ...) -> None: ...
+
+class Vec3(_message.Message):
+    __slots__ = ["x", "y", "z"]
+    X_FIELD_NUMBER: _ClassVar[int]
+    Y_FIELD_NUMBER: _ClassVar[int]
+    Z_FIELD_NUMBER: _ClassVar[int]
+    x: float
+    y: float
+    z: float
+    def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
+
+class Welcome(_message.Message):
+    __slots__ = ["device_name", "features", "loop_hz", "max_force_n", "position_resolution_m", "role", "server", "timeout_ms", "version"]
+    DEVICE_NAME_FIELD_NUMBER: _ClassVar[int]
+    FEATURES_FIELD_NUMBER: _ClassVar[int]
+    LOOP_HZ_FIELD_NUMBER: _ClassVar[int]
+    MAX_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    POSITION_RESOLUTION_M_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    SERVER_FIELD_NUMBER: _ClassVar[int]
+    TIMEOUT_MS_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    device_name: str
+    features: _containers.RepeatedScalarFieldContainer[str]
+    loop_hz: int
+    max_force_n: float
+    position_resolution_m: float
+    role: Role
+    server: str
+    timeout_ms: int
+    version: int
+    def __init__(self, version: _Optional[int] = ..., features: _Optional[_Iterable[str]] = ..., role: _Optional[_Union[Role, str]] = ..., device_name: _Optional[str] = ..., max_force_n: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., timeout_ms: _Optional[int] = ..., server: _Optional[str] = ...) -> None: ...
+
+class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class Code(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class Role(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []

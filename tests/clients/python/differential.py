@@ -1,0 +1,278 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Shows the same random and damaged datagrams to the C++ decoder (tests/fuzz/decode_lines) and to the Python one, and compares
+what they take them for, to the last bit. Exit code 0: the same; 1: not the same, the first such datagrams are printed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from conftest import ROOT
+from wire_md import PAGE, golden_datagrams
+
+from tendon import codec
+from tendon import tendon_pb2 as pb
+from tendon.codec import DatagramType, Suite
+from tendon.messages import (
+    Bye,
+    Control,
+    ControlAck,
+    DeviceState,
+    ForceCommand,
+    Frame,
+    Refused,
+    SetStateRate,
+    Vec3,
+    Welcome,
+)
+
+# ---- What Python takes a datagram for, in the words of decode_lines ----
+
+
+def _double(number: float) -> str:
+    return struct.pack(">d", number).hex()
+
+
+def _vector(vector: Vec3) -> list[object]:
+    return [_double(component) for component in vector]
+
+
+def _text(text: str) -> str:
+    return "x" + text.encode().hex()
+
+
+def _frame(frame: Frame) -> list[object]:
+    if isinstance(frame, DeviceState):
+        return [
+            *("state", frame.tick, frame.sampled_ns),
+            *(*_vector(frame.position), *_vector(frame.velocity), *_vector(frame.force_applied)),
+            *(_double(frame.energy), _double(frame.permitted_force)),
+            *(frame.reasons, frame.force_sequence, frame.force_age_ns, int(frame.mode)),
+        ]
+    if isinstance(frame, ForceCommand):
+        words: list[object] = ["force", frame.sequence, frame.based_on_tick, *_vector(frame.force)]
+        words.append(frame.valid_for_us * 1000)
+        if frame.model is not None:
+            words += ["model", *_vector(frame.model.at)]
+            for row in frame.model.stiffness:
+                words += [_double(entry + 0.0) for entry in row]  # −0 is 0: k · 0 is either
+        return words
+    if isinstance(frame, Control):
+        if frame.request is None:
+            return ["control", frame.id, "unknown"]
+        if isinstance(frame.request, SetStateRate):
+            return ["control", frame.id, "rate", frame.request.hz]
+        return ["control", frame.id, "rearm"]
+    if isinstance(frame, ControlAck):
+        return ["ack", frame.id, int(frame.code), _text(frame.detail)]
+    assert isinstance(frame, Bye)
+    return ["bye", int(frame.code), _text(frame.reason)]
+
+
+def _data(body: bytes) -> list[object]:
+    content = codec.read_data(body)
+    if content is None:
+        return ["-"]
+    words: list[object] = [content.sent_ns]
+    if content.echo is not None:
+        echo = content.echo
+        words += ["echo", echo.sent_ns, echo.received_ns, echo.packet_number, echo.received_mask]
+    for frame in content.frames:
+        words += _frame(frame)
+    return [*words, "invalid", content.invalid]
+
+
+def _answer(body: bytes) -> list[object]:
+    said = codec.read_answer(body)
+    if isinstance(said, Refused):
+        return ["refused", int(said.code), _text(said.detail), said.version_min, said.version_max]
+    if isinstance(said, Welcome):
+        return [
+            *("welcome", said.version, len(said.features), *map(_text, said.features), int(said.role)),
+            *(_text(said.device_name), _double(said.max_force), _double(said.position_resolution)),
+            *(said.loop_hz, said.timeout_ms * 1_000_000, _text(said.server)),
+        ]
+    return []
+
+
+def _hello(body: bytes) -> list[object]:
+    said = codec.read_hello(body)
+    if said is None:
+        return []
+    features = [len(said.features), *map(_text, said.features)]
+    return [said.version_min, said.version_max, int(said.role), _text(said.name), *features]
+
+
+def verdict(datagram: bytes) -> str:
+    header = codec.decode_header(datagram)
+    if header is None:
+        return "-"
+    words: list[object] = [int(header.type), int(header.suite), header.epoch, header.connection_id, header.packet_number]
+    plain = header.suite is Suite.PLAIN
+    if header.type is DatagramType.DATA:
+        words += _data(datagram[codec.HEADER_SIZE :]) if plain else []
+    elif (hello := codec.decode_hello(datagram)) is not None:
+        words += ["hello", "x" + hello.random.hex(), "x" + hello.cookie.hex(), len(hello.body)]
+        words += _hello(hello.body) if plain else []
+    elif (retry := codec.decode_retry(datagram)) is not None:
+        words += ["retry", "x" + retry.random.hex(), "x" + retry.cookie.hex()]
+    elif (answer := codec.decode_answer(datagram)) is not None:
+        words += ["answer", "x" + answer.random.hex(), len(answer.body)]
+        words += _answer(answer.body) if plain else []
+    else:
+        words.append("-")
+    return " ".join(map(str, words))
+
+
+# ---- Datagrams ----
+
+_DOUBLES = [0.0, -0.0, 1.0, -2.5, 1e12, -1e12, 1.0000000000000002e12, -1.1e12, 5e-324, float("inf"), float("-inf"), float("nan")]
+_TEXTS = ["", "a", "ä" * 16, "f" * 32, "f" * 33, "n" * 64, "n" * 65, "d" * 128, "d" * 129, "€" * 21, "€" * 22, "\0", "\U0010ffff"]
+_SIZES = {"TYPE_UINT32": 32, "TYPE_FIXED32": 32, "TYPE_UINT64": 64, "TYPE_FIXED64": 64}
+
+
+class Dice(random.Random):
+    def whole(self, bits: int) -> int:
+        edges = [0, 1, 2, 3, 16, 1000, 3_600_000, 3_600_001, 10_000_000, 10_000_001, 1_000_000, 1_000_001, 1 << 60, (1 << 60) + 1]
+        value = self.choice([*edges, (1 << bits) - 1, self.getrandbits(bits), self.getrandbits(self.randrange(1, bits + 1))])
+        return value & (1 << bits) - 1
+
+    def fill(self, message: pb.Datagram, depth: int = 0) -> None:
+        """Values in and out of bounds, for each of the fields or not."""
+        present = self.choice([0.3, 0.9, 0.97])
+        for field in message.DESCRIPTOR.fields:
+            if self.random() > present:
+                continue
+            kind = field.type
+            if field.label == field.LABEL_REPEATED:
+                many = getattr(message, field.name)
+                for _ in range(self.choice([1, 1, 2, 3, 3, 4, 9, 9, 16, 17, 64, 65] if depth else [0, 1, 1, 2, 3])):
+                    if kind == field.TYPE_MESSAGE:
+                        self.fill(many.add(), depth + 1)
+                    else:
+                        many.append(self.value(field))
+            elif kind == field.TYPE_MESSAGE:
+                inside = getattr(message, field.name)
+                inside.SetInParent()
+                self.fill(inside, depth + 1)
+            else:
+                setattr(message, field.name, self.value(field))
+
+    def value(self, field: object) -> float | int | str | bool:
+        kind = field.type  # type: ignore[attr-defined]
+        if kind == field.TYPE_DOUBLE:  # type: ignore[attr-defined]
+            good = [self.uniform(-10, 10)] * 120
+            return self.choice([*_DOUBLES, *good])
+        if kind == field.TYPE_STRING:  # type: ignore[attr-defined]
+            return self.choice(_TEXTS)
+        if kind == field.TYPE_ENUM:  # type: ignore[attr-defined]
+            return self.choice([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, -1, 1000])
+        if kind == field.TYPE_SFIXED64:  # type: ignore[attr-defined]
+            edges = [0, 1, -1, 1 << 60, -(1 << 60), (1 << 60) + 1, -(1 << 60) - 1, (1 << 63) - 1, -(1 << 63)]
+            return self.choice([*edges, *[self.randrange(10**12)] * 60])
+        return self.whole(32 if kind in (field.TYPE_UINT32, field.TYPE_FIXED32) else 64)  # type: ignore[attr-defined]
+
+    def made(self) -> bytes:
+        """A datagram with the right shape and any values."""
+        random16 = self.randbytes(16)
+        kind = self.choice(["data"] * 8 + ["hello", "answer", "answer", "retry"])
+        suite = Suite(self.choice([0] * 15 + [1]))
+        if kind == "hello":
+            hello = pb.Hello()
+            self.fill(hello)
+            body = hello.SerializeToString()[: self.choice([1000, 1001, 1150])]
+            return codec.encode_hello(codec.HelloDatagram(random16, body, self.randbytes(16), suite))
+        if kind == "answer":
+            answer = pb.Answer()
+            self.fill(answer)
+            connection_id = self.getrandbits(32)
+            return codec.encode_answer(codec.AnswerDatagram(random16, answer.SerializeToString(), connection_id, suite))
+        if kind == "retry":
+            return codec.encode_retry(codec.RetryDatagram(random16, self.randbytes(16), suite))
+        epoch = self.randrange(256) if suite is Suite.NOISE else 0
+        header = codec.Header(DatagramType.DATA, suite, epoch, self.getrandbits(32), self.whole(64))
+        datagram = pb.Datagram()
+        self.fill(datagram)
+        return codec.encode_header(header) + datagram.SerializeToString()
+
+    def damaged(self, datagram: bytes, others: list[bytes]) -> bytes:
+        bytes_ = bytearray(datagram)
+        for _ in range(self.choice([1, 1, 1, 2, 3, 8])):
+            at = self.randrange(len(bytes_) + 1) if self.random() < 0.3 else self.randrange(min(len(bytes_), 120) + 1)
+            end = min(len(bytes_), at + self.choice([1, 1, 2, 8, 40]))
+            how = self.randrange(8)
+            if how == 0 and at < len(bytes_):
+                bytes_[at] ^= 1 << self.randrange(8)
+            elif how == 1 and at < len(bytes_):
+                bytes_[at] = self.choice([0, 1, 0x7F, 0x80, 0xFF, self.randrange(256)])
+            elif how == 2:
+                del bytes_[at:end]
+            elif how == 3:
+                bytes_[at:at] = self.randbytes(self.choice([1, 2, 8, 30]))
+            elif how == 4:
+                del bytes_[at:]
+            elif how == 5:
+                bytes_[at:at] = bytes_[at:end]
+            elif how == 6:
+                bytes_[at : at + 8] = struct.pack("<d", self.choice(_DOUBLES))
+            else:
+                other = self.choice(others)
+                start = self.randrange(len(other))
+                bytes_[at:end] = other[start : start + 40]
+        return bytes(bytes_)
+
+
+def datagrams(seed: int, count: int) -> Iterator[bytes]:
+    dice = Dice(seed)
+    golden = list(golden_datagrams(PAGE.read_text(encoding="utf-8")).values())
+    yield from golden
+    for _ in range(count - len(golden)):
+        sound = dice.choice(golden) if dice.random() < 0.3 else dice.made()
+        yield sound if dice.random() < 0.4 else dice.damaged(sound, golden)
+
+
+def compare(decode_lines: Path, seed: int, count: int) -> tuple[dict[str, int], list[tuple[bytes, str, str]]]:
+    """How many datagrams were what, and those on which the two differ: the bytes, what C++ says, what Python says."""
+    shown = list(datagrams(seed, count))
+    lines = "".join(datagram.hex() + "\n" for datagram in shown)
+    done = subprocess.run([decode_lines], input=lines, capture_output=True, text=True, check=True)
+    theirs = done.stdout.splitlines()
+    if len(theirs) != len(shown):
+        raise RuntimeError(f"decode_lines has answered {len(theirs)} of {len(shown)} lines")
+    told = {"datagrams": len(shown), "refused": 0, "with frames": 0, "with frames out of bounds": 0}
+    different = []
+    for datagram, cpp in zip(shown, theirs):
+        python = verdict(datagram)
+        told["refused"] += python.endswith("-")
+        told["with frames"] += any(word in python for word in ("state", "force", "control", "ack", "bye"))
+        told["with frames out of bounds"] += "invalid" in python and not python.endswith("invalid 0")
+        if python != cpp:
+            different.append((datagram, cpp, python))
+    return told, different
+
+
+def main() -> int:
+    built = ROOT / "build" / "release" / "tests" / "decode_lines"
+    example = "Example: differential.py --count 100000 --seed 7"
+    line = argparse.ArgumentParser(description=__doc__, epilog=example)
+    line.add_argument("--decode-lines", type=Path, default=built, metavar="PROGRAM", help="[%(default)s]")
+    line.add_argument("--count", type=int, default=100_000, help="Datagrams [%(default)s]")
+    line.add_argument("--seed", type=int, default=1, help="[%(default)s]")
+    line.add_argument("--json", action="store_true", help="What was seen as one JSON object on stdout")
+    options = line.parse_args()
+    told, different = compare(options.decode_lines, options.seed, options.count)
+    print(json.dumps({**told, "different": len(different)}) if options.json else f"{told}, different: {len(different)}")
+    for datagram, cpp, python in different[:10]:
+        print(f"\n{datagram.hex()}\n  C++:    {cpp}\n  Python: {python}", file=sys.stderr)
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The server's end of the Noise handshake, for a test's own server."""
+
+from __future__ import annotations
+
+from tendon.noise import KEY_SIZE, TAG_SIZE, Split, SymmetricState, public_key, shared_key
+
+
+class Responder:
+    def __init__(self, key: bytes, prologue: bytes) -> None:
+        self._state = SymmetricState(prologue)
+        self._state.mix_key_and_hash(key)
+        self._peer = b""
+
+    def read(self, message: bytes) -> bytes | None:
+        """The payload of message 1. None when it is not authentic."""
+        if len(message) < KEY_SIZE + TAG_SIZE:
+            return None
+        self._peer = message[:KEY_SIZE]
+        self._state.mix_ephemeral(self._peer)
+        return self._state.decrypt(message[KEY_SIZE:])
+
+    def reply(self, ephemeral: bytes, payload: bytes) -> tuple[bytes, Split]:
+        """Message 2, and the keys. Once."""
+        point = public_key(ephemeral)
+        self._state.mix_ephemeral(point)
+        shared = shared_key(ephemeral, self._peer)
+        assert shared is not None
+        self._state.mix_key(shared)
+        return point + self._state.encrypt(payload), self._state.split()

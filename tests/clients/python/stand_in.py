@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A server for one client, sans I/O: it shakes hands as SESSION.md says, in either suite, and holds one Session."""
+
+from __future__ import annotations
+
+from responder import Responder
+
+from tendon import codec
+from tendon.cipher import Cipher, Plain, Sealed
+from tendon.codec import DatagramType, Header, Suite
+from tendon.handshake import key_id, prologue
+from tendon.messages import NEVER, Hello, Instant, Refused, Welcome
+from tendon.session import Session
+
+COOKIE = bytes(range(1, 17))
+
+
+class StandIn:
+    """`refusal`: what it says instead of Welcome. `deaf`: it answers nothing at all."""
+
+    def __init__(self, key: bytes | None = None) -> None:
+        self.key = key
+        self.refusal: Refused | None = None
+        self.deaf = False
+        self.features: tuple[str, ...] = ("local-model",)
+        self.version = 1
+        self.hellos: list[Hello] = []  # with the cookie, each attempt once
+        self.session: Session | None = None
+        self._answers: dict[bytes, bytes] = {}  # by client random
+        self._to_send: list[bytes] = []
+        self._welcomed = 0
+
+    def receive(self, now: int, datagram: bytes) -> None:
+        if self.deaf:
+            return
+        hello = codec.decode_hello(datagram)
+        if hello is None:
+            if self.session is not None:
+                self.session.receive(now, datagram)
+        elif hello.cookie != COOKIE:
+            self._to_send.append(codec.encode_retry(codec.RetryDatagram(hello.random, COOKIE, hello.suite)))
+        else:
+            if hello.random not in self._answers:
+                self._answer(now, hello)
+            if hello.random in self._answers:
+                self._to_send.append(self._answers[hello.random])
+
+    def tick(self, now: int) -> None:
+        if self.session is not None:
+            self.session.tick(now)
+
+    def next_datagram(self, now: int) -> bytes | None:
+        if self._to_send:
+            return self._to_send.pop(0)
+        return None if self.deaf or self.session is None else self.session.next_datagram(now)
+
+    def next_turn(self) -> Instant:
+        return NEVER if self.deaf or self.session is None else self.session.next_turn()
+
+    def _answer(self, now: int, hello: codec.HelloDatagram) -> None:
+        body, responder = hello.body, None
+        if hello.suite is Suite.NOISE:
+            header = codec.encode_header(Header(DatagramType.HELLO, Suite.NOISE))
+            if self.key is None or body[:8] != key_id(self.key):
+                return
+            responder = Responder(self.key, prologue(header, body[:8], hello.random))
+            opened = responder.read(body[8:])
+            if opened is None:
+                return
+            body = opened
+        said = codec.read_hello(body)
+        if said is None:
+            return
+        self.hellos.append(said)
+        self._welcomed += 1
+        answer: codec.Answer = self.refusal or Welcome(
+            self.version, self.features, said.role, "stand-in", 8.0, 0.0, 1000, 2000, "test"
+        )
+        connection_id = 0 if self.refusal else self._welcomed
+        body = codec.write_answer(answer)
+        cipher: Cipher = Plain()
+        if responder is not None:
+            body, split = responder.reply(bytes(31) + bytes([self._welcomed]), body)
+            cipher = Sealed(split.responder_to_initiator, split.initiator_to_responder, now)
+        if self.refusal is None:
+            self.session = Session(connection_id, now, cipher)
+        datagram = codec.AnswerDatagram(hello.random, body, connection_id, hello.suite)
+        self._answers[hello.random] = codec.encode_answer(datagram)

@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a guest does, against a stand-in server over virtual networks: the behaviour of clients/cpp/force_client.h."""
+
+from __future__ import annotations
+
+import random
+from math import inf, nan
+
+import pytest
+from stand_in import StandIn
+from world import MS, PERFECT, SECOND, Weather, World
+
+from tendon import Code, Config, ForceClient, Mode, Phase, Role, Touch
+from tendon.codec import DatagramType, decode_header, decode_hello
+from tendon.messages import Control, DeviceState, ForceCommand, Rearm, Refused, SetStateRate
+
+KEY = bytes(range(32))
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Stage:
+    """A guest whose physics is a wall at x = 0, and a device whose hand is 1 mm inside it, at 1 kHz."""
+
+    def __init__(self, config: Config, server: StandIn | None = None, weather: Weather = PERFECT, seed: int = 1):
+        self.client = ForceClient(config, World.START, random.Random(seed).randbytes)
+        self.server = server or StandIn()
+        self.world = World(self.client, self.server, weather, seed)
+        self.silent = False  # the server gives no states
+        self.touch = lambda hand: Touch((-2000 * hand.position[0], 0, 0))
+        self.seen: list[DeviceState] = []
+        self.forces: list[ForceCommand] = []
+        self.requests: list[Control] = []
+        self._next_state = World.START
+
+    def run(self, length: int) -> None:
+        self.world.run(length, self._each_turn)
+
+    def _each_turn(self):
+        now = self.world.now
+        session = self.server.session
+        while session is not None and (event := session.next_event()) is not None:
+            if isinstance(event, ForceCommand):
+                self.forces.append(event)
+            elif isinstance(event, Control):
+                self.requests.append(event)
+                session.answer(event.id, Code.OK, "")
+        if now >= self._next_state:
+            tick = (now - World.START) // MS
+            self._next_state = World.START + (tick + 1) * MS
+            if session is not None and not self.silent:
+                session.send(DeviceState(tick, now, (1e-3, 0.0, 0.0), ZERO, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
+        while (hand := self.client.next_state(now)) is not None:
+            self.seen.append(hand)
+            if self.touch is not None:
+                self.client.send(hand, self.touch(hand))
+        return min(self._next_state, self.client.next_state_due())
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["plain", "noise"])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_wall_is_felt_over_a_bad_network_in_either_suite(seed, key):
+    weather = Weather(5 * MS, 10 * MS, loss=0.2, duplicate=0.2)
+    stage = Stage(Config(name="wall", key=key, rate_hz=100), StandIn(key), weather, seed)
+    stage.run(5 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+    assert stage.client.welcome.device_name == "stand-in"
+    assert len(stage.forces) > 200
+    assert {force.force for force in stage.forces} == {(-2.0, 0.0, 0.0)}
+    sequences = [force.sequence for force in stage.forces]
+    assert sequences == sorted(set(sequences))
+    assert [hello.name for hello in stage.server.hellos] == ["wall"], "a Hello that comes twice is one attempt"
+
+
+def test_with_a_key_nothing_but_the_hellos_frame_is_readable():
+    stage = Stage(Config(name="a name that must not show", key=KEY), StandIn(KEY))
+    stage.run(1 * SECOND)
+    sent = stage.world.there.delivered
+    assert len(sent) > 100
+    assert all(b"must not show" not in datagram for datagram in sent)
+    assert {decode_header(datagram).suite for datagram in sent} == {1}
+
+
+@pytest.mark.parametrize("key", [None, bytes(32)], ids=["no key", "another key"])
+def test_a_server_with_another_key_is_one_that_does_not_answer(key):
+    stage = Stage(Config(key=KEY), StandIn(key))
+    stage.run(2500 * MS)
+    assert stage.client.stats.reason == "no answer"
+    assert stage.client.stats.sessions == 0
+
+
+def test_hellos_go_out_every_100_ms_and_one_attempt_has_one_random_and_one_noise_message():
+    stage = Stage(Config(key=KEY), StandIn(KEY))
+    stage.server.deaf = True
+    stage.run(1 * SECOND)
+    hellos = [decode_hello(datagram) for datagram in stage.world.there.delivered]
+    assert len(hellos) == 10
+    assert len({hello.random for hello in hellos}) == len({hello.body for hello in hellos}) == 1
+
+
+def test_attempts_are_given_up_after_2_s_and_wait_twice_as_long_each_time():
+    stage = Stage(Config())
+    stage.server.deaf = True
+    stage.run(30 * SECOND)
+    hellos = [decode_hello(datagram).random for datagram in stage.world.there.delivered]
+    assert stage.client.stats.attempts == len(set(hellos))
+    # 2 s each, and between them 0.1, 0.2, 0.4, 0.8, 1.6, 2, 2 … s.
+    assert stage.client.stats.attempts == 10
+
+
+def test_a_server_that_restarts_is_found_again_and_the_sequence_begins_anew():
+    stage = Stage(Config(rate_hz=100))
+    stage.run(1 * SECOND)
+    stage.server.session.close(Code.SHUTDOWN, "SIGTERM")
+    stage.run(50 * MS)
+    assert (stage.client.phase, stage.client.stats.reason) == (Phase.LOST, "SIGTERM")
+    stage.forces.clear()
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+    assert stage.client.stats.sessions == 2
+    assert stage.forces[0].sequence == 1
+
+
+def test_whose_place_another_program_has_taken_does_not_come_back():
+    stage = Stage(Config())
+    stage.run(1 * SECOND)
+    stage.server.session.close(Code.REPLACED, "taken over")
+    stage.run(10 * SECOND)
+    stats = stage.client.stats
+    assert (stats.phase, stats.code, stats.attempts) == (Phase.STOPPED, Code.REPLACED, 1)
+
+
+def test_a_sealed_session_that_is_a_day_old_says_bye_and_shakes_hands_again(monkeypatch):
+    monkeypatch.setattr("tendon.limits.LIFE_NS", 3 * SECOND)
+    stage = Stage(Config(key=KEY), StandIn(KEY))
+    stage.run(1 * SECOND)
+    first = stage.server.session
+    stage.run(2500 * MS)
+    assert not first.open
+    assert stage.client.phase is Phase.OPEN
+    assert stage.client.stats.sessions == 2
+
+
+def test_silence_of_the_server_ends_the_session_and_a_new_attempt_follows():
+    stage = Stage(Config())
+    stage.run(1 * SECOND)
+    stage.server.deaf = True
+    stage.run(2050 * MS)
+    assert (stage.client.phase, stage.client.stats.code) == (Phase.LOST, Code.TIMED_OUT)
+    stage.server.deaf = False
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+
+
+def test_a_refused_guest_asks_again_and_tells_the_servers_words():
+    stage = Stage(Config())
+    stage.server.refusal = Refused(Code.BUSY, "one controller")
+    stage.run(500 * MS)
+    stats = stage.client.stats
+    assert (stats.phase, stats.code, stats.reason) == (Phase.REFUSED, Code.BUSY, "one controller")
+    stage.server.refusal = None
+    stage.run(3 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+
+
+def test_an_answer_with_a_version_that_was_not_offered_is_ignored():
+    stage = Stage(Config())
+    stage.server.version = 2
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.GREETING
+
+
+def test_states_are_handed_out_on_the_grid_of_the_rate_and_the_others_skipped():
+    stage = Stage(Config(rate_hz=100))
+    stage.run(2 * SECOND)
+    stats = stage.client.stats
+    ticks = [hand.tick for hand in stage.seen[1:]]  # the first one comes when it comes
+    assert {later - earlier for earlier, later in zip(ticks, ticks[1:])} == {10}
+    assert stats.states == len(stage.seen) + stats.states_skipped + (stage.client.next_state_due() != inf)
+
+
+def test_with_rate_0_every_state_is_handed_out_once():
+    stage = Stage(Config())
+    stage.run(1 * SECOND)
+    ticks = [hand.tick for hand in stage.seen]
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks))) and len(ticks) > 900
+
+
+@pytest.mark.parametrize(
+    "config, valid_for_us",
+    [
+        (Config(rate_hz=100), 30_000),
+        (Config(rate_hz=1000), 20_000),
+        (Config(rate_hz=20), 150_000),
+        (Config(), 20_000),
+        (Config(valid_for_s=0.5), 500_000),
+    ],
+)
+def test_a_force_is_valid_for_three_periods_and_at_least_20_ms(config, valid_for_us):
+    stage = Stage(config)
+    stage.run(1 * SECOND)
+    assert {force.valid_for_us for force in stage.forces} == {valid_for_us}
+
+
+def test_a_force_names_the_tick_it_answers():
+    stage = Stage(Config(rate_hz=50))
+    stage.run(1 * SECOND)
+    assert [force.based_on_tick for force in stage.forces] == [hand.tick for hand in stage.seen][: len(stage.forces)]
+
+
+@pytest.mark.parametrize(
+    "stiffness, matrix",
+    [
+        (5, ((5, 0, 0), (0, 5, 0), (0, 0, 5))),
+        ((1, 2, 3), ((1, 0, 0), (0, 2, 0), (0, 0, 3))),
+        ([[1, 2, 3], [4, 5, 6], [7, 8, 9]], ((1, 2, 3), (4, 5, 6), (7, 8, 9))),
+    ],
+)
+def test_the_local_model_travels_in_all_its_forms(stiffness, matrix):
+    stage = Stage(Config())
+    stage.touch = lambda hand: Touch((0, 0, 0), stiffness)
+    stage.run(200 * MS)
+    assert {force.model.stiffness for force in stage.forces} == {matrix}
+    assert {force.model.at for force in stage.forces} == {(1e-3, 0.0, 0.0)}
+
+
+def test_numpy_arrays_will_do():
+    numpy = pytest.importorskip("numpy")
+    stage = Stage(Config())
+    stage.touch = lambda hand: Touch(-500 * numpy.array(hand.position), 500 * numpy.eye(3))
+    stage.run(200 * MS)
+    assert {force.force for force in stage.forces} == {(-0.5, 0.0, 0.0)}
+
+
+def test_without_the_servers_consent_no_local_model_is_sent():
+    stage = Stage(Config())
+    stage.server.features = ()
+    stage.touch = lambda hand: Touch((0, 0, 0), 100)
+    stage.run(200 * MS)
+    assert {force.model for force in stage.forces} == {None}
+
+
+@pytest.mark.parametrize("touch", [Touch((nan, 0, 0)), Touch((0, inf, 0)), Touch((0, 0, 0), 2e12)])
+def test_a_force_that_is_not_usable_is_counted_and_not_sent(touch):
+    stage = Stage(Config(rate_hz=100))
+    stage.touch = lambda hand: touch
+    stage.run(1 * SECOND)
+    assert stage.forces == []
+    assert stage.client.stats.forces_unusable == len(stage.seen) > 50
+
+
+@pytest.mark.parametrize("touch", [Touch((1, 2)), Touch((1, 2, 3), (1, 2)), Touch(7), Touch(("a", 0, 0))])
+def test_a_force_of_a_wrong_shape_is_an_error_in_the_callers_program(touch):
+    stage = Stage(Config())
+    stage.touch = lambda hand: touch
+    with pytest.raises(ValueError, match="expected a (force|stiffness)"):
+        stage.run(1 * SECOND)
+
+
+def test_an_observer_sees_states_and_cannot_send():
+    stage = Stage(Config(role=Role.OBSERVER))
+    stage.touch = None
+    stage.run(200 * MS)
+    assert len(stage.seen) > 100
+    assert stage.server.hellos[0].role is Role.OBSERVER
+    with pytest.raises(PermissionError):
+        stage.client.send(stage.seen[0], Touch())
+
+
+def test_a_wanted_state_rate_and_rearm_arrive_as_requests():
+    stage = Stage(Config(state_hz=250))
+    assert not stage.client.rearm(), "there is no session yet"
+    stage.run(500 * MS)
+    assert stage.client.rearm()
+    stage.run(500 * MS)
+    assert [control.request for control in stage.requests] == [SetStateRate(250), Rearm()]
+
+
+def test_stop_says_bye_and_is_for_good():
+    stage = Stage(Config(name="wall"))
+    stage.run(1 * SECOND)
+    stage.client.stop(stage.world.now)
+    stage.run(5 * SECOND)
+    assert stage.client.phase is Phase.STOPPED
+    assert stage.client.stats.attempts == 1
+    last = stage.world.there.delivered[-1]
+    assert decode_header(last).type is DatagramType.DATA
+    assert not stage.server.session.open
+
+
+@pytest.mark.parametrize(
+    "changes, word",
+    [
+        ({"name": 65 * "n"}, "name"),
+        ({"key": bytes(31)}, "key"),
+        ({"rate_hz": -1}, "rate_hz"),
+        ({"rate_hz": nan}, "rate_hz"),
+        ({"state_hz": 2_000_000}, "state_hz"),
+        ({"valid_for_s": 11}, "valid_for_s"),
+        ({"patience_s": 0}, "patience_s"),
+        ({"retry_min_s": 0}, "retry_min_s"),
+        ({"retry_max_s": 0.01}, "retry_max_s"),
+    ],
+)
+def test_an_impossible_setting_is_named(changes, word):
+    with pytest.raises(ValueError, match=word):
+        Config(**changes)
+
+
+def test_a_key_does_not_show_in_what_is_printed():
+    assert "key" not in repr(Config(key=KEY))

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The package as strangers get it: generated code, types, a wheel, examples, a page."""
+
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from importlib.util import find_spec
+
+import pytest
+from conftest import ROOT
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+
+from tendon import tendon_pb2
+from tendon.messages import Code, Mode, Role
+
+PACKAGE = ROOT / "clients" / "python"
+
+
+def run(*command, **options):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, **options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_generated_code_is_that_of_tendon_proto(tmp_path):
+    """After a change of tendon.proto: clients/python/generate."""
+    if shutil.which("protoc") is None:
+        pytest.skip("no protoc: apt-get install protobuf-compiler")
+    described = tmp_path / "tendon.bin"
+    run("protoc", f"--proto_path={ROOT / 'protocol'}", f"--descriptor_set_out={described}", "tendon.proto")
+    (file,) = FileDescriptorSet.FromString(described.read_bytes()).file
+    for message in file.message_type:
+        for field in message.field:
+            field.ClearField("json_name")  # protoc writes it down here and leaves it out there
+    assert tendon_pb2.DESCRIPTOR.serialized_pb == file.SerializeToString()
+
+
+@pytest.mark.parametrize("ours, theirs", [(Code, "Code"), (Mode, "Mode"), (Role, "Role")])
+def test_the_enums_are_those_of_tendon_proto(ours, theirs):
+    values = tendon_pb2.DESCRIPTOR.enum_types_by_name[theirs].values_by_name
+    expected = {name.removeprefix(theirs.upper() + "_"): value.number for name, value in values.items()}
+    del expected["UNSPECIFIED"]
+    assert {value.name: value.value for value in ours} == expected
+
+
+def test_the_types_are_right():
+    mypy = shutil.which("mypy")
+    if mypy is None:
+        pytest.skip("no mypy: apt-get install mypy")
+    run(mypy, "--no-incremental", cwd=PACKAGE)
+
+
+def test_a_wheel_holds_the_package_with_its_types(tmp_path):
+    if not all(map(find_spec, ("pip", "setuptools", "wheel"))):
+        pytest.skip("no pip, setuptools or wheel: apt-get install python3-pip python3-wheel")
+    source = tmp_path / "source"  # setuptools leaves things behind
+    shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info", "build"))
+    run(sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index", "-w", tmp_path, source)
+    (wheel,) = tmp_path.glob("*.whl")
+    held = {name for name in zipfile.ZipFile(wheel).namelist() if name.startswith("tendon/")}
+    there = {f"tendon/{file.name}" for file in (PACKAGE / "tendon").iterdir() if file.is_file()}
+    assert held == there
+    assert {"tendon/py.typed", "tendon/tendon_pb2.pyi"} <= held
+
+
+def test_the_version_is_that_of_the_project():
+    project = re.search(r"project\(tendon VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
+    package = re.search(r'^version = "([\d.]+)"', (PACKAGE / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)
+    assert package[1] == project[1]
+
+
+@pytest.mark.parametrize("example", ["echo_motion.py", "virtual_wall.py"])
+def test_an_example_has_at_most_25_lines_and_explains_itself(example):
+    file = PACKAGE / "examples" / example
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 25
+    help_text = run(sys.executable, file, "--help", env={"PYTHONPATH": str(PACKAGE), "PATH": ""})
+    for word in ("--server", "--key", "--rate-hz", "--duration-s", "--json", f"Example: {file.stem}"):
+        assert word in help_text
+    for wrong in (["--server", "nowhere"], ["--rate-hz", "nan"], ["--duration-s", "-1"]):
+        done = subprocess.run([sys.executable, file, *wrong], env={"PYTHONPATH": str(PACKAGE)}, capture_output=True)
+        assert done.returncode == 2 and b"expected" in done.stderr
+
+
+def test_the_code_on_the_page_compiles():
+    blocks = re.findall(r"^```python\n(.*?)^```", (PACKAGE / "README.md").read_text(encoding="utf-8"), re.M | re.S)
+    assert blocks
+    for block in blocks:
+        compile(block, "README.md", "exec")

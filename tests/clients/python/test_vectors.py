@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""protocol/vectors: what every client must be able to make, and to take apart."""
+
+import hmac
+import json
+
+import pytest
+from conftest import ROOT
+from google.protobuf import json_format
+from responder import Responder
+
+from tendon import codec, noise, read_key
+from tendon import tendon_pb2 as pb
+from tendon.cipher import Forged, Sealed
+from tendon.codec import DatagramType, Header, Suite
+from tendon.handshake import Accepted, ClientHandshake, key_id, prologue
+from tendon.messages import Refused
+from tendon.replay_window import ReplayWindow
+from tendon.session import Session
+
+VECTORS = ROOT / "protocol" / "vectors"
+
+
+def load(name):
+    return json.loads((VECTORS / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def unhex(value):
+    """All hexadecimal texts of one level as bytes."""
+    words = ("body", "cookie", "datagram", "ephemeral", "hash", "key", "key_id", "prologue", "psk", "random")
+    return {
+        name: bytes.fromhex(text) if isinstance(text, str) and name.endswith(words) else text
+        for name, text in value.items()
+    }
+
+
+PLAIN, SEALED = (unhex(load(name)) for name in ("plain", "sealed"))
+FILES = [pytest.param(PLAIN, id="plain"), pytest.param(SEALED, id="sealed")]
+
+
+def cases(vectors, name="name"):
+    return [pytest.param(vector, id=vector[name]) for vector in vectors]
+
+
+def encoded(message_type, message):
+    return json_format.ParseDict(message, message_type()).SerializeToString()
+
+
+# ---- Primitives ----
+
+PRIMITIVES = load("primitives")
+
+
+@pytest.mark.parametrize("vector", cases(PRIMITIVES["x25519"], "source"))
+def test_x25519(vector):
+    scalar, point = bytes.fromhex(vector["scalar"]), bytes.fromhex(vector["point"])
+    assert noise.shared_key(scalar, point).hex() == vector["result"]
+    if point == bytes([9]) + bytes(31):
+        assert noise.public_key(scalar).hex() == vector["result"]
+
+
+@pytest.mark.parametrize("vector", cases(PRIMITIVES["hmac_sha256"], "source"))
+def test_hmac_sha256(vector):
+    key, data = bytes.fromhex(vector["key"]), bytes.fromhex(vector["data"])
+    assert hmac.digest(key, data, "sha256").hex() == vector["result"]
+
+
+def test_noise_is_that_of_the_public_vector():
+    (vector,) = load("noise")["vectors"]
+    (psk,) = map(bytes.fromhex, vector["init_psks"])
+    agreed, ours, theirs = (
+        bytes.fromhex(vector[name]) for name in ("init_prologue", "init_ephemeral", "resp_ephemeral")
+    )
+    messages = [(bytes.fromhex(m["payload"]), bytes.fromhex(m["ciphertext"])) for m in vector["messages"]]
+
+    initiator = noise.Initiator(psk, ours, agreed, messages[0][0])
+    assert initiator.message == messages[0][1]
+    responder = Responder(psk, agreed)
+    assert responder.read(messages[0][1]) == messages[0][0]
+    message, split = responder.reply(theirs, messages[1][0])
+    assert message == messages[1][1]
+    assert initiator.read(message) == (messages[1][0], split)
+    assert split.handshake_hash.hex() == vector["handshake_hash"]
+    for i, (plain, sealed) in enumerate(messages[2:]):
+        key = (split.initiator_to_responder, split.responder_to_initiator)[i % 2]
+        assert noise.seal(key, i // 2, b"", plain) == sealed
+        assert noise.unseal(key, i // 2, b"", sealed) == plain
+
+
+# ---- The handshake ----
+
+
+def handshake(file, now=0):
+    hello = codec.read_hello(unhex(file["hello"])["body"])
+    secret = {"key": file["psk"], "ephemeral": file["client_ephemeral"]} if file["suite"] else {}
+    return ClientHandshake(hello, file["client_random"], now, **secret)
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_hello_is_written_as_it_is_here_before_and_after_the_cookie(file):
+    hello = unhex(file["hello"])
+    assert encoded(pb.Hello, hello["message"]) == hello["body"]
+    assert codec.write_hello(codec.read_hello(hello["body"])) == hello["body"]
+
+    client = handshake(file)
+    ours = {codec.NO_COOKIE: client.next_datagram(0)}
+    client.receive(1, unhex(file["retry"])["datagram"])
+    ours[file["cookie"]] = client.next_datagram(1)
+    for name in hello.keys() & {"first_datagram", "datagram"}:
+        assert ours[codec.decode_hello(hello[name]).cookie] == hello[name]
+
+
+def test_key_id_and_prologue_are_as_they_are_here():
+    header = codec.encode_header(Header(DatagramType.HELLO, Suite.NOISE))
+    assert key_id(SEALED["psk"]) == SEALED["key_id"]
+    assert prologue(header, SEALED["key_id"], SEALED["client_random"]) == unhex(SEALED["hello"])["prologue"]
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("name", ["welcome", "refused"])
+def test_the_answer_is_read_as_it_is_here(file, name):
+    answer = unhex(file[name])
+    assert encoded(pb.Answer, answer["message"]) == answer["body"]
+    assert codec.write_answer(codec.read_answer(answer["body"])) == answer["body"]
+
+    client = handshake(file)
+    client.receive(1, answer["datagram"])
+    if name == "refused":
+        assert isinstance(client.outcome, Refused)
+    else:
+        assert isinstance(client.outcome, Accepted)
+        assert client.outcome.connection_id == file["connection_id"]
+        assert client.outcome.welcome == codec.read_answer(answer["body"])
+
+
+# ---- Data ----
+
+
+def number_of(vector):
+    return int(vector["packet_number"])
+
+
+def all_data(files):
+    for suite, file in files:
+        for vector in file["data"]:
+            yield pytest.param(file, unhex(vector), id=f"{suite}: {vector['name']}")
+
+
+@pytest.mark.parametrize("file, vector", all_data([("plain", PLAIN), ("sealed", SEALED)]))
+def test_a_datagram_is_written_and_read_as_it_is_here(file, vector):
+    body = vector["body"]
+    assert encoded(pb.Datagram, vector["message"]) == body
+    content = codec.read_data(body)
+    assert codec.write_data_head(content.sent_ns, content.echo) + b"".join(map(codec.write_frame, content.frames)) == body
+
+    header = codec.encode_header(
+        Header(DatagramType.DATA, Suite(file["suite"]), vector.get("epoch", 0), file["connection_id"], number_of(vector))
+    )
+    sealed = noise.seal(vector["key"], number_of(vector), header, body) if file["suite"] else body
+    assert header + sealed == vector["datagram"]
+
+
+def test_the_conversation_here_can_be_held_with_the_keys_of_its_welcome():
+    welcome = unhex(SEALED["welcome"])
+    ours, theirs = welcome["client_to_server_key"], welcome["server_to_client_key"]
+    client, server = Sealed(ours, theirs, 0), Sealed(theirs, ours, 0)
+    for vector in map(unhex, SEALED["data"]):
+        end = server if vector["direction"] == "client_to_server" else client
+        header, sealed = vector["datagram"][:16], vector["datagram"][16:]
+        assert end.open(0, vector["epoch"], number_of(vector), header, sealed) == vector["body"]
+        other = client if end is server else server
+        with pytest.raises(Forged):
+            other.open(0, vector["epoch"] and 1, number_of(vector), header, sealed)
+
+
+@pytest.mark.parametrize("vector", cases(map(unhex, SEALED["dropped"])))
+def test_what_is_dropped_here_is_dropped_and_counted(vector):
+    client = handshake(SEALED)
+    client.receive(0, unhex(SEALED["welcome"])["datagram"])
+    session = Session(client.outcome.connection_id, 0, client.outcome.cipher)
+    session.receive(0, vector["datagram"])
+    assert session.stats.datagrams_received == 0
+    assert getattr(session.stats, vector["counter"]) == 1
+
+
+# ---- What else ----
+
+REPLAY = load("replay")
+
+
+@pytest.mark.parametrize("script", cases(REPLAY["scripts"]))
+def test_packet_numbers_are_let_in_as_they_are_here(script):
+    assert ReplayWindow.REMEMBERED == REPLAY["remembered"]
+    window, accepted = ReplayWindow(), []
+    for number in map(int, script["packet_numbers"]):
+        accepted.append(not window.contains(number))
+        if accepted[-1]:
+            window.insert(number)
+    assert accepted == script["accept"]
+
+
+@pytest.mark.parametrize("vector", cases(load("key_files")["files"]))
+def test_key_files_are_read_or_refused_as_they_are_here(vector, tmp_path):
+    file = tmp_path / "a.key"
+    file.write_bytes(vector["text"].encode())
+    file.chmod(0o600)
+    if vector["accept"]:
+        assert read_key(file).hex() == vector["key"]
+        assert key_id(read_key(file)).hex() == vector["key_id"]
+    else:
+        with pytest.raises(ValueError, match="expected one line|weak"):
+            read_key(file)

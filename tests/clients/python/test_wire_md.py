@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bytes of WIRE.md are what this client writes, and what it reads."""
+
+from math import nan
+
+import pytest
+from wire_md import PAGE, golden_datagrams
+
+from tendon import codec
+from tendon.codec import AnswerDatagram, DatagramType, Echo, Header, HelloDatagram, RetryDatagram
+from tendon.messages import (
+    Bye,
+    Code,
+    Control,
+    ControlAck,
+    DeviceState,
+    ForceCommand,
+    Hello,
+    LocalModel,
+    Mode,
+    Refused,
+    Role,
+    SetStateRate,
+    Welcome,
+)
+
+GOLDEN = golden_datagrams(PAGE.read_text(encoding="utf-8"))
+RANDOM = bytes(range(0xA0, 0xB0))
+COOKIE = bytes(range(0xC0, 0xD0))
+ID = 0x11223344
+TX_TIME = 1_000_100_000
+ECHO = Echo(sent_ns=5_000_000, received_ns=999_000_000, packet_number=3, received_mask=5)
+
+HELLO = Hello(Role.CONTROLLER, "wall", ("local-model",))
+WELCOME = Welcome(1, ("local-model",), Role.CONTROLLER, "simulated", 8.0, 0.0, 1000, 2000, "tendond")
+REFUSED = Refused(Code.BUSY, "one controller", 1, 1)
+STATE = DeviceState(
+    tick=1000,
+    sampled_ns=1_000_000_000,
+    position=(0.01, 0.0, -0.02),
+    velocity=(0.5, 0.0, 0.0),
+    force_applied=(-2.0, 0.0, 0.0),
+    energy=0.25,
+    permitted_force=8.0,
+    reasons=3,
+    force_sequence=99,
+    force_age_ns=1_500_000,
+    mode=Mode.ACTIVE,
+)
+WALL = ((2000.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+FORCE = ForceCommand(100, 1000, (-2.0, 0.0, 0.0), 20_000, LocalModel((0.01, 0.0, 0.0), WALL))
+FRAMES = {
+    "keep-alive": (0, None, []),
+    "state": (42, ECHO, [STATE]),
+    "force": (43, ECHO, [FORCE]),
+    "control": (44, None, [Control(7, SetStateRate(500))]),
+    "control-ack": (45, None, [ControlAck(7, Code.OK, "500 Hz")]),
+    "bye": (46, None, [Bye(Code.SHUTDOWN, "SIGTERM")]),
+}
+
+
+def test_every_golden_datagram_is_known_here():
+    assert set(GOLDEN) == {"hello", "retry", "welcome", "refused", *FRAMES}
+
+
+def test_hello_is_written_and_read_as_the_page_has_it():
+    datagram = HelloDatagram(RANDOM, codec.write_hello(HELLO))
+    assert codec.encode_hello(datagram) == GOLDEN["hello"]
+    assert codec.decode_hello(GOLDEN["hello"]) == datagram
+    assert codec.read_hello(datagram.body) == HELLO
+
+
+def test_retry_is_written_and_read_as_the_page_has_it():
+    assert codec.encode_retry(RetryDatagram(RANDOM, COOKIE)) == GOLDEN["retry"]
+    assert codec.decode_retry(GOLDEN["retry"]) == RetryDatagram(RANDOM, COOKIE)
+
+
+@pytest.mark.parametrize("name, answer, connection_id", [("welcome", WELCOME, ID), ("refused", REFUSED, 0)])
+def test_answers_are_written_and_read_as_the_page_has_them(name, answer, connection_id):
+    datagram = AnswerDatagram(RANDOM, codec.write_answer(answer), connection_id)
+    assert codec.encode_answer(datagram) == GOLDEN[name]
+    assert codec.decode_answer(GOLDEN[name]) == datagram
+    assert codec.read_answer(datagram.body) == answer
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_data_is_written_and_read_as_the_page_has_it(name):
+    number, echo, frames = FRAMES[name]
+    header = Header(DatagramType.DATA, connection_id=ID, packet_number=number)
+    body = codec.write_data_head(TX_TIME, echo) + b"".join(map(codec.write_frame, frames))
+    assert codec.encode_header(header) + body == GOLDEN[name]
+
+    assert codec.decode_header(GOLDEN[name]) == header
+    content = codec.read_data(GOLDEN[name][codec.HEADER_SIZE :])
+    assert content == codec.DataContent(TX_TIME, echo, frames, invalid=0)
+
+
+@pytest.mark.parametrize(
+    "at, value",
+    [(0, 0x55), (1, 0x23), (1, 0x15), (1, 0x10), (2, 1), (3, 2)],
+    ids=["magic", "version", "type", "type 0", "epoch of plain", "suite"],
+)
+def test_a_header_that_the_page_does_not_know_is_refused(at, value):
+    datagram = bytearray(GOLDEN["state"])
+    datagram[at] = value
+    assert codec.decode_header(bytes(datagram)) is None
+
+
+def test_a_datagram_of_1200_bytes_is_read_and_none_of_1201():
+    assert codec.decode_header(GOLDEN["state"].ljust(1200, b"\0")) is not None
+    assert codec.decode_header(GOLDEN["state"].ljust(1201, b"\0")) is None
+
+
+def out_of_bounds():
+    """Frames with one value beyond the page's bounds, by what is wrong with them."""
+
+    def state(**changes):
+        values = {name: getattr(STATE, name) for name in DeviceState.__slots__}
+        return DeviceState(**{**values, **changes})
+
+    def force(**changes):
+        values = {name: getattr(FORCE, name) for name in ForceCommand.__slots__}
+        return ForceCommand(**{**values, **changes})
+
+    yield "position", state(position=(1.1e12, 0.0, 0.0))
+    yield "velocity NaN", state(velocity=(0.0, nan, 0.0))
+    yield "force infinite", state(force_applied=(0.0, 0.0, float("-inf")))
+    yield "energy NaN", state(energy=nan)
+    yield "permitted force negative", state(permitted_force=-1.0)
+    yield "permitted force NaN", state(permitted_force=nan)
+    yield "sampled", state(sampled_ns=2**60 + 1)
+    yield "force age", state(force_age_ns=2**60 + 1)
+    yield "mode 0", state(mode=0)
+    yield "mode 7", state(mode=7)
+    yield "sequence 0", force(sequence=0)
+    yield "force NaN", force(force=(nan, 0.0, 0.0))
+    yield "valid for nothing", force(valid_for_us=0)
+    yield "valid for too long", force(valid_for_us=10_000_001)
+    yield "stiffness", force(model=LocalModel((0.0, 0.0, 0.0), ((2e12, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))))
+    yield "request 0", Control(0, SetStateRate(1))
+    yield "answer to 0", ControlAck(0, Code.OK)
+    yield "code 0", ControlAck(1, 0)
+    yield "unknown code", Bye(99)
+
+
+@pytest.mark.parametrize("frame", [pytest.param(frame, id=what) for what, frame in out_of_bounds()])
+def test_a_value_out_of_bounds_drops_its_frame_and_no_other(frame):
+    body = codec.write_data_head(1, None) + codec.write_frame(frame) + codec.write_frame(Bye(Code.OK))
+    assert codec.read_data(body) == codec.DataContent(1, None, [Bye(Code.OK)], invalid=1)
+
+
+def test_no_bound_on_the_force_is_infinity():
+    values = {name: getattr(STATE, name) for name in DeviceState.__slots__}
+    unbounded = DeviceState(**{**values, "permitted_force": float("inf")})
+    assert codec.read_data(codec.write_data_head(1, None) + codec.write_frame(unbounded)).frames == [unbounded]
+
+
+def test_64_frames_are_read_and_65_are_malformed():
+    empty = b"\x1a\x00"  # a frame of a newer peer
+    assert codec.read_data(codec.write_data_head(1, None) + 64 * empty) == codec.DataContent(1, None, [], 0)
+    assert codec.read_data(codec.write_data_head(1, None) + 65 * empty) is None
+
+
+def test_texts_are_cut_to_their_bounds_at_a_character():
+    answer = codec.read_answer(codec.write_answer(Refused(Code.BUSY, 127 * "a" + "ä" + "b")))
+    assert answer == Refused(Code.BUSY, 127 * "a")
+    hello = codec.read_hello(codec.write_hello(Hello(Role.OBSERVER, "a\ud800b", tuple(20 * ["f" * 40]))))
+    assert hello == Hello(Role.OBSERVER, "a", tuple(16 * ["f" * 32]))
+
+
+def test_a_text_that_is_not_utf_8_makes_the_datagram_malformed():
+    assert codec.read_data(GOLDEN["bye"][16:].replace(b"SIGTERM", b"SIG\xffERM")) is None

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The golden datagrams of protocol/WIRE.md, read from the page itself."""
+
+import re
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parents[3] / "protocol" / "WIRE.md"
+
+
+def golden_datagrams(page: str) -> dict[str, bytes]:
+    """Name → bytes. `00 x9` is nine zeros; what follows a semicolon says what the bytes mean."""
+    datagrams = {}
+    for name, block in re.findall(r"^```golden (\S+)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        datagram = bytearray()
+        for line in block.splitlines():
+            for word in line.partition(";")[0].split():
+                if word.startswith("x"):
+                    datagram += datagram[-1:] * (int(word[1:]) - 1)
+                else:
+                    datagram += bytes.fromhex(word)
+        datagrams[name] = bytes(datagram)
+    return datagrams

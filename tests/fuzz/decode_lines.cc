@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// decode_lines: reads datagrams, one a line in hexadecimal digits, and prints what C++ takes each for, one line each. A
+// client in another language prints the same of the same bytes (tests/clients/python/differential.py), or one of the
+// two is wrong.
+//
+// Numbers are in decimal, floating-point ones as the 16 hexadecimal digits of their bits, texts and bytes in
+// hexadecimal digits; vectors and matrices row by row. What is refused is a "-".
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <iostream>
+#include <span>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "protocol/codec.h"
+
+namespace tendon {
+namespace {
+
+constexpr std::string_view kDigits = "0123456789abcdef";
+
+std::vector<std::byte> from_hex(std::string_view text) {
+  if (text.size() % 2 != 0) throw std::invalid_argument("expected an even number of hexadecimal digits");
+  const auto digit = [&](std::size_t at) {
+    const auto value = kDigits.find(text[at]);
+    if (value == std::string_view::npos) throw std::invalid_argument("expected hexadecimal digits, in lower case");
+    return static_cast<unsigned>(value);
+  };
+  std::vector<std::byte> bytes;
+  for (std::size_t i = 0; i < text.size(); i += 2) bytes.push_back(std::byte(digit(i) << 4U | digit(i + 1)));
+  return bytes;
+}
+
+/// One line of words.
+class Line {
+ public:
+  Line& operator<<(std::string_view word) {
+    text_ << (empty_ ? "" : " ") << word;
+    empty_ = false;
+    return *this;
+  }
+  Line& operator<<(std::int64_t number) { return *this << std::to_string(number); }
+  Line& operator<<(std::uint64_t number) { return *this << std::to_string(number); }
+  Line& operator<<(std::uint32_t number) { return *this << std::to_string(number); }
+  Line& operator<<(double number) {
+    std::string digits;
+    for (unsigned shift = 64; shift > 0; shift -= 4) {
+      digits += kDigits[std::bit_cast<std::uint64_t>(number) >> (shift - 4) & 0xFU];
+    }
+    return *this << digits;
+  }
+  Line& operator<<(std::span<const std::byte> bytes) {
+    std::string digits = "x";
+    for (const std::byte b : bytes) {
+      digits += kDigits[std::to_integer<std::size_t>(b >> 4)];
+      digits += kDigits[std::to_integer<std::size_t>(b & std::byte{0xF})];
+    }
+    return *this << digits;
+  }
+  Line& operator<<(const Vec3& v) { return *this << v.x() << v.y() << v.z(); }
+  Line& operator<<(Duration d) { return *this << std::int64_t{d.count()}; }
+  template <class Enum>
+  requires std::is_enum_v<Enum> Line& operator<<(Enum value) {
+    return *this << std::uint32_t{static_cast<std::uint8_t>(value)};
+  }
+  Line& put_text(const std::string& text) { return *this << std::as_bytes(std::span(text)); }
+  Line& put_texts(const std::vector<std::string>& texts) {
+    *this << std::uint64_t{texts.size()};
+    for (const auto& text : texts) put_text(text);
+    return *this;
+  }
+
+  std::string str() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  bool empty_ = true;
+};
+
+void print(Line& line, const DeviceState& state) {
+  line << "state" << state.tick << state.sampled.time_since_epoch() << state.position << state.velocity
+       << state.force_applied << state.energy << state.permitted_force << state.reasons << state.force_sequence
+       << state.force_age << state.mode;
+}
+
+void print(Line& line, const ForceCommand& force) {
+  line << "force" << force.sequence << force.based_on_tick << force.force << force.valid_for;
+  if (!force.model) return;
+  line << "model" << force.model->at;
+  const Vec3 zero = Vec3::Zero();  // added, it turns −0 into 0: k · 0 is either
+  for (int row = 0; row < 3; ++row) line << Vec3(force.model->stiffness.row(row).transpose() + zero);
+}
+
+void print(Line& line, const Control& control) {
+  line << "control" << control.id;
+  if (!control.request) {
+    line << "unknown";
+  } else if (const auto* rate = std::get_if<SetStateRate>(&*control.request)) {
+    line << "rate" << rate->hz;
+  } else {
+    line << "rearm";
+  }
+}
+
+void print(Line& line, const ControlAck& ack) {
+  line << "ack" << ack.id << ack.code;
+  line.put_text(ack.detail);
+}
+
+void print(Line& line, const Bye& bye) {
+  line << "bye" << bye.code;
+  line.put_text(bye.reason);
+}
+
+void print(Line& line, const Welcome& welcome) {
+  line << "welcome" << welcome.version;
+  line.put_texts(welcome.features) << welcome.role;
+  line.put_text(welcome.device_name) << welcome.max_force << welcome.position_resolution << welcome.loop_hz
+                                     << welcome.timeout;
+  line.put_text(welcome.server);
+}
+
+void print(Line& line, const Refused& refused) {
+  line << "refused" << refused.code;
+  line.put_text(refused.detail) << refused.version_min << refused.version_max;
+}
+
+void print_data(Line& line, std::span<const std::byte> body) {
+  static DataReader reader;
+  const DataContent* content = reader.read(body);
+  if (content == nullptr) {
+    line << "-";
+    return;
+  }
+  line << content->sent.time_since_epoch();
+  if (content->echo) {
+    line << "echo" << content->echo->sent.time_since_epoch() << content->echo->received.time_since_epoch()
+         << content->echo->packet_number << content->echo->received_mask;
+  }
+  for (const Frame& frame : content->frames) {
+    std::visit([&](const auto& value) { print(line, value); }, frame);
+  }
+  line << "invalid" << content->invalid;
+}
+
+std::string verdict(std::span<const std::byte> datagram) {
+  Line line;
+  const auto header = decode_header(datagram);
+  if (!header) return "-";
+  line << header->type << header->suite << std::uint32_t{header->epoch} << header->connection_id
+       << header->packet_number;
+  const bool plain = header->suite == Suite::kPlain;  // otherwise the body is sealed
+  if (header->type == DatagramType::kData) {
+    if (plain) print_data(line, datagram.subspan(kHeaderSize));
+  } else if (const auto hello = decode_hello(datagram)) {
+    line << "hello" << hello->random << hello->cookie << std::uint64_t{hello->body.size()};
+    const auto said = read_hello(hello->body);
+    if (plain && said) {
+      line << said->version_min << said->version_max << said->role;
+      line.put_text(said->name);
+      line.put_texts(said->features);
+    }
+  } else if (const auto retry = decode_retry(datagram)) {
+    line << "retry" << retry->random << retry->cookie;
+  } else if (const auto answer = decode_answer(datagram)) {
+    line << "answer" << answer->random << std::uint64_t{answer->body.size()};
+    const auto said = read_answer(answer->body);
+    if (plain && said) std::visit([&](const auto& value) { print(line, value); }, *said);
+  } else {
+    line << "-";
+  }
+  return line.str();
+}
+
+}  // namespace
+}  // namespace tendon
+
+int main(int argc, char**) {
+  if (argc > 1) {
+    std::cout << "Prints what C++ takes each datagram for. Hexadecimal lines in, one line each out.\n"
+                 "Example: echo 5413000000000000000000000000000009a0509c3b00000000 | decode_lines\n";
+    return 2;
+  }
+  try {
+    for (std::string line; std::getline(std::cin, line);) std::cout << tendon::verdict(tendon::from_hex(line)) << '\n';
+  } catch (const std::exception& error) {
+    std::cerr << "decode_lines: " << error.what() << '\n';
+    return 2;
+  }
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/session.h"
+#include "tests/fuzz/target.h"
+
+// What an honest key says that its holder should not: the input is sealed as the peer would, and a session takes it.
+
+using namespace tendon;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  constexpr LocalTime kOpened{std::chrono::seconds(100)};
+  constexpr std::uint32_t kConnection = 7;
+  Ratchet random(1);
+  const SessionKeys keys{.send = random.next(), .receive = random.next()};
+  Session session({.connection_id = kConnection}, keys, kOpened);
+  std::array<std::byte, kMaxDatagram> buffer;
+  session.request(Rearm{});
+  session.next_datagram(kOpened, buffer);
+
+  const auto body = std::as_bytes(std::span(data, std::min(size, kMaxDatagram - kHeaderSize - crypto::kTagSize)));
+  Sealer peer(keys.receive, {}, kOpened);
+  const Header header{.suite = Suite::kNoise, .connection_id = kConnection};
+  const auto clear = encode_header(header);
+  std::copy(clear.begin(), clear.end(), buffer.begin());
+  std::copy(body.begin(), body.end(), buffer.begin() + kHeaderSize);
+  const std::size_t sealed = peer.seal(header, buffer, kHeaderSize + body.size());
+  session.receive(kOpened, std::span(buffer).first(sealed));
+
+  const LinkStats& s = session.stats();
+  fuzz::require(s.datagrams_received + s.malformed == 1 && s.forged == 0 && s.old_key == 0);
+  while (const auto event = session.next_event()) {
+    if (const auto* force = std::get_if<Session::ForceArrived>(&*event)) {
+      fuzz::require(force->command.force.allFinite() && force->command.valid_for > Duration::zero());
+      fuzz::require(!force->command.model || force->command.model->stiffness.allFinite());
+    } else if (const auto* state = std::get_if<Session::StateArrived>(&*event)) {
+      fuzz::require(state->state.position.allFinite() && state->state.velocity.allFinite());
+    } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
+      session.answer(request->id, Code::kOk, {});
+    }
+  }
+  while (const std::size_t out = session.next_datagram(kOpened, buffer)) fuzz::require(out <= kMaxDatagram);
+  return 0;
+}
