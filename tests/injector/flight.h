@@ -24,7 +24,7 @@ namespace tendon::injector {
 class History {
  public:
   /// The furthest back that a replay can reach.
-  static constexpr std::size_t kDepth = 64;
+  static constexpr std::size_t kDepth = kMaxReplayDepth;
 
   void remember(std::span<const std::byte> datagram) {
     auto& place = ring_[count_++ % kDepth];

@@ -5,123 +5,203 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
-#include <utility>
+#include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "core/time.h"
 #include "protocol/link.h"
+#include "tests/injector/duration_histogram.h"
+#include "tests/injector/flight.h"
 #include "tests/injector/injector.h"
+#include "tests/injector/trace.h"
+#include "tests/injector/trace_player.h"
 
 namespace tendon::injector {
 
-/// Counts the clients since the proxy started: 0, 1, 2, … in order of their first datagram. Never
-/// used again for another client. It is the link of the client's injectors.
+/// Counts the clients since the proxy started: 0, 1, 2, … in order of their first datagram. Never used again for
+/// another client. It is the `link` of the client's injectors and of its lines in a trace.
 using ClientIndex = std::uint32_t;
 
-struct ProxyOptions {
-  Address server;
-  Profile up;
-  Profile down;
-  std::uint64_t seed = 0;
+inline constexpr std::size_t kCauses = static_cast<std::size_t>(Cause::kReplay) + 1;
 
-  /// Clients at one time; datagrams of further ones are refused. Each costs the driver a socket, and
-  /// the server serves one controller and a handful of observers.
-  std::size_t max_clients = 64;
-
-  /// A client that says nothing for this long is forgotten, once nothing is on its way any more.
-  /// Well beyond the 10 s after which the server ends a session, so no living session loses its route.
-  Duration idle_timeout = std::chrono::seconds(30);
-
-  /// What may be on its way at one time, payload and bookkeeping; datagrams beyond are refused.
-  /// The longest delay (60 s) at 1 kHz in both directions with 400-byte datagrams fits.
-  std::size_t max_bytes_in_flight = std::size_t{64} << 20;
-};
-
-/// What has happened to datagrams in one direction since the start.
+/// What has happened to datagrams in one direction since the start. Each that came in was refused or dropped, has left,
+/// was not taken by the kernel, or is still on its way.
 struct ProxyCounters {
-  std::uint64_t received = 0;    ///< all that came in
-  std::uint64_t refused = 0;     ///< … but were beyond a limit of ProxyOptions, or not from the server
-  std::uint64_t lost = 0;        ///< … and that the profile made vanish
-  std::uint64_t forwarded = 0;   ///< first copies handed out by next_due
-  std::uint64_t duplicated = 0;  ///< second copies handed out by next_due
+  std::uint64_t received = 0;                    ///< all that came in
+  std::uint64_t refused_clients = 0;             ///< … from clients beyond Config::max_clients, or forgotten
+  std::uint64_t refused_full = 0;                ///< … beyond Config::max_bytes_in_flight
+  std::array<std::uint64_t, kCauses> dropped{};  ///< … that the network made vanish, by Cause
+  std::uint64_t forwarded = 0;                   ///< first copies that left
+  std::uint64_t duplicated = 0;                  ///< second copies that left
+  std::uint64_t replayed = 0;                    ///< stale copies that left
+  std::uint64_t flipped = 0;                     ///< of those forwarded: with a bit flipped
+  std::uint64_t truncated = 0;                   ///< … cut
+  std::uint64_t unsent = 0;                      ///< copies of all kinds that the kernel did not take
+
+  std::uint64_t lost() const noexcept;  ///< Σ dropped
 };
 
-/// A bad network between many clients and one server, without sockets and without a clock: datagrams
-/// go in with the time of their arrival, and come out when they are due. Each client and direction
-/// has an Injector of its own (the link is the client's index), so that what one client sends does not
-/// change what happens to another.
+/// What one direction of the proxy did.
+struct ProxyMeasurements {
+  ProxyCounters counters;
+  DurationHistogram delay;          ///< of first copies: when they left − when they arrived, the truth of the run
+  DurationHistogram release_error;  ///< of all copies: when they left − when they were due
+};
+
+/// A bad network between many clients and one server, without sockets and without a clock: datagrams go in with the
+/// time of their arrival, and come out when they are due. Each client and direction has a Decider of its own, so that
+/// what one client sends does not change what happens to another.
 ///
-/// The driver owns one socket that clients send to, and one more for each client, from which the
-/// server receives that client's datagrams (it tells its peers apart by address).
+/// The driver owns one socket that clients send to, and one more for each client, connected to the server, on which the
+/// server's answers to that client come in.
 ///
 /// Thread-safe: no.
 class Proxy {
  public:
-  /// Throws std::invalid_argument as check() does, naming the direction as well.
-  explicit Proxy(const ProxyOptions& options);
+  /// Another network from now on, made ready where there is time for it: building an injector's tables takes up to
+  /// milliseconds.
+  struct PreparedChange {
+    std::optional<ClientIndex> client;          ///< none: all clients, those to come as well
+    std::array<std::optional<Injector>, 2> to;  ///< by Direction; none: stays as it is
+    std::string text;                           ///< what people call it
+  };
+  struct Step {
+    Duration at{};  ///< after the first datagram
+    PreparedChange change;
+  };
 
-  /// A datagram from a client to the server. The client's index, so that the driver can open a
-  /// socket for a new one; empty when the datagram was refused because there are too many clients.
+  struct Config {
+    /// By Direction: every client gets the same network, with draws of its own (Injector::for_link).
+    std::array<Injector, 2> networks;
+
+    /// In the order of their times.
+    std::vector<Step> timeline = {};
+
+    /// When given, recorded decisions instead of all that. Must outlive the proxy.
+    const Trace* replay = nullptr;
+    TracePlayer::By replay_by = TracePlayer::By::kIndex;
+
+    /// Keep a TraceRecord of every decision, see records().
+    bool record = false;
+
+    /// Clients at one time; datagrams of further ones are refused. Each costs the driver a socket.
+    std::size_t max_clients = 64;
+
+    /// A client that says nothing for this long is forgotten, once nothing is on its way any more. NATs keep a UDP
+    /// mapping for 30 s and more (RFC 4787 asks for 120 s): who is silent for longer must be ready for a new one.
+    Duration idle_timeout = std::chrono::seconds(30);
+
+    /// What may be on its way at one time, payload and bookkeeping; datagrams beyond are refused.
+    std::size_t max_bytes_in_flight = Flight<int>::kDefaultMaxBytes;
+  };
+
+  /// Throws std::invalid_argument as TracePlayer does.
+  explicit Proxy(Config config);
+
+  /// A datagram from a client to the server. The client's index, so that the driver can open a socket for a new one;
+  /// empty when the datagram was refused because there are too many clients.
   std::optional<ClientIndex> receive_from_client(const Address& client, std::span<const std::byte> datagram,
-                                                 LocalTime now);
+                                                 LocalTime arrival);
 
-  /// A datagram that came in on the socket of `client`. Only the server's are taken.
-  void receive_from_server(ClientIndex client, const Address& from, std::span<const std::byte> datagram, LocalTime now);
+  /// A datagram that came in on the socket of `client`.
+  void receive_from_server(ClientIndex client, std::span<const std::byte> datagram, LocalTime arrival);
 
   struct Departure {
-    Direction direction{};
-    ClientIndex client = 0;
-    Address to;       ///< the server, or the client
-    LocalTime due{};  ///< when it should have left
-    std::vector<std::byte> datagram;
+    Address to;       ///< the client; the server is not known here
+    LocalTime due{};  ///< when it should leave
+    Copy copy{};
+    std::span<const std::byte> datagram;  ///< valid until the next datagram is received
+    TraceRecord record;                   ///< direction, link and decision
   };
-  /// Takes out the next datagram that is due at `now`, in order of due times and, for equal ones, of
-  /// arrival; empty when there is none.
+  /// Takes out the next datagram that is due at `now`, in order of due times and, for equal ones, of arrival; empty
+  /// when there is none. What became of it must be told to `left` or `not_sent`.
   std::optional<Departure> next_due(LocalTime now);
 
-  /// Forgets one idle client and names it, so that the driver can close its socket; empty when there
-  /// is none (any more).
+  /// The kernel took it at `now`.
+  void left(const Departure& departure, LocalTime now);
+  /// The kernel did not take it.
+  void not_sent(const Departure& departure);
+
+  /// Nothing changes while a trace is replayed.
+  void change(const PreparedChange& change, LocalTime now);
+
+  /// Makes the changes of the timeline that are due. Needed only to see them in time: every datagram meets those that
+  /// were due at its arrival.
+  void follow_timeline(LocalTime now);
+
+  /// Forgets one idle client and names it, so that the driver can close its socket; empty when there is none (any
+  /// more).
   std::optional<ClientIndex> next_evicted(LocalTime now);
 
-  /// When next_due or next_evicted will have something again; empty when nothing is on its way and
-  /// there is no client.
+  /// When next_due or next_evicted will have something again; empty when nothing is on its way and there is no client.
   std::optional<LocalTime> next_wake() const;
 
-  const ProxyCounters& counters(Direction direction) const { return counters_[static_cast<std::size_t>(direction)]; }
-  std::size_t clients() const { return clients_.size(); }
-  std::size_t in_flight() const { return in_flight_.size(); }
+  /// Of the decisions that were completed since this was emptied last, for whoever writes them down and empties it:
+  /// those on datagrams that were dropped when they were, the others when the datagram has left. Times count from the
+  /// first datagram. The proxy forgets what nobody fetches only when Config::record is off.
+  std::vector<TraceRecord>& records() noexcept { return records_; }
+
+  const ProxyMeasurements& measurements(Direction direction) const { return measurements_[index_of(direction)]; }
+  /// The last change, as people call it; empty when there was none.
+  const std::string& last_change() const noexcept { return last_change_; }
+  /// Steps of the timeline that are behind us.
+  std::size_t steps_done() const noexcept { return steps_done_; }
+  struct ClientSummary {
+    ClientIndex index;
+    Address address;
+    std::array<std::uint64_t, 2> received;  ///< by Direction
+  };
+  std::vector<ClientSummary> clients() const;
+  std::size_t in_flight() const noexcept { return flight_.size(); }
 
  private:
+  struct Way {
+    std::unique_ptr<Decider> decider;
+    Injector* injector = nullptr;      // the decider, unless a trace is replayed
+    std::unique_ptr<History> history;  // where stale replays are possible
+    std::uint64_t received = 0;
+  };
   struct Client {
-    ClientIndex index;
+    ClientIndex index = 0;
     Address address;
     LocalTime last_heard;
     std::size_t in_flight = 0;
-    std::array<Injector, 2> injectors;  // by Direction
+    std::array<Way, 2> ways;  // by Direction
   };
-  struct Flying {
-    Direction direction{};
-    ClientIndex client = 0;
-    bool second_copy = false;
-    std::vector<std::byte> datagram;
+  struct Tag {
+    Client* client = nullptr;  // stays: no client is forgotten while something is on its way
+    TraceRecord record;
+  };
+  struct AddressHash {
+    std::size_t operator()(const Address& address) const noexcept;
   };
 
-  Client* find(ClientIndex index);
-  void inject(Client& client, Direction direction, std::span<const std::byte> datagram, LocalTime now);
-  void take_off(Client& client, Direction direction, std::span<const std::byte> datagram, LocalTime due,
-                bool second_copy);
-  ProxyCounters& count(Direction direction) { return counters_[static_cast<std::size_t>(direction)]; }
+  static std::size_t index_of(Direction direction) noexcept { return static_cast<std::size_t>(direction); }
+  ProxyCounters& count(Direction direction) noexcept { return measurements_[index_of(direction)].counters; }
+  Client& add_client(const Address& address);
+  void inject(Client& client, Direction direction, std::span<const std::byte> datagram, LocalTime arrival);
+  void complete(TraceRecord record);
 
-  ProxyOptions options_;
-  std::array<Injector, 2> prototypes_;  // by Direction
-  std::vector<Client> clients_;         // at most max_clients: searched one by one
+  Config config_;
+  std::optional<LocalTime> start_;  // the first datagram
+  struct Network {
+    Injector injector;
+    LocalTime since;  // from when its times count
+  };
+  std::array<std::optional<LocalTime>, 2> changed_;              // when config_.networks were, by Direction
+  std::array<std::map<ClientIndex, Network>, 2> of_one_client_;  // where it is not that of all, by Direction
+  std::string last_change_;
+  std::size_t steps_done_ = 0;
+  std::unordered_map<ClientIndex, std::unique_ptr<Client>> clients_;
+  std::unordered_map<Address, Client*, AddressHash> by_address_;
   ClientIndex next_index_ = 0;
-  std::map<std::pair<LocalTime, std::uint64_t>, Flying> in_flight_;  // by due time, then by order of arrival
-  std::uint64_t next_sequence_ = 0;
-  std::size_t bytes_in_flight_ = 0;
-  std::array<ProxyCounters, 2> counters_{};  // by Direction
+  Flight<Tag> flight_;
+  std::array<ProxyMeasurements, 2> measurements_;  // by Direction
+  std::vector<TraceRecord> records_;
 };
 
 }  // namespace tendon::injector

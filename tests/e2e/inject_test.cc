@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tendon-inject as strangers use it: between two programs that know nothing of Tendon. Nothing here measures a time.
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/stage.h"
+#include "tests/injector/trace.h"
+#include "tests/injector/udp_batch.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using injector::Direction;
+using injector::Trace;
+using injector::TraceRecord;
+using injector::UdpBatch;
+using injector::Verdict;
+using testing::ScratchFolder;
+
+/// The proxy may be as late as it likes.
+const std::vector<std::string> kAnyReleaseError = {"--max-release-error-us", "1e9"};
+
+std::vector<std::string> with(std::vector<std::string> arguments, const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+/// Sends `count` datagrams to `proxy`, 10 ms after each other, and reads at `server` what comes of them.
+void send_through(UdpBatch& server, const std::string& proxy, int count) {
+  UdpBatch client = UdpBatch::connected(parse_address(proxy));
+  UdpBatch::Inbox inbox;
+  for (int i = 0; i < count; ++i) {
+    const std::string text = "datagram " + std::to_string(i);
+    const UdpBatch::Outgoing datagram{{}, std::as_bytes(std::span(text))};
+    client.send({&datagram, 1});
+    ::poll(nullptr, 0, 10);
+    server.receive(inbox);
+  }
+}
+
+/// What became of each datagram up, by index.
+std::string fates(const Trace& trace) {
+  std::string result;
+  for (const TraceRecord& record : trace.records) {
+    if (record.direction != Direction::kUp) continue;
+    result.resize(std::max<std::size_t>(result.size(), record.index + 1), '?');
+    result[record.index] = record.verdict == Verdict::kDrop ? '-' : record.verdict == Verdict::kPass ? '+' : '2';
+  }
+  return result;
+}
+
+TEST(Inject, ARecordedRunMeetsTheSameFatesOnceMore) {
+  const ScratchFolder folder;
+  UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
+  const std::vector<std::string> to = with(kAnyReleaseError, {"--to", to_string(server.local_address())});
+  {
+    Service proxy("tendon-inject",
+                  with(to, {"--profile", "loss=30% duplicate=20%", "--seed", "7", "--record", "first.csv"}),
+                  folder.path(), "start", "listen");
+    send_through(server, proxy.address(), 60);
+    proxy.stop();
+  }
+  {
+    Service proxy("tendon-inject", with(to, {"--replay", "first.csv", "--record", "second.csv"}), folder.path(),
+                  "start", "listen");
+    send_through(server, proxy.address(), 60);
+    proxy.stop();
+  }
+  const std::string first = fates(injector::read_trace(folder.path() / "first.csv"));
+  EXPECT_EQ(first.size(), 60U);
+  EXPECT_NE(first.find('-'), std::string::npos) << first;
+  EXPECT_NE(first.find('2'), std::string::npos) << first;
+  EXPECT_EQ(fates(injector::read_trace(folder.path() / "second.csv")), first);
+}
+
+TEST(Inject, ARunThatCouldNotKeepUpIsInvalidAndFails) {
+  const ScratchFolder folder;
+  UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
+  // No machine releases a datagram in no time.
+  Service proxy("tendon-inject", {"--to", to_string(server.local_address()), "--max-release-error-us", "0"},
+                folder.path(), "start", "listen");
+  send_through(server, proxy.address(), 3);
+  proxy.process().signal(SIGINT);
+  EXPECT_EQ(proxy.process().wait(), 1);
+  EXPECT_NE(proxy.process().out().find(R"("valid":false,"invalid_because":["up: one datagram in a hundred)"),
+            std::string::npos)
+      << proxy.process().out();
+}
+
+TEST(Inject, TakesCommandsFromAnotherProgramWhileItRuns) {
+  const ScratchFolder folder;
+  UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
+  Service proxy("tendon-inject",
+                with(kAnyReleaseError,
+                     {"--to", to_string(server.local_address()), "--control", "control", "--record", "run.csv"}),
+                folder.path(), "start", "listen");
+  const auto command = [&](std::vector<std::string> words) {
+    Process control(program("tendon-inject"), with({"control", "control"}, words), folder.path());
+    const int code = control.wait();
+    return std::to_string(code) + " " + control.out() + control.err();
+  };
+  EXPECT_EQ(command({"up", "loss=100%"}), "0 ok\n");
+  proxy.process().wait_for_line(R"("last_change":"up loss=100%")");
+  send_through(server, proxy.address(), 3);
+  EXPECT_EQ(command({"up loss=0%"}), "0 ok\n");
+  proxy.process().wait_for_line(R"("last_change":"up loss=0%")");
+  send_through(server, proxy.address(), 1);
+  EXPECT_TRUE(command({"stats"}).starts_with("0 {\"t_s\":"));
+  EXPECT_TRUE(command({"up", "loss=200%"}).starts_with("1 error: "));
+  EXPECT_EQ(command({"stop"}), "0 ok\n");
+  EXPECT_EQ(proxy.process().wait(), 0) << proxy.process().err();
+  const Trace trace = injector::read_trace(folder.path() / "run.csv");
+  EXPECT_EQ(trace.notes.size(), 2U);
+  ASSERT_EQ(trace.records.size(), 4U);
+  EXPECT_EQ(std::ranges::count(trace.records, Verdict::kDrop, &TraceRecord::verdict), 3);
+}
+
+TEST(Inject, ADryRunPrintsOneObjectPerPacket) {
+  const ScratchFolder folder;
+  Process dry(program("tendon-inject"),
+              {"--dry-run", "--count", "200", "--seed", "7", "--profile", "wifi-bad", "--json"}, folder.path());
+  EXPECT_EQ(dry.wait(), 0) << dry.err();
+  EXPECT_EQ(std::ranges::count(dry.out(), '\n'), 200);
+  EXPECT_TRUE(dry.out().starts_with(R"({"dir":"up","index":0,"t_in_ns":0,"verdict":")")) << dry.out();
+}
+
+}  // namespace
+}  // namespace tendon::e2e
