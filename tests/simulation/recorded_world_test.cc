@@ -63,8 +63,8 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, co
   const auto measured = [&hist](const char* file) {
     return injector::parse_profile("delay=histogram(" + (hist / file).string() + ")");
   };
-  world_config.to_server = measured("5G-midband-Downlink_PD-Wireless-5G-2a.csv");
-  world_config.from_server = measured("5G-midband-Uplink_PD-Wireless-5G-2a.csv");
+  world_config.weather = {.up = measured("5G-midband-Downlink_PD-Wireless-5G-2a.csv"),
+                          .down = measured("5G-midband-Uplink_PD-Wireless-5G-2a.csv")};
   World world(world_config, device);
   world.add_controller({.name = "wall", .rate_hz = 100}, [wall = hand.wall](const DeviceState& state) -> Touch {
     return Vec3(-2000 * std::max(0.0, state.position.x() - wall), 0, 0);

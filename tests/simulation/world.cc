@@ -2,7 +2,8 @@
 #include "tests/simulation/world.h"
 
 #include <algorithm>
-#include <cstring>
+#include <stdexcept>
+#include <utility>
 
 #include "core/time.h"
 
@@ -26,93 +27,22 @@ Address address_of(std::uint16_t port) {
   return address;
 }
 
+/// Longer than any storm of datagrams that one instant brings.
+constexpr int kMostWakesAtOnce = 100'000;
+
 }  // namespace
 
-class Network::End final : public Link {
- public:
-  End(Network& network, const Address& address) : network_(network), address_(address) {}
-
-  void send(const Address& to, std::span<const std::byte> datagram) override {
-    network_.launch(address_, to, datagram);
-  }
-
-  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
-    if (inbox_.empty()) return 0;
-    const auto [sender, datagram] = std::move(inbox_.front());
-    inbox_.pop_front();
-    from = sender;
-    std::memcpy(buffer.data(), datagram.data(), std::min(buffer.size(), datagram.size()));
-    return datagram.size();
-  }
-
-  void arrive(const Address& from, std::vector<std::byte> datagram) { inbox_.emplace_back(from, std::move(datagram)); }
-
- private:
-  Network& network_;
-  Address address_;
-  std::deque<std::pair<Address, std::vector<std::byte>>> inbox_;
-};
-
-Network::Network(std::uint64_t seed, const injector::Profile& to_server, const injector::Profile& from_server,
-                 const Address& server)
-    : seed_(seed), to_server_(to_server), from_server_(from_server), server_(server) {}
-
-Link& Network::open(const Address& address) {
-  auto& end = ends_[address];
-  end = std::make_unique<End>(*this, address);
-  return *end;
+Network::Weather World::Config::bad() {
+  const injector::Profile profile = injector::parse_profile("delay=uniform(15ms,25ms) loss=2%");
+  return {profile, profile};
 }
-
-void Network::launch(const Address& from, const Address& to, std::span<const std::byte> datagram) {
-  const auto key = std::pair(from, to);
-  auto route = routes_.find(key);
-  if (route == routes_.end()) {
-    const bool up = to == server_;
-    const std::uint32_t link = up ? from.port : to.port;
-    const auto direction = up ? injector::Direction::kUp : injector::Direction::kDown;
-    route = routes_.emplace(key, injector::Injector(up ? to_server_ : from_server_, seed_, link, direction)).first;
-  }
-  const injector::Packet packet{
-      .arrival = now_, .size = static_cast<std::uint32_t>(datagram.size()), .bytes = datagram};
-  const injector::Decision decision = route->second.decide(packet);
-  const auto take_off = [&](LocalTime due) {
-    flying_.emplace(std::pair(due, launched_++), Flying{from, to, {datagram.begin(), datagram.end()}});
-  };
-  if (decision.verdict != injector::Verdict::kDrop) take_off(decision.release);
-  if (decision.duplicate) take_off(*decision.duplicate);
-}
-
-void Network::forge(const Address& from, const Address& to, std::vector<std::byte> datagram) {
-  ends_.at(to)->arrive(from, std::move(datagram));
-}
-
-std::vector<Address> Network::deliver(LocalTime now) {
-  now_ = now;
-  std::vector<Address> mail;
-  while (!flying_.empty() && flying_.begin()->first.first <= now) {
-    Flying flying = std::move(flying_.begin()->second);
-    flying_.erase(flying_.begin());
-    if (const auto end = ends_.find(flying.to); end != ends_.end()) {
-      end->second->arrive(flying.from, std::move(flying.datagram));
-      mail.push_back(flying.to);
-    }
-  }
-  return mail;
-}
-
-std::optional<LocalTime> Network::next_arrival() const {
-  if (flying_.empty()) return std::nullopt;
-  return flying_.begin()->first.first;
-}
-
-injector::Profile World::Config::bad() { return injector::parse_profile("delay=uniform(15ms,25ms) loss=2%"); }
 
 World::World(const Config& config, Device& device)
     : config_(config),
       now_(std::chrono::seconds(1)),  // no code may take zero for the beginning of time
       random_(config.seed),
       server_address_(address_of(47100)),
-      network_(config.seed, config.to_server, config.from_server, server_address_),
+      network_(config.seed, config.weather, server_address_, config.players),
       mail_(std::make_unique<Mailboxes>(capacities(config))),
       haptic_(config.loop, device, *mail_),
       network_loop_(
@@ -126,7 +56,7 @@ World::World(const Config& config, Device& device)
             network.max_observers = config.max_observers;
             return network;
           }(),
-          network_.open(server_address_), *mail_),
+          network_.server(), *mail_),
       haptic_due_(now_),
       network_due_(now_),
       record_due_(config.record ? now_ : LocalTime::max()) {
@@ -140,28 +70,49 @@ World::~World() = default;
 
 double World::uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
 
-std::size_t World::add(const std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)>& make) {
-  Client client;
-  client.address = address_of(static_cast<std::uint16_t>(50000 + clients_.size()));
-  client.client = make(network_.open(client.address), now_);
+World::Client& World::place(const injector::DriftingClock& clock) {
+  Client& client = clients_.emplace_back();
+  client.address = address_of(static_cast<std::uint16_t>(kFirstClientPort + clients_.size() - 1));
+  client.link = &network_.open(client.address);
+  client.clock = clock;
   client.due = now_;
-  clients_.push_back(std::move(client));
+  return client;
+}
+
+std::size_t World::add_controller(const ForceClient::Config& config, Physics physics,
+                                  const injector::DriftingClock& clock) {
+  Client& client = place(clock);
+  client.client =
+      std::make_unique<ForceClient>(*client.link, server_address_, config, std::move(physics), clock.reading(now_));
   return clients_.size() - 1;
 }
 
-std::size_t World::add_controller(const ForceClient::Config& config, Physics physics) {
-  return add([&](Link& link, LocalTime now) {
-    return std::make_unique<ForceClient>(link, server_address_, config, std::move(physics), now);
-  });
+std::size_t World::add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock) {
+  Client& client = place(clock);
+  client.client =
+      std::make_unique<ForceClient>(*client.link, server_address_, config, std::move(watch), clock.reading(now_));
+  return clients_.size() - 1;
 }
 
-std::size_t World::add_observer(const ForceClient::Config& config, Watch watch) {
-  return add([&](Link& link, LocalTime now) {
-    return std::make_unique<ForceClient>(link, server_address_, config, std::move(watch), now);
-  });
+std::size_t World::add_guest(const std::function<std::unique_ptr<Guest>(Link&, const Address&)>& make) {
+  Client& client = place({});
+  client.guest = make(*client.link, server_address_);
+  return clients_.size() - 1;
 }
 
-void World::kill(std::size_t handle) { clients_[handle].client.reset(); }
+void World::restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics) {
+  Client& client = clients_[handle];
+  network_.open(client.address);
+  client.client = std::make_unique<ForceClient>(*client.link, server_address_, config, std::move(physics),
+                                                client.clock.reading(now_));
+  client.due = now_;
+}
+
+void World::kill(std::size_t handle) {
+  clients_[handle].client.reset();
+  clients_[handle].guest.reset();
+  clients_[handle].due = LocalTime::max();
+}
 
 void World::step_haptic() {
   haptic_due_ = haptic_.step(now_);
@@ -189,31 +140,44 @@ void World::drain_datagrams() {
 }
 
 void World::turn_server() {
-  network_due_ = std::max(network_loop_.turn(now_), now_ + Duration(1));
+  const LocalTime due = network_loop_.turn(now_);
+  network_due_ = std::max(due, now_ + Duration(1));
   if (recorder_) drain_datagrams();
+  if (watch_turns_) watch_turns_({std::nullopt, due <= now_});
+}
+
+void World::turn_client(std::size_t handle) {
+  Client& client = clients_[handle];
+  const LocalTime reading = client.clock.reading(now_);
+  const LocalTime due = client.client ? client.client->turn(reading) : client.guest->turn(reading);
+  // `never` is no reading of any clock.
+  client.due = due == LocalTime::max() ? due : std::max(client.clock.truth(due), now_ + Duration(1));
+  if (watch_turns_) watch_turns_({handle, due <= reading});
 }
 
 void World::run_for(Duration duration) {
   const LocalTime end = now_ + duration;
+  LocalTime since = now_;
+  int wakes = 0;
   for (;;) {
     LocalTime next = std::min({haptic_due_, network_due_, record_due_});
     if (const auto arrival = network_.next_arrival()) next = std::min(next, *arrival);
-    for (const Client& client : clients_) {
-      if (client.client) next = std::min(next, client.due);
-    }
+    for (const Client& client : clients_) next = std::min(next, client.due);
     if (next > end) break;
     now_ = std::max(now_, next);
-
-    for (const Address& to : network_.deliver(now_)) {
-      if (to == server_address_) network_due_ = now_;
-      for (Client& client : clients_) {
-        if (client.address == to) client.due = now_;
-      }
+    if (now_ - since > std::chrono::microseconds(1)) {
+      since = now_;
+      wakes = 0;
+    } else if (++wakes > kMostWakesAtOnce) {
+      throw std::runtime_error("somebody wants to be called again and again");
     }
+
+    network_.deliver(now_);
     if (haptic_due_ <= now_) step_haptic();
-    if (network_due_ <= now_) turn_server();
-    for (Client& client : clients_) {
-      if (client.client && client.due <= now_) client.due = std::max(client.client->turn(now_), now_ + Duration(1));
+    if (network_.take_news_of_server() || network_due_ <= now_) turn_server();
+    for (std::size_t i = 0; i < clients_.size(); ++i) {
+      const bool news = network_.take_news_of(static_cast<std::uint32_t>(i));
+      if ((clients_[i].client || clients_[i].guest) && (news || clients_[i].due <= now_)) turn_client(i);
     }
     if (record_due_ <= now_) {
       recorder_->tick(now_);

@@ -3,13 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <random>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include "clients/cpp/force_client.h"
@@ -20,47 +18,21 @@
 #include "server/mailboxes.h"
 #include "server/network_loop.h"
 #include "server/recorder.h"
-#include "tests/injector/injector.h"
+#include "tests/injector/peer_clock.h"
+#include "tests/injector/profile.h"
+#include "tests/simulation/network.h"
 
 namespace tendon::simulation {
 
-/// A network of simulated links: what one end sends, the other receives when its injector says so.
-/// Each ordered pair of addresses has an injector of its own, seeded by the world; the link is the client's port.
-class Network {
+/// Port of the first client of a world; the others follow.
+inline constexpr std::uint16_t kFirstClientPort = 50000;
+
+/// A peer that is none of ours: what it does is its own business.
+class Guest {
  public:
-  Network(std::uint64_t seed, const injector::Profile& to_server, const injector::Profile& from_server,
-          const Address& server);
-
-  /// An end at `address`. Lives as long as the network.
-  Link& open(const Address& address);
-
-  /// Moves the clock: datagrams due by `now` are in the inboxes after it. Returns who has mail.
-  std::vector<Address> deliver(LocalTime now);
-
-  /// When the next datagram arrives; empty when none is on its way.
-  std::optional<LocalTime> next_arrival() const;
-
-  /// Puts bytes into the inbox of `to` at once, as if they came from `from`: forgeries and garbage.
-  void forge(const Address& from, const Address& to, std::vector<std::byte> datagram);
-
- private:
-  class End;
-  struct Flying {
-    Address from;
-    Address to;
-    std::vector<std::byte> datagram;
-  };
-  void launch(const Address& from, const Address& to, std::span<const std::byte> datagram);
-
-  std::uint64_t seed_;
-  injector::Profile to_server_;
-  injector::Profile from_server_;
-  Address server_;
-  LocalTime now_{};
-  std::map<Address, std::unique_ptr<End>> ends_;
-  std::map<std::pair<Address, Address>, injector::Injector> routes_;
-  std::map<std::pair<LocalTime, std::uint64_t>, Flying> flying_;
-  std::uint64_t launched_ = 0;
+  virtual ~Guest() = default;
+  /// Does all there is to do at `now`, by its own clock, and returns when it wants to be called again at the latest.
+  virtual LocalTime turn(LocalTime now) = 0;
 };
 
 /// The whole server and its clients in one thread on a virtual clock: the same HapticLoop, NetworkLoop,
@@ -74,8 +46,9 @@ class World {
     std::uint64_t seed = 1;
     HapticLoop::Config loop;
     /// 20 ± 5 ms, 2 % loss each way, unless a test says otherwise.
-    injector::Profile to_server = bad();
-    injector::Profile from_server = bad();
+    Network::Weather weather = bad();
+    /// A recorded network instead of the weather.
+    Network::Players players{};
     /// The operating system wakes the haptic thread this late, uniformly distributed.
     Duration latest_wake{};
     /// … or not at all for `pause`, with this probability per step: a virtual machine.
@@ -87,16 +60,22 @@ class World {
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
 
-    static injector::Profile bad();
+    static Network::Weather bad();
   };
 
   /// `device` must outlive the world.
   World(const Config& config, Device& device);
   ~World();
 
-  /// A client at an address of its own. Returns a handle for `client` and `kill`.
-  std::size_t add_controller(const ForceClient::Config& config, Physics physics);
-  std::size_t add_observer(const ForceClient::Config& config, Watch watch);
+  /// A client at an address of its own, which reads a clock of its own. Returns a handle for `client` and `kill`;
+  /// clients count from 0.
+  std::size_t add_controller(const ForceClient::Config& config, Physics physics,
+                             const injector::DriftingClock& clock = {});
+  std::size_t add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock = {});
+  std::size_t add_guest(const std::function<std::unique_ptr<Guest>(Link& link, const Address& server)>& make);
+  /// In place of a client that was killed: at the same address, with the same clock.
+  void restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics);
+  bool alive(std::size_t handle) const { return clients_[handle].client != nullptr; }
   ForceClient& client(std::size_t handle) { return *clients_[handle].client; }
   Address client_address(std::size_t handle) const { return clients_[handle].address; }
   /// SIGKILL: it neither says Bye nor anything else, ever again.
@@ -105,6 +84,15 @@ class World {
   /// Called with every haptic step, in order, at once.
   void watch_steps(std::function<void(const StepRecord&)> watch) { watch_steps_ = std::move(watch); }
 
+  /// A turn of the server, or of a client.
+  struct Turn {
+    std::optional<std::size_t> client;  ///< empty: the server's
+    bool wants_more = false;            ///< it wants to be called again at once
+  };
+  /// Called after every turn.
+  void watch_turns(std::function<void(const Turn&)> watch) { watch_turns_ = std::move(watch); }
+
+  /// Throws std::runtime_error when somebody wants to be called again and again without an end.
   void run_for(Duration duration);
 
   LocalTime now() const { return now_; }
@@ -121,10 +109,14 @@ class World {
  private:
   struct Client {
     Address address;
+    Link* link = nullptr;
+    injector::DriftingClock clock;
     std::unique_ptr<ForceClient> client;  ///< null once killed
+    std::unique_ptr<Guest> guest;
     LocalTime due{};
   };
-  std::size_t add(const std::function<std::unique_ptr<ForceClient>(Link&, LocalTime)>& make);
+  Client& place(const injector::DriftingClock& clock);
+  void turn_client(std::size_t handle);
   void step_haptic();
   void turn_server();
   void drain_steps();
@@ -144,6 +136,7 @@ class World {
   LocalTime record_due_;  ///< never, when nobody records
   std::vector<Client> clients_;
   std::function<void(const StepRecord&)> watch_steps_;
+  std::function<void(const Turn&)> watch_turns_;
   MemorySink sink_;
   Recorder::Config recorder_config_;
   std::optional<Recorder> recorder_;

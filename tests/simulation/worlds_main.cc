@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-worlds: simulated worlds, one for each seed. Here is its command line; each verb is a function of its own.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <exception>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "tests/simulation/runner.h"
+#include "tests/simulation/second_look.h"
+#include "tests/simulation/shrink_world.h"
+
+namespace tendon::simulation {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+struct RunArguments {
+  RunOptions options;
+  std::optional<std::uint64_t> seed;
+  std::optional<double> for_s;
+  std::string seeds_file;
+  bool verbose = false;
+};
+
+int run(RunArguments& arguments) {
+  RunOptions& options = arguments.options;
+  if (arguments.seed) return run_one(*arguments.seed, arguments.verbose, std::cout) ? kDone : kFailed;
+  if (!arguments.seeds_file.empty()) options.seeds = read_seeds(arguments.seeds_file);
+  const auto began = std::chrono::steady_clock::now();
+  options.elapsed = [began] { return std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now() - began); };
+  if (arguments.for_s) options.budget = from_seconds(*arguments.for_s);
+  options.progress = isatty(STDERR_FILENO) != 0;
+  return explore(options, std::cout, std::cerr) ? kDone : kFailed;
+}
+
+void add_run(CLI::App& app, RunArguments& arguments) {
+  CLI::App* const verb = app.add_subcommand("run", "Explores worlds, one for each seed, until one breaks a promise");
+  auto* const count =
+      verb->add_option("--count", arguments.options.count, "worlds")->type_name("N")->capture_default_str();
+  verb->add_option("--for-s", arguments.for_s, "as many as there is time for")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber)
+      ->excludes(count);
+  verb->add_option("--first-seed", arguments.options.first_seed, "seed of the first; the others follow")
+      ->type_name("K")
+      ->capture_default_str();
+  verb->add_option("--jobs", arguments.options.jobs, "threads")
+      ->type_name("J")
+      ->check(CLI::Range(1U, 1024U))
+      ->default_str("one for each core");
+  verb->add_option("--seeds", arguments.seeds_file,
+                   "seeds to run before all others: a number at the beginning of a line")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile.description(""));
+  auto* const seed = verb->add_option("--seed", arguments.seed, "this world and no other")->type_name("N");
+  verb->add_flag("--verbose", arguments.verbose, "say what the world is like, and what happened")->needs(seed);
+  verb->add_flag("--json", arguments.options.json, "one JSON object for each broken world, and one at the end");
+  verb->footer(
+      "\nExample: ten minutes, then the world that it names\n"
+      "  tendon-worlds run --for-s 600\n"
+      "  tendon-worlds run --seed 1234 --verbose\n"
+      "\nExit: 0 every promise was kept; 1 one was broken; 2 wrong usage.");
+}
+
+struct ShrinkArguments {
+  std::uint64_t seed = 0;
+  std::string out;
+};
+
+void add_shrink(CLI::App& app, ShrinkArguments& arguments) {
+  CLI::App* const verb =
+      app.add_subcommand("shrink", "Reduces what the network did in a broken world to the few datagrams that matter");
+  verb->add_option("--seed", arguments.seed, "of the broken world")->type_name("N")->required();
+  verb->add_option("--out", arguments.out, "the network of the world, as a sparse trace: `replay` and tests load it")
+      ->type_name("FILE")
+      ->required();
+  verb->footer(
+      "\nExample:\n  tendon-worlds shrink --seed 1234 --out world-1234.csv\n"
+      "\nExit: 0 done; 1 that world breaks no promise, or not because of the network; 2 wrong usage.");
+}
+
+void add_replay(CLI::App& app, SecondLookOptions& options) {
+  CLI::App* const verb = app.add_subcommand(
+      "replay", "A scene and a wall over a recorded network, in virtual time, with one law after the other");
+  verb->add_option("SCENE", options.scene,
+                   "scene file: the device, the hand, the loop; its law is one of those compared")
+      ->type_name("SCENE.toml")
+      ->required()
+      ->check(CLI::ExistingFile.description(""));
+  verb->add_option("--trace", options.trace, "network recorded by tendon-inject --record")
+      ->type_name("FILE")
+      ->required()
+      ->check(CLI::ExistingFile.description(""));
+  verb->add_option("--law", options.laws, "law to try; any number of times (default: those that promise passivity)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  verb->add_option("--stiffness", options.stiffness, "of the wall at x = 0, N/m")->capture_default_str();
+  verb->add_option("--rate-hz", options.rate_hz, "forces per second of the wall's engine")->capture_default_str();
+  verb->add_option("--for-s", options.length_s, "virtual seconds (default: as long as the trace)");
+  verb->add_flag("--json", options.json, "one JSON object for each law on stdout instead of the table");
+  verb->footer(
+      "\nExample: what would energy bounding have felt on that same network?\n"
+      "  tendon-worlds replay scene.toml --trace run.csv --law energy-bounding --law aol+\n"
+      "\nExit: 0 done; 1 the trace or the scene cannot be read; 2 wrong usage.");
+}
+
+int main_of(int argc, char** argv) {
+  CLI::App app("Simulated worlds: the whole server, its clients, the network, the device and the hand, from one seed",
+               "tendon-worlds");
+  app.require_subcommand(1);
+  RunArguments run_arguments;
+  run_arguments.options.jobs = std::max(1U, std::thread::hardware_concurrency());
+  ShrinkArguments shrink_arguments;
+  SecondLookOptions replay_options;
+  add_run(app, run_arguments);
+  add_shrink(app, shrink_arguments);
+  add_replay(app, replay_options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? kDone : kWrongUsage;
+  }
+  try {
+    if (app.got_subcommand("run")) return run(run_arguments);
+    if (app.got_subcommand("shrink")) {
+      return shrink_world(shrink_arguments.seed, shrink_arguments.out, std::cout) ? kDone : kFailed;
+    }
+    second_look(replay_options, std::cout);
+    return kDone;
+  } catch (const std::invalid_argument& error) {
+    std::cerr << "tendon-worlds: " << error.what() << " (see --help)\n";
+    return kWrongUsage;
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-worlds: " << error.what() << '\n';
+    return kFailed;
+  }
+}
+
+}  // namespace
+}  // namespace tendon::simulation
+
+int main(int argc, char** argv) { return tendon::simulation::main_of(argc, argv); }
