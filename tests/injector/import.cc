@@ -190,11 +190,12 @@ PingLog read_ping(std::istream& from, const std::string& name) {
     newest = index;
     oldest = std::min(oldest.value_or(index), index);
     latest = std::max(latest.value_or(index), index);
-    if (!answer || line.ends_with("(DUP!)")) return;
+    if (!answer) return;
     const auto text = number_after(line, "time=");
     const auto ms = text ? parse_number(*text) : std::nullopt;
     const auto round_trip = ms ? to_duration(*ms, 1e6) : std::nullopt;
     if (!round_trip) refuse(name, number, "expected time=… ms in " + in_quotes(line));
+    // Of a duplicate the first one counts.
     log.answers.try_emplace(index, PingLog::Answer{*round_trip, time_stamp(line)});
     const std::string_view counted =
         line.starts_with('[') ? line.substr(std::min(line.find("] "), line.size() - 2) + 2) : line;

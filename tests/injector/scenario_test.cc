@@ -45,12 +45,12 @@ up = "delay=5ms"
 down = "wifi-good loss=1%"
 
 [[at]]
-t_s = 0.5
+t_s = 0.5004
 both = "delay=20ms loss=10%"
 note = "microwave oven on"
 
 [[at]]
-t_s = 1
+t_s = 1.0004
 link = 1
 up = "outage(at=100ms,for=200ms)"
 
@@ -77,7 +77,7 @@ TEST(Scenario, SaysWhatTheFileSays) {
   EXPECT_EQ(scenario.up, parse_profile("delay=5ms"));
   EXPECT_EQ(scenario.down, resolve_profile("wifi-good loss=1%", Direction::kDown));
   ASSERT_EQ(scenario.changes.size(), 4U);
-  EXPECT_EQ(scenario.changes[0].at, 500ms);
+  EXPECT_EQ(scenario.changes[0].at, 500'400us);
   EXPECT_EQ(scenario.changes[0].change.up, parse_profile("delay=20ms loss=10%"));
   EXPECT_EQ(scenario.changes[0].change.down, scenario.changes[0].change.up);
   EXPECT_EQ(scenario.changes[0].change.text, "both delay=20ms loss=10%, note microwave oven on");
@@ -161,15 +161,32 @@ TEST(Scenario, InVirtualTimeTheSameSeedMeetsTheSameFates) {
   EXPECT_EQ(run(333us), decisions);
   EXPECT_EQ(run(17ms), decisions);
   EXPECT_EQ(run(0ms), decisions);
-  // The outage of link 1: from 1.1 s to 1.3 s, of nobody else.
+  // The outage of link 1: from 1.1004 s to 1.3004 s, of nobody else.
   std::map<Duration, int> outage;
   for (const Decision& decision : decisions) {
     if (decision.cause == Cause::kOutage) ++outage[decision.arrival - at(100s)];
   }
   ASSERT_EQ(outage.size(), 200U);
-  EXPECT_EQ(outage.begin()->first, 1100ms);
+  EXPECT_EQ(outage.begin()->first, 1101ms);
   EXPECT_EQ(outage.begin()->second, 1);
-  EXPECT_EQ(outage.rbegin()->first, 1299ms);
+  EXPECT_EQ(outage.rbegin()->first, 1300ms);
+}
+
+TEST(ScenarioPlayer, AChangeIsInForceFromItsTimeOnWheneverItIsAskedFor) {
+  ScenarioPlayer player(parse_scenario(kStorm, "storm.toml"), at(100s));
+  EXPECT_EQ(player.next_wake(), at(100s + 500'400us));
+  EXPECT_FALSE(player.next_due(at(100s + 500'399us)));
+  EXPECT_EQ(player.weather(Direction::kUp, 0).since, at(100s));
+  EXPECT_TRUE(player.next_due(at(100s + 500'400us)));
+  EXPECT_EQ(player.weather(Direction::kUp, 0).since, at(100s + 500'400us));
+  const auto late = player.next_due(at(200s));
+  ASSERT_TRUE(late);
+  EXPECT_EQ(late->at, at(101s + 400us));
+  EXPECT_EQ(player.weather(Direction::kUp, 1).since, at(101s + 400us));
+  EXPECT_TRUE(player.next_due(at(200s)));
+  EXPECT_TRUE(player.next_due(at(200s)));
+  EXPECT_FALSE(player.next_due(at(200s)));
+  EXPECT_FALSE(player.next_wake());
 }
 
 TEST(ScenarioPlayer, AChangeForOneLinkHoldsUntilOneForAll) {
