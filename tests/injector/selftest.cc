@@ -216,7 +216,8 @@ std::vector<Check> memory(const SelftestOptions& options) {
   const double round = 39.6;
   Traffic traffic;
   traffic.at = [&](std::size_t i) {
-    double after = round * static_cast<double>(i / gaps.size());
+    const std::size_t rounds = i / gaps.size();
+    double after = round * static_cast<double>(rounds);
     for (std::size_t k = 0; k < i % gaps.size(); ++k) after += gaps[k + 1];
     return microseconds(std::llround(after * 1000));
   };
@@ -559,18 +560,21 @@ std::vector<Check> events(const SelftestOptions& options) {
     return leaves >= 200 && within < 50 ? 60 - within : 10;
   });
 
-  for (const auto& [line, first_ms, every_ms, lasts_ms] :
-       {std::tuple{"outage(every=150ms,for=7ms)", 150, 150, 7},
-        std::tuple{"outage(at=500ms,for=100ms)", 500, 1'000'000'000, 100},
-        std::tuple{"outage(at=20ms,every=150ms,for=7ms)", 20, 150, 7},
-        std::tuple{"handover(every=150ms,for=7ms,5ms)", 150, 150, 7}}) {
+  struct Absence {
+    const char* line;
+    Duration first, every, lasts;
+  };
+  for (const Absence& absence :
+       {Absence{"outage(every=150ms,for=7ms)", milliseconds(150), milliseconds(150), milliseconds(7)},
+        Absence{"outage(at=500ms,for=100ms)", milliseconds(500), Duration::max(), milliseconds(100)},
+        Absence{"outage(at=20ms,every=150ms,for=7ms)", milliseconds(20), milliseconds(150), milliseconds(7)},
+        Absence{"handover(every=150ms,for=7ms,5ms)", milliseconds(150), milliseconds(150), milliseconds(7)}}) {
     std::size_t off = 0;
-    play(parse_profile(line), traffic, options, [&](std::size_t, const Decision& decision) {
-      const bool gone =
-          in_window(decision.arrival - kStart, milliseconds(first_ms), milliseconds(every_ms), milliseconds(lasts_ms));
+    play(parse_profile(absence.line), traffic, options, [&](std::size_t, const Decision& decision) {
+      const bool gone = in_window(decision.arrival - kStart, absence.first, absence.every, absence.lasts);
       off += lost(decision) == gone ? 0U : 1U;
     });
-    checks.push_back(none(line, "losses at another time", off));
+    checks.push_back(none(absence.line, "losses at another time", off));
   }
 
   const std::string handover = "base=20ms handover(every=20ms,for=2ms,5ms) order=free";

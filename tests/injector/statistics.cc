@@ -13,6 +13,12 @@ namespace {
 
 constexpr double kFewestExpected = 10;  // below that a cell's count is too skewed for the chi-square law
 
+/// ln Γ(a). Not std::lgamma, which writes the sign into a global variable.
+double log_gamma(double a) {
+  int sign = 0;
+  return ::lgamma_r(a, &sign);
+}
+
 double gamma_series(double a, double x) {
   double term = 1 / a;
   double sum = term;
@@ -20,7 +26,7 @@ double gamma_series(double a, double x) {
     term *= x / n;
     sum += term;
   }
-  return sum * std::exp(a * std::log(x) - x - std::lgamma(a));
+  return sum * std::exp(a * std::log(x) - x - log_gamma(a));
 }
 
 double gamma_fraction(double a, double x) {
@@ -40,7 +46,7 @@ double gamma_fraction(double a, double x) {
     product *= d * c;
     if (std::abs(d * c - 1) < 1e-16) break;
   }
-  return product * std::exp(a * std::log(x) - x - std::lgamma(a));
+  return product * std::exp(a * std::log(x) - x - log_gamma(a));
 }
 
 /// 1 − P(a, x), without the cancellation where P is almost 1.
