@@ -274,6 +274,15 @@ TEST(Injector, RegimesTakeTurnsInTheSharesOfTheirDwellTimesWhateverIsSent) {
   EXPECT_EQ(often.front().verdict, Verdict::kPass);  // the first begins
 }
 
+TEST(Injector, TheLossOfTheProfileGoesOnUnderTheLossOfARegime) {
+  const auto plain = decisions("loss=gilbert(5%,10%,100%,0%)", 20'000, 1ms);
+  const auto regimes =
+      decisions("loss=gilbert(5%,10%,100%,0%) regime(a,dwell=50ms) regime(b,dwell=50ms,loss=100%)", 20'000, 1ms);
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    ASSERT_TRUE(regimes[i].cause == Cause::kRegime || lost(regimes[i]) == lost(plain[i])) << i;
+  }
+}
+
 TEST(Injector, EachOfThreeRegimesFollowsEachOtherEquallyOftenAndAddsItsDelay) {
   const auto all = delays_ms(
       "base=1ms regime(a,dwell=50ms) regime(b,dwell=50ms,delay=2ms) regime(c,dwell=50ms,delay=4ms) order=free", 400'000,
@@ -318,6 +327,12 @@ TEST(Injector, AJumpLeavesJustAheadOfTheDatagramThatManyPlacesBeforeAndMovesNoOt
     }
   }
   EXPECT_NEAR(jumps, 500, four_sigma(5000, 0.1));
+  // Nor where others wait for those ahead of them.
+  const auto waiting = decisions(kPlain, 5000, 1ms);
+  const auto overtaken = decisions(kPlain + std::string(" jump(10%,3)"), 5000, 1ms);
+  for (std::size_t i = 0; i < waiting.size(); ++i) {
+    ASSERT_TRUE(overtaken[i].cause == Cause::kReorder || overtaken[i].release == waiting[i].release) << i;
+  }
   // Nobody to overtake: the one before has long left.
   for (const Decision& d : decisions("delay=10ms jump(100%,1)", 100, 50ms)) EXPECT_EQ(delay(d), 10ms);
   // Not earlier than the road is long.
