@@ -10,7 +10,6 @@ import math
 import signal
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 from .client import Client, Physics
 from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
@@ -47,6 +46,13 @@ def _address(text: str) -> str:
     return text
 
 
+def _key(text: str) -> bytes:
+    try:
+        return read_key(text)
+    except (OSError, ValueError) as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
 def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.ArgumentParser:
     """--server, --key, --rate-hz, --duration-s, --json and --help; add what your program has besides."""
     example = f"Example: {name} --server 127.0.0.1:47100 --duration-s 10"
@@ -59,7 +65,7 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         help="Where tendond listens [%(default)s]",
     )
     line.add_argument(
-        "--key", type=Path, metavar="FILE", help="The key that tendond knows us by; without one only loopback is possible"
+        "--key", type=_key, metavar="FILE", help="The key that tendond knows us by; without one only loopback is possible"
     )
     line.add_argument(
         "--rate-hz",
@@ -95,7 +101,7 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
         config = Config(
             name=options.name,
             role=Role.CONTROLLER if physics else Role.OBSERVER,
-            key=options.key and read_key(options.key),
+            key=options.key,
             rate_hz=options.rate_hz,
         )
         with Client(options.server, config) as client:

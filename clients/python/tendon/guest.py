@@ -17,6 +17,9 @@ MAX_DATAGRAMS = 256
 """Taken from the socket in one turn: a flood must not keep us from sending. A 1 kHz server sends so many in a
 quarter of a second, the longest silence before it stops the device."""
 
+_MAX_ERRORS = 64
+"""Passed over in search of one datagram: a flood of reports must not keep us from sending either."""
+
 _KEEP_TRYING = (Code.BUSY, Code.SHUTDOWN)
 
 
@@ -97,14 +100,15 @@ class Guest:
             raise RefusedForGood(f"{self.server} has ended this: {stats.reason}", stats.code)
 
     def _receive(self) -> bytes | None:
-        while True:
+        for _ in range(_MAX_ERRORS):
             try:
                 # One byte more than the largest datagram: one that is too large stays too large after the cut.
                 return self.socket.recv(limits.MAX_DATAGRAM + 1)
             except BlockingIOError:
                 return None
-            except ConnectionError:
-                continue  # "port unreachable", while no server is up; each report is told once
+            except OSError:
+                pass  # what ICMP has told: no server is up, no way there. Each report comes once
+        return None
 
     def _say(self) -> None:
         sentence = self._sentence()

@@ -149,9 +149,9 @@ def test_without_a_server_an_example_says_so_and_leaves_with_1(tmp_path):
             assert guest.wait() == 1
 
 
-def test_a_key_that_is_not_there_is_one_sentence(tmp_path):
+def test_a_key_that_is_not_there_is_a_wrong_usage(tmp_path):
     with example(tmp_path, "virtual_wall", "--key", "no.key") as guest:
-        assert guest.wait() == 1
+        assert guest.wait() == 2
         assert "no.key" in guest.said[-1] and "Traceback" not in "".join(guest.said)
 
 

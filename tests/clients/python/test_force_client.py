@@ -11,8 +11,19 @@ from stand_in import StandIn
 from world import MS, PERFECT, SECOND, Weather, World
 
 from tendon import Code, Config, ForceClient, Mode, Phase, Role, Touch
-from tendon.codec import DatagramType, decode_header, decode_hello
-from tendon.messages import Control, DeviceState, ForceCommand, Rearm, Refused, SetStateRate
+from tendon.codec import (
+    AnswerDatagram,
+    DatagramType,
+    RetryDatagram,
+    Suite,
+    decode_header,
+    decode_hello,
+    encode_answer,
+    encode_retry,
+    write_answer,
+)
+from tendon.handshake import ClientHandshake
+from tendon.messages import Control, DeviceState, ForceCommand, Hello, Rearm, Refused, SetStateRate
 
 KEY = bytes(range(32))
 ZERO = (0.0, 0.0, 0.0)
@@ -95,6 +106,27 @@ def test_hellos_go_out_every_100_ms_and_one_attempt_has_one_random_and_one_noise
     hellos = [decode_hello(datagram) for datagram in stage.world.there.delivered]
     assert len(hellos) == 10
     assert len({hello.random for hello in hellos}) == len({hello.body for hello in hellos}) == 1
+
+
+def test_only_the_first_retry_is_answered_at_once_and_the_last_cookie_is_used():
+    handshake = ClientHandshake(Hello(Role.OBSERVER), bytes(16), 0)
+    assert decode_hello(handshake.next_datagram(0)).cookie == bytes(16)
+    for cookie in (b"a" * 16, b"b" * 16):
+        handshake.receive(MS, encode_retry(RetryDatagram(bytes(16), cookie)))
+        sent = handshake.next_datagram(MS)
+        assert (sent is not None) == (cookie == b"a" * 16)
+    assert handshake.next_datagram(100 * MS) is None
+    assert decode_hello(handshake.next_datagram(101 * MS)).cookie == b"b" * 16
+
+
+def test_a_retry_and_an_answer_of_another_attempt_are_ignored():
+    handshake = ClientHandshake(Hello(Role.OBSERVER), bytes(16), 0)
+    handshake.next_datagram(0)
+    handshake.receive(1, encode_retry(RetryDatagram(b"other attempt...", b"a" * 16)))
+    refused = write_answer(Refused(Code.BUSY))
+    handshake.receive(1, encode_answer(AnswerDatagram(b"other attempt...", refused)))
+    handshake.receive(1, encode_answer(AnswerDatagram(bytes(16), refused, suite=Suite.NOISE)))
+    assert handshake.outcome is None and handshake.next_turn() == 100 * MS
 
 
 def test_attempts_are_given_up_after_2_s_and_wait_twice_as_long_each_time():
