@@ -3,13 +3,16 @@
 // ForceClient against a server on virtual time, over a network that a seed makes.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
+import { encodeAnswerMessage } from "../../../clients/typescript/src/codec.js";
 import { encodeAnswer } from "../../../clients/typescript/src/datagram.js";
 import { ForceClient, type ClientConfig } from "../../../clients/typescript/src/force_client.js";
 import { Code, Role, type DeviceState } from "../../../clients/typescript/src/messages.js";
+import { NoiseSeal } from "../../../clients/typescript/src/seal.js";
+import { Session } from "../../../clients/typescript/src/session.js";
 import { fromMilliseconds, kSecond } from "../../../clients/typescript/src/time.js";
 import { flipped } from "./support/bytes.js";
 import { Random } from "./support/random.js";
-import { kFair, kFoul, World, type ServerConduct, type Weather } from "./support/world.js";
+import { kFair, kFoul, kWelcome, World, type ServerConduct, type Weather } from "./support/world.js";
 
 const kPush = { x: -1, y: 0, z: 0 };
 const kKey = new Random(99).bytes(32);
@@ -139,6 +142,11 @@ describe("the handshake", () => {
       const random = datagram.slice(16, 32);
       world.client.receive(world.now, encodeAnswer({ suite: 0, connectionId: 9, random, content: new Uint8Array(0) }));
       world.client.receive(world.now, encodeAnswer({ suite: 1, connectionId: 9, random, content: new Uint8Array(48) }));
+      const plain = encodeAnswerMessage({ ...kWelcome, features: [], role: Role.CONTROLLER });
+      for (const suite of [0, 1] as const) {
+        world.client.receive(world.now, encodeAnswer({ suite, connectionId: 9, random, content: plain }));
+      }
+      assert.equal(world.client.phase, "greeting");
     };
     const send = world.toClient.send.bind(world.toClient);
     world.toClient.send = (datagram) => {
@@ -217,6 +225,35 @@ describe("reconnection", () => {
     world.server.forces.length = 0;
     world.runMs(1000);
     assert.equal(world.server.forces[0]!.command.sequence, 1n);
+  });
+});
+
+describe("a session's end", () => {
+  it("by the age of a day is told with a Bye, and a new one opens by itself", () => {
+    const day = 86_400n * kSecond;
+    const seal = new NoiseSeal({ sendKey: kKey, receiveKey: kKey }, 0n);
+    const session = new Session({ connectionId: 1, seal, timeout: 2n * day }, 0n);
+    session.tick(day - 1n);
+    assert.equal(session.open, true);
+    session.tick(day);
+    assert.deepEqual([session.open, session.nextEvent()?.kind], [false, "closed"]);
+    assert.ok(session.nextDatagram(day) && session.nextDatagram(day) && session.nextDatagram(day));
+    assert.equal(session.nextDatagram(day), undefined);
+
+    const { world } = controller(1, kFair, { key: kKey }, { key: kKey });
+    assert.ok(world.runUntil(() => world.client.stats().states > 0, 1000));
+    world.server.session!.close(Code.EXPIRED, "a day");
+    world.runMs(20);
+    world.server.restart();
+    assert.ok(world.runUntil(() => world.client.stats().sessions === 2, 1000));
+  });
+
+  it("by another program with the same key is for good", () => {
+    const { world } = controller(1, kFair, { key: kKey }, { key: kKey });
+    assert.ok(world.runUntil(() => world.client.stats().states > 0, 1000));
+    world.server.session!.close(Code.REPLACED, "another has this key");
+    world.runMs(5000);
+    assert.deepEqual([world.client.phase, world.client.stats().code, world.client.stats().attempts], ["stopped", Code.REPLACED, 1]);
   });
 });
 
