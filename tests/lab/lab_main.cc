@@ -14,6 +14,7 @@
 #include "tests/lab/compare.h"
 #include "tests/lab/cost.h"
 #include "tests/lab/filter.h"
+#include "tests/lab/netem.h"
 #include "tests/lab/paper.h"
 #include "tests/lab/report.h"
 
@@ -184,6 +185,19 @@ void add_cost(CLI::App& app, CostOptions& options) {
   verb->callback([&options] { cost(options, std::cout); });
 }
 
+void add_netem(CLI::App& app, NetemOptions& options) {
+  CLI::App* const verb = app.add_subcommand(
+      "netem", "What is left of loss and delay that are asked for with a correlation: tc-netem, and here");
+  verb->add_option("--count", options.count, "datagrams for each line")->capture_default_str();
+  verb->add_option("--seed", options.seed, "of both")->capture_default_str();
+  verb->add_option("--out", options.out, "draw the figure there, SVG and PNG (needs gnuplot)")->type_name("DIR");
+  verb->add_flag("--json", options.json, "one JSON object for each line instead of the table");
+  verb->footer(
+      "\nExample\n  tendon-lab netem --out figures\n"
+      "\nExit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+  verb->callback([&options] { netem(options, std::cout); });
+}
+
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
   app.require_subcommand(1);
@@ -198,12 +212,14 @@ int main(int argc, char** argv) {
   CompareOptions compare_options;
   BoundaryOptions boundary_options;
   CostOptions cost_options;
+  NetemOptions netem_options;
   add_report(app, report_arguments);
   add_paper(app, paper_options);
   add_filter(app, filter_arguments, exit);
   add_compare(app, compare_options);
   add_boundary(app, boundary_options);
   add_cost(app, cost_options);
+  add_netem(app, netem_options);
 
   try {
     app.parse(argc, argv);
