@@ -52,4 +52,4 @@ tendon_mutant(older-force SOURCE protocol/session.cc LIBRARY tendon_protocol
 # Who was refused or lost never comes back.
 tendon_mutant(no-return SOURCE clients/cpp/force_client.cc LIBRARY tendon_client
   REPLACE "now >= retry_" "false"
-  ORACLES "recovery")
+  ORACLES "calm|recovery")
