@@ -38,6 +38,7 @@ class Stage:
         self.world = World(self.client, self.server, weather, seed)
         self.touch = lambda hand: Touch((-2000 * hand.position[0], 0, 0))
         self.seen: list[DeviceState] = []
+        self.seen_at: list[int] = []
         self.forces: list[ForceCommand] = []
         self.requests: list[Control] = []
         self._next_state = World.START
@@ -61,6 +62,7 @@ class Stage:
                 session.send(DeviceState(tick, now, (1e-3, 0.0, 0.0), ZERO, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
         while (hand := self.client.next_state(now)) is not None:
             self.seen.append(hand)
+            self.seen_at.append(now)
             if self.touch is not None:
                 self.client.send(hand, self.touch(hand))
         device = self._next_state if session is not None and session.open and not self.server.deaf else inf
@@ -208,6 +210,16 @@ def test_states_are_handed_out_on_the_grid_of_the_rate_and_the_others_skipped():
     ticks = [hand.tick for hand in stage.seen[1:]]  # the first one comes when it comes
     assert {later - earlier for earlier, later in zip(ticks, ticks[1:])} == {10}
     assert stats.states == len(stage.seen) + stats.states_skipped + (stage.client.next_state_due() != inf)
+
+
+def test_after_a_pause_the_grid_starts_anew_and_nothing_is_caught_up():
+    stage = Stage(Config(rate_hz=100))
+    stage.run(500 * MS)
+    stage._next_state += 55 * MS  # the device pauses
+    stage.run(500 * MS)
+    apart = [later - earlier for earlier, later in zip(stage.seen_at[1:], stage.seen_at[2:])]
+    assert len([pause for pause in apart if pause > 40 * MS]) == 1
+    assert set(apart) == {10 * MS, max(apart)}
 
 
 def test_with_rate_0_every_state_is_handed_out_once():
