@@ -255,6 +255,16 @@ TEST(Proxy, ATimelineCountsFromTheFirstDatagramAndDoesNotDependOnWhenItIsAsked) 
   EXPECT_EQ(proxy.last_change(), "up delay=50ms");
 }
 
+TEST(Proxy, TheTimesOfAStepCountFromTheStepAndNotFromTheDatagramThatMeetsItFirst) {
+  Proxy::Config o = config("", "");
+  Proxy::PreparedChange outage;
+  outage.to[0].emplace(parse_profile("outage(at=5ms,for=5ms)"), 7, 0, Direction::kUp);
+  o.timeline.push_back({10ms, outage});
+  Proxy proxy(o);
+  for (const Duration at : {0ms, 12ms, 16ms, 20ms}) proxy.receive_from_client(kA, bytes("a"), kStart + at);
+  EXPECT_EQ(departures(proxy, kStart + 1s), (Lines{"a@0>server", "a@12>server", "a@20>server"}));
+}
+
 TEST(Proxy, AChangeForOneClientIsForThatClientEvenBeforeItComes) {
   Proxy proxy(config("delay=1ms", ""));
   Proxy::PreparedChange slow;
