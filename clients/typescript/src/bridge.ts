@@ -82,8 +82,10 @@ export class Bridge {
     parseAddress(bridge.#config.to);
     const { host, port } = parseAddress(bridge.#config.listen);
     await new Promise<void>((resolve, reject) => {
-      const refused = ({ code }: NodeJS.ErrnoException): void =>
-        reject(new Error(`cannot listen on ${bridge.#config.listen}: ${code === "EADDRINUSE" ? "address already in use" : code}`));
+      const refused = ({ code }: NodeJS.ErrnoException): void => {
+        const why = code === "EADDRINUSE" ? "address already in use" : code;
+        reject(new Error(`cannot listen on ${bridge.#config.listen}: ${why}`));
+      };
       bridge.#http.once("error", refused).listen({ host, port }, resolve);
     });
     return bridge;

@@ -189,7 +189,7 @@ export class Session {
     if (now - this.#lastHeard >= timeout) {
       this.#open = false;
       this.#closed = { kind: "closed", code: Code.TIMED_OUT, reason: `nothing heard for ${toMilliseconds(timeout)} ms` };
-    } else if (seal.suite !== CipherSuite.Plain && now - this.#opened >= life) {
+    } else if (seal.suite !== CipherSuite.Plain && (now - this.#opened >= life || this.#nextPacket >= kMaxPacketNumber)) {
       const reason = "the session has reached its age";
       this.close(Code.EXPIRED, reason);
       this.#closed = { kind: "closed", code: Code.EXPIRED, reason };

@@ -129,7 +129,8 @@ describe("the handshake", () => {
     assert.deepEqual(third, first);
     assert.equal(sent.length, 5); // at 0, 100 and 200 ms; given up at 250, again at 350 and 450 ms
     assert.ok(sent.every((datagram) => datagram.length === 1200));
-    const differs = (from: number, to: number): boolean => Buffer.compare(first!.subarray(from, to), next!.subarray(from, to)) !== 0;
+    const differs = (from: number, to: number): boolean =>
+      Buffer.compare(first!.subarray(from, to), next!.subarray(from, to)) !== 0;
     assert.ok(differs(16, 32), "random");
     assert.ok(!differs(50, 58), "key id");
     assert.ok(differs(58, 90), "ephemeral key");
@@ -253,7 +254,8 @@ describe("a session's end", () => {
     assert.ok(world.runUntil(() => world.client.stats().states > 0, 1000));
     world.server.session!.close(Code.REPLACED, "another has this key");
     world.runMs(5000);
-    assert.deepEqual([world.client.phase, world.client.stats().code, world.client.stats().attempts], ["stopped", Code.REPLACED, 1]);
+    const { phase, code, attempts } = world.client.stats();
+    assert.deepEqual([phase, code, attempts], ["stopped", Code.REPLACED, 1]);
   });
 });
 

@@ -80,7 +80,8 @@ describe("the cipher", () => {
 
   it("renews a key as Noise's REKEY", () => {
     const key = new Random(2).bytes(32);
-    const cipher = createCipheriv("chacha20-poly1305", key, Buffer.from("00000000ffffffffffffffff", "hex"), { authTagLength: 16 });
+    const nonce = Buffer.from("00000000ffffffffffffffff", "hex");
+    const cipher = createCipheriv("chacha20-poly1305", key, nonce, { authTagLength: 16 });
     assert.equal(toHex(rekey(key)), cipher.update(Buffer.alloc(32)).toString("hex"));
   });
 

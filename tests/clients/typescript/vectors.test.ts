@@ -5,7 +5,9 @@ import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { fromJson, toBinary, type JsonValue } from "@bufbuild/protobuf";
 import { decodeData, decodeHelloMessage, encodeFrame, encodeHead } from "../../../clients/typescript/src/codec.js";
-import { concat, decodeHeader, decodeHello, encodeAnswer, encodeHello, encodeRetry } from "../../../clients/typescript/src/datagram.js";
+import {
+  concat, decodeHeader, decodeHello, encodeAnswer, encodeHello, encodeRetry,
+} from "../../../clients/typescript/src/datagram.js";
 import * as pb from "../../../clients/typescript/src/gen/tendon_pb.js";
 import { ClientHandshake } from "../../../clients/typescript/src/handshake.js";
 import { parseKeyFile } from "../../../clients/typescript/src/key_file.js";

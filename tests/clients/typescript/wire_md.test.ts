@@ -139,8 +139,10 @@ describe("WIRE.md", () => {
   });
 
   it("control, its answer and bye say what the page says", () => {
-    assert.deepEqual(contentOf("control").frames, [{ kind: "control", value: { id: 7, request: { kind: "setStateRate", hz: 500 } } }]);
-    assert.deepEqual(contentOf("control-ack").frames, [{ kind: "controlAck", value: { id: 7, code: Code.OK, detail: "500 Hz" } }]);
+    const request = { kind: "setStateRate", hz: 500 };
+    assert.deepEqual(contentOf("control").frames, [{ kind: "control", value: { id: 7, request } }]);
+    const acknowledged = { id: 7, code: Code.OK, detail: "500 Hz" };
+    assert.deepEqual(contentOf("control-ack").frames, [{ kind: "controlAck", value: acknowledged }]);
     assert.deepEqual(contentOf("bye").frames, [{ kind: "bye", value: { code: Code.SHUTDOWN, reason: "SIGTERM" } }]);
   });
 });
