@@ -41,12 +41,12 @@ constexpr std::array<NamedProfile, 8> kProfiles = {{
     // trials for industrial automation", Electronics 11(3):412, 2022. The client has the radio. Losses are not in the
     // data,
     // and none are assumed.
-    {"5g-urllc", "5G millimetre wave, set up for low latency", "base=0.5ms delay=gamma(0.187ms,0.098ms) memory=10ms",
-     "base=0.55ms delay=gamma(0.226ms,0.122ms) memory=10ms"},
+    {"5g-urllc", "5G millimetre wave, set up for low latency", "base=0.27ms delay=gamma(0.417ms,0.098ms) memory=10ms",
+     "base=0.4ms delay=lognormal(0.376ms,0.123ms) memory=10ms"},
 
     // The same for 100-byte PROFINET, one each 10 ms, over mid-band 5G (PD-Wireless-5G-2a).
-    {"5g-midband", "5G mid-band on a factory floor", "base=3.7ms delay=gamma(2.82ms,1.003ms) memory=50ms",
-     "base=3ms delay=gamma(2.695ms,1.506ms) memory=50ms"},
+    {"5g-midband", "5G mid-band on a factory floor", "base=4.65ms delay=gamma(1.871ms,1.003ms) memory=50ms",
+     "base=4.35ms delay=lognormal(1.345ms,1.507ms) memory=50ms"},
 
     // Lauridsen et al., "From LTE to 5G for connected mobility", IEEE Communications Magazine 55(3), 2017: 19 000 km of
     // drive tests; each handover interrupts for 40 ms (median). How often it happens (a cell of 400 m at 80 km/h), the

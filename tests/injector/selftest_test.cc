@@ -143,10 +143,10 @@ TEST_P(NamedProfileFit, AreAsCloseToTheMeasuredHistogramsAsTheySay) {
 
 INSTANTIATE_TEST_SUITE_P(
     FiveG, NamedProfileFit,
-    testing::Values(Fit{"5g-urllc", Direction::kUp, "5G-URLLC-mmW-Uplink_PD-Wireless-5G-3a.csv", 0.075},
-                    Fit{"5g-urllc", Direction::kDown, "5G-URLLC-mmW-Downlink_PD-Wireless-5G-3a.csv", 0.03},
-                    Fit{"5g-midband", Direction::kUp, "5G-midband-Uplink_PD-Wireless-5G-2a.csv", 0.095},
-                    Fit{"5g-midband", Direction::kDown, "5G-midband-Downlink_PD-Wireless-5G-2a.csv", 0.18}));
+    testing::Values(Fit{"5g-urllc", Direction::kUp, "5G-URLLC-mmW-Uplink_PD-Wireless-5G-3a.csv", 0.04},
+                    Fit{"5g-urllc", Direction::kDown, "5G-URLLC-mmW-Downlink_PD-Wireless-5G-3a.csv", 0.022},
+                    Fit{"5g-midband", Direction::kUp, "5G-midband-Uplink_PD-Wireless-5G-2a.csv", 0.075},
+                    Fit{"5g-midband", Direction::kDown, "5G-midband-Downlink_PD-Wireless-5G-2a.csv", 0.072}));
 
 }  // namespace
 }  // namespace tendon::injector
