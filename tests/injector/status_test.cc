@@ -74,7 +74,9 @@ TEST(TerminalView, ShowsWhatIsNewSinceBeforeAndFitsTheTerminal) {
   const Heading heading{"127.0.0.1:1", "127.0.0.1:2", 7, {"wifi-bad", "lan"}, 1ms};
   const std::string view = terminal_view(heading, now, before, "both la", 60);
   EXPECT_NE(view.find("up         500"), std::string::npos) << view;
-  EXPECT_NE(view.find("50.00    50.00    50.00"), std::string::npos) << "the delays of the last second are those near 50 ms\n" << view;
+  EXPECT_NE(view.find("50.00    50.00    50.00"), std::string::npos)
+      << "the delays of the last second are those near 50 ms\n"
+      << view;
   EXPECT_NE(view.find("5 lost (outage 5)"), std::string::npos) << view;
   EXPECT_TRUE(view.ends_with("\n> both la")) << view;
   std::istringstream lines(view);
