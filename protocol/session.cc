@@ -53,6 +53,7 @@ struct Session::State {
   std::optional<std::uint64_t> newest_echoed;  ///< newest packet of ours that the peer has told of
   IncomingRequests answering;
   RoundTrip round_trip;
+  ClockOffsetEstimator peer_clock;
 
   // To tell.
   std::optional<DeviceState> state_arrived;
@@ -180,6 +181,7 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
     return;
   }
   count_lost_outgoing(told);
+  peer_clock.observe({.sent = told.sent, .received = told.received, .answered = sent, .answered_at = now});
   const Duration sample = (now - told.sent) - (sent - told.received);
   if (sample < Duration::zero()) return;  // two clocks of different rates, and a peer that held the echo for long
   round_trip.observe(sample);
@@ -194,7 +196,9 @@ void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   const std::uint64_t since = newest_echoed ? told.packet_number - *newest_echoed : told.packet_number + 1;
   const std::uint64_t before = std::min<std::uint64_t>(since - 1, 32);
   const std::uint64_t reached = (std::uint64_t{1} << before) - 1;
-  stats.lost_outgoing += before - static_cast<std::uint64_t>(std::popcount(told.received_mask & reached));
+  const auto seen_before = static_cast<std::uint64_t>(std::popcount(told.received_mask & reached));
+  stats.lost_outgoing += before - seen_before;
+  stats.seen_outgoing += 1 + seen_before;
   newest_echoed = told.packet_number;
 }
 
@@ -328,5 +332,8 @@ LocalTime Session::next_tick() const noexcept {
 bool Session::open() const noexcept { return state_->open; }
 std::uint32_t Session::connection_id() const noexcept { return state_->config.connection_id; }
 const LinkStats& Session::stats() const noexcept { return state_->stats; }
+std::optional<ClockOffsetEstimator::Estimate> Session::peer_clock() const noexcept {
+  return state_->peer_clock.estimate(state_->latest);
+}
 
 }  // namespace tendon

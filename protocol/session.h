@@ -9,6 +9,7 @@
 #include <string>
 #include <variant>
 
+#include "core/estimation/clock_offset_estimator.h"
 #include "core/time.h"
 #include "protocol/limits.h"
 #include "protocol/link.h"
@@ -26,6 +27,7 @@ struct LinkStats {
   std::uint64_t datagrams_received = 0;  ///< accepted ones
   std::uint64_t lost = 0;                ///< peer packet numbers never seen (so far)
   std::uint64_t lost_outgoing = 0;       ///< ours that the peer had not seen, as far as its ack vectors reach
+  std::uint64_t seen_outgoing = 0;       ///< … and those that it had
   std::uint64_t reordered = 0;           ///< accepted, but older than one seen before
   std::uint64_t duplicated = 0;          ///< seen before, older than the window, or of the handshake: dropped
   std::uint64_t malformed = 0;           ///< not a datagram of this conversation: dropped
@@ -138,6 +140,9 @@ class Session {
   bool open() const noexcept;
   std::uint32_t connection_id() const noexcept;
   const LinkStats& stats() const noexcept;
+  /// The peer's clock, as the echoes tell of it up to the newest `now`, with the bound on its error; empty before the
+  /// first.
+  std::optional<ClockOffsetEstimator::Estimate> peer_clock() const noexcept;
 
  private:
   struct State;

@@ -47,8 +47,8 @@ std::string describe(const Lateness::Report& report) {
 
 }  // namespace
 
-void Lateness::attend(bool controller, LocalTime now) noexcept {
-  attending_ = controller;
+void Lateness::begin(LocalTime now) noexcept {
+  attending_ = true;
   usual_known_ = false;
   heard_ = now;
   valid_until_ = LocalTime::max();  // before the first force nothing is late

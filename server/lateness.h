@@ -49,11 +49,14 @@ class Lateness {
     std::string text;
   };
 
+  /// An engine has come: silence counts from its first force on.
+  void begin(LocalTime now) noexcept;
+  /// It has gone, and nobody is late.
+  void end() noexcept { attending_ = false; }
+
   /// Any authentic datagram of the engine.
   void heard(LocalTime now) noexcept { heard_ = now; }
   void observe(const Way& way) noexcept;
-  /// A controller has come (true) or gone: silence counts from here on, or not at all.
-  void attend(bool controller, LocalTime now) noexcept;
 
   /// Since the last call. A force that is still missing counts as late too: the engine is to blame when it is heard but
   /// sends no force, the network when nothing is heard.

@@ -62,6 +62,8 @@ void print_json(const Server::Summary& summary) {
   add("forces", network.forces);
   add("denied", network.denied);
   add("unanswerable", network.unanswerable);
+  add("late", network.late);
+  add("hopeless", network.hopeless);
   add("replaced", network.replaced);
   add("roamed", network.roamed);
   add("half_open_forgotten", network.half_open_forgotten);
@@ -80,6 +82,11 @@ void print_json(const Server::Summary& summary) {
   add("stale", network.dropped.stale);
   add("lost", network.controller.lost);
   add("round_trip_ms", seconds(network.controller.smoothed_round_trip) * 1e3);
+  if (const auto& clock = network.controller_clock) {
+    add("clock_offset_ms", seconds(clock->offset) * 1e3);
+    add("clock_drift_ppm", clock->drift * 1e6);
+    add("clock_error_bound_ms", seconds(clock->error_bound) * 1e3);
+  }
   if (recording) {
     add("recorded_bytes", recording->bytes);
     add("recorded_steps", recording->steps);

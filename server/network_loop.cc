@@ -61,7 +61,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, Mailboxes& mail)
 
 LocalTime NetworkLoop::turn(LocalTime now) {
   const bool more = drain(now);
-  publish();
+  publish(now);
   for (Guest& guest : guests_) {
     guest.session.tick(now);
     serve(now, guest);
@@ -69,6 +69,8 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   std::erase_if(guests_, [](const Guest& guest) { return guest.gone; });
   stats_.half_open_forgotten +=
       std::erase_if(half_open_, [&](const Guest& guest) { return now - guest.arrived >= config_.half_open_timeout; });
+
+  report_lateness(now);
 
   if (more) return now;
   LocalTime next = LocalTime::max();
@@ -109,6 +111,8 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       guest->address = from;
       ++stats_.roamed;
     }
+    if (newest && guest->role == Role::kController) lateness_.heard(now);
+    if (newest) adapt(now, *guest);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
     if (!waiting->session.receive(now, datagram)) return;
@@ -244,15 +248,43 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   notice(false, "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" +
                     guest.name + "\" at " + to_string(guest.address) +
                     (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""));
+  if (guest.role == Role::kController) lateness_.begin(now);
+  if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);
   guests_.push_back(std::move(guest));
 }
 
-void NetworkLoop::publish() {
+void NetworkLoop::adapt(LocalTime now, Guest& guest) {
+  const LinkStats& link = guest.session.stats();
+  if (!guest.adaptation || link.round_trip == Duration::zero()) return;
+  const std::uint32_t before = guest.adaptation->one_in();
+  guest.adaptation->observe(now, link.round_trip, link.seen_outgoing, link.lost_outgoing);
+  const std::uint32_t one_in = guest.adaptation->one_in();
+  if (one_in != before) {
+    notice(one_in > before, "\"" + guest.name + "\" is sent one state in " + std::to_string(one_in) +
+                                (one_in > before ? ": the way to it is full" : " again"));
+  }
+  if (std::exchange(guest.hopeless, guest.adaptation->hopeless()) != guest.hopeless) {
+    notice(guest.hopeless,
+           "the link of \"" + guest.name +
+               (guest.hopeless ? "\" loses too much to be of use: its forces are not taken" : "\" is of use again"));
+  }
+}
+
+void NetworkLoop::report_lateness(LocalTime now) {
+  if (now < report_next_) return;
+  report_next_ = now + std::chrono::seconds(1);
+  Lateness::Report report = lateness_.report(now);
+  stats_.late += report.late;
+  if (!report.text.empty()) notice(true, std::move(report.text));
+}
+
+void NetworkLoop::publish(LocalTime now) {
   const DeviceState* state = mail_.state.take();
   if (state == nullptr) return;
-  sampled_[state->tick % kRemembered] = {state->tick, LocalTime(state->sampled.time_since_epoch())};
+  sampled_[state->tick % kRemembered] = {state->tick, LocalTime(state->sampled.time_since_epoch()), now};
   for (Guest& guest : guests_) {
-    if (state->tick - guest.last_state < guest.state_every) continue;
+    const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
+    if (state->tick - guest.last_state < std::max(guest.state_every, one_in)) continue;
     guest.last_state = state->tick;
     guest.session.send(*state);
   }
@@ -292,6 +324,15 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     ++stats_.unanswerable;
     return;
   }
+  if (guest.adaptation && guest.adaptation->hopeless()) {
+    ++stats_.hopeless;
+    return;
+  }
+  lateness_.observe({.sampled = answered.at,
+                     .sent = answered.sent,
+                     .received = now,
+                     .round_trip = guest.session.stats().round_trip,
+                     .valid_for = command.valid_for});
   RemoteForce force;
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
@@ -331,7 +372,10 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
   notice(guest.role == Role::kController,
          "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how);
   // A full ring means 16 orders wait: the haptic thread stands still, and age will do the same a little later.
-  if (guest.role == Role::kController) mail_.orders.try_push(HapticOrder::kRelease);
+  if (guest.role != Role::kController) return;
+  mail_.orders.try_push(HapticOrder::kRelease);
+  lateness_.end();
+  stats_.controller_clock = guest.session.peer_clock();
 }
 
 void NetworkLoop::close(LocalTime now) {
@@ -339,6 +383,7 @@ void NetworkLoop::close(LocalTime now) {
     guest.session.close(Code::kShutdown, "the server is going down");
     send_all(now, guest);
     add(stats_.dropped, guest.session.stats());
+    if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
   }
   guests_.clear();
   half_open_.clear();
@@ -347,7 +392,10 @@ void NetworkLoop::close(LocalTime now) {
 NetworkLoop::Stats NetworkLoop::stats() const {
   Stats stats = stats_;
   stats.hellos = doorman_.stats();
-  for (const Guest& guest : guests_) add(stats.dropped, guest.session.stats());
+  for (const Guest& guest : guests_) {
+    add(stats.dropped, guest.session.stats());
+    if (guest.role == Role::kController) stats.controller_clock = guest.session.peer_clock();
+  }
   return stats;
 }
 

@@ -11,7 +11,9 @@
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
+#include "protocol/rate_adaptation.h"
 #include "protocol/session.h"
+#include "server/lateness.h"
 #include "server/mailboxes.h"
 
 namespace tendon {
@@ -52,6 +54,9 @@ class NetworkLoop {
     Duration half_open_timeout = std::chrono::seconds(5);
     Rekey rekey{};  ///< of the sessions of suite 1, as their `life`
     Duration session_life = Session::Config{}.life;
+    /// States leave more rarely where the way to a guest is full, see RateAdaptation; where even the lowest rate loses
+    /// a tenth, forces are not handed on, and the device comes to its safe stop.
+    bool adapt_state_rate = false;
     /// Datagrams taken in one turn; a flood must not keep states from being sent. A 1 kHz engine sends 1 per turn.
     std::size_t max_datagrams = 256;
   };
@@ -79,8 +84,11 @@ class NetworkLoop {
     std::uint64_t forces = 0;              ///< handed to the haptic loop
     std::uint64_t denied = 0;              ///< forces and requests that only a controller may send
     std::uint64_t unanswerable = 0;        ///< forces that answer a step which never was, or long ago
+    std::uint64_t late = 0;                ///< forces that came when the one before had outlived its validity
+    std::uint64_t hopeless = 0;            ///< forces not handed on, over a link of no use
     Dropped dropped;
     LinkStats controller;  ///< the link of the present controller, or of the last one
+    std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< … and its clock, by ours
   };
 
   /// What the operator should read in the log.
@@ -116,6 +124,8 @@ class NetworkLoop {
     LocalTime arrived;
     std::uint64_t state_every = 1;  ///< haptic steps
     std::uint64_t last_state = 0;   ///< tick
+    std::optional<RateAdaptation> adaptation{};
+    bool hopeless = false;  ///< as it was told to the operator
     bool gone = false;
   };
   struct Refusal {
@@ -135,7 +145,9 @@ class NetworkLoop {
   void answer(Guest& guest, std::uint32_t id, const Request& request);
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
-  void publish();
+  void publish(LocalTime now);
+  void adapt(LocalTime now, Guest& guest);
+  void report_lateness(LocalTime now);
   void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
            std::size_t size);
@@ -153,9 +165,13 @@ class NetworkLoop {
   struct Sampled {
     std::uint64_t tick = 0;
     LocalTime at{};
+    LocalTime sent{};  ///< when the state left
   };
   static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz, longer than any loop worth rendering
   std::array<Sampled, kRemembered> sampled_{};
+
+  Lateness lateness_;
+  LocalTime report_next_{};
 
   Stats stats_;
   std::vector<Notice> notices_;

@@ -719,6 +719,8 @@ void declare_scene(Table& scene, Draft& draft) {
     keys.key("max_observers", network.max_observers, kObservers, "guests besides the controller");
     keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
     keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
+    keys.key("adapt_state_rate", network.adapt_state_rate, YesNo{},
+             "whether states leave more rarely where the way to a guest is full, down to 1 in 20");
   });
 
   scene.optional_table("recording", [&draft](Table& recording) {

@@ -25,6 +25,7 @@ struct Scene {
     std::size_t max_observers = NetworkLoop::Config{}.max_observers;
     Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
+    bool adapt_state_rate = NetworkLoop::Config{}.adapt_state_rate;
   };
 
   SimulatedDevice::Config device;

@@ -38,6 +38,7 @@ NetworkLoop::Config network_config(const Scene& scene, const DeviceInfo& device)
   config.max_observers = scene.network.max_observers;
   config.controller_timeout = scene.network.controller_timeout;
   config.observer_timeout = scene.network.observer_timeout;
+  config.adapt_state_rate = scene.network.adapt_state_rate;
   return config;
 }
 

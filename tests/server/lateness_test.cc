@@ -12,7 +12,7 @@ using std::chrono::seconds;
 /// An engine at 100 Hz behind a round trip of 40 ms, whose forces are valid for 30 ms.
 class Engine {
  public:
-  Engine() { lateness.attend(true, now_); }
+  Engine() { lateness.begin(now_); }
 
   /// The next force; the parts are longer than usual by so much.
   void answer(Duration ours = {}, Duration network = {}, Duration engine = {}) {
@@ -86,7 +86,7 @@ TEST(Lateness, NobodyIsLateBeforeTheFirstForceOrWithoutAController) {
   Engine engine;
   EXPECT_EQ(engine.lateness.report(engine.now() + seconds(9)).late, 0U);
   engine.answer_times(5);
-  engine.lateness.attend(false, engine.now());
+  engine.lateness.end();
   engine.lateness.report(engine.now());
   EXPECT_EQ(engine.lateness.report(engine.now() + seconds(9)).late, 0U);
 }

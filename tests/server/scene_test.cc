@@ -151,6 +151,7 @@ listen = "[::1]:5000"
 max_observers = 3
 controller_timeout_ms = 1500
 observer_timeout_ms = 2500
+adapt_state_rate = true
 [recording]
 path = "run.mcap"
 )");
@@ -187,6 +188,7 @@ path = "run.mcap"
   EXPECT_EQ(scene.network.max_observers, 3U);
   EXPECT_EQ(scene.network.controller_timeout, 1500ms);
   EXPECT_EQ(scene.network.observer_timeout, 2500ms);
+  EXPECT_TRUE(scene.network.adapt_state_rate);
   EXPECT_EQ(scene.recording, "run.mcap");
 }
 
@@ -455,7 +457,7 @@ TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
 TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
   EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
             "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, max_observers, controller_timeout_ms, "
-            "observer_timeout_ms");
+            "observer_timeout_ms, adapt_state_rate");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found \"x\"");
 }

@@ -56,6 +56,7 @@ World::World(const Config& config, Device& device)
             network.position_resolution = device.info().position_resolution;
             network.haptic_period = config.loop.period;
             network.max_observers = config.max_observers;
+            network.adapt_state_rate = config.adapt_state_rate;
             return network;
           }(),
           network_.server(), *mail_),

@@ -59,6 +59,7 @@ class World {
     /// Steps are taken out as they are made. Datagrams only go to a recording.
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
+    bool adapt_state_rate = false;
 
     static Network::Weather bad();
   };

@@ -394,5 +394,75 @@ TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) 
   EXPECT_EQ(overruns, world.haptic().stats().overruns);
 }
 
+// 700 kbit/s carry 400 states a second.
+NetworkLoop::Stats on_a_narrow_link(bool adapt) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.weather = {.up = injector::parse_profile("base=5ms"),
+                    .down = injector::parse_profile("base=5ms rate=700kbit/s queue=2000packets")};
+  config.adapt_state_rate = adapt;
+  World world(config, device);
+  world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(14));
+  return world.server().stats();
+}
+
+TEST(World, WhereALinkIsNarrowStatesLeaveMoreRarelyAndSoArriveSooner) {
+  EXPECT_GT(on_a_narrow_link(false).controller.smoothed_round_trip, seconds(2));
+  EXPECT_LT(on_a_narrow_link(true).controller.smoothed_round_trip, milliseconds(30));
+}
+
+TEST(World, OverALinkThatLosesTooMuchForcesAreNotTakenWhereTheRateIsAdapted) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.weather = {.up = injector::parse_profile("base=5ms"), .down = injector::parse_profile("base=5ms loss=30%")};
+  config.adapt_state_rate = true;
+  World world(config, device);
+  world.add_controller(at_100_hz(), wall());
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(12));
+  EXPECT_GT(world.server().stats().hopeless, 100U);
+  EXPECT_NE(log.steps.back().mode, Mode::kActive);
+}
+
+std::string told(World& world) {
+  std::string text;
+  for (const NetworkLoop::Notice& notice : world.server().take_notices()) text += notice.text + "\n";
+  return text;
+}
+
+TEST(World, TheOperatorIsToldWhyAForceWasLate) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.weather = {.up = injector::parse_profile("base=20ms"),
+                    .down = injector::parse_profile("base=20ms spike(at=3s,for=300ms,150ms)")};
+  World world(config, device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(milliseconds(2900));
+  EXPECT_EQ(told(world).find("late"), std::string::npos);
+  world.run_for(seconds(2));
+  const std::string text = told(world);
+  EXPECT_NE(text.find("the network (round trip 19"), std::string::npos) << text;
+  EXPECT_NE(text.find("usually 40 ms)"), std::string::npos) << text;
+  world.kill(z);
+  world.run_for(milliseconds(1500));
+  EXPECT_NE(told(world).find("nothing is heard of the engine's machine"), std::string::npos);
+}
+
+TEST(World, TheServerKnowsTheClockOfTheEngineWithinTheBoundItStates) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const injector::DriftingClock clock({.offset = std::chrono::hours(30), .drift_ppb = -150'000, .steps = {}});
+  world.add_controller(at_100_hz(), wall(), clock);
+  world.run_for(seconds(60));
+  const auto estimate = world.server().stats().controller_clock;
+  ASSERT_TRUE(estimate);
+  const Duration error = std::chrono::abs(estimate->offset - (clock.reading(world.now()) - world.now()));
+  EXPECT_LE(error, estimate->error_bound);
+  EXPECT_LT(error, milliseconds(3));
+  EXPECT_LT(estimate->error_bound, milliseconds(25));
+}
+
 }  // namespace
 }  // namespace tendon::simulation
