@@ -34,6 +34,7 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   require(config.retry_min > Duration::zero(), "retry_min: must be above zero");
   require(config.retry_max >= config.retry_min, "retry_max: must not be below retry_min");
   require(config.max_datagrams > 0, "max_datagrams: must be above zero");
+  if (config.deadband) Deadband{*config.deadband};  // throws what is wrong with it
   return config;
 }
 
@@ -126,6 +127,7 @@ void ForceClient::settle(LocalTime now) {
   }
   if (config_.state_hz > 0) session_->request(SetStateRate{config_.state_hz});
   sequence_ = 0;
+  if (config_.deadband) deadband_.emplace(*config_.deadband);  // what another session was sent, this one was not
   stats_.phase = Phase::kOpen;
   ++stats_.sessions;
 }
@@ -221,7 +223,7 @@ bool ForceClient::call(LocalTime now) {
       return false;
     }
     const Touch touch = physics_(state);
-    if (session_) send(touch, state);  // unless the callback has called stop()
+    if (session_) send(now, touch, state);  // unless the callback has called stop()
     return true;
   } catch (...) {
     stop(now);
@@ -229,9 +231,13 @@ bool ForceClient::call(LocalTime now) {
   }
 }
 
-void ForceClient::send(const Touch& touch, const DeviceState& answered) {
+void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& answered) {
   if (!usable(touch.force) || (touch.stiffness && !usable(*touch.stiffness))) {
     ++stats_.forces_unusable;
+    return;
+  }
+  if (deadband_ && !deadband_->passes(now, touch.force)) {
+    ++stats_.forces_alike;
     return;
   }
   ForceCommand command;
@@ -254,6 +260,7 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
     const double apart = static_cast<double>(tick - answered_tick_) / welcome_->loop_hz;
     period = std::max(period, from_seconds(std::min(apart, seconds(kMaxObservedPeriod))));
   }
+  if (config_.deadband) period = std::max(period, config_.deadband->longest_silence);
   return std::clamp(kValidPeriods * period, kMinValidFor, limits::kMaxValidFor);
 }
 

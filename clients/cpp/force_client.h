@@ -9,6 +9,7 @@
 #include <string>
 
 #include "protocol/crypto.h"
+#include "protocol/deadband.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
@@ -70,12 +71,16 @@ class ForceClient {
     /// asked one or, when the physics is slower, the time between the states of the last two forces:
     ///
     ///     T         = max(1 / rate_hz, min(Δtick / loop_hz, 100 ms))      with rate_hz = 0: the second term
-    ///     valid_for = max(3 T, 20 ms)
+    ///     valid_for = max(3 T, 20 ms)                          with a deadband: T ≥ its longest silence
     ///
     /// 3 T: two forces in a row may be lost and the third is still in time. 20 ms: an engine at 1 kHz
     /// would otherwise be late by a delay variation of 3 ms. 100 ms: a gap is not a period; an engine
     /// slower than 10 Hz says so by rate_hz.
     Duration valid_for{};
+    /// Forces that a hand cannot tell from the last one sent are not sent (Weber's law): a tenth of the datagrams at 1
+    /// kHz, where those are dear. Compares forces; a stiffness that alone has changed waits for the next one, at most
+    /// for the longest silence. Empty: every force is sent.
+    std::optional<Deadband::Config> deadband{};
     /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
     std::optional<Key> key{};
     Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
@@ -114,6 +119,7 @@ class ForceClient {
     std::uint64_t states_skipped = 0;   ///< of these, replaced by a newer one before a callback was due
     std::uint64_t forces = 0;           ///< forces sent
     std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
+    std::uint64_t forces_alike = 0;     ///< forces not sent: a hand could not have told them from the one before
     std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
   };
 
@@ -152,7 +158,7 @@ class ForceClient {
   void tick(LocalTime now);
   void flush(LocalTime now);
   bool call(LocalTime now);
-  void send(const Touch& touch, const DeviceState& answered);
+  void send(LocalTime now, const Touch& touch, const DeviceState& answered);
   Duration valid_for(std::uint64_t tick) const;
   LocalTime next_turn() const;
 
@@ -174,6 +180,7 @@ class ForceClient {
 
   std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
   LocalTime next_call_{};
+  std::optional<Deadband> deadband_;
   std::uint64_t sequence_ = 0;       ///< of the newest force
   std::uint64_t answered_tick_ = 0;  ///< the tick it answers
   Stats stats_;

@@ -250,6 +250,22 @@ TEST(ForceClient, DoesNotSendAForceThatIsNoForce) {
   EXPECT_EQ(world.z->forces.back().second.sequence, world.z->forces.size()) << "what is not sent takes no number";
 }
 
+TEST(ForceClient, WithADeadbandForcesThatFeelAlikeAreNotSentAndTheServerNeverWaitsLongerThanTheyAreValid) {
+  World world(29, kFineWeather);
+  std::uint64_t calls = 0;
+  world.connect({.deadband = Deadband::force()}, [&](const DeviceState&) {
+    return Touch(Vec3(3 + std::sin(static_cast<double>(++calls) / 200), 0, 0));
+  });
+  world.run(5 * kSecond);
+  const ForceClient::Stats stats = world.a->stats();
+  EXPECT_EQ(stats.forces + stats.forces_alike, calls);
+  EXPECT_LT(stats.forces, calls / 10);
+  const auto& forces = world.z->forces;
+  for (std::size_t i = 1; i < forces.size(); ++i) {
+    EXPECT_LT(forces[i].first - forces[i - 1].first, forces[i - 1].second.valid_for) << i;
+  }
+}
+
 TEST(ForceClient, AnObserverSeesTheHandAndTheLinkAndSendsNoForce) {
   World world(13, kFineWeather);
   int calls = 0;
