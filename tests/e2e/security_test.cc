@@ -57,10 +57,12 @@ TEST(Security, AClientWithItsKeyControlsAndAnObserverWatches) {
   EXPECT_EQ(wall.wait(), 0);
   const std::string end = server.stop();
   EXPECT_EQ(count_in(end, "welcomed"), 2U);
-  for (const char* const cause : {"forged", "old_key", "hellos_plain", "hellos_limited", "hellos_unknown_key",
-                                  "hellos_forged", "unknown_connection"}) {
+  for (const char* const cause :
+       {"forged", "old_key", "hellos_plain", "hellos_limited", "hellos_unknown_key", "hellos_forged"}) {
     EXPECT_EQ(count_in(end, cause), 0U) << cause;
   }
+  // Each said Bye three times; what comes in a turn after the first belongs to nobody.
+  EXPECT_LE(count_in(end, "unknown_connection"), 4U);
 }
 
 TEST(Security, WithoutAKeyOrWithTheWrongOneNobodyGetsIn) {
