@@ -198,7 +198,7 @@ LocalTime Driver::send_due(LocalTime now) {
     while (due_.size() < kUdpBatch) {
       auto next = proxy_.next_due(now);
       if (!next) break;
-      due_.push_back(std::move(*next));
+      due_.push_back(*next);
     }
     if (due_.empty()) return now;
     // One system call for all that leave by the same socket: that of the first one not yet sent.

@@ -113,7 +113,6 @@ class Witness {
   std::optional<Breach> breach_;
   std::uint64_t forces_ = 0;  ///< that the server has handed to the haptic loop
   std::optional<LocalTime> last_force_;
-  std::uint64_t welcomed_ = 0;
   LocalTime answered_ = LocalTime::min();  ///< when the motion was sampled which the rendered force answers
   std::optional<LocalTime> silent_since_;  ///< there should be no force
   double last_account_ = 0;
@@ -125,7 +124,6 @@ class Witness {
   std::optional<LocalTime> recovered_by_;
   std::vector<Mark> marks_;
   std::uint64_t forces_then_ = 0;
-  std::uint64_t welcomed_then_ = 0;
 };
 
 }  // namespace tendon::simulation
