@@ -260,9 +260,14 @@ TEST_F(Handshake, NoReplyIsEverLongerThanTheDatagramItAnswers) {
       EXPECT_LE(knock(bad).size, bad.size());
     }
   }
+}
+
+TEST_F(Handshake, ARefusalFitsADatagramHoweverMuchItHasToSay) {
+  const auto guest = knock(hello_with_cookie()).guest;
+  ASSERT_TRUE(guest.has_value());
   Refused refused = examples::refused();
   refused.detail.assign(5000, 'x');
-  EXPECT_LT(z_->refuse(*knock(hello).guest, refused, answer_).size, kMaxDatagram);
+  EXPECT_LT(z_->refuse(*guest, refused, answer_).size, kMaxDatagram);
 }
 
 TEST_F(Handshake, ImpossibleSettingsAreRefusedAtOnce) {
