@@ -115,6 +115,23 @@ bool read_enum(int from, Enum last, Enum& to) noexcept {
 bool read(pb::Mode from, Mode& to) noexcept { return read_enum(from, Mode::kFault, to); }
 bool read(pb::Role from, Role& to) noexcept { return read_enum(from, Role::kController, to); }
 bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kReplaced, to); }
+bool read(pb::ChannelRule from, ChannelRule& to) noexcept { return read_enum(from, ChannelRule::kPriority, to); }
+
+bool read_device(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxDevices; }
+bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxChannels; }
+
+bool read_ms(std::uint32_t from, Duration& to) noexcept {
+  to = std::chrono::milliseconds(from);
+  return to <= limits::kMaxTimeout;
+}
+/// Rounded up: who waits for so long has waited long enough.
+std::uint32_t in_ms(Duration from) noexcept {
+  const auto ms = std::chrono::ceil<std::chrono::milliseconds>(std::clamp(from, Duration::zero(), limits::kMaxTimeout));
+  return static_cast<std::uint32_t>(ms.count());
+}
+
+/// A number that is 0 when it is not known.
+bool read_size(double from, double& to) noexcept { return bounded(to = from) && from >= 0; }
 
 bool read(const std::string& from, std::size_t limit, std::string& to) {
   if (from.size() > limit) return false;
@@ -150,7 +167,8 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
          read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
          bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
-         from.force_age_ns() <= static_cast<std::uint64_t>(limits::kMaxTime.count()) && read(from.mode(), to.mode);
+         from.force_age_ns() <= static_cast<std::uint64_t>(limits::kMaxTime.count()) && read(from.mode(), to.mode) &&
+         read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
 }
 
 void write(const DeviceState& from, pb::DeviceState& to) {
@@ -165,6 +183,8 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   to.set_force_sequence(from.force_sequence);
   to.set_force_age_ns(static_cast<std::uint64_t>(from.force_age.count()));
   to.set_mode(static_cast<pb::Mode>(from.mode));
+  to.set_device(from.device);
+  to.set_channel(from.channel);
 }
 
 bool read(const pb::LocalModel& from, LocalModel& to) noexcept {
@@ -211,7 +231,8 @@ bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept {
   to.model.reset();
   if (from.has_model() && !read(from.model(), to.model.emplace())) return false;
   return to.sequence > 0 && read(from.force_n(), to.force) && to.valid_for > Duration::zero() &&
-         to.valid_for <= limits::kMaxValidFor;
+         to.valid_for <= limits::kMaxValidFor && read_device(from.device(), to.device) &&
+         read_channel(from.channel(), to.channel);
 }
 
 void write(const ForceCommand& from, pb::ForceCommand& to) {
@@ -227,26 +248,71 @@ void write(const ForceCommand& from, pb::ForceCommand& to) {
   const bool possible = from.valid_for > Duration::zero() && from.valid_for <= limits::kMaxValidFor;
   const auto us = std::chrono::ceil<std::chrono::microseconds>(possible ? from.valid_for : Duration::zero());
   to.set_valid_for_us(static_cast<std::uint32_t>(us.count()));
+  to.set_device(from.device);
+  to.set_channel(from.channel);
 }
 
-bool read(const pb::Control& from, Control& to) noexcept {
+bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
+  to.hz = from.hz();
+  return read_device(from.device(), to.device);
+}
+bool read(const pb::Rearm& from, Rearm& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Describe& from, Describe& to) noexcept { return read_device(from.device(), to.device); }
+template <class Message, class Lease>
+bool read_lease(const Message& from, Lease& to) noexcept {
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
+}
+bool read(const pb::TakeLease& from, TakeLease& to) noexcept { return read_lease(from, to); }
+bool read(const pb::GiveLease& from, GiveLease& to) noexcept { return read_lease(from, to); }
+bool read(const pb::LeaseLost& from, LeaseLost& to) {
+  return read_lease(from, to) && read(from.to(), limits::kMaxName, to.to);
+}
+
+template <class Value, class Message>
+bool read_request(const Message& from, Control& to) {
+  return read(from, to.request.emplace().emplace<Value>());
+}
+
+bool read(const pb::Control& from, Control& to) {
   to.id = from.id();
+  if (to.id == 0) return false;
   switch (from.op_case()) {
     case pb::Control::kSetStateRate:
-      to.request = SetStateRate{from.set_state_rate().hz()};
-      break;
+      return read_request<SetStateRate>(from.set_state_rate(), to);
     case pb::Control::kRearm:
-      to.request = Rearm{};
-      break;
+      return read_request<Rearm>(from.rearm(), to);
+    case pb::Control::kDescribe:
+      return read_request<Describe>(from.describe(), to);
+    case pb::Control::kTakeLease:
+      return read_request<TakeLease>(from.take_lease(), to);
+    case pb::Control::kGiveLease:
+      return read_request<GiveLease>(from.give_lease(), to);
+    case pb::Control::kLeaseLost:
+      return read_request<LeaseLost>(from.lease_lost(), to);
     case pb::Control::OP_NOT_SET:
-      to.request.reset();
       break;
   }
-  return to.id > 0;
+  to.request.reset();
+  return true;
 }
 
-void write_request(const SetStateRate& from, pb::Control& to) { to.mutable_set_state_rate()->set_hz(from.hz); }
-void write_request(const Rearm&, pb::Control& to) { to.mutable_rearm(); }
+void write_request(const SetStateRate& from, pb::Control& to) {
+  to.mutable_set_state_rate()->set_hz(from.hz);
+  to.mutable_set_state_rate()->set_device(from.device);
+}
+void write_request(const Rearm& from, pb::Control& to) { to.mutable_rearm()->set_device(from.device); }
+void write_request(const Describe& from, pb::Control& to) { to.mutable_describe()->set_device(from.device); }
+template <class Lease, class Message>
+void write_lease(const Lease& from, Message& to) {
+  to.set_device(from.device);
+  to.set_channel(from.channel);
+}
+void write_request(const TakeLease& from, pb::Control& to) { write_lease(from, *to.mutable_take_lease()); }
+void write_request(const GiveLease& from, pb::Control& to) { write_lease(from, *to.mutable_give_lease()); }
+void write_request(const LeaseLost& from, pb::Control& to) {
+  write_lease(from, *to.mutable_lease_lost());
+  to.mutable_lease_lost()->set_to(clip(from.to, limits::kMaxName));
+}
 
 void write(const Control& from, pb::Control& to) {
   to.set_id(from.id);
@@ -254,15 +320,76 @@ void write(const Control& from, pb::Control& to) {
   if (from.request) std::visit([&](const auto& request) { write_request(request, to); }, *from.request);
 }
 
+bool read(const pb::ChannelDescription& from, ChannelDescription& to) {
+  return read(from.name(), limits::kMaxLabel, to.name) && read(from.rule(), to.rule) &&
+         read_ms(from.lease_ms(), to.lease) && read(from.holder(), limits::kMaxLabel, to.holder);
+}
+
+void write(const ChannelDescription& from, pb::ChannelDescription& to) {
+  to.set_name(clip(from.name, limits::kMaxLabel));
+  to.set_rule(static_cast<pb::ChannelRule>(from.rule));
+  to.set_lease_ms(in_ms(from.lease));
+  to.set_holder(clip(from.holder, limits::kMaxLabel));
+}
+
+bool read(const pb::DeviceDescription& from, DeviceDescription& to) {
+  const auto read_dof = [](std::uint32_t dof, std::uint32_t& known) { return (known = dof) >= 1 && dof <= 6; };
+  if (from.has_workspace_min_m() != from.has_workspace_max_m()) return false;
+  if (from.has_workspace_min_m()) {
+    auto& box = to.workspace.emplace();
+    if (!read(from.workspace_min_m(), box.min) || !read(from.workspace_max_m(), box.max)) return false;
+    if ((box.min.array() > box.max.array()).any()) return false;
+  }
+  const int channels = from.channels_size();
+  if (channels < 1 || channels > static_cast<int>(limits::kMaxChannels)) return false;
+  for (const auto& channel : from.channels()) {
+    if (!read(channel, to.channels.emplace_back())) return false;
+  }
+  to.loop_hz = from.loop_hz();
+  return read_device(from.device(), to.device) && read(from.name(), limits::kMaxLabel, to.name) &&
+         read(from.model(), limits::kMaxName, to.model) && read_dof(from.position_dof(), to.position_dof) &&
+         read_dof(from.force_dof(), to.force_dof) && read_size(from.max_force_n(), to.max_force) &&
+         read_size(from.continuous_force_n(), to.continuous_force) &&
+         read_size(from.max_stiffness_npm(), to.max_stiffness) &&
+         read_size(from.position_resolution_m(), to.position_resolution) && to.loop_hz >= 1 &&
+         to.loop_hz <= limits::kMaxLoopHz;
+}
+
+void write(const DeviceDescription& from, pb::DeviceDescription& to) {
+  to.set_device(from.device);
+  to.set_name(clip(from.name, limits::kMaxLabel));
+  to.set_model(clip(from.model, limits::kMaxName));
+  to.set_position_dof(from.position_dof);
+  to.set_force_dof(from.force_dof);
+  if (from.workspace) {
+    write(from.workspace->min, *to.mutable_workspace_min_m());
+    write(from.workspace->max, *to.mutable_workspace_max_m());
+  }
+  to.set_max_force_n(from.max_force);
+  to.set_continuous_force_n(from.continuous_force);
+  to.set_max_stiffness_npm(from.max_stiffness);
+  to.set_position_resolution_m(from.position_resolution);
+  to.set_loop_hz(from.loop_hz);
+  for (const ChannelDescription& channel : from.channels) {
+    if (to.channels_size() == static_cast<int>(limits::kMaxChannels)) break;
+    write(channel, *to.add_channels());
+  }
+}
+
 bool read(const pb::ControlAck& from, ControlAck& to) {
   to.id = from.id();
-  return to.id > 0 && read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail);
+  if (from.has_device() && !read(from.device(), to.device.emplace())) return false;
+  return to.id > 0 && read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail) &&
+         read_ms(from.wait_ms(), to.wait);
 }
 
 void write(const ControlAck& from, pb::ControlAck& to) {
   to.set_id(from.id);
   to.set_code(static_cast<pb::Code>(from.code));
   to.set_detail(clip(from.detail, limits::kMaxDetail));
+  to.set_wait_ms(in_ms(from.wait));
+  to.clear_device();
+  if (from.device) write(*from.device, *to.mutable_device());
 }
 
 bool read(const pb::Bye& from, Bye& to) {
@@ -291,11 +418,30 @@ void take(const Message& from, DataContent& content) {
 
 // ---- handshake ----
 
+bool read(const pb::Claim& from, Claim& to) {
+  return read(from.device(), limits::kMaxLabel, to.device) && read(from.channel(), limits::kMaxLabel, to.channel) &&
+         read(from.role(), to.role);
+}
+bool read(const pb::Grant& from, Grant& to) noexcept {
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
+         read(from.role(), to.role);
+}
+
+/// Claims, or grants.
+template <class Messages, class Value>
+bool read_claims(const Messages& from, std::vector<Value>& to) {
+  if (from.size() > limits::kMaxClaims) return false;
+  to.resize(static_cast<std::size_t>(from.size()));
+  return std::equal(from.begin(), from.end(), to.begin(),
+                    [](const auto& one, Value& value) { return read(one, value); });
+}
+
 bool read(const pb::Hello& from, Hello& to) {
   to.version_min = from.version_min();
   to.version_max = from.version_max();
-  return to.version_min >= 1 && to.version_min <= to.version_max && read(from.role(), to.role) &&
-         read(from.name(), limits::kMaxName, to.name) && read_features(from.features(), to.features);
+  return read_claims(from.claims(), to.claims) && to.version_min >= 1 && to.version_min <= to.version_max &&
+         read(from.role(), to.role) && read(from.name(), limits::kMaxName, to.name) &&
+         read_features(from.features(), to.features);
 }
 
 void write(const Hello& from, pb::Hello& to) {
@@ -304,6 +450,13 @@ void write(const Hello& from, pb::Hello& to) {
   to.set_role(static_cast<pb::Role>(from.role));
   to.set_name(clip(from.name, limits::kMaxName));
   write_features(from.features, *to.mutable_features());
+  for (const Claim& claim : from.claims) {
+    if (to.claims_size() == limits::kMaxClaims) break;
+    pb::Claim& out = *to.add_claims();
+    out.set_device(clip(claim.device, limits::kMaxLabel));
+    out.set_channel(clip(claim.channel, limits::kMaxLabel));
+    out.set_role(static_cast<pb::Role>(claim.role));
+  }
 }
 
 bool read(const pb::Welcome& from, Welcome& to) {
@@ -312,11 +465,11 @@ bool read(const pb::Welcome& from, Welcome& to) {
   to.position_resolution = from.position_resolution_m();
   to.loop_hz = from.loop_hz();
   to.timeout = std::chrono::milliseconds(from.timeout_ms());
-  return to.version >= 1 && read_features(from.features(), to.features) && read(from.role(), to.role) &&
-         read(from.device_name(), limits::kMaxName, to.device_name) && bounded(to.max_force) && to.max_force >= 0 &&
-         bounded(to.position_resolution) && to.position_resolution >= 0 && to.loop_hz >= 1 &&
-         to.loop_hz <= limits::kMaxLoopHz && to.timeout > Duration::zero() && to.timeout <= limits::kMaxTimeout &&
-         read(from.server(), limits::kMaxName, to.server);
+  return to.version >= 1 && read_claims(from.grants(), to.grants) && read_features(from.features(), to.features) &&
+         read(from.role(), to.role) && read(from.device_name(), limits::kMaxName, to.device_name) &&
+         bounded(to.max_force) && to.max_force >= 0 && bounded(to.position_resolution) && to.position_resolution >= 0 &&
+         to.loop_hz >= 1 && to.loop_hz <= limits::kMaxLoopHz && to.timeout > Duration::zero() &&
+         to.timeout <= limits::kMaxTimeout && read(from.server(), limits::kMaxName, to.server);
 }
 
 void write(const Welcome& from, pb::Welcome& to) {
@@ -330,6 +483,13 @@ void write(const Welcome& from, pb::Welcome& to) {
   to.set_timeout_ms(
       static_cast<std::uint32_t>(std::chrono::duration_cast<std::chrono::milliseconds>(from.timeout).count()));
   to.set_server(clip(from.server, limits::kMaxName));
+  for (const Grant& grant : from.grants) {
+    if (to.grants_size() == limits::kMaxClaims) break;
+    pb::Grant& out = *to.add_grants();
+    out.set_device(grant.device);
+    out.set_channel(grant.channel);
+    out.set_role(static_cast<pb::Role>(grant.role));
+  }
 }
 
 bool read(const pb::Refused& from, Refused& to) {
@@ -438,9 +598,10 @@ DataWriter& DataWriter::operator=(DataWriter&&) noexcept = default;
 template <class Piece>
 bool DataWriter::append(const Piece& piece) {
   const std::size_t size = piece.ByteSizeLong();
-  if (size > buffer_.size() - size_) return false;
+  if (size > buffer_.size() - size_ || frames_ + piece.frames_size() > limits::kMaxFrames) return false;
   piece.SerializeWithCachedSizesToArray(bytes(buffer_.data() + size_));
   size_ += size;
+  frames_ += piece.frames_size();
   return true;
 }
 
@@ -449,6 +610,7 @@ void DataWriter::begin(std::span<std::byte> buffer, const Header& header, LocalT
   buffer_ = buffer;
   put_header(header, buffer_.data());
   size_ = kHeaderSize;
+  frames_ = 0;
 
   pb::Datagram& head = pieces_->head;
   head.set_tx_time_ns(sent.time_since_epoch().count());

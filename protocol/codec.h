@@ -79,6 +79,8 @@ struct ControlAck {
   std::uint32_t id = 0;
   Code code = Code::kOk;
   std::string detail;
+  Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
+  std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
 };
 struct Bye {
   Code code = Code::kOk;
@@ -103,8 +105,8 @@ class DataWriter {
   void begin(std::span<std::byte> buffer, const Header& header, LocalTime sent,
              const std::optional<OutgoingEcho>& echo);
 
-  /// Appends one frame; false when it does not fit any more (then the datagram is as before). A buffer of
-  /// kMaxDatagram − 16 bytes or more, without other frames, holds any frame.
+  /// Appends one frame; false when it does not fit any more, or is the 65th (then the datagram is as before). A buffer
+  /// of kMaxDatagram − 16 bytes or more, without other frames, holds any frame.
   bool add(const DeviceState& state);
   bool add(const ForceCommand& command);
   bool add(const Control& control);
@@ -121,6 +123,7 @@ class DataWriter {
   std::unique_ptr<Pieces> pieces_;
   std::span<std::byte> buffer_;
   std::size_t size_ = 0;
+  int frames_ = 0;
 };
 
 /// What a Data datagram holds.
@@ -177,7 +180,7 @@ struct AnswerDatagram {
   std::span<const std::byte> body;
 };
 
-/// The longest body: of the largest Hello, 674 bytes, and of the largest Welcome, 746, with what suite 1
+/// The longest body: of the largest Hello without claims, 674 bytes, and of the largest Welcome, 874, with what suite 1
 /// adds to them, 56. A reply is never longer than the Hello it answers.
 inline constexpr std::size_t kMaxHandshakeBody = 1000;
 

@@ -52,6 +52,11 @@ ClientHandshake::ClientHandshake(const Config& config, LocalTime now)
       resend_(config.resend),
       body_(write_body(config.hello)),
       next_tick_(now) {
+  constexpr std::size_t kMost = kMaxHandshakeBody - sizeof(KeyId) - kNoiseOverhead;
+  if (body_.size() > kMost) {
+    throw std::invalid_argument("the Hello has " + std::to_string(body_.size()) + " bytes of " + std::to_string(kMost) +
+                                ": claim less, or by shorter names");
+  }
   if (!config.secret) return;
   crypto::start();
   const KeyId id = key_id(config.secret->key);

@@ -49,6 +49,7 @@ class ClientHandshake {
   };
   using Outcome = std::variant<Accepted, Refused>;
 
+  /// Throws std::invalid_argument when the Hello is longer than a datagram holds: too many claims with long names.
   ClientHandshake(const Config& config, LocalTime now);
 
   void receive(LocalTime now, std::span<const std::byte> datagram);

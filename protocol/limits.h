@@ -24,16 +24,26 @@ inline constexpr Duration kMaxTime{std::int64_t{1} << 60};
 /// A force cannot be promised for longer: beyond every peer timeout, the promise is about a dead peer.
 inline constexpr Duration kMaxValidFor = std::chrono::seconds(10);
 
-/// Frames in one datagram. We send at most 2 + 2·16 (state, force, the two request windows); a
-/// 1200-byte datagram could otherwise hold 590 empty ones.
+/// Frames in one datagram. The two request windows and sixteen states or forces are 48; a 1200-byte datagram
+/// could otherwise hold 590 empty ones.
 inline constexpr int kMaxFrames = 64;
 
 /// Requests sent and not yet answered. Both ends keep this many slots, which is what makes the answers
 /// survive loss (see requests.h). A request is a human act; 16 are a burst of clicks.
 inline constexpr std::uint32_t kRequestWindow = 16;
 
-/// Bytes of UTF-8. With these the largest Hello (674 bytes before padding) and the largest Welcome
-/// (746) stay below the 1200 bytes of a datagram, with room to grow.
+/// Devices of one server, numbered from 0: two hands of five fingers, and as much again for tools. Each has a thread.
+inline constexpr std::uint32_t kMaxDevices = 16;
+/// Channels of one device, numbered from 0. Each costs its haptic step a reconstruction.
+inline constexpr std::uint32_t kMaxChannels = 8;
+/// Claims in one Hello.
+inline constexpr int kMaxClaims = 16;
+/// Bytes of the name of a device or a channel.
+inline constexpr std::size_t kMaxLabel = 24;
+
+/// Bytes of UTF-8. With these the largest Hello without claims (674 bytes before padding) and the largest Welcome
+/// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) do not
+/// go with sixteen of the longest features (544): ClientHandshake refuses what is too long.
 inline constexpr std::size_t kMaxName = 64;
 inline constexpr std::size_t kMaxFeature = 32;
 inline constexpr int kMaxFeatures = 16;

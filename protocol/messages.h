@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/channel_rule.h"
 #include "core/mode.h"
 #include "core/motion.h"
 #include "core/remote_force.h"
@@ -23,7 +24,7 @@ inline constexpr std::uint32_t kProtocolVersion = 1;
 
 enum class Role : std::uint8_t {
   kObserver = 1,    ///< sees device states
-  kController = 2,  ///< sees device states and sends forces; one per device
+  kController = 2,  ///< sees device states and sends forces; one per channel
 };
 
 /// Why something was refused or ended. Part of the wire: never renumber.
@@ -39,7 +40,10 @@ enum class Code : std::uint8_t {
   kReplaced = 9,     ///< another program with the same key has taken this place: do not come back unasked
 };
 
-/// Server → client, unreliable, newest wins: the device at one haptic step.
+// Devices of a server and channels of a device are numbered from 0: below limits::kMaxDevices and kMaxChannels. A
+// channel is where one engine's forces come in; the device renders what its channels make together.
+
+/// Server → client, unreliable, newest wins for each device: the device at one haptic step.
 struct DeviceState {
   std::uint64_t tick = 0;             ///< number of the haptic step
   PeerTime sampled{};                 ///< when the position was sampled, server clock
@@ -52,30 +56,105 @@ struct DeviceState {
   std::uint64_t force_sequence = 0;   ///< ForceCommand rendered now; 0 = none
   Duration force_age{};               ///< its age since it arrived; 0 when none
   Mode mode = Mode::kIdle;
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;  ///< of the force that `force_sequence`, `force_age` and `mode` are about
 };
 
-/// Client → server, unreliable, newest wins: the force that the physics engine wants.
+/// Client → server, unreliable, newest wins for each device and channel: the force that the physics engine wants.
 struct ForceCommand {
-  std::uint64_t sequence = 0;       ///< 1, 2, 3 … per session
-  std::uint64_t based_on_tick = 0;  ///< DeviceState::tick it was computed from
+  std::uint64_t sequence = 0;       ///< 1, 2, 3 … per session, device and channel
+  std::uint64_t based_on_tick = 0;  ///< DeviceState::tick of that device that it was computed from
   Vec3 force = Vec3::Zero();        ///< N, on the hand
   std::optional<LocalModel> model;
   Duration valid_for{};  ///< counted from arrival; > 0, at most 10 s; travels in whole µs, rounded up
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
 };
 
-/// Client → server, reliable: how many device states per second this client wants. The server sends
+/// Client → server, reliable: how many states of a device per second this client wants. The server sends
 /// the nearest rate that divides its own, and never more.
 struct SetStateRate {
   std::uint32_t hz = 0;
+  std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: clears a latched fault. Only from the controller.
-struct Rearm {};
+/// Client → server, reliable: clears a latched fault. Only from a controller of the device.
+struct Rearm {
+  std::uint32_t device = 0;
+};
 
-using Request = std::variant<SetStateRate, Rearm>;
+/// Client → server, reliable: what a device is and can do; answered with a DeviceDescription.
+struct Describe {
+  std::uint32_t device = 0;
+};
+
+/// Client → server, reliable: I want to be the one whose forces this channel takes. Only from one that claimed it.
+struct TakeLease {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+};
+
+/// Client → server, reliable: I do not want to be it any more.
+struct GiveLease {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+};
+
+/// Server → client, reliable: you are not it any more.
+struct LeaseLost {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+  std::string to;  ///< name of the one that is; at most 64 bytes
+};
+
+using Request = std::variant<SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost>;
+
+struct ChannelDescription {
+  std::string name;  ///< at most 24 bytes
+  ChannelRule rule = ChannelRule::kSum;
+  /// A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves.
+  Duration lease{};
+  std::string holder;  ///< whose forces it takes; empty = nobody's; cut to 24 bytes
+};
+
+/// What a device is and can do. 0 = not known, where a value cannot be 0.
+struct DeviceDescription {
+  struct Box {
+    Vec3 min = Vec3::Zero();  ///< m
+    Vec3 max = Vec3::Zero();
+  };
+  std::uint32_t device = 0;
+  std::string name;                ///< as the server calls it; at most 24 bytes
+  std::string model;               ///< what it is; at most 64 bytes
+  std::uint32_t position_dof = 3;  ///< axes that are measured, 1 … 6
+  std::uint32_t force_dof = 3;     ///< axes with a motor, 1 … 6
+  std::optional<Box> workspace{};  ///< the handle stays within
+  double max_force = 0;            ///< N, norm of the force the device can give out
+  double continuous_force = 0;     ///< N, … for ever
+  double max_stiffness = 0;        ///< N/m, what it can render stably
+  double position_resolution = 0;  ///< m, one encoder count at the handle; 0 = exact
+  std::uint32_t loop_hz = 0;       ///< haptic steps per second
+  std::vector<ChannelDescription> channels{};
+};
 
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.
 inline constexpr std::string_view kFeatureLocalModel = "local-model";
+/// A feature: the client claims devices and channels by name, and can be told that it has lost a lease.
+inline constexpr std::string_view kFeatureChannels = "channels";
+
+/// What a client wants of a server: a device, and of a controller a channel of it, by their names.
+struct Claim {
+  std::string device;   ///< empty: device 0; at most 24 bytes
+  std::string channel;  ///< empty: channel 0; at most 24 bytes
+  Role role = Role::kObserver;
+};
+
+/// What it gets: the numbers that stand for the names from now on.
+struct Grant {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+  Role role = Role::kObserver;  ///< kObserver to a controller's claim: another one holds the lease, see TakeLease
+};
 
 /// The first words of a client. Sent again with the server's cookie once it has been received.
 struct Hello {
@@ -84,6 +163,8 @@ struct Hello {
   Role role = Role::kObserver;
   std::string name;                   ///< for logs; at most 64 bytes
   std::vector<std::string> features;  ///< offered; the intersection is used. At most 16 of at most 32 bytes
+  /// Each once; at most 16. Empty: device 0, its channel 0, and `role`. Otherwise `role` is the highest among them.
+  std::vector<Claim> claims{};
 };
 
 /// The server's yes.
@@ -97,6 +178,9 @@ struct Welcome {
   std::uint32_t loop_hz = 0;       ///< haptic steps per second
   Duration timeout{};              ///< silence after which the server forgets this client
   std::string server;              ///< name and version of the server
+  /// One for each claim, in their order; device_name … loop_hz are of the first one's device. A server that knows no
+  /// claims grants none: then it is as if there had been none.
+  std::vector<Grant> grants{};
 };
 
 /// The server's no, with the reason.

@@ -71,16 +71,16 @@ std::optional<Control> IncomingRequests::next() {
     Slot& mine = slot(next_++);
     mine.stage = Slot::Stage::kTaken;
     if (mine.control.request) return mine.control;
-    answer(mine.control.id, Code::kUnsupported, "this version does not know that request");
+    answer({mine.control.id, Code::kUnsupported, "this version does not know that request"});
   }
   return {};
 }
 
-void IncomingRequests::answer(std::uint32_t id, Code code, std::string detail) {
-  Slot& mine = slot(id);
-  if (mine.control.id != id || mine.stage != Slot::Stage::kTaken) return;
+void IncomingRequests::answer(ControlAck ack) {
+  Slot& mine = slot(ack.id);
+  if (mine.control.id != ack.id || mine.stage != Slot::Stage::kTaken) return;
   mine.stage = Slot::Stage::kAnswered;
-  mine.answer = {.id = id, .code = code, .detail = std::move(detail)};
+  mine.answer = std::move(ack);
   mine.due = true;
 }
 

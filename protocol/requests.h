@@ -64,7 +64,7 @@ class IncomingRequests {
   /// The next request, exactly once and in order. Those this build does not know are answered here.
   std::optional<Control> next();
   /// Answers a request that `next` returned; any other id is ignored.
-  void answer(std::uint32_t id, Code code, std::string detail);
+  void answer(ControlAck ack);
 
   /// The first answer to be sent now; null when none is.
   const ControlAck* next_due() const noexcept;

@@ -5,6 +5,7 @@
 #include <bit>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "protocol/codec.h"
 #include "protocol/limits.h"
@@ -13,6 +14,67 @@
 #include "protocol/round_trip.h"
 
 namespace tendon {
+namespace {
+
+/// Of each stream, a device's states or a channel's forces, the newest value. Takes memory at a stream's first value
+/// only; their number is bounded by the codec: kMaxDevices, and kMaxDevices · kMaxChannels.
+template <class Value>
+class Newest {
+ public:
+  /// Replaces what was not taken.
+  void put(const Value& value) {
+    Stream& mine = stream(value);
+    waiting_ += mine.waiting ? 0 : 1;
+    mine.value = value;
+    mine.waiting = true;
+  }
+  /// As `put`; false, and nothing is changed, when `number` is not higher than any before in its stream.
+  bool put_if_newer(const Value& value, std::uint64_t number) {
+    Stream& mine = stream(value);
+    if (mine.number && number <= *mine.number) return false;
+    mine.number = number;
+    put(value);
+    return true;
+  }
+
+  bool empty() const noexcept { return waiting_ == 0; }
+
+  /// The value to be taken next, null when there is none; streams come in the order of their first values.
+  const Value* first() const noexcept { return empty() ? nullptr : &next_waiting()->value; }
+  /// Takes it out.
+  Value take() {
+    const auto next = streams_.begin() + (next_waiting() - streams_.cbegin());
+    next->waiting = false;
+    --waiting_;
+    return next->value;
+  }
+
+ private:
+  struct Stream {
+    Value value;
+    bool waiting = false;
+    std::optional<std::uint64_t> number;
+  };
+
+  static bool same(const DeviceState& a, const DeviceState& b) noexcept { return a.device == b.device; }
+  static bool same(const ForceCommand& a, const ForceCommand& b) noexcept {
+    return a.device == b.device && a.channel == b.channel;
+  }
+  typename std::vector<Stream>::const_iterator next_waiting() const noexcept {
+    return std::find_if(streams_.begin(), streams_.end(), [](const Stream& s) { return s.waiting; });
+  }
+  Stream& stream(const Value& value) {
+    const auto found =
+        std::find_if(streams_.begin(), streams_.end(), [&](const Stream& s) { return same(s.value, value); });
+    if (found != streams_.end()) return *found;
+    return streams_.emplace_back(Stream{.value = value, .waiting = false, .number = {}});
+  }
+
+  std::vector<Stream> streams_;
+  std::size_t waiting_ = 0;
+};
+
+}  // namespace
 
 struct Session::State {
   State(const Config& the_config, const SessionKeys* keys, LocalTime the_opening)
@@ -37,8 +99,8 @@ struct Session::State {
   DataWriter writer;
   std::uint64_t next_packet = 0;
   std::optional<LocalTime> last_sent;
-  std::optional<DeviceState> state_to_send;
-  std::optional<ForceCommand> force_to_send;
+  Newest<DeviceState> states_to_send;
+  Newest<ForceCommand> forces_to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -48,16 +110,14 @@ struct Session::State {
   LocalTime last_heard;
   ReplayWindow seen;
   std::optional<OutgoingEcho> echo;
-  std::optional<std::uint64_t> newest_tick;
-  std::optional<std::uint64_t> newest_sequence;
   std::optional<std::uint64_t> newest_echoed;  ///< newest packet of ours that the peer has told of
   IncomingRequests answering;
   RoundTrip round_trip;
   ClockOffsetEstimator peer_clock;
 
   // To tell.
-  std::optional<DeviceState> state_arrived;
-  std::optional<ForceCommand> force_arrived;
+  Newest<DeviceState> states_arrived;
+  Newest<ForceCommand> forces_arrived;
   std::optional<Closed> closed;
 
   Suite suite() const noexcept { return sealer ? Suite::kNoise : Suite::kPlain; }
@@ -67,15 +127,16 @@ struct Session::State {
   void observe(LocalTime now, PeerTime sent, const IncomingEcho& told);
   void count_lost_outgoing(const IncomingEcho& told);
 
-  void take(const DeviceState& state);
-  void take(const ForceCommand& command);
+  void take(const DeviceState& state) { stats.stale += states_arrived.put_if_newer(state, state.tick) ? 0 : 1; }
+  void take(const ForceCommand& force) { stats.stale += forces_arrived.put_if_newer(force, force.sequence) ? 0 : 1; }
   void take(const Control& control) { stats.invalid += answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
   bool something_to_say(LocalTime now) const noexcept {
-    return state_to_send || force_to_send || answering.next_due() || asked.next_due(now) || silent_too_long(now);
+    return !states_to_send.empty() || !forces_to_send.empty() || answering.next_due() || asked.next_due(now) ||
+           silent_too_long(now);
   }
   bool too_old(LocalTime now) const noexcept {
     return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams);
@@ -202,37 +263,23 @@ void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   newest_echoed = told.packet_number;
 }
 
-void Session::State::take(const DeviceState& state) {
-  if (newest_tick && state.tick <= *newest_tick) {
-    ++stats.stale;
-    return;
-  }
-  newest_tick = state.tick;
-  state_arrived = state;
-}
-
-void Session::State::take(const ForceCommand& command) {
-  if (newest_sequence && command.sequence <= *newest_sequence) {
-    ++stats.stale;
-    return;
-  }
-  newest_sequence = command.sequence;
-  force_arrived = command;
-}
-
 void Session::State::take(const Bye& said) {
   open = false;
   closed = Closed{.code = said.code, .reason = said.reason};
 }
 
-void Session::send(const DeviceState& state) { state_->state_to_send = state; }
+void Session::send(const DeviceState& state) { state_->states_to_send.put(state); }
 
-void Session::send(const ForceCommand& command) { state_->force_to_send = command; }
+void Session::send(const ForceCommand& command) { state_->forces_to_send.put(command); }
 
 std::optional<std::uint32_t> Session::request(const Request& request) { return state_->asked.add(request); }
 
-void Session::answer(std::uint32_t id, Code code, std::string detail) {
-  state_->answering.answer(id, code, std::move(detail));
+void Session::answer(std::uint32_t id, Code code, std::string detail, Duration wait) {
+  state_->answering.answer({.id = id, .code = code, .detail = std::move(detail), .wait = wait});
+}
+
+void Session::answer(std::uint32_t id, DeviceDescription device) {
+  state_->answering.answer({.id = id, .code = Code::kOk, .detail = {}, .wait = {}, .device = std::move(device)});
 }
 
 void Session::close(Code code, std::string reason) { state_->close(code, std::move(reason)); }
@@ -280,11 +327,11 @@ std::size_t Session::State::sent(LocalTime now, const Header& header,
   return sealer ? sealer->seal(header, buffer, writer.size()) : writer.size();
 }
 
-/// As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; state
-/// and force always fit together.
+/// As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; a state
+/// and a force always fit together.
 void Session::State::fill(LocalTime now) {
-  if (state_to_send && writer.add(*state_to_send)) state_to_send.reset();
-  if (force_to_send && writer.add(*force_to_send)) force_to_send.reset();
+  while (states_to_send.first() && writer.add(*states_to_send.first())) states_to_send.take();
+  while (forces_to_send.first() && writer.add(*forces_to_send.first())) forces_to_send.take();
   for (const ControlAck* ack = answering.next_due(); ack && writer.add(*ack); ack = answering.next_due()) {
     answering.sent(ack->id);
   }
@@ -313,10 +360,14 @@ std::optional<Session::Event> Session::next_event() {
   State& my = *state_;
   if (const auto control = my.answering.next()) return RequestArrived{.id = control->id, .request = *control->request};
   if (auto ack = my.asked.next_answer()) {
-    return RequestAnswered{.id = ack->id, .code = ack->code, .detail = std::move(ack->detail)};
+    return RequestAnswered{.id = ack->id,
+                           .code = ack->code,
+                           .detail = std::move(ack->detail),
+                           .wait = ack->wait,
+                           .device = std::move(ack->device)};
   }
-  if (my.force_arrived) return ForceArrived{.command = *std::exchange(my.force_arrived, std::nullopt)};
-  if (my.state_arrived) return StateArrived{.state = *std::exchange(my.state_arrived, std::nullopt)};
+  if (!my.forces_arrived.empty()) return ForceArrived{.command = my.forces_arrived.take()};
+  if (!my.states_arrived.empty()) return StateArrived{.state = my.states_arrived.take()};
   if (my.closed) return *std::exchange(my.closed, std::nullopt);
   return {};
 }

@@ -43,15 +43,15 @@ struct LinkStats {
 /// One open conversation between a client and a server, seen from either end: bytes and instants in,
 /// bytes and events out (sans-I/O, pull). It has no socket, clock, thread or randomness of its own.
 ///
-/// * State and force are unreliable and newest-wins: `send` replaces what has not left yet, and a
-///   received one older than the newest is dropped and counted.
+/// * State and force are unreliable and newest-wins, each device and channel by itself: `send` replaces what has
+///   not left yet, and a received one older than the newest is dropped and counted.
 /// * Requests are reliable and in order: resent until answered. Between requests, states and forces no
 ///   order is promised.
 /// * Every datagram carries tx_time and an Echo, so each gives a round trip and an ack vector.
 /// * Silence is filled with keep-alives and, when too long, ends the conversation.
 ///
-/// Nothing queues without a bound: there is room for one state, one force and limits::kRequestWindow
-/// requests each way; an event that was not taken out is replaced by a newer one of its kind.
+/// Nothing queues without a bound: there is room for one state of each device, one force of each channel and
+/// limits::kRequestWindow requests each way; an event that was not taken out is replaced by a newer one of its kind.
 ///
 /// SESSION.md describes the behaviour over time, WIRE.md the bytes.
 ///
@@ -104,6 +104,8 @@ class Session {
     std::uint32_t id;
     Code code;
     std::string detail;
+    Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
+    std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
   };
   struct Closed {
     Code code;  ///< as the peer said Bye: kOk, kShutdown …; kTimedOut: it fell silent; kExpired: too old
@@ -122,7 +124,9 @@ class Session {
   /// sent and their RequestAnswered not yet taken out.
   std::optional<std::uint32_t> request(const Request& request);
   /// Answers a `RequestArrived`. Every request must be answered; an id that waits for none is ignored.
-  void answer(std::uint32_t id, Code code, std::string detail);
+  void answer(std::uint32_t id, Code code, std::string detail, Duration wait = {});
+  /// … a Describe.
+  void answer(std::uint32_t id, DeviceDescription device);
   /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. What was not sent yet is
   /// dropped. No Closed comes: the owner knows.
   void close(Code code, std::string reason);

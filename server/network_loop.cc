@@ -362,6 +362,7 @@ void NetworkLoop::answer(Guest& guest, std::uint32_t id, const Request& request)
                    notice(true, "rearmed by \"" + guest.name + "\"");
                    guest.session.answer(id, Code::kOk, {});
                  },
+                 [&](const auto&) { guest.session.answer(id, Code::kUnsupported, "there is nothing to choose from"); },
              },
              request);
 }

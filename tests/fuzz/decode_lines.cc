@@ -102,8 +102,10 @@ void print(Line& line, const Control& control) {
     line << "unknown";
   } else if (const auto* rate = std::get_if<SetStateRate>(&*control.request)) {
     line << "rate" << rate->hz;
-  } else {
+  } else if (std::holds_alternative<Rearm>(*control.request)) {
     line << "rearm";
+  } else {
+    line << "other";
   }
 }
 

@@ -66,6 +66,8 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   in.force_sequence = *rc::gen::arbitrary<std::uint64_t>();
   in.force_age = std::chrono::abs(any_time());
   in.mode = static_cast<Mode>(*rc::gen::inRange(1, 7));
+  in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -83,6 +85,8 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   RC_ASSERT(out.force_sequence == in.force_sequence);
   RC_ASSERT((out.force_age == in.force_age));
   RC_ASSERT((out.mode == in.mode));
+  RC_ASSERT(out.device == in.device);
+  RC_ASSERT(out.channel == in.channel);
 }
 
 RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
@@ -91,6 +95,8 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   in.based_on_tick = *rc::gen::arbitrary<std::uint64_t>();
   in.force = any_vector();
   in.valid_for = std::chrono::microseconds(*rc::gen::inRange(1, 10'000'001));
+  in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
   const int form = *rc::gen::inRange(0, 4);
   if (form > 0) {
     in.model = LocalModel{.at = any_vector(), .stiffness = any_value() * Mat3::Identity()};
@@ -107,6 +113,8 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   RC_ASSERT(out.based_on_tick == in.based_on_tick);
   RC_ASSERT(out.force == in.force);
   RC_ASSERT((out.valid_for == in.valid_for));
+  RC_ASSERT(out.device == in.device);
+  RC_ASSERT(out.channel == in.channel);
   RC_ASSERT(out.model.has_value() == in.model.has_value());
   if (in.model) {
     RC_ASSERT(out.model->at == in.model->at);
@@ -353,11 +361,90 @@ TEST(Codec, TheFullestHelloAndWelcomeFit) {
                         .position_resolution = 1,
                         .loop_hz = limits::kMaxLoopHz,
                         .timeout = limits::kMaxTimeout,
-                        .server = name};
+                        .server = name,
+                        .grants = std::vector<Grant>(limits::kMaxClaims + 1, {15, 7, Role::kController})};
   const Bytes bytes = examples::answer_datagram(1, welcome);
-  EXPECT_LE(bytes.size(), 746U);  // as limits.h says
+  EXPECT_LE(bytes.size(), 874U);  // as limits.h says
   EXPECT_LE(write_body(welcome).size() + suite_1, kMaxHandshakeBody);
   EXPECT_TRUE(read_answer(decode_answer(bytes)->body).has_value());
+}
+
+TEST(Codec, ClaimsAndGrantsComeOutAsTheyWentIn) {
+  const auto hello = read_hello(write_body(examples::hello_with_claims()));
+  ASSERT_TRUE(hello.has_value());
+  ASSERT_EQ(hello->claims.size(), 2U);
+  EXPECT_EQ(hello->claims[1].device, "right");
+  EXPECT_EQ(hello->claims[1].channel, "tissue");
+  EXPECT_EQ(hello->claims[1].role, Role::kController);
+  const auto answer = read_answer(write_body(Answer(examples::welcome_with_grants())));
+  ASSERT_TRUE(answer.has_value());
+  const auto& grants = std::get<Welcome>(*answer).grants;
+  ASSERT_EQ(grants.size(), 2U);
+  EXPECT_EQ(grants[0].role, Role::kObserver);
+  EXPECT_EQ(grants[1].device, 1U);
+  EXPECT_EQ(grants[1].channel, 1U);
+}
+
+TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
+  const std::string name(limits::kMaxName, 'n');
+  const Vec3 most = Vec3::Constant(limits::kMaxValue);
+  ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
+  answer.device = DeviceDescription{.device = 15,
+                                    .name = name,
+                                    .model = name,
+                                    .workspace = DeviceDescription::Box{-most, most},
+                                    .max_force = 1,
+                                    .continuous_force = 1,
+                                    .max_stiffness = 1,
+                                    .position_resolution = 1,
+                                    .loop_hz = limits::kMaxLoopHz};
+  answer.device->channels.resize(
+      limits::kMaxChannels + 1,
+      {.name = name, .rule = ChannelRule::kPriority, .lease = limits::kMaxTimeout, .holder = name});
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
+               examples::echo());
+  ASSERT_TRUE(writer.add(answer));
+  DataReader reader;
+  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  const auto& device = std::get<ControlAck>(content->frames[0]).device;
+  ASSERT_TRUE(device.has_value());
+  EXPECT_EQ(device->channels.size(), limits::kMaxChannels);
+  EXPECT_EQ(device->name.size(), limits::kMaxLabel);
+}
+
+TEST(Codec, ADeviceOrChannelThatCannotBeIsRefused) {
+  const auto refused = [](const RawProtobuf& frame) {
+    DataReader reader;
+    const DataContent* content = reader.read(datagram_with(frame));
+    return content != nullptr && content->frames.empty() && content->invalid == 1;
+  };
+  const auto lease = [](std::uint64_t device, std::uint64_t channel) {
+    return RawProtobuf().message(
+        3, RawProtobuf().varint(1, 1).message(5, RawProtobuf().varint(1, device).varint(2, channel)));
+  };
+  EXPECT_FALSE(refused(raw_force([](RawProtobuf& f) { f.varint(6, 15).varint(7, 7); })));
+  EXPECT_TRUE(refused(raw_force([](RawProtobuf& f) { f.varint(6, 16); })));
+  EXPECT_TRUE(refused(raw_force([](RawProtobuf& f) { f.varint(7, 8); })));
+  EXPECT_FALSE(refused(lease(15, 7)));
+  EXPECT_TRUE(refused(lease(16, 7)));
+  EXPECT_TRUE(refused(lease(15, 8)));
+  EXPECT_TRUE(refused(RawProtobuf().message(1, RawProtobuf().varint(11, 2).varint(12, 16))));
+  EXPECT_TRUE(refused(RawProtobuf().message(1, RawProtobuf().varint(11, 2).varint(13, 8))));
+}
+
+TEST(Codec, TheSixtyFifthFrameDoesNotFit) {
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(buffer, {}, LocalTime{}, {});
+  const Control small{.id = 1, .request = Rearm{}};
+  for (int i = 0; i < limits::kMaxFrames; ++i) ASSERT_TRUE(writer.add(small));
+  EXPECT_FALSE(writer.add(small));
+  writer.begin(buffer, {}, LocalTime{}, {});
+  EXPECT_TRUE(writer.add(small)) << "the next datagram is empty again";
 }
 
 TEST(Codec, AHelloWithAnythingInItsPaddingIsRefused) {

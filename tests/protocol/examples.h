@@ -68,6 +68,67 @@ inline Welcome welcome() {
           .server = "tendond"};
 }
 
+// A server with two devices; the second has two channels.
+
+/// Looks at the first device, and wants the channel "tissue" of the second.
+inline Hello hello_with_claims() {
+  Hello hello = examples::hello();
+  hello.features.emplace_back(kFeatureChannels);
+  hello.claims = {{.device = {}, .channel = {}, .role = Role::kObserver},
+                  {.device = "right", .channel = "tissue", .role = Role::kController}};
+  return hello;
+}
+
+inline Welcome welcome_with_grants() {
+  Welcome welcome = examples::welcome();
+  welcome.features.emplace_back(kFeatureChannels);
+  welcome.grants = {{.device = 0, .channel = 0, .role = Role::kObserver},
+                    {.device = 1, .channel = 1, .role = Role::kController}};
+  return welcome;
+}
+
+inline DeviceState state_of_the_second_device() {
+  DeviceState second = state();
+  second.tick = 2000;
+  second.device = 1;
+  second.channel = 1;
+  return second;
+}
+
+inline ForceCommand force_to_a_channel() {
+  ForceCommand command = force();
+  command.model.reset();
+  command.device = 1;
+  command.channel = 1;
+  return command;
+}
+
+inline DeviceDescription description() {
+  return {.device = 1,
+          .name = "right",
+          .model = "simulated",
+          .position_dof = 3,
+          .force_dof = 3,
+          .workspace = DeviceDescription::Box{.min = {-0.08, -0.06, -0.035}, .max = {0.08, 0.06, 0.035}},
+          .max_force = 8,
+          .continuous_force = 1.75,
+          .max_stiffness = 2000,
+          .position_resolution = 0.000055,
+          .loop_hz = 1000,
+          .channels = {{.name = "guidance", .rule = ChannelRule::kSum, .lease = {}, .holder = {}},
+                       {.name = "tissue",
+                        .rule = ChannelRule::kPriority,
+                        .lease = std::chrono::milliseconds(500),
+                        .holder = "wall"}}};
+}
+
+inline ControlAck described(std::uint32_t id) {
+  return {.id = id, .code = Code::kOk, .detail = {}, .wait = {}, .device = description()};
+}
+inline ControlAck busy(std::uint32_t id) {
+  return {.id = id, .code = Code::kBusy, .detail = "\"wall\" holds it", .wait = std::chrono::milliseconds(180)};
+}
+
 inline Refused refused() {
   return {.code = Code::kBusy, .detail = "one controller", .version_min = 1, .version_max = 1};
 }
@@ -125,6 +186,19 @@ inline std::vector<Named> datagrams() {
       {"control", data(44, {}, control)},
       {"control-ack", data(45, {}, ack)},
       {"bye", data(46, {}, bye)},
+      {"hello-claims", hello_datagram(hello_with_claims())},
+      {"welcome-grants", answer_datagram(kConnection, welcome_with_grants())},
+      {"states", data(47, {}, state(), state_of_the_second_device())},
+      {"force-channel", data(48, {}, force_to_a_channel())},
+      {"control-rate-device", data(49, {}, Control{.id = 8, .request = SetStateRate{.hz = 250, .device = 1}})},
+      {"control-rearm-device", data(50, {}, Control{.id = 9, .request = Rearm{.device = 1}})},
+      {"control-describe", data(51, {}, Control{.id = 10, .request = Describe{.device = 1}})},
+      {"control-ack-description", data(52, {}, described(10))},
+      {"control-take-lease", data(53, {}, Control{.id = 11, .request = TakeLease{.device = 1, .channel = 1}})},
+      {"control-ack-busy", data(54, {}, busy(11))},
+      {"control-give-lease", data(55, {}, Control{.id = 12, .request = GiveLease{.device = 1, .channel = 1}})},
+      {"control-lease-lost",
+       data(56, {}, Control{.id = 1, .request = LeaseLost{.device = 1, .channel = 1, .to = "wall"}})},
   };
 }
 

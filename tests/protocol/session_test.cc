@@ -106,6 +106,49 @@ TEST_F(TwoEnds, WhatWasNotTakenOutYetIsReplacedByTheNewer) {
   EXPECT_EQ(events(a_).size(), 1U);
 }
 
+TEST_F(TwoEnds, TheNewestWinsForEachDeviceAndChannelByItself) {
+  const auto to = [](std::uint64_t sequence, std::uint32_t device, std::uint32_t channel) {
+    ForceCommand command = force(sequence);
+    command.device = device;
+    command.channel = channel;
+    return command;
+  };
+  a_.send(to(5, 0, 0));
+  a_.send(to(3, 1, 0));
+  a_.send(to(2, 0, 1));
+  a_.send(to(6, 0, 0));
+  deliver(z_, now_, pull(a_, now_));
+  a_.send(to(4, 1, 0));
+  a_.send(to(2, 0, 1));
+  deliver(z_, now_, pull(a_, now_));
+  std::vector<std::array<std::uint64_t, 3>> arrived;
+  for (const auto& event : events(z_)) {
+    const ForceCommand& command = std::get<Session::ForceArrived>(event).command;
+    arrived.push_back({command.sequence, command.device, command.channel});
+  }
+  EXPECT_EQ(arrived, (std::vector<std::array<std::uint64_t, 3>>{{6, 0, 0}, {4, 1, 0}, {2, 0, 1}}));
+  EXPECT_EQ(z_.stats().stale, 1U) << "2 came twice to device 0, channel 1";
+}
+
+TEST_F(TwoEnds, StatesOfSixteenDevicesShareThreeDatagrams) {
+  for (std::uint32_t device = 0; device < limits::kMaxDevices; ++device) {
+    DeviceState full = examples::state();
+    full.tick = std::uint64_t{1} << 40;
+    full.position = full.velocity = full.force_applied = Vec3(0.1, 0.2, 0.3);
+    full.force_sequence = full.tick;
+    full.device = device;
+    z_.send(full);
+  }
+  const auto datagrams = pull(z_, now_);
+  EXPECT_EQ(datagrams.size(), 3U);
+  deliver(a_, now_, datagrams);
+  const auto told = events(a_);
+  ASSERT_EQ(told.size(), limits::kMaxDevices);
+  for (std::uint32_t device = 0; device < limits::kMaxDevices; ++device) {
+    EXPECT_EQ(std::get<Session::StateArrived>(told[device]).state.device, device);
+  }
+}
+
 TEST_F(TwoEnds, AnOlderForceOrStateThatComesLateIsDroppedAndCounted) {
   a_.send(force(1));
   const auto old_force = pull(a_, now_);
@@ -214,6 +257,23 @@ TEST_F(TwoEnds, AnAnswerThatWasLostIsGivenAgainWhenTheRequestComesAgain) {
   EXPECT_EQ(answered.id, *id);
   EXPECT_EQ(answered.code, Code::kDenied);
   EXPECT_EQ(answered.detail, "only from the controller");
+}
+
+TEST_F(TwoEnds, AnAnswerBringsADeviceOrHowLongToWait) {
+  const auto describe = a_.request(Describe{.device = 1});
+  const auto take = a_.request(TakeLease{.device = 1, .channel = 1});
+  deliver(z_, now_, pull(a_, now_));
+  ASSERT_EQ(events(z_).size(), 2U);
+  z_.answer(*describe, examples::description());
+  z_.answer(*take, Code::kBusy, "somebody", milliseconds(180) - Duration(1));
+  deliver(a_, now_, pull(z_, now_));
+  const auto told = events(a_);
+  ASSERT_EQ(told.size(), 2U);
+  const auto& described = std::get<Session::RequestAnswered>(told[0]);
+  EXPECT_EQ(described.code, Code::kOk);
+  ASSERT_TRUE(described.device.has_value());
+  EXPECT_EQ(described.device->channels.at(1).name, "tissue");
+  EXPECT_EQ(std::get<Session::RequestAnswered>(told[1]).wait, milliseconds(180));
 }
 
 TEST_F(TwoEnds, RequestsThatOvertakeEachOtherAreDeliveredInOrder) {

@@ -131,6 +131,9 @@ std::vector<Shown> shown(std::uint64_t far) {
   const Control rate{.id = 7, .request = SetStateRate{.hz = 500}};
   const Control rearm{.id = 8, .request = Rearm{}};
   const ControlAck ack{.id = 7, .code = Code::kOk, .detail = "500 Hz"};
+  const auto request = [&](std::uint64_t packet_number, std::uint32_t id, const Request& what) {
+    return at(packet_number, Control{.id = id, .request = what});
+  };
   const Bye bye{.code = Code::kShutdown, .reason = "SIGTERM"};
   return {
       {"keep-alive from the client", true, 0, 0, at(0)},
@@ -140,6 +143,16 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"force at packet number 255", true, 255, 0, at(255, examples::force())},
       {"state rate", true, 256, 0, at(256, rate)},
       {"rearm and a force in one datagram", true, 257, 0, at(257, examples::force(), rearm)},
+      {"states of two devices", false, 2, 0, at(2, examples::state(), examples::state_of_the_second_device())},
+      {"force to a channel", true, 258, 0, at(258, examples::force_to_a_channel())},
+      {"state rate of a device", true, 259, 0, request(259, 9, SetStateRate{.hz = 250, .device = 1})},
+      {"rearm a device", true, 260, 0, request(260, 10, Rearm{.device = 1})},
+      {"describe", true, 261, 0, request(261, 11, Describe{.device = 1})},
+      {"description", false, 3, 0, at(3, examples::described(11))},
+      {"take a lease", true, 262, 0, request(262, 12, TakeLease{.device = 1, .channel = 1})},
+      {"another one holds it", false, 4, 0, at(4, examples::busy(12))},
+      {"give a lease", true, 263, 0, request(263, 13, GiveLease{.device = 1, .channel = 1})},
+      {"a lease is lost", false, 5, 0, request(5, 1, LeaseLost{.device = 1, .channel = 1, .to = "wall"})},
       {"answer to a request", false, 258, 0, at(258, ack)},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
@@ -158,6 +171,8 @@ std::string plain_file() {
   const Bytes hello = write_body(examples::hello());
   const Bytes welcome = write_body(Answer(examples::welcome()));
   const Bytes refused = write_body(Answer(examples::refused()));
+  const Bytes claims = write_body(examples::hello_with_claims());
+  const Bytes grants = write_body(Answer(examples::welcome_with_grants()));
   const auto datagrams = examples::datagrams();
   std::vector<std::string> data;
   for (const Shown& d : shown(std::uint64_t{1} << 32)) {
@@ -192,6 +207,18 @@ std::string plain_file() {
                                   .bytes("body", refused)
                                   .bytes("datagram", datagrams[3].bytes)
                                   .str())
+             .json("hello_with_claims", Object()
+                                            .json("message", meaning<v1::Hello>(claims))
+                                            .bytes("body", claims)
+                                            .bytes("datagram", examples::hello_datagram(examples::hello_with_claims()))
+                                            .str())
+             .json("welcome_with_grants",
+                   Object()
+                       .json("message", meaning<v1::Answer>(grants))
+                       .bytes("body", grants)
+                       .bytes("datagram",
+                              examples::answer_datagram(examples::kConnection, examples::welcome_with_grants()))
+                       .str())
              .json("data", list(data))
              .str() +
          "\n";

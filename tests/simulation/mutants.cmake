@@ -47,7 +47,7 @@ tendon_mutant(wrong-clock SOURCE protocol/session.cc LIBRARY tendon_protocol
   ORACLES "round-trip")
 # An older force replaces a newer one.
 tendon_mutant(older-force SOURCE protocol/session.cc LIBRARY tendon_protocol
-  REPLACE "command.sequence <= *newest_sequence" "command.sequence == *newest_sequence"
+  REPLACE "number <= *mine.number" "number == *mine.number"
   ORACLES "newest")
 # Who was refused or lost never comes back.
 tendon_mutant(no-return SOURCE clients/cpp/force_client.cc LIBRARY tendon_client

@@ -5,6 +5,9 @@ from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Mapping, Optional as _Optional, Union as _Union
 
+CHANNEL_RULE_PRIORITY: ChannelRule
+CHANNEL_RULE_SUM: ChannelRule
+CHANNEL_RULE_UNSPECIFIED: ChannelRule
 CODE_BUSY: Code
 CODE_DENIED: Code
 CODE_EXPIRED: Code
@@ -43,25 +46,59 @@ class Bye(_message.Message):
     reason: str
     def __init__(self, code: _Optional[_Union[Code, str]] = ..., reason: _Optional[str] = ...) -> None: ...
 
+class ChannelDescription(_message.Message):
+    __slots__ = ["holder", "lease_ms", "name", "rule"]
+    HOLDER_FIELD_NUMBER: _ClassVar[int]
+    LEASE_MS_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    RULE_FIELD_NUMBER: _ClassVar[int]
+    holder: str
+    lease_ms: int
+    name: str
+    rule: ChannelRule
+    def __init__(self, name: _Optional[str] = ..., rule: _Optional[_Union[ChannelRule, str]] = ..., lease_ms: _Optional[int] = ..., holder: _Optional[str] = ...) -> None: ...
+
+class Claim(_message.Message):
+    __slots__ = ["channel", "device", "role"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    channel: str
+    device: str
+    role: Role
+    def __init__(self, device: _Optional[str] = ..., channel: _Optional[str] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
+
 class Control(_message.Message):
-    __slots__ = ["id", "rearm", "set_state_rate"]
+    __slots__ = ["describe", "give_lease", "id", "lease_lost", "rearm", "set_state_rate", "take_lease"]
+    DESCRIBE_FIELD_NUMBER: _ClassVar[int]
+    GIVE_LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
+    LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
     REARM_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
+    TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
+    describe: Describe
+    give_lease: GiveLease
     id: int
+    lease_lost: LeaseLost
     rearm: Rearm
     set_state_rate: SetStateRate
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ...) -> None: ...
+    take_lease: TakeLease
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
-    __slots__ = ["code", "detail", "id"]
+    __slots__ = ["code", "detail", "device", "id", "wait_ms"]
     CODE_FIELD_NUMBER: _ClassVar[int]
     DETAIL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
+    WAIT_MS_FIELD_NUMBER: _ClassVar[int]
     code: Code
     detail: str
+    device: DeviceDescription
     id: int
-    def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ...) -> None: ...
+    wait_ms: int
+    def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., wait_ms: _Optional[int] = ..., device: _Optional[_Union[DeviceDescription, _Mapping]] = ...) -> None: ...
 
 class Datagram(_message.Message):
     __slots__ = ["echo", "frames", "tx_time_ns"]
@@ -73,8 +110,46 @@ class Datagram(_message.Message):
     tx_time_ns: int
     def __init__(self, tx_time_ns: _Optional[int] = ..., echo: _Optional[_Union[Echo, _Mapping]] = ..., frames: _Optional[_Iterable[_Union[Frame, _Mapping]]] = ...) -> None: ...
 
+class Describe(_message.Message):
+    __slots__ = ["device"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    def __init__(self, device: _Optional[int] = ...) -> None: ...
+
+class DeviceDescription(_message.Message):
+    __slots__ = ["channels", "continuous_force_n", "device", "force_dof", "loop_hz", "max_force_n", "max_stiffness_npm", "model", "name", "position_dof", "position_resolution_m", "workspace_max_m", "workspace_min_m"]
+    CHANNELS_FIELD_NUMBER: _ClassVar[int]
+    CONTINUOUS_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    FORCE_DOF_FIELD_NUMBER: _ClassVar[int]
+    LOOP_HZ_FIELD_NUMBER: _ClassVar[int]
+    MAX_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    MAX_STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    MODEL_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    POSITION_DOF_FIELD_NUMBER: _ClassVar[int]
+    POSITION_RESOLUTION_M_FIELD_NUMBER: _ClassVar[int]
+    WORKSPACE_MAX_M_FIELD_NUMBER: _ClassVar[int]
+    WORKSPACE_MIN_M_FIELD_NUMBER: _ClassVar[int]
+    channels: _containers.RepeatedCompositeFieldContainer[ChannelDescription]
+    continuous_force_n: float
+    device: int
+    force_dof: int
+    loop_hz: int
+    max_force_n: float
+    max_stiffness_npm: float
+    model: str
+    name: str
+    position_dof: int
+    position_resolution_m: float
+    workspace_max_m: Vec3
+    workspace_min_m: Vec3
+    def __init__(self, device: _Optional[int] = ..., name: _Optional[str] = ..., model: _Optional[str] = ..., position_dof: _Optional[int] = ..., force_dof: _Optional[int] = ..., workspace_min_m: _Optional[_Union[Vec3, _Mapping]] = ..., workspace_max_m: _Optional[_Union[Vec3, _Mapping]] = ..., max_force_n: _Optional[float] = ..., continuous_force_n: _Optional[float] = ..., max_stiffness_npm: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., channels: _Optional[_Iterable[_Union[ChannelDescription, _Mapping]]] = ...) -> None: ...
+
 class DeviceState(_message.Message):
-    __slots__ = ["energy_j", "force_age_ns", "force_applied_n", "force_sequence", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    __slots__ = ["channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
     ENERGY_J_FIELD_NUMBER: _ClassVar[int]
     FORCE_AGE_NS_FIELD_NUMBER: _ClassVar[int]
     FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
@@ -86,6 +161,8 @@ class DeviceState(_message.Message):
     SAMPLED_NS_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
     energy_j: float
     force_age_ns: int
     force_applied_n: Vec3
@@ -97,7 +174,7 @@ class DeviceState(_message.Message):
     sampled_ns: int
     tick: int
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
 
 class Echo(_message.Message):
     __slots__ = ["peer_packet_number", "peer_tx_time_ns", "received_mask", "rx_time_ns"]
@@ -112,18 +189,22 @@ class Echo(_message.Message):
     def __init__(self, peer_tx_time_ns: _Optional[int] = ..., rx_time_ns: _Optional[int] = ..., peer_packet_number: _Optional[int] = ..., received_mask: _Optional[int] = ...) -> None: ...
 
 class ForceCommand(_message.Message):
-    __slots__ = ["based_on_tick", "force_n", "model", "sequence", "valid_for_us"]
+    __slots__ = ["based_on_tick", "channel", "device", "force_n", "model", "sequence", "valid_for_us"]
     BASED_ON_TICK_FIELD_NUMBER: _ClassVar[int]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
     FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MODEL_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     VALID_FOR_US_FIELD_NUMBER: _ClassVar[int]
     based_on_tick: int
+    channel: int
+    device: int
     force_n: Vec3
     model: LocalModel
     sequence: int
     valid_for_us: int
-    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ...) -> None: ...
+    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
 
 class Frame(_message.Message):
     __slots__ = ["bye", "control", "control_ack", "force", "state"]
@@ -139,19 +220,49 @@ class Frame(_message.Message):
     state: DeviceState
     def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
 
+class GiveLease(_message.Message):
+    __slots__ = ["channel", "device"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
+
+class Grant(_message.Message):
+    __slots__ = ["channel", "device", "role"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    role: Role
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
+
 class Hello(_message.Message):
-    __slots__ = ["features", "name", "role", "version_max", "version_min"]
+    __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]
+    CLAIMS_FIELD_NUMBER: _ClassVar[int]
     FEATURES_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
     ROLE_FIELD_NUMBER: _ClassVar[int]
     VERSION_MAX_FIELD_NUMBER: _ClassVar[int]
     VERSION_MIN_FIELD_NUMBER: _ClassVar[int]
+    claims: _containers.RepeatedCompositeFieldContainer[Claim]
     features: _containers.RepeatedScalarFieldContainer[str]
     name: str
     role: Role
     version_max: int
     version_min: int
-    def __init__(self, version_min: _Optional[int] = ..., version_max: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ..., name: _Optional[str] = ..., features: _Optional[_Iterable[str]] = ...) -> None: ...
+    def __init__(self, version_min: _Optional[int] = ..., version_max: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ..., name: _Optional[str] = ..., features: _Optional[_Iterable[str]] = ..., claims: _Optional[_Iterable[_Union[Claim, _Mapping]]] = ...) -> None: ...
+
+class LeaseLost(_message.Message):
+    __slots__ = ["channel", "device", "to"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    TO_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    to: str
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., to: _Optional[str] = ...) -> None: ...
 
 class LocalModel(_message.Message):
     __slots__ = ["at_m", "stiffness_npm"]
@@ -162,8 +273,10 @@ class LocalModel(_message.Message):
     def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Rearm(_message.Message):
-    __slots__ = []
-    def __init__(self) -> None: ...
+    __slots__ = ["device"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    def __init__(self, device: _Optional[int] = ...) -> None: ...
 
 class Refused(_message.Message):
     __slots__ = ["code", "detail", "version_max", "version_min"]
@@ -178,10 +291,20 @@ class Refused(_message.Message):
     def __init__(self, code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., version_min: _Optional[int] = ..., version_max: _Optional[int] = ...) -> None: ...
 
 class SetStateRate(_message.Message):
-    __slots__ = ["hz"]
+    __slots__ = ["device", "hz"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
     HZ_FIELD_NUMBER: _ClassVar[int]
+    device: int
     hz: int
-    def __init__(self, hz: _Optional[int] = ...) -> None: ...
+    def __init__(self, hz: _Optional[int] = ..., device: _Optional[int] = ...) -> None: ...
+
+class TakeLease(_message.Message):
+    __slots__ = ["channel", "device"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
 
 class Vec3(_message.Message):
     __slots__ = ["x", "y", "z"]
@@ -194,9 +317,10 @@ class Vec3(_message.Message):
     def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
 
 class Welcome(_message.Message):
-    __slots__ = ["device_name", "features", "loop_hz", "max_force_n", "position_resolution_m", "role", "server", "timeout_ms", "version"]
+    __slots__ = ["device_name", "features", "grants", "loop_hz", "max_force_n", "position_resolution_m", "role", "server", "timeout_ms", "version"]
     DEVICE_NAME_FIELD_NUMBER: _ClassVar[int]
     FEATURES_FIELD_NUMBER: _ClassVar[int]
+    GRANTS_FIELD_NUMBER: _ClassVar[int]
     LOOP_HZ_FIELD_NUMBER: _ClassVar[int]
     MAX_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     POSITION_RESOLUTION_M_FIELD_NUMBER: _ClassVar[int]
@@ -206,6 +330,7 @@ class Welcome(_message.Message):
     VERSION_FIELD_NUMBER: _ClassVar[int]
     device_name: str
     features: _containers.RepeatedScalarFieldContainer[str]
+    grants: _containers.RepeatedCompositeFieldContainer[Grant]
     loop_hz: int
     max_force_n: float
     position_resolution_m: float
@@ -213,9 +338,12 @@ class Welcome(_message.Message):
     server: str
     timeout_ms: int
     version: int
-    def __init__(self, version: _Optional[int] = ..., features: _Optional[_Iterable[str]] = ..., role: _Optional[_Union[Role, str]] = ..., device_name: _Optional[str] = ..., max_force_n: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., timeout_ms: _Optional[int] = ..., server: _Optional[str] = ...) -> None: ...
+    def __init__(self, version: _Optional[int] = ..., features: _Optional[_Iterable[str]] = ..., role: _Optional[_Union[Role, str]] = ..., device_name: _Optional[str] = ..., max_force_n: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., timeout_ms: _Optional[int] = ..., server: _Optional[str] = ..., grants: _Optional[_Iterable[_Union[Grant, _Mapping]]] = ...) -> None: ...
 
 class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class ChannelRule(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class Code(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLWAQoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAQgYKBGJvZHkiJwoEVmVjMxIJCgF4GAEgASgBEgkKAXkYAiABKAESCQoBehgDIAEoASKwAgoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUilQEKDEZvcmNlQ29tbWFuZBIQCghzZXF1ZW5jZRgBIAEoBBIVCg1iYXNlZF9vbl90aWNrGAIgASgEEiAKB2ZvcmNlX24YAyABKAsyDy50ZW5kb24udjEuVmVjMxIkCgVtb2RlbBgEIAEoCzIVLnRlbmRvbi52MS5Mb2NhbE1vZGVsEhQKDHZhbGlkX2Zvcl91cxgFIAEoDSJGCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQASJxCgdDb250cm9sEgoKAmlkGAEgASgNEjEKDnNldF9zdGF0ZV9yYXRlGAIgASgLMhcudGVuZG9uLnYxLlNldFN0YXRlUmF0ZUgAEiEKBXJlYXJtGAMgASgLMhAudGVuZG9uLnYxLlJlYXJtSABCBAoCb3AiGgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNIgcKBVJlYXJtIkcKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSJwCgVIZWxsbxITCgt2ZXJzaW9uX21pbhgBIAEoDRITCgt2ZXJzaW9uX21heBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSDAoEbmFtZRgEIAEoCRIQCghmZWF0dXJlcxgFIAMoCSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLJAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLWAQoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAQgYKBGJvZHkiJwoEVmVjMxIJCgF4GAEgASgBEgkKAXkYAiABKAESCQoBehgDIAEoASLRAgoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0itgEKDEZvcmNlQ29tbWFuZBIQCghzZXF1ZW5jZRgBIAEoBBIVCg1iYXNlZF9vbl90aWNrGAIgASgEEiAKB2ZvcmNlX24YAyABKAsyDy50ZW5kb24udjEuVmVjMxIkCgVtb2RlbBgEIAEoCzIVLnRlbmRvbi52MS5Mb2NhbE1vZGVsEhQKDHZhbGlkX2Zvcl91cxgFIAEoDRIOCgZkZXZpY2UYBiABKA0SDwoHY2hhbm5lbBgHIAEoDSJGCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQASKeAgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGgoIRGVzY3JpYmUSDgoGZGV2aWNlGAEgASgNIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIoYBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -97,7 +97,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
    */
   body: {
     /**
-     * server → client, unreliable, newest tick wins
+     * server → client, unreliable, of each device the newest tick wins
      *
      * @generated from field: tendon.v1.DeviceState state = 1;
      */
@@ -105,7 +105,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "state";
   } | {
     /**
-     * client → server, unreliable, newest sequence wins
+     * client → server, unreliable, of each device and channel the newest sequence wins
      *
      * @generated from field: tendon.v1.ForceCommand force = 2;
      */
@@ -113,7 +113,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "force";
   } | {
     /**
-     * client → server, reliable, in order
+     * either way, reliable, in order
      *
      * @generated from field: tendon.v1.Control control = 3;
      */
@@ -121,7 +121,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "control";
   } | {
     /**
-     * server → client, the answer to a Control
+     * the answer to a Control
      *
      * @generated from field: tendon.v1.ControlAck control_ack = 4;
      */
@@ -173,7 +173,7 @@ export const Vec3Schema: GenMessage<Vec3> = /*@__PURE__*/
   messageDesc(file_tendon, 3);
 
 /**
- * The device at one haptic step.
+ * A device at one haptic step.
  *
  * @generated from message tendon.v1.DeviceState
  */
@@ -248,6 +248,20 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
    * @generated from field: tendon.v1.Mode mode = 11;
    */
   mode: Mode;
+
+  /**
+   * ≤ 15
+   *
+   * @generated from field: uint32 device = 12;
+   */
+  device: number;
+
+  /**
+   * ≤ 7; of the force that force_sequence, force_age_ns and mode are about
+   *
+   * @generated from field: uint32 channel = 13;
+   */
+  channel: number;
 };
 
 /**
@@ -264,14 +278,14 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
  */
 export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   /**
-   * 1, 2, 3 … per session; 0 is refused
+   * 1, 2, 3 … per session, device and channel; 0 is refused
    *
    * @generated from field: uint64 sequence = 1;
    */
   sequence: bigint;
 
   /**
-   * DeviceState.tick it was computed from: the loop's true age needs no clock
+   * DeviceState.tick of that device it was computed from: the loop's true age needs no clock
    *
    * @generated from field: uint64 based_on_tick = 2;
    */
@@ -297,6 +311,20 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
    * @generated from field: uint32 valid_for_us = 5;
    */
   validForUs: number;
+
+  /**
+   * ≤ 15
+   *
+   * @generated from field: uint32 device = 6;
+   */
+  device: number;
+
+  /**
+   * ≤ 7
+   *
+   * @generated from field: uint32 channel = 7;
+   */
+  channel: number;
 };
 
 /**
@@ -339,7 +367,7 @@ export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
  */
 export type Control = Message<"tendon.v1.Control"> & {
   /**
-   * 1, 2, 3 … per session; at most 16 unanswered
+   * 1, 2, 3 … per session and direction; at most 16 unanswered
    *
    * @generated from field: uint32 id = 1;
    */
@@ -352,6 +380,8 @@ export type Control = Message<"tendon.v1.Control"> & {
    */
   op: {
     /**
+     * client → server
+     *
      * @generated from field: tendon.v1.SetStateRate set_state_rate = 2;
      */
     value: SetStateRate;
@@ -362,6 +392,32 @@ export type Control = Message<"tendon.v1.Control"> & {
      */
     value: Rearm;
     case: "rearm";
+  } | {
+    /**
+     * @generated from field: tendon.v1.Describe describe = 4;
+     */
+    value: Describe;
+    case: "describe";
+  } | {
+    /**
+     * @generated from field: tendon.v1.TakeLease take_lease = 5;
+     */
+    value: TakeLease;
+    case: "takeLease";
+  } | {
+    /**
+     * @generated from field: tendon.v1.GiveLease give_lease = 6;
+     */
+    value: GiveLease;
+    case: "giveLease";
+  } | {
+    /**
+     * server → client
+     *
+     * @generated from field: tendon.v1.LeaseLost lease_lost = 7;
+     */
+    value: LeaseLost;
+    case: "leaseLost";
   } | { case: undefined; value?: undefined };
 };
 
@@ -373,7 +429,7 @@ export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
   messageDesc(file_tendon, 7);
 
 /**
- * How many device states per second the client wants.
+ * How many states of a device per second the client wants.
  *
  * @generated from message tendon.v1.SetStateRate
  */
@@ -382,6 +438,11 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
    * @generated from field: uint32 hz = 1;
    */
   hz: number;
+
+  /**
+   * @generated from field: uint32 device = 2;
+   */
+  device: number;
 };
 
 /**
@@ -392,11 +453,15 @@ export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
   messageDesc(file_tendon, 8);
 
 /**
- * Clears a latched fault. Only from the controller.
+ * Clears a latched fault. Only from a controller of the device.
  *
  * @generated from message tendon.v1.Rearm
  */
 export type Rearm = Message<"tendon.v1.Rearm"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
 };
 
 /**
@@ -405,6 +470,105 @@ export type Rearm = Message<"tendon.v1.Rearm"> & {
  */
 export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
   messageDesc(file_tendon, 9);
+
+/**
+ * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
+ *
+ * @generated from message tendon.v1.Describe
+ */
+export type Describe = Message<"tendon.v1.Describe"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+};
+
+/**
+ * Describes the message tendon.v1.Describe.
+ * Use `create(DescribeSchema)` to create a new message.
+ */
+export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
+  messageDesc(file_tendon, 10);
+
+/**
+ * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
+ * from now on. CODE_BUSY: another one is; wait_ms says for how much longer its lease lasts unless renewed.
+ *
+ * @generated from message tendon.v1.TakeLease
+ */
+export type TakeLease = Message<"tendon.v1.TakeLease"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+};
+
+/**
+ * Describes the message tendon.v1.TakeLease.
+ * Use `create(TakeLeaseSchema)` to create a new message.
+ */
+export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
+  messageDesc(file_tendon, 11);
+
+/**
+ * I do not want to be it any more.
+ *
+ * @generated from message tendon.v1.GiveLease
+ */
+export type GiveLease = Message<"tendon.v1.GiveLease"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+};
+
+/**
+ * Describes the message tendon.v1.GiveLease.
+ * Use `create(GiveLeaseSchema)` to create a new message.
+ */
+export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
+  messageDesc(file_tendon, 12);
+
+/**
+ * You are not it any more. Only to a client that named the feature "channels".
+ *
+ * @generated from message tendon.v1.LeaseLost
+ */
+export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * name of the one that is; at most 64 bytes
+   *
+   * @generated from field: string to = 3;
+   */
+  to: string;
+};
+
+/**
+ * Describes the message tendon.v1.LeaseLost.
+ * Use `create(LeaseLostSchema)` to create a new message.
+ */
+export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
+  messageDesc(file_tendon, 13);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -428,6 +592,20 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
    * @generated from field: string detail = 3;
    */
   detail: string;
+
+  /**
+   * with CODE_BUSY of TakeLease: ms; 0 = nobody knows. At most 3 600 000
+   *
+   * @generated from field: uint32 wait_ms = 4;
+   */
+  waitMs: number;
+
+  /**
+   * with CODE_OK of Describe
+   *
+   * @generated from field: tendon.v1.DeviceDescription device = 5;
+   */
+  device?: DeviceDescription | undefined;
 };
 
 /**
@@ -435,7 +613,146 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 10);
+  messageDesc(file_tendon, 14);
+
+/**
+ * What a device is and can do.
+ *
+ * @generated from message tendon.v1.DeviceDescription
+ */
+export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * as the server calls it; at most 24 bytes
+   *
+   * @generated from field: string name = 2;
+   */
+  name: string;
+
+  /**
+   * what it is; at most 64 bytes
+   *
+   * @generated from field: string model = 3;
+   */
+  model: string;
+
+  /**
+   * axes that are measured …
+   *
+   * @generated from field: uint32 position_dof = 4;
+   */
+  positionDof: number;
+
+  /**
+   * … and those with a motor; 1 … 6 each
+   *
+   * @generated from field: uint32 force_dof = 5;
+   */
+  forceDof: number;
+
+  /**
+   * a box that the handle stays in; both absent: not known
+   *
+   * @generated from field: tendon.v1.Vec3 workspace_min_m = 6;
+   */
+  workspaceMinM?: Vec3 | undefined;
+
+  /**
+   * @generated from field: tendon.v1.Vec3 workspace_max_m = 7;
+   */
+  workspaceMaxM?: Vec3 | undefined;
+
+  /**
+   * norm of the force the device can give out
+   *
+   * @generated from field: double max_force_n = 8;
+   */
+  maxForceN: number;
+
+  /**
+   * … for ever; 0 = not known
+   *
+   * @generated from field: double continuous_force_n = 9;
+   */
+  continuousForceN: number;
+
+  /**
+   * what it can render stably; 0 = not known
+   *
+   * @generated from field: double max_stiffness_npm = 10;
+   */
+  maxStiffnessNpm: number;
+
+  /**
+   * one encoder count at the handle; 0 = exact
+   *
+   * @generated from field: double position_resolution_m = 11;
+   */
+  positionResolutionM: number;
+
+  /**
+   * haptic steps per second; 1 … 1 000 000
+   *
+   * @generated from field: uint32 loop_hz = 12;
+   */
+  loopHz: number;
+
+  /**
+   * 1 … 8, by number
+   *
+   * @generated from field: repeated tendon.v1.ChannelDescription channels = 13;
+   */
+  channels: ChannelDescription[];
+};
+
+/**
+ * Describes the message tendon.v1.DeviceDescription.
+ * Use `create(DeviceDescriptionSchema)` to create a new message.
+ */
+export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
+  messageDesc(file_tendon, 15);
+
+/**
+ * @generated from message tendon.v1.ChannelDescription
+ */
+export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
+  /**
+   * at most 24 bytes
+   *
+   * @generated from field: string name = 1;
+   */
+  name: string;
+
+  /**
+   * @generated from field: tendon.v1.ChannelRule rule = 2;
+   */
+  rule: ChannelRule;
+
+  /**
+   * A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves. ≤ 3 600 000
+   *
+   * @generated from field: uint32 lease_ms = 3;
+   */
+  leaseMs: number;
+
+  /**
+   * name of the client whose forces it takes, its first 24 bytes; empty = nobody's
+   *
+   * @generated from field: string holder = 4;
+   */
+  holder: string;
+};
+
+/**
+ * Describes the message tendon.v1.ChannelDescription.
+ * Use `create(ChannelDescriptionSchema)` to create a new message.
+ */
+export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
+  messageDesc(file_tendon, 16);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -459,7 +776,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 11);
+  messageDesc(file_tendon, 17);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -495,6 +812,13 @@ export type Hello = Message<"tendon.v1.Hello"> & {
    * @generated from field: repeated string features = 5;
    */
   features: string[];
+
+  /**
+   * what is wanted, each once; at most 16. None: device 0, its channel 0, and `role`
+   *
+   * @generated from field: repeated tendon.v1.Claim claims = 6;
+   */
+  claims: Claim[];
 };
 
 /**
@@ -502,7 +826,40 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 12);
+  messageDesc(file_tendon, 18);
+
+/**
+ * With claims, `role` of the Hello is the highest among them.
+ *
+ * @generated from message tendon.v1.Claim
+ */
+export type Claim = Message<"tendon.v1.Claim"> & {
+  /**
+   * its name; empty: device 0. At most 24 bytes
+   *
+   * @generated from field: string device = 1;
+   */
+  device: string;
+
+  /**
+   * of a controller: its name; empty: channel 0. At most 24 bytes
+   *
+   * @generated from field: string channel = 2;
+   */
+  channel: string;
+
+  /**
+   * @generated from field: tendon.v1.Role role = 3;
+   */
+  role: Role;
+};
+
+/**
+ * Describes the message tendon.v1.Claim.
+ * Use `create(ClaimSchema)` to create a new message.
+ */
+export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
+  messageDesc(file_tendon, 19);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -531,7 +888,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 20);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -597,6 +954,13 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
    * @generated from field: string server = 9;
    */
   server: string;
+
+  /**
+   * one for each Claim, in their order; fields 4 … 7 are of the first one's device
+   *
+   * @generated from field: repeated tendon.v1.Grant grants = 10;
+   */
+  grants: Grant[];
 };
 
 /**
@@ -604,7 +968,38 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 21);
+
+/**
+ * @generated from message tendon.v1.Grant
+ */
+export type Grant = Message<"tendon.v1.Grant"> & {
+  /**
+   * the numbers that stand for the names of the claim from now on
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * ROLE_OBSERVER for a controller's claim: another one holds the lease, see TakeLease
+   *
+   * @generated from field: tendon.v1.Role role = 3;
+   */
+  role: Role;
+};
+
+/**
+ * Describes the message tendon.v1.Grant.
+ * Use `create(GrantSchema)` to create a new message.
+ */
+export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
+  messageDesc(file_tendon, 22);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -640,7 +1035,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 23);
 
 /**
  * @generated from enum tendon.v1.Mode
@@ -701,6 +1096,41 @@ export enum Mode {
  */
 export const ModeSchema: GenEnum<Mode> = /*@__PURE__*/
   enumDesc(file_tendon, 0);
+
+/**
+ * How a device makes one force of its channels': those of the sum, and the first fresh one of those with a priority,
+ * in the order of their numbers.
+ *
+ * @generated from enum tendon.v1.ChannelRule
+ */
+export enum ChannelRule {
+  /**
+   * refused
+   *
+   * @generated from enum value: CHANNEL_RULE_UNSPECIFIED = 0;
+   */
+  UNSPECIFIED = 0,
+
+  /**
+   * its force is added to the others
+   *
+   * @generated from enum value: CHANNEL_RULE_SUM = 1;
+   */
+  SUM = 1,
+
+  /**
+   * it silences the channels of this rule that come after it
+   *
+   * @generated from enum value: CHANNEL_RULE_PRIORITY = 2;
+   */
+  PRIORITY = 2,
+}
+
+/**
+ * Describes the enum tendon.v1.ChannelRule.
+ */
+export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
+  enumDesc(file_tendon, 1);
 
 /**
  * @generated from enum tendon.v1.Code
@@ -779,7 +1209,7 @@ export enum Code {
  * Describes the enum tendon.v1.Code.
  */
 export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
-  enumDesc(file_tendon, 1);
+  enumDesc(file_tendon, 2);
 
 /**
  * @generated from enum tendon.v1.Role
@@ -800,7 +1230,7 @@ export enum Role {
   OBSERVER = 1,
 
   /**
-   * … and sends forces; one per device
+   * … and sends forces; one per channel
    *
    * @generated from enum value: ROLE_CONTROLLER = 2;
    */
@@ -811,5 +1241,5 @@ export enum Role {
  * Describes the enum tendon.v1.Role.
  */
 export const RoleSchema: GenEnum<Role> = /*@__PURE__*/
-  enumDesc(file_tendon, 2);
+  enumDesc(file_tendon, 3);
 
