@@ -12,7 +12,7 @@
 namespace tendon {
 
 HapticController::HapticController(const Config& config)
-    : config_(config), limiter_(config.limiter), held_(config.hold) {
+    : config_(config), limiter_(config.limiter), held_({.hold = config.hold, .rules = config.channels}) {
   const auto positive = [](double value, const char* name) {
     if (!(value > 0))
       throw std::invalid_argument(std::string(name) + " must be above zero, got " + std::to_string(value));
@@ -81,12 +81,13 @@ Step HapticController::step(const Motion& hand, const Vec3& applied, const std::
   started_ = true;
   missed_ = 0;
 
-  const HeldForce::Wanted wanted = held_.wanted(hand);
+  const ForceChannels::Wanted wanted = held_.wanted(hand);
   step.wanted = wanted.force;
   step.mode = wanted.mode;
   step.reasons |= wanted.reasons;
   step.force_age = wanted.age;
-  if (const auto& newest = held_.newest()) {
+  step.channel = static_cast<std::uint32_t>(wanted.channel);
+  if (const auto& newest = held_.newest(wanted.channel)) {
     step.force_sequence = newest->sequence;
     step.loop_age = hand.at - newest->answers;
   }

@@ -3,11 +3,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "core/control/admittance_loop.h"
 #include "core/control/limiter.h"
+#include "core/force_channels.h"
 #include "core/friction_map.h"
-#include "core/held_force.h"
 #include "core/mode.h"
 #include "core/motion.h"
 #include "core/reason.h"
@@ -27,6 +28,7 @@ struct Step {
   double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
+  std::uint32_t channel = 0;         ///< `mode`, `force_sequence` and the ages are of this channel's force
   std::uint64_t force_sequence = 0;  ///< the remote force in use; 0 = none
   Duration force_age{};              ///< since it arrived
   Duration loop_age{};               ///< since the motion it answers was sampled
@@ -35,7 +37,7 @@ struct Step {
 /// The heart: from one look at the hand to the force it is to feel.
 ///
 ///     account ← the interval just ended, with the force really held         (Limiter::observe)
-///     F ← newest remote force, held, faded or stopped by its age            (HeldForce)
+///     F ← newest remote force, held, faded or stopped by its age            (HeldForce; several: ForceChannels)
 ///     F ← the force that makes the handle follow a tool which F acts on     (AdmittanceLoop, when listed)
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
@@ -70,6 +72,8 @@ class HapticController {
     double max_force = 0;  ///< N; > 0
     double max_slew = 0;   ///< N/s; > 0, may be infinite
     HeldForce::Config hold;
+    /// Of the channels that remote forces come in by; each has a HeldForce of its own.
+    std::vector<ChannelRule> channels = {ChannelRule::kSum};
     /// Readings that may fail in a row before it is a fault: 20 ms at 1 kHz, what libfranka allows.
     std::uint32_t max_missed = 20;
   };
@@ -77,11 +81,14 @@ class HapticController {
   /// Throws std::invalid_argument naming the field when a value is impossible.
   explicit HapticController(const Config& config);
 
-  /// A newer remote force has come. Returns false when it was refused because it is not finite.
-  bool observe(const RemoteForce& force) noexcept { return held_.observe(force); }
+  /// A newer remote force has come, for a channel below their number. Returns false when it was refused because it is
+  /// not finite.
+  bool observe(const RemoteForce& force, std::size_t channel = 0) noexcept { return held_.observe(channel, force); }
 
-  /// The remote environment has left.
-  void release(LocalTime now) noexcept { held_.release(now); }
+  /// The remote environment `source` has left a channel.
+  void release(LocalTime now, std::uint32_t source = 0, std::size_t channel = 0) noexcept {
+    held_.release(channel, source, now);
+  }
 
   /// One haptic step. `applied` is the force that the device has really held since the step before, `hand_force`
   /// (N, of the hand on the handle) what its force sensor measured; with `admittance` a step without one gives no
@@ -104,7 +111,7 @@ class HapticController {
   Limiter limiter_;
   std::optional<AdmittanceLoop<3>> admittance_;
   std::optional<FrictionMap> friction_map_;
-  HeldForce held_;
+  ForceChannels held_;
   Fault fault_ = Fault::kNone;
   std::uint32_t missed_ = 0;
   std::optional<Motion> last_;  ///< empty when the position before this step is unknown

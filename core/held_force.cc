@@ -30,8 +30,9 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
 bool HeldForce::observe(const RemoteForce& force) noexcept {
   if (!force.force.allFinite()) return false;
   if (force.model && !(force.model->at.allFinite() && force.model->stiffness.allFinite())) return false;
-  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop) {
+  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop || newest_->source != force.source) {
     engaged_ = force.received;
+    from_ = rendered_;
     if (local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
   }
   if (local_model_) local_model_->observe(force);
@@ -41,8 +42,8 @@ bool HeldForce::observe(const RemoteForce& force) noexcept {
   return true;
 }
 
-void HeldForce::release(LocalTime now) noexcept {
-  if (newest_) newest_->valid_for = std::min(newest_->valid_for, now - newest_->received);
+void HeldForce::release(std::uint32_t source, LocalTime now) noexcept {
+  if (newest_ && newest_->source == source) newest_->valid_for = std::min(newest_->valid_for, now - newest_->received);
 }
 
 Duration HeldForce::validity() const noexcept { return std::min(newest_->valid_for, config_.max_valid_for); }
@@ -71,6 +72,7 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   // A safe stop is only left by `observe`: a clock that stands still must not revive a force.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
     mode_ = Mode::kSafeStop;
+    rendered_.setZero();
     result.mode = mode_;
     result.reasons = Reason::kSafeStop;
     return result;
@@ -88,15 +90,19 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
     gain = std::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
   }
   const Duration since_engaged = hand.at - engaged_;
+  Vec3 rest = Vec3::Zero();
   if (since_engaged < config_.ramp_in) {
     result.reasons |= Reason::kRampIn;
-    gain *= std::max(0.0, seconds(since_engaged) / seconds(config_.ramp_in));
+    const double ramp = std::max(0.0, seconds(since_engaged) / seconds(config_.ramp_in));
+    rest = from_ * (gain * (1 - ramp));
+    gain *= ramp;
   }
 
   result.mode = mode_;
   const Prediction environment = follow(hand);
-  result.force = environment.force * gain;
+  result.force = environment.force * gain + rest;
   result.stiffness = environment.stiffness * gain;
+  rendered_ = result.force;
   return result;
 }
 

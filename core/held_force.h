@@ -28,9 +28,9 @@ namespace tendon {
 ///     adaptive_local_model   the same, but a new model is blended in          (AdaptiveLocalModel)
 ///     output_estimator       a model of the environment, learned on the way   (OutputEstimator)
 ///
-/// The first force ever, and the first one after a safe stop, is ramped in linearly over `ramp_in`: the hand is never
-/// kicked by an engine that comes back. A force that is not finite is refused, and the one before it
-/// ages on.
+/// The first force ever, the first one after a safe stop, and the first one of another source are ramped in linearly
+/// over `ramp_in`, from what is rendered at that moment: the hand is never kicked by an engine that comes back, or by
+/// one that takes over. A force that is not finite is refused, and the one before it ages on.
 ///
 /// It decides what is *wanted*; that it cannot hurt is the business of the limiter downstream.
 ///
@@ -67,13 +67,15 @@ class HeldForce {
   /// Takes a newer force. Returns false, and changes nothing, when it is not finite.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// The remote environment has left: its force is no longer fresh from now on.
-  void release(LocalTime now) noexcept;
+  /// The remote environment `source` has left: its force, when it is the one that is held, is no longer fresh from now
+  /// on.
+  void release(std::uint32_t source, LocalTime now) noexcept;
 
   /// Forgets the force: idle, until a fresh one comes and is ramped in.
   void disengage() noexcept {
     newest_.reset();
     mode_ = Mode::kIdle;
+    rendered_.setZero();
   }
 
   /// What is wanted at `hand.position` at `hand.at`. Once in each haptic step: an estimator learns from it.
@@ -89,7 +91,9 @@ class HeldForce {
   Config config_;
   std::optional<RemoteForce> newest_;
   Mode mode_ = Mode::kIdle;
-  LocalTime engaged_{};  ///< start of the ramp
+  LocalTime engaged_{};       ///< start of the ramp …
+  Vec3 from_ = Vec3::Zero();  ///< … and the force it starts from
+  Vec3 rendered_ = Vec3::Zero();
   std::optional<AdaptiveLocalModel> local_model_;
   std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB that only those pay who list it
 };

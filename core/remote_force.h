@@ -30,7 +30,8 @@ struct RemoteForce {
   LocalTime received{};            ///< when it reached us
   Vec3 force = Vec3::Zero();       ///< N, on the hand
   std::optional<LocalModel> model;
-  Duration valid_for{};  ///< counted from `received`; older than this it is no longer fresh
+  Duration valid_for{};      ///< counted from `received`; older than this it is no longer fresh
+  std::uint32_t source = 0;  ///< who sent it: the forces of another engine are ramped in
 };
 
 }  // namespace tendon

@@ -114,7 +114,7 @@ struct ChannelDescription {
   ChannelRule rule = ChannelRule::kSum;
   /// A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves.
   Duration lease{};
-  std::string holder;  ///< whose forces it takes; empty = nobody's; cut to 24 bytes
+  std::string holder{};  ///< whose forces it takes; empty = nobody's; cut to 24 bytes
 };
 
 /// What a device is and can do. 0 = not known, where a value cannot be 0.
@@ -124,8 +124,8 @@ struct DeviceDescription {
     Vec3 max = Vec3::Zero();
   };
   std::uint32_t device = 0;
-  std::string name;                ///< as the server calls it; at most 24 bytes
-  std::string model;               ///< what it is; at most 64 bytes
+  std::string name{};              ///< as the server calls it; at most 24 bytes
+  std::string model{};             ///< what it is; at most 64 bytes
   std::uint32_t position_dof = 3;  ///< axes that are measured, 1 … 6
   std::uint32_t force_dof = 3;     ///< axes with a motor, 1 … 6
   std::optional<Box> workspace{};  ///< the handle stays within

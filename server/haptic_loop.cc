@@ -7,8 +7,10 @@ namespace tendon {
 
 namespace {
 
-DeviceState to_state(const StepRecord& record) noexcept {
+DeviceState to_state(std::uint32_t device, const StepRecord& record) noexcept {
   DeviceState state;
+  state.device = device;
+  state.channel = record.channel;
   state.tick = record.tick;
   state.sampled = PeerTime(record.hand.at.time_since_epoch());  // our clock is the client's peer's
   state.position = record.hand.position;
@@ -32,21 +34,24 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
       controller_(config.control),
       velocity_(device.info().position_resolution) {
   if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
+  if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
 }
 
 void HapticLoop::take_mail(LocalTime now) noexcept {
   while (const HapticOrder* order = mail_.orders.front()) {
-    switch (*order) {
-      case HapticOrder::kRelease:
-        controller_.release(now);
+    switch (order->kind) {
+      case HapticOrder::Kind::kRelease:
+        controller_.release(now, order->source, order->channel);
         break;
-      case HapticOrder::kRearm:
+      case HapticOrder::Kind::kRearm:
         controller_.rearm();
         break;
     }
     mail_.orders.pop();
   }
-  if (const RemoteForce* force = mail_.force.take()) controller_.observe(*force);
+  for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
+    if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
+  }
 }
 
 LocalTime HapticLoop::step(LocalTime now) noexcept {
@@ -73,7 +78,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
 }
 
 void HapticLoop::publish(const StepRecord& record) noexcept {
-  mail_.state.put(to_state(record));
+  mail_.state.put(to_state(config_.device, record));
   if (!mail_.steps.try_push(record)) mail_.steps_lost.fetch_add(1, std::memory_order_relaxed);
   mail_.flight.record(record);
 

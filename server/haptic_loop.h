@@ -20,6 +20,7 @@ namespace tendon {
 class HapticLoop {
  public:
   struct Config {
+    std::uint32_t device = 0;  ///< its number
     Duration period = std::chrono::milliseconds(1);
     HapticController::Config control;
   };

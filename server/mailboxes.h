@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -9,25 +10,32 @@
 #include "core/latest.h"
 #include "core/remote_force.h"
 #include "core/spsc_ring.h"
+#include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/records.h"
 
 namespace tendon {
 
-/// Orders to the haptic thread.
-enum class HapticOrder : std::uint8_t {
-  kRelease,  ///< the controller has left: its force is no longer fresh
-  kRearm,    ///< clear the latched fault
+/// An order to the haptic thread.
+struct HapticOrder {
+  enum class Kind : std::uint8_t {
+    kRelease,  ///< `source` no longer has `channel`: its force is no longer fresh
+    kRearm,    ///< clear the latched fault
+  };
+  Kind kind = Kind::kRearm;
+  std::uint32_t channel = 0;
+  std::uint32_t source = 0;
 };
 
-/// All that passes between the threads of the server. There is nothing else they share, and no lock.
+/// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else
+/// they share, and no lock.
 ///
-///     network ──force──▶ haptic      newest wins; an older force is worth nothing
+///     network ──forces─▶ haptic      one box for each channel; newest wins: an older force is worth nothing
 ///     network ──orders─▶ haptic      all of them, in order
 ///     haptic  ──state──▶ network     newest wins
 ///     haptic  ──steps──▶ log         all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
-///     network ─datagrams▶ log        all of them; what does not fit is counted
+///     network ─datagrams▶ log        all of them, those of other devices too; what does not fit is counted
 ///
 /// Takes its memory when it is made, before the loops run: some 14 MB with the default capacities.
 struct Mailboxes {
@@ -42,7 +50,7 @@ struct Mailboxes {
       : steps(capacities.steps), flight(capacities.flight), datagrams(capacities.datagrams) {}
   Mailboxes() : Mailboxes(Capacities{}) {}
 
-  Latest<RemoteForce> force;
+  std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
   SpscRing<HapticOrder> orders{16};
   Latest<DeviceState> state;
   SpscRing<StepRecord> steps;

@@ -5,9 +5,11 @@
 #include <csignal>
 #include <ctime>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "devices/simulated/profiles.h"
 #include "protocol/limits.h"
@@ -46,8 +48,42 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s) {
   return signal > 0 ? "signal " + std::to_string(signal) : "its duration is over";
 }
 
+/// Of all devices together.
+HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
+  HapticLoop::Stats sum;
+  for (const auto& [name, haptic] : devices) {
+    sum.steps += haptic.steps;
+    sum.overruns += haptic.overruns;
+    sum.unseen += haptic.unseen;
+    sum.longest_interval = std::max(sum.longest_interval, haptic.longest_interval);
+    sum.fault = std::max(sum.fault, haptic.fault);
+  }
+  return sum;
+}
+
+/// JSON: a list of the devices, each with its channels. Their names need no escapes; a holder's does not appear.
+std::string by_device(const Server::Summary& summary) {
+  std::ostringstream out;
+  for (const auto& [name, haptic] : summary.devices) {
+    out << (out.tellp() > 0 ? ",{" : "{") << "\"name\":\"" << name << "\",\"steps\":" << haptic.steps
+        << ",\"overruns\":" << haptic.overruns << ",\"unseen\":" << haptic.unseen
+        << ",\"longest_interval_us\":" << seconds(haptic.longest_interval) * 1e6
+        << ",\"fault\":" << static_cast<int>(haptic.fault) << ",\"channels\":[";
+    bool first = true;
+    for (const auto& channel : summary.network.channels) {
+      if (channel.device != name) continue;
+      out << (first ? "{" : ",{") << "\"name\":\"" << channel.channel << "\",\"forces\":" << channel.forces
+          << ",\"late\":" << channel.late << ",\"handovers\":" << channel.handovers << "}";
+      first = false;
+    }
+    out << "]}";
+  }
+  return "[" + out.str() + "]";
+}
+
 void print_json(const Server::Summary& summary) {
-  const auto& [haptic, network, recording, uptime] = summary;
+  const HapticLoop::Stats haptic = total(summary.devices);
+  const auto& [devices, network, recording, uptime] = summary;
   std::ostringstream out;
   const auto add = [&out](const char* name, auto value) { out << ",\"" << name << "\":" << value; };
   add("uptime_s", seconds(uptime));
@@ -94,10 +130,11 @@ void print_json(const Server::Summary& summary) {
     add("lost_datagrams", recording->lost_datagrams);
     add("recording_ended_early", recording->error.empty() ? "false" : "true");
   }
+  add("devices", by_device(summary));
   std::cout << "{\"event\":\"stopped\"" << out.str() << "}" << std::endl;
 }
 
-int run(Scene scene, double duration_s, bool json) {
+int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   // Every thread inherits this mask, so that signals come to sigwait only.
   const sigset_t signals = signals_to_end();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
@@ -105,19 +142,19 @@ int run(Scene scene, double duration_s, bool json) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
-  Server server(scene);
+  Server server(scenes);
   server.start();
   log::info("tendond " + std::string(kVersion) + " (" + std::string(kCommit) + ") listens on " +
             to_string(server.address()));
-  if (scene.recording) log::info("recording to " + scene.recording->string());
+  if (const auto& recording = scenes.front().recording) log::info("recording to " + recording->string());
   if (json) {
     std::cout << "{\"event\":\"listening\",\"address\":\"" << to_string(server.address()) << "\"}" << std::endl;
   }
   const std::string why = wait_for_the_end(signals, duration_s);
   const Server::Summary summary = server.stop();
-  log::info("stopped: " + why + "; " + std::to_string(summary.haptic.steps) + " steps, " +
-            std::to_string(summary.haptic.overruns) + " overruns, " + std::to_string(summary.network.forces) +
-            " forces");
+  const HapticLoop::Stats haptic = total(summary.devices);
+  log::info("stopped: " + why + "; " + std::to_string(haptic.steps) + " steps, " + std::to_string(haptic.overruns) +
+            " overruns, " + std::to_string(summary.network.forces) + " forces");
   if (json) print_json(summary);
   return 0;
 }
@@ -151,8 +188,10 @@ int main(int argc, char** argv) {
   CLI::App app(
       "tendond: the haptics server. Runs the device loop and the output limiter beside the device, and lets\n"
       "remote physics engines send forces over UDP.\n\n"
-      "Example:  tendond deploy/scenes/demo.toml --record run.mcap\n");
-  std::string scene_file;
+      "Example:  tendond deploy/scenes/demo.toml --record run.mcap\n\n"
+      "Several devices: a scene for each; [network] and [recording] are in the first one only.\n"
+      "Example:  tendond deploy/scenes/left.toml deploy/scenes/right.toml\n");
+  std::vector<std::filesystem::path> scene_files;
   std::string record;
   std::string listen;
   double duration_s = 0;
@@ -160,7 +199,8 @@ int main(int argc, char** argv) {
   bool json = false;
   bool profiles = false;
   bool scene_help = false;
-  auto* scene_option = app.add_option("scene", scene_file, "Scene file (TOML)");
+  auto* scene_option = app.add_option("scene", scene_files, "Scene files (TOML), one for each device");
+  scene_option->expected(1, static_cast<int>(limits::kMaxDevices));
   app.add_option("--record", record, "Record to this MCAP file, whatever the scene says");
   app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
   app.add_option("--duration-s", duration_s, "Stop after so many seconds; 0 = at SIGINT or SIGTERM");
@@ -200,11 +240,13 @@ int main(int argc, char** argv) {
   }
 
   try {
-    Scene scene = read_scene(scene_file);
-    if (!record.empty()) scene.recording = record;
-    if (!listen.empty()) scene.network.listen = parse_address(listen);
-    if (without_limiter) scene.loop.control.limiter.law = Law::kNone;
-    return run(std::move(scene), duration_s, json);
+    std::vector<Scene> scenes = read_scenes(scene_files);
+    if (!record.empty()) scenes.front().recording = record;
+    if (!listen.empty()) scenes.front().network.listen = parse_address(listen);
+    if (without_limiter) {
+      for (Scene& scene : scenes) scene.loop.control.limiter.law = Law::kNone;
+    }
+    return run(scenes, duration_s, json);
   } catch (const std::exception& problem) {
     log::error(problem.what());
     return 2;

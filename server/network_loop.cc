@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "protocol/codec.h"
@@ -15,7 +16,7 @@ namespace {
 constexpr std::size_t kMaxNotices = 64;
 
 /// What this server can do beyond the version's minimum.
-constexpr std::array<std::string_view, 1> kFeatures = {kFeatureLocalModel};
+constexpr std::array<std::string_view, 2> kFeatures = {kFeatureLocalModel, kFeatureChannels};
 
 std::vector<std::string> in_common(const std::vector<std::string>& offered) {
   std::vector<std::string> both;
@@ -46,17 +47,51 @@ bool may(const ClientKey* key, Role role) {
   return key == nullptr || key->role == Role::kController || role == Role::kObserver;
 }
 
+/// The place of the one of that name; the first, when none is named.
+template <class Named>
+std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
+  if (name.empty()) return 0;
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
+  if (found == all.end()) return std::nullopt;
+  return static_cast<std::uint32_t>(found - all.begin());
+}
+
+template <class Named>
+std::string names_of(const std::vector<Named>& all) {
+  std::string names;
+  for (const Named& one : all) names += (names.empty() ? "\"" : ", \"") + one.name + "\"";
+  return names;
+}
+
+template <class Named>
+void check_names(const std::vector<Named>& all, std::size_t most, const std::string& what) {
+  if (all.empty() || all.size() > most) {
+    throw std::invalid_argument("expected 1 to " + std::to_string(most) + " " + what + "s, got " +
+                                std::to_string(all.size()));
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (place_of(all, all[i].name) != i) throw std::invalid_argument("two " + what + "s have one name: " + all[i].name);
+  }
+}
+
 }  // namespace
 
-NetworkLoop::NetworkLoop(const Config& config, Link& link, Mailboxes& mail)
+NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes*> mail)
     : config_(config),
       link_(link),
-      mail_(mail),
       doorman_({.secret = config.secret, .keys = config.keys}),
       next_connection_id_(config.first_connection_id) {
-  guests_.reserve(config.max_observers + 1);
   half_open_.reserve(config.max_half_open);
   config_.secret = {};  // the doorman has what it needs of it
+  check_names(config.devices, limits::kMaxDevices, "device");
+  if (mail.size() != config.devices.size()) throw std::invalid_argument("expected mailboxes for each device");
+  for (std::size_t i = 0; i < mail.size(); ++i) {
+    Device& device = devices_.emplace_back(Device{
+        .about = config.devices[i], .mail = mail[i], .sampled = std::vector<Sampled>(kRemembered), .channels = {}});
+    check_names(device.about.channels, limits::kMaxChannels, "channel");
+    device.about.device = static_cast<std::uint32_t>(i);
+    device.channels.resize(device.about.channels.size());
+  }
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
@@ -111,7 +146,12 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       guest->address = from;
       ++stats_.roamed;
     }
-    if (newest && guest->role == Role::kController) lateness_.heard(now);
+    if (newest) {
+      for (const Seat& seat : guest->seats) {
+        Channel& channel = devices_[seat.device].channels[seat.channel];
+        if (channel.holder == header->connection_id) channel.lateness.heard(now);
+      }
+    }
     if (newest) adapt(now, *guest);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
@@ -132,27 +172,75 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   if (reply.size > 0) send(now, from, std::span(answer).first(reply.size));
 }
 
+/// The numbers of what it claims.
+std::variant<std::vector<NetworkLoop::Seat>, NetworkLoop::Refusal> NetworkLoop::seats_of(const Hello& hello) const {
+  if (hello.claims.empty()) return std::vector<Seat>{{.device = 0, .channel = 0, .role = hello.role}};
+  std::vector<Seat> seats;
+  Role highest = Role::kObserver;
+  for (const Claim& claim : hello.claims) {
+    const auto device = place_of(config_.devices, claim.device);
+    if (!device) {
+      return Refusal{Code::kInvalid, "there is no device \"" + claim.device + "\", but " + names_of(config_.devices)};
+    }
+    const auto& channels = config_.devices[*device].channels;
+    const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
+    if (!channel) {
+      return Refusal{Code::kInvalid, "there is no channel \"" + claim.channel + "\", but " + names_of(channels)};
+    }
+    const bool twice = std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
+      return seat.device == *device && seat.channel == *channel && seat.role == claim.role;
+    });
+    if (twice) return Refusal{Code::kInvalid, "the same is claimed twice"};
+    highest = std::max(highest, claim.role);
+    seats.push_back({.device = *device, .channel = *channel, .role = claim.role, .by_name = true});
+  }
+  if (highest != hello.role) return Refusal{Code::kInvalid, "the role is not the highest of the claims'"};
+  return seats;
+}
+
+/// The same program, started again.
+bool NetworkLoop::takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
+                                     const std::vector<Seat>& seats) {
+  if (key != present.key) return false;
+  if (present.address == from) return true;
+  return key != nullptr && std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
+           return seat.role == Role::kController && sits_on(present, seat.device, seat.channel);
+         });
+}
+
 std::optional<NetworkLoop::Refusal> NetworkLoop::reason_to_refuse(const Address& from, const ClientKey* key,
-                                                                  Role role) const {
+                                                                  const std::vector<Seat>& seats) const {
   if (key == nullptr && !config_.keys.empty()) {
     return Refusal{Code::kDenied, "this server lets in those who have a key: --key FILE"};
   }
-  if (!may(key, role)) return Refusal{Code::kDenied, "the key \"" + key->name + "\" is an observer's"};
-  std::size_t observers = 0;
-  for (const Guest& present : guests_) {
-    if (present.gone) continue;
-    // The same program, started again: it takes its own place.
-    const bool itself = key == present.key && (present.address == from ||
-                                               (key != nullptr && role == present.role && role == Role::kController));
-    if (itself) continue;
-    if (present.role == Role::kObserver) ++observers;
-    if (role == Role::kController && present.role == Role::kController) {
-      return Refusal{Code::kBusy, "the device is controlled by \"" + present.name + "\" at " +
-                                      to_string(present.address) + "; observers are welcome"};
-    }
+  const bool controls =
+      std::any_of(seats.begin(), seats.end(), [](const Seat& s) { return s.role == Role::kController; });
+  if (!may(key, controls ? Role::kController : Role::kObserver)) {
+    return Refusal{Code::kDenied, "the key \"" + key->name + "\" is an observer's"};
   }
-  if (role == Role::kObserver && observers >= config_.max_observers) {
+  for (const Seat& seat : seats) {
+    const Device& device = devices_[seat.device];
+    const bool can_wait = seat.by_name && device.about.channels[seat.channel].lease > Duration::zero();
+    const Guest* const holder = holder_of(device.channels[seat.channel]);
+    if (seat.role != Role::kController || holder == nullptr || can_wait) continue;
+    if (takes_the_place_of(*holder, from, key, seats)) continue;
+    return Refusal{Code::kBusy, "the device is controlled by \"" + holder->name + "\" at " +
+                                    to_string(holder->address) + "; observers are welcome"};
+  }
+  const auto observers = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
+    return !g.gone && g.role == Role::kObserver && !takes_the_place_of(g, from, key, seats);
+  }));
+  // Whoever waits for a lease is no observer, but one more who gets states.
+  const auto guests = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
+    return !g.gone && !takes_the_place_of(g, from, key, seats);
+  }));
+  std::size_t channels = 0;
+  for (const Device& device : devices_) channels += device.channels.size();
+  if (!controls && observers >= config_.max_observers) {
     return Refusal{Code::kBusy, "there are " + std::to_string(observers) + " observers already"};
+  }
+  if (guests >= config_.max_observers + channels) {
+    return Refusal{Code::kBusy, "there are " + std::to_string(guests) + " guests already"};
   }
   return std::nullopt;
 }
@@ -176,14 +264,22 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
 
   std::array<std::byte, kMaxDatagram> answer;
   const Role role = guest.hello.role;
-  std::optional<Refusal> refusal = guest.version == 0 ? Refusal{Code::kUnsupported, "no protocol version in common"}
-                                                      : reason_to_refuse(from, guest.key, role);
+  auto claimed = seats_of(guest.hello);
+  std::optional<Refusal> refusal;
+  if (guest.version == 0) {
+    refusal = Refusal{Code::kUnsupported, "no protocol version in common"};
+  } else if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) {
+    refusal = std::move(*cannot_be);
+  } else {
+    refusal = reason_to_refuse(from, guest.key, std::get<std::vector<Seat>>(claimed));
+  }
   if (refusal) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal->reason);
     const Refused refused{refusal->code, std::move(refusal->reason), kProtocolVersion, kProtocolVersion};
     return send(now, from, std::span(answer).first(doorman_.refuse(guest, refused, answer).size));
   }
+  const auto& seats = std::get<std::vector<Seat>>(claimed);
 
   Session::Config session;
   session.connection_id = next_connection_id_++;
@@ -195,12 +291,22 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   welcome.version = guest.version;
   welcome.features = in_common(guest.hello.features);
   welcome.role = role;
-  welcome.device_name = config_.device_name;
-  welcome.max_force = config_.max_force;
-  welcome.position_resolution = config_.position_resolution;
-  welcome.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(config_.haptic_period)));
+  const DeviceDescription& first = devices_[seats.front().device].about;
+  welcome.device_name = first.model;
+  welcome.max_force = first.max_force;
+  welcome.position_resolution = first.position_resolution;
+  welcome.loop_hz = first.loop_hz;
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
+  std::vector<View> views;
+  for (const Seat& seat : seats) {
+    const Guest* const holder = holder_of(devices_[seat.device].channels[seat.channel]);
+    const bool free = holder == nullptr || takes_the_place_of(*holder, from, guest.key, seats);
+    if (seat.by_name) welcome.grants.push_back({seat.device, seat.channel, free ? seat.role : Role::kObserver});
+    const bool seen =
+        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == seat.device; });
+    if (!seen) views.push_back({.device = seat.device});
+  }
   const Doorman::Answered answered = doorman_.welcome(guest, session.connection_id, welcome, answer);
   if (answered.size == 0) return;
   const auto bytes = std::span(answer).first(answered.size);
@@ -211,7 +317,9 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 guest.key,
                 guest.hello.name,
                 role,
-                welcome.loop_hz,
+                std::find(welcome.features.begin(), welcome.features.end(), kFeatureChannels) != welcome.features.end(),
+                seats,
+                std::move(views),
                 {bytes.begin(), bytes.end()},
                 answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
                 now};
@@ -226,17 +334,17 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
 /// From here on the guest is one of ours.
 void NetworkLoop::open(LocalTime now, Guest guest) {
   // While it was half-open somebody else may have come.
-  if (const auto refusal = reason_to_refuse(guest.address, guest.key, guest.role)) {
+  if (const auto refusal = reason_to_refuse(guest.address, guest.key, guest.seats)) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
     guest.session.close(refusal->code, refusal->reason);
     return send_all(now, guest);
   }
   for (Guest& present : guests_) {
-    if (present.gone || present.key != guest.key) continue;
+    if (present.gone || !takes_the_place_of(present, guest.address, guest.key, guest.seats)) continue;
     if (present.address == guest.address) {
       leave(present, "started again");
-    } else if (guest.key != nullptr && guest.role == Role::kController && present.role == Role::kController) {
+    } else {
       present.session.close(Code::kReplaced, "a program with the same key has taken this place");
       send_all(now, present);
       ++stats_.replaced;
@@ -248,9 +356,89 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   notice(false, "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" +
                     guest.name + "\" at " + to_string(guest.address) +
                     (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""));
-  if (guest.role == Role::kController) lateness_.begin(now);
   if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);
   guests_.push_back(std::move(guest));
+  Guest& arrived = guests_.back();
+  for (const Seat& seat : arrived.seats) {
+    if (seat.role != Role::kController) continue;
+    const Guest* const holder = holder_of(devices_[seat.device].channels[seat.channel]);
+    if (holder == nullptr) {
+      hold(now, arrived, seat.device, seat.channel);
+    } else if (arrived.can_lose) {  // to one that was half-open for a while, this may be news
+      arrived.session.request(LeaseLost{.device = seat.device, .channel = seat.channel, .to = holder->name});
+    }
+  }
+}
+
+const NetworkLoop::Guest* NetworkLoop::holder_of(const Channel& channel) const {
+  if (channel.holder == 0) return nullptr;
+  const auto found = std::find_if(guests_.begin(), guests_.end(), [&](const Guest& guest) {
+    return !guest.gone && guest.session.connection_id() == channel.holder;
+  });
+  return found == guests_.end() ? nullptr : &*found;
+}
+
+bool NetworkLoop::sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel) {
+  return std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
+    return seat.device == device && seat.channel == channel && seat.role == Role::kController;
+  });
+}
+
+bool NetworkLoop::may_take_over(const Guest& guest) const {
+  const std::string& name = guest.key != nullptr ? guest.key->name : guest.name;
+  return std::find(config_.takeover.begin(), config_.takeover.end(), name) != config_.takeover.end();
+}
+
+void NetworkLoop::hold(LocalTime now, Guest& guest, std::uint32_t device, std::uint32_t channel) {
+  Channel& held = devices_[device].channels[channel];
+  held.holder = guest.session.connection_id();
+  held.renewed = now;
+  held.lateness.begin(now);
+}
+
+void NetworkLoop::free(std::uint32_t device, std::uint32_t channel) {
+  Channel& held = devices_[device].channels[channel];
+  // A full ring means 16 orders wait: the haptic thread stands still, and age will do the same a little later.
+  devices_[device].mail->orders.try_push({HapticOrder::Kind::kRelease, channel, held.holder});
+  held.holder = 0;
+  held.lateness.end();
+}
+
+/// The holder loses the channel to the guest of the name `to`.
+void NetworkLoop::dispossess(LocalTime now, std::uint32_t device, std::uint32_t channel, const std::string& to) {
+  const std::uint32_t id = devices_[device].channels[channel].holder;
+  free(device, channel);
+  const auto loser = std::find_if(guests_.begin(), guests_.end(), [&](const Guest& guest) {
+    return !guest.gone && guest.session.connection_id() == id;
+  });
+  if (loser == guests_.end()) return;
+  notice(false, "\"" + to + "\" takes " + devices_[device].about.name + "/" +
+                    devices_[device].about.channels[channel].name + " from \"" + loser->name + "\"");
+  if (loser->can_lose && loser->session.request(LeaseLost{.device = device, .channel = channel, .to = to})) return;
+  // It cannot be told otherwise, or does not answer.
+  loser->session.close(Code::kReplaced, "\"" + to + "\" has taken this place");
+  send_all(now, *loser);
+  ++stats_.replaced;
+  leave(*loser, "replaced by \"" + to + "\"");
+}
+
+void NetworkLoop::take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted) {
+  Device& device = devices_[wanted.device];
+  Channel& channel = device.channels[wanted.channel];
+  const Duration lease = device.about.channels[wanted.channel].lease;
+  const Guest* const holder = holder_of(channel);
+  if (holder != nullptr && holder != &guest) {
+    const Duration left = channel.renewed + lease - now;
+    const bool over = lease > Duration::zero() && left <= Duration::zero();
+    if (!over && (lease == Duration::zero() || !may_take_over(guest))) {
+      return guest.session.answer(id, Code::kBusy, "\"" + holder->name + "\" holds it",
+                                  lease > Duration::zero() ? left : Duration::zero());
+    }
+    ++channel.handovers;
+    dispossess(now, wanted.device, wanted.channel, guest.name);
+  }
+  if (holder != &guest) hold(now, guest, wanted.device, wanted.channel);
+  guest.session.answer(id, Code::kOk, {});
 }
 
 void NetworkLoop::adapt(LocalTime now, Guest& guest) {
@@ -273,20 +461,34 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
 void NetworkLoop::report_lateness(LocalTime now) {
   if (now < report_next_) return;
   report_next_ = now + std::chrono::seconds(1);
-  Lateness::Report report = lateness_.report(now);
-  stats_.late += report.late;
-  if (!report.text.empty()) notice(true, std::move(report.text));
+  for (Device& device : devices_) {
+    for (std::size_t i = 0; i < device.channels.size(); ++i) {
+      Channel& channel = device.channels[i];
+      Lateness::Report report = channel.lateness.report(now);
+      stats_.late += report.late;
+      channel.late += report.late;
+      if (report.text.empty()) continue;
+      const bool only_one = devices_.size() == 1 && device.channels.size() == 1;
+      notice(true, (only_one ? "" : device.about.name + "/" + device.about.channels[i].name + ": ") + report.text);
+    }
+  }
 }
 
 void NetworkLoop::publish(LocalTime now) {
-  const DeviceState* state = mail_.state.take();
-  if (state == nullptr) return;
-  sampled_[state->tick % kRemembered] = {state->tick, LocalTime(state->sampled.time_since_epoch()), now};
-  for (Guest& guest : guests_) {
-    const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
-    if (state->tick - guest.last_state < std::max(guest.state_every, one_in)) continue;
-    guest.last_state = state->tick;
-    guest.session.send(*state);
+  for (std::uint32_t number = 0; number < devices_.size(); ++number) {
+    const DeviceState* state = devices_[number].mail->state.take();
+    if (state == nullptr) continue;
+    devices_[number].sampled[state->tick % kRemembered] = {state->tick, LocalTime(state->sampled.time_since_epoch()),
+                                                           now};
+    for (Guest& guest : guests_) {
+      const auto view =
+          std::find_if(guest.views.begin(), guest.views.end(), [&](const View& seen) { return seen.device == number; });
+      if (view == guest.views.end()) continue;
+      const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
+      if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
+      view->last_state = state->tick;
+      guest.session.send(*state);
+    }
   }
 }
 
@@ -294,7 +496,7 @@ void NetworkLoop::serve(LocalTime now, Guest& guest) {
   while (const auto event = guest.session.next_event()) {
     std::visit(Overloaded{
                    [&](const Session::ForceArrived& arrived) { take_force(now, guest, arrived.command); },
-                   [&](const Session::RequestArrived& arrived) { answer(guest, arrived.id, arrived.request); },
+                   [&](const Session::RequestArrived& arrived) { answer(now, guest, arrived.id, arrived.request); },
                    [&](const Session::Closed& closed) {
                      if (closed.code == Code::kTimedOut) ++stats_.timed_out;
                      leave(guest, closed.reason);
@@ -315,11 +517,15 @@ void NetworkLoop::send_all(LocalTime now, Guest& guest) {
 }
 
 void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& command) {
-  if (guest.role != Role::kController) {
+  const bool there = command.device < devices_.size() && command.channel < devices_[command.device].channels.size();
+  if (!there || devices_[command.device].channels[command.channel].holder != guest.session.connection_id()) {
     ++stats_.denied;
     return;
   }
-  const Sampled& answered = sampled_[command.based_on_tick % kRemembered];
+  Device& device = devices_[command.device];
+  Channel& channel = device.channels[command.channel];
+  channel.renewed = now;
+  const Sampled& answered = device.sampled[command.based_on_tick % kRemembered];
   if (answered.tick != command.based_on_tick || command.based_on_tick == 0) {
     ++stats_.unanswerable;
     return;
@@ -328,11 +534,11 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     ++stats_.hopeless;
     return;
   }
-  lateness_.observe({.sampled = answered.at,
-                     .sent = answered.sent,
-                     .received = now,
-                     .round_trip = guest.session.stats().round_trip,
-                     .valid_for = command.valid_for});
+  channel.lateness.observe({.sampled = answered.at,
+                            .sent = answered.sent,
+                            .received = now,
+                            .round_trip = guest.session.stats().round_trip,
+                            .valid_for = command.valid_for});
   RemoteForce force;
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
@@ -341,28 +547,67 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.force = command.force;
   force.model = command.model;
   force.valid_for = command.valid_for;
-  mail_.force.put(force);
+  force.source = channel.holder;
+  device.mail->forces[command.channel].put(force);
+  ++channel.forces;
   ++stats_.forces;
 }
 
-void NetworkLoop::answer(Guest& guest, std::uint32_t id, const Request& request) {
+void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request) {
+  const auto no_such_device = [&] {
+    guest.session.answer(id, Code::kInvalid, "there are " + std::to_string(devices_.size()) + " devices");
+  };
   std::visit(Overloaded{
                  [&](const SetStateRate& rate) {
-                   const auto loop_hz = static_cast<double>(guest.loop_hz);
                    if (rate.hz == 0) return guest.session.answer(id, Code::kInvalid, "a state rate must be above zero");
-                   guest.state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
+                   const auto view = std::find_if(guest.views.begin(), guest.views.end(),
+                                                  [&](const View& seen) { return seen.device == rate.device; });
+                   if (view == guest.views.end())
+                     return guest.session.answer(id, Code::kInvalid, "that device is not claimed");
+                   const auto loop_hz = static_cast<double>(devices_[rate.device].about.loop_hz);
+                   view->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
                    guest.session.answer(id, Code::kOk, {});
                  },
-                 [&](const Rearm&) {
-                   if (guest.role != Role::kController) {
+                 [&](const Rearm& rearm) {
+                   const bool controls = std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
+                     return seat.device == rearm.device && seat.role == Role::kController;
+                   });
+                   if (!controls) {
                      ++stats_.denied;
-                     return guest.session.answer(id, Code::kDenied, "only the controller may rearm");
+                     return guest.session.answer(id, Code::kDenied, "only a controller may rearm");
                    }
-                   if (!mail_.orders.try_push(HapticOrder::kRearm)) return guest.session.answer(id, Code::kBusy, {});
+                   if (!devices_[rearm.device].mail->orders.try_push({HapticOrder::Kind::kRearm})) {
+                     return guest.session.answer(id, Code::kBusy, {});
+                   }
                    notice(true, "rearmed by \"" + guest.name + "\"");
                    guest.session.answer(id, Code::kOk, {});
                  },
-                 [&](const auto&) { guest.session.answer(id, Code::kUnsupported, "there is nothing to choose from"); },
+                 [&](const Describe& describe) {
+                   if (describe.device >= devices_.size()) return no_such_device();
+                   const Device& device = devices_[describe.device];
+                   DeviceDescription about = device.about;
+                   for (std::size_t i = 0; i < device.channels.size(); ++i) {
+                     const Guest* const holder = holder_of(device.channels[i]);
+                     about.channels[i].holder = holder != nullptr ? holder->name : std::string();
+                   }
+                   guest.session.answer(id, std::move(about));
+                 },
+                 [&](const TakeLease& wanted) {
+                   if (sits_on(guest, wanted.device, wanted.channel)) return take_lease(now, guest, id, wanted);
+                   ++stats_.denied;
+                   guest.session.answer(id, Code::kDenied, "only for one that has claimed it as a controller");
+                 },
+                 [&](const GiveLease& given) {
+                   if (!sits_on(guest, given.device, given.channel)) {
+                     ++stats_.denied;
+                     return guest.session.answer(id, Code::kDenied, "only for one that has claimed it as a controller");
+                   }
+                   const bool holds =
+                       devices_[given.device].channels[given.channel].holder == guest.session.connection_id();
+                   if (holds) free(given.device, given.channel);
+                   guest.session.answer(id, Code::kOk, {});
+                 },
+                 [&](const LeaseLost&) { guest.session.answer(id, Code::kUnsupported, "that is the server's to say"); },
              },
              request);
 }
@@ -372,11 +617,11 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
   add(stats_.dropped, guest.session.stats());
   notice(guest.role == Role::kController,
          "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how);
-  // A full ring means 16 orders wait: the haptic thread stands still, and age will do the same a little later.
-  if (guest.role != Role::kController) return;
-  mail_.orders.try_push(HapticOrder::kRelease);
-  lateness_.end();
-  stats_.controller_clock = guest.session.peer_clock();
+  for (const Seat& seat : guest.seats) {
+    const bool holds = devices_[seat.device].channels[seat.channel].holder == guest.session.connection_id();
+    if (holds) free(seat.device, seat.channel);
+  }
+  if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
 }
 
 void NetworkLoop::close(LocalTime now) {
@@ -393,6 +638,18 @@ void NetworkLoop::close(LocalTime now) {
 NetworkLoop::Stats NetworkLoop::stats() const {
   Stats stats = stats_;
   stats.hellos = doorman_.stats();
+  for (const Device& device : devices_) {
+    for (std::size_t i = 0; i < device.channels.size(); ++i) {
+      const Channel& channel = device.channels[i];
+      const Guest* const holder = holder_of(channel);
+      stats.channels.push_back({.device = device.about.name,
+                                .channel = device.about.channels[i].name,
+                                .holder = holder != nullptr ? holder->name : std::string(),
+                                .forces = channel.forces,
+                                .handovers = channel.handovers,
+                                .late = channel.late});
+    }
+  }
   for (const Guest& guest : guests_) {
     add(stats.dropped, guest.session.stats());
     if (guest.role == Role::kController) stats.controller_clock = guest.session.peer_clock();
@@ -407,9 +664,10 @@ void NetworkLoop::send(LocalTime now, const Address& to, std::span<const std::by
 
 void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer,
                       std::span<const std::byte> datagram, std::size_t size) {
-  DatagramRecord* const record = mail_.datagrams.back();
+  Mailboxes& mail = *devices_.front().mail;
+  DatagramRecord* const record = mail.datagrams.back();
   if (record == nullptr) {
-    mail_.datagrams_lost.fetch_add(1, std::memory_order_relaxed);
+    mail.datagrams_lost.fetch_add(1, std::memory_order_relaxed);
     return;
   }
   record->at = now;
@@ -417,7 +675,7 @@ void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, const 
   record->peer = peer;
   record->size = static_cast<std::uint32_t>(std::min<std::size_t>(size, std::numeric_limits<std::uint32_t>::max()));
   std::copy(datagram.begin(), datagram.end(), record->bytes.begin());
-  mail_.datagrams.push();
+  mail.datagrams.push();
 }
 
 void NetworkLoop::notice(bool warning, std::string text) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "protocol/handshake.h"
@@ -18,13 +19,14 @@
 
 namespace tendon {
 
-/// The other half of the world: lets guests in, hands their forces to the haptic loop and the device's
+/// The other half of the world: lets guests in, hands their forces to the haptic loops and the devices'
 /// states to them.
 ///
 /// One thread calls `turn` when a datagram has come, when the haptic loop has made a step, or when the
 /// time that the last turn returned has come; it does nothing else but wait and read the clock.
 ///
-/// One controller and up to `max_observers` observers. The link is drained in every turn, so nothing
+/// One controller for each channel, who may have to share it with others in turn (a lease, SESSION.md), and up to
+/// `max_observers` observers. The link is drained in every turn, so nothing
 /// waits behind what is old; forces are newest-wins, every request is answered.
 ///
 /// Without keys guests speak in the clear, from this machine only. With keys they speak suite 1 only: a guest
@@ -40,10 +42,10 @@ class NetworkLoop {
     std::vector<ClientKey> keys{};          ///< who may come in; empty: anybody on this machine, in the clear
     std::uint32_t first_connection_id = 1;  ///< random at start, so that a restarted server does not know old guests
     std::string server_name = "tendond";
-    std::string device_name;
-    double max_force = 0;            ///< N, told to guests
-    double position_resolution = 0;  ///< m, told to guests
-    Duration haptic_period = std::chrono::milliseconds(1);
+    /// What guests are told of each device; its number is its place, `holder` does not count.
+    std::vector<DeviceDescription> devices{};
+    /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
+    std::vector<std::string> takeover{};
     /// Each costs a state datagram of some 250 bytes per haptic step.
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
@@ -82,11 +84,20 @@ class NetworkLoop {
     std::uint64_t unknown_connection = 0;  ///< Data that belongs to nobody, or comes from the wrong address
     Doorman::Stats hellos;                 ///< Hellos that did not lead to an Answer
     std::uint64_t forces = 0;              ///< handed to the haptic loop
-    std::uint64_t denied = 0;              ///< forces and requests that only a controller may send
+    std::uint64_t denied = 0;              ///< forces and requests that only the holder of a channel may send
     std::uint64_t unanswerable = 0;        ///< forces that answer a step which never was, or long ago
     std::uint64_t late = 0;                ///< forces that came when the one before had outlived its validity
     std::uint64_t hopeless = 0;            ///< forces not handed on, over a link of no use
     Dropped dropped;
+    struct Channel {
+      std::string device;
+      std::string channel;
+      std::string holder;           ///< its name; empty: nobody
+      std::uint64_t forces = 0;     ///< handed on
+      std::uint64_t handovers = 0;  ///< from one holder to another who wanted it
+      std::uint64_t late = 0;       ///< as above
+    };
+    std::vector<Channel> channels;
     LinkStats controller;  ///< the link of the present controller, or of the last one
     std::optional<ClockOffsetEstimator::Estimate> controller_clock;  ///< … and its clock, by ours
   };
@@ -97,8 +108,9 @@ class NetworkLoop {
     std::string text;
   };
 
-  /// `link` and `mail` must outlive the loop.
-  NetworkLoop(const Config& config, Link& link, Mailboxes& mail);
+  /// One of `mail` for each device; datagrams go to the first. They and `link` must outlive the loop. Throws
+  /// std::invalid_argument when there are as many devices or channels as cannot be, or two of one name.
+  NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes*> mail);
 
   /// One round. Returns when the next one is due at the latest.
   LocalTime turn(LocalTime now);
@@ -112,18 +124,31 @@ class NetworkLoop {
   std::vector<Notice> take_notices();
 
  private:
+  /// What a guest has claimed.
+  struct Seat {
+    std::uint32_t device = 0;
+    std::uint32_t channel = 0;
+    Role role = Role::kObserver;
+    bool by_name = false;  ///< it may wait for the lease
+  };
+  /// A device that a guest sees.
+  struct View {
+    std::uint32_t device = 0;
+    std::uint64_t state_every = 1;  ///< haptic steps
+    std::uint64_t last_state = 0;   ///< tick
+  };
   struct Guest {
     Address address;
     ClientRandom random;   ///< of its Hello: the same one again is the same attempt
     const ClientKey* key;  ///< null in suite 0
     std::string name;
     Role role;
-    std::uint32_t loop_hz;
+    bool can_lose;            ///< it can be told that it has lost a lease
+    std::vector<Seat> seats;  ///< `role` is what its Welcome says
+    std::vector<View> views;
     std::vector<std::byte> answer;  ///< for when it was lost
     Session session;
     LocalTime arrived;
-    std::uint64_t state_every = 1;  ///< haptic steps
-    std::uint64_t last_state = 0;   ///< tick
     std::optional<RateAdaptation> adaptation{};
     bool hopeless = false;  ///< as it was told to the operator
     bool gone = false;
@@ -132,17 +157,49 @@ class NetworkLoop {
     Code code;
     std::string reason;
   };
+  struct Channel {
+    std::uint32_t holder = 0;  ///< connection id; 0 = nobody
+    LocalTime renewed{};       ///< by its newest force, or when it came
+    std::uint64_t forces = 0;
+    std::uint64_t handovers = 0;
+    std::uint64_t late = 0;
+    Lateness lateness;
+  };
+  /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.
+  struct Sampled {
+    std::uint64_t tick = 0;
+    LocalTime at{};
+    LocalTime sent{};  ///< when the state left
+  };
+  static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz, longer than any loop worth rendering
+  struct Device {
+    DeviceDescription about;
+    Mailboxes* mail;
+    std::vector<Sampled> sampled;
+    std::vector<Channel> channels;
+  };
 
   bool drain(LocalTime now);
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);
   bool answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest);
-  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, Role role) const;
+  std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello) const;
+  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key,
+                                          const std::vector<Seat>& seats) const;
+  static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
+                                 const std::vector<Seat>& seats);
   void open(LocalTime now, Guest guest);
   void serve(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
-  void answer(Guest& guest, std::uint32_t id, const Request& request);
+  void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
+  void take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted);
+  void hold(LocalTime now, Guest& guest, std::uint32_t device, std::uint32_t channel);
+  void free(std::uint32_t device, std::uint32_t channel);
+  void dispossess(LocalTime now, std::uint32_t device, std::uint32_t channel, const std::string& to);
+  const Guest* holder_of(const Channel& channel) const;
+  static bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel);
+  bool may_take_over(const Guest& guest) const;
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
@@ -155,22 +212,11 @@ class NetworkLoop {
 
   Config config_;
   Link& link_;
-  Mailboxes& mail_;
+  std::vector<Device> devices_;
   Doorman doorman_;
   std::vector<Guest> guests_;
   std::vector<Guest> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
-
-  /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.
-  struct Sampled {
-    std::uint64_t tick = 0;
-    LocalTime at{};
-    LocalTime sent{};  ///< when the state left
-  };
-  static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz, longer than any loop worth rendering
-  std::array<Sampled, kRemembered> sampled_{};
-
-  Lateness lateness_;
   LocalTime report_next_{};
 
   Stats stats_;

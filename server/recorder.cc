@@ -18,20 +18,28 @@ Recorder::Recorder(const Config& config, ByteSink& sink)
       sink_(sink),
       writer_("tendon " + config.scene.version, sink),
       scene_channel_(add_channel(writer_, recording::kScene)),
-      step_channel_(add_channel(writer_, recording::kStep)),
+      step_channels_{add_channel(writer_, recording::kStep)},
       datagram_channel_(add_channel(writer_, recording::kDatagram)),
       loss_channel_(add_channel(writer_, recording::kLoss)) {
   write(scene_channel_, config_.started, recording::encode(config_.scene));
+  for (const Device& device : config_.more_devices) {
+    const auto of_device = [&](const recording::Channel& channel) {
+      const std::string topic = "/" + device.name + std::string(channel.topic);
+      return add_channel(writer_, {topic, channel.schema});
+    };
+    write(of_device(recording::kScene), config_.started, recording::encode(device.scene));
+    step_channels_.push_back(of_device(recording::kStep));
+  }
   settle(writer_.flush_chunk());
 }
 
-void Recorder::record(const StepRecord& step) {
+void Recorder::record(const StepRecord& step, std::size_t device) {
   if (!recording()) {
     ++lost_.steps;
     return;
   }
   ++pending_.steps;
-  write(step_channel_, step.hand.at, recording::encode(step));
+  write(step_channels_[device], step.hand.at, recording::encode(step));
 }
 
 void Recorder::record(const DatagramRecord& datagram) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/time.h"
 #include "server/byte_sink.h"
@@ -27,8 +28,14 @@ namespace tendon {
 /// Thread-safe: no; the log thread owns it. Realtime-safe: no.
 class Recorder {
  public:
+  /// A device besides the first.
+  struct Device {
+    std::string name;  ///< its records are in channels /NAME/scene and /NAME/haptic/step
+    SceneRecord scene;
+  };
   struct Config {
     SceneRecord scene;
+    std::vector<Device> more_devices{};
     LocalTime started{};  ///< time of the scene's message
     /// The most recorded time that a kill can cost. Each flush costs one write(2) and some 300 bytes of chunk and
     /// index.
@@ -50,7 +57,8 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  void record(const StepRecord& step);
+  /// `device` by number: 0 is the first, and those of `more_devices` follow.
+  void record(const StepRecord& step, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   /// Notes that records were dropped before they came here, so that a reader knows of the gap.
   void lost(LocalTime at, std::uint64_t steps, std::uint64_t datagrams);
@@ -78,7 +86,7 @@ class Recorder {
   ByteSink& sink_;
   McapWriter writer_;
   std::uint16_t scene_channel_;
-  std::uint16_t step_channel_;
+  std::vector<std::uint16_t> step_channels_;  ///< by device
   std::uint16_t datagram_channel_;
   std::uint16_t loss_channel_;
   std::optional<LocalTime> chunk_opened_;

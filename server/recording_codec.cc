@@ -88,6 +88,7 @@ std::string encode(const StepRecord& step) {
   out.set_force_sequence(step.force_sequence);
   out.set_force_age_ns(step.force_age.count());
   out.set_loop_age_ns(step.loop_age.count());
+  out.set_channel(step.channel);
   if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
   return out.SerializeAsString();
 }
@@ -145,6 +146,7 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.force_sequence = in.force_sequence();
   out.force_age = Duration(in.force_age_ns());
   out.loop_age = Duration(in.loop_age_ns());
+  out.channel = in.channel();
   if (in.has_hand_force_n()) out.hand_force = vec3(in.hand_force_n());
   return out;
 }

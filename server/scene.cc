@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -287,6 +288,33 @@ struct ListOf {
   }
 };
 
+/// The name of a device or a channel.
+bool in_a_label(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_'; }
+
+/// The nearest label to any text.
+std::string label_of(std::string text) {
+  text.resize(std::min(text.size(), limits::kMaxLabel));
+  for (char& c : text) c = in_a_label(c) ? c : '-';
+  return text.empty() ? "device" : text;
+}
+
+struct Label {
+  static std::string expected(const Unit&) {
+    return "a name of 1 to " + std::to_string(limits::kMaxLabel) + " letters, digits, - or _";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
+    const auto* text = node.as_string();
+    const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= limits::kMaxLabel &&
+                      std::all_of((*text)->begin(), (*text)->end(), in_a_label);
+    if (!good) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
+};
+
 struct YesNo {
   static std::string expected(const Unit&) { return "true or false"; }
 
@@ -536,6 +564,8 @@ template <class Table>
 void declare_device(Table& device, Draft& draft) {
   device.kind(Names<DeviceKind>{{{"simulated", DeviceKind::kSimulated}}}, [&draft](Table& keys, DeviceKind) {
     SimulatedDevice::Config& config = draft.scene.device;
+    keys.key("name", draft.scene.name, Label{}, "what clients call it that want this one of several",
+             Absent{.text = "the name of the scene file"});
     keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
     if (draft.profile != nullptr) config = draft.profile->device();
     keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
@@ -710,6 +740,16 @@ void declare_scene(Table& scene, Draft& draft) {
     declare_between(force, control.hold);
   });
 
+  scene.tables("channel", draft.scene.channels, limits::kMaxChannels, [](Table& keys, Scene::Channel& channel) {
+    keys.key("name", channel.name, Label{}, "what clients call it that want this one of several", kRequired);
+    keys.key("rule", channel.rule,
+             Names<ChannelRule>{{{"sum", ChannelRule::kSum}, {"priority", ChannelRule::kPriority}}},
+             "its force is added to the others; or it silences those of this rule that come after it, as long as it is "
+             "fresh, and is faded in and out for ramp_in_ms");
+    keys.key("lease_ms", channel.lease, Number{.least = 0, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)},
+             "another client may take it from one that has sent no force for so long; 0: it stays until it leaves");
+  });
+
   scene.table("network", [&draft](Table& keys) {
     Scene::Network& network = draft.scene.network;
     keys.key("listen", network.listen, ListenAddress{},
@@ -721,6 +761,8 @@ void declare_scene(Table& scene, Draft& draft) {
     keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
     keys.key("adapt_state_rate", network.adapt_state_rate, YesNo{},
              "whether states leave more rarely where the way to a guest is full, down to 1 in 20");
+    keys.key("takeover", network.takeover, ListOf<Label>{},
+             "names of the keys (without keys: of the clients) that may take a channel from its holder at once");
   });
 
   scene.optional_table("recording", [&draft](Table& recording) {
@@ -884,6 +926,25 @@ class Reader {
     optional_table(name, [&](Reader& keys) { declare(keys, target.emplace()); });
   }
 
+  /// A table written with [[name]], for each of a few of a kind; without one `target` stays as it is.
+  template <class T, class Declare>
+  void tables(std::string_view name, std::vector<T>& target, std::size_t most, const Declare& declare) {
+    const toml::node* node = look_up(name);
+    if (node == nullptr) return;
+    const std::string path = joined(path_, name);
+    if (!node->is_array_of_tables() || node->as_array()->size() > most) {
+      findings_.wrong(place_of(*node), path,
+                      "expected 1 to " + std::to_string(most) + " tables [[" + path + "]], found " + found_in(*node));
+      return;
+    }
+    target.clear();
+    for (const toml::node& one : *node->as_array()) {
+      Reader inner(findings_, one.as_table(), path + "[" + std::to_string(target.size()) + "]", place_of(one));
+      declare(inner, target.emplace_back());
+      inner.refuse_unknown();
+    }
+  }
+
   void refuse_unknown() const {
     if (table_ == nullptr || !kind_known_) return;
     for (const auto& [name, node] : *table_) {
@@ -964,6 +1025,15 @@ class Reference {
     });
   }
 
+  template <class T, class Declare>
+  void tables(std::string_view name, std::vector<T>&, std::size_t most, const Declare& declare) {
+    const std::string path = joined(path_, name);
+    text_.append("\n[[").append(path).append("]]  at most ").append(std::to_string(most)).append("\n");
+    Reference inner(text_, path);
+    T defaults;
+    declare(inner, defaults);
+  }
+
  private:
   std::string& text_;
   std::string path_;
@@ -980,6 +1050,7 @@ class Settlement {
     settle_motion(directory);
     settle_network(directory);
     settle_control();
+    settle_channels();
     // Rules of the constructors that are not among ours yet.
     Scene& scene = draft_.scene;
     if (draft_.has_hand) scene.device.hand = draft_.hand;
@@ -1029,6 +1100,19 @@ class Settlement {
       }
       draft_.hand.motion = ScriptedMotion(std::move(draft_.motion));
     });
+  }
+
+  void settle_channels() {
+    Scene& scene = draft_.scene;
+    scene.loop.control.channels.clear();
+    for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+      scene.loop.control.channels.push_back(scene.channels[i].rule);
+      for (std::size_t before = 0; before < i; ++before) {
+        if (scene.channels[before].name != scene.channels[i].name) continue;
+        blame("channel[" + std::to_string(i) + "].name", {},
+              "expected a name of its own, found " + in_quotes(scene.channels[i].name) + " again");
+      }
+    }
   }
 
   void settle_network(const std::filesystem::path& directory) {
@@ -1174,6 +1258,8 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   const toml::table file = parse_toml(text, name);
   Draft draft;
   draft.scene.text = text;
+  draft.scene.has_network = file.contains("network");
+  draft.scene.name = label_of(std::filesystem::path(name).stem().string());
   Findings findings;
   Reader reader(findings, &file, "", {});
   declare_scene(reader, draft);
@@ -1195,6 +1281,26 @@ Scene read_scene(const std::filesystem::path& file) {
   text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
   if (std::ferror(stream.get()) != 0) fail();
   return parse_scene(text, file.string(), file.parent_path());
+}
+
+std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files) {
+  std::vector<Scene> scenes;
+  for (const std::filesystem::path& file : files) {
+    Scene scene = read_scene(file);
+    scene.loop.device = static_cast<std::uint32_t>(scenes.size());
+    for (const Scene& before : scenes) {
+      if (scene.name != before.name) continue;
+      throw SceneError(file.string() + ": device.name: expected a name of its own, found " + in_quotes(scene.name) +
+                       " again");
+    }
+    for (const auto& [name, there] :
+         {std::pair("network", scene.has_network), std::pair("recording", scene.recording.has_value())}) {
+      if (!there || scenes.empty()) continue;
+      throw SceneError(file.string() + ": " + name + ": expected in the first scene only, " + files.front().string());
+    }
+    scenes.push_back(std::move(scene));
+  }
+  return scenes;
 }
 
 std::string scene_reference() {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/time.h"
 #include "devices/simulated/simulated_device.h"
@@ -26,11 +27,20 @@ struct Scene {
     Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
     Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
     bool adapt_state_rate = NetworkLoop::Config{}.adapt_state_rate;
+    std::vector<std::string> takeover{};  ///< see NetworkLoop
+  };
+  struct Channel {
+    std::string name = "main";
+    ChannelRule rule = ChannelRule::kSum;
+    Duration lease{};  ///< 0: its holder stays until it leaves
   };
 
+  std::string name;  ///< of the device, as clients claim it
   SimulatedDevice::Config device;
   HapticLoop::Config loop;
+  std::vector<Channel> channels = {Channel{}};
   Network network;
+  bool has_network = false;                        ///< the file says something about it
   std::optional<std::filesystem::path> recording;  ///< relative to the current directory; empty: nothing is recorded
   std::string text;                                ///< the file, whole, for the recording
 };
@@ -53,6 +63,10 @@ inline constexpr std::size_t kMaxSceneBytes = 16'384;
 /// Of several mistakes the first in the file is reported; a key that is missing only when all that is
 /// there is right, because a misspelt key is both.
 Scene read_scene(const std::filesystem::path& file);
+
+/// The scenes of several devices that one server runs. Network and recording are the first one's; a later one that has
+/// such a table is refused, as are two devices of one name.
+std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files);
 
 /// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for
 /// relative to `directory`.

@@ -2,6 +2,7 @@
 #include "server/server.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <span>
 #include <utility>
@@ -24,22 +25,17 @@ constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is told at most this often, with how much of it there was.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
 
-NetworkLoop::Config network_config(const Scene& scene, const DeviceInfo& device) {
-  NetworkLoop::Config config;
-  fill_random(config.secret);
-  fill_random(std::as_writable_bytes(std::span(&config.first_connection_id, 1)));
-  config.first_connection_id |= 1;  // never 0
-  if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
-  config.server_name = "tendond " + std::string(kVersion);
-  config.device_name = device.name;
-  config.max_force = scene.loop.control.max_force;
-  config.position_resolution = device.position_resolution;
-  config.haptic_period = scene.loop.period;
-  config.max_observers = scene.network.max_observers;
-  config.controller_timeout = scene.network.controller_timeout;
-  config.observer_timeout = scene.network.observer_timeout;
-  config.adapt_state_rate = scene.network.adapt_state_rate;
-  return config;
+DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
+  DeviceDescription about;
+  about.name = scene.name;
+  about.model = device.name;
+  about.max_force = scene.loop.control.max_force;
+  about.position_resolution = device.position_resolution;
+  about.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(scene.loop.period)));
+  for (const Scene::Channel& channel : scene.channels) {
+    about.channels.push_back({.name = channel.name, .rule = channel.rule, .lease = channel.lease, .holder = {}});
+  }
+  return about;
 }
 
 const char* describe(HapticController::Fault fault) {
@@ -56,44 +52,83 @@ const char* describe(HapticController::Fault fault) {
 
 }  // namespace
 
-Server::Server(const Scene& scene)
-    : scene_(scene),
-      started_(clock::now()),
-      device_(std::make_unique<SimulatedDevice>(scene.device)),
-      mail_(std::make_unique<Mailboxes>()),
-      link_(scene.network.listen, scene.network.keys ? Reach::kAnywhere : Reach::kThisMachine),
-      haptic_(scene.loop, *device_, *mail_),
-      network_(network_config(scene, device_->info()), link_, *mail_),
-      tell_next_(started_ + kTellPeriod) {
-  if (scene.recording) {
-    sink_ = std::make_unique<FileSink>(*scene.recording);
-    recorder_ = std::make_unique<Recorder>(recorder_config(), *sink_);
+Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capacities)
+    : scene(the_scene),
+      device(std::make_unique<SimulatedDevice>(scene.device)),
+      mail(capacities),
+      haptic(scene.loop, *device, mail) {}
+
+Server::Lanes Server::lanes_of(const std::vector<Scene>& scenes) {
+  Lanes lanes;
+  for (const Scene& scene : scenes) {
+    Mailboxes::Capacities capacities;
+    if (!lanes.empty()) capacities.datagrams = 1;  // all go to the first
+    lanes.push_back(std::make_unique<Lane>(scene, capacities));
   }
+  return lanes;
 }
 
-Recorder::Config Server::recorder_config() const {
-  Recorder::Config config;
-  config.scene = {.text = scene_.text,
-                  .version = std::string(kVersion),
-                  .commit = std::string(kCommit),
-                  .unix_offset = clock::unix_offset()};
-  config.started = started_;
+std::vector<Mailboxes*> Server::mail_of(const Lanes& lanes) {
+  std::vector<Mailboxes*> mail;
+  for (const auto& lane : lanes) mail.push_back(&lane->mail);
+  return mail;
+}
+
+NetworkLoop::Config Server::network_config(const Lanes& lanes) {
+  const Scene& scene = lanes.front()->scene;
+  NetworkLoop::Config config;
+  fill_random(config.secret);
+  fill_random(std::as_writable_bytes(std::span(&config.first_connection_id, 1)));
+  config.first_connection_id |= 1;  // never 0
+  if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
+  config.server_name = "tendond " + std::string(kVersion);
+  for (const auto& lane : lanes) config.devices.push_back(description_of(lane->scene, lane->device->info()));
+  config.takeover = scene.network.takeover;
+  config.max_observers = scene.network.max_observers;
+  config.controller_timeout = scene.network.controller_timeout;
+  config.observer_timeout = scene.network.observer_timeout;
+  config.adapt_state_rate = scene.network.adapt_state_rate;
   return config;
 }
 
+Server::Server(const std::vector<Scene>& scenes)
+    : started_(clock::now()),
+      lanes_(lanes_of(scenes)),
+      link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
+      network_(network_config(lanes_), link_, mail_of(lanes_)),
+      tell_next_(started_ + kTellPeriod) {
+  if (const auto& path = lanes_.front()->scene.recording) {
+    Recorder::Config config{.scene = scene_record(*lanes_.front()), .started = started_};
+    for (std::size_t i = 1; i < lanes_.size(); ++i) {
+      config.more_devices.push_back({lanes_[i]->scene.name, scene_record(*lanes_[i])});
+    }
+    sink_ = std::make_unique<FileSink>(*path);
+    recorder_ = std::make_unique<Recorder>(config, *sink_);
+  }
+}
+
+SceneRecord Server::scene_record(const Lane& lane) const {
+  return {.text = lane.scene.text,
+          .version = std::string(kVersion),
+          .commit = std::string(kCommit),
+          .unix_offset = clock::unix_offset()};
+}
+
+std::string Server::prefix(const Lane& lane) const { return lanes_.size() == 1 ? "" : lane.scene.name + ": "; }
+
 Server::~Server() {
-  if (haptic_thread_.joinable()) stop();
+  if (network_thread_.joinable()) stop();
 }
 
 void Server::start() {
   log_thread_ = std::thread([this] { run_log(); });
   network_thread_ = std::thread([this] { run_network(); });
-  haptic_thread_ = std::thread([this] { run_haptic(); });
+  for (auto& lane : lanes_) lane->thread = std::thread([this, &lane = *lane] { run_haptic(lane); });
 }
 
 Server::Summary Server::stop() {
   stop_haptic_.store(true, std::memory_order_release);
-  haptic_thread_.join();
+  for (auto& lane : lanes_) lane->thread.join();
   stop_network_.store(true, std::memory_order_release);
   stepped_.ring();
   network_thread_.join();
@@ -101,22 +136,25 @@ Server::Summary Server::stop() {
   log_thread_.join();
 
   Summary summary;
-  summary.haptic = haptic_.stats();
+  for (const auto& lane : lanes_) summary.devices.push_back({lane->scene.name, lane->haptic.stats()});
   summary.network = network_.stats();
   if (recorder_) summary.recording = recorder_->status();
   summary.uptime = clock::now() - started_;
   return summary;
 }
 
-void Server::run_haptic() {
-  for (const std::string& refused : enter_realtime(kHapticPriority)) log::warn(refused);
+void Server::run_haptic(Lane& lane) {
+  const bool first = &lane == lanes_.front().get();
+  for (const std::string& refused : enter_realtime(kHapticPriority)) {
+    if (first) log::warn(refused);  // to all of them alike
+  }
   LocalTime due = clock::now();
   while (!stop_haptic_.load(std::memory_order_acquire)) {
-    due = haptic_.step(clock::now());
+    due = lane.haptic.step(clock::now());
     stepped_.ring();
     clock::sleep_until(due);
   }
-  haptic_.stop();
+  lane.haptic.stop();
 }
 
 void Server::run_network() {
@@ -139,7 +177,7 @@ void Server::run_log() {
     const LocalTime now = clock::now();
     drain_to_recorder(now);
     if (now >= tell_next_ || last) {
-      report_trouble();
+      for (auto& lane : lanes_) report_trouble(*lane);
       tell_next_ = now + kTellPeriod;
     }
     if (!last) clock::sleep_until(now + kLogPeriod);
@@ -148,22 +186,27 @@ void Server::run_log() {
 }
 
 void Server::drain_to_recorder(LocalTime now) {
-  while (const StepRecord* step = mail_->steps.front()) {
-    if (recorder_) recorder_->record(*step);
-    mail_->steps.pop();
+  std::uint64_t steps_lost = 0;
+  for (std::size_t device = 0; device < lanes_.size(); ++device) {
+    Lane& lane = *lanes_[device];
+    while (const StepRecord* step = lane.mail.steps.front()) {
+      if (recorder_) recorder_->record(*step, device);
+      lane.mail.steps.pop();
+    }
+    const std::uint64_t lost = lane.mail.steps_lost.load(std::memory_order_relaxed);
+    steps_lost += lost - std::exchange(lane.told_steps_lost, lost);
   }
-  while (const DatagramRecord* datagram = mail_->datagrams.front()) {
+  Mailboxes& first = lanes_.front()->mail;
+  while (const DatagramRecord* datagram = first.datagrams.front()) {
     if (recorder_) recorder_->record(*datagram);
-    mail_->datagrams.pop();
+    first.datagrams.pop();
   }
-  const std::uint64_t steps = mail_->steps_lost.load(std::memory_order_relaxed);
-  const std::uint64_t datagrams = mail_->datagrams_lost.load(std::memory_order_relaxed);
-  if (steps != told_steps_lost_ || datagrams != told_datagrams_lost_) {
-    log::warn("the log thread could not follow: " + std::to_string(steps - told_steps_lost_) + " steps and " +
-              std::to_string(datagrams - told_datagrams_lost_) + " datagrams are missing");
-    if (recorder_) recorder_->lost(now, steps - told_steps_lost_, datagrams - told_datagrams_lost_);
-    told_steps_lost_ = steps;
-    told_datagrams_lost_ = datagrams;
+  const std::uint64_t lost = first.datagrams_lost.load(std::memory_order_relaxed);
+  const std::uint64_t datagrams_lost = lost - std::exchange(told_datagrams_lost_, lost);
+  if (steps_lost > 0 || datagrams_lost > 0) {
+    log::warn("the log thread could not follow: " + std::to_string(steps_lost) + " steps and " +
+              std::to_string(datagrams_lost) + " datagrams are missing");
+    if (recorder_) recorder_->lost(now, steps_lost, datagrams_lost);
   }
   if (!recorder_) return;
   recorder_->tick(now);
@@ -173,30 +216,32 @@ void Server::drain_to_recorder(LocalTime now) {
   }
 }
 
-void Server::report_trouble() {
-  const HapticLoop::Stats now = haptic_.stats();
-  if (now.overruns > told_.overruns) {
-    log::warn(std::to_string(now.overruns - told_.overruns) + " overruns in the last second; longest interval so far " +
+void Server::report_trouble(Lane& lane) {
+  const HapticLoop::Stats now = lane.haptic.stats();
+  if (now.overruns > lane.told.overruns) {
+    log::warn(prefix(lane) + std::to_string(now.overruns - lane.told.overruns) +
+              " overruns in the last second; longest interval so far " +
               std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now.longest_interval).count()) +
               " µs");
   }
-  if (mail_->flight.frozen()) {  // each fault freezes it once, and saving thaws it
-    log::error(std::string("fault: ") + describe(now.fault) + "; force is zero until a controller rearms");
-    save_flight();
+  if (lane.mail.flight.frozen()) {  // each fault freezes it once, and saving thaws it
+    log::error(prefix(lane) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");
+    save_flight(lane);
   }
-  told_ = now;
+  lane.told = now;
 }
 
-void Server::save_flight() {
-  std::filesystem::path path = scene_.recording.value_or("tendon.mcap");
-  path.replace_extension(".fault-" + std::to_string(++flights_) + ".mcap");
+void Server::save_flight(Lane& lane) {
+  std::filesystem::path path = lanes_.front()->scene.recording.value_or("tendon.mcap");
+  path.replace_extension((lanes_.size() == 1 ? "" : "." + lane.scene.name) + ".fault-" +
+                         std::to_string(++lane.flights) + ".mcap");
   try {
     FileSink sink(path);
-    write_flight(mail_->flight, recorder_config(), sink);
+    write_flight(lane.mail.flight, {.scene = scene_record(lane), .started = started_}, sink);
     log::error("the steps before the fault are in " + path.string());
   } catch (const std::exception& problem) {
     log::error(std::string("the steps before the fault are lost: ") + problem.what());
-    mail_->flight.thaw();
+    lane.mail.flight.thaw();
   }
 }
 

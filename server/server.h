@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "devices/device.h"
 #include "server/byte_sink.h"
@@ -20,26 +21,32 @@
 
 namespace tendon {
 
-/// The server: one scene's device, its two loops and its recording, each on a thread of its own.
+/// The server: a device with its haptic loop for each scene, one network loop and one recording, each on a thread of
+/// its own.
 ///
 /// | thread  | owns                         | waits for                               | may                     |
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
-/// | haptic  | HapticLoop, Device           | the absolute time of its next step      | nothing but compute     |
+/// | haptic… | HapticLoop, Device           | the absolute time of its next step      | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
 /// | log     | Recorder                     | 20 ms                                   | allocate, write, log    |
 ///
-/// They share the Mailboxes, and nothing else.
+/// They share the Mailboxes of each device, and nothing else.
 class Server {
  public:
-  struct Summary {
+  struct DeviceSummary {
+    std::string name;
     HapticLoop::Stats haptic;
+  };
+  struct Summary {
+    std::vector<DeviceSummary> devices;
     NetworkLoop::Stats network;
     std::optional<Recorder::Status> recording;  ///< empty when the scene records nothing
     Duration uptime{};
   };
 
   /// Binds the port, opens the recording, makes the device. Throws what these throw: sentences for the operator.
-  explicit Server(const Scene& scene);
+  /// Network and recording are those of the first scene.
+  explicit Server(const std::vector<Scene>& scenes);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -52,37 +59,51 @@ class Server {
   Address address() const { return link_.local_address(); }
 
  private:
-  void run_haptic();
+  /// A device and what it needs to itself.
+  struct Lane {
+    Lane(const Scene& scene, const Mailboxes::Capacities& capacities);
+    Scene scene;
+    std::unique_ptr<Device> device;
+    Mailboxes mail;
+    HapticLoop haptic;
+    std::thread thread;
+
+    // What run_log has told the operator already.
+    HapticLoop::Stats told;
+    std::uint64_t told_steps_lost = 0;
+    int flights = 0;
+  };
+  using Lanes = std::vector<std::unique_ptr<Lane>>;
+
+  static Lanes lanes_of(const std::vector<Scene>& scenes);
+  static NetworkLoop::Config network_config(const Lanes& lanes);
+  static std::vector<Mailboxes*> mail_of(const Lanes& lanes);
+  /// "left: ", where there is more than one.
+  std::string prefix(const Lane& lane) const;
+  SceneRecord scene_record(const Lane& lane) const;
+  void run_haptic(Lane& lane);
   void run_network();
   void run_log();
   void drain_to_recorder(LocalTime now);
-  void report_trouble();
-  void save_flight();
-  Recorder::Config recorder_config() const;
+  void report_trouble(Lane& lane);
+  void save_flight(Lane& lane);
 
-  Scene scene_;
   LocalTime started_;
-  std::unique_ptr<Device> device_;
-  std::unique_ptr<Mailboxes> mail_;
+  Lanes lanes_;
   UdpLink link_;
   Doorbell stepped_;
-  HapticLoop haptic_;
   NetworkLoop network_;
   std::unique_ptr<FileSink> sink_;
   std::unique_ptr<Recorder> recorder_;
 
   // What run_log has told the operator already.
-  HapticLoop::Stats told_;
-  std::uint64_t told_steps_lost_ = 0;
   std::uint64_t told_datagrams_lost_ = 0;
   bool told_recording_ended_ = false;
   LocalTime tell_next_{};
-  int flights_ = 0;
 
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};
-  std::thread haptic_thread_;
   std::thread network_thread_;
   std::thread log_thread_;
 };

@@ -17,6 +17,9 @@ namespace {
 constexpr int kValidPeriods = 3;
 constexpr Duration kMinValidFor = std::chrono::milliseconds(20);
 constexpr Duration kMaxObservedPeriod = std::chrono::milliseconds(100);
+/// A lease is asked for again when it may be over, but not at a higher rate than this: the holder renews it all the
+/// time.
+constexpr Duration kAskLeaseAgain = std::chrono::milliseconds(50);
 
 void require(bool ok, const char* sentence) {
   if (!ok) throw std::invalid_argument(sentence);
@@ -24,6 +27,8 @@ void require(bool ok, const char* sentence) {
 
 const ForceClient::Config& checked(const ForceClient::Config& config) {
   require(config.name.size() <= limits::kMaxName, "name: at most 64 bytes");
+  require(config.device.size() <= limits::kMaxLabel, "device: at most 24 bytes");
+  require(config.channel.size() <= limits::kMaxLabel, "channel: at most 24 bytes");
   require(
       config.rate_hz == 0 || (config.rate_hz >= ForceClient::kMinRateHz && config.rate_hz <= ForceClient::kMaxRateHz),
       "rate_hz: expected 0, or 0.001 to 100000");
@@ -67,7 +72,19 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
   watch_ = std::move(watch);
 }
 
-bool ForceClient::rearm() { return session_ && session_->request(Rearm{}).has_value(); }
+bool ForceClient::rearm() { return session_ && session_->request(Rearm{.device = place_.device}).has_value(); }
+
+bool ForceClient::take_lease() {
+  if (session_) asked_lease_ = session_->request(TakeLease{.device = place_.device, .channel = place_.channel});
+  return session_ && asked_lease_;
+}
+
+bool ForceClient::give_lease() {
+  ask_lease_ = LocalTime::max();
+  if (!session_ || !session_->request(GiveLease{.device = place_.device, .channel = place_.channel})) return false;
+  holds_ = false;
+  return true;
+}
 
 LocalTime ForceClient::turn(LocalTime now) {
   if (stats_.phase == Phase::kStopped) return LocalTime::max();
@@ -97,7 +114,8 @@ void ForceClient::greet(LocalTime now) {
   config.hello.version_max = kProtocolVersion;
   config.hello.role = role_;
   config.hello.name = config_.name;
-  config.hello.features = {std::string(kFeatureLocalModel)};
+  config.hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels)};
+  if (claims()) config.hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
   const Key random = secrets_.next();
   std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
   if (config_.key) config.secret = {.key = *config_.key, .ephemeral = secrets_.next()};
@@ -116,8 +134,19 @@ void ForceClient::settle(LocalTime now) {
     return;
   }
   const auto& accepted = std::get<ClientHandshake::Accepted>(outcome);
+  const auto& grants = accepted.welcome.grants;
+  if (claims() && grants.size() != 1) {
+    end(now, Phase::kRefused, Code::kUnsupported, "that server has one device, with one channel: name none");
+    return;
+  }
   handshake_.reset();
   welcome_ = accepted.welcome;
+  place_ = grants.empty() ? Grant{.device = 0, .channel = 0, .role = accepted.welcome.role} : grants.front();
+  holds_ = place_.role == Role::kController;
+  asked_lease_.reset();
+  description_.reset();
+  stats_.lease_lost_to.clear();
+  ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
   Session::Config config;
   config.connection_id = accepted.connection_id;
   if (accepted.keys) {
@@ -125,7 +154,8 @@ void ForceClient::settle(LocalTime now) {
   } else {
     session_.emplace(config, now);
   }
-  if (config_.state_hz > 0) session_->request(SetStateRate{config_.state_hz});
+  if (claims()) session_->request(Describe{.device = place_.device});
+  if (config_.state_hz > 0) session_->request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
   sequence_ = 0;
   if (config_.deadband) deadband_.emplace(*config_.deadband);  // what another session was sent, this one was not
   stats_.phase = Phase::kOpen;
@@ -139,6 +169,7 @@ void ForceClient::end(LocalTime now, Phase phase, Code code, std::string reason)
   stats_.reason = std::move(reason);
   handshake_.reset();
   session_.reset();
+  holds_ = false;
   unseen_.reset();
   retry_ = now + back_off_;
   back_off_ = std::min(2 * back_off_, config_.retry_max);
@@ -173,6 +204,7 @@ void ForceClient::tick(LocalTime now) {
   if (session_) {
     session_->tick(now);
     take_events(now);
+    if (session_ && now >= ask_lease_ && !asked_lease_ && !take_lease()) ask_lease_ = now + kAskLeaseAgain;
   } else if (handshake_) {
     if (now >= give_up_) {
       end(now, Phase::kUnanswered, Code::kTimedOut, "no answer from " + to_string(server_));
@@ -193,12 +225,39 @@ void ForceClient::take_events(LocalTime now) {
       if (unseen_) ++stats_.states_skipped;
       unseen_ = arrived->state;
       back_off_ = config_.retry_min;
+    } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&*event)) {
+      take_answer(now, *answered);
+    } else if (const auto* asked = std::get_if<Session::RequestArrived>(&*event)) {
+      take_request(now, *asked);
     } else if (const auto* closed = std::get_if<Session::Closed>(&*event)) {
       const bool for_good = closed->code == Code::kReplaced;
       flush(now);  // a Bye of our own
       end(now, for_good ? Phase::kStopped : Phase::kLost, closed->code, closed->reason);
     }
   }
+}
+
+void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& answered) {
+  if (answered.device) description_ = answered.device;
+  if (answered.id != asked_lease_) return;
+  asked_lease_.reset();
+  holds_ = answered.code == Code::kOk;
+  ask_lease_ = LocalTime::max();
+  if (holds_) {
+    stats_.lease_lost_to.clear();
+  } else if (config_.take_lease && answered.code == Code::kBusy) {
+    ask_lease_ = now + std::max(answered.wait, kAskLeaseAgain);
+  }
+}
+
+void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arrived) {
+  const auto* lost = std::get_if<LeaseLost>(&arrived.request);
+  if (lost == nullptr) return session_->answer(arrived.id, Code::kUnsupported, "that is a client's to ask");
+  session_->answer(arrived.id, Code::kOk, {});
+  if (lost->device != place_.device || lost->channel != place_.channel) return;
+  holds_ = false;
+  stats_.lease_lost_to = lost->to;
+  if (config_.take_lease) ask_lease_ = now + kAskLeaseAgain;
 }
 
 void ForceClient::flush(LocalTime now) {
@@ -213,7 +272,7 @@ void ForceClient::flush(LocalTime now) {
 
 /// True when a force now waits to be sent.
 bool ForceClient::call(LocalTime now) {
-  if (!unseen_ || now < next_call_) return false;
+  if (!unseen_ || now < next_call_ || (physics_ && !holds_)) return false;
   next_call_ += period_;
   if (next_call_ <= now) next_call_ = now + period_;
   const DeviceState state = *std::exchange(unseen_, std::nullopt);
@@ -245,6 +304,8 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
   command.sequence = ++sequence_;
   command.based_on_tick = answered.tick;
   command.force = touch.force;
+  command.device = place_.device;
+  command.channel = place_.channel;
   const auto& agreed = welcome_->features;
   const bool with_model = std::find(agreed.begin(), agreed.end(), kFeatureLocalModel) != agreed.end();
   if (touch.stiffness && with_model) command.model = LocalModel{answered.position, *touch.stiffness};
@@ -265,7 +326,11 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
 }
 
 LocalTime ForceClient::next_turn() const {
-  if (session_) return unseen_ ? std::min(next_call_, session_->next_tick()) : session_->next_tick();
+  if (session_) {
+    LocalTime next = session_->next_tick();
+    if (unseen_ && (!physics_ || holds_)) next = std::min(next, next_call_);
+    return asked_lease_ ? next : std::min(next, ask_lease_);
+  }
   if (handshake_) return std::min(give_up_, handshake_->next_tick());
   return retry_;
 }

@@ -63,7 +63,13 @@ class ForceClient {
  public:
   struct Config {
     std::string name = "guest";  ///< for the server's log; at most limits::kMaxName bytes
-    double rate_hz = 0;          ///< calls per second, kMinRateHz … kMaxRateHz; 0 = one for every new state
+    /// Of several devices and channels of a server, by their names; empty: the first one.
+    std::string device{};
+    std::string channel{};
+    /// Where another controller holds the channel's lease: ask for it until we have it. It is asked again when the
+    /// server says that the lease may be over.
+    bool take_lease = false;
+    double rate_hz = 0;  ///< calls per second, kMinRateHz … kMaxRateHz; 0 = one for every new state
     /// States per second to ask the server for, 0 … limits::kMaxLoopHz; 0 = what the server gives by itself.
     std::uint32_t state_hz = 0;
     /// How long the server may take a force as fresh, counted from its arrival; at most
@@ -121,6 +127,7 @@ class ForceClient {
     std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
     std::uint64_t forces_alike = 0;     ///< forces not sent: a hand could not have told them from the one before
     std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
+    std::string lease_lost_to;          ///< name of the one that has taken the channel from us; empty: nobody
   };
 
   /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves
@@ -138,6 +145,12 @@ class ForceClient {
   /// there is no session to ask in, or too many requests are open.
   bool rearm();
 
+  /// Whether the channel takes our forces; while it does not, the callback is not called.
+  bool holds() const noexcept { return holds_; }
+  /// Asks for the channel's lease, once, or gives it up. False as for rearm().
+  bool take_lease();
+  bool give_lease();
+
   /// Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing.
   void stop(LocalTime now);
 
@@ -146,6 +159,8 @@ class ForceClient {
 
   /// What the server said of itself and its device when the newest session opened; empty before that.
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
+  /// What the device is and can do, when we have named a device or a channel and the server has answered; empty before.
+  const std::optional<DeviceDescription>& description() const noexcept { return description_; }
 
  private:
   ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now);
@@ -154,7 +169,10 @@ class ForceClient {
   void settle(LocalTime now);
   void end(LocalTime now, Phase phase, Code code, std::string reason);
   bool drain(LocalTime now);
+  bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
   void take_events(LocalTime now);
+  void take_answer(LocalTime now, const Session::RequestAnswered& answered);
+  void take_request(LocalTime now, const Session::RequestArrived& arrived);
   void tick(LocalTime now);
   void flush(LocalTime now);
   bool call(LocalTime now);
@@ -174,9 +192,14 @@ class ForceClient {
   std::optional<ClientHandshake> handshake_;
   std::optional<Session> session_;
   std::optional<Welcome> welcome_;
-  LocalTime give_up_{};  ///< end of the present attempt's patience
-  LocalTime retry_{};    ///< when the next attempt begins
-  Duration back_off_{};  ///< wait before the attempt after that
+  std::optional<DeviceDescription> description_;
+  Grant place_;  ///< the numbers of our device and channel
+  bool holds_ = false;
+  std::optional<std::uint32_t> asked_lease_;  ///< the request that waits for its answer
+  LocalTime ask_lease_ = LocalTime::max();  ///< when to ask (again)
+  LocalTime give_up_{};                     ///< end of the present attempt's patience
+  LocalTime retry_{};                       ///< when the next attempt begins
+  Duration back_off_{};                     ///< wait before the attempt after that
 
   std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
   LocalTime next_call_{};

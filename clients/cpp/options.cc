@@ -71,6 +71,11 @@ CommandLine::CommandLine(std::string purpose, Options& options)
          "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
       ->type_name("FILE")
       ->check(CLI::Validator(check_key, ""));
+  app.add_option("--device", options.client.device, "Name of the device, of a server with several")->type_name("NAME");
+  app.add_option("--channel", options.client.channel, "Name of the device's channel that is to take the forces")
+      ->type_name("NAME");
+  app.add_flag("--take-lease", options.client.take_lease,
+               "Where another client holds the channel: ask for it until it is ours");
   app.add_option("--rate-hz", options.client.rate_hz, "Times per second; 0 = for every device state that arrives")
       ->capture_default_str()
       ->check(number(ForceClient::kMinRateHz, ForceClient::kMaxRateHz));

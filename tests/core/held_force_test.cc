@@ -160,7 +160,7 @@ TEST(HeldForce, NoEngineIsBelievedForLongerThanTheLimit) {
 TEST(HeldForce, ReleaseEndsValidityAtOnce) {
   HeldForce held(without_ramp());
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0), milliseconds(400)));
-  held.release(LocalTime(milliseconds(10)));
+  held.release(0, LocalTime(milliseconds(10)));
   EXPECT_EQ(held.wanted(at(milliseconds(11))).mode, Mode::kHolding);
   EXPECT_EQ(held.wanted(at(milliseconds(100))).mode, Mode::kDecaying);
 }

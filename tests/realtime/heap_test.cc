@@ -53,8 +53,10 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
       force.force = Vec3(state->position.x() > 0 ? -2000 * state->position.x() : 0, 0, 0);
       if (i % 20 == 0) force.model = LocalModel{state->position, Mat3(Vec3(2000, 0, 0).asDiagonal())};
       force.valid_for = milliseconds(i % 500'000 < 250'000 ? 30 : 1);
-      mail->force.put(force);
-      if (i % 100'000 == 0) mail->orders.try_push(i % 200'000 == 0 ? HapticOrder::kRearm : HapticOrder::kRelease);
+      mail->forces[0].put(force);
+      if (i % 100'000 == 0) {
+        mail->orders.try_push({i % 200'000 == 0 ? HapticOrder::Kind::kRearm : HapticOrder::Kind::kRelease});
+      }
     }
     {
       const HeapGuard guard;

@@ -74,8 +74,15 @@ class SealedServer : public testing::Test {
 
   void restart(NetworkLoop::Config config) {
     config.secret.fill(std::byte{7});
-    config.device_name = "device";
-    loop_ = std::make_unique<NetworkLoop>(config, server_, *mail_);
+    if (config.devices.empty()) {
+      config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
+    }
+    std::vector<Mailboxes*> mail = {mail_.get()};
+    if (config.devices.size() > 1) {
+      second_ = std::make_unique<Mailboxes>(Mailboxes::Capacities{.datagrams = 1});
+      mail.push_back(second_.get());
+    }
+    loop_ = std::make_unique<NetworkLoop>(config, server_, mail);
   }
 
   static ForceClient::Config config_of(const std::optional<ClientKey>& key, std::uint64_t seed) {
@@ -107,6 +114,10 @@ class SealedServer : public testing::Test {
       state.tick = ++tick_;
       state.sampled = PeerTime(now_.time_since_epoch());
       mail_->state.put(state);
+      if (second_) {
+        state.device = 1;
+        second_->state.put(state);
+      }
       loop_->turn(now_);
       for (Client* client : clients) client->client->turn(now_);
       for (const std::size_t count = wire_.size(); count_ < count; ++count_) {
@@ -133,6 +144,7 @@ class SealedServer : public testing::Test {
   std::size_t count_ = 0;  ///< of the wire, delivered
   End server_{wire_, parse_address("192.0.2.100:47100")};
   std::unique_ptr<Mailboxes> mail_ = std::make_unique<Mailboxes>();
+  std::unique_ptr<Mailboxes> second_;  ///< of a second device
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
   std::uint64_t seed_ = 10;
@@ -287,6 +299,126 @@ TEST_F(SealedServer, AReplayFromElsewhereDoesNotLeadItsAnswersAway) {
     if (wire_[i].to == thief) to_thief += wire_[i].bytes.size() > 48 ? 1U : 0U;
   }
   EXPECT_EQ(to_thief, 0U);
+}
+
+/// A server with a device "left" of one channel, and a device "right" of two, the second of which has a lease.
+class TwoDevices : public SealedServer {
+ protected:
+  TwoDevices() {
+    NetworkLoop::Config config;
+    config.keys = {wall_, other_, screen_};
+    config.takeover = {"other"};
+    config.devices = {
+        {.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
+        {.name = "right",
+         .model = "device",
+         .loop_hz = 1000,
+         .channels = {{.name = "guidance"},
+                      {.name = "tissue", .rule = ChannelRule::kPriority, .lease = milliseconds(500), .holder = {}}}}};
+    restart(config);
+  }
+
+  Client controller_of(const ClientKey& key, const std::string& address, const std::string& device,
+                       const std::string& channel, bool take_lease = false) {
+    Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
+    ForceClient::Config config = config_of(key, ++seed_);
+    config.device = device;
+    config.channel = channel;
+    config.take_lease = take_lease;
+    client.client = std::make_unique<ForceClient>(
+        *client.end, server_.self, config, [](const DeviceState&) { return Touch(Vec3(1, 0, 0)); }, now_);
+    return client;
+  }
+  NetworkLoop::Stats::Channel tissue() const { return loop_->stats().channels.at(2); }
+};
+
+TEST_F(TwoDevices, GivesEachEngineItsDeviceAndItsChannel) {
+  Client left = controller(wall_, "192.0.2.1:4000");  // knows of nothing but "the device"
+  Client right = controller_of(other_, "192.0.2.2:4000", "right", "guidance");
+  run(seconds(1), {&left, &right});
+  const auto channels = loop_->stats().channels;
+  ASSERT_EQ(channels.size(), 3U);
+  EXPECT_GT(channels[0].forces, 500U);
+  EXPECT_GT(channels[1].forces, 500U);
+  EXPECT_EQ(channels[2].forces, 0U);
+  EXPECT_EQ(channels[0].holder, "wall");
+  EXPECT_EQ(channels[1].holder, "other");
+  EXPECT_EQ(loop_->stats().denied, 0U);
+  EXPECT_NE(mail_->forces[0].take(), nullptr);
+  EXPECT_NE(second_->forces[0].take(), nullptr);
+  EXPECT_EQ(second_->forces[1].take(), nullptr);
+  ASSERT_TRUE(right.client->description().has_value());
+  EXPECT_EQ(right.client->description()->name, "right");
+  EXPECT_EQ(right.client->description()->channels.at(0).holder, "other");
+}
+
+TEST_F(TwoDevices, RefusesWhatIsNotThereAndSaysWhatIs) {
+  Client a = controller_of(wall_, "192.0.2.1:4000", "middle", "");
+  run(milliseconds(50), {&a});
+  EXPECT_EQ(a.client->stats().code, Code::kInvalid);
+  EXPECT_EQ(a.client->stats().reason, "there is no device \"middle\", but \"left\", \"right\"");
+  Client b = controller_of(wall_, "192.0.2.2:4000", "right", "bone");
+  run(milliseconds(50), {&b});
+  EXPECT_EQ(b.client->stats().reason, "there is no channel \"bone\", but \"guidance\", \"tissue\"");
+}
+
+TEST_F(TwoDevices, ALeaseIsTakenFromAHolderThatHasFallenSilentAndNotBefore) {
+  Client first = controller_of(other_, "192.0.2.1:4000", "right", "tissue");
+  run(milliseconds(300), {&first});
+  EXPECT_TRUE(first.client->holds());
+  Client second = controller_of(wall_, "192.0.2.2:4000", "right", "tissue", true);
+  run(seconds(2), {&first, &second});
+  EXPECT_FALSE(second.client->holds());
+  EXPECT_EQ(phase(second), Phase::kOpen);
+  EXPECT_EQ(second.client->stats().forces, 0U);
+  EXPECT_EQ(tissue().holder, "other");
+
+  const LocalTime silent = now_;  // its session lives on for 2 s, but nothing comes from it
+  run(milliseconds(400), {&second});
+  EXPECT_EQ(tissue().holder, "other");
+  while (!second.client->holds() && now_ - silent < seconds(1)) run(milliseconds(10), {&second});
+  EXPECT_TRUE(second.client->holds());
+  EXPECT_GE(now_ - silent, milliseconds(500));
+  EXPECT_EQ(tissue().handovers, 1U);
+  run(milliseconds(300), {&first, &second});
+  EXPECT_FALSE(first.client->holds()) << "it was told that it has lost the lease";
+  EXPECT_EQ(first.client->stats().lease_lost_to, "wall");
+  EXPECT_EQ(phase(first), Phase::kOpen);
+  EXPECT_EQ(tissue().holder, "wall");
+}
+
+TEST_F(TwoDevices, WhoMayTakeOverNeedNotWait) {
+  Client first = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
+  run(milliseconds(300), {&first});
+  Client second = controller_of(other_, "192.0.2.2:4000", "right", "tissue", true);
+  run(milliseconds(100), {&first, &second});
+  EXPECT_TRUE(second.client->holds());
+  EXPECT_FALSE(first.client->holds());
+  const std::uint64_t forces = first.client->stats().forces;
+  run(milliseconds(300), {&first, &second});
+  EXPECT_EQ(first.client->stats().forces, forces) << "the loser sends no more";
+  EXPECT_EQ(tissue().handovers, 1U);
+}
+
+TEST_F(TwoDevices, AGivenLeaseIsFree) {
+  Client first = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
+  run(milliseconds(300), {&first});
+  EXPECT_TRUE(first.client->give_lease());
+  run(milliseconds(50), {&first});
+  EXPECT_FALSE(first.client->holds());
+  EXPECT_EQ(tissue().holder, "");
+  EXPECT_TRUE(first.client->take_lease());
+  run(milliseconds(50), {&first});
+  EXPECT_TRUE(first.client->holds());
+}
+
+TEST_F(TwoDevices, AChannelWithoutALeaseIsNotTakenFromItsHolder) {
+  Client first = controller_of(wall_, "192.0.2.1:4000", "right", "guidance");
+  run(milliseconds(300), {&first});
+  Client second = controller_of(other_, "192.0.2.2:4000", "right", "guidance", true);
+  run(milliseconds(100), {&first, &second});
+  EXPECT_EQ(second.client->stats().code, Code::kBusy);
+  EXPECT_TRUE(first.client->holds());
 }
 
 TEST_F(SealedServer, ASessionThatHasReachedItsAgeIsBegunAgainByItsClient) {

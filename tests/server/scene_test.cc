@@ -422,7 +422,7 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
       {"[limitre]\n", "s.toml:4: limitre: unknown table; did you mean limiter?"},
       {"[recording]\nfilename = \"x\"\n", "s.toml:5: recording.filename: unknown key; known here: path"},
       {"[device.gravity]\n",
-       "s.toml:4: device.gravity: unknown table; known here: kind, profile, start_position_mm, effects, hand"},
+       "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n",
        "s.toml:5: loop." + std::string(10'000, 'x') + ": unknown key; known here: period_us, longest_hold_us"},
   });
@@ -445,7 +445,8 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
         << error_of(text);
   }
   EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
-            "s.toml:4: other: unknown table; known here: device, loop, limiter, admittance, force, network, recording");
+            "s.toml:4: other: unknown table; known here: device, loop, limiter, admittance, force, channel, network, "
+            "recording");
 }
 
 TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
@@ -457,7 +458,7 @@ TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
 TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
   EXPECT_EQ(error_of_minimal_and("[network]\nzzzzzz = 1\n[loop]\naaaaaa = 1\n"),
             "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, max_observers, controller_timeout_ms, "
-            "observer_timeout_ms, adapt_state_rate");
+            "observer_timeout_ms, adapt_state_rate, takeover");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
             "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found \"x\"");
 }
@@ -679,7 +680,8 @@ TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
   std::string deep = "[a";
   while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
   EXPECT_EQ(error_of(deep + "]\n"),
-            "s.toml:1: a: unknown table; known here: device, loop, limiter, admittance, force, network, recording");
+            "s.toml:1: a: unknown table; known here: device, loop, limiter, admittance, force, channel, network, "
+            "recording");
   EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
 }
 
@@ -701,6 +703,66 @@ TEST(ShippedScenes, AdmittanceIsAHeavyDeviceThatMovesAsATool) {
   const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "admittance.toml");
   EXPECT_TRUE(scene.device.force_sensor);
   EXPECT_TRUE(scene.loop.control.admittance);
+}
+
+TEST(Scene, HasOneChannelForAllWhoNameNone) {
+  const Scene scene = minimal_and("");
+  ASSERT_EQ(scene.channels.size(), 1U);
+  EXPECT_EQ(scene.channels[0].name, "main");
+  EXPECT_EQ(scene.channels[0].lease, Duration::zero());
+  EXPECT_EQ(scene.loop.control.channels, std::vector{ChannelRule::kSum});
+  EXPECT_EQ(scene.name, "s") << "that of the file";
+}
+
+TEST(Scene, ListsItsChannelsInOrder) {
+  const Scene scene = minimal_and(
+      "name = \"left-hand\"\n[[channel]]\nname = \"wall\"\n[[channel]]\nname = \"tissue\"\nrule = \"priority\"\n"
+      "lease_ms = 500\n[network]\ntakeover = [\"surgeon\"]\n");
+  EXPECT_EQ(scene.name, "left-hand");
+  ASSERT_EQ(scene.channels.size(), 2U);
+  EXPECT_EQ(scene.channels[0].name, "wall");
+  EXPECT_EQ(scene.channels[1].name, "tissue");
+  EXPECT_EQ(scene.channels[1].lease, std::chrono::milliseconds(500));
+  EXPECT_EQ(scene.loop.control.channels, (std::vector{ChannelRule::kSum, ChannelRule::kPriority}));
+  EXPECT_EQ(scene.network.takeover, std::vector<std::string>{"surgeon"});
+}
+
+TEST(SceneError, OfAChannelHasItsLine) {
+  EXPECT_EQ(error_of_minimal_and("[[channel]]\nname = \"a\"\n[[channel]]\nname = \"a\"\n"),
+            "s.toml:7: channel[1].name: expected a name of its own, found \"a\" again");
+  EXPECT_EQ(error_of_minimal_and("[[channel]]\nrule = \"sum\"\n"),
+            "s.toml:4: channel[0].name: missing, expected a name of 1 to 24 letters, digits, - or _");
+  EXPECT_EQ(error_of_minimal_and("[channel]\nname = \"a\"\n"),
+            "s.toml:4: channel: expected 1 to 8 tables [[channel]], found a table");
+  std::string nine;
+  for (int i = 0; i < 9; ++i) nine += "[[channel]]\nname = \"c" + std::to_string(i) + "\"\n";
+  EXPECT_EQ(error_of_minimal_and(nine), "s.toml:4: channel: expected 1 to 8 tables [[channel]], found an array of 9");
+}
+
+TEST(Scene, SeveralMakeOneServerWhoseNetworkIsTheFirstOnes) {
+  const std::filesystem::path shipped(TENDON_SCENES);
+  const auto scenes = read_scenes({shipped / "left.toml", shipped / "right.toml"});
+  ASSERT_EQ(scenes.size(), 2U);
+  EXPECT_EQ(scenes[0].name, "left");
+  EXPECT_EQ(scenes[1].name, "right");
+  EXPECT_EQ(scenes[1].loop.device, 1U);
+  const auto error_of_both = [&](const std::filesystem::path& second) -> std::string {
+    try {
+      read_scenes({shipped / "left.toml", second});
+    } catch (const SceneError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_TRUE(error_of_both(shipped / "left.toml").ends_with("expected a name of its own, found \"left\" again"));
+  EXPECT_NE(error_of_both(shipped / "demo.toml").find("recording: expected in the first scene only"),
+            std::string::npos);
+}
+
+TEST(ShippedScenes, TwoEnginesShareADevice) {
+  const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "two-engines.toml");
+  EXPECT_EQ(scene.loop.control.channels,
+            (std::vector{ChannelRule::kSum, ChannelRule::kPriority, ChannelRule::kPriority}));
 }
 
 TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {

@@ -51,15 +51,19 @@ World::World(const Config& config, Device& device)
           [&] {
             NetworkLoop::Config network;
             for (std::byte& b : network.secret) b = static_cast<std::byte>(random_());
-            network.device_name = device.info().name;
-            network.max_force = config.loop.control.max_force;
-            network.position_resolution = device.info().position_resolution;
-            network.haptic_period = config.loop.period;
+            DeviceDescription about;
+            about.name = "device";
+            about.model = device.info().name;
+            about.max_force = config.loop.control.max_force;
+            about.position_resolution = device.info().position_resolution;
+            about.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(config.loop.period)));
+            about.channels = {{.name = "main"}};
+            network.devices = {about};
             network.max_observers = config.max_observers;
             network.adapt_state_rate = config.adapt_state_rate;
             return network;
           }(),
-          network_.server(), *mail_),
+          network_.server(), {mail_.get()}),
       haptic_due_(now_),
       network_due_(now_),
       record_due_(config.record ? now_ : LocalTime::max()) {

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Several engines on one device and several devices on one server, each a process of its own. Nothing here measures a
+// time.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+/// A hand that rests inside a wall at x > 0.
+constexpr std::string_view kRestingHand = R"([device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 300
+)";
+
+/// Waits until the force along x is below −`at_least`, N.
+void wait_until_felt(Process& echo, double at_least) {
+  watch_force(echo, [at_least](double force) { return force < -at_least; });
+}
+
+TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
+  const ScratchFolder folder;
+  const auto scene = folder.path() / "device.toml";
+  write(scene, std::string(kRestingHand) + "[[channel]]\nname = \"one\"\n[[channel]]\nname = \"two\"\n");
+  Server server(folder.path(), scene);
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  Client one("virtual_wall", server.address(), folder.path(), {"--stiffness-n-per-m", "150"});
+  wait_until_felt(echo, 0.3);
+  Client two("virtual_wall", server.address(), folder.path(), {"--channel", "two", "--stiffness-n-per-m", "150"});
+  two.wait_for_line("connected");
+  // Alone, 150 N/m against a grip of 300 N/m meet at 15 mm / 3: 1.5 N. Together, 300 N/m: at 7.5 mm, 2.25 N.
+  wait_until_felt(echo, 1.9);
+  const std::string end = server.stop();
+  EXPECT_NE(end.find(R"("name":"one","forces":)"), std::string::npos) << end;
+  EXPECT_EQ(end.find(R"("forces":0)"), std::string::npos) << "both channels had forces: " << end;
+  EXPECT_EQ(count_in(end, "denied"), 0U);
+}
+
+TEST(Engines, ALeaseIsTakenFromAnEngineThatHangs) {
+  const ScratchFolder folder;
+  const auto scene = folder.path() / "device.toml";
+  write(scene, std::string(kRestingHand) +
+                   "[[channel]]\nname = \"tissue\"\nlease_ms = 300\n[network]\ncontroller_timeout_ms = 60000\n");
+  Server server(folder.path(), scene);
+  Client first("virtual_wall", server.address(), folder.path(), {"--channel", "tissue"});
+  first.wait_for_line("connected");
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  wait_until_felt(echo, 0.5);
+  Client second("virtual_wall", server.address(), folder.path(), {"--channel", "tissue", "--take-lease"});
+  second.wait_for_line("connected");
+  first.signal(SIGSTOP);  // its session lives on for a minute
+  server.process().wait_for_line("takes device/tissue from");
+  wait_until_felt(echo, 0.5);
+  first.signal(SIGCONT);
+  const std::string end = server.stop();
+  EXPECT_EQ(count_in(end, "handovers"), 1U);
+  EXPECT_EQ(count_in(end, "welcomed"), 3U);
+}
+
+TEST(Engines, TwoDevicesEachHaveTheirOwnHandAndEngine) {
+  const ScratchFolder folder;
+  const auto left = folder.path() / "left.toml";
+  const auto right = folder.path() / "right.toml";
+  write(left, kRestingHand);
+  write(right, kRestingHand);
+  Server server(folder.path(), left, {right.string()});
+  Client left_echo("echo_motion", server.address(), folder.path(), {"--json"});
+  Client right_echo("echo_motion", server.address(), folder.path(), {"--json", "--device", "right"});
+  Client wall("virtual_wall", server.address(), folder.path(), {"--device", "right"});
+  wait_until_felt(right_echo, 0.5);
+  Client other("virtual_wall", server.address(), folder.path());  // the first device
+  wait_until_felt(left_echo, 0.5);
+  const std::string end = server.stop();
+  EXPECT_NE(end.find(R"({"name":"left","steps":)"), std::string::npos) << end;
+  EXPECT_NE(end.find(R"({"name":"right","steps":)"), std::string::npos) << end;
+  EXPECT_EQ(end.find(R"("forces":0)"), std::string::npos) << "both devices had forces: " << end;
+}
+
+}  // namespace
+}  // namespace tendon::e2e
