@@ -397,6 +397,7 @@ TEST_F(TwoDevices, WhoMayTakeOverNeedNotWait) {
   const std::uint64_t forces = first.client->stats().forces;
   run(milliseconds(300), {&first, &second});
   EXPECT_EQ(first.client->stats().forces, forces) << "the loser sends no more";
+  EXPECT_GT(loop_->stats().denied, 0U) << "and what it sent before it knew was not taken";
   EXPECT_EQ(tissue().handovers, 1U);
 }
 
