@@ -54,12 +54,17 @@ CLI::Validator number(double least, double most) {
 struct CommandLine::Parser {
   CLI::App app;
   Options& options;
+
+  void set_example(const std::string& argument) {
+    app.footer("Example: " + options.client.name + argument + " --server " + to_string(options.server) +
+               " --duration-s 10");
+  }
 };
 
 CommandLine::CommandLine(std::string purpose, Options& options)
     : parser_(new Parser{CLI::App(std::move(purpose), options.client.name), options}) {
   CLI::App& app = parser_->app;
-  app.footer("Example: " + options.client.name + " --server " + to_string(options.server) + " --duration-s 10");
+  parser_->set_example("");
   app.set_help_flag("-h,--help", "Print this and leave");
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { options.server = parse_address(text); }, "Where tendond listens")
@@ -87,6 +92,11 @@ CommandLine::CommandLine(std::string purpose, Options& options)
 }
 
 CommandLine::~CommandLine() = default;
+
+void CommandLine::add_argument(const std::string& name, std::string& value, const std::string& meaning) {
+  parser_->app.add_option(name, value, meaning)->required();
+  parser_->set_example(" " + name);
+}
 
 void CommandLine::add(const std::string& name, double& value, const std::string& meaning) {
   parser_->app.add_option(name, value, meaning)

@@ -20,6 +20,8 @@ class CommandLine {
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
 
+  /// What must be given, without a name before it: "SCENE".
+  void add_argument(const std::string& name, std::string& value, const std::string& meaning);
   /// A number ≥ 0: "--stiffness-n-per-m".
   void add(const std::string& name, double& value, const std::string& meaning);
   /// A switch: "--local-model".

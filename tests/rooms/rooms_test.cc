@@ -63,6 +63,8 @@ TEST(Rooms, AGuestSeesProtocolAndItsOwnFolder) {
             Places{});
   EXPECT_EQ(places("clients/cpp/a.cc", kLicence + "#include \"core/z.h\"\n#include \"clients/softbody/z.h\"\n"),
             (Places{"clients/cpp/a.cc:2", "clients/cpp/a.cc:3"}));
+  EXPECT_EQ(places("clients/softbody/a.cc", kLicence + "#include \"clients/cpp/z.h\"\n#include \"clients/dash/z.h\"\n"),
+            Places{"clients/softbody/a.cc:3"});
 }
 
 TEST(Rooms, TestsSeeAll) {

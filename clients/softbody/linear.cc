@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/linear.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace tendon::softbody {
+namespace {
+
+Factor factor_of(const Solid& solid) {
+  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
+  SymmetricMatrix stiffness = solid.pattern();
+  solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, stiffness);
+  Factor factor(stiffness);
+  if (!factor.factorize(stiffness)) {
+    throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
+  }
+  return factor;
+}
+
+/// 1 N against the normal, shared by the patch's nodes.
+VectorXd load(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes, const VectorXd& weights) {
+  VectorXd all = VectorXd::Zero(solid.size());
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    all.segment<3>(3 * nodes[static_cast<std::size_t>(i)]) = -weights[i] * normal;
+  }
+  return solid.to_free(all);
+}
+
+/// How deep each node of the patch is under 1 N → the reaction of a linear body.
+Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value) {
+  const double compliance = patch.weights.dot(depth_per_newton);
+  Reaction reaction;
+  reaction.stiffness = 1 / compliance;
+  reaction.force = given == Given::kForce ? value : value / compliance;
+  reaction.depth = given == Given::kDepth ? value : value * compliance;
+  reaction.slope = reaction.force * (patch.slopes * depth_per_newton);
+  return reaction;
+}
+
+}  // namespace
+
+LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface)
+    : solid_(solid), normal_(surface.normal()), factor_(factor_of(solid)) {}
+
+VectorXd LinearModel::displacements(const Patch& patch) const {
+  return factor_.solve(load(solid_, normal_, patch.nodes, patch.weights));
+}
+
+Reaction LinearModel::press(const Patch& patch, Given given, double value) {
+  VectorXd all = VectorXd::Zero(solid_.size());
+  solid_.add_free(displacements(patch), all);
+  VectorXd depth(patch.weights.size());
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    depth[i] = -normal_.dot(all.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
+  }
+  return linear_reaction(patch, depth, given, value);
+}
+
+CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
+    : nodes_(nodes), row_of_(solid.mesh().nodes.size(), -1) {
+  const Factor factor = factor_of(solid);
+  const auto count = static_cast<Eigen::Index>(nodes_.size());
+  for (Eigen::Index i = 0; i < count; ++i) row_of_[at(nodes_[static_cast<std::size_t>(i)])] = static_cast<int>(i);
+  table_.resize(count, count);
+  constexpr Eigen::Index kAtOnce = 64;  // columns: CHOLMOD's blocks are then products of matrices
+  for (Eigen::Index first = 0; first < count; first += kAtOnce) {
+    const Eigen::Index some = std::min(kAtOnce, count - first);
+    MatrixXd loads(solid.free_count(), some);
+    for (Eigen::Index j = 0; j < some; ++j) {
+      loads.col(j) = load(solid, surface.normal(), {nodes_[static_cast<std::size_t>(first + j)]}, VectorXd::Ones(1));
+    }
+    // The same functional reads the depth that wrote the load: the table is symmetric by its making.
+    const MatrixXd solution = factor.solve(loads);
+    for (Eigen::Index j = 0; j < some; ++j) {
+      VectorXd all = VectorXd::Zero(solid.size());
+      solid.add_free(solution.col(j), all);
+      for (Eigen::Index i = 0; i < count; ++i) {
+        table_(i, first + j) = -surface.normal().dot(all.segment<3>(3 * nodes_[static_cast<std::size_t>(i)]));
+      }
+    }
+  }
+  table_ = 0.5 * (table_ + table_.transpose()).eval();
+}
+
+Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
+  rows_.clear();
+  for (const int node : patch.nodes) {
+    const int row = row_of_.at(at(node));
+    if (row < 0) throw std::out_of_range("the patch leaves the part of the body that was condensed");
+    rows_.push_back(row);
+  }
+  const auto size = patch.weights.size();
+  VectorXd depth = VectorXd::Zero(size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    const double weight = patch.weights[j];
+    const double* const column = table_.col(rows_[static_cast<std::size_t>(j)]).data();
+    for (Eigen::Index i = 0; i < size; ++i) depth[i] += weight * column[rows_[static_cast<std::size_t>(i)]];
+  }
+  return linear_reaction(patch, depth, given, value);
+}
+
+std::size_t CondensedModel::bytes() const noexcept {
+  return static_cast<std::size_t>(table_.size()) * sizeof(double) + (nodes_.size() + row_of_.size()) * sizeof(int);
+}
+
+}  // namespace tendon::softbody

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/scene.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <vector>
+
+namespace tendon::softbody {
+namespace {
+
+/// toml++ recurses, so that a small file of brackets could overflow the stack.
+constexpr std::uintmax_t kMaxSceneBytes = 16'384;
+constexpr double kMaxLength = 1e3;  // m: whoever writes more has mistaken the unit
+constexpr std::int64_t kMaxCells = 200;
+
+struct EffectInfo {
+  std::string_view name;
+  std::string_view what;
+};
+constexpr std::array kEffects{
+    EffectInfo{"contact", "the tool can touch the body"},
+    EffectInfo{"geometric-nonlinearity", "large rotations"},
+    EffectInfo{"material-nonlinearity", "large strains"},
+};
+
+template <class Infos>
+std::string names(const Infos& infos) {
+  std::string all;
+  for (const auto& each : infos) all.append(all.empty() ? "" : ", ").append(each.name);
+  return all;
+}
+
+/// A table of a scene. Every key that is asked for is known; at the end, those that were never asked for are wrong.
+class Table {
+ public:
+  Table(const toml::table& table, std::string path, const std::string& file)
+      : table_(table), path_(std::move(path)), file_(file) {}
+
+  [[noreturn]] void fail(const toml::node& node, std::string_view key, const std::string& what) const {
+    std::ostringstream text;
+    text << file_ << ':' << node.source().begin.line << ": " << path_ << key << ": " << what;
+    throw SceneError(text.str());
+  }
+
+  const toml::node* find(std::string_view key) {
+    known_.emplace(key);
+    return table_.get(key);
+  }
+
+  const toml::node& need(std::string_view key, std::string_view expected) {
+    if (const toml::node* node = find(key)) return *node;
+    missing(key, expected);
+  }
+
+  [[noreturn]] void missing(std::string_view key, std::string_view expected) {
+    throw SceneError(file_ + ": " + path_ + std::string(key) + ": expected " + std::string(expected) +
+                     ", found nothing");
+  }
+
+  /// A number above `least` (or equal to it, with `or_equal`) and not above `most`, divided by `per_si`.
+  double number(std::string_view key, double least, bool or_equal, double most, double per_si,
+                std::optional<double> otherwise = {}) {
+    std::ostringstream expected;
+    expected << "a number " << (or_equal ? "of at least " : "above ") << least << " and at most " << most;
+    const toml::node* node = find(key);
+    if (node == nullptr) {
+      if (otherwise) return *otherwise;
+      missing(key, expected.str());
+    }
+    const std::optional<double> value = node->value<double>();
+    const bool good = value && (or_equal ? *value >= least : *value > least) && *value <= most;
+    if (!good || node->is_boolean()) fail(*node, key, "expected " + expected.str());
+    return *value / per_si;
+  }
+
+  /// A length in mm above 0.
+  double length(std::string_view key) { return number(key, 0, false, 1e3 * kMaxLength, 1e3); }
+
+  int count(std::string_view key, std::int64_t most, std::optional<int> otherwise = {}) {
+    const std::string expected = "a whole number from 1 to " + std::to_string(most);
+    const toml::node* node = find(key);
+    if (node == nullptr) {
+      if (otherwise) return *otherwise;
+      missing(key, expected);
+    }
+    const auto* whole = node->as_integer();
+    if (whole == nullptr || **whole < 1 || **whole > most) fail(*node, key, "expected " + expected);
+    return static_cast<int>(**whole);
+  }
+
+  std::string text(std::string_view key, std::string_view expected) {
+    const toml::node& node = need(key, expected);
+    const auto* value = node.as_string();
+    if (value == nullptr) fail(node, key, "expected " + std::string(expected));
+    return **value;
+  }
+
+  /// One of the names of a catalogue.
+  template <class Named>
+  auto choice(std::string_view key, const std::string& all, Named named) {
+    const std::string name = text(key, "one of " + all);
+    const auto found = named(name);
+    if (!found) fail(*table_.get(key), key, "expected one of " + all + ", found \"" + name + '"');
+    return *found;
+  }
+
+  Vec3 vector(std::string_view key, double most, double per_si, std::optional<Vec3> otherwise = {}) {
+    constexpr std::string_view kExpected = "[x, y, z]";
+    const toml::node* node = find(key);
+    if (node == nullptr) {
+      if (otherwise) return *otherwise;
+      missing(key, kExpected);
+    }
+    Vec3 vector;
+    const auto* array = node->as_array();
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto value = array != nullptr && array->size() == 3 ? array->get(i)->value<double>() : std::nullopt;
+      if (!value || !(std::abs(*value) <= most)) fail(*node, key, "expected " + std::string(kExpected));
+      vector[static_cast<Eigen::Index>(i)] = *value / per_si;
+    }
+    return vector;
+  }
+
+  Vec3 direction(std::string_view key, const Vec3& otherwise) {
+    const Vec3 vector = this->vector(key, 1e6, 1, otherwise);
+    if (!(vector.norm() > 1e-6)) fail(*table_.get(key), key, "expected a direction, not [0, 0, 0]");
+    return vector.normalized();
+  }
+
+  Table table(std::string_view key) {
+    const toml::node& node = need(key, "a table");
+    const auto* table = node.as_table();
+    if (table == nullptr) fail(node, key, "expected a table");
+    return {*table, path_ + std::string(key) + ".", file_};
+  }
+
+  void check_unknown() const {
+    for (const auto& [key, node] : table_) {
+      if (!known_.contains(key.str())) {
+        fail(node, key.str(), "unknown key; expected one of " + join(known_));
+      }
+    }
+  }
+
+  const std::string& file() const { return file_; }
+
+ private:
+  static std::string join(const std::set<std::string, std::less<>>& keys) {
+    std::string all;
+    for (const auto& key : keys) all.append(all.empty() ? "" : ", ").append(key);
+    return all;
+  }
+
+  const toml::table& table_;
+  std::string path_;
+  std::string file_;
+  std::set<std::string, std::less<>> known_;
+};
+
+void read_body(Table table, const std::filesystem::path& directory, BodyConfig& body) {
+  const std::string kind = table.choice("shape", "block, cylinder, file", [](std::string_view name) {
+    return name == "block" || name == "cylinder" || name == "file" ? std::optional(std::string(name)) : std::nullopt;
+  });
+  body.element = table.choice("element", names(elements()), element_named);
+  if (kind == "block") {
+    BlockShape block{};
+    block.size = table.vector("size_mm", 1e3 * kMaxLength, 1e3);
+    if (!(block.size.array() > 0).all()) table.fail(*table.find("size_mm"), "size_mm", "expected lengths above 0");
+    const toml::node& cells = table.need("cells", "[nx, ny, nz]");
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto* array = cells.as_array();
+      const auto* count = array != nullptr && array->size() == 3 ? array->get(i)->as_integer() : nullptr;
+      if (count == nullptr || **count < 1 || **count > kMaxCells) {
+        table.fail(cells, "cells", "expected three whole numbers from 1 to " + std::to_string(kMaxCells));
+      }
+      block.cells[i] = static_cast<int>(**count);
+    }
+    body.shape = block;
+  } else if (kind == "cylinder") {
+    body.shape = CylinderShape{table.length("radius_mm"), table.length("height_mm"),
+                               table.count("cells_across", kMaxCells), table.count("cells_up", kMaxCells)};
+  } else {
+    body.shape = FileShape{directory / table.text("file", "the path of a gmsh file"),
+                           1 / table.number("units_per_m", 0, false, 1e9, 1)};
+  }
+  body.clamped_below = table.number("clamped_below_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
+  Table material = table.table("material");
+  body.material.young = material.number("young_pa", 0, false, 1e12, 1);
+  const double poisson = material.number("poisson", 0, true, 0.4999, 1);
+  body.material.poisson = poisson;
+  material.check_unknown();
+  table.check_unknown();
+}
+
+void read_touch(Table table, BodyConfig& body) {
+  body.towards_tool = table.direction("from", Vec3::UnitZ());
+  body.middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
+  body.patch_radius = table.length("patch_radius_mm");
+  body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
+  if (table.find("reach_mm") != nullptr) body.reach = table.length("reach_mm");
+  if (table.find("side") != nullptr) {
+    body.side = table.choice("side", "unilateral, bilateral", [](std::string_view name) {
+      if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
+      return name == "bilateral" ? std::optional(PatchContact::Side::kBilateral) : std::nullopt;
+    });
+  }
+  table.check_unknown();
+}
+
+/// The effects that are listed must be those that the model simulates, no more and no fewer.
+void read_effects(Table& root, const ModelInfo& model) {
+  const toml::node& node = root.need("effects", "a list of effects");
+  const auto* list = node.as_array();
+  if (list == nullptr) root.fail(node, "effects", "expected a list of effects");
+  std::set<std::string> listed;
+  for (const toml::node& each : *list) {
+    const auto* name = each.as_string();
+    if (name == nullptr) root.fail(each, "effects", "expected names in quotes");
+    if (std::ranges::find(kEffects, **name, &EffectInfo::name) == kEffects.end()) {
+      root.fail(each, "effects", "unknown effect \"" + **name + "\"; expected one of " + names(kEffects));
+    }
+    if (!listed.insert(**name).second) root.fail(each, "effects", "\"" + **name + "\" is listed twice");
+  }
+  const auto want = [&](const std::string& effect, bool simulated) {
+    if (listed.contains(effect) == simulated) return;
+    root.fail(node, "effects",
+              "the model \"" + std::string(model.name) + "\" " +
+                  (simulated ? "simulates \"" + effect + "\", which is not listed"
+                             : "does not simulate \"" + effect + "\", which is listed"));
+  };
+  want("contact", true);
+  want("geometric-nonlinearity", model.large_rotations);
+  want("material-nonlinearity", model.large_strains);
+}
+
+}  // namespace
+
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory) {
+  toml::table parsed;
+  try {
+    parsed = toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    std::ostringstream what;
+    what << name << ':' << error.source().begin.line << ": " << error.description();
+    throw SceneError(what.str());
+  }
+  Table root(parsed, "", name);
+  Scene scene;
+  Table model = root.table("model");
+  scene.body.model = model.choice("kind", names(models()), model_named);
+  const ModelInfo& chosen = info(scene.body.model);
+  if (chosen.law != Law::kLinear) {
+    scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+  }
+  model.check_unknown();
+  read_effects(root, chosen);
+  read_body(root.table("body"), directory, scene.body);
+  read_touch(root.table("touch"), scene.body);
+  if (root.find("place") != nullptr) {
+    Table place = root.table("place");
+    scene.at = place.vector("at_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
+    scene.towards_hand = place.direction("towards_hand", Vec3::UnitZ());
+    place.check_unknown();
+  }
+  root.check_unknown();
+  return scene;
+}
+
+Scene read_scene(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(file, error);
+  if (error) throw SceneError("cannot read " + file.string() + ": " + error.message());
+  if (bytes > kMaxSceneBytes) throw SceneError(file.string() + ": larger than 16 KiB: is this a scene?");
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  if (!stream) throw SceneError("cannot read " + file.string());
+  return parse_scene(text, file.string(), file.parent_path());
+}
+
+std::string scene_reference() {
+  std::ostringstream text;
+  text << "effects = [...]          what is simulated; nothing else is\n";
+  for (const auto& each : kEffects) text << "    " << each.name << ": " << each.what << '\n';
+  text << "[body]\n"
+          "shape                    block, cylinder or file\n"
+          "element                  how it is cut:\n";
+  for (const auto& each : elements()) text << "    " << each.name << ": " << each.what << '\n';
+  text << "size_mm, cells           of a block: [x, y, z]\n"
+          "radius_mm, height_mm, cells_across, cells_up     of a cylinder\n"
+          "file, units_per_m        a mesh of gmsh; 1000 when it is in mm\n"
+          "clamped_below_mm = 0     nodes up to so far above the lowest are held\n"
+          "[body.material]\n"
+          "young_pa, poisson        0 to 0.4999\n"
+          "[model]\n"
+          "kind                     how it is computed:\n";
+  for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
+  text << "max_iterations = " << BodyConfig{}.max_iterations
+       << "      of one answer, for those that iterate\n"
+          "[touch]\n"
+          "patch_radius_mm          the tool presses on a patch of this size\n"
+          "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
+          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
+          "reach_mm                 for condensed: touched only so far from the middle. Without: anywhere\n"
+          "tool_radius_mm = 0       a point, or a sphere, which touches so much earlier\n"
+          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
+          "[place]\n"
+          "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
+          "towards_hand = [0, 0, 1] the way from there to the hand, in the device's frame\n";
+  return text.str();
+}
+
+std::string explain(const Scene& scene) {
+  const ModelInfo& model = info(scene.body.model);
+  const ElementInfo& element = info(scene.body.element);
+  Body body(scene.body);
+  const Body::Size size = body.size();
+  const Reaction small = body.press(Given::kDepth, 1e-5);
+  std::ostringstream text;
+  text << "simulated:\n  contact: " << (scene.body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
+       << ", without friction, on a patch of " << 1e3 * scene.body.patch_radius << " mm\n  elasticity: " << model.name
+       << ", " << model.what << '\n';
+  if (model.large_rotations) text << "  geometric-nonlinearity\n";
+  if (model.large_strains) text << "  material-nonlinearity\n";
+  text << "not simulated:\n";
+  if (!model.large_rotations)
+    text << "  geometric-nonlinearity: a large rotation would make forces that are not there\n";
+  if (!model.large_strains) text << "  material-nonlinearity\n";
+  text << "  gravity, inertia, viscosity, friction, cutting, self-collision, plasticity: there is no code for them; no "
+          "velocity and no mass is kept\n"
+       << "cost:\n  mesh: " << size.nodes << " nodes, " << size.elements << " elements (" << element.name << ": "
+       << element.what << ")\n  unknowns: " << size.free << "\n  touchable nodes: " << size.touchable
+       << "\n  model: " << static_cast<double>(size.bytes) / 1e6 << " MB\n"
+       << "at first touch: " << small.stiffness << " N/m\n";
+  for (const std::string& warning : warnings(scene.body)) text << "warning: " << warning << '\n';
+  return text.str();
+}
+
+std::vector<std::string> warnings(const BodyConfig& body) {
+  std::vector<std::string> all;
+  const ElementInfo& element = info(body.element);
+  if (body.material.poisson > element.locks_above) {
+    std::ostringstream text;
+    text << element.name << " locks above a Poisson ratio of " << element.locks_above << " (here "
+         << body.material.poisson << "): forces come out far too large; use hex8-sri or hex27-sri";
+    all.push_back(text.str());
+  }
+  return all;
+}
+
+}  // namespace tendon::softbody

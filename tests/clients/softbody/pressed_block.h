@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "clients/softbody/solid.h"
+
+namespace tendon::softbody::testing {
+
+/// The pressed block B1: 100 × 100 × 50 mm, clamped below, 10 kPa, pressed in the middle of its top by a patch of
+/// 20 mm. What its stiffness is, to ± 0.1 %, by finite elements of other people's (deal.II 9.4, Q2 n = 32 and Q3 n =
+/// 12).
+inline constexpr double kB1 = 420.2;                      // N/m, ν = 0.45
+inline constexpr double kB1NearlyIncompressible = 450.9;  // N/m, ν = 0.499
+inline constexpr double kB1PatchRadius = 0.02;            // m
+
+inline Solid pressed_block(Element element, int n, double poisson, Law law = Law::kLinear) {
+  Mesh mesh = block(info(element).shape, Vec3(0.1, 0.1, 0.05), {n, n, n / 2});
+  Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
+  return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, std::move(fixed)};
+}
+
+}  // namespace tendon::softbody::testing

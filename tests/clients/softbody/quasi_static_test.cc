@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/quasi_static.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "clients/softbody/linear.h"
+#include "tests/clients/softbody/pressed_block.h"
+#include "tests/support/dice.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::kB1PatchRadius;
+using testing::pressed_block;
+
+struct Pressed {
+  explicit Pressed(Element element, int n, Law law, int max_iterations = 30)
+      : solid(pressed_block(element, n, 0.45, law)),
+        top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
+        model(solid, top, {.max_iterations = max_iterations}),
+        patch(*top.patch(Vec2::Zero())) {}
+  Solid solid;
+  TouchSurface top;
+  QuasiStaticModel model;
+  Patch patch;
+};
+
+constexpr Law kLaws[] = {Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
+
+TEST(QuasiStatic, SmallPressesAreAnsweredAsByTheLinearModel) {
+  for (const Element element : {Element::kTet4, Element::kHex8Sri}) {
+    const Solid linear = pressed_block(element, 4, 0.45);
+    const TouchSurface top(linear.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+    const double expected = LinearModel(linear, top).press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-6).force;
+    for (const Law law : kLaws) {
+      Pressed pressed(element, 4, law);
+      const Reaction found = pressed.model.press(pressed.patch, Given::kDepth, 1e-6);
+      EXPECT_NEAR(found.force / expected, 1, 2e-4) << static_cast<int>(law);
+      EXPECT_NEAR(found.depth, 1e-6, 1e-12);
+    }
+  }
+}
+
+TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
+  for (const Law law : kLaws) {
+    Pressed pressed(Element::kHex8Sri, 4, law);
+    const double h = 1e-5;
+    const auto press = [&](double depth) {
+      const Reaction reaction = pressed.model.press(pressed.patch, Given::kDepth, depth);
+      return std::pair(reaction, pressed.solid.energy(pressed.model.displacements()));
+    };
+    const auto [low, energy_low] = press(0.004 - h);
+    const auto [here, energy] = press(0.004);
+    const auto [high, energy_high] = press(0.004 + h);
+    EXPECT_NEAR((energy_high - energy_low) / (2 * h) / here.force, 1, 1e-5);
+    EXPECT_NEAR((high.force - low.force) / (2 * h) / here.stiffness, 1, 1e-4);
+    EXPECT_LT(here.error, 1e-5 * here.force);
+  }
+}
+
+TEST(QuasiStatic, TheSameForceComesFromDepthAsFromForceAndFromOneStepAsFromMany) {
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    Pressed at_once(Element::kHex8Sri, 4, law);
+    const Reaction deep = at_once.model.press(at_once.patch, Given::kDepth, 0.01);
+    Pressed slowly(Element::kHex8Sri, 4, law);
+    for (const double depth : {0.002, 0.004, 0.006, 0.008}) slowly.model.press(slowly.patch, Given::kDepth, depth);
+    EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kDepth, 0.01).force / deep.force, 1, 1e-6);
+    EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kForce, deep.force).depth, 0.01, 1e-7);
+  }
+}
+
+TEST(QuasiStatic, OneIterationAtEachAnswerFollowsAMovingToolAndSaysHowFarItIsOff) {
+  Pressed exact(Element::kHex8Sri, 4, Law::kNeoHookean);
+  Pressed hasty(Element::kHex8Sri, 4, Law::kNeoHookean, 1);
+  for (int i = 1; i <= 20; ++i) {
+    const double depth = 5e-4 * i;
+    const double truth = exact.model.press(exact.patch, Given::kDepth, depth).force;
+    const Reaction found = hasty.model.press(hasty.patch, Given::kDepth, depth);
+    EXPECT_EQ(hasty.model.iterations(), 1);
+    EXPECT_NEAR(found.force, truth, 0.03 * truth + 1e-9);
+    EXPECT_GE(found.error, std::abs(found.force - truth));
+  }
+}
+
+TEST(HardCase, ABlockTurnedInsideOutFindsItsWayBackWithEveryElementTheRightWayRound) {
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    for (const bool scattered : {false, true}) {
+      Pressed pressed(Element::kTet4, 4, law, 300);
+      Dice dice(7);
+      VectorXd u = VectorXd::Zero(pressed.solid.size());
+      for (std::size_t i = 0; i < pressed.solid.mesh().nodes.size(); ++i) {
+        const Vec3& node = pressed.solid.mesh().nodes[i];
+        if (node.z() < 1e-9) continue;
+        // Mirrored below the floor, or anywhere.
+        const Vec3 drawn(dice.within(-0.05, 0.05), dice.within(-0.05, 0.05), dice.within(0, 0.05));
+        const Vec3 place = scattered ? drawn : Vec3(node.x(), node.y(), -node.z());
+        u.segment<3>(3 * static_cast<Eigen::Index>(i)) = place - node;
+      }
+      pressed.model.set_displacements(u);
+      EXPECT_GT(pressed.solid.inverted(u), 50);
+      pressed.model.release();
+      EXPECT_EQ(pressed.solid.inverted(pressed.model.displacements()), 0) << static_cast<int>(law) << scattered;
+      EXPECT_LT(pressed.model.displacements().cwiseAbs().maxCoeff(), 1e-6) << static_cast<int>(law) << scattered;
+    }
+  }
+}
+
+TEST(HardCase, AToolThatJumps20MillimetresDeepIsAnsweredWithAFiniteForceAndLeavesNoTrace) {
+  Pressed pressed(Element::kHex8Sri, 4, Law::kNeoHookean);
+  const double before = pressed.model.press(pressed.patch, Given::kDepth, 0.002).force;
+  const Reaction deep = pressed.model.press(pressed.patch, Given::kDepth, 0.02);
+  EXPECT_GT(deep.force, before);
+  EXPECT_LT(deep.force, 100);
+  EXPECT_NEAR(pressed.model.press(pressed.patch, Given::kDepth, 0.002).force / before, 1, 1e-6);
+}
+
+TEST(QuasiStatic, WhatCannotBeIsRefused) {
+  const Solid solid = pressed_block(Element::kHex8Sri, 2, 0.45, Law::kNeoHookean);
+  const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+  EXPECT_THROW(QuasiStaticModel(solid, top, {.max_iterations = 0}), std::invalid_argument);
+  EXPECT_THROW(QuasiStaticModel(solid, top, {.tolerance = 0}), std::invalid_argument);
+  EXPECT_THROW(LinearModel(solid, top), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon::softbody

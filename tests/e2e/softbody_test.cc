@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The reference physics engine as people start it: a process of its own, in front of a hand that presses into it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+using testing::ScratchFolder;
+
+std::string softbody_scene() { return demo_scene().replace_filename("softbody.toml").string(); }
+
+TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "run.mcap";
+  const Scene scene = read_scene(demo_scene());
+  Server server(folder.path(), demo_scene(), {"--record", file.string()});
+  Process body(program("tendon-softbody"),
+               {softbody_scene(), "--server", server.address(), "--duration-s", "3", "--json"}, folder.path());
+  EXPECT_EQ(body.wait(), 0) << body.err();
+  EXPECT_GT(count_in(body.out(), "forces"), 50U);
+  EXPECT_EQ(count_in(body.out(), "forces_unusable"), 0U);
+  server.stop();
+
+  const Recording recording = read_recording(file);
+  expect_passive(recording, scene);
+  // The block gives 457.9 N/m. The local model that comes with each force lets the server follow the hand, so what is
+  // wanted is that much at every depth; the first forces are ramped in, and late ones fade.
+  double peak = 0;
+  std::size_t deep = 0;
+  std::size_t as_stiff = 0;
+  for (const StepRecord& step : recording.steps) {
+    const double depth = step.hand.position.x();
+    peak = std::max(peak, -step.applied.x());
+    if (depth < 2e-3 || step.mode != Mode::kActive) continue;
+    ++deep;
+    const double stiffness = -step.wanted.x() / depth;
+    as_stiff += stiffness > 0.95 * 457.9 && stiffness < 1.05 * 457.9 ? 1 : 0;
+  }
+  EXPECT_GT(peak, 0.5);
+  EXPECT_GT(deep, 200U);
+  EXPECT_GT(as_stiff, deep / 2);
+}
+
+TEST(Softbody, ExplainsASceneWithoutAServerAndNamesTheLineOfAMistake) {
+  const ScratchFolder folder;
+  Process explain(program("tendon-softbody"), {"explain", softbody_scene()}, folder.path());
+  EXPECT_EQ(explain.wait(), 0) << explain.err();
+  EXPECT_NE(explain.out().find("405 nodes, 256 elements (hex8-sri"), std::string::npos) << explain.out();
+  EXPECT_NE(explain.out().find("not simulated:"), std::string::npos);
+
+  const std::string bad =
+      write(folder.path() / "bad.toml", "effects = [\"contact\",\n  \"magic\"]\n[model]\nkind = \"linear\"\n");
+  Process refused(program("tendon-softbody"), {bad}, folder.path());
+  EXPECT_EQ(refused.wait(), 1);
+  EXPECT_NE(refused.err().find("bad.toml:2: effects: unknown effect \"magic\""), std::string::npos) << refused.err();
+  Process wrong(program("tendon-softbody"), {}, folder.path());
+  EXPECT_EQ(wrong.wait(), 2);
+}
+
+}  // namespace
+}  // namespace tendon::e2e
