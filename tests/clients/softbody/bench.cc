@@ -15,7 +15,9 @@ namespace {
 
 void answer(benchmark::State& state, ModelKind model, Element element) {
   const auto n = static_cast<int>(state.range(0));
-  BodyConfig config{.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}}, .material = {1e4, 0.45}};
+  BodyConfig config;
+  config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}};
+  config.material = {.young = 1e4, .poisson = 0.45};
   config.element = element;
   config.model = model;
   config.patch_radius = testing::kB1PatchRadius;
