@@ -14,23 +14,6 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// A hand that rests inside a wall at x > 0.
-constexpr std::string_view kRestingHand = R"([device]
-kind = "simulated"
-profile = "falcon"
-
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-
-[device.hand.motion]
-kind = "ramp-hold"
-from_mm = [-10, 0, 0]
-to_mm = [15, 0, 0]
-ramp_ms = 300
-)";
-
 /// Waits until the force along x is below −`at_least`, N.
 void wait_until_felt(Process& echo, double at_least) {
   watch_force(echo, [at_least](double force) { return force < -at_least; });
@@ -39,7 +22,7 @@ void wait_until_felt(Process& echo, double at_least) {
 TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
   const ScratchFolder folder;
   const auto scene = folder.path() / "device.toml";
-  write(scene, std::string(kRestingHand) + "[[channel]]\nname = \"one\"\n[[channel]]\nname = \"two\"\n");
+  write(scene, std::string(kPressingHand) + "[[channel]]\nname = \"one\"\n[[channel]]\nname = \"two\"\n");
   Server server(folder.path(), scene);
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
   Client one("virtual_wall", server.address(), folder.path(), {"--stiffness-n-per-m", "150"});
@@ -57,7 +40,7 @@ TEST(Engines, TheForcesOfTwoAddUpOnOneDevice) {
 TEST(Engines, ALeaseIsTakenFromAnEngineThatHangs) {
   const ScratchFolder folder;
   const auto scene = folder.path() / "device.toml";
-  write(scene, std::string(kRestingHand) +
+  write(scene, std::string(kPressingHand) +
                    "[[channel]]\nname = \"tissue\"\nlease_ms = 300\n[network]\ncontroller_timeout_ms = 60000\n");
   Server server(folder.path(), scene);
   Client first("virtual_wall", server.address(), folder.path(), {"--channel", "tissue"});
@@ -79,8 +62,8 @@ TEST(Engines, TwoDevicesEachHaveTheirOwnHandAndEngine) {
   const ScratchFolder folder;
   const auto left = folder.path() / "left.toml";
   const auto right = folder.path() / "right.toml";
-  write(left, kRestingHand);
-  write(right, kRestingHand);
+  write(left, kPressingHand);
+  write(right, kPressingHand);
   Server server(folder.path(), left, {right.string()});
   Client left_echo("echo_motion", server.address(), folder.path(), {"--json"});
   Client right_echo("echo_motion", server.address(), folder.path(), {"--json", "--device", "right"});

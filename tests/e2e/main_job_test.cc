@@ -18,28 +18,6 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// A hand that goes into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
-/// every stage of the age policy is seen.
-constexpr std::string_view kPressingHand = R"([device]
-kind = "simulated"
-profile = "falcon"
-
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-
-[device.hand.motion]
-kind = "ramp-hold"
-from_mm = [-10, 0, 0]
-to_mm = [15, 0, 0]
-ramp_ms = 300
-
-[force]
-hold_ms = 200
-safe_stop_ms = 1000
-)";
-
 bool felt(double force) { return force < -0.5; }  // N along x, away from the wall
 
 struct Stretch {

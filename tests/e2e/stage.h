@@ -19,6 +19,28 @@ std::filesystem::path program(const std::string& name);
 /// The scene that comes with Tendon, deploy/scenes/demo.toml.
 std::filesystem::path demo_scene();
 
+/// A hand that goes into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
+/// every stage of the age policy is seen.
+inline constexpr std::string_view kPressingHand = R"([device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 300
+
+[force]
+hold_ms = 200
+safe_stop_ms = 1000
+)";
+
 /// Writes `file`; its path as text, for a command line.
 std::string write(const std::filesystem::path& file, std::string_view text);
 
