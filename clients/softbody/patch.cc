@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -43,6 +42,9 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
   for (const auto& facet : facets_) nodes_.insert(nodes_.end(), facet.begin(), facet.end());
   std::ranges::sort(nodes_);
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+  for (auto& facet : facets_) {
+    for (int& node : facet) node = static_cast<int>(std::ranges::lower_bound(nodes_, node) - nodes_.begin());
+  }
 }
 
 void TouchSurface::add(const Mesh& mesh, const Facet& facet) {
@@ -94,13 +96,15 @@ void TouchSurface::add(const Mesh& mesh, const Facet& facet) {
 }
 
 std::vector<int> TouchSurface::nodes_of_patches(const Vec2& middle, double reach) const {
-  std::vector<bool> near(places_.size());
+  std::vector<bool> near(nodes_.size());
   for (const Piece& piece : pieces_) {
     if ((piece.at - middle).norm() > reach + radius_) continue;
     for (const int node : facets_[at(piece.facet)]) near[at(node)] = true;
   }
   std::vector<int> nodes;
-  std::ranges::copy_if(nodes_, std::back_inserter(nodes), [&](int node) { return near[at(node)]; });
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (near[i]) nodes.push_back(nodes_[i]);
+  }
   return nodes;
 }
 
@@ -110,9 +114,10 @@ std::optional<Patch> TouchSurface::patch(const Vec2& middle, double least_covere
   const auto begin = std::ranges::lower_bound(pieces_, middle.x() - radius_, {}, by_x);
   const auto end = std::ranges::upper_bound(pieces_, middle.x() + radius_, {}, by_x);
   const double top = 3 / (std::numbers::pi * radius_ * radius_);
-  // weight, slope x, slope y
-  std::map<int, Vec3> sums;
+  std::vector<Vec3> sums(nodes_.size(), Vec3::Zero());  // weight, slope x, slope y
+  std::vector<bool> below(nodes_.size());
   Vec3 total = Vec3::Zero();
+  int count = 0;
   for (auto piece = begin; piece != end; ++piece) {
     const Vec2 from = (piece->at - middle) / radius_;
     const double left = 1 - from.squaredNorm();
@@ -122,34 +127,25 @@ std::optional<Patch> TouchSurface::patch(const Vec2& middle, double least_covere
     total += share;
     const auto& nodes = facets_[at(piece->facet)];
     for (Eigen::Index i = 0; i < piece->shares.size(); ++i) {
-      sums.try_emplace(nodes[static_cast<std::size_t>(i)], Vec3::Zero()).first->second += piece->shares[i] * share;
+      const std::size_t node = at(nodes[static_cast<std::size_t>(i)]);
+      sums[node] += piece->shares[i] * share;
+      count += below[node] ? 0 : 1;
+      below[node] = true;
     }
   }
   if (!(total[0] >= least_covered)) return std::nullopt;
   Patch patch;
   patch.covered = std::min(1.0, total[0]);
-  patch.weights.resize(static_cast<Eigen::Index>(sums.size()));
-  patch.slopes.resize(2, static_cast<Eigen::Index>(sums.size()));
-  for (const auto& [node, sum] : sums) {
+  patch.weights.resize(count);
+  patch.slopes.resize(2, count);
+  for (std::size_t node = 0; node < nodes_.size(); ++node) {
+    if (!below[node]) continue;
     const auto i = static_cast<Eigen::Index>(patch.nodes.size());
-    patch.nodes.push_back(node);
-    patch.weights[i] = sum[0] / total[0];
-    patch.slopes.col(i) = (sum.tail<2>() - patch.weights[i] * total.tail<2>()) / total[0];
+    patch.nodes.push_back(nodes_[node]);
+    patch.weights[i] = sums[node][0] / total[0];
+    patch.slopes.col(i) = (sums[node].tail<2>() - patch.weights[i] * total.tail<2>()) / total[0];
   }
   return patch;
-}
-
-VectorXd TouchSurface::areas(const std::vector<int>& nodes) const {
-  std::map<int, double> sums;
-  for (const Piece& piece : pieces_) {
-    const auto& on = facets_[at(piece.facet)];
-    for (Eigen::Index i = 0; i < piece.shares.size(); ++i) {
-      sums[on[static_cast<std::size_t>(i)]] += piece.shares[i] * piece.area;
-    }
-  }
-  VectorXd areas(static_cast<Eigen::Index>(nodes.size()));
-  for (std::size_t i = 0; i < nodes.size(); ++i) areas[static_cast<Eigen::Index>(i)] = sums[nodes[i]];
-  return areas;
 }
 
 }  // namespace tendon::softbody

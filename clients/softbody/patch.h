@@ -52,9 +52,6 @@ class TouchSurface {
   /// The height of a node, m: its position along the normal.
   double height(int node) const { return heights_[static_cast<std::size_t>(node)]; }
 
-  /// The area of the plane that belongs to each of `nodes`, m²; not in general above 0 with hex20.
-  VectorXd areas(const std::vector<int>& nodes) const;
-
  private:
   /// A small piece of a facet.
   struct Piece {
@@ -71,7 +68,7 @@ class TouchSurface {
   Eigen::Matrix<double, 2, 3> across_;
   std::vector<Vec2> places_;  ///< of all nodes of the mesh, across
   std::vector<double> heights_;
-  std::vector<std::vector<int>> facets_;  ///< the nodes of each
+  std::vector<std::vector<int>> facets_;  ///< where in nodes_ those of each are
   std::vector<Piece> pieces_;             ///< sorted by at.x
   std::vector<int> nodes_;
 };
