@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/protocol/vectors.h"
 
-#include <google/protobuf/struct.pb.h>
-#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "protocol/client_key.h"
@@ -25,7 +24,7 @@ namespace tendon {
 namespace {
 
 using examples::Bytes;
-using Json = google::protobuf::Value;
+using Json = nlohmann::json;
 
 const std::filesystem::path kFolder = TENDON_VECTORS;
 
@@ -35,15 +34,9 @@ std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-Json read(const std::string& name) {
-  Json value;
-  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(text_of(kFolder / name), &value).ok()) << name;
-  return value;
-}
+Json read(const std::string& name) { return Json::parse(text_of(kFolder / name)); }
 
-const Json& at(const Json& json, const std::string& name) { return json.struct_value().fields().at(name); }
-std::string text(const Json& json, const std::string& name) { return at(json, name).string_value(); }
-const auto& list(const Json& json, const std::string& name) { return at(json, name).list_value().values(); }
+std::string text(const Json& json, const std::string& name) { return json.at(name).get<std::string>(); }
 
 Bytes bytes(const std::string& hex) {
   Bytes out;
@@ -66,7 +59,7 @@ Key key(const Json& json, const std::string& name) { return key(text(json, name)
 
 TEST(Vectors, X25519GivesTheAnswersOfRfc7748) {
   const Json file = read("primitives.json");
-  for (const Json& v : list(file, "x25519")) {
+  for (const Json& v : file.at("x25519")) {
     Key result;
     ASSERT_TRUE(crypto::x25519(key(v, "scalar"), key(v, "point").bytes(), result));
     EXPECT_EQ(result.bytes(), key(v, "result").bytes()) << text(v, "source");
@@ -78,7 +71,7 @@ TEST(Vectors, X25519GivesTheAnswersOfRfc7748) {
 
 TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
   const Json file = read("primitives.json");
-  for (const Json& v : list(file, "hmac_sha256")) {
+  for (const Json& v : file.at("hmac_sha256")) {
     const Bytes data = bytes(v, "data");
     const auto half = std::span(data).first(data.size() / 2);
     const auto rest = std::span(data).subspan(data.size() / 2);
@@ -88,7 +81,7 @@ TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
 
 TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
   const Json file = read("primitives.json");
-  for (const Json& v : list(file, "chacha20_poly1305")) {
+  for (const Json& v : file.at("chacha20_poly1305")) {
     const Bytes nonce = bytes(v, "nonce");
     const Bytes plain = bytes(v, "text");
     const Bytes sealed = bytes(v, "sealed");
@@ -108,32 +101,32 @@ TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
 
 TEST(Vectors, OurNoiseIsThatOfCacophony) {
   const Json file = read("noise.json");
-  ASSERT_EQ(list(file, "vectors").size(), 1);
-  const Json& v = list(file, "vectors").Get(0);
-  const auto& messages = list(v, "messages");
-  const Key psk = key(list(v, "init_psks").Get(0).string_value());
+  ASSERT_EQ(file.at("vectors").size(), 1U);
+  const Json& v = file.at("vectors").at(0);
+  const auto& messages = v.at("messages");
+  const Key psk = key(v.at("init_psks").at(0).get<std::string>());
   const Bytes prologue = bytes(v, "init_prologue");
 
-  const NoiseInitiator a(psk, key(v, "init_ephemeral"), prologue, bytes(messages.Get(0), "payload"));
-  EXPECT_EQ(a.message(), bytes(messages.Get(0), "ciphertext"));
+  const NoiseInitiator a(psk, key(v, "init_ephemeral"), prologue, bytes(messages.at(0), "payload"));
+  EXPECT_EQ(a.message(), bytes(messages.at(0), "ciphertext"));
   const auto z = NoiseResponder::read(psk, prologue, a.message());
   ASSERT_TRUE(z.has_value());
-  EXPECT_EQ(z->payload(), bytes(messages.Get(0), "payload"));
-  const auto reply = z->reply(key(v, "resp_ephemeral"), bytes(messages.Get(1), "payload"));
+  EXPECT_EQ(z->payload(), bytes(messages.at(0), "payload"));
+  const auto reply = z->reply(key(v, "resp_ephemeral"), bytes(messages.at(1), "payload"));
   ASSERT_TRUE(reply.has_value());
-  EXPECT_EQ(reply->message, bytes(messages.Get(1), "ciphertext"));
+  EXPECT_EQ(reply->message, bytes(messages.at(1), "ciphertext"));
   const auto answer = a.read(reply->message);
   ASSERT_TRUE(answer.has_value());
-  EXPECT_EQ(answer->payload, bytes(messages.Get(1), "payload"));
+  EXPECT_EQ(answer->payload, bytes(messages.at(1), "payload"));
 
   for (const NoiseSplit& split : {answer->split, reply->split}) {
     EXPECT_EQ(Bytes(split.handshake_hash.begin(), split.handshake_hash.end()), bytes(v, "handshake_hash"));
-    for (int i = 2; i < messages.size(); ++i) {
-      const Bytes payload = bytes(messages.Get(i), "payload");
+    for (std::size_t i = 2; i < messages.size(); ++i) {
+      const Bytes payload = bytes(messages.at(i), "payload");
       const Key& from = i % 2 == 0 ? split.initiator_to_responder : split.responder_to_initiator;
       Bytes sealed(payload.size() + crypto::kTagSize);
-      crypto::seal(from, static_cast<std::uint64_t>(i / 2 - 1), {}, payload, sealed);
-      EXPECT_EQ(sealed, bytes(messages.Get(i), "ciphertext")) << i;
+      crypto::seal(from, i / 2 - 1, {}, payload, sealed);
+      EXPECT_EQ(sealed, bytes(messages.at(i), "ciphertext")) << i;
     }
   }
 }
@@ -178,33 +171,33 @@ class SealedVectors : public testing::Test {
 
 TEST_F(SealedVectors, AClientSaysAndUnderstandsThem) {
   ClientHandshake client(config(), kNow);
-  EXPECT_EQ(next(client), bytes(at(file_, "hello"), "first_datagram"));
-  client.receive(kNow, bytes(at(file_, "retry"), "datagram"));
-  EXPECT_EQ(next(client), bytes(at(file_, "hello"), "datagram"));
+  EXPECT_EQ(next(client), bytes(file_.at("hello"), "first_datagram"));
+  client.receive(kNow, bytes(file_.at("retry"), "datagram"));
+  EXPECT_EQ(next(client), bytes(file_.at("hello"), "datagram"));
   ClientHandshake other = client;
 
-  client.receive(kNow, bytes(at(file_, "welcome"), "datagram"));
+  client.receive(kNow, bytes(file_.at("welcome"), "datagram"));
   ASSERT_TRUE(client.outcome().has_value());
   const auto& accepted = std::get<ClientHandshake::Accepted>(*client.outcome());
   EXPECT_EQ(accepted.connection_id, examples::kConnection);
-  EXPECT_EQ(accepted.keys->send.bytes(), key(at(file_, "welcome"), "client_to_server_key").bytes());
-  EXPECT_EQ(accepted.keys->receive.bytes(), key(at(file_, "welcome"), "server_to_client_key").bytes());
+  EXPECT_EQ(accepted.keys->send.bytes(), key(file_.at("welcome"), "client_to_server_key").bytes());
+  EXPECT_EQ(accepted.keys->receive.bytes(), key(file_.at("welcome"), "server_to_client_key").bytes());
 
-  other.receive(kNow, bytes(at(file_, "refused"), "datagram"));
+  other.receive(kNow, bytes(file_.at("refused"), "datagram"));
   ASSERT_TRUE(other.outcome().has_value());
   EXPECT_EQ(std::get<Refused>(*other.outcome()).code, Code::kBusy);
 }
 
 TEST_F(SealedVectors, ASessionOpensThemAcrossTheRekey) {
   for (const bool to_server : {true, false}) {
-    const Json& welcome = at(file_, "welcome");
+    const Json& welcome = file_.at("welcome");
     const Key up = key(welcome, "client_to_server_key");
     const Key down = key(welcome, "server_to_client_key");
     const SessionKeys keys =
         to_server ? SessionKeys{.send = down, .receive = up} : SessionKeys{.send = up, .receive = down};
     Session session({.connection_id = examples::kConnection}, keys, kNow);
     std::uint64_t taken = 0;
-    for (const Json& datagram : list(file_, "data")) {
+    for (const Json& datagram : file_.at("data")) {
       if ((text(datagram, "direction") == "client_to_server") != to_server) continue;
       session.receive(kNow, bytes(datagram, "datagram"));
       EXPECT_EQ(session.stats().datagrams_received, ++taken) << text(datagram, "name");
@@ -214,8 +207,8 @@ TEST_F(SealedVectors, ASessionOpensThemAcrossTheRekey) {
 }
 
 TEST_F(SealedVectors, AClientDropsWhatIsToBeDroppedAndCountsWhy) {
-  const Json& welcome = at(file_, "welcome");
-  for (const Json& datagram : list(file_, "dropped")) {
+  const Json& welcome = file_.at("welcome");
+  for (const Json& datagram : file_.at("dropped")) {
     Session session(
         {.connection_id = examples::kConnection},
         SessionKeys{.send = key(welcome, "client_to_server_key"), .receive = key(welcome, "server_to_client_key")},
@@ -232,15 +225,15 @@ TEST_F(SealedVectors, AClientDropsWhatIsToBeDroppedAndCountsWhy) {
 
 TEST(Vectors, TheReplayScriptsAreDecidedAsASetWouldDecide) {
   const Json file = read("replay.json");
-  EXPECT_EQ(at(file, "remembered").number_value(), static_cast<double>(ReplayWindow::kRemembered));
-  for (const Json& script : list(file, "scripts")) {
+  EXPECT_EQ(file.at("remembered").get<std::uint64_t>(), ReplayWindow::kRemembered);
+  for (const Json& script : file.at("scripts")) {
     std::set<std::uint64_t> seen;
-    const auto& numbers = list(script, "packet_numbers");
-    for (int i = 0; i < numbers.size(); ++i) {
-      const auto number = static_cast<std::uint64_t>(numbers.Get(i).number_value());
+    const auto& numbers = script.at("packet_numbers");
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto number = numbers.at(i).get<std::uint64_t>();
       const bool too_old = !seen.empty() && number + ReplayWindow::kRemembered <= *seen.rbegin();
       const bool accept = !too_old && seen.insert(number).second;
-      EXPECT_EQ(list(script, "accept").Get(i).bool_value(), accept) << text(script, "name") << ' ' << i;
+      EXPECT_EQ(script.at("accept").at(i).get<bool>(), accept) << text(script, "name") << ' ' << i;
     }
   }
 }
