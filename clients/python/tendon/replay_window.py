@@ -32,9 +32,9 @@ class ReplayWindow:
         self._seen |= 1 << self.highest - number
         self._count += 1
 
-    def mask_before_highest(self) -> int:
-        """Bit i: (highest − 1 − i) is known to have been inserted."""
-        return self._seen >> 1 & 0xFFFFFFFF
+    def mask_before(self, number: int) -> int:
+        """Bit i: (number − 1 − i) is known to have been inserted."""
+        return self._seen >> self.highest - number + 1 & 0xFFFFFFFF
 
     def missing(self) -> int:
         """Numbers from 0 to the highest that were never inserted."""

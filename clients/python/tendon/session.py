@@ -77,7 +77,8 @@ class Session:
         # In.
         self._last_heard = opened
         self._seen = ReplayWindow()
-        self._newest_sent_ns = 0  # T1 and T2 of the newest datagram received
+        self._newest_number = -1  # of the datagrams accepted, with its T1 and T2
+        self._newest_sent_ns = 0
         self._newest_received_ns = 0
         self._newest_tick = -1
         self._newest_sequence = -1
@@ -206,6 +207,7 @@ class Session:
         self._seen.insert(number)
         stats.lost = self._seen.missing()
         if newest:
+            self._newest_number = number
             self._newest_sent_ns = content.sent_ns
             self._newest_received_ns = now
         else:
@@ -275,9 +277,9 @@ class Session:
 
     def _head(self, now: int) -> bytes:
         echo = None
-        if self._seen.highest >= 0:
-            mask = self._seen.mask_before_highest()
-            echo = Echo(self._newest_sent_ns, self._newest_received_ns, self._seen.highest, mask)
+        if self._newest_number >= 0:
+            mask = self._seen.mask_before(self._newest_number)
+            echo = Echo(self._newest_sent_ns, self._newest_received_ns, self._newest_number, mask)
         return codec.write_data_head(now, echo)
 
     def _fill(self, now: int) -> bytes:

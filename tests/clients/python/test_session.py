@@ -181,6 +181,29 @@ def test_an_authentic_datagram_that_is_malformed_uses_up_its_number():
     assert (session.stats.malformed, session.stats.duplicated) == (1, 1)
 
 
+def test_an_authentic_datagram_that_is_malformed_is_not_echoed():
+    ours, theirs = ciphers("sealed")
+    session = Session(7, World.START, ours)
+
+    def hear(number: int, body: bytes) -> None:
+        header = codec.encode_header(codec.Header(codec.DatagramType.DATA, codec.Suite.NOISE, 0, 7, number))
+        session.receive(World.START, header + theirs.seal(number, header, body))
+
+    def echo():
+        datagram = session.next_datagram(World.START + 50 * MS * (1 + session.stats.datagrams_sent))
+        header = codec.decode_header(datagram)
+        opener = ciphers("sealed")[1]
+        body = opener.open(0, 0, header.packet_number, datagram[: codec.HEADER_SIZE], datagram[codec.HEADER_SIZE :])
+        return codec.read_data(body).echo
+
+    hear(0, b"not protobuf")
+    assert echo() is None
+    hear(1, codec.write_data_head(5, None))
+    hear(2, b"not protobuf")
+    told = echo()
+    assert (told.packet_number, told.sent_ns) == (1, 5)
+
+
 def test_in_the_clear_a_damaged_copy_does_not_shut_out_the_good_one():
     ours, theirs = Session(7, 0), Session(7, 0)
     good = theirs.next_datagram(0)
@@ -351,5 +374,5 @@ def test_the_replay_window_is_a_set_with_a_horizon(seed):
             window.insert(number)
             model.add(number)
         mask = sum(1 << i for i in range(32) if window.highest - 1 - i in model)
-        assert (window.highest, window.mask_before_highest()) == (max(model), mask)
+        assert (window.highest, window.mask_before(window.highest)) == (max(model), mask)
     assert window.missing() == max(model) + 1 - len(model)
