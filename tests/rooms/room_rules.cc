@@ -92,10 +92,18 @@ const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
 
 /// The threads of the server and of the client library wait and read the clock once for each turn; everybody else is
 /// told the time. tests/core/time_test.cc shows that the time types of core have no now().
-const Names kClockReaders = {
-    "server/clock.h", "server/clock.cc", "server/server.cc",        "clients/cpp/run.cc", "tests/bench/",
-    "tests/e2e/",     "tests/realtime/", "tests/core/time_test.cc", "tests/lab/cost.cc",  "tests/injector/real_time.cc",
-    "*_main.cc"};
+const Names kClockReaders = {"server/clock.h",
+                             "server/clock.cc",
+                             "server/server.cc",
+                             "clients/cpp/run.cc",
+                             "tests/bench/",
+                             "tests/e2e/",
+                             "tests/realtime/",
+                             "tests/core/time_test.cc",
+                             "tests/lab/cost.cc",
+                             "tests/injector/real_time.cc",
+                             "tests/conformance/udp_wire.cc",
+                             "*_main.cc"};
 
 // ---- Reading --------------------------------------------------------------------------------------------------------
 

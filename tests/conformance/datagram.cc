@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/conformance/datagram.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace tendon::conformance {
+namespace {
+
+constexpr std::size_t kHelloBodyAt = 50;
+
+void put_little_endian(Bytes& out, std::uint64_t value, int size) {
+  for (int i = 0; i < size; ++i) out.push_back(static_cast<std::byte>(value >> (8 * i)));
+}
+
+std::uint64_t little_endian(Span bytes) {
+  std::uint64_t value = 0;
+  for (std::size_t i = bytes.size(); i-- > 0;) value = value << 8 | std::to_integer<std::uint64_t>(bytes[i]);
+  return value;
+}
+
+std::uint8_t number_of(std::byte byte) { return std::to_integer<std::uint8_t>(byte); }
+
+}  // namespace
+
+Bytes write(const Head& head) {
+  Bytes out;
+  out.push_back(std::byte{head.magic});
+  out.push_back(static_cast<std::byte>(head.version << 4U | head.type));
+  out.push_back(std::byte{head.epoch});
+  out.push_back(std::byte{head.suite});
+  put_little_endian(out, head.connection_id, 4);
+  put_little_endian(out, head.number, 8);
+  return out;
+}
+
+std::optional<Head> read_head(Span datagram) {
+  if (datagram.size() < kHeadSize) return std::nullopt;
+  const std::uint8_t kind = number_of(datagram[1]);
+  return Head{.magic = number_of(datagram[0]),
+              .version = static_cast<std::uint8_t>(kind >> 4U),
+              .type = static_cast<std::uint8_t>(kind & 0xFU),
+              .epoch = number_of(datagram[2]),
+              .suite = number_of(datagram[3]),
+              .connection_id = static_cast<std::uint32_t>(little_endian(datagram.subspan(4, 4))),
+              .number = little_endian(datagram.subspan(8, 8))};
+}
+
+Bytes hello(std::uint8_t suite, const Sixteen& random, const Sixteen& cookie, Span body) {
+  Bytes out = write({.type = kHelloType, .suite = suite}) + random + cookie;
+  put_little_endian(out, body.size(), 2);
+  out = std::move(out) + body;
+  out.resize(std::max(kLargest, kHelloBodyAt + body.size()));
+  return out;
+}
+
+Bytes retry(std::uint8_t suite, const Sixteen& random, const Sixteen& cookie) {
+  return write({.type = kRetryType, .suite = suite}) + random + cookie;
+}
+
+Bytes answer(std::uint8_t suite, std::uint32_t connection_id, const Sixteen& random, Span body) {
+  return write({.type = kAnswerType, .suite = suite, .connection_id = connection_id}) + random + body;
+}
+
+Sixteen sixteen(Span datagram, std::size_t at) {
+  Sixteen out{};
+  if (datagram.size() >= at + out.size()) std::ranges::copy(datagram.subspan(at, out.size()), out.begin());
+  return out;
+}
+
+Bytes operator+(Bytes a, Span b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+Bytes bytes_of(std::string_view text) {
+  const Span bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+Bytes bytes_of(const google::protobuf::MessageLite& message) {
+  std::string text;
+  message.SerializePartialToString(&text);
+  return bytes_of(text);
+}
+
+bool read(Span bytes, google::protobuf::MessageLite& message) {
+  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+std::string hex(Span bytes, std::size_t most) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string out;
+  for (const std::byte byte : bytes.first(std::min(most, bytes.size()))) {
+    if (!out.empty()) out += ' ';
+    out += kDigits[number_of(byte) >> 4U];
+    out += kDigits[number_of(byte) & 0xFU];
+  }
+  if (bytes.size() > most) out += " … (" + std::to_string(bytes.size()) + " bytes)";
+  return out;
+}
+
+Bytes from_hex(std::string_view digits) {
+  Bytes out;
+  int high = -1;
+  for (const char c : digits) {
+    if (std::isxdigit(static_cast<unsigned char>(c)) == 0) continue;
+    const int value = c <= '9' ? c - '0' : (c | 0x20) - 'a' + 10;
+    if (high < 0) {
+      high = value;
+    } else {
+      out.push_back(static_cast<std::byte>(high << 4 | value));
+      high = -1;
+    }
+  }
+  return out;
+}
+
+}  // namespace tendon::conformance
