@@ -87,6 +87,7 @@ std::string clip(std::string_view text, std::size_t limit) {
 // ---- single values; `read` is false when the value is out of bounds ----
 
 bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }  // false for NaN
+bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }
 
 bool read(const pb::Vec3& from, Vec3& to) noexcept {
   to = {from.x(), from.y(), from.z()};
@@ -104,6 +105,13 @@ bool read(std::int64_t ns, Time& to) noexcept {
   to = Time{Duration{ns}};
   return ns >= -limits::kMaxTime.count() && ns <= limits::kMaxTime.count();
 }
+
+/// A length of time, which is never below zero.
+bool read(std::uint64_t ns, Duration& to) noexcept {
+  to = Duration{static_cast<Duration::rep>(ns)};
+  return ns <= static_cast<std::uint64_t>(limits::kMaxTime.count());
+}
+std::uint64_t unsigned_ns(Duration d) noexcept { return static_cast<std::uint64_t>(d.count()); }
 
 /// Our enums have the numbers of the wire: first is 1, all up to `last` are used.
 template <class Enum>
@@ -162,12 +170,11 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   to.permitted_force = from.permitted_force_n();
   to.reasons = from.reasons();
   to.force_sequence = from.force_sequence();
-  to.force_age = Duration{static_cast<Duration::rep>(from.force_age_ns())};
   const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
   return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
          read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
          bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
-         from.force_age_ns() <= static_cast<std::uint64_t>(limits::kMaxTime.count()) && read(from.mode(), to.mode) &&
+         read(from.force_age_ns(), to.force_age) && read(from.mode(), to.mode) &&
          read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
 }
 
@@ -181,7 +188,7 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   to.set_permitted_force_n(from.permitted_force);
   to.set_reasons(from.reasons);
   to.set_force_sequence(from.force_sequence);
-  to.set_force_age_ns(static_cast<std::uint64_t>(from.force_age.count()));
+  to.set_force_age_ns(unsigned_ns(from.force_age));
   to.set_mode(static_cast<pb::Mode>(from.mode));
   to.set_device(from.device);
   to.set_channel(from.channel);
@@ -289,6 +296,13 @@ bool read(const pb::Control& from, Control& to) {
       return read_request<GiveLease>(from.give_lease(), to);
     case pb::Control::kLeaseLost:
       return read_request<LeaseLost>(from.lease_lost(), to);
+    case pb::Control::kSetStateDeadband: {
+      const auto& asked = from.set_state_deadband();
+      to.request = SetStateDeadband{.share = asked.share(),
+                                    .floor = asked.floor_mps(),
+                                    .max_silence = std::chrono::microseconds(asked.max_silence_us())};
+      return to.id > 0 && bounded(asked.share()) && bounded(asked.floor_mps());
+    }
     case pb::Control::OP_NOT_SET:
       break;
   }
@@ -312,6 +326,15 @@ void write_request(const GiveLease& from, pb::Control& to) { write_lease(from, *
 void write_request(const LeaseLost& from, pb::Control& to) {
   write_lease(from, *to.mutable_lease_lost());
   to.mutable_lease_lost()->set_to(clip(from.to, limits::kMaxName));
+}
+void write_request(const SetStateDeadband& from, pb::Control& to) {
+  auto& out = *to.mutable_set_state_deadband();
+  out.set_share(from.share);
+  out.set_floor_mps(from.floor);
+  // What is out of range becomes what the server does not grant; a cast could make it look like something else.
+  const bool possible = from.max_silence >= Duration::zero() && from.max_silence <= limits::kMaxStateSilence;
+  const auto us = std::chrono::ceil<std::chrono::microseconds>(from.max_silence).count();
+  out.set_max_silence_us(possible ? static_cast<std::uint32_t>(us) : std::numeric_limits<std::uint32_t>::max());
 }
 
 void write(const Control& from, pb::Control& to) {
@@ -390,6 +413,64 @@ void write(const ControlAck& from, pb::ControlAck& to) {
   to.set_wait_ms(in_ms(from.wait));
   to.clear_device();
   if (from.device) write(*from.device, *to.mutable_device());
+}
+
+bool read(const pb::Delays& from, Delays& to) noexcept {
+  to = {.median = Duration{from.median_ns()}, .p99 = Duration{from.p99_ns()}};
+  return in_time(to.median) && in_time(to.p99);
+}
+
+bool read(const pb::LinkReport& from, LinkReport& to) {
+  const auto delays = [](bool there, const pb::Delays& in, std::optional<Delays>& out) {
+    out.reset();
+    return !there || read(in, out.emplace());
+  };
+  to.number = from.number();
+  to.forces = from.forces();
+  to.late_server = from.late_server();
+  to.late_network = from.late_network();
+  to.late_engine = from.late_engine();
+  to.clock_offset = Duration{from.clock_offset_ns()};
+  to.clock_drift_ppm = from.clock_drift_ppm();
+  to.received = from.received();
+  to.lost = from.lost();
+  to.reordered = from.reordered();
+  to.duplicated = from.duplicated();
+  return to.number > 0 && read(from.until_ns(), to.until) && read(from.span_ns(), to.span) &&
+         read(from.worst_late_ns(), to.worst_late) && read(from.longest_gap_ns(), to.longest_gap) &&
+         delays(from.has_round_trip(), from.round_trip(), to.round_trip) &&
+         delays(from.has_to_server(), from.to_server(), to.to_server) &&
+         delays(from.has_to_client(), from.to_client(), to.to_client) && in_time(to.clock_offset) &&
+         bounded(to.clock_drift_ppm) && read(from.clock_error_ns(), to.clock_error) &&
+         read(from.words(), limits::kMaxDetail, to.words);
+}
+
+void write(const LinkReport& from, pb::LinkReport& to) {
+  const auto delays = [](const Delays& in, pb::Delays& out) {
+    out.set_median_ns(in.median.count());
+    out.set_p99_ns(in.p99.count());
+  };
+  to.Clear();
+  to.set_number(from.number);
+  to.set_until_ns(from.until.time_since_epoch().count());
+  to.set_span_ns(unsigned_ns(from.span));
+  to.set_forces(from.forces);
+  to.set_late_server(from.late_server);
+  to.set_late_network(from.late_network);
+  to.set_late_engine(from.late_engine);
+  to.set_worst_late_ns(unsigned_ns(from.worst_late));
+  to.set_longest_gap_ns(unsigned_ns(from.longest_gap));
+  if (from.round_trip) delays(*from.round_trip, *to.mutable_round_trip());
+  if (from.to_server) delays(*from.to_server, *to.mutable_to_server());
+  if (from.to_client) delays(*from.to_client, *to.mutable_to_client());
+  to.set_clock_offset_ns(from.clock_offset.count());
+  to.set_clock_drift_ppm(from.clock_drift_ppm);
+  to.set_clock_error_ns(unsigned_ns(from.clock_error));
+  to.set_received(from.received);
+  to.set_lost(from.lost);
+  to.set_reordered(from.reordered);
+  to.set_duplicated(from.duplicated);
+  to.set_words(clip(from.words, limits::kMaxDetail));
 }
 
 bool read(const pb::Bye& from, Bye& to) {
@@ -582,12 +663,13 @@ std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcep
 /// merge, so a datagram with several frames is written piece after piece, and each piece keeps its
 /// objects for the next time.
 struct DataWriter::Pieces {
-  pb::Datagram head, state, force, control, ack, bye;
+  pb::Datagram head, state, force, control, ack, bye, report;
   pb::Frame& state_frame = *state.add_frames();
   pb::Frame& force_frame = *force.add_frames();
   pb::Frame& control_frame = *control.add_frames();
   pb::Frame& ack_frame = *ack.add_frames();
   pb::Frame& bye_frame = *bye.add_frames();
+  pb::Frame& report_frame = *report.add_frames();
 };
 
 DataWriter::DataWriter() : pieces_(std::make_unique<Pieces>()) {}
@@ -646,6 +728,10 @@ bool DataWriter::add(const Bye& bye) {
   write(bye, *pieces_->bye_frame.mutable_bye());
   return append(pieces_->bye);
 }
+bool DataWriter::add(const LinkReport& report) {
+  write(report, *pieces_->report_frame.mutable_report());
+  return append(pieces_->report);
+}
 
 /// Parsed objects live in an arena whose first block is ours: no heap for a state or a force, and one
 /// `Reset` frees what a hostile datagram made of its 1200 bytes.
@@ -692,6 +778,9 @@ const DataContent* DataReader::read(std::span<const std::byte> body) {
         break;
       case pb::Frame::kBye:
         take<Bye>(frame.bye(), content);
+        break;
+      case pb::Frame::kReport:
+        take<LinkReport>(frame.report(), content);
         break;
       case pb::Frame::BODY_NOT_SET:
         break;  // a frame of a newer peer

@@ -86,7 +86,7 @@ struct Bye {
   Code code = Code::kOk;
   std::string reason;
 };
-using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye>;
+using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport>;
 
 /// Writes one Data datagram after the other, in the clear. Keeps its protobuf objects: after the first of
 /// its kind, a state or a force costs no heap call (a request, or a long text, does).
@@ -112,6 +112,7 @@ class DataWriter {
   bool add(const Control& control);
   bool add(const ControlAck& ack);
   bool add(const Bye& bye);
+  bool add(const LinkReport& report);
 
   std::size_t size() const noexcept { return size_; }
 

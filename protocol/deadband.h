@@ -2,8 +2,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "core/motion.h"
+#include "protocol/messages.h"
 
 namespace tendon {
 
@@ -12,12 +14,11 @@ namespace tendon {
 ///
 ///     ‖v − v_sent‖ > max(share · ‖v_sent‖, floor)   or   now − sent ≥ longest_silence
 ///
-/// With 10 % on force (floor 0.05 N) 6.6 % of 1 kHz samples remained on recorded touch; on velocity (floor 1 mm/s, the
-/// receiver goes on along the line) 17.5 %, at 0.05 mm rms. What the receiver rebuilds can hold more energy than what
-/// was left out, so a limiter has to stand behind it: Tendon's does.
+/// What the receiver rebuilds can hold more energy than what was left out, so a limiter has to stand behind it:
+/// Tendon's does.
 ///
 /// Source: Hinterseer, Hirche, Chaudhuri, Steinbach, Buss, "Perception-based data reduction and transmission of haptic
-/// data in telepresence and teleaction systems", IEEE TSP 56(2), 2008; numbers from network.md section 2.
+/// data in telepresence and teleaction systems", IEEE TSP 56(2), 2008.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Deadband {
@@ -35,6 +36,8 @@ class Deadband {
 
   /// Whether `value` is worth sending at `now`; if so it counts as sent.
   bool passes(LocalTime now, const Vec3& value) noexcept;
+  /// It has been sent for another reason.
+  void sent(LocalTime now, const Vec3& value) noexcept { sent_ = {now, value}; }
 
  private:
   struct Sent {
@@ -43,6 +46,34 @@ class Deadband {
   };
   Config config_;
   std::optional<Sent> sent_;
+};
+
+/// Where the device is `later` than in `sent`, as far as the line goes that it was on. Both ends reckon with this, so
+/// that the sender knows what the receiver believes. In whole haptic periods, so that the result is at a tick:
+///
+///     n = ⌊later / haptic_period⌋      tick + n      sampled + n T      position + velocity · n T
+///
+/// Everything else is as it was. A `later` below zero is none. Realtime-safe: yes.
+DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
+
+/// Leaves out the device states that their receiver can foretell: a deadband on velocity, which is the slope of the
+/// line that it goes on along. A state of another mode passes always.
+///
+/// Thread-safe: no. Realtime-safe: yes.
+class StateDeadband {
+ public:
+  /// What is wrong with what a client asks for; empty when it can be granted. Off is granted.
+  static std::string objection(const SetStateDeadband& asked);
+
+  /// `asked` is one that can be granted, and not off.
+  explicit StateDeadband(const SetStateDeadband& asked);
+
+  /// Whether the receiver needs this state; if so it counts as sent.
+  bool passes(const DeviceState& state) noexcept;
+
+ private:
+  Deadband velocity_;
+  std::optional<Mode> mode_;  ///< as sent
 };
 
 }  // namespace tendon

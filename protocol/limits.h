@@ -32,6 +32,14 @@ inline constexpr int kMaxFrames = 64;
 /// survive loss (see requests.h). A request is a human act; 16 are a burst of clicks.
 inline constexpr std::uint32_t kRequestWindow = 16;
 
+/// What a server leaves out of the states when it is asked to. Half the speed is beyond every threshold of touch
+/// (7 … 15 %). 20 ms of silence at 1 m/s are 20 mm of foretold way, five lost keep-alives fit into a safe stop, and
+/// below 1 ms there is nothing to leave out.
+inline constexpr double kMaxDeadbandShare = 0.5;
+inline constexpr double kMaxDeadbandFloor = 0.1;  ///< m/s
+inline constexpr Duration kMinStateSilence = std::chrono::milliseconds(1);
+inline constexpr Duration kMaxStateSilence = std::chrono::milliseconds(20);
+
 /// Devices of one server, numbered from 0: two hands of five fingers, and as much again for tools. Each has a thread.
 inline constexpr std::uint32_t kMaxDevices = 16;
 /// Channels of one device, numbered from 0. Each costs its haptic step a reconstruction.

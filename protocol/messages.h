@@ -71,11 +71,51 @@ struct ForceCommand {
   std::uint32_t channel = 0;
 };
 
+/// Two quantiles of a delay; below zero only where two clocks had to be compared.
+struct Delays {
+  Duration median{};
+  Duration p99{};
+};
+
+/// Server → client, unreliable, newest wins: what became of the client's forces and datagrams. Once in `span` while its
+/// forces come. Delays are absent where nothing was measured; those of one way are known ± `clock_error`.
+struct LinkReport {
+  std::uint64_t number = 0;  ///< 1, 2, 3 … per session
+  PeerTime until{};          ///< end of the time it tells of, server clock
+  Duration span{};           ///< … and its length
+  // In that time:
+  std::uint64_t forces = 0;        ///< that came
+  std::uint64_t late_server = 0;   ///< late ones, because the server sent a state late
+  std::uint64_t late_network = 0;  ///< … because of the way there and back
+  std::uint64_t late_engine = 0;   ///< … because the engine took longer than usual
+  Duration worst_late{};           ///< longest time that the device was without a valid force
+  Duration longest_gap{};          ///< longest time that nothing was heard of the client
+  std::optional<Delays> round_trip;
+  std::optional<Delays> to_server;
+  std::optional<Delays> to_client;
+  Duration clock_offset{};     ///< the client's clock less the server's
+  double clock_drift_ppm = 0;  ///< how fast that grows
+  Duration clock_error{};      ///< |true offset − clock_offset| is at most this
+  // Datagrams of the client since the session opened:
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;
+  std::uint64_t reordered = 0;
+  std::uint64_t duplicated = 0;
+  std::string words;  ///< why forces were late, for people; empty when none was. At most 128 bytes
+};
+
 /// Client → server, reliable: how many states of a device per second this client wants. The server sends
 /// the nearest rate that divides its own, and never more.
 struct SetStateRate {
   std::uint32_t hz = 0;
   std::uint32_t device = 0;
+};
+
+/// Client → server, reliable: leave out the states that I can foretell. See StateDeadband; the bounds are in limits.h.
+struct SetStateDeadband {
+  double share = 0;        ///< of the speed
+  double floor = 0;        ///< m/s
+  Duration max_silence{};  ///< 0: every state is sent, as before this was asked; travels in whole µs
 };
 
 /// Client → server, reliable: clears a latched fault. Only from a controller of the device.
@@ -107,7 +147,7 @@ struct LeaseLost {
   std::string to;  ///< name of the one that is; at most 64 bytes
 };
 
-using Request = std::variant<SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost>;
+using Request = std::variant<SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband>;
 
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes

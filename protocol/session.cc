@@ -101,6 +101,7 @@ struct Session::State {
   std::optional<LocalTime> last_sent;
   Newest<DeviceState> states_to_send;
   Newest<ForceCommand> forces_to_send;
+  std::optional<LinkReport> report_to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -110,14 +111,17 @@ struct Session::State {
   LocalTime last_heard;
   ReplayWindow seen;
   std::optional<OutgoingEcho> echo;
+  std::uint64_t newest_report = 0;
   std::optional<std::uint64_t> newest_echoed;  ///< newest packet of ours that the peer has told of
   IncomingRequests answering;
   RoundTrip round_trip;
+  std::optional<ClockExchange> exchange;
   ClockOffsetEstimator peer_clock;
 
   // To tell.
   Newest<DeviceState> states_arrived;
   Newest<ForceCommand> forces_arrived;
+  std::optional<LinkReport> report_arrived;
   std::optional<Closed> closed;
 
   Suite suite() const noexcept { return sealer ? Suite::kNoise : Suite::kPlain; }
@@ -129,14 +133,15 @@ struct Session::State {
 
   void take(const DeviceState& state) { stats.stale += states_arrived.put_if_newer(state, state.tick) ? 0 : 1; }
   void take(const ForceCommand& force) { stats.stale += forces_arrived.put_if_newer(force, force.sequence) ? 0 : 1; }
+  void take(const LinkReport& report);
   void take(const Control& control) { stats.invalid += answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
   bool something_to_say(LocalTime now) const noexcept {
-    return !states_to_send.empty() || !forces_to_send.empty() || answering.next_due() || asked.next_due(now) ||
-           silent_too_long(now);
+    return !states_to_send.empty() || !forces_to_send.empty() || report_to_send || answering.next_due() ||
+           asked.next_due(now) || silent_too_long(now);
   }
   bool too_old(LocalTime now) const noexcept {
     return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams);
@@ -242,7 +247,8 @@ void Session::State::observe(LocalTime now, PeerTime sent, const IncomingEcho& t
     return;
   }
   count_lost_outgoing(told);
-  peer_clock.observe({.sent = told.sent, .received = told.received, .answered = sent, .answered_at = now});
+  exchange = {.sent = told.sent, .received = told.received, .answered = sent, .answered_at = now};
+  peer_clock.observe(*exchange);
   const Duration sample = (now - told.sent) - (sent - told.received);
   if (sample < Duration::zero()) return;  // two clocks of different rates, and a peer that held the echo for long
   round_trip.observe(sample);
@@ -263,6 +269,15 @@ void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   newest_echoed = told.packet_number;
 }
 
+void Session::State::take(const LinkReport& report) {
+  if (report.number <= newest_report) {
+    ++stats.stale;
+    return;
+  }
+  newest_report = report.number;
+  report_arrived = report;
+}
+
 void Session::State::take(const Bye& said) {
   open = false;
   closed = Closed{.code = said.code, .reason = said.reason};
@@ -271,6 +286,8 @@ void Session::State::take(const Bye& said) {
 void Session::send(const DeviceState& state) { state_->states_to_send.put(state); }
 
 void Session::send(const ForceCommand& command) { state_->forces_to_send.put(command); }
+
+void Session::send(const LinkReport& report) { state_->report_to_send = report; }
 
 std::optional<std::uint32_t> Session::request(const Request& request) { return state_->asked.add(request); }
 
@@ -339,6 +356,7 @@ void Session::State::fill(LocalTime now) {
   for (const Control* due = asked.next_due(now); due && writer.add(*due); due = asked.next_due(now)) {
     asked.sent(due->id, now, timeout);
   }
+  if (report_to_send && writer.add(*report_to_send)) report_to_send.reset();
 }
 
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
@@ -367,6 +385,7 @@ std::optional<Session::Event> Session::next_event() {
                            .device = std::move(ack->device)};
   }
   if (!my.forces_arrived.empty()) return ForceArrived{.command = my.forces_arrived.take()};
+  if (my.report_arrived) return ReportArrived{.report = *std::exchange(my.report_arrived, std::nullopt)};
   if (!my.states_arrived.empty()) return StateArrived{.state = my.states_arrived.take()};
   if (my.closed) return *std::exchange(my.closed, std::nullopt);
   return {};
@@ -383,6 +402,7 @@ LocalTime Session::next_tick() const noexcept {
 bool Session::open() const noexcept { return state_->open; }
 std::uint32_t Session::connection_id() const noexcept { return state_->config.connection_id; }
 const LinkStats& Session::stats() const noexcept { return state_->stats; }
+const std::optional<ClockExchange>& Session::newest_exchange() const noexcept { return state_->exchange; }
 std::optional<ClockOffsetEstimator::Estimate> Session::peer_clock() const noexcept {
   return state_->peer_clock.estimate(state_->latest);
 }

@@ -34,7 +34,7 @@ struct LinkStats {
   std::uint64_t forged = 0;              ///< suite 1: did not open; forged, or damaged under way: dropped
   std::uint64_t old_key = 0;             ///< suite 1: of a key that is over, or far ahead: dropped
   std::uint64_t invalid = 0;             ///< well-formed, with a value out of bounds (NaN, Inf …): frame dropped
-  std::uint64_t stale = 0;               ///< state or force not newer than the newest one: frame dropped
+  std::uint64_t stale = 0;               ///< state, force or report not newer than the newest one: frame dropped
   Duration round_trip{};                 ///< newest sample, (T4 − T1) − (T3 − T2); 0 = none yet
   Duration smoothed_round_trip{};        ///< RFC 6298 SRTT
   Duration round_trip_variation{};       ///< RFC 6298 RTTVAR
@@ -43,15 +43,17 @@ struct LinkStats {
 /// One open conversation between a client and a server, seen from either end: bytes and instants in,
 /// bytes and events out (sans-I/O, pull). It has no socket, clock, thread or randomness of its own.
 ///
-/// * State and force are unreliable and newest-wins, each device and channel by itself: `send` replaces what has
-///   not left yet, and a received one older than the newest is dropped and counted.
+/// * State, force and report are unreliable and newest-wins, states and forces of each device and channel by
+///   themselves: `send` replaces what has not left yet, and a received one older than the newest is dropped and
+///   counted.
 /// * Requests are reliable and in order: resent until answered. Between requests, states and forces no
 ///   order is promised.
 /// * Every datagram carries tx_time and an Echo, so each gives a round trip and an ack vector.
 /// * Silence is filled with keep-alives and, when too long, ends the conversation.
 ///
-/// Nothing queues without a bound: there is room for one state of each device, one force of each channel and
-/// limits::kRequestWindow requests each way; an event that was not taken out is replaced by a newer one of its kind.
+/// Nothing queues without a bound: there is room for one state of each device, one force of each channel, one report
+/// and limits::kRequestWindow requests each way; an event that was not taken out is replaced by a newer one of its
+/// kind.
 ///
 /// SESSION.md describes the behaviour over time, WIRE.md the bytes.
 ///
@@ -96,6 +98,9 @@ class Session {
   struct ForceArrived {
     ForceCommand command;
   };
+  struct ReportArrived {
+    LinkReport report;
+  };
   struct RequestArrived {
     std::uint32_t id;
     Request request;
@@ -111,7 +116,7 @@ class Session {
     Code code;  ///< as the peer said Bye: kOk, kShutdown …; kTimedOut: it fell silent; kExpired: too old
     std::string reason;
   };
-  using Event = std::variant<StateArrived, ForceArrived, RequestArrived, RequestAnswered, Closed>;
+  using Event = std::variant<StateArrived, ForceArrived, ReportArrived, RequestArrived, RequestAnswered, Closed>;
 
   // In.
   /// Takes any bytes. What is not a good datagram of this conversation is counted and dropped. True when
@@ -120,6 +125,7 @@ class Session {
   bool receive(LocalTime now, std::span<const std::byte> datagram);
   void send(const DeviceState& state);
   void send(const ForceCommand& command);
+  void send(const LinkReport& report);
   /// Queues a reliable request and returns its id; empty when limits::kRequestWindow are open, that is
   /// sent and their RequestAnswered not yet taken out.
   std::optional<std::uint32_t> request(const Request& request);
@@ -144,6 +150,8 @@ class Session {
   bool open() const noexcept;
   std::uint32_t connection_id() const noexcept;
   const LinkStats& stats() const noexcept;
+  /// The newest echo with its four time stamps; empty before the first.
+  const std::optional<ClockExchange>& newest_exchange() const noexcept;
   /// The peer's clock, as the echoes tell of it up to the newest `now`, with the bound on its error; empty before the
   /// first.
   std::optional<ClockOffsetEstimator::Estimate> peer_clock() const noexcept;

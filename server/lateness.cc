@@ -23,23 +23,27 @@ std::string milliseconds_text(Duration d) {
 }
 
 std::string describe(const Lateness::Report& report) {
-  if (report.late == 0) return {};
+  if (report.late() == 0) return {};
   std::string text = "forces were late " +
-                     (report.late == 1 ? std::string("once") : std::to_string(report.late) + " times") + ", by up to " +
-                     milliseconds_text(report.worst) + ": ";
+                     (report.late() == 1 ? std::string("once") : std::to_string(report.late()) + " times") +
+                     ", by up to " + milliseconds_text(report.worst) + ": ";
   const auto part = [](Duration now, Duration usual) {
     return milliseconds_text(now) + ", usually " + milliseconds_text(usual) + ")";
   };
-  switch (report.to_blame) {
-    case Lateness::Part::kOurs:
-      return text + "our own threads (a state waited " + part(report.ours, report.usual_ours);
-    case Lateness::Part::kNetwork:
-      if (report.network == Duration::zero()) return text + "the network (nothing is heard of the engine's machine)";
+  switch (report.cause) {
+    case Lateness::Cause::kStateWaited:
+      return text + "the server's threads (a state waited " + part(report.ours, report.usual_ours);
+    case Lateness::Cause::kRoundTrip:
       return text + "the network (round trip " + part(report.network, report.usual_network);
-    case Lateness::Part::kEngine:
-      if (report.engine == Duration::zero()) return text + "the engine (it is heard, but sends no force)";
+    case Lateness::Cause::kLost:
+      return text + "the network (datagrams were lost)";
+    case Lateness::Cause::kUnheard:
+      return text + "the network (nothing is heard of the engine's machine)";
+    case Lateness::Cause::kEngineTook:
       return text + "the engine (it took " + part(report.engine, report.usual_engine);
-    case Lateness::Part::kNone:
+    case Lateness::Cause::kEngineMissing:
+      return text + "the engine (it is heard, but sends no force)";
+    case Lateness::Cause::kNone:
       break;
   }
   return text + "not known why";
@@ -54,11 +58,30 @@ void Lateness::begin(LocalTime now) noexcept {
   valid_until_ = LocalTime::max();  // before the first force nothing is late
 }
 
-void Lateness::blame(Duration late_by, Part part, const Parts& parts) noexcept {
-  ++report_.late;
+Lateness::Part Lateness::part(Cause cause) noexcept {
+  switch (cause) {
+    case Cause::kStateWaited:
+      return Part::kOurs;
+    case Cause::kRoundTrip:
+    case Cause::kLost:
+    case Cause::kUnheard:
+      return Part::kNetwork;
+    case Cause::kEngineTook:
+    case Cause::kEngineMissing:
+      return Part::kEngine;
+    case Cause::kNone:
+      break;
+  }
+  return Part::kNone;
+}
+
+void Lateness::blame(Duration late_by, Cause cause, const Parts& parts) noexcept {
+  report_.late_ours += part(cause) == Part::kOurs ? 1 : 0;
+  report_.late_network += part(cause) == Part::kNetwork ? 1 : 0;
+  report_.late_engine += part(cause) == Part::kEngine ? 1 : 0;
   if (late_by <= report_.worst) return;
   report_.worst = late_by;
-  report_.to_blame = part;
+  report_.cause = cause;
   report_.ours = parts.ours;
   report_.network = parts.network;
   report_.engine = parts.engine;
@@ -75,10 +98,13 @@ void Lateness::observe(const Way& way) noexcept {
     const Duration ours = parts.ours - usual_.ours;
     const Duration network = parts.network - usual_.network;
     const Duration engine = parts.engine - usual_.engine;
-    const Part part = ours >= network && ours >= engine ? Part::kOurs
-                      : network >= engine               ? Part::kNetwork
-                                                        : Part::kEngine;
-    blame(way.received - valid_until_, part, parts);
+    const Duration late_by = way.received - valid_until_;
+    const Cause cause = 2 * std::max({ours, network, engine}) < late_by
+                            ? (way.lost ? Cause::kLost : Cause::kEngineMissing)
+                        : ours >= network && ours >= engine ? Cause::kStateWaited
+                        : network >= engine                 ? Cause::kRoundTrip
+                                                            : Cause::kEngineTook;
+    blame(late_by, cause, parts);
   } else if (!usual_known_) {
     usual_ = parts;
     usual_known_ = true;
@@ -91,11 +117,20 @@ void Lateness::observe(const Way& way) noexcept {
   valid_until_ = way.received + way.valid_for;
 }
 
+void Lateness::Report::add(const Report& other) {
+  Report sum = other.worst > worst ? other : *this;
+  sum.forces = forces + other.forces;
+  sum.late_ours = late_ours + other.late_ours;
+  sum.late_network = late_network + other.late_network;
+  sum.late_engine = late_engine + other.late_engine;
+  *this = std::move(sum);
+}
+
 Lateness::Report Lateness::report(LocalTime now) {
   if (attending_ && now > valid_until_) {
     // Five keep-alives have not come: see SESSION.md.
     const bool silent = now - heard_ > std::chrono::milliseconds(250);
-    blame(now - valid_until_, silent ? Part::kNetwork : Part::kEngine, {});
+    blame(now - valid_until_, silent ? Cause::kUnheard : Cause::kEngineMissing, {});
   }
   Report report = std::exchange(report_, {});
   report.usual_ours = usual_.ours;

@@ -98,8 +98,12 @@ void print_json(const Server::Summary& summary) {
   add("forces", network.forces);
   add("denied", network.denied);
   add("unanswerable", network.unanswerable);
-  add("late", network.late);
+  add("late", network.late_ours + network.late_network + network.late_engine);
+  add("late_server", network.late_ours);
+  add("late_network", network.late_network);
+  add("late_engine", network.late_engine);
   add("hopeless", network.hopeless);
+  add("foretold", network.foretold);
   add("replaced", network.replaced);
   add("roamed", network.roamed);
   add("half_open_forgotten", network.half_open_forgotten);

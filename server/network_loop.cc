@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -14,6 +15,9 @@ namespace tendon {
 namespace {
 
 constexpr std::size_t kMaxNotices = 64;
+
+/// How often a controller is told how its forces fare: often enough to look at, and nothing beside 1000 states.
+constexpr Duration kReportPeriod = std::chrono::seconds(1);
 
 /// What this server can do beyond the version's minimum.
 constexpr std::array<std::string_view, 2> kFeatures = {kFeatureLocalModel, kFeatureChannels};
@@ -97,6 +101,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes
 LocalTime NetworkLoop::turn(LocalTime now) {
   const bool more = drain(now);
   publish(now);
+  report(now);
   for (Guest& guest : guests_) {
     guest.session.tick(now);
     serve(now, guest);
@@ -104,8 +109,6 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   std::erase_if(guests_, [](const Guest& guest) { return guest.gone; });
   stats_.half_open_forgotten +=
       std::erase_if(half_open_, [&](const Guest& guest) { return now - guest.arrived >= config_.half_open_timeout; });
-
-  report_lateness(now);
 
   if (more) return now;
   LocalTime next = LocalTime::max();
@@ -146,13 +149,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       guest->address = from;
       ++stats_.roamed;
     }
-    if (newest) {
-      for (const Seat& seat : guest->seats) {
-        Channel& channel = devices_[seat.device].channels[seat.channel];
-        if (channel.holder == header->connection_id) channel.lateness.heard(now);
-      }
-    }
-    if (newest) adapt(now, *guest);
+    if (newest) measure(now, *guest);
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
     if (!waiting->session.receive(now, datagram)) return;
@@ -356,6 +353,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   notice(false, "welcomed " + std::string(guest.role == Role::kController ? "controller" : "observer") + " \"" +
                     guest.name + "\" at " + to_string(guest.address) +
                     (guest.key != nullptr ? " with the key \"" + guest.key->name + "\"" : ""));
+  if (guest.role == Role::kController) guest.meter.emplace(now);
   if (config_.adapt_state_rate) guest.adaptation.emplace(RateAdaptation::Config{}, now);
   guests_.push_back(std::move(guest));
   Guest& arrived = guests_.back();
@@ -458,34 +456,106 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
   }
 }
 
-void NetworkLoop::report_lateness(LocalTime now) {
-  if (now < report_next_) return;
-  report_next_ = now + std::chrono::seconds(1);
+void NetworkLoop::measure(LocalTime now, Guest& guest) {
+  for (const Seat& seat : guest.seats) {
+    Channel& channel = devices_[seat.device].channels[seat.channel];
+    if (channel.holder == guest.session.connection_id()) channel.lateness.heard(now);
+  }
+  if (guest.meter) {
+    guest.meter->heard(now);
+    const auto& exchange = guest.session.newest_exchange();
+    if (exchange && exchange->answered_at == now) {  // this datagram had an echo
+      if (const auto clock = guest.session.peer_clock()) guest.meter->observe(*exchange, *clock);
+    }
+  }
+  adapt(now, guest);
+}
+
+/// To the operator, channel by channel; to each holder, of all its channels together.
+void NetworkLoop::report(LocalTime now) {
+  if (now - reported_ < kReportPeriod) return;
+  std::map<std::uint32_t, Lateness::Report> told;  // by connection id
   for (Device& device : devices_) {
     for (std::size_t i = 0; i < device.channels.size(); ++i) {
       Channel& channel = device.channels[i];
-      Lateness::Report report = channel.lateness.report(now);
-      stats_.late += report.late;
-      channel.late += report.late;
+      const Lateness::Report report = channel.lateness.report(now);
+      stats_.late_ours += report.late_ours;
+      stats_.late_network += report.late_network;
+      stats_.late_engine += report.late_engine;
+      channel.late += report.late();
+      if (channel.holder != 0) told[channel.holder].add(report);
       if (report.text.empty()) continue;
       const bool only_one = devices_.size() == 1 && device.channels.size() == 1;
       notice(true, (only_one ? "" : device.about.name + "/" + device.about.channels[i].name + ": ") + report.text);
     }
   }
+  for (Guest& guest : guests_) {
+    if (guest.meter) tell(now, guest, told[guest.session.connection_id()]);
+  }
+  reported_ = now;
+}
+
+void NetworkLoop::tell(LocalTime now, Guest& guest, const Lateness::Report& forces) {
+  const LinkMeter::Report link = guest.meter->report(now);
+  if (forces.forces == 0 && forces.late() == 0) return;
+  const LinkStats& counted = guest.session.stats();
+  LinkReport report;
+  report.number = ++guest.reports;
+  report.until = PeerTime(now.time_since_epoch());
+  report.span = now - std::max(reported_, guest.arrived);
+  report.forces = forces.forces;
+  report.late_server = forces.late_ours;
+  report.late_network = forces.late_network;
+  report.late_engine = forces.late_engine;
+  report.worst_late = forces.worst;
+  report.longest_gap = link.longest_gap;
+  report.round_trip = link.round_trip;
+  report.to_server = link.from_peer;
+  report.to_client = link.to_peer;
+  if (const auto clock = guest.session.peer_clock()) {
+    report.clock_offset = clock->offset;
+    report.clock_drift_ppm = 1e6 * clock->drift;
+    report.clock_error = clock->error_bound;
+  }
+  report.received = counted.datagrams_received;
+  report.lost = counted.lost;
+  report.reordered = counted.reordered;
+  report.duplicated = counted.duplicated;
+  report.words = forces.text;
+  guest.session.send(report);
+}
+
+/// A client may answer a step that it has foretold, also one that we were too late to see: those between the last state
+/// and this one were evenly spaced, as far as we know.
+void NetworkLoop::remember(LocalTime now, Device& device, const DeviceState& state) {
+  const LocalTime at(state.sampled.time_since_epoch());
+  const Sampled last = device.sampled[device.newest_tick % kRemembered];
+  const std::uint64_t since = state.tick - std::exchange(device.newest_tick, state.tick);
+  if (last.tick > 0 && since < kRemembered) {
+    const Duration apart = (at - last.at) / static_cast<Duration::rep>(since);
+    for (std::uint64_t i = 1; i < since; ++i) {
+      const std::uint64_t tick = last.tick + i;
+      device.sampled[tick % kRemembered] = {tick, last.at + static_cast<Duration::rep>(i) * apart, now};
+    }
+  }
+  device.sampled[state.tick % kRemembered] = {state.tick, at, now};
 }
 
 void NetworkLoop::publish(LocalTime now) {
   for (std::uint32_t number = 0; number < devices_.size(); ++number) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
-    devices_[number].sampled[state->tick % kRemembered] = {state->tick, LocalTime(state->sampled.time_since_epoch()),
-                                                           now};
+    remember(now, devices_[number], *state);
     for (Guest& guest : guests_) {
       const auto view =
           std::find_if(guest.views.begin(), guest.views.end(), [&](const View& seen) { return seen.device == number; });
       if (view == guest.views.end()) continue;
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
+      if (view->deadband && !view->deadband->passes(*state)) {
+        ++stats_.foretold;
+        continue;
+      }
       view->last_state = state->tick;
       guest.session.send(*state);
     }
@@ -534,11 +604,14 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
     ++stats_.hopeless;
     return;
   }
+  const LinkStats& link = guest.session.stats();
+  const std::uint64_t lost = link.lost + link.lost_outgoing;
   channel.lateness.observe({.sampled = answered.at,
                             .sent = answered.sent,
                             .received = now,
-                            .round_trip = guest.session.stats().round_trip,
-                            .valid_for = command.valid_for});
+                            .round_trip = link.round_trip,
+                            .valid_for = command.valid_for,
+                            .lost = lost > std::exchange(guest.lost, lost)});
   RemoteForce force;
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
@@ -566,6 +639,15 @@ void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Re
                      return guest.session.answer(id, Code::kInvalid, "that device is not claimed");
                    const auto loop_hz = static_cast<double>(devices_[rate.device].about.loop_hz);
                    view->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
+                   guest.session.answer(id, Code::kOk, {});
+                 },
+                 [&](const SetStateDeadband& asked) {
+                   const std::string objection = StateDeadband::objection(asked);
+                   if (!objection.empty()) return guest.session.answer(id, Code::kInvalid, objection);
+                   for (View& view : guest.views) {
+                     view.deadband.reset();
+                     if (asked.max_silence > Duration::zero()) view.deadband.emplace(asked);
+                   }
                    guest.session.answer(id, Code::kOk, {});
                  },
                  [&](const Rearm& rearm) {

@@ -9,8 +9,10 @@
 #include <variant>
 #include <vector>
 
+#include "protocol/deadband.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
+#include "protocol/link_meter.h"
 #include "protocol/messages.h"
 #include "protocol/rate_adaptation.h"
 #include "protocol/session.h"
@@ -86,7 +88,10 @@ class NetworkLoop {
     std::uint64_t forces = 0;              ///< handed to the haptic loop
     std::uint64_t denied = 0;              ///< forces and requests that only the holder of a channel may send
     std::uint64_t unanswerable = 0;        ///< forces that answer a step which never was, or long ago
-    std::uint64_t late = 0;                ///< forces that came when the one before had outlived its validity
+    std::uint64_t late_ours = 0;           ///< forces that came when the one before had outlived its validity: by us,
+    std::uint64_t late_network = 0;        ///< … the network,
+    std::uint64_t late_engine = 0;         ///< … and the engine; see Lateness
+    std::uint64_t foretold = 0;            ///< states left out because their client can foretell them
     std::uint64_t hopeless = 0;            ///< forces not handed on, over a link of no use
     Dropped dropped;
     struct Channel {
@@ -136,6 +141,7 @@ class NetworkLoop {
     std::uint32_t device = 0;
     std::uint64_t state_every = 1;  ///< haptic steps
     std::uint64_t last_state = 0;   ///< tick
+    std::optional<StateDeadband> deadband{};
   };
   struct Guest {
     Address address;
@@ -150,7 +156,10 @@ class NetworkLoop {
     Session session;
     LocalTime arrived;
     std::optional<RateAdaptation> adaptation{};
-    bool hopeless = false;  ///< as it was told to the operator
+    std::optional<LinkMeter> meter{};  ///< of a controller
+    std::uint64_t reports = 0;         ///< sent to it
+    std::uint64_t lost = 0;            ///< datagrams, either way, as of the newest force
+    bool hopeless = false;             ///< as it was told to the operator
     bool gone = false;
   };
   struct Refusal {
@@ -176,6 +185,7 @@ class NetworkLoop {
     DeviceDescription about;
     Mailboxes* mail;
     std::vector<Sampled> sampled;
+    std::uint64_t newest_tick = 0;
     std::vector<Channel> channels;
   };
 
@@ -203,8 +213,11 @@ class NetworkLoop {
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
+  void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
-  void report_lateness(LocalTime now);
+  void remember(LocalTime now, Device& device, const DeviceState& state);
+  void report(LocalTime now);
+  void tell(LocalTime now, Guest& guest, const Lateness::Report& forces);
   void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
            std::size_t size);
@@ -217,7 +230,7 @@ class NetworkLoop {
   std::vector<Guest> guests_;
   std::vector<Guest> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
-  LocalTime report_next_{};
+  LocalTime reported_{};
 
   Stats stats_;
   std::vector<Notice> notices_;

@@ -40,6 +40,10 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   require(config.retry_max >= config.retry_min, "retry_max: must not be below retry_min");
   require(config.max_datagrams > 0, "max_datagrams: must be above zero");
   if (config.deadband) Deadband{*config.deadband};  // throws what is wrong with it
+  if (config.state_deadband) {
+    const std::string objection = StateDeadband::objection(*config.state_deadband);
+    if (!objection.empty()) throw std::invalid_argument("state_deadband: " + objection);
+  }
   return config;
 }
 
@@ -155,6 +159,10 @@ void ForceClient::settle(LocalTime now) {
     session_.emplace(config, now);
   }
   if (claims()) session_->request(Describe{.device = place_.device});
+  deadband_request_ = config_.state_deadband ? session_->request(*config_.state_deadband) : std::nullopt;
+  foretell_ = false;
+  seen_tick_ = 0;
+  report_.reset();
   if (config_.state_hz > 0) session_->request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
   sequence_ = 0;
   if (config_.deadband) deadband_.emplace(*config_.deadband);  // what another session was sent, this one was not
@@ -171,6 +179,7 @@ void ForceClient::end(LocalTime now, Phase phase, Code code, std::string reason)
   session_.reset();
   holds_ = false;
   unseen_.reset();
+  newest_.reset();
   retry_ = now + back_off_;
   back_off_ = std::min(2 * back_off_, config_.retry_max);
 }
@@ -223,8 +232,11 @@ void ForceClient::take_events(LocalTime now) {
     if (const auto* arrived = std::get_if<Session::StateArrived>(&*event)) {
       ++stats_.states;
       if (unseen_) ++stats_.states_skipped;
-      unseen_ = arrived->state;
+      unseen_ = newest_ = arrived->state;
+      newest_arrived_ = now;
       back_off_ = config_.retry_min;
+    } else if (const auto* report = std::get_if<Session::ReportArrived>(&*event)) {
+      report_ = report->report;
     } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&*event)) {
       take_answer(now, *answered);
     } else if (const auto* asked = std::get_if<Session::RequestArrived>(&*event)) {
@@ -239,6 +251,10 @@ void ForceClient::take_events(LocalTime now) {
 
 void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& answered) {
   if (answered.device) description_ = answered.device;
+  if (answered.id == deadband_request_) {
+    foretell_ = answered.code == Code::kOk && period_ > Duration::zero() &&
+                config_.state_deadband->max_silence > Duration::zero();
+  }
   if (answered.id != asked_lease_) return;
   asked_lease_.reset();
   holds_ = answered.code == Code::kOk;
@@ -270,12 +286,26 @@ void ForceClient::flush(LocalTime now) {
   while (const std::size_t size = next()) link_.send(server_, std::span<const std::byte>(buffer).first(size));
 }
 
+/// What the callback is to see now; empty when there is nothing new.
+std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
+  if (!foretell_) return std::exchange(unseen_, std::nullopt);
+  if (!newest_ || now - newest_arrived_ > config_.state_deadband->max_silence) return {};
+  const DeviceState state = foretell(*newest_, now - newest_arrived_, haptic_period());
+  if (state.tick <= seen_tick_) return {};  // the one before was on its way for less time
+  unseen_.reset();
+  stats_.states_foretold += state.tick > newest_->tick ? 1 : 0;
+  return state;
+}
+
 /// True when a force now waits to be sent.
 bool ForceClient::call(LocalTime now) {
-  if (!unseen_ || now < next_call_ || (physics_ && !holds_)) return false;
+  if (now < next_call_ || (physics_ && !holds_)) return false;
+  const std::optional<DeviceState> due = due_state(now);
+  if (!due) return false;
+  const DeviceState& state = *due;
+  seen_tick_ = state.tick;
   next_call_ += period_;
   if (next_call_ <= now) next_call_ = now + period_;
-  const DeviceState state = *std::exchange(unseen_, std::nullopt);
   try {
     if (watch_) {
       watch_(state, stats().link);
@@ -325,10 +355,22 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
   return std::clamp(kValidPeriods * period, kMinValidFor, limits::kMaxValidFor);
 }
 
+Duration ForceClient::haptic_period() const { return from_seconds(1.0 / welcome_->loop_hz); }
+
+/// When the callback is due next; LocalTime::max() while there is nothing that it has not seen.
+LocalTime ForceClient::next_call() const {
+  if (!foretell_) return unseen_ ? next_call_ : LocalTime::max();
+  if (!newest_) return LocalTime::max();
+  // The first tick that it has not seen.
+  const std::uint64_t ahead = seen_tick_ >= newest_->tick ? seen_tick_ + 1 - newest_->tick : 0;
+  const LocalTime at = std::max(next_call_, newest_arrived_ + static_cast<Duration::rep>(ahead) * haptic_period());
+  return at - newest_arrived_ <= config_.state_deadband->max_silence ? at : LocalTime::max();
+}
+
 LocalTime ForceClient::next_turn() const {
   if (session_) {
     LocalTime next = session_->next_tick();
-    if (unseen_ && (!physics_ || holds_)) next = std::min(next, next_call_);
+    if (!physics_ || holds_) next = std::min(next, next_call());
     return asked_lease_ ? next : std::min(next, ask_lease_);
   }
   if (handshake_) return std::min(give_up_, handshake_->next_tick());

@@ -87,6 +87,12 @@ class ForceClient {
     /// kHz, where those are dear. Compares forces; a stiffness that alone has changed waits for the next one, at most
     /// for the longest silence. Empty: every force is sent.
     std::optional<Deadband::Config> deadband{};
+    /// States that we can foretell are not sent to us: most of them, where they are dear. With rate_hz = r the callback
+    /// is then called at multiples of 1/r with the state as it is foretold for that instant, its tick and time of
+    /// sampling included; it never sees a tick twice, nor an older one. Nothing is foretold for longer than
+    /// max_silence: where states are lost the callback waits for the next one. With rate_hz = 0 it is called for each
+    /// state that comes. Empty: every state is asked for. A server that knows nothing of this sends every state.
+    std::optional<SetStateDeadband> state_deadband{};
     /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
     std::optional<Key> key{};
     Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
@@ -122,6 +128,7 @@ class ForceClient {
     std::uint64_t attempts = 0;
     std::uint64_t sessions = 0;         ///< of these, answered with a Welcome
     std::uint64_t states = 0;           ///< states that came in
+    std::uint64_t states_foretold = 0;  ///< states that the callback saw without that they came
     std::uint64_t states_skipped = 0;   ///< of these, replaced by a newer one before a callback was due
     std::uint64_t forces = 0;           ///< forces sent
     std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
@@ -162,6 +169,10 @@ class ForceClient {
   /// What the device is and can do, when we have named a device or a channel and the server has answered; empty before.
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
 
+  /// The server's newest word on how our forces fare, once a second while they come: late ones by cause, delays,
+  /// losses. Of the present session; empty before the first.
+  const std::optional<LinkReport>& report() const noexcept { return report_; }
+
  private:
   ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now);
 
@@ -176,8 +187,11 @@ class ForceClient {
   void tick(LocalTime now);
   void flush(LocalTime now);
   bool call(LocalTime now);
+  std::optional<DeviceState> due_state(LocalTime now);
   void send(LocalTime now, const Touch& touch, const DeviceState& answered);
   Duration valid_for(std::uint64_t tick) const;
+  Duration haptic_period() const;
+  LocalTime next_call() const;
   LocalTime next_turn() const;
 
   Link& link_;
@@ -196,16 +210,22 @@ class ForceClient {
   Grant place_;  ///< the numbers of our device and channel
   bool holds_ = false;
   std::optional<std::uint32_t> asked_lease_;  ///< the request that waits for its answer
-  LocalTime ask_lease_ = LocalTime::max();  ///< when to ask (again)
-  LocalTime give_up_{};                     ///< end of the present attempt's patience
-  LocalTime retry_{};                       ///< when the next attempt begins
-  Duration back_off_{};                     ///< wait before the attempt after that
+  LocalTime ask_lease_ = LocalTime::max();    ///< when to ask (again)
+  LocalTime give_up_{};                       ///< end of the present attempt's patience
+  LocalTime retry_{};                         ///< when the next attempt begins
+  Duration back_off_{};                       ///< wait before the attempt after that
 
   std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
+  std::optional<DeviceState> newest_;  ///< newest state, seen or not
+  LocalTime newest_arrived_{};
+  std::uint64_t seen_tick_ = 0;                      ///< newest tick that the callback has seen
+  std::optional<std::uint32_t> deadband_request_{};  ///< … of the states
+  bool foretell_ = false;                            ///< the server leaves states out
   LocalTime next_call_{};
   std::optional<Deadband> deadband_;
   std::uint64_t sequence_ = 0;       ///< of the newest force
   std::uint64_t answered_tick_ = 0;  ///< the tick it answers
+  std::optional<LinkReport> report_;
   Stats stats_;
 };
 

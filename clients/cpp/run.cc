@@ -106,6 +106,31 @@ void print_summary(const ForceClient::Stats& stats, Duration duration, const Opt
   }
 }
 
+/// What the server says of our forces, each time that it says it.
+void print_report(const LinkReport& report, const Options& options) {
+  using ull = unsigned long long;
+  if (options.json) {
+    const auto delays = [](const char* name, const std::optional<Delays>& d) {
+      if (d)
+        std::printf(",\"%s_ms\":{\"median\":%.3f,\"p99\":%.3f}", name, milliseconds(d->median), milliseconds(d->p99));
+    };
+    std::printf(
+        "{\"report\":{\"number\":%llu,\"forces\":%llu,\"late_server\":%llu,\"late_network\":%llu,\"late_engine\":%llu,"
+        "\"worst_late_ms\":%.3f,\"longest_gap_ms\":%.3f",
+        ull{report.number}, ull{report.forces}, ull{report.late_server}, ull{report.late_network},
+        ull{report.late_engine}, milliseconds(report.worst_late), milliseconds(report.longest_gap));
+    delays("round_trip", report.round_trip);
+    delays("to_server", report.to_server);
+    delays("to_client", report.to_client);
+    std::printf(",\"clock_error_ms\":%.3f,\"received\":%llu,\"lost\":%llu,\"reordered\":%llu,\"duplicated\":%llu}}\n",
+                milliseconds(report.clock_error), ull{report.received}, ull{report.lost}, ull{report.reordered},
+                ull{report.duplicated});
+    std::fflush(stdout);
+  } else if (!report.words.empty()) {
+    std::fprintf(stderr, "%s: the server says: %s\n", options.client.name.c_str(), report.words.c_str());
+  }
+}
+
 template <typename Callback>
 int run_with(const Options& options, Callback callback) {
   const auto say = [&](const std::string& text) { std::cerr << options.client.name << ": " << text << '\n'; };
@@ -119,10 +144,14 @@ int run_with(const Options& options, Callback callback) {
     ForceClient client(transport, options.server, config, std::move(callback), start);
 
     std::string said;
+    PeerTime reported{};
     LocalTime now = start;
     while (now < end && stop_asked == 0) {
       const LocalTime next = std::min(client.turn(now), end);
       if (const std::string text = sentence(client, options); !text.empty() && text != said) say(said = text);
+      if (const auto& report = client.report()) {
+        if (std::exchange(reported, report->until) != report->until) print_report(*report, options);
+      }
       if (client.phase() == ForceClient::Phase::kRefused && final(client.stats().code)) return 1;
       if (client.phase() == ForceClient::Phase::kStopped) return 1;
       transport.wait(std::min(next - now, kLongestWait));

@@ -21,7 +21,8 @@ struct Options {
 ///
 /// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps
 /// trying. stderr gets one sentence for each change of the connection, stdout nothing but the callback's
-/// own output and, with `json`, the summary: {"summary":{"duration_s":…, …}}.
+/// own output and, with `json`, what the server says of our forces once a second, {"report":{"number":1, …}}, and the
+/// summary: {"summary":{"duration_s":…, …}}. Without `json` stderr gets the server's sentence when forces were late.
 ///
 /// One at a time in a process, because the signal handlers are the process's.
 int run(const Options& options, Physics physics);  ///< a controller

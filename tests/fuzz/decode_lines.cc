@@ -102,6 +102,8 @@ void print(Line& line, const Control& control) {
     line << "unknown";
   } else if (const auto* rate = std::get_if<SetStateRate>(&*control.request)) {
     line << "rate" << rate->hz;
+  } else if (const auto* deadband = std::get_if<SetStateDeadband>(&*control.request)) {
+    line << "deadband" << deadband->share << deadband->floor << deadband->max_silence;
   } else if (std::holds_alternative<Rearm>(*control.request)) {
     line << "rearm";
   } else {
@@ -117,6 +119,18 @@ void print(Line& line, const ControlAck& ack) {
 void print(Line& line, const Bye& bye) {
   line << "bye" << bye.code;
   line.put_text(bye.reason);
+}
+
+void print(Line& line, const LinkReport& report) {
+  line << "report" << report.number << report.until.time_since_epoch() << report.span << report.forces
+       << report.late_server << report.late_network << report.late_engine << report.worst_late << report.longest_gap;
+  for (const auto& delays : {report.round_trip, report.to_server, report.to_client}) {
+    line << (delays ? "measured" : "-");
+    if (delays) line << delays->median << delays->p99;
+  }
+  line << report.clock_offset << report.clock_drift_ppm << report.clock_error << report.received << report.lost
+       << report.reordered << report.duplicated;
+  line.put_text(report.words);
 }
 
 void print(Line& line, const Welcome& welcome) {

@@ -122,6 +122,63 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   }
 }
 
+Duration any_length() { return Duration{*rc::gen::inRange<std::int64_t>(0, limits::kMaxTime.count())}; }
+
+RC_GTEST_PROP(Codec, AReportComesOutAsItWentIn, ()) {
+  const auto any_delays = []() -> std::optional<Delays> {
+    if (*rc::gen::arbitrary<bool>()) return {};
+    const Duration median = any_time();
+    return Delays{median, any_time()};
+  };
+  const auto same = [](const std::optional<Delays>& a, const std::optional<Delays>& b) {
+    return a.has_value() == b.has_value() && (!a || (a->median == b->median && a->p99 == b->p99));
+  };
+  LinkReport in;
+  in.number = *rc::gen::inRange<std::uint64_t>(1, ~std::uint64_t{0});
+  in.until = PeerTime{any_time()};
+  in.span = any_length();
+  in.forces = *rc::gen::arbitrary<std::uint64_t>();
+  in.late_server = *rc::gen::arbitrary<std::uint64_t>();
+  in.late_network = *rc::gen::arbitrary<std::uint64_t>();
+  in.late_engine = *rc::gen::arbitrary<std::uint64_t>();
+  in.worst_late = any_length();
+  in.longest_gap = any_length();
+  in.round_trip = any_delays();
+  in.to_server = any_delays();
+  in.to_client = any_delays();
+  in.clock_offset = any_time();
+  in.clock_drift_ppm = any_value();
+  in.clock_error = any_length();
+  in.received = *rc::gen::arbitrary<std::uint64_t>();
+  in.lost = *rc::gen::arbitrary<std::uint64_t>();
+  in.reordered = *rc::gen::arbitrary<std::uint64_t>();
+  in.duplicated = *rc::gen::arbitrary<std::uint64_t>();
+  in.words = std::string(*rc::gen::inRange<std::size_t>(0, limits::kMaxDetail + 1), 'w');
+
+  DataReader reader;
+  const DataContent* content = read(reader, data(1, {}, in));
+  RC_ASSERT(content != nullptr);
+  RC_ASSERT(content->frames.size() == 1U);
+  const auto& out = std::get<LinkReport>(content->frames[0]);
+  RC_ASSERT(out.number == in.number);
+  RC_ASSERT((out.until == in.until));
+  RC_ASSERT((out.span == in.span && out.worst_late == in.worst_late && out.longest_gap == in.longest_gap));
+  RC_ASSERT(out.forces == in.forces);
+  RC_ASSERT(out.late_server == in.late_server);
+  RC_ASSERT(out.late_network == in.late_network);
+  RC_ASSERT(out.late_engine == in.late_engine);
+  RC_ASSERT(same(out.round_trip, in.round_trip));
+  RC_ASSERT(same(out.to_server, in.to_server));
+  RC_ASSERT(same(out.to_client, in.to_client));
+  RC_ASSERT((out.clock_offset == in.clock_offset && out.clock_error == in.clock_error));
+  RC_ASSERT(out.clock_drift_ppm == in.clock_drift_ppm);
+  RC_ASSERT(out.received == in.received);
+  RC_ASSERT(out.lost == in.lost);
+  RC_ASSERT(out.reordered == in.reordered);
+  RC_ASSERT(out.duplicated == in.duplicated);
+  RC_ASSERT(out.words == in.words);
+}
+
 TEST(Codec, SeveralFramesAndAnEchoShareOneDatagram) {
   DataReader reader;
   const auto* content = read(reader, data(42, examples::echo(), examples::state(), examples::force(),
@@ -229,6 +286,63 @@ TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
     EXPECT_EQ(content->invalid, 1U) << bad.what;
     ASSERT_EQ(content->frames.size(), 1U) << bad.what;
     EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
+  }
+}
+
+struct BadReport {
+  const char* what;
+  void (*spoil)(LinkReport&);
+};
+
+TEST(Codec, AReportOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadReport cases[] = {
+      {"number 0", [](LinkReport& r) { r.number = 0; }},
+      {"from beyond all clocks", [](LinkReport& r) { r.until = PeerTime{-limits::kMaxTime - Duration{1}}; }},
+      {"a span below zero", [](LinkReport& r) { r.span = Duration{-1}; }},
+      {"an endless span", [](LinkReport& r) { r.span = limits::kMaxTime + Duration{1}; }},
+      {"early by less than zero", [](LinkReport& r) { r.worst_late = Duration{-1}; }},
+      {"a gap below zero", [](LinkReport& r) { r.longest_gap = Duration{-1}; }},
+      {"an endless median", [](LinkReport& r) { r.round_trip->median = limits::kMaxTime + Duration{1}; }},
+      {"an endless p99", [](LinkReport& r) { r.to_server->p99 = limits::kMaxTime + Duration{1}; }},
+      {"a p99 from before all time", [](LinkReport& r) { r.to_client->p99 = -limits::kMaxTime - Duration{1}; }},
+      {"an endless offset", [](LinkReport& r) { r.clock_offset = limits::kMaxTime + Duration{1}; }},
+      {"NaN drift", [](LinkReport& r) { r.clock_drift_ppm = kNan; }},
+      {"infinite drift", [](LinkReport& r) { r.clock_drift_ppm = -kInf; }},
+      {"an error below zero", [](LinkReport& r) { r.clock_error = Duration{-1}; }},
+  };
+  for (const BadReport& bad : cases) {
+    LinkReport report = examples::report();
+    bad.spoil(report);
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, report, examples::state()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
+  }
+  LinkReport wordy = examples::report();
+  wordy.words.assign(limits::kMaxDetail + 1, 'w');  // ours are cut; a stranger's are refused
+  DataReader reader;
+  EXPECT_EQ(read(reader, data(1, {}, wordy))->frames.size(), 1U);
+  const RawProtobuf report = RawProtobuf().varint(1, 1).text(20, wordy.words);
+  EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(6, report)))->invalid, 1U);
+}
+
+TEST(Codec, ADeadbandThatIsNoNumberIsLeftOutAndOneThatMakesNoSenseIsForTheServerToRefuse) {
+  const auto read_back = [](const SetStateDeadband& asked) -> std::optional<SetStateDeadband> {
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, Control{.id = 1, .request = asked}));
+    if (content->frames.empty()) return {};
+    return std::get<SetStateDeadband>(*std::get<Control>(content->frames[0]).request);
+  };
+  EXPECT_FALSE(read_back({.share = kNan}).has_value());
+  EXPECT_FALSE(read_back({.floor = kInf}).has_value());
+  const auto silly = read_back({.share = -7, .floor = 9, .max_silence = std::chrono::milliseconds(20)});
+  EXPECT_EQ(silly->share, -7);
+  EXPECT_EQ(silly->floor, 9);
+  EXPECT_EQ(silly->max_silence, std::chrono::milliseconds(20));
+  for (const Duration impossible : {Duration{-1}, limits::kMaxStateSilence + Duration{1}, Duration::max()}) {
+    EXPECT_GT(read_back({.max_silence = impossible})->max_silence, limits::kMaxStateSilence);
   }
 }
 

@@ -67,5 +67,84 @@ TEST(Deadband, RefusesWhatIsImpossible) {
   EXPECT_THROW(Deadband({.longest_silence = Duration(0)}), std::invalid_argument);
 }
 
+// ---- states ----
+
+constexpr SetStateDeadband kAsked{.share = 0.10, .floor = 1e-3, .max_silence = milliseconds(20)};
+
+const Vec3 kRest = Vec3::Zero();
+
+DeviceState state(int ms, const Vec3& position, const Vec3& velocity, Mode mode = Mode::kActive) {
+  return {.tick = static_cast<std::uint64_t>(ms),
+          .sampled = PeerTime(milliseconds(ms)),
+          .position = position,
+          .velocity = velocity,
+          .mode = mode};
+}
+
+TEST(Foretell, GoesOnAlongTheLineInWholeHapticPeriods) {
+  const DeviceState sent = state(100, {1, 2, 3}, {0.5, 0, -1});
+  const DeviceState later = foretell(sent, milliseconds(3) + Duration(999'999), milliseconds(1));
+  EXPECT_EQ(later.tick, 103U);
+  EXPECT_EQ(later.sampled, PeerTime(milliseconds(103)));
+  EXPECT_LT((later.position - Vec3(1.0015, 2, 2.997)).norm(), 1e-12);
+  EXPECT_EQ(later.velocity, sent.velocity);
+  EXPECT_EQ(foretell(sent, Duration(-1), milliseconds(1)).tick, 100U);
+}
+
+TEST(StateDeadband, LeavesOutAHandThatGoesStraightOnAndSendsWhenItTurns) {
+  StateDeadband deadband(kAsked);
+  EXPECT_TRUE(deadband.passes(state(1, kRest, {0.1, 0, 0})));
+  EXPECT_FALSE(deadband.passes(state(2, kRest, {0.109, 0, 0})));
+  EXPECT_FALSE(deadband.passes(state(3, kRest, {0.1, 0.009, 0})));
+  EXPECT_TRUE(deadband.passes(state(4, kRest, {0.1, 0.011, 0})));
+}
+
+TEST(StateDeadband, SendsEachChangeOfModeAtOnceAndCountsTheSilenceFromThere) {
+  StateDeadband deadband(kAsked);
+  EXPECT_TRUE(deadband.passes(state(1, kRest, kRest)));
+  EXPECT_TRUE(deadband.passes(state(11, kRest, kRest, Mode::kHolding)));
+  EXPECT_FALSE(deadband.passes(state(30, kRest, kRest, Mode::kHolding)));
+  EXPECT_TRUE(deadband.passes(state(31, kRest, kRest, Mode::kHolding)));
+  EXPECT_TRUE(deadband.passes(state(32, kRest, kRest, Mode::kFault)));
+}
+
+/// Of a hand that moves by `position(t)`: what the receiver foretells is off by no more than velocity may be, for as
+/// long as nothing is sent.
+TEST(StateDeadband, WhatIsForetoldIsOffByAtMostTheBandTimesTheSilence) {
+  StateDeadband deadband(kAsked);
+  DeviceState believed;
+  int sent = 0;
+  for (int ms = 1; ms <= 10'000; ++ms) {
+    const double w = 2 * std::numbers::pi * 0.5;
+    const double t = ms * 1e-3;
+    const DeviceState now = state(ms, {0.02 * std::sin(w * t), 0, 0}, {0.02 * w * std::cos(w * t), 0, 0});
+    if (deadband.passes(now)) {
+      believed = now;
+      ++sent;
+    }
+    const DeviceState foretold = foretell(believed, now.sampled - believed.sampled, milliseconds(1));
+    ASSERT_EQ(foretold.tick, now.tick);
+    const double band = std::max(0.1 * believed.velocity.norm(), 1e-3);
+    EXPECT_LE((foretold.position - now.position).norm(), band * 20e-3);
+  }
+  EXPECT_LT(sent, 1000);
+  EXPECT_GE(sent, 500);
+}
+
+TEST(StateDeadband, GrantsWhatIsWithinItsBoundsAndSaysWhatIsNot) {
+  const auto objection = [](double share, double floor, Duration silence) {
+    return StateDeadband::objection({.share = share, .floor = floor, .max_silence = silence});
+  };
+  EXPECT_EQ(objection(0.1, 1e-3, milliseconds(20)), "");
+  EXPECT_EQ(objection(0, 0, milliseconds(1)), "");
+  EXPECT_EQ(objection(0.5, 0.1, milliseconds(20)), "");
+  EXPECT_EQ(objection(9, 9, Duration(0)), "");  // off
+  EXPECT_EQ(objection(0.51, 0, milliseconds(20)), "share: expected 0 to 0.5");
+  EXPECT_EQ(objection(std::nan(""), 0, milliseconds(20)), "share: expected 0 to 0.5");
+  EXPECT_EQ(objection(0, -1e-9, milliseconds(20)), "floor_mps: expected 0 to 0.1");
+  EXPECT_EQ(objection(0, 0, milliseconds(21)), "max_silence_us: expected 0, or 1000 to 20000");
+  EXPECT_EQ(objection(0, 0, Duration(-1)), "max_silence_us: expected 0, or 1000 to 20000");
+}
+
 }  // namespace
 }  // namespace tendon

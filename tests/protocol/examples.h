@@ -52,6 +52,34 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
+inline Control state_deadband() {
+  return {.id = 9,
+          .request = SetStateDeadband{.share = 0.1, .floor = 0.001, .max_silence = std::chrono::milliseconds(20)}};
+}
+
+inline LinkReport report() {
+  return {.number = 3,
+          .until = PeerTime{Duration{1'000'000'000}},
+          .span = Duration{1'000'000'000},
+          .forces = 97,
+          .late_server = 0,
+          .late_network = 2,
+          .late_engine = 1,
+          .worst_late = Duration{75'000'000},
+          .longest_gap = Duration{90'000'000},
+          .round_trip = Delays{Duration{41'000'000}, Duration{131'000'000}},
+          .to_server = Delays{Duration{20'500'000}, Duration{110'000'000}},
+          .to_client = Delays{Duration{20'500'000}, Duration{22'000'000}},
+          .clock_offset = Duration{-5'000'000},
+          .clock_drift_ppm = 16,
+          .clock_error = Duration{250'000},
+          .received = 3000,
+          .lost = 12,
+          .reordered = 1,
+          .duplicated = 0,
+          .words = "forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)"};
+}
+
 inline Hello hello() {
   return {.version_min = 1, .version_max = 1, .role = Role::kController, .name = "wall", .features = {"local-model"}};
 }
@@ -199,6 +227,8 @@ inline std::vector<Named> datagrams() {
       {"control-give-lease", data(55, {}, Control{.id = 12, .request = GiveLease{.device = 1, .channel = 1}})},
       {"control-lease-lost",
        data(56, {}, Control{.id = 1, .request = LeaseLost{.device = 1, .channel = 1, .to = "wall"}})},
+      {"report", data(57, {}, report())},
+      {"state-deadband", data(58, {}, state_deadband())},
   };
 }
 

@@ -167,6 +167,27 @@ TEST_F(TwoEnds, AnOlderForceOrStateThatComesLateIsDroppedAndCounted) {
   EXPECT_EQ(z_.stats().stale, 2U);
 }
 
+TEST_F(TwoEnds, AReportIsNewestWinsAsWellAndGoesBesideAState) {
+  LinkReport report = examples::report();
+  z_.send(report);
+  report.number = 4;
+  z_.send(report);
+  z_.send(state(8));
+  const auto both = pull(z_, now_);
+  EXPECT_EQ(both.size(), 1U);
+  deliver(a_, now_, both);
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_a.size(), 2U);
+  EXPECT_EQ(std::get<Session::ReportArrived>(at_a[0]).report.number, 4U);
+  EXPECT_EQ(std::get<Session::ReportArrived>(at_a[0]).report.words, report.words);
+
+  report.number = 3;  // older
+  z_.send(report);
+  deliver(a_, now_, pull(z_, now_));
+  EXPECT_TRUE(events(a_).empty());
+  EXPECT_EQ(a_.stats().stale, 1U);
+}
+
 // ---- round trip ----
 
 TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeThatThePeerTook) {

@@ -154,6 +154,8 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"give a lease", true, 263, 0, request(263, 13, GiveLease{.device = 1, .channel = 1})},
       {"a lease is lost", false, 5, 0, request(5, 1, LeaseLost{.device = 1, .channel = 1, .to = "wall"})},
       {"answer to a request", false, 258, 0, at(258, ack)},
+      {"report on a client's forces", false, 261, 0, at(261, examples::report())},
+      {"deadband of states", true, 264, 0, at(264, examples::state_deadband())},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

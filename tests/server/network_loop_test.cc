@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <deque>
 #include <memory>
 #include <set>
@@ -420,6 +422,89 @@ TEST_F(TwoDevices, AChannelWithoutALeaseIsNotTakenFromItsHolder) {
   run(milliseconds(100), {&first, &second});
   EXPECT_EQ(second.client->stats().code, Code::kBusy);
   EXPECT_TRUE(first.client->holds());
+}
+
+TEST_F(SealedServer, TellsAControllerOnceASecondHowItsForcesFareAndAnObserverNothing) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  Client b = observer(screen_, "192.0.2.2:4000");
+  run(milliseconds(3500), {&a, &b});
+  ASSERT_TRUE(a.client->report().has_value());
+  const LinkReport& report = *a.client->report();
+  EXPECT_EQ(report.number, 3U);
+  EXPECT_EQ(report.span, seconds(1));
+  EXPECT_GT(report.forces, 900U);
+  EXPECT_EQ(report.late_server + report.late_network + report.late_engine, 0U);
+  EXPECT_EQ(report.words, "");
+  EXPECT_EQ(report.lost, 0U);
+  EXPECT_GT(report.received, 2900U);
+  ASSERT_TRUE(report.round_trip && report.to_server && report.to_client);
+  EXPECT_LE(report.round_trip->p99, milliseconds(2));
+  // Both ways and the clocks: one time here, so the offset is within its bound of 0.
+  EXPECT_LE(std::chrono::abs(report.clock_offset), report.clock_error);
+  EXPECT_LE(std::chrono::abs(report.to_server->median + report.to_client->median - report.round_trip->median),
+            milliseconds(1));
+  EXPECT_FALSE(b.client->report().has_value());
+}
+
+TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(1500), {&a});
+  run(milliseconds(60), {&a}, [](Datagram&) { return false; });
+  run(milliseconds(600), {&a});
+  ASSERT_TRUE(a.client->report().has_value());
+  const LinkReport& report = *a.client->report();
+  EXPECT_EQ(report.number, 2U);
+  EXPECT_GT(report.longest_gap, milliseconds(55));
+  EXPECT_GE(report.lost, 1U);
+  EXPECT_EQ(report.late_network, 1U);
+  EXPECT_EQ(report.late_engine + report.late_server, 0U);
+  EXPECT_NEAR(tendon::seconds(report.worst_late), 40e-3, 4e-3);  // valid for 20 ms
+  EXPECT_NE(report.words.find("the network (datagrams were lost)"), std::string::npos) << report.words;
+  EXPECT_EQ(loop_->stats().late_network, 1U);
+  const auto notices = loop_->take_notices();
+  EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [&](const auto& n) { return n.text == report.words; }));
+}
+
+TEST_F(SealedServer, AControllerThatHasSentNoForceIsToldNothingAboutItsForces) {
+  Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+  a.client = std::make_unique<ForceClient>(
+      *a.end, server_.self, config_of(wall_, 5), [](const DeviceState&) { return Touch(Vec3::Constant(NAN)); }, now_);
+  run(seconds(3), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_FALSE(a.client->report().has_value());
+}
+
+TEST_F(SealedServer, LeavesOutStatesThatAClientCanForetellWhenItAsksForIt) {
+  for (const bool asks : {false, true}) {
+    Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+    ForceClient::Config config = config_of(wall_, ++seed_);
+    config.rate_hz = 500;
+    if (asks) config.state_deadband = SetStateDeadband{.share = 0.1, .floor = 1e-3, .max_silence = milliseconds(20)};
+    std::uint64_t calls = 0;
+    std::uint64_t newest = 0;
+    a.client = std::make_unique<ForceClient>(
+        *a.end, server_.self, config,
+        [&](const DeviceState& hand) {
+          EXPECT_GT(hand.tick, newest);
+          newest = hand.tick;
+          ++calls;
+          return Touch(Vec3(1, 0, 0));
+        },
+        now_);
+    const std::uint64_t unanswerable = loop_->stats().unanswerable;
+    run(seconds(2), {&a});
+    if (asks) {
+      EXPECT_LT(a.client->stats().states, 150U);  // a hand at rest: one in 20
+      EXPECT_GT(loop_->stats().foretold, 1800U);
+    } else {
+      EXPECT_GT(a.client->stats().states, 1900U);
+      EXPECT_EQ(loop_->stats().foretold, 0U);
+    }
+    EXPECT_GT(calls, 950U);
+    EXPECT_EQ(loop_->stats().unanswerable, unanswerable);
+    a.client->stop(now_);
+    run(milliseconds(10), {&a});
+  }
 }
 
 TEST_F(SealedServer, ASessionThatHasReachedItsAgeIsBegunAgainByItsClient) {

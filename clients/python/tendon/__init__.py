@@ -12,23 +12,40 @@ clock, for a loop of your own. SI units, device base frame; a force is what the 
 
 from . import aio, cli
 from .client import Client
+from .deadband import ForceDeadband
 from .force_client import Config, ForceClient, Phase, Stats
 from .guest import RefusedForGood
 from .keys import read_key
-from .messages import Code, DeviceState, LinkStats, Mode, Reason, Role, Touch, Welcome
+from .messages import (
+    Code,
+    Delays,
+    DeviceState,
+    LinkReport,
+    LinkStats,
+    Mode,
+    Reason,
+    Role,
+    SetStateDeadband,
+    Touch,
+    Welcome,
+)
 
 __all__ = [
     "Client",
     "Code",
     "Config",
+    "Delays",
     "DeviceState",
     "ForceClient",
+    "ForceDeadband",
+    "LinkReport",
     "LinkStats",
     "Mode",
     "Phase",
     "Reason",
     "RefusedForGood",
     "Role",
+    "SetStateDeadband",
     "Stats",
     "Touch",
     "Welcome",

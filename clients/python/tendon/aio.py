@@ -11,7 +11,7 @@ from typing import Union
 
 from .force_client import Config, Stats
 from .guest import Guest
-from .messages import NEVER, DeviceState, Instant, Touch, Welcome
+from .messages import NEVER, DeviceState, Instant, LinkReport, Touch, Welcome
 
 Physics = Callable[[DeviceState], Awaitable[Union[Touch, Sequence[float]]]]
 
@@ -76,6 +76,11 @@ class Client:
     def welcome(self) -> Welcome | None:
         """What the server said of itself and its device when the newest session opened; None before that."""
         return self._guest.welcome
+
+    @property
+    def report(self) -> LinkReport | None:
+        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
+        return self._guest.report
 
     async def __aenter__(self) -> Client:
         asyncio.get_running_loop().add_reader(self._guest.socket, self._turn)

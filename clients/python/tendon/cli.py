@@ -15,7 +15,7 @@ from .client import Client, Physics
 from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
 from .guest import RefusedForGood, log, parse_address
 from .keys import read_key
-from .messages import DeviceState, LinkStats, Role
+from .messages import Delays, DeviceState, LinkReport, LinkStats, Role
 
 Watch = Callable[[DeviceState, LinkStats], None]
 """An onlooker: device state and the state of the link in, nothing out."""
@@ -89,8 +89,9 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
         0   it has been connected to the server
         1   it could not connect, or the server refused it for good
 
-    stderr gets one sentence for each change of the connection, stdout nothing but the callback's own output and, with
-    --json, the summary: {"summary":{"duration_s":…, …}}. What the callback raises passes through, after a Bye.
+    stderr gets one sentence for each change of the connection, and the server's when forces were late; stdout nothing but the
+    callback's own output and, with --json, what the server says of our forces once a second, {"report":{"number":1, …}}, and the
+    summary: {"summary":{"duration_s":…, …}}. What the callback raises passes through, after a Bye.
     """
     if (physics is None) == (watch is None):
         raise TypeError("run: expected physics or watch")
@@ -106,7 +107,11 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
         )
         with Client(options.server, config) as client:
             try:
+                reported: LinkReport | None = None
                 for hand in client.states(options.duration_s or None):
+                    if options.json and client.report is not reported:
+                        reported = client.report
+                        _print_report(reported)
                     if physics is not None:
                         client.send(hand, physics(hand))
                     elif watch is not None:
@@ -119,6 +124,33 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
         return 1
     _print_summary(stats, time.monotonic() - start, options.json)
     return 0 if stats.sessions > 0 else 1
+
+
+def _print_report(report: LinkReport | None) -> None:
+    if report is None:  # of a new session
+        return
+
+    def delays(of: Delays | None) -> dict[str, float] | None:
+        return None if of is None else {"median": of.median_ns / 1e6, "p99": of.p99_ns / 1e6}
+
+    told = {
+        "number": report.number,
+        "forces": report.forces,
+        "late_server": report.late_server,
+        "late_network": report.late_network,
+        "late_engine": report.late_engine,
+        "worst_late_ms": report.worst_late_ns / 1e6,
+        "longest_gap_ms": report.longest_gap_ns / 1e6,
+        "round_trip_ms": delays(report.round_trip),
+        "to_server_ms": delays(report.to_server),
+        "to_client_ms": delays(report.to_client),
+        "clock_error_ms": report.clock_error_ns / 1e6,
+        "received": report.received,
+        "lost": report.lost,
+        "reordered": report.reordered,
+        "duplicated": report.duplicated,
+    }
+    print(json.dumps({"report": told}, separators=(",", ":")), flush=True)
 
 
 def _print_summary(stats: Stats, duration_s: float, as_json: bool) -> None:

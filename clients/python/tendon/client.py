@@ -11,7 +11,7 @@ from typing import Union
 
 from .force_client import Config, Stats
 from .guest import Guest
-from .messages import NEVER, DeviceState, Touch, Welcome
+from .messages import NEVER, DeviceState, LinkReport, Touch, Welcome
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float]]]
 """The physics engine, seen from here: device state in, force (and stiffness) out."""
@@ -79,6 +79,11 @@ class Client:
     def welcome(self) -> Welcome | None:
         """What the server said of itself and its device when the newest session opened; None before that."""
         return self._guest.welcome
+
+    @property
+    def report(self) -> LinkReport | None:
+        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
+        return self._guest.report
 
     def close(self) -> None:
         """Says Bye, so that the server need not wait for a timeout."""

@@ -24,10 +24,12 @@ from .messages import (
     Code,
     Control,
     ControlAck,
+    Delays,
     DeviceState,
     ForceCommand,
     Frame,
     Hello,
+    LinkReport,
     LocalModel,
     Mat3,
     Mode,
@@ -35,6 +37,7 @@ from .messages import (
     Refused,
     Request,
     Role,
+    SetStateDeadband,
     SetStateRate,
     Vec3,
     Welcome,
@@ -130,6 +133,11 @@ def _whole(value: int, least: int, most: int) -> int:
 
 def _time(ns: int) -> int:
     return _whole(ns, -limits.MAX_TIME_NS, limits.MAX_TIME_NS)
+
+
+def _length(ns: int) -> int:
+    """Of time, which is never below zero."""
+    return _whole(ns, 0, limits.MAX_TIME_NS)
 
 
 def _text(text: str, limit: int) -> str:
@@ -233,7 +241,7 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         permitted_force=permitted if permitted == inf else _magnitude(permitted),
         reasons=message.reasons,
         force_sequence=message.force_sequence,
-        force_age_ns=_whole(message.force_age_ns, 0, limits.MAX_TIME_NS),
+        force_age_ns=_length(message.force_age_ns),
         mode=_enum(_MODES, message.mode),
     )
 
@@ -278,6 +286,9 @@ def _read_control(message: pb.Control) -> Control:
         request = SetStateRate(message.set_state_rate.hz)
     elif op == "rearm":
         request = Rearm()
+    elif op == "set_state_deadband":
+        asked = message.set_state_deadband
+        request = SetStateDeadband(_number(asked.share), _number(asked.floor_mps), asked.max_silence_us)
     return Control(id=_whole(message.id, 1, 2**32), request=request)
 
 
@@ -291,6 +302,64 @@ def _read_ack(message: pb.ControlAck) -> ControlAck:
 
 def _read_bye(message: pb.Bye) -> Bye:
     return Bye(code=_enum(_CODES, message.code), reason=_text(message.reason, limits.MAX_DETAIL))
+
+
+def _read_delays(message: pb.Delays) -> Delays:
+    return Delays(_time(message.median_ns), _time(message.p99_ns))
+
+
+def _read_report(message: pb.LinkReport) -> LinkReport:
+    return LinkReport(
+        number=_whole(message.number, 1, 2**64),
+        until_ns=_time(message.until_ns),
+        span_ns=_length(message.span_ns),
+        forces=message.forces,
+        late_server=message.late_server,
+        late_network=message.late_network,
+        late_engine=message.late_engine,
+        worst_late_ns=_length(message.worst_late_ns),
+        longest_gap_ns=_length(message.longest_gap_ns),
+        round_trip=_read_delays(message.round_trip) if message.HasField("round_trip") else None,
+        to_server=_read_delays(message.to_server) if message.HasField("to_server") else None,
+        to_client=_read_delays(message.to_client) if message.HasField("to_client") else None,
+        clock_offset_ns=_time(message.clock_offset_ns),
+        clock_drift_ppm=_number(message.clock_drift_ppm),
+        clock_error_ns=_length(message.clock_error_ns),
+        received=message.received,
+        lost=message.lost,
+        reordered=message.reordered,
+        duplicated=message.duplicated,
+        words=_text(message.words, limits.MAX_DETAIL),
+    )
+
+
+def _write_delays(delays: Delays | None) -> pb.Delays | None:
+    return None if delays is None else pb.Delays(median_ns=delays.median_ns, p99_ns=delays.p99_ns)
+
+
+def _write_report(report: LinkReport) -> pb.LinkReport:
+    return pb.LinkReport(
+        number=report.number,
+        until_ns=report.until_ns,
+        span_ns=report.span_ns,
+        forces=report.forces,
+        late_server=report.late_server,
+        late_network=report.late_network,
+        late_engine=report.late_engine,
+        worst_late_ns=report.worst_late_ns,
+        longest_gap_ns=report.longest_gap_ns,
+        round_trip=_write_delays(report.round_trip),
+        to_server=_write_delays(report.to_server),
+        to_client=_write_delays(report.to_client),
+        clock_offset_ns=report.clock_offset_ns,
+        clock_drift_ppm=report.clock_drift_ppm,
+        clock_error_ns=report.clock_error_ns,
+        received=report.received,
+        lost=report.lost,
+        reordered=report.reordered,
+        duplicated=report.duplicated,
+        words=_clip(report.words, limits.MAX_DETAIL),
+    )
 
 
 def _write_vector(vector: Vec3) -> pb.Vec3:
@@ -328,10 +397,17 @@ def _write_frame(frame: Frame) -> pb.Frame:
             control.set_state_rate.hz = frame.request.hz
         elif isinstance(frame.request, Rearm):
             control.rearm.SetInParent()
+        elif isinstance(frame.request, SetStateDeadband):
+            asked = frame.request
+            control.set_state_deadband.CopyFrom(
+                pb.SetStateDeadband(share=asked.share, floor_mps=asked.floor, max_silence_us=asked.max_silence_us)
+            )
         return pb.Frame(control=control)
     if isinstance(frame, ControlAck):
         ack = pb.ControlAck(id=frame.id, code=cast(pb.Code, frame.code), detail=_clip(frame.detail, limits.MAX_DETAIL))
         return pb.Frame(control_ack=ack)
+    if isinstance(frame, LinkReport):
+        return pb.Frame(report=_write_report(frame))
     bye = pb.Bye(code=cast(pb.Code, frame.code), reason=_clip(frame.reason, limits.MAX_DETAIL))
     return pb.Frame(bye=bye)
 
@@ -399,6 +475,8 @@ def _read_frame(message: pb.Frame) -> Frame | None:
         return _read_ack(message.control_ack)
     if body == "bye":
         return _read_bye(message.bye)
+    if body == "report":
+        return _read_report(message.report)
     return None  # a frame of a newer peer
 
 

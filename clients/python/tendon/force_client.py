@@ -12,21 +12,25 @@ from enum import Enum
 from typing import cast
 
 from . import limits
+from .deadband import Deadband, ForceDeadband, foretell, objection
 from .handshake import ClientHandshake
 from .messages import (
     FEATURE_LOCAL_MODEL,
     NEVER,
     Code,
+    ControlAck,
     DeviceState,
     ForceCommand,
     Hello,
     Instant,
+    LinkReport,
     LinkStats,
     LocalModel,
     Mat3,
     Rearm,
     Refused,
     Role,
+    SetStateDeadband,
     SetStateRate,
     Stiffness,
     Touch,
@@ -66,8 +70,14 @@ class Config:
     between the states of the last two forces:
 
         T         = max(1 / rate_hz, min(Δtick / loop_hz, 0.1))      with rate_hz = 0: the second term
-        valid_for = max(3 T, 0.02)
+        valid_for = max(3 T, 0.02)                           with a deadband: T ≥ its longest silence
     """
+    deadband: ForceDeadband | None = None
+    """Forces that a hand cannot tell from the last one sent are not sent. None: every force is."""
+    state_deadband: SetStateDeadband | None = None
+    """States that we can foretell are not sent to us. With rate_hz = r, states are then handed out at multiples of 1/r as they
+    are foretold for that instant, their tick and time of sampling included; never a tick twice, never an older one, and nothing
+    is foretold for longer than max_silence_us. With rate_hz = 0, only those that come. None: every state is asked for."""
     patience_s: float = 2.0
     """Hellos of one attempt go unanswered for so long before it is given up."""
     retry_min_s: float = 0.1
@@ -86,6 +96,8 @@ class Config:
         require(rate_possible, "rate_hz: expected 0, or 0.001 to 100000")
         require(0 <= self.state_hz <= limits.MAX_LOOP_HZ, "state_hz: expected 0 to 1000000")
         require(0 <= self.valid_for_s <= 10, "valid_for_s: expected 0 to 10")
+        wrong = objection(self.state_deadband) if self.state_deadband else ""
+        require(not wrong, f"state_deadband: {wrong}")
         require(self.patience_s > 0, "patience_s: must be above zero")
         require(self.retry_min_s > 0, "retry_min_s: must be above zero")
         require(self.retry_max_s >= self.retry_min_s, "retry_max_s: must not be below retry_min_s")
@@ -109,9 +121,11 @@ class Stats:
     attempts: int = 0
     sessions: int = 0  # of these, answered with a Welcome
     states: int = 0  # states that came in
-    states_skipped: int = 0  # of these, replaced by a newer one before they were due
+    states_foretold: int = 0  # handed out without that they came in
+    states_skipped: int = 0  # of these that came in, replaced by a newer one before they were due
     forces: int = 0  # forces sent
     forces_unusable: int = 0  # forces not sent: not finite, or out of bounds
+    forces_alike: int = 0  # forces not sent: a hand could not have told them from the one before
 
 
 _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
@@ -128,6 +142,8 @@ class ForceClient:
         """`random(n)`: n bytes from a cryptographic source. The first Hello is due at once."""
         self.welcome: Welcome | None = None
         """What the server said of itself and its device when the newest session opened."""
+        self.report: LinkReport | None = None
+        """The server's newest word on how our forces fare, once a second while they come. Of the present session."""
         self.config = config
         self._random = random
         self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
@@ -139,6 +155,12 @@ class ForceClient:
         self._retry = now  # when the next attempt begins
         self._back_off = _ns(config.retry_min_s)  # wait before the attempt after that
         self._unseen: DeviceState | None = None  # newest state that was not handed out
+        self._newest: DeviceState | None = None  # newest state, handed out or not
+        self._newest_arrived = now
+        self._seen_tick = 0  # newest tick handed out
+        self._deadband_request: int | None = None  # … of the states
+        self._foretell = False  # the server leaves states out
+        self._deadband: Deadband | None = None
         self._next_call = now
         self._sequence = 0  # of the newest force
         self._answered_tick = 0  # the tick it answers
@@ -177,10 +199,14 @@ class ForceClient:
             raise PermissionError("an observer sends no force: role=Role.CONTROLLER")
         force = _vector(touch.force)
         stiffness = None if touch.stiffness is None else _matrix(touch.stiffness)
-        if self._session is None or self.welcome is None:
+        session = self._session
+        if session is None or self.welcome is None:
             return
         if not (_usable(force) and (stiffness is None or all(map(_usable, stiffness)))):
             self._stats.forces_unusable += 1
+            return
+        if self._deadband is not None and not self._deadband.passes(session.latest, force):
+            self._stats.forces_alike += 1
             return
         model = None
         if stiffness is not None and FEATURE_LOCAL_MODEL in self.welcome.features:
@@ -188,7 +214,7 @@ class ForceClient:
         valid_for_us = self._valid_for_us(hand.tick, self.welcome.loop_hz)
         self._sequence += 1
         self._answered_tick = hand.tick
-        self._session.send(ForceCommand(self._sequence, hand.tick, force, valid_for_us, model))
+        session.send(ForceCommand(self._sequence, hand.tick, force, valid_for_us, model))
         self._stats.forces += 1
 
     def rearm(self) -> bool:
@@ -219,12 +245,16 @@ class ForceClient:
 
     def next_state(self, now: int) -> DeviceState | None:
         """The newest state, when it is due and was not handed out before."""
-        if self._unseen is None or now < self._next_call:
+        if now < self._next_call:
             return None
+        state = self._foretold(now) if self._foretell else self._unseen
+        if state is None:
+            return None
+        self._unseen = None
+        self._seen_tick = state.tick
         self._next_call += self._period
         if self._next_call <= now:
             self._next_call = now + self._period
-        state, self._unseen = self._unseen, None
         return state
 
     def next_turn(self) -> Instant:
@@ -239,7 +269,13 @@ class ForceClient:
 
     def next_state_due(self) -> Instant:
         """When `next_state` gives one; NEVER = not before another has come in."""
-        return NEVER if self._unseen is None else self._next_call
+        if not self._foretell:
+            return NEVER if self._unseen is None else self._next_call
+        if self._newest is None:
+            return NEVER
+        ahead = max(self._seen_tick + 1 - self._newest.tick, 0)  # the first tick that was not handed out
+        due = max(self._next_call, self._newest_arrived + ahead * self._haptic_period())
+        return due if due - self._newest_arrived <= self._silence_ns() else NEVER
 
     @property
     def phase(self) -> Phase:
@@ -275,6 +311,13 @@ class ForceClient:
         self._session = Session(outcome.connection_id, now, outcome.cipher)
         if self.config.state_hz > 0:
             self._session.request(SetStateRate(self.config.state_hz))
+        asked = self.config.state_deadband
+        self._deadband_request = self._session.request(asked) if asked else None
+        self._foretell = False
+        self._seen_tick = 0
+        self.report = None
+        # What another session was sent, this one was not.
+        self._deadband = Deadband(self.config.deadband) if self.config.deadband else None
         self._sequence = 0
         self._stats.phase = Phase.OPEN
         self._stats.sessions += 1
@@ -287,7 +330,7 @@ class ForceClient:
         self._stats.reason = reason
         self._handshake = None
         self._ended, self._session = self._session, None
-        self._unseen = None
+        self._unseen = self._newest = None
         self._retry = now + self._back_off
         self._back_off = min(2 * self._back_off, _ns(self.config.retry_max_s))
 
@@ -296,11 +339,34 @@ class ForceClient:
             if isinstance(event, DeviceState):
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None
-                self._unseen = event
+                self._unseen = self._newest = event
+                self._newest_arrived = now
                 self._back_off = _ns(self.config.retry_min_s)
+            elif isinstance(event, LinkReport):
+                self.report = event
+            elif isinstance(event, ControlAck):
+                if event.id == self._deadband_request:
+                    self._foretell = event.code is Code.OK and self._period > 0 and self._silence_ns() > 0
             elif isinstance(event, Closed):
                 taken_over = event.code is Code.REPLACED  # to come back would be to take turns for ever
                 self._end(now, Phase.STOPPED if taken_over else Phase.LOST, event.code, event.reason)
+
+    def _haptic_period(self) -> int:
+        return _ns(1 / self.welcome.loop_hz) if self.welcome else 0
+
+    def _silence_ns(self) -> int:
+        return 1000 * self.config.state_deadband.max_silence_us if self.config.state_deadband else 0
+
+    def _foretold(self, now: int) -> DeviceState | None:
+        """The state of now; None when there is nothing new, or nothing has come for too long."""
+        newest, age = self._newest, now - self._newest_arrived
+        if newest is None or age > self._silence_ns():
+            return None
+        state = foretell(newest, age, self._haptic_period())
+        if state.tick <= self._seen_tick:  # the one before was on its way for less time
+            return None
+        self._stats.states_foretold += state.tick > newest.tick
+        return state
 
     def _valid_for_us(self, tick: int, loop_hz: int) -> int:
         valid_for = _ns(self.config.valid_for_s)
@@ -308,6 +374,8 @@ class ForceClient:
             period = self._period
             if self._sequence > 0:
                 period = max(period, min(_ns((tick - self._answered_tick) / loop_hz), _MAX_OBSERVED_PERIOD_NS))
+            if self.config.deadband:
+                period = max(period, _ns(self.config.deadband.longest_silence_s))
             valid_for = max(_VALID_PERIODS * period, _MIN_VALID_FOR_NS)
         return min(-(-valid_for // 1000), limits.MAX_VALID_FOR_US)
 

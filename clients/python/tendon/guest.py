@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
-from .messages import Code, DeviceState, Touch, Welcome
+from .messages import Code, DeviceState, LinkReport, Touch, Welcome
 
 log = logging.getLogger("tendon")
 
@@ -52,6 +52,7 @@ class Guest:
         self.core = ForceClient(config, now)
         self._doubt = "is tendond running there" + (", and does it know our key" if config.key else "")
         self._said = ""
+        self._told: LinkReport | None = None
 
     @property
     def stats(self) -> Stats:
@@ -61,6 +62,11 @@ class Guest:
     def welcome(self) -> Welcome | None:
         """What the server said of itself and its device when the newest session opened; None before that."""
         return self.core.welcome
+
+    @property
+    def report(self) -> LinkReport | None:
+        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
+        return self.core.report
 
     def turn(self, now: int) -> None:
         """Takes what has come in, does what is due, sends what is to be sent."""
@@ -111,6 +117,11 @@ class Guest:
         return None
 
     def _say(self) -> None:
+        report = self.core.report
+        if report is not None and report is not self._told:
+            self._told = report
+            if report.words:
+                log.warning("the server says: %s", report.words)
         sentence = self._sentence()
         if sentence and sentence != self._said:
             self._said = sentence

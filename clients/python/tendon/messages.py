@@ -121,7 +121,20 @@ class Rearm:
     """Client → server, reliable: clears a latched fault. Only from the controller."""
 
 
-Request = Union[SetStateRate, Rearm]
+@dataclass(frozen=True, slots=True)
+class SetStateDeadband:
+    """Client → server, reliable: leave out the states that this client can foretell (`foretell`).
+
+    After a state with velocity v the next one that is sent is the first whose velocity differs from v by more than
+    max(share · ‖v‖, floor), whose mode is another, or which comes `max_silence_us` later.
+    """
+
+    share: float = 0.1  # of the speed: 0 … 0.5
+    floor: float = 1e-3  # m/s: 0 … 0.1
+    max_silence_us: int = 20_000  # 1000 … 20 000; 0 = every state is sent, as before this was asked
+
+
+Request = Union[SetStateRate, Rearm, SetStateDeadband]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +160,46 @@ class Bye:
     reason: str = ""
 
 
-Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye]
+@dataclass(frozen=True, slots=True)
+class Delays:
+    """Two quantiles of a delay; below zero only where two clocks had to be compared."""
+
+    median_ns: int
+    p99_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class LinkReport:
+    """Server → client, newest wins: why forces were late, and what the network did. Once a second while forces come.
+
+    A delay is None where nothing was measured; those of one way are known ± `clock_error_ns`.
+    """
+
+    number: int  # 1, 2, 3 … per session
+    until_ns: int  # end of the time it tells of, server clock
+    span_ns: int  # … and its length
+    # In that time:
+    forces: int  # that came
+    late_server: int  # late ones, because the server sent a state late
+    late_network: int  # … because of the way there and back
+    late_engine: int  # … because the engine took longer than usual
+    worst_late_ns: int  # longest time that the device was without a valid force
+    longest_gap_ns: int  # longest time that nothing was heard of this client
+    round_trip: Delays | None
+    to_server: Delays | None
+    to_client: Delays | None
+    clock_offset_ns: int  # this client's clock less the server's
+    clock_drift_ppm: float  # how fast that grows
+    clock_error_ns: int  # |true offset − clock_offset_ns| is at most this
+    # Datagrams of this client since the session opened:
+    received: int
+    lost: int
+    reordered: int
+    duplicated: int
+    words: str  # why forces were late, for people; empty when none was
+
+
+Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport]
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +273,7 @@ class LinkStats:
     forged: int = 0  # suite 1: did not open; forged, or damaged under way: dropped
     old_key: int = 0  # suite 1: of a key that is over, or far ahead: dropped
     invalid: int = 0  # well-formed, with a value out of bounds: frame dropped
-    stale: int = 0  # state or force not newer than the newest one: frame dropped
+    stale: int = 0  # state, force or report not newer than the newest one: frame dropped
     round_trip_ns: int = 0  # newest sample; 0 = none yet
     smoothed_round_trip_ns: int = 0  # RFC 6298 SRTT
     round_trip_variation_ns: int = 0  # RFC 6298 RTTVAR

@@ -19,6 +19,7 @@ from .messages import (
     ForceCommand,
     Frame,
     Instant,
+    LinkReport,
     LinkStats,
     Request,
 )
@@ -42,7 +43,7 @@ class Closed:
     reason: str
 
 
-Event = Union[DeviceState, ForceCommand, Control, ControlAck, Closed]
+Event = Union[DeviceState, ForceCommand, LinkReport, Control, ControlAck, Closed]
 """A Control is a request that has arrived and wants an answer, a ControlAck the answer to one of ours."""
 
 
@@ -52,8 +53,8 @@ class Session:
     Use: `receive` what arrives and `tick` when `next_turn()` is due; then pull `next_event` and
     `next_datagram` until they are empty. `now` never goes back.
 
-    Nothing queues without a bound: there is room for one state, one force and limits.REQUEST_WINDOW
-    requests each way; what was not taken out is replaced by a newer one of its kind.
+    Nothing queues without a bound: there is room for one state, one force, one report and
+    limits.REQUEST_WINDOW requests each way; what was not taken out is replaced by a newer one of its kind.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
@@ -62,7 +63,7 @@ class Session:
         self.stats = LinkStats()
         self._connection_id = connection_id
         self._opened = opened
-        self._latest = opened  # the newest `now` we were told
+        self.latest = opened  # the newest `now` we were told
         self._cipher = cipher or Plain()
         self._expires = NEVER if self._cipher.suite is Suite.PLAIN else opened + limits.LIFE_NS
         self._room = limits.MAX_DATAGRAM - codec.HEADER_SIZE - self._cipher.overhead
@@ -71,6 +72,7 @@ class Session:
         self._last_sent: int | None = None
         self._state_to_send: DeviceState | None = None
         self._force_to_send: ForceCommand | None = None
+        self._report_to_send: LinkReport | None = None
         self._asked = OutgoingRequests()
         self._bye: Bye | None = None
         self._byes_left = 0
@@ -82,19 +84,21 @@ class Session:
         self._newest_received_ns = 0
         self._newest_tick = -1
         self._newest_sequence = -1
+        self._newest_report = 0
         self._newest_echoed = -1  # newest packet of ours that the peer has told of
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
         # To tell.
         self._state_arrived: DeviceState | None = None
         self._force_arrived: ForceCommand | None = None
+        self._report_arrived: LinkReport | None = None
         self._closed: Closed | None = None
 
     # ---- In ----
 
     def receive(self, now: int, datagram: bytes) -> None:
         """Takes any bytes. What is not a good datagram of this conversation is counted and dropped."""
-        self._latest = now
+        self.latest = now
         if not self.open:
             return
         header = codec.decode_header(datagram)
@@ -130,10 +134,12 @@ class Session:
             return
         self._accept(now, number, content)
 
-    def send(self, frame: DeviceState | ForceCommand) -> None:
+    def send(self, frame: DeviceState | ForceCommand | LinkReport) -> None:
         """Replaces what has not left yet."""
         if isinstance(frame, ForceCommand):
             self._force_to_send = frame
+        elif isinstance(frame, LinkReport):
+            self._report_to_send = frame
         else:
             self._state_to_send = frame
 
@@ -154,7 +160,7 @@ class Session:
 
     def tick(self, now: int) -> None:
         """Notices the silence of the peer, and our age."""
-        self._latest = now
+        self.latest = now
         if not self.open:
             return
         if now - self._last_heard >= TIMEOUT_NS:
@@ -168,7 +174,7 @@ class Session:
 
     def next_datagram(self, now: int) -> bytes | None:
         """The next datagram to send; None = nothing to send now."""
-        self._latest = now
+        self.latest = now
         if self._byes_left > 0 and self._bye is not None:
             self._byes_left -= 1
             return self._seal(now, self._head(now) + codec.write_frame(self._bye))
@@ -182,6 +188,8 @@ class Session:
         if event is None:
             event, self._force_arrived = self._force_arrived, None
         if event is None:
+            event, self._report_arrived = self._report_arrived, None
+        if event is None:
             event, self._state_arrived = self._state_arrived, None
         if event is None:
             event, self._closed = self._closed, None
@@ -190,9 +198,9 @@ class Session:
     def next_turn(self) -> Instant:
         """When `tick` and `next_datagram` are due next; not in the future when something waits to be sent."""
         if not self.open:
-            return self._latest if self._byes_left > 0 else NEVER
-        if self._last_sent is None or self._something_to_say(self._latest):
-            return self._latest
+            return self.latest if self._byes_left > 0 else NEVER
+        if self._last_sent is None or self._something_to_say(self.latest):
+            return self.latest
         silence = self._last_heard + TIMEOUT_NS
         return min(silence, self._expires, self._last_sent + KEEP_ALIVE_NS, self._asked.next_due())
 
@@ -230,6 +238,12 @@ class Session:
                 return
             self._newest_sequence = frame.sequence
             self._force_arrived = frame
+        elif isinstance(frame, LinkReport):
+            if frame.number <= self._newest_report:
+                self.stats.stale += 1
+                return
+            self._newest_report = frame.number
+            self._report_arrived = frame
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):
@@ -269,6 +283,7 @@ class Session:
         return (
             self._force_to_send is not None
             or self._state_to_send is not None
+            or self._report_to_send is not None
             or self._last_sent is None
             or now - self._last_sent >= KEEP_ALIVE_NS
             or self._asked.next_due() <= now
@@ -306,6 +321,8 @@ class Session:
             if not add(control):
                 break
             self._asked.sent(control.id, now, timeout)
+        if self._report_to_send is not None and add(self._report_to_send):
+            self._report_to_send = None
         return bytes(body)
 
     def _seal(self, now: int, body: bytes) -> bytes:

@@ -69,12 +69,13 @@ class Claim(_message.Message):
     def __init__(self, device: _Optional[str] = ..., channel: _Optional[str] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
 
 class Control(_message.Message):
-    __slots__ = ["describe", "give_lease", "id", "lease_lost", "rearm", "set_state_rate", "take_lease"]
+    __slots__ = ["describe", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
     GIVE_LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
     REARM_FIELD_NUMBER: _ClassVar[int]
+    SET_STATE_DEADBAND_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
     TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
     describe: Describe
@@ -82,9 +83,10 @@ class Control(_message.Message):
     id: int
     lease_lost: LeaseLost
     rearm: Rearm
+    set_state_deadband: SetStateDeadband
     set_state_rate: SetStateRate
     take_lease: TakeLease
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
     __slots__ = ["code", "detail", "device", "id", "wait_ms"]
@@ -109,6 +111,14 @@ class Datagram(_message.Message):
     frames: _containers.RepeatedCompositeFieldContainer[Frame]
     tx_time_ns: int
     def __init__(self, tx_time_ns: _Optional[int] = ..., echo: _Optional[_Union[Echo, _Mapping]] = ..., frames: _Optional[_Iterable[_Union[Frame, _Mapping]]] = ...) -> None: ...
+
+class Delays(_message.Message):
+    __slots__ = ["median_ns", "p99_ns"]
+    MEDIAN_NS_FIELD_NUMBER: _ClassVar[int]
+    P99_NS_FIELD_NUMBER: _ClassVar[int]
+    median_ns: int
+    p99_ns: int
+    def __init__(self, median_ns: _Optional[int] = ..., p99_ns: _Optional[int] = ...) -> None: ...
 
 class Describe(_message.Message):
     __slots__ = ["device"]
@@ -207,18 +217,20 @@ class ForceCommand(_message.Message):
     def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
 
 class Frame(_message.Message):
-    __slots__ = ["bye", "control", "control_ack", "force", "state"]
+    __slots__ = ["bye", "control", "control_ack", "force", "report", "state"]
     BYE_FIELD_NUMBER: _ClassVar[int]
     CONTROL_ACK_FIELD_NUMBER: _ClassVar[int]
     CONTROL_FIELD_NUMBER: _ClassVar[int]
     FORCE_FIELD_NUMBER: _ClassVar[int]
+    REPORT_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     bye: Bye
     control: Control
     control_ack: ControlAck
     force: ForceCommand
+    report: LinkReport
     state: DeviceState
-    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ...) -> None: ...
+    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
 
 class GiveLease(_message.Message):
     __slots__ = ["channel", "device"]
@@ -264,6 +276,50 @@ class LeaseLost(_message.Message):
     to: str
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., to: _Optional[str] = ...) -> None: ...
 
+class LinkReport(_message.Message):
+    __slots__ = ["clock_drift_ppm", "clock_error_ns", "clock_offset_ns", "duplicated", "forces", "late_engine", "late_network", "late_server", "longest_gap_ns", "lost", "number", "received", "reordered", "round_trip", "span_ns", "to_client", "to_server", "until_ns", "words", "worst_late_ns"]
+    CLOCK_DRIFT_PPM_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_ERROR_NS_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_OFFSET_NS_FIELD_NUMBER: _ClassVar[int]
+    DUPLICATED_FIELD_NUMBER: _ClassVar[int]
+    FORCES_FIELD_NUMBER: _ClassVar[int]
+    LATE_ENGINE_FIELD_NUMBER: _ClassVar[int]
+    LATE_NETWORK_FIELD_NUMBER: _ClassVar[int]
+    LATE_SERVER_FIELD_NUMBER: _ClassVar[int]
+    LONGEST_GAP_NS_FIELD_NUMBER: _ClassVar[int]
+    LOST_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    RECEIVED_FIELD_NUMBER: _ClassVar[int]
+    REORDERED_FIELD_NUMBER: _ClassVar[int]
+    ROUND_TRIP_FIELD_NUMBER: _ClassVar[int]
+    SPAN_NS_FIELD_NUMBER: _ClassVar[int]
+    TO_CLIENT_FIELD_NUMBER: _ClassVar[int]
+    TO_SERVER_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_NS_FIELD_NUMBER: _ClassVar[int]
+    WORDS_FIELD_NUMBER: _ClassVar[int]
+    WORST_LATE_NS_FIELD_NUMBER: _ClassVar[int]
+    clock_drift_ppm: float
+    clock_error_ns: int
+    clock_offset_ns: int
+    duplicated: int
+    forces: int
+    late_engine: int
+    late_network: int
+    late_server: int
+    longest_gap_ns: int
+    lost: int
+    number: int
+    received: int
+    reordered: int
+    round_trip: Delays
+    span_ns: int
+    to_client: Delays
+    to_server: Delays
+    until_ns: int
+    words: str
+    worst_late_ns: int
+    def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., forces: _Optional[int] = ..., late_server: _Optional[int] = ..., late_network: _Optional[int] = ..., late_engine: _Optional[int] = ..., worst_late_ns: _Optional[int] = ..., longest_gap_ns: _Optional[int] = ..., round_trip: _Optional[_Union[Delays, _Mapping]] = ..., to_server: _Optional[_Union[Delays, _Mapping]] = ..., to_client: _Optional[_Union[Delays, _Mapping]] = ..., clock_offset_ns: _Optional[int] = ..., clock_drift_ppm: _Optional[float] = ..., clock_error_ns: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., reordered: _Optional[int] = ..., duplicated: _Optional[int] = ..., words: _Optional[str] = ...) -> None: ...
+
 class LocalModel(_message.Message):
     __slots__ = ["at_m", "stiffness_npm"]
     AT_M_FIELD_NUMBER: _ClassVar[int]
@@ -289,6 +345,16 @@ class Refused(_message.Message):
     version_max: int
     version_min: int
     def __init__(self, code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., version_min: _Optional[int] = ..., version_max: _Optional[int] = ...) -> None: ...
+
+class SetStateDeadband(_message.Message):
+    __slots__ = ["floor_mps", "max_silence_us", "share"]
+    FLOOR_MPS_FIELD_NUMBER: _ClassVar[int]
+    MAX_SILENCE_US_FIELD_NUMBER: _ClassVar[int]
+    SHARE_FIELD_NUMBER: _ClassVar[int]
+    floor_mps: float
+    max_silence_us: int
+    share: float
+    def __init__(self, share: _Optional[float] = ..., floor_mps: _Optional[float] = ..., max_silence_us: _Optional[int] = ...) -> None: ...
 
 class SetStateRate(_message.Message):
     __slots__ = ["device", "hz"]

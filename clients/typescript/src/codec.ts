@@ -4,7 +4,9 @@
 import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
-import type { DeviceState, ForceCommand, Hello, LocalModel, Refused, Request, Stiffness, Vec3, Welcome } from "./messages.js";
+import type {
+  Delays, DeviceState, ForceCommand, Hello, LinkReport, LocalModel, Refused, Request, Stiffness, Vec3, Welcome,
+} from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
 /** The newest datagram received from the peer, told back to it. */
@@ -38,7 +40,8 @@ export type Frame =
   | { readonly kind: "force"; readonly value: ForceCommand }
   | { readonly kind: "control"; readonly value: Control }
   | { readonly kind: "controlAck"; readonly value: ControlAck }
-  | { readonly kind: "bye"; readonly value: Bye };
+  | { readonly kind: "bye"; readonly value: Bye }
+  | { readonly kind: "report"; readonly value: LinkReport };
 
 /** What a Data datagram holds. */
 export interface DataContent {
@@ -181,7 +184,9 @@ function readBody(body: Body): Frame | undefined {
     }
     case "control": {
       const { id, op } = body.value;
-      return id > 0 ? { kind: "control", value: { id, request: readRequest(op) } } : undefined;
+      const request = readRequest(op);
+      const good = id > 0 && (request?.kind !== "setStateDeadband" || (isBounded(request.share) && isBounded(request.floor)));
+      return good ? { kind: "control", value: { id, request } } : undefined;
     }
     case "controlAck": {
       const { id, code, detail } = body.value;
@@ -192,6 +197,10 @@ function readBody(body: Body): Frame | undefined {
       const { code, reason } = body.value;
       const good = isEnum(code, pb.CodeSchema) && isText(reason, limits.kMaxDetail);
       return good ? { kind: "bye", value: { code, reason } } : undefined;
+    }
+    case "report": {
+      const value = readReport(body.value);
+      return value && { kind: "report", value };
     }
   }
 }
@@ -212,6 +221,8 @@ function writeBody(frame: Frame): Body {
       const { code, reason } = frame.value;
       return { case: "bye", value: create(pb.ByeSchema, { code, reason: clip(reason, limits.kMaxDetail) }) };
     }
+    case "report":
+      return { case: "report", value: writeReport(frame.value) };
   }
 }
 
@@ -241,7 +252,7 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
   };
   const good = isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
     isVec3(state.forceApplied) && isBounded(state.energy) &&
-    (state.permittedForce === Infinity || isMagnitude(state.permittedForce)) && state.forceAgeNs <= limits.kMaxTime &&
+    (state.permittedForce === Infinity || isMagnitude(state.permittedForce)) && isLength(state.forceAgeNs) &&
     isEnum(state.mode, pb.ModeSchema);
   return good ? state : undefined;
 }
@@ -290,12 +301,46 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
     validForUs: from.validForUs,
   });
 
+const isLength = (ns: bigint): boolean => ns <= limits.kMaxTime; // of time; it has no sign on the wire
+const readDelays = (from: pb.Delays | undefined): Delays | undefined =>
+  from && { medianNs: from.medianNs, p99Ns: from.p99Ns };
+const areDelays = (delays: Delays | undefined): boolean => !delays || (isTime(delays.medianNs) && isTime(delays.p99Ns));
+
+function readReport(from: pb.LinkReport): LinkReport | undefined {
+  const { $typeName: _name, $unknown: _unknown, roundTrip, toServer, toClient, ...rest } = from;
+  const report: LinkReport = {
+    ...rest,
+    roundTrip: readDelays(roundTrip),
+    toServer: readDelays(toServer),
+    toClient: readDelays(toClient),
+  };
+  const good = report.number > 0n && isTime(report.untilNs) && isLength(report.spanNs) && isLength(report.worstLateNs) &&
+    isLength(report.longestGapNs) && areDelays(report.roundTrip) && areDelays(report.toServer) &&
+    areDelays(report.toClient) && isTime(report.clockOffsetNs) && isBounded(report.clockDriftPpm) &&
+    isLength(report.clockErrorNs) && isText(report.words, limits.kMaxDetail);
+  return good ? report : undefined;
+}
+
+function writeReport({ roundTrip, toServer, toClient, words, ...rest }: LinkReport): pb.LinkReport {
+  return create(pb.LinkReportSchema, {
+    ...rest,
+    ...(roundTrip && { roundTrip: create(pb.DelaysSchema, roundTrip) }),
+    ...(toServer && { toServer: create(pb.DelaysSchema, toServer) }),
+    ...(toClient && { toClient: create(pb.DelaysSchema, toClient) }),
+    words: clip(words, limits.kMaxDetail),
+  });
+}
+
 function readRequest(op: pb.Control["op"]): Request | undefined {
   switch (op.case) {
     case "setStateRate":
       return { kind: "setStateRate", hz: op.value.hz };
     case "rearm":
       return { kind: "rearm" };
+    case "setStateDeadband": {
+      const { share, floorMps, maxSilenceUs } = op.value;
+      return { kind: "setStateDeadband", share, floor: floorMps, maxSilenceUs };
+    }
     default:
       return undefined;
   }
@@ -307,6 +352,10 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
       return { case: "setStateRate", value: create(pb.SetStateRateSchema, { hz: request.hz }) };
     case "rearm":
       return { case: "rearm", value: create(pb.RearmSchema) };
+    case "setStateDeadband": {
+      const { share, floor, maxSilenceUs } = request;
+      return { case: "setStateDeadband", value: create(pb.SetStateDeadbandSchema, { share, floorMps: floor, maxSilenceUs }) };
+    }
     case undefined:
       return { case: undefined };
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
-import type { Welcome } from "./messages.js";
+import type { LinkReport, Welcome } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
 /** Where datagrams to one server leave. */
@@ -15,12 +15,16 @@ export type OpenTransport = (receive: (datagram: Uint8Array) => void) => Transpo
 export interface ConnectConfig extends ClientConfig {
   /** Told whenever the connection's phase has changed. */
   readonly onPhase?: (guest: Guest) => void;
+  /** Told of each report of the server. */
+  readonly onReport?: (report: LinkReport) => void;
 }
 
 /** A guest in real time. */
 export interface Guest {
   readonly phase: Phase;
   readonly welcome: Welcome | undefined;
+  /** The server's newest word on how our forces fare, once a second while they come. */
+  readonly report: LinkReport | undefined;
   stats(): ClientStats;
   rearm(): boolean;
   /** Says Bye and ends. */
@@ -55,6 +59,8 @@ class RealTimeGuest implements Guest {
   readonly #client: ForceClient;
   readonly #transport: Transport;
   readonly #onPhase: ((guest: Guest) => void) | undefined;
+  readonly #onReport: ((report: LinkReport) => void) | undefined;
+  #told: LinkReport | undefined;
   readonly #defer: (task: () => void) => void;
   #resolve!: () => void;
   #reject!: (error: unknown) => void;
@@ -74,6 +80,7 @@ class RealTimeGuest implements Guest {
       this.#reject = reject;
     });
     this.#onPhase = config.onPhase;
+    this.#onReport = config.onReport;
     this.#defer = makeDefer();
     this.#client = new ForceClient(config, callback, (datagram) => this.#transport.send(datagram), readClock());
     this.#transport = open((datagram) => this.#receive(datagram));
@@ -85,6 +92,9 @@ class RealTimeGuest implements Guest {
   }
   get welcome(): Welcome | undefined {
     return this.#client.welcome;
+  }
+  get report(): LinkReport | undefined {
+    return this.#client.report;
   }
   stats(): ClientStats {
     return this.#client.stats();
@@ -138,6 +148,7 @@ class RealTimeGuest implements Guest {
       }
       this.#arm(now, next);
       this.#tellPhase();
+      this.#tellReport();
     } catch (error) {
       this.#reject(error);
       this.#end();
@@ -148,6 +159,13 @@ class RealTimeGuest implements Guest {
     if (this.#phase === this.phase) return;
     this.#phase = this.phase;
     this.#onPhase?.(this);
+  }
+
+  #tellReport(): void {
+    const { report } = this.#client;
+    if (!report || report === this.#told) return;
+    this.#told = report;
+    this.#onReport?.(report);
   }
 
   /** A timer that fires too early costs less than setting it anew with every datagram. */

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 import { randomBytes } from "@noble/hashes/utils";
 import { isForce, isStiffness } from "./codec.js";
+import { Deadband, foretell, forceDeadbandObjection, stateDeadbandObjection, type ForceDeadband } from "./deadband.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, kFeatureLocalModel, kProtocolVersion, Role, type DeviceState, type Stiffness, type Vec3, type Welcome,
+  Code, kFeatureLocalModel, kProtocolVersion, Role, type DeviceState, type LinkReport, type StateDeadband, type Stiffness,
+  type Vec3, type Welcome,
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
-import { earliest, fromMilliseconds, kNever, type Nanoseconds } from "./time.js";
+import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
 /** What the physics answers to one device state: what the hand is to feel there. */
 export interface Touch {
@@ -42,6 +44,15 @@ export interface ClientConfig {
    * the last two forces: max(3 T, 20 ms). Two forces in a row may be lost and the third is still in time.
    */
   readonly validForMs?: number;
+  /** Forces that a hand cannot tell from the last one sent are not sent. Absent: every force is. */
+  readonly deadband?: ForceDeadband | undefined;
+  /**
+   * States that we can foretell are not sent to us. With rateHz = r the callback is then called at multiples of 1/r with the
+   * state as it is foretold for that instant, its tick and time of sampling included; it never sees a tick twice, nor an
+   * older one, and nothing is foretold for longer than maxSilenceUs. With rateHz = 0 it sees only those that come. Absent:
+   * every state is asked for.
+   */
+  readonly stateDeadband?: StateDeadband | undefined;
   /** The Hellos of one attempt go unanswered for so long before it is given up. */
   readonly patienceMs?: number;
   /** First wait before the next attempt. */
@@ -71,12 +82,16 @@ export interface ClientStats {
   sessions: number;
   /** States that came in. */
   states: number;
-  /** Of these, replaced by a newer one before a callback was due. */
+  /** States that the callback saw without that they came. */
+  statesForetold: number;
+  /** Of those that came in, replaced by a newer one before a callback was due. */
   statesSkipped: number;
   /** Forces sent. */
   forces: number;
   /** Forces not sent: not finite, or out of bounds. */
   forcesUnusable: number;
+  /** Forces not sent: a hand could not have told them from the one before. */
+  forcesAlike: number;
 }
 
 const kValidPeriods = 3;
@@ -84,14 +99,16 @@ const kMinValidForMs = 20;
 /** A gap is not a period; an engine slower than 10 Hz says so by rateHz. */
 const kMaxObservedPeriodMs = 100;
 
-const kDefaults: Required<Omit<ClientConfig, "key">> = {
+const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
   name: "guest", rateHz: 0, stateHz: 0, validForMs: 0, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000,
   random: randomBytes,
 };
 
 function checked(config: ClientConfig): Required<ClientConfig> {
   const given = Object.fromEntries(Object.entries(config).filter(([, value]) => value !== undefined));
-  const full: Required<ClientConfig> = { key: undefined, ...kDefaults, ...given };
+  const full: Required<ClientConfig> = {
+    key: undefined, deadband: undefined, stateDeadband: undefined, ...kDefaults, ...given,
+  };
   const require = (ok: boolean, sentence: string): void => {
     if (!ok) throw new RangeError(sentence);
   };
@@ -101,6 +118,10 @@ function checked(config: ClientConfig): Required<ClientConfig> {
   require(Number.isInteger(full.stateHz) && full.stateHz >= 0 && full.stateHz <= kMaxLoopHz,
     `stateHz: expected a whole number from 0 to ${kMaxLoopHz}`);
   require(full.validForMs >= 0 && full.validForMs <= kMaxValidForMs, `validForMs: expected 0 to ${kMaxValidForMs}`);
+  const force = full.deadband ? forceDeadbandObjection(full.deadband) : "";
+  require(!force, `deadband: ${force}`);
+  const state = full.stateDeadband ? stateDeadbandObjection(full.stateDeadband) : "";
+  require(!state, `stateDeadband: ${state}`);
   require(full.patienceMs > 0, "patienceMs: must be above zero");
   require(full.retryMinMs > 0, "retryMinMs: must be above zero");
   require(full.retryMaxMs >= full.retryMinMs, "retryMaxMs: must not be below retryMinMs");
@@ -142,14 +163,25 @@ export class ForceClient {
 
   /** Newest state that the callback has not seen. */
   #unseen: DeviceState | undefined;
+  /** Newest state, seen or not. */
+  #newest: DeviceState | undefined;
+  #newestArrived: Nanoseconds;
+  /** Newest tick that the callback has seen. */
+  #seenTick = 0n;
+  /** … for the deadband of states. */
+  #deadbandRequest: number | undefined;
+  /** The server leaves states out. */
+  #foretells = false;
+  #deadband: Deadband | undefined;
+  #report: LinkReport | undefined;
   #nextCall: Nanoseconds;
   /** Of the newest force. */
   #sequence = 0n;
   /** The tick that it answers. */
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
-    phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesSkipped: 0,
-    forces: 0, forcesUnusable: 0,
+    phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesForetold: 0,
+    statesSkipped: 0, forces: 0, forcesUnusable: 0, forcesAlike: 0,
   };
 
   /**
@@ -169,7 +201,7 @@ export class ForceClient {
     this.#send = send;
     this.#period = this.#config.rateHz > 0 ? fromMilliseconds(1000 / this.#config.rateHz) : 0n;
     this.#backOff = fromMilliseconds(this.#config.retryMinMs);
-    this.#nextCall = now;
+    this.#nextCall = this.#newestArrived = now;
     this.#greet(now);
   }
 
@@ -224,6 +256,11 @@ export class ForceClient {
     return this.#welcome;
   }
 
+  /** The server's newest word on how our forces fare, once a second while they come. Of the present session. */
+  get report(): LinkReport | undefined {
+    return this.#report;
+  }
+
   #greet(now: Nanoseconds): void {
     const hello = {
       versionMin: kProtocolVersion,
@@ -251,6 +288,12 @@ export class ForceClient {
     this.#welcome = welcome;
     this.#session = new Session({ connectionId, seal }, now);
     if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz });
+    const { deadband, stateDeadband } = this.#config;
+    this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
+    this.#foretells = false;
+    this.#seenTick = 0n;
+    this.#report = undefined;
+    this.#deadband = deadband && new Deadband(deadband); // what another session was sent, this one was not
     this.#sequence = 0n;
     this.#stats.phase = "open";
     ++this.#stats.sessions;
@@ -260,7 +303,7 @@ export class ForceClient {
     Object.assign(this.#stats, { phase, code, reason, link: this.#session?.stats ?? this.#stats.link });
     this.#handshake = undefined;
     this.#session = undefined;
-    this.#unseen = undefined;
+    this.#unseen = this.#newest = undefined;
     this.#retry = now + this.#backOff;
     this.#backOff = earliest(2n * this.#backOff, fromMilliseconds(this.#config.retryMaxMs));
   }
@@ -284,8 +327,13 @@ export class ForceClient {
       if (event.kind === "state") {
         ++this.#stats.states;
         if (this.#unseen) ++this.#stats.statesSkipped;
-        this.#unseen = event.state;
+        this.#unseen = this.#newest = event.state;
+        this.#newestArrived = now;
         this.#backOff = fromMilliseconds(this.#config.retryMinMs);
+      } else if (event.kind === "report") {
+        this.#report = event.report;
+      } else if (event.kind === "answered" && event.id === this.#deadbandRequest) {
+        this.#foretells = event.code === Code.OK && this.#period > 0n && this.#silence() > 0n;
       } else if (event.kind === "closed") {
         this.#flush(now); // our own Bye, when the session ends by its age
         // Two programs with one key would otherwise take the place from each other for ever.
@@ -300,9 +348,11 @@ export class ForceClient {
 
   /** True when a force now waits to be sent. */
   #call(now: Nanoseconds): boolean {
-    const hand = this.#unseen;
-    if (!hand || now < this.#nextCall) return false;
+    if (now < this.#nextCall) return false;
+    const hand = this.#foretells ? this.#foretold(now) : this.#unseen;
+    if (!hand) return false;
     this.#unseen = undefined;
+    this.#seenTick = hand.tick;
     this.#nextCall += this.#period;
     if (this.#nextCall <= now) this.#nextCall = now + this.#period;
     try {
@@ -310,7 +360,7 @@ export class ForceClient {
       if (!this.#physics) return false;
       const touch = this.#physics(hand);
       if (!touch) throw new TypeError(`physics: expected {x, y, z} or {force: {x, y, z}}, got ${touch}`);
-      this.#answer("force" in touch ? touch : { force: touch }, hand);
+      this.#answer(now, "force" in touch ? touch : { force: touch }, hand);
       return true;
     } catch (error) {
       this.stop(now);
@@ -318,10 +368,31 @@ export class ForceClient {
     }
   }
 
-  #answer({ force, stiffness }: Touch, hand: DeviceState): void {
+  /** The state of now; undefined when there is nothing new, or nothing has come for too long. */
+  #foretold(now: Nanoseconds): DeviceState | undefined {
+    const age = now - this.#newestArrived;
+    if (!this.#newest || age > this.#silence()) return undefined;
+    const state = foretell(this.#newest, age, this.#hapticPeriod());
+    if (state.tick <= this.#seenTick) return undefined; // the one before was on its way for less time
+    if (state.tick > this.#newest.tick) ++this.#stats.statesForetold;
+    return state;
+  }
+
+  #silence(): Nanoseconds {
+    return BigInt(this.#config.stateDeadband?.maxSilenceUs ?? 0) * 1000n;
+  }
+  #hapticPeriod(): Nanoseconds {
+    return fromMilliseconds(1000 / this.#welcome!.loopHz);
+  }
+
+  #answer(now: Nanoseconds, { force, stiffness }: Touch, hand: DeviceState): void {
     if (!this.#session || !this.#welcome) return; // the callback has called stop()
     if (!isForce(force) || (stiffness && !isStiffness(stiffness))) {
       ++this.#stats.forcesUnusable;
+      return;
+    }
+    if (this.#deadband && !this.#deadband.passes(now, force)) {
+      ++this.#stats.forcesAlike;
       return;
     }
     const withModel = stiffness && this.#welcome.features.includes(kFeatureLocalModel);
@@ -340,14 +411,23 @@ export class ForceClient {
     if (this.#config.validForMs > 0) return this.#config.validForMs;
     const asked = this.#config.rateHz > 0 ? 1000 / this.#config.rateHz : 0;
     const seen = this.#sequence > 0n ? (1000 * Number(tick - this.#answeredTick)) / loopHz : 0;
-    const period = Math.max(asked, Math.min(seen, kMaxObservedPeriodMs));
+    const silence = this.#config.deadband?.longestSilenceMs ?? 0;
+    const period = Math.max(asked, Math.min(seen, kMaxObservedPeriodMs), silence);
     return Math.min(Math.max(kValidPeriods * period, kMinValidForMs), kMaxValidForMs);
+  }
+
+  /** When the callback is due next; kNever while there is nothing that it has not seen. */
+  #nextDue(): Nanoseconds {
+    if (!this.#foretells) return this.#unseen ? this.#nextCall : kNever;
+    if (!this.#newest) return kNever;
+    const ahead = latest(this.#seenTick + 1n - this.#newest.tick, 0n); // the first tick that it has not seen
+    const due = latest(this.#nextCall, this.#newestArrived + ahead * this.#hapticPeriod());
+    return due - this.#newestArrived <= this.#silence() ? due : kNever;
   }
 
   #nextTurn(): Nanoseconds {
     if (this.#session) {
-      const next = this.#session.nextTick();
-      return this.#unseen ? earliest(this.#nextCall, next) : next;
+      return earliest(this.#nextDue(), this.#session.nextTick());
     }
     if (this.#handshake) return earliest(this.#giveUp, this.#handshake.nextTick());
     return this.phase === "stopped" ? kNever : this.#retry;

@@ -4,9 +4,11 @@ export { connect, type ConnectConfig, type Guest, type OpenTransport, type Trans
 export {
   ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Touch, type Watch,
 } from "./force_client.js";
+export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
-  Code, Mode, reasonNames, Role, type DeviceState, type Stiffness, type Vec3, type Welcome,
+  Code, Mode, reasonNames, Role, type Delays, type DeviceState, type LinkReport, type StateDeadband, type Stiffness,
+  type Vec3, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";
 export type { Nanoseconds } from "./time.js";

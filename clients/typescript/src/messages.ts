@@ -66,8 +66,67 @@ export interface ForceCommand {
   readonly validForUs: number;
 }
 
-/** Reliable, client → server: how many states per second it wants, or: clear a latched fault. */
-export type Request = { readonly kind: "setStateRate"; readonly hz: number } | { readonly kind: "rearm" };
+/**
+ * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the first
+ * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode is another, or which comes maxSilenceUs
+ * later.
+ */
+export interface StateDeadband {
+  /** Of the speed: 0 … 0.5. */
+  readonly share: number;
+  /** m/s: 0 … 0.1. */
+  readonly floor: number;
+  /** 1000 … 20 000; 0 = every state is sent, as before this was asked. */
+  readonly maxSilenceUs: number;
+}
+
+/** Reliable, client → server: how many states per second it wants, clear a latched fault, or which states to leave out. */
+export type Request =
+  | { readonly kind: "setStateRate"; readonly hz: number }
+  | { readonly kind: "rearm" }
+  | ({ readonly kind: "setStateDeadband" } & StateDeadband);
+
+/** Two quantiles of a delay; below zero only where two clocks had to be compared. */
+export interface Delays {
+  readonly medianNs: Nanoseconds;
+  readonly p99Ns: Nanoseconds;
+}
+
+/**
+ * Why forces were late, and what the network did: from the server, once a second while forces come. A delay is absent where
+ * nothing was measured; those of one way are known ± clockErrorNs.
+ */
+export interface LinkReport {
+  /** 1, 2, 3 … per session. */
+  readonly number: bigint;
+  /** End of the time it tells of, on the server's clock, and its length. */
+  readonly untilNs: Nanoseconds;
+  readonly spanNs: Nanoseconds;
+  /** Forces that came in that time. */
+  readonly forces: bigint;
+  /** Late ones: the server sent a state late; the way there and back; the engine took longer than usual. */
+  readonly lateServer: bigint;
+  readonly lateNetwork: bigint;
+  readonly lateEngine: bigint;
+  /** Longest time that the device was without a valid force. */
+  readonly worstLateNs: Nanoseconds;
+  /** Longest time that nothing was heard of this client. */
+  readonly longestGapNs: Nanoseconds;
+  readonly roundTrip: Delays | undefined;
+  readonly toServer: Delays | undefined;
+  readonly toClient: Delays | undefined;
+  /** This client's clock less the server's, how fast that grows, and how far it is off at most. */
+  readonly clockOffsetNs: Nanoseconds;
+  readonly clockDriftPpm: number;
+  readonly clockErrorNs: Nanoseconds;
+  /** Datagrams of this client since the session opened. */
+  readonly received: bigint;
+  readonly lost: bigint;
+  readonly reordered: bigint;
+  readonly duplicated: bigint;
+  /** Why forces were late, for people; empty when none was. */
+  readonly words: string;
+}
 
 /** The first words of a client. */
 export interface Hello {
@@ -106,7 +165,7 @@ export interface Refused {
 
 const kReasons = [
   "energy", "max force", "slew", "ramp-in", "held", "decaying", "safe stop", "not finite", "fault", "device clamp",
-  "overrun", "watchdog",
+  "overrun", "watchdog", "position unseen",
 ] as const;
 
 /** The names of the bits of DeviceState.reasons. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { connect, type Guest } from "./connect.js";
 import type { ClientStats, Physics, Watch } from "./force_client.js";
-import { Code } from "./messages.js";
+import { Code, type LinkReport } from "./messages.js";
 import type { Options } from "./options.js";
 import { udp } from "./udp.js";
 
@@ -49,11 +49,31 @@ function printSummary(stats: ClientStats, seconds: number, { name, json }: Optio
   }
 }
 
+/** What the server says of our forces, each time that it says it. */
+function printReport(report: LinkReport, { name, json }: Options): void {
+  if (!json) {
+    if (report.words) console.error(`${name}: the server says: ${report.words}`);
+    return;
+  }
+  const ms = (ns: bigint): number => Number(ns) / 1e6;
+  const delays = (of: LinkReport["roundTrip"]) => of && { median: ms(of.medianNs), p99: ms(of.p99Ns) };
+  console.log(JSON.stringify({
+    report: {
+      number: Number(report.number), forces: Number(report.forces), late_server: Number(report.lateServer),
+      late_network: Number(report.lateNetwork), late_engine: Number(report.lateEngine), worst_late_ms: ms(report.worstLateNs),
+      longest_gap_ms: ms(report.longestGapNs), round_trip_ms: delays(report.roundTrip), to_server_ms: delays(report.toServer),
+      to_client_ms: delays(report.toClient), clock_error_ms: ms(report.clockErrorNs), received: Number(report.received),
+      lost: Number(report.lost), reordered: Number(report.reordered), duplicated: Number(report.duplicated),
+    },
+  }));
+}
+
 /**
  * Runs a guest over UDP until it is told to stop (durationS, SIGINT or SIGTERM); then it says Bye. The exit code comes
  * back: 0 = it has been connected to the server, 1 = it could not connect, the server refused it for good, or the callback
  * threw. Another controller at the device and a server that goes down are not for good: it keeps trying. stderr gets one
- * sentence for each change of the connection, stdout nothing but the callback's own output and, with `json`, the summary.
+ * sentence for each change of the connection and the server's own when forces were late, stdout nothing but the callback's own
+ * output and, with `json`, what the server says of our forces once a second, and the summary.
  */
 export async function run(
   options: Options,
@@ -72,6 +92,7 @@ export async function run(
       refused = true;
       changed.stop();
     },
+    onReport: (report) => printReport(report, options),
   }, callback);
 
   const stop = (): void => guest.stop();

@@ -2,7 +2,7 @@
 import { decodeData, encodeFrame, encodeHead, type DataContent, type Echo, type Frame } from "./codec.js";
 import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
 import { kByes, kMaxDatagram, kMaxPacketNumber } from "./limits.js";
-import { Code, type DeviceState, type ForceCommand, type Request } from "./messages.js";
+import { Code, type DeviceState, type ForceCommand, type LinkReport, type Request } from "./messages.js";
 import { ReplayWindow } from "./replay_window.js";
 import { IncomingRequests, OutgoingRequests } from "./requests.js";
 import { RoundTrip } from "./round_trip.js";
@@ -33,7 +33,7 @@ export interface LinkStats {
   oldKey: number;
   /** Well-formed, with a value out of bounds (NaN, Infinity …): frame dropped. */
   invalid: number;
-  /** State or force not newer than the newest one: frame dropped. */
+  /** State, force or report not newer than the newest one: frame dropped. */
   stale: number;
   /** ms, newest sample; undefined before the first. */
   roundTripMs: number | undefined;
@@ -47,6 +47,7 @@ export interface LinkStats {
 export type SessionEvent =
   | { readonly kind: "state"; readonly state: DeviceState }
   | { readonly kind: "force"; readonly command: ForceCommand }
+  | { readonly kind: "report"; readonly report: LinkReport }
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | { readonly kind: "answered"; readonly id: number; readonly code: Code; readonly detail: string }
   /** As the peer said Bye; Code.TIMED_OUT: it fell silent; Code.EXPIRED: too old. The last event. */
@@ -69,7 +70,7 @@ export interface SessionConfig {
  * One open conversation between a client and a server, seen from either end: bytes and times in, bytes and events out
  * (sans-I/O, pull). protocol/SESSION.md describes the behaviour.
  *
- * State and force: newest wins. Requests: reliable and in order. Every datagram carries an echo, so each gives a round
+ * State, force and report: newest wins. Requests: reliable and in order. Every datagram carries an echo, so each gives a round
  * trip and an ack vector. Nothing queues without a bound.
  *
  * Use: `receive` what arrives and `tick` when `nextTick()` is due; then pull `nextEvent` and `nextDatagram` until they
@@ -90,6 +91,7 @@ export class Session {
   #lastSent: Nanoseconds | undefined;
   #stateToSend: DeviceState | undefined;
   #forceToSend: ForceCommand | undefined;
+  #reportToSend: LinkReport | undefined;
   readonly #asked = new OutgoingRequests();
   #bye: Frame | undefined;
   #byesLeft = 0;
@@ -100,6 +102,7 @@ export class Session {
   #echo: Omit<Echo, "receivedMask"> | undefined;
   #newestTick = -1n;
   #newestSequence = -1n;
+  #newestReport = 0n;
   /** Newest packet of ours that the peer has told of. */
   #newestEchoed = -1n;
   readonly #answering = new IncomingRequests();
@@ -108,6 +111,7 @@ export class Session {
   // To tell.
   #stateArrived: DeviceState | undefined;
   #forceArrived: ForceCommand | undefined;
+  #reportArrived: LinkReport | undefined;
   #closed: SessionEvent | undefined;
 
   /** `opened` is the instant of the handshake's end. The first datagram is due at once. */
@@ -166,6 +170,9 @@ export class Session {
   sendForce(command: ForceCommand): void {
     this.#forceToSend = command;
   }
+  sendReport(report: LinkReport): void {
+    this.#reportToSend = report;
+  }
   /** Queues a reliable request and returns its id; undefined when 16 are open. */
   request(request: Request): number | undefined {
     return this.#asked.add(request);
@@ -217,6 +224,9 @@ export class Session {
     const command = this.#forceArrived;
     this.#forceArrived = undefined;
     if (command) return { kind: "force", command };
+    const report = this.#reportArrived;
+    this.#reportArrived = undefined;
+    if (report) return { kind: "report", report };
     const state = this.#stateArrived;
     this.#stateArrived = undefined;
     if (state) return { kind: "state", state };
@@ -293,6 +303,14 @@ export class Session {
           ++this.stats.stale;
         }
         return;
+      case "report":
+        if (frame.value.number > this.#newestReport) {
+          this.#newestReport = frame.value.number;
+          this.#reportArrived = frame.value;
+        } else {
+          ++this.stats.stale;
+        }
+        return;
       case "control":
         this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
         return;
@@ -309,6 +327,7 @@ export class Session {
   #somethingToSay(now: Nanoseconds): boolean {
     const silentTooLong = this.#lastSent === undefined || now - this.#lastSent >= this.#config.keepAlive;
     return silentTooLong || this.#stateToSend !== undefined || this.#forceToSend !== undefined ||
+      this.#reportToSend !== undefined ||
       this.#answering.nextDue() !== undefined || this.#asked.nextDue(now) !== undefined;
   }
 
@@ -338,6 +357,7 @@ export class Session {
       for (let due; (due = this.#asked.nextDue(now)) && add({ kind: "control", value: due }); ) {
         this.#asked.sent(due.id, now, timeout);
       }
+      if (this.#reportToSend && add({ kind: "report", value: this.#reportToSend })) this.#reportToSend = undefined;
     }
     const datagram = seal.close(now, connectionId, this.#nextPacket, body);
     ++this.#nextPacket;

@@ -27,7 +27,9 @@ from tendon.messages import (
     DeviceState,
     ForceCommand,
     Frame,
+    LinkReport,
     Refused,
+    SetStateDeadband,
     SetStateRate,
     Vec3,
     Welcome,
@@ -46,6 +48,16 @@ def _vector(vector: Vec3) -> list[object]:
 
 def _text(text: str) -> str:
     return "x" + text.encode().hex()
+
+
+def _report(report: LinkReport) -> list[object]:
+    words: list[object] = ["report", report.number, report.until_ns, report.span_ns, report.forces]
+    words += [report.late_server, report.late_network, report.late_engine, report.worst_late_ns, report.longest_gap_ns]
+    for delays in (report.round_trip, report.to_server, report.to_client):
+        words += ["-"] if delays is None else ["measured", delays.median_ns, delays.p99_ns]
+    words += [report.clock_offset_ns, _double(report.clock_drift_ppm), report.clock_error_ns]
+    words += [report.received, report.lost, report.reordered, report.duplicated, _text(report.words)]
+    return words
 
 
 def _frame(frame: Frame) -> list[object]:
@@ -69,9 +81,15 @@ def _frame(frame: Frame) -> list[object]:
             return ["control", frame.id, "unknown"]
         if isinstance(frame.request, SetStateRate):
             return ["control", frame.id, "rate", frame.request.hz]
+        if isinstance(frame.request, SetStateDeadband):
+            asked = frame.request
+            words = ["control", frame.id, "deadband", _double(asked.share), _double(asked.floor)]
+            return [*words, asked.max_silence_us * 1000]
         return ["control", frame.id, "rearm"]
     if isinstance(frame, ControlAck):
         return ["ack", frame.id, int(frame.code), _text(frame.detail)]
+    if isinstance(frame, LinkReport):
+        return _report(frame)
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]
 

@@ -8,9 +8,10 @@ from math import inf, nan
 
 import pytest
 from stand_in import StandIn
+from test_wire_md import REPORT
 from world import MS, PERFECT, SECOND, Weather, World
 
-from tendon import Code, Config, ForceClient, Mode, Phase, Role, Touch
+from tendon import Code, Config, ForceClient, ForceDeadband, Mode, Phase, Role, SetStateDeadband, Touch
 from tendon.codec import (
     AnswerDatagram,
     DatagramType,
@@ -41,6 +42,9 @@ class Stage:
         self.seen_at: list[int] = []
         self.forces: list[ForceCommand] = []
         self.requests: list[Control] = []
+        self.grant = Code.OK
+        self.speed = 0.0  # m/s
+        self.every = 1  # ms from one state to the next that is sent
         self._next_state = World.START
 
     def run(self, length: int) -> None:
@@ -54,12 +58,14 @@ class Stage:
                 self.forces.append(event)
             elif isinstance(event, Control):
                 self.requests.append(event)
-                session.answer(event.id, Code.OK, "")
+                session.answer(event.id, self.grant, "")
         if now >= self._next_state:
             tick = (now - World.START) // MS
             self._next_state = World.START + (tick + 1) * MS
-            if session is not None:
-                session.send(DeviceState(tick, now, (1e-3, 0.0, 0.0), ZERO, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
+            if session is not None and tick % self.every == 0:
+                position = (1e-3 + 1e-3 * self.speed * tick, 0.0, 0.0)
+                velocity = (self.speed, 0.0, 0.0)
+                session.send(DeviceState(tick, now, position, velocity, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
         while (hand := self.client.next_state(now)) is not None:
             self.seen.append(hand)
             self.seen_at.append(now)
@@ -352,3 +358,87 @@ def test_an_impossible_setting_is_named(changes, word):
 
 def test_a_key_does_not_show_in_what_is_printed():
     assert "key" not in repr(Config(key=KEY))
+
+
+# ---- What need not be sent, and what the server says of it ----
+
+KEPT = SetStateDeadband(share=0.1, floor=1e-3, max_silence_us=20_000)
+
+
+def sparse(every: int) -> Stage:
+    """A hand that moves at 0.1 m/s, of which the server sends one state in `every`."""
+    stage = Stage(Config(rate_hz=500, state_deadband=KEPT))
+    stage.every = every
+    stage.speed = 0.1
+    return stage
+
+
+def test_states_that_were_left_out_are_foretold_at_the_callbacks_rate():
+    stage = sparse(10)
+    stage.run(1 * SECOND)
+    assert [control.request for control in stage.requests] == [KEPT]
+    stats = stage.client.stats
+    assert stats.states < 110
+    assert stats.states_foretold > 300
+    assert len(stage.seen) > 450
+    ticks = [hand.tick for hand in stage.seen]
+    assert all(before < after for before, after in zip(ticks, ticks[1:]))
+    for hand in stage.seen:
+        assert hand.position[0] == pytest.approx(1e-3 + 1e-4 * hand.tick, abs=1e-12)
+        assert hand.sampled_ns == World.START + hand.tick * MS
+    assert {force.based_on_tick for force in stage.forces} <= set(ticks)
+
+
+def test_nothing_is_foretold_beyond_the_longest_silence():
+    stage = sparse(200)
+    stage.run(1 * SECOND)
+    assert 5 * 8 < len(stage.seen) < 5 * 12 + 2  # 20 ms of every 200
+
+
+def test_a_server_that_does_not_know_of_deadbands_sends_every_state_and_none_is_foretold():
+    stage = Stage(Config(rate_hz=500, state_deadband=KEPT))
+    stage.grant = Code.UNSUPPORTED
+    stage.run(1 * SECOND)
+    assert stage.client.stats.states > 900
+    assert stage.client.stats.states_foretold == 0
+
+
+@pytest.mark.parametrize(
+    "asked, wrong",
+    [
+        (SetStateDeadband(0.51), "share"),
+        (SetStateDeadband(nan), "share"),
+        (SetStateDeadband(0.1, -1e-3), "floor"),
+        (SetStateDeadband(0.1, 0.2), "floor"),
+        (SetStateDeadband(0.1, 1e-3, 999), "max_silence_us"),
+        (SetStateDeadband(0.1, 1e-3, 20_001), "max_silence_us"),
+    ],
+)
+def test_a_deadband_that_no_server_grants_is_refused_here(asked, wrong):
+    with pytest.raises(ValueError, match=f"state_deadband: {wrong}"):
+        Config(state_deadband=asked)
+
+
+def test_forces_that_feel_alike_are_left_out_but_not_for_longer_than_the_silence():
+    stage = Stage(Config(deadband=ForceDeadband()))
+    stage.touch = lambda hand: Touch((1.0, 0.0, 0.0) if hand.tick < 500 else (1.2, 0.0, 0.0))
+    stage.run(1 * SECOND)
+    stats = stage.client.stats
+    assert stats.forces + stats.forces_alike == len(stage.seen)
+    assert 45 < stats.forces < 60
+    changed = [force for force in stage.forces if force.based_on_tick == 500]
+    assert len(changed) == 1, "at once"
+    assert {force.valid_for_us for force in stage.forces[1:]} == {60_000}
+
+
+def test_what_the_server_says_of_our_forces_is_there_for_the_asking_and_goes_with_the_session():
+    stage = Stage(Config())
+    stage.run(100 * MS)
+    assert stage.client.report is None
+    stage.server.session.send(REPORT)
+    stage.run(100 * MS)
+    assert stage.client.report == REPORT
+    stage.server.session.close(Code.SHUTDOWN, "")
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+    assert stage.client.report is None

@@ -13,13 +13,16 @@ from tendon.messages import (
     Code,
     Control,
     ControlAck,
+    Delays,
     DeviceState,
     ForceCommand,
     Hello,
+    LinkReport,
     LocalModel,
     Mode,
     Refused,
     Role,
+    SetStateDeadband,
     SetStateRate,
     Welcome,
 )
@@ -49,6 +52,28 @@ STATE = DeviceState(
 )
 WALL = ((2000.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 FORCE = ForceCommand(100, 1000, (-2.0, 0.0, 0.0), 20_000, LocalModel((0.01, 0.0, 0.0), WALL))
+REPORT = LinkReport(
+    number=3,
+    until_ns=1_000_000_000,
+    span_ns=1_000_000_000,
+    forces=97,
+    late_server=0,
+    late_network=2,
+    late_engine=1,
+    worst_late_ns=75_000_000,
+    longest_gap_ns=90_000_000,
+    round_trip=Delays(41_000_000, 131_000_000),
+    to_server=Delays(20_500_000, 110_000_000),
+    to_client=Delays(20_500_000, 22_000_000),
+    clock_offset_ns=-5_000_000,
+    clock_drift_ppm=16.0,
+    clock_error_ns=250_000,
+    received=3000,
+    lost=12,
+    reordered=1,
+    duplicated=0,
+    words="forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)",
+)
 FRAMES = {
     "keep-alive": (0, None, []),
     "state": (42, ECHO, [STATE]),
@@ -56,6 +81,8 @@ FRAMES = {
     "control": (44, None, [Control(7, SetStateRate(500))]),
     "control-ack": (45, None, [ControlAck(7, Code.OK, "500 Hz")]),
     "bye": (46, None, [Bye(Code.SHUTDOWN, "SIGTERM")]),
+    "report": (57, None, [REPORT]),
+    "state-deadband": (58, None, [Control(9, SetStateDeadband(0.1, 0.001, 20_000))]),
 }
 
 

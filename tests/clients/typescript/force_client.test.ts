@@ -3,15 +3,16 @@
 // ForceClient against a server on virtual time, over a network that a seed makes.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
-import { encodeAnswerMessage } from "../../../clients/typescript/src/codec.js";
+import { decodeData, encodeAnswerMessage } from "../../../clients/typescript/src/codec.js";
 import { encodeAnswer } from "../../../clients/typescript/src/datagram.js";
 import { ForceClient, type ClientConfig } from "../../../clients/typescript/src/force_client.js";
-import { Code, Role, type DeviceState } from "../../../clients/typescript/src/messages.js";
+import { Code, Mode, Role, type DeviceState } from "../../../clients/typescript/src/messages.js";
 import { NoiseSeal } from "../../../clients/typescript/src/seal.js";
 import { Session } from "../../../clients/typescript/src/session.js";
 import { fromMilliseconds, kSecond } from "../../../clients/typescript/src/time.js";
-import { flipped } from "./support/bytes.js";
+import { flipped, fromHex } from "./support/bytes.js";
 import { Random } from "./support/random.js";
+import { readVectors } from "./support/vectors.js";
 import { kFair, kFoul, kWelcome, World, type ServerConduct, type Weather } from "./support/world.js";
 
 const kPush = { x: -1, y: 0, z: 0 };
@@ -349,5 +350,83 @@ describe("an impossible configuration", () => {
     for (const [config, message] of bad) {
       assert.throws(() => new ForceClient(config, { watch: () => {} }, () => {}, 0n), message);
     }
+  });
+});
+
+describe("what need not be sent", () => {
+  const stateDeadband = { share: 0.1, floor: 1e-3, maxSilenceUs: 20_000 };
+  /** At 0.1 m/s; one tick in `every` is sent. */
+  const moving = (every: bigint): Partial<ServerConduct> => ({
+    every,
+    state: (tick) => ({
+      tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) * 1e-4, y: 0, z: 0 }, velocity: { x: 0.1, y: 0, z: 0 },
+      forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0, forceSequence: 0n,
+      forceAgeNs: 0n, mode: Mode.ACTIVE,
+    }),
+  });
+
+  it("states that were left out are foretold at the callback's rate, their tick and time included", () => {
+    const { seen, world } = controller(1, kFair, { rateHz: 500, stateDeadband }, moving(10n));
+    world.runMs(1000);
+    assert.deepEqual(world.server.requests, [{ kind: "setStateDeadband", ...stateDeadband }]);
+    const { states, statesForetold } = world.client.stats();
+    assert.ok(states < 110 && statesForetold > 300 && seen.length > 440, `${states} ${statesForetold} ${seen.length}`);
+    seen.forEach((hand, i) => {
+      assert.ok(i === 0 || hand.tick > seen[i - 1]!.tick);
+      assert.ok(Math.abs(hand.position.x - Number(hand.tick) * 1e-4) < 1e-12);
+      assert.equal(hand.sampledNs, hand.tick * 1_000_000n);
+    });
+    assert.ok(world.server.forces.every(({ command }) => seen.some(({ tick }) => tick === command.basedOnTick)));
+  });
+
+  it("nothing is foretold beyond the longest silence, nor for a server that does not grant it", () => {
+    const silent = controller(1, kFair, { rateHz: 500, stateDeadband }, moving(200n));
+    silent.world.runMs(1000);
+    assert.ok(silent.seen.length > 30 && silent.seen.length < 65, `${silent.seen.length}`);
+    const old = controller(1, kFair, { rateHz: 500, stateDeadband }, { answer: Code.UNSUPPORTED });
+    old.world.runMs(1000);
+    assert.equal(old.world.client.stats().statesForetold, 0);
+    assert.ok(old.seen.length > 450);
+  });
+
+  it("forces that feel alike are left out, but not for longer than the silence", () => {
+    const deadband = { share: 0.1, floor: 0.05, longestSilenceMs: 20 };
+    const { seen, world } = controller(1, kFair, { deadband });
+    world.runMs(1000);
+    const { forces, forcesAlike } = world.client.stats();
+    assert.equal(forces + forcesAlike, seen.length);
+    assert.ok(forces > 45 && forces < 55, `${forces}`);
+    assert.ok(world.server.forces.slice(1).every(({ command }) => command.validForUs === 60_000));
+  });
+
+  it("an impossible deadband is refused with a sentence that names the field", () => {
+    const wrong = (config: ClientConfig, message: RegExp) =>
+      assert.throws(() => new ForceClient(config, { watch: () => {} }, () => {}, 0n), message);
+    wrong({ stateDeadband: { ...stateDeadband, share: 0.51 } }, /stateDeadband: share/);
+    wrong({ stateDeadband: { ...stateDeadband, floor: NaN } }, /stateDeadband: floor/);
+    wrong({ stateDeadband: { ...stateDeadband, maxSilenceUs: 999 } }, /stateDeadband: maxSilenceUs/);
+    wrong({ deadband: { share: -1, floor: 0, longestSilenceMs: 20 } }, /deadband: share/);
+    wrong({ deadband: { share: 0, floor: 0, longestSilenceMs: 0 } }, /deadband: longestSilenceMs/);
+  });
+});
+
+describe("what the server says of our forces", () => {
+  it("is there for the asking, the newest only, and goes with the session", () => {
+    const { world } = controller(1, kFair);
+    world.runMs(100);
+    assert.equal(world.client.report, undefined);
+    const [frame] = decodeData(fromHex(readVectors("plain.json").data.find(
+      ({ name }: { name: string }) => name === "report on a client's forces")!.body))!.frames;
+    assert.ok(frame?.kind === "report");
+    world.server.session!.sendReport(frame.value);
+    world.runMs(100);
+    assert.deepEqual(world.client.report, frame.value);
+    world.server.session!.sendReport({ ...frame.value, number: 2n });
+    world.runMs(100);
+    assert.deepEqual(world.client.report, frame.value);
+    world.server.session!.close(Code.SHUTDOWN, "");
+    world.runMs(1000);
+    assert.equal(world.client.phase, "open");
+    assert.equal(world.client.report, undefined);
   });
 });

@@ -83,7 +83,8 @@ function roundTrip(datagram: Uint8Array): Uint8Array {
 
 describe("WIRE.md", () => {
   it("has golden datagrams of every kind", () => {
-    const expected = ["hello", "retry", "welcome", "refused", "keep-alive", "state", "force", "control", "control-ack", "bye"];
+    const expected = ["hello", "retry", "welcome", "refused", "keep-alive", "state", "force", "control", "control-ack", "bye",
+      "report", "state-deadband"];
     for (const name of expected) golden(name);
   });
 
@@ -126,6 +127,28 @@ describe("WIRE.md", () => {
       },
     }]);
     assert.deepEqual(reasonNames(3), ["energy", "max force"]);
+  });
+
+  it("report says what the page says", () => {
+    const [frame] = contentOf("report").frames;
+    assert.ok(frame?.kind === "report");
+    const report = frame.value;
+    assert.deepEqual([report.number, report.untilNs, report.spanNs, report.forces], [3n, 1_000_000_000n, 1_000_000_000n, 97n]);
+    assert.deepEqual([report.lateServer, report.lateNetwork, report.lateEngine], [0n, 2n, 1n]);
+    assert.deepEqual([report.worstLateNs, report.longestGapNs], [75_000_000n, 90_000_000n]);
+    assert.deepEqual(report.roundTrip, { medianNs: 41_000_000n, p99Ns: 131_000_000n });
+    assert.deepEqual(report.toServer, { medianNs: 20_500_000n, p99Ns: 110_000_000n });
+    assert.deepEqual(report.toClient, { medianNs: 20_500_000n, p99Ns: 22_000_000n });
+    assert.deepEqual([report.clockOffsetNs, report.clockDriftPpm, report.clockErrorNs], [-5_000_000n, 16, 250_000n]);
+    assert.deepEqual([report.received, report.lost, report.reordered, report.duplicated], [3000n, 12n, 1n, 0n]);
+    assert.match(report.words, /^forces were late 3 times, .* usually 41 ms\)$/);
+  });
+
+  it("state-deadband says what the page says", () => {
+    assert.deepEqual(contentOf("state-deadband").frames, [{
+      kind: "control",
+      value: { id: 9, request: { kind: "setStateDeadband", share: 0.1, floor: 0.001, maxSilenceUs: 20_000 } },
+    }]);
   });
 
   it("force says what the page says", () => {

@@ -7,7 +7,7 @@ import {
 } from "../../../../clients/typescript/src/datagram.js";
 import { ForceClient, type ClientConfig } from "../../../../clients/typescript/src/force_client.js";
 import {
-  Mode, type DeviceState, type ForceCommand, type Hello, type Refused, type Request, type Welcome,
+  Code, Mode, type DeviceState, type ForceCommand, type Hello, type Refused, type Request, type Welcome,
 } from "../../../../clients/typescript/src/messages.js";
 import { keyId } from "../../../../clients/typescript/src/noise.js";
 import { NoiseSeal, PlainSeal, type Seal } from "../../../../clients/typescript/src/seal.js";
@@ -62,6 +62,10 @@ export interface ServerConduct {
   /** When it renews its key, so often that a test sees it. */
   renewAfter: { datagrams: bigint; time: Nanoseconds };
   state: (tick: bigint) => DeviceState;
+  /** One tick in so many is sent. */
+  every: bigint;
+  /** To every request. */
+  answer: Code;
 }
 
 export const kWelcome: Omit<Welcome, "role" | "features"> = {
@@ -78,6 +82,8 @@ export class Server {
     features: ["local-model"],
     key: undefined,
     renewAfter: NoiseSeal.kRenewAfter,
+    every: 1n,
+    answer: Code.OK,
     state: (tick) => ({
       tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) / 1e6, y: 0, z: 0 },
       velocity: { x: 0, y: 0, z: 0 }, forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0,
@@ -118,12 +124,13 @@ export class Server {
     if (!session || !conduct.up || halfOpen) return;
     const time = this.clock(now);
     session.tick(time);
-    session.sendState(conduct.state(this.#tick++));
+    const tick = this.#tick++;
+    if (tick % conduct.every === 0n) session.sendState(conduct.state(tick));
     for (let event; (event = session.nextEvent()); ) {
       if (event.kind === "force") this.forces.push({ at: now, command: event.command });
       if (event.kind === "request") {
         this.requests.push(event.request);
-        session.answer(event.id, 1, "done");
+        session.answer(event.id, conduct.answer, "done");
       }
     }
     for (let datagram; (datagram = session.nextDatagram(time)); ) send(datagram);
