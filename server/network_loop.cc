@@ -320,7 +320,6 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 {bytes.begin(), bytes.end()},
                 answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
                 now};
-  if (!answered.keys) return open(now, std::move(arrived));
   if (half_open_.size() >= config_.max_half_open) {
     half_open_.erase(half_open_.begin());
     ++stats_.half_open_forgotten;

@@ -245,6 +245,38 @@ TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
   EXPECT_EQ(loop_->stats().replaced, 0U);
 }
 
+/// In suite 0 anybody on this machine may say an old Hello again, and the network may, from where it came.
+TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
+  restart({});
+  Client a = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(500), {&a});
+  Bytes hello;
+  for (const Datagram& datagram : wire_) {
+    if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;
+  }
+  a.client->stop(now_);
+  run(milliseconds(10), {&a});
+  Client b = controller(std::nullopt, "127.0.0.1:4000");  // begun again, at the same address
+  run(milliseconds(500), {&b});
+  const std::uint64_t welcomed = loop_->stats().welcomed;
+  const std::uint64_t forces = loop_->stats().forces;
+  for (int i = 0; i < 10; ++i) {
+    deliver(a.end->self, hello);  // its cookie is good for two minutes
+    run(milliseconds(100), {&b});
+  }
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(b.client->stats().sessions, 1U);
+  EXPECT_EQ(loop_->stats().welcomed, welcomed);
+  EXPECT_GT(loop_->stats().forces, forces + 950);
+  // Nor does it keep the device from anybody once b has gone.
+  b.client->stop(now_);
+  run(milliseconds(10), {&b});
+  deliver(a.end->self, hello);
+  Client c = controller(std::nullopt, "127.0.0.1:4001");
+  run(milliseconds(500), {&c});
+  EXPECT_EQ(phase(c), Phase::kOpen);
+}
+
 TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
   Client a = controller(wall_, "192.0.2.1:4000");
   // The Answer never arrives.
