@@ -21,14 +21,22 @@ from . import tendon_pb2 as pb
 from .messages import (
     PROTOCOL_VERSION,
     Bye,
+    ChannelDescription,
+    ChannelRule,
+    Claim,
     Code,
     Control,
     ControlAck,
     Delays,
+    Describe,
+    DeviceDescription,
     DeviceState,
     ForceCommand,
     Frame,
+    GiveLease,
+    Grant,
     Hello,
+    LeaseLost,
     LinkReport,
     LocalModel,
     Mat3,
@@ -39,6 +47,7 @@ from .messages import (
     Role,
     SetStateDeadband,
     SetStateRate,
+    TakeLease,
     Vec3,
     Welcome,
 )
@@ -140,6 +149,14 @@ def _length(ns: int) -> int:
     return _whole(ns, 0, limits.MAX_TIME_NS)
 
 
+def _device(number: int) -> int:
+    return _whole(number, 0, limits.MAX_DEVICES - 1)
+
+
+def _channel(number: int) -> int:
+    return _whole(number, 0, limits.MAX_CHANNELS - 1)
+
+
 def _text(text: str, limit: int) -> str:
     if len(text) > limit or len(text.encode()) > limit:
         raise _OutOfBounds
@@ -156,6 +173,7 @@ _Number = TypeVar("_Number", bound=IntEnum)
 _MODES: dict[int, Mode] = {int(mode): mode for mode in Mode}
 _CODES: dict[int, Code] = {int(code): code for code in Code}
 _ROLES: dict[int, Role] = {int(role): role for role in Role}
+_RULES: dict[int, ChannelRule] = {int(rule): rule for rule in ChannelRule}
 
 
 def _enum(known: dict[int, _Number], number: int) -> _Number:
@@ -243,6 +261,8 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         force_sequence=message.force_sequence,
         force_age_ns=_length(message.force_age_ns),
         mode=_enum(_MODES, message.mode),
+        device=_device(message.device),
+        channel=_channel(message.channel),
     )
 
 
@@ -276,6 +296,8 @@ def _read_force(message: pb.ForceCommand) -> ForceCommand:
         force=_vector(message.force_n),
         valid_for_us=_whole(message.valid_for_us, 1, limits.MAX_VALID_FOR_US),
         model=_read_model(message.model) if message.HasField("model") else None,
+        device=_device(message.device),
+        channel=_channel(message.channel),
     )
 
 
@@ -283,9 +305,18 @@ def _read_control(message: pb.Control) -> Control:
     op = message.WhichOneof("op")
     request: Request | None = None
     if op == "set_state_rate":
-        request = SetStateRate(message.set_state_rate.hz)
+        request = SetStateRate(message.set_state_rate.hz, _device(message.set_state_rate.device))
     elif op == "rearm":
-        request = Rearm()
+        request = Rearm(_device(message.rearm.device))
+    elif op == "describe":
+        request = Describe(_device(message.describe.device))
+    elif op == "take_lease":
+        request = TakeLease(_device(message.take_lease.device), _channel(message.take_lease.channel))
+    elif op == "give_lease":
+        request = GiveLease(_device(message.give_lease.device), _channel(message.give_lease.channel))
+    elif op == "lease_lost":
+        lost = message.lease_lost
+        request = LeaseLost(_device(lost.device), _channel(lost.channel), _text(lost.to, limits.MAX_NAME))
     elif op == "set_state_deadband":
         asked = message.set_state_deadband
         request = SetStateDeadband(_number(asked.share), _number(asked.floor_mps), asked.max_silence_us)
@@ -297,7 +328,71 @@ def _read_ack(message: pb.ControlAck) -> ControlAck:
         id=_whole(message.id, 1, 2**32),
         code=_enum(_CODES, message.code),
         detail=_text(message.detail, limits.MAX_DETAIL),
+        wait_ms=_whole(message.wait_ms, 0, limits.MAX_TIMEOUT_MS),
+        device=_read_description(message.device) if message.HasField("device") else None,
     )
+
+
+def _read_description(message: pb.DeviceDescription) -> DeviceDescription:
+    if message.HasField("workspace_min_m") != message.HasField("workspace_max_m"):
+        raise _OutOfBounds
+    workspace = None
+    if message.HasField("workspace_min_m"):
+        low, high = workspace = (_vector(message.workspace_min_m), _vector(message.workspace_max_m))
+        if any(a > b for a, b in zip(low, high)):
+            raise _OutOfBounds
+    _whole(len(message.channels), 1, limits.MAX_CHANNELS)
+    return DeviceDescription(
+        device=_device(message.device),
+        name=_text(message.name, limits.MAX_LABEL),
+        model=_text(message.model, limits.MAX_NAME),
+        position_dof=_whole(message.position_dof, 1, limits.MAX_DOF),
+        force_dof=_whole(message.force_dof, 1, limits.MAX_DOF),
+        workspace=workspace,
+        max_force=_magnitude(message.max_force_n),
+        continuous_force=_magnitude(message.continuous_force_n),
+        max_stiffness=_magnitude(message.max_stiffness_npm),
+        position_resolution=_magnitude(message.position_resolution_m),
+        loop_hz=_whole(message.loop_hz, 1, limits.MAX_LOOP_HZ),
+        channels=tuple(
+            ChannelDescription(
+                name=_text(channel.name, limits.MAX_LABEL),
+                rule=_enum(_RULES, channel.rule),
+                lease_ms=_whole(channel.lease_ms, 0, limits.MAX_TIMEOUT_MS),
+                holder=_text(channel.holder, limits.MAX_LABEL),
+            )
+            for channel in message.channels
+        ),
+    )
+
+
+def _write_description(description: DeviceDescription) -> pb.DeviceDescription:
+    message = pb.DeviceDescription(
+        device=description.device,
+        name=_clip(description.name, limits.MAX_LABEL),
+        model=_clip(description.model, limits.MAX_NAME),
+        position_dof=description.position_dof,
+        force_dof=description.force_dof,
+        max_force_n=description.max_force,
+        continuous_force_n=description.continuous_force,
+        max_stiffness_npm=description.max_stiffness,
+        position_resolution_m=description.position_resolution,
+        loop_hz=description.loop_hz,
+    )
+    if description.workspace is not None:
+        low, high = description.workspace
+        message.workspace_min_m.CopyFrom(_write_vector(low))
+        message.workspace_max_m.CopyFrom(_write_vector(high))
+    for channel in description.channels[: limits.MAX_CHANNELS]:
+        message.channels.append(
+            pb.ChannelDescription(
+                name=_clip(channel.name, limits.MAX_LABEL),
+                rule=cast(pb.ChannelRule, channel.rule),
+                lease_ms=channel.lease_ms,
+                holder=_clip(channel.holder, limits.MAX_LABEL),
+            )
+        )
+    return message
 
 
 def _read_bye(message: pb.Bye) -> Bye:
@@ -366,6 +461,28 @@ def _write_vector(vector: Vec3) -> pb.Vec3:
     return pb.Vec3(x=vector[0], y=vector[1], z=vector[2])
 
 
+def _write_control(frame: Control) -> pb.Control:
+    control, request = pb.Control(id=frame.id), frame.request
+    if isinstance(request, SetStateRate):
+        control.set_state_rate.CopyFrom(pb.SetStateRate(hz=request.hz, device=request.device))
+    elif isinstance(request, Rearm):
+        control.rearm.CopyFrom(pb.Rearm(device=request.device))
+    elif isinstance(request, Describe):
+        control.describe.CopyFrom(pb.Describe(device=request.device))
+    elif isinstance(request, TakeLease):
+        control.take_lease.CopyFrom(pb.TakeLease(device=request.device, channel=request.channel))
+    elif isinstance(request, GiveLease):
+        control.give_lease.CopyFrom(pb.GiveLease(device=request.device, channel=request.channel))
+    elif isinstance(request, LeaseLost):
+        to = _clip(request.to, limits.MAX_NAME)
+        control.lease_lost.CopyFrom(pb.LeaseLost(device=request.device, channel=request.channel, to=to))
+    elif isinstance(request, SetStateDeadband):
+        control.set_state_deadband.CopyFrom(
+            pb.SetStateDeadband(share=request.share, floor_mps=request.floor, max_silence_us=request.max_silence_us)
+        )
+    return control
+
+
 def _write_frame(frame: Frame) -> pb.Frame:
     if isinstance(frame, ForceCommand):
         force = pb.ForceCommand(
@@ -374,6 +491,8 @@ def _write_frame(frame: Frame) -> pb.Frame:
             force_n=_write_vector(frame.force),
             model=_write_model(frame.model) if frame.model else None,
             valid_for_us=frame.valid_for_us,
+            device=frame.device,
+            channel=frame.channel,
         )
         return pb.Frame(force=force)
     if isinstance(frame, DeviceState):
@@ -389,22 +508,20 @@ def _write_frame(frame: Frame) -> pb.Frame:
             force_sequence=frame.force_sequence,
             force_age_ns=frame.force_age_ns,
             mode=cast(pb.Mode, frame.mode),
+            device=frame.device,
+            channel=frame.channel,
         )
         return pb.Frame(state=state)
     if isinstance(frame, Control):
-        control = pb.Control(id=frame.id)
-        if isinstance(frame.request, SetStateRate):
-            control.set_state_rate.hz = frame.request.hz
-        elif isinstance(frame.request, Rearm):
-            control.rearm.SetInParent()
-        elif isinstance(frame.request, SetStateDeadband):
-            asked = frame.request
-            control.set_state_deadband.CopyFrom(
-                pb.SetStateDeadband(share=asked.share, floor_mps=asked.floor, max_silence_us=asked.max_silence_us)
-            )
-        return pb.Frame(control=control)
+        return pb.Frame(control=_write_control(frame))
     if isinstance(frame, ControlAck):
-        ack = pb.ControlAck(id=frame.id, code=cast(pb.Code, frame.code), detail=_clip(frame.detail, limits.MAX_DETAIL))
+        ack = pb.ControlAck(
+            id=frame.id,
+            code=cast(pb.Code, frame.code),
+            detail=_clip(frame.detail, limits.MAX_DETAIL),
+            wait_ms=frame.wait_ms,
+            device=None if frame.device is None else _write_description(frame.device),
+        )
         return pb.Frame(control_ack=ack)
     if isinstance(frame, LinkReport):
         return pb.Frame(report=_write_report(frame))
@@ -605,6 +722,14 @@ def write_hello(hello: Hello) -> bytes:
         role=cast(pb.Role, hello.role),
         name=_clip(hello.name, limits.MAX_NAME),
         features=[_clip(feature, limits.MAX_FEATURE) for feature in hello.features[: limits.MAX_FEATURES]],
+        claims=[
+            pb.Claim(
+                device=_clip(claim.device, limits.MAX_LABEL),
+                channel=_clip(claim.channel, limits.MAX_LABEL),
+                role=cast(pb.Role, claim.role),
+            )
+            for claim in hello.claims[: limits.MAX_CLAIMS]
+        ],
     )
     return bytes(message.SerializeToString())
 
@@ -628,6 +753,10 @@ def write_answer(answer: Answer) -> bytes:
         loop_hz=answer.loop_hz,
         timeout_ms=answer.timeout_ms,
         server=_clip(answer.server, limits.MAX_NAME),
+        grants=[
+            pb.Grant(device=grant.device, channel=grant.channel, role=cast(pb.Role, grant.role))
+            for grant in answer.grants[: limits.MAX_CLAIMS]
+        ],
     )
     return bytes(pb.Answer(welcome=welcome).SerializeToString())
 
@@ -641,6 +770,7 @@ def read_hello(body: bytes) -> Hello | None:
             features=_features(message.features),
             version_min=_whole(message.version_min, 1, message.version_max),
             version_max=message.version_max,
+            claims=_read_claims(message),
         )
     except (DecodeError, _OutOfBounds):
         return None
@@ -659,6 +789,22 @@ def read_answer(body: bytes) -> Answer | None:
     return None
 
 
+def _read_claims(message: pb.Hello) -> tuple[Claim, ...]:
+    _whole(len(message.claims), 0, limits.MAX_CLAIMS)
+    label = limits.MAX_LABEL
+    return tuple(
+        Claim(_enum(_ROLES, claim.role), _text(claim.device, label), _text(claim.channel, label))
+        for claim in message.claims
+    )
+
+
+def _read_grants(message: pb.Welcome) -> tuple[Grant, ...]:
+    _whole(len(message.grants), 0, limits.MAX_CLAIMS)
+    return tuple(
+        Grant(_enum(_ROLES, grant.role), _device(grant.device), _channel(grant.channel)) for grant in message.grants
+    )
+
+
 def _read_welcome(message: pb.Welcome) -> Welcome:
     return Welcome(
         version=_whole(message.version, 1, 2**32),
@@ -670,6 +816,7 @@ def _read_welcome(message: pb.Welcome) -> Welcome:
         loop_hz=_whole(message.loop_hz, 1, limits.MAX_LOOP_HZ),
         timeout_ms=_whole(message.timeout_ms, 1, limits.MAX_TIMEOUT_MS),
         server=_text(message.server, limits.MAX_NAME),
+        grants=_read_grants(message),
     )
 
 

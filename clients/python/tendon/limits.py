@@ -17,6 +17,12 @@ REQUEST_WINDOW = 16
 """Requests sent and not yet answered, and answers kept."""
 MAX_NAME = 64
 """Bytes of UTF-8 in a name."""
+MAX_LABEL = 24
+"""Bytes of UTF-8 in the name of a device or a channel."""
+MAX_DEVICES = 16
+MAX_CHANNELS = 8
+MAX_CLAIMS = 16
+MAX_DOF = 6
 MAX_FEATURE = 32
 MAX_FEATURES = 16
 MAX_DETAIL = 128

@@ -21,13 +21,16 @@ ZERO: Vec3 = (0.0, 0.0, 0.0)
 PROTOCOL_VERSION = 1
 """The version of the wire that this package speaks."""
 
+FEATURE_CHANNELS = "channels"
+"""The client understands that a lease can be lost."""
+
 FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
 
 
 class Role(IntEnum):
     OBSERVER = 1  # sees device states
-    CONTROLLER = 2  # … and sends forces; one per device
+    CONTROLLER = 2  # … and sends forces; one per channel
 
 
 class Code(IntEnum):
@@ -88,6 +91,8 @@ class DeviceState:
     force_sequence: int  # of the ForceCommand rendered now; 0 = none
     force_age_ns: int  # since it arrived
     mode: Mode
+    device: int = 0
+    channel: int = 0  # of the force that force_sequence, force_age_ns and mode are about
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,23 +107,60 @@ class LocalModel:
 class ForceCommand:
     """Client → server, newest wins: the force that the physics engine wants."""
 
-    sequence: int  # 1, 2, 3 … per session
+    sequence: int  # 1, 2, 3 … per session, device and channel
     based_on_tick: int  # `DeviceState.tick` it was computed from
     force: Vec3  # N, on the hand
     valid_for_us: int  # counted from arrival
     model: LocalModel | None = None
+    device: int = 0
+    channel: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class SetStateRate:
-    """Client → server, reliable: how many states per second this client wants."""
+    """Client → server, reliable: how many states of a device per second this client wants."""
 
     hz: int
+    device: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Rearm:
-    """Client → server, reliable: clears a latched fault. Only from the controller."""
+    """Client → server, reliable: clears a latched fault. Only from a controller of the device."""
+
+    device: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Describe:
+    """Client → server, reliable: what a device is and can do; answered with a DeviceDescription."""
+
+    device: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class TakeLease:
+    """Client → server, reliable: I want to be the one whose forces this channel takes."""
+
+    device: int = 0
+    channel: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GiveLease:
+    """Client → server, reliable: I do not want to be it any more."""
+
+    device: int = 0
+    channel: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseLost:
+    """Server → client, reliable: you are not it any more."""
+
+    device: int = 0
+    channel: int = 0
+    to: str = ""  # name of the one that is
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +176,40 @@ class SetStateDeadband:
     max_silence_us: int = 20_000  # 1000 … 20 000; 0 = every state is sent, as before this was asked
 
 
-Request = Union[SetStateRate, Rearm, SetStateDeadband]
+Request = Union[SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband]
+
+
+class ChannelRule(IntEnum):
+    """What a device makes of a channel's force."""
+
+    SUM = 1  # it is added to the others
+    PRIORITY = 2  # it silences the channels of this rule that come after it
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelDescription:
+    name: str
+    rule: ChannelRule
+    lease_ms: int = 0  # a holder that sends no force for so long may be followed by another; 0 = it stays until it leaves
+    holder: str = ""  # whose forces it takes; empty = nobody's
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceDescription:
+    """What a device is and can do. 0 = not known, where a value cannot be 0."""
+
+    device: int
+    name: str  # as the server calls it
+    model: str  # what it is
+    position_dof: int  # axes that are measured
+    force_dof: int  # axes with a motor
+    workspace: tuple[Vec3, Vec3] | None  # m, two corners of a box that the handle stays in
+    max_force: float  # N
+    continuous_force: float  # N, for ever
+    max_stiffness: float  # N/m, what it can render stably
+    position_resolution: float  # m, one encoder count; 0 = exact
+    loop_hz: int
+    channels: Sequence[ChannelDescription]
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +227,8 @@ class ControlAck:
     id: int
     code: Code
     detail: str = ""
+    wait_ms: int = 0  # with Code.BUSY of TakeLease; 0 = nobody knows
+    device: DeviceDescription | None = None  # with Code.OK of Describe
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +280,24 @@ Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport]
 
 
 @dataclass(frozen=True, slots=True)
+class Claim:
+    """What a client wants: a device by name, and as a controller a channel by name; empty = number 0."""
+
+    role: Role
+    device: str = ""
+    channel: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """The numbers that stand for the names of a Claim. OBSERVER for a controller's: another one holds the lease."""
+
+    role: Role
+    device: int = 0
+    channel: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Hello:
     """The first words of a client."""
 
@@ -211,6 +306,7 @@ class Hello:
     features: Sequence[str] = ()
     version_min: int = PROTOCOL_VERSION
     version_max: int = PROTOCOL_VERSION
+    claims: Sequence[Claim] = ()  # none: device 0, its channel 0, and `role`, which is the highest of the claims'
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +322,7 @@ class Welcome:
     loop_hz: int  # haptic steps per second
     timeout_ms: int  # silence after which the server forgets this client
     server: str  # name and version of the server
+    grants: Sequence[Grant] = ()  # one for each Claim, in their order
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,8 +82,8 @@ class Session:
         self._newest_number = -1  # of the datagrams accepted, with its T1 and T2
         self._newest_sent_ns = 0
         self._newest_received_ns = 0
-        self._newest_tick = -1
-        self._newest_sequence = -1
+        self._newest_tick: dict[int, int] = {}  # by device
+        self._newest_sequence: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_report = 0
         self._newest_echoed = -1  # newest packet of ours that the peer has told of
         self._answering = IncomingRequests()
@@ -227,16 +227,17 @@ class Session:
 
     def _take(self, frame: Frame) -> None:
         if isinstance(frame, DeviceState):
-            if frame.tick <= self._newest_tick:
+            if frame.tick <= self._newest_tick.get(frame.device, -1):
                 self.stats.stale += 1
                 return
-            self._newest_tick = frame.tick
+            self._newest_tick[frame.device] = frame.tick
             self._state_arrived = frame
         elif isinstance(frame, ForceCommand):
-            if frame.sequence <= self._newest_sequence:
+            channel = (frame.device, frame.channel)
+            if frame.sequence <= self._newest_sequence.get(channel, -1):
                 self.stats.stale += 1
                 return
-            self._newest_sequence = frame.sequence
+            self._newest_sequence[channel] = frame.sequence
             self._force_arrived = frame
         elif isinstance(frame, LinkReport):
             if frame.number <= self._newest_report:

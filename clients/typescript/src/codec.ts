@@ -5,7 +5,7 @@ import { create, fromBinary, toBinary, type DescMessage, type MessageShape } fro
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
-  Delays, DeviceState, ForceCommand, Hello, LinkReport, LocalModel, Refused, Request, Stiffness, Vec3, Welcome,
+  Claim, Delays, DeviceDescription, DeviceState, ForceCommand, Grant, Hello, LinkReport, LocalModel, Refused, Request, Stiffness, Vec3, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -29,6 +29,10 @@ export interface ControlAck {
   readonly id: number;
   readonly code: pb.Code;
   readonly detail: string;
+  /** With BUSY of takeLease; 0 = nobody knows. */
+  readonly waitMs?: number | undefined;
+  /** With OK of describe. */
+  readonly device?: DeviceDescription | undefined;
 }
 export interface Bye {
   readonly code: pb.Code;
@@ -99,15 +103,20 @@ export const encodeHelloMessage = (hello: Hello): Uint8Array =>
     role: hello.role,
     name: clip(hello.name, limits.kMaxName),
     features: writeFeatures(hello.features),
+    claims: (hello.claims ?? []).slice(0, limits.kMaxClaims).map(({ device, channel, role }) =>
+      create(pb.ClaimSchema, { device: clip(device, limits.kMaxLabel), channel: clip(channel, limits.kMaxLabel), role })),
   }));
 
 export function decodeHelloMessage(bytes: Uint8Array): Hello | undefined {
   const hello = parse(pb.HelloSchema, bytes);
   if (!hello) return undefined;
   const { versionMin, versionMax, role, name, features } = hello;
+  const claims = hello.claims.map(({ device, channel, role }): Claim => ({ device, channel, role }));
   const good = versionMin >= 1 && versionMin <= versionMax && isEnum(role, pb.RoleSchema) &&
-    isText(name, limits.kMaxName) && areFeatures(features);
-  return good ? { versionMin, versionMax, role, name, features } : undefined;
+    isText(name, limits.kMaxName) && areFeatures(features) && claims.length <= limits.kMaxClaims &&
+    claims.every(({ device, channel, role }) =>
+      isText(device, limits.kMaxLabel) && isText(channel, limits.kMaxLabel) && isEnum(role, pb.RoleSchema));
+  return good ? { versionMin, versionMax, role, name, features, ...(claims.length && { claims }) } : undefined;
 }
 
 export function encodeAnswerMessage(answer: Welcome | Refused): Uint8Array {
@@ -137,6 +146,8 @@ export function decodeAnswerMessage(bytes: Uint8Array): Welcome | Refused | unde
 const isBounded = (value: number): boolean => Math.abs(value) <= limits.kMaxValue; // false for NaN
 const isMagnitude = (value: number): boolean => value >= 0 && value <= limits.kMaxValue;
 const isTime = (ns: bigint): boolean => ns >= -limits.kMaxTime && ns <= limits.kMaxTime;
+const isDevice = (number: number): boolean => number < limits.kMaxDevices;
+const isChannel = (number: number): boolean => number < limits.kMaxChannels;
 const isVec3 = (v: Vec3): boolean => isBounded(v.x) && isBounded(v.y) && isBounded(v.z);
 /** Number 0 of every enumeration is refused, as are those that this version does not know. */
 const isEnum = (value: number, schema: { readonly value: Record<number, unknown> }): boolean =>
@@ -185,13 +196,17 @@ function readBody(body: Body): Frame | undefined {
     case "control": {
       const { id, op } = body.value;
       const request = readRequest(op);
-      const good = id > 0 && (request?.kind !== "setStateDeadband" || (isBounded(request.share) && isBounded(request.floor)));
+      const good = id > 0 && (!request || isRequest(request));
       return good ? { kind: "control", value: { id, request } } : undefined;
     }
     case "controlAck": {
-      const { id, code, detail } = body.value;
-      const good = id > 0 && isEnum(code, pb.CodeSchema) && isText(detail, limits.kMaxDetail);
-      return good ? { kind: "controlAck", value: { id, code, detail } } : undefined;
+      const { id, code, detail, waitMs } = body.value;
+      const device = body.value.device && readDescription(body.value.device);
+      const good = id > 0 && isEnum(code, pb.CodeSchema) && isText(detail, limits.kMaxDetail) &&
+        waitMs <= limits.kMaxTimeoutMs && (device !== undefined || !body.value.device);
+      return good
+        ? { kind: "controlAck", value: { id, code, detail, ...(waitMs && { waitMs }), ...(device && { device }) } }
+        : undefined;
     }
     case "bye": {
       const { code, reason } = body.value;
@@ -214,8 +229,10 @@ function writeBody(frame: Frame): Body {
     case "control":
       return { case: "control", value: create(pb.ControlSchema, { id: frame.value.id, op: writeRequest(frame.value.request) }) };
     case "controlAck": {
-      const { id, code, detail } = frame.value;
-      return { case: "controlAck", value: create(pb.ControlAckSchema, { id, code, detail: clip(detail, limits.kMaxDetail) }) };
+      const { id, code, detail, waitMs, device } = frame.value;
+      const ack = create(pb.ControlAckSchema, { id, code, detail: clip(detail, limits.kMaxDetail), waitMs: waitMs ?? 0 });
+      if (device) ack.device = writeDescription(device);
+      return { case: "controlAck", value: ack };
     }
     case "bye": {
       const { code, reason } = frame.value;
@@ -249,11 +266,13 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
     forceSequence: from.forceSequence,
     forceAgeNs: from.forceAgeNs,
     mode: from.mode,
+    device: from.device,
+    channel: from.channel,
   };
   const good = isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
     isVec3(state.forceApplied) && isBounded(state.energy) &&
     (state.permittedForce === Infinity || isMagnitude(state.permittedForce)) && isLength(state.forceAgeNs) &&
-    isEnum(state.mode, pb.ModeSchema);
+    isEnum(state.mode, pb.ModeSchema) && isDevice(state.device) && isChannel(state.channel);
   return good ? state : undefined;
 }
 
@@ -270,6 +289,8 @@ const writeState = (from: DeviceState): pb.DeviceState =>
     forceSequence: from.forceSequence,
     forceAgeNs: from.forceAgeNs,
     mode: from.mode,
+    device: from.device,
+    channel: from.channel,
   });
 
 /** 1 entry, 3 or 9, all of them within bounds. */
@@ -286,8 +307,10 @@ function readForce(from: pb.ForceCommand): ForceCommand | undefined {
     force: readVec3(from.forceN),
     model,
     validForUs: from.validForUs,
+    device: from.device,
+    channel: from.channel,
   };
-  const good = command.sequence > 0n && isVec3(command.force) && command.validForUs >= 1 &&
+  const good = isDevice(command.device) && isChannel(command.channel) && command.sequence > 0n && isVec3(command.force) && command.validForUs >= 1 &&
     command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || (isVec3(model.at) && isStiffness(model.stiffness)));
   return good ? command : undefined;
 }
@@ -299,6 +322,8 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
     forceN: writeVec3(from.force),
     ...(from.model && { model: { atM: writeVec3(from.model.at), stiffnessNpm: [...from.model.stiffness] } }),
     validForUs: from.validForUs,
+    device: from.device,
+    channel: from.channel,
   });
 
 const isLength = (ns: bigint): boolean => ns <= limits.kMaxTime; // of time; it has no sign on the wire
@@ -331,12 +356,64 @@ function writeReport({ roundTrip, toServer, toClient, words, ...rest }: LinkRepo
   });
 }
 
+/** Its values are within bounds. */
+function isRequest(request: Request): boolean {
+  if (request.kind === "setStateDeadband") return isBounded(request.share) && isBounded(request.floor);
+  return isDevice(request.device) && (!("channel" in request) || isChannel(request.channel)) &&
+    (!("to" in request) || isText(request.to, limits.kMaxName));
+}
+
+function readDescription(from: pb.DeviceDescription): DeviceDescription | undefined {
+  const { device, name, model, positionDof, forceDof, workspaceMinM: min, workspaceMaxM: max, loopHz } = from;
+  const channels = from.channels.map(({ name, rule, leaseMs, holder }) => ({ name, rule, leaseMs, holder }));
+  const isDof = (axes: number): boolean => axes >= 1 && axes <= limits.kMaxDof;
+  const sizes = [from.maxForceN, from.continuousForceN, from.maxStiffnessNpm, from.positionResolutionM] as const;
+  const workspace = min && max && { min: readVec3(min), max: readVec3(max) };
+  const isBox = !min === !max && (!workspace || (isVec3(workspace.min) && isVec3(workspace.max) &&
+    workspace.min.x <= workspace.max.x && workspace.min.y <= workspace.max.y && workspace.min.z <= workspace.max.z));
+  const good = isDevice(device) && isText(name, limits.kMaxLabel) && isText(model, limits.kMaxName) && isDof(positionDof) &&
+    isDof(forceDof) && isBox && sizes.every(isMagnitude) && loopHz >= 1 && loopHz <= limits.kMaxLoopHz &&
+    channels.length >= 1 && channels.length <= limits.kMaxChannels && channels.every((channel) =>
+      isText(channel.name, limits.kMaxLabel) && isEnum(channel.rule, pb.ChannelRuleSchema) &&
+      channel.leaseMs <= limits.kMaxTimeoutMs && isText(channel.holder, limits.kMaxLabel));
+  if (!good) return undefined;
+  const [maxForce, continuousForce, maxStiffness, positionResolution] = sizes;
+  return {
+    device, name, model, positionDof, forceDof, workspace, maxForce, continuousForce, maxStiffness, positionResolution, loopHz,
+    channels,
+  };
+}
+
+function writeDescription(from: DeviceDescription): pb.DeviceDescription {
+  const { device, positionDof, forceDof, workspace, loopHz } = from;
+  return create(pb.DeviceDescriptionSchema, {
+    device, positionDof, forceDof, loopHz,
+    name: clip(from.name, limits.kMaxLabel),
+    model: clip(from.model, limits.kMaxName),
+    ...(workspace && { workspaceMinM: writeVec3(workspace.min), workspaceMaxM: writeVec3(workspace.max) }),
+    maxForceN: from.maxForce,
+    continuousForceN: from.continuousForce,
+    maxStiffnessNpm: from.maxStiffness,
+    positionResolutionM: from.positionResolution,
+    channels: from.channels.slice(0, limits.kMaxChannels).map(({ name, rule, leaseMs, holder }) =>
+      create(pb.ChannelDescriptionSchema, {
+        name: clip(name, limits.kMaxLabel), rule, leaseMs, holder: clip(holder, limits.kMaxLabel),
+      })),
+  });
+}
+
 function readRequest(op: pb.Control["op"]): Request | undefined {
   switch (op.case) {
     case "setStateRate":
-      return { kind: "setStateRate", hz: op.value.hz };
+      return { kind: op.case, hz: op.value.hz, device: op.value.device };
     case "rearm":
-      return { kind: "rearm" };
+    case "describe":
+      return { kind: op.case, device: op.value.device };
+    case "takeLease":
+    case "giveLease":
+      return { kind: op.case, device: op.value.device, channel: op.value.channel };
+    case "leaseLost":
+      return { kind: op.case, device: op.value.device, channel: op.value.channel, to: op.value.to };
     case "setStateDeadband": {
       const { share, floorMps, maxSilenceUs } = op.value;
       return { kind: "setStateDeadband", share, floor: floorMps, maxSilenceUs };
@@ -349,9 +426,19 @@ function readRequest(op: pb.Control["op"]): Request | undefined {
 function writeRequest(request: Request | undefined): pb.Control["op"] {
   switch (request?.kind) {
     case "setStateRate":
-      return { case: "setStateRate", value: create(pb.SetStateRateSchema, { hz: request.hz }) };
+      return { case: request.kind, value: create(pb.SetStateRateSchema, { hz: request.hz, device: request.device }) };
     case "rearm":
-      return { case: "rearm", value: create(pb.RearmSchema) };
+      return { case: request.kind, value: create(pb.RearmSchema, { device: request.device }) };
+    case "describe":
+      return { case: request.kind, value: create(pb.DescribeSchema, { device: request.device }) };
+    case "takeLease":
+      return { case: request.kind, value: create(pb.TakeLeaseSchema, { device: request.device, channel: request.channel }) };
+    case "giveLease":
+      return { case: request.kind, value: create(pb.GiveLeaseSchema, { device: request.device, channel: request.channel }) };
+    case "leaseLost": {
+      const { device, channel, to } = request;
+      return { case: request.kind, value: create(pb.LeaseLostSchema, { device, channel, to: clip(to, limits.kMaxName) }) };
+    }
     case "setStateDeadband": {
       const { share, floor, maxSilenceUs } = request;
       return { case: "setStateDeadband", value: create(pb.SetStateDeadbandSchema, { share, floorMps: floor, maxSilenceUs }) };
@@ -363,14 +450,16 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
 
 function readWelcome(from: pb.Welcome): Welcome | undefined {
   const { version, features, role, deviceName, loopHz, timeoutMs, server } = from;
-  const good = version >= 1 && areFeatures(features) && isEnum(role, pb.RoleSchema) &&
+  const grants = from.grants.map(({ device, channel, role }): Grant => ({ device, channel, role }));
+  const good = version >= 1 && grants.length <= limits.kMaxClaims && grants.every(({ device, channel, role }) =>
+      isDevice(device) && isChannel(channel) && isEnum(role, pb.RoleSchema)) && areFeatures(features) && isEnum(role, pb.RoleSchema) &&
     isText(deviceName, limits.kMaxName) && isMagnitude(from.maxForceN) && isMagnitude(from.positionResolutionM) &&
     loopHz >= 1 && loopHz <= limits.kMaxLoopHz && timeoutMs >= 1 && timeoutMs <= limits.kMaxTimeoutMs &&
     isText(server, limits.kMaxName);
   if (!good) return undefined;
   return {
     version, features, role, deviceName, maxForce: from.maxForceN, positionResolution: from.positionResolutionM, loopHz,
-    timeoutMs, server,
+    timeoutMs, server, ...(grants.length && { grants }),
   };
 }
 
@@ -385,4 +474,5 @@ const writeWelcome = (from: Welcome): pb.Welcome =>
     loopHz: from.loopHz,
     timeoutMs: from.timeoutMs,
     server: clip(from.server, limits.kMaxName),
+    grants: (from.grants ?? []).slice(0, limits.kMaxClaims).map((grant) => create(pb.GrantSchema, grant)),
   });

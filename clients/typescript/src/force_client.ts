@@ -232,7 +232,7 @@ export class ForceClient {
    * no session to ask in, or too many requests are open.
    */
   rearm(): boolean {
-    return this.#session?.request({ kind: "rearm" }) !== undefined;
+    return this.#session?.request({ kind: "rearm", device: 0 }) !== undefined;
   }
 
   /** Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing. */
@@ -287,7 +287,7 @@ export class ForceClient {
     this.#handshake = undefined;
     this.#welcome = welcome;
     this.#session = new Session({ connectionId, seal }, now);
-    if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz });
+    if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz, device: 0 });
     const { deadband, stateDeadband } = this.#config;
     this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
     this.#foretells = false;
@@ -401,6 +401,8 @@ export class ForceClient {
       sequence: ++this.#sequence,
       basedOnTick: hand.tick,
       force,
+      device: hand.device,
+      channel: 0,
       model: withModel ? { at: hand.position, stiffness } : undefined,
     });
     this.#answeredTick = hand.tick;

@@ -16,6 +16,13 @@ export const kMaxFrames = 64;
 export const kRequestWindow = 16;
 /** Bytes of UTF-8 in a name. */
 export const kMaxName = 64;
+/** Bytes of UTF-8 in the name of a device or a channel. */
+export const kMaxLabel = 24;
+export const kMaxDevices = 16;
+export const kMaxChannels = 8;
+export const kMaxClaims = 16;
+/** Axes of a device. */
+export const kMaxDof = 6;
 export const kMaxFeatures = 16;
 /** Bytes of UTF-8 in one feature. */
 export const kMaxFeature = 32;

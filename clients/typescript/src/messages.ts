@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
 // frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
-import { Code, Mode, Role } from "./gen/tendon_pb.js";
+import { ChannelRule, Code, Mode, Role } from "./gen/tendon_pb.js";
 import type { Nanoseconds } from "./time.js";
 
-export { Code, Mode, Role };
+export { ChannelRule, Code, Mode, Role };
 
 /** The version of the wire that this client speaks. */
 export const kProtocolVersion = 1;
 /** A feature: the client may send a local model with its forces, and the server follows the hand with it. */
 export const kFeatureLocalModel = "local-model";
+
+/** A feature: the client understands that a lease can be lost. */
+export const kFeatureChannels = "channels";
 
 /** Any object with x, y and z will do: the vector of your engine too. */
 export interface Vec3 {
@@ -44,6 +47,9 @@ export interface DeviceState {
   /** Time since that force arrived at the server. */
   readonly forceAgeNs: Nanoseconds;
   readonly mode: Mode;
+  readonly device: number;
+  /** Of the force that forceSequence, forceAgeNs and mode are about. */
+  readonly channel: number;
 }
 
 /** F(x) = force − stiffness · (x − at): what the force becomes when the hand moves on. */
@@ -55,7 +61,7 @@ export interface LocalModel {
 
 /** The force that the physics wants. */
 export interface ForceCommand {
-  /** 1, 2, 3 … per session. */
+  /** 1, 2, 3 … per session, device and channel. */
   readonly sequence: bigint;
   /** The state it was computed from. */
   readonly basedOnTick: bigint;
@@ -64,6 +70,8 @@ export interface ForceCommand {
   readonly model?: LocalModel | undefined;
   /** Counted from its arrival; 1 … 10 000 000. */
   readonly validForUs: number;
+  readonly device: number;
+  readonly channel: number;
 }
 
 /**
@@ -80,11 +88,47 @@ export interface StateDeadband {
   readonly maxSilenceUs: number;
 }
 
-/** Reliable, client → server: how many states per second it wants, clear a latched fault, or which states to leave out. */
+/**
+ * Reliable. Client → server: how many states of a device per second it wants; clear a latched fault; what is this device; my
+ * forces are to be this channel's, or no longer; which states to leave out. Server → client: they no longer are.
+ */
 export type Request =
-  | { readonly kind: "setStateRate"; readonly hz: number }
-  | { readonly kind: "rearm" }
+  | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
+  | { readonly kind: "rearm" | "describe"; readonly device: number }
+  | { readonly kind: "takeLease" | "giveLease"; readonly device: number; readonly channel: number }
+  | { readonly kind: "leaseLost"; readonly device: number; readonly channel: number; readonly to: string }
   | ({ readonly kind: "setStateDeadband" } & StateDeadband);
+
+export interface ChannelDescription {
+  readonly name: string;
+  readonly rule: ChannelRule;
+  /** A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves. */
+  readonly leaseMs: number;
+  /** Whose forces it takes; empty = nobody's. */
+  readonly holder: string;
+}
+
+/** What a device is and can do. 0 = not known, where a value cannot be 0. */
+export interface DeviceDescription {
+  readonly device: number;
+  /** As the server calls it, and what it is. */
+  readonly name: string;
+  readonly model: string;
+  /** Axes that are measured, and those with a motor. */
+  readonly positionDof: number;
+  readonly forceDof: number;
+  /** m, a box that the handle stays in. */
+  readonly workspace: { readonly min: Vec3; readonly max: Vec3 } | undefined;
+  /** N, the norm, and for ever. */
+  readonly maxForce: number;
+  readonly continuousForce: number;
+  /** N/m, what it can render stably. */
+  readonly maxStiffness: number;
+  /** m, one encoder count at the handle; 0 = exact. */
+  readonly positionResolution: number;
+  readonly loopHz: number;
+  readonly channels: readonly ChannelDescription[];
+}
 
 /** Two quantiles of a delay; below zero only where two clocks had to be compared. */
 export interface Delays {
@@ -128,6 +172,19 @@ export interface LinkReport {
   readonly words: string;
 }
 
+/** What a client wants: a device by name, and as a controller a channel by name; empty = number 0. */
+export interface Claim {
+  readonly device: string;
+  readonly channel: string;
+  readonly role: Role;
+}
+/** The numbers that stand for the names of a Claim. OBSERVER for a controller's: another one holds the lease. */
+export interface Grant {
+  readonly device: number;
+  readonly channel: number;
+  readonly role: Role;
+}
+
 /** The first words of a client. */
 export interface Hello {
   readonly versionMin: number;
@@ -135,6 +192,8 @@ export interface Hello {
   readonly role: Role;
   readonly name: string;
   readonly features: readonly string[];
+  /** None: device 0, its channel 0, and `role`, which is the highest of the claims'. */
+  readonly claims?: readonly Claim[] | undefined;
 }
 
 /** The server's yes. */
@@ -153,6 +212,8 @@ export interface Welcome {
   readonly timeoutMs: number;
   /** Name and version of the server. */
   readonly server: string;
+  /** One for each Claim, in their order. */
+  readonly grants?: readonly Grant[] | undefined;
 }
 
 /** The server's no, with the reason. */

@@ -100,8 +100,9 @@ export class Session {
   #lastHeard: Nanoseconds;
   readonly #seen = new ReplayWindow();
   #echo: Omit<Echo, "receivedMask"> | undefined;
-  #newestTick = -1n;
-  #newestSequence = -1n;
+  /** By device, and by device and channel. */
+  readonly #newestTick = new Map<number, bigint>();
+  readonly #newestSequence = new Map<string, bigint>();
   #newestReport = 0n;
   /** Newest packet of ours that the peer has told of. */
   #newestEchoed = -1n;
@@ -288,21 +289,23 @@ export class Session {
   #take(frame: Frame): void {
     switch (frame.kind) {
       case "state":
-        if (frame.value.tick > this.#newestTick) {
-          this.#newestTick = frame.value.tick;
+        if (frame.value.tick > (this.#newestTick.get(frame.value.device) ?? -1n)) {
+          this.#newestTick.set(frame.value.device, frame.value.tick);
           this.#stateArrived = frame.value;
         } else {
           ++this.stats.stale;
         }
         return;
-      case "force":
-        if (frame.value.sequence > this.#newestSequence) {
-          this.#newestSequence = frame.value.sequence;
+      case "force": {
+        const channel = `${frame.value.device}/${frame.value.channel}`;
+        if (frame.value.sequence > (this.#newestSequence.get(channel) ?? -1n)) {
+          this.#newestSequence.set(channel, frame.value.sequence);
           this.#forceArrived = frame.value;
         } else {
           ++this.stats.stale;
         }
         return;
+      }
       case "report":
         if (frame.value.number > this.#newestReport) {
           this.#newestReport = frame.value.number;

@@ -28,6 +28,7 @@ from tendon.messages import (
     ForceCommand,
     Frame,
     LinkReport,
+    Rearm,
     Refused,
     SetStateDeadband,
     SetStateRate,
@@ -85,7 +86,7 @@ def _frame(frame: Frame) -> list[object]:
             asked = frame.request
             words = ["control", frame.id, "deadband", _double(asked.share), _double(asked.floor)]
             return [*words, asked.max_silence_us * 1000]
-        return ["control", frame.id, "rearm"]
+        return ["control", frame.id, "rearm" if isinstance(frame.request, Rearm) else "other"]
     if isinstance(frame, ControlAck):
         return ["ack", frame.id, int(frame.code), _text(frame.detail)]
     if isinstance(frame, LinkReport):

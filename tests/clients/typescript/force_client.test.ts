@@ -77,8 +77,8 @@ for (const [suite, key] of kSuites) {
         world.server.forces.forEach(({ command }, i, all) =>
           assert.ok(i === 0 || command.sequence > all[i - 1]!.command.sequence, context));
         assert.ok(world.server.forces.length > 500, `${context}: ${world.server.forces.length} forces`);
-        const rearms = new Array(10).fill({ kind: "rearm" });
-        assert.deepEqual(world.server.requests, [{ kind: "setStateRate", hz: 1000 }, ...rearms], context);
+        const rearms = new Array(10).fill({ kind: "rearm", device: 0 });
+        assert.deepEqual(world.server.requests, [{ kind: "setStateRate", hz: 1000, device: 0 }, ...rearms], context);
         const link = world.client.stats().link!;
         assert.ok(link.lost > 0 && link.lostOutgoing > 0 && link.duplicated > 0 && link.reordered > 0, context);
         assert.equal(link.malformed + link.forged + link.invalid, 0, context);
@@ -361,7 +361,7 @@ describe("what need not be sent", () => {
     state: (tick) => ({
       tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) * 1e-4, y: 0, z: 0 }, velocity: { x: 0.1, y: 0, z: 0 },
       forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0, forceSequence: 0n,
-      forceAgeNs: 0n, mode: Mode.ACTIVE,
+      forceAgeNs: 0n, mode: Mode.ACTIVE, device: 0, channel: 0,
     }),
   });
 

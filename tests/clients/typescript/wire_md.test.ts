@@ -123,7 +123,7 @@ describe("WIRE.md", () => {
       value: {
         tick: 1000n, sampledNs: 1_000_000_000n, position: { x: 0.01, y: 0, z: -0.02 }, velocity: { x: 0.5, y: 0, z: 0 },
         forceApplied: { x: -2, y: 0, z: 0 }, energy: 0.25, permittedForce: 8, reasons: 3, forceSequence: 99n,
-        forceAgeNs: 1_500_000n, mode: Mode.ACTIVE,
+        forceAgeNs: 1_500_000n, mode: Mode.ACTIVE, device: 0, channel: 0,
       },
     }]);
     assert.deepEqual(reasonNames(3), ["energy", "max force"]);
@@ -157,6 +157,7 @@ describe("WIRE.md", () => {
       value: {
         sequence: 100n, basedOnTick: 1000n, force: { x: -2, y: 0, z: 0 },
         model: { at: { x: 0.01, y: 0, z: 0 }, stiffness: [2000, 0, 0] }, validForUs: 20_000,
+        device: 0, channel: 0,
       },
     }]);
   });
