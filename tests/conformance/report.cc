@@ -21,7 +21,7 @@ constexpr std::string_view kSuite1 = "Cipher suite 1";
 constexpr std::string_view kOpening = "Opening";
 constexpr std::string_view kStates = "States";
 constexpr std::string_view kSent = "What is sent when";
-constexpr std::string_view kNewest = "State and force: newest wins";
+constexpr std::string_view kNewest = "State, force and report: newest wins";
 constexpr std::string_view kRequests = "Requests: exactly once, in order, answered";
 constexpr std::string_view kDropped = "Dropped and counted";
 
@@ -79,7 +79,7 @@ constexpr std::array kChecks = {
           "counted."},
     // Data.
     Check{"first-data", kBoth, kSession, kOpening,
-          "Each end sends a first Data datagram at once: both then have a round trip."},
+          "of which the client sends one at once; the server answers it at once: both then have a round trip."},
     Check{"data-header", kBoth, kWire, kHeader, "Type 3 has the version that the Answer names."},
     Check{"data-size", kBoth, kWire, "Ground rules", "One UDP datagram is one unit; none is longer than 1200 bytes."},
     Check{"data-opens", kBoth, kWire, kSuite1, "Nonce: 4 zeros ‖ packet number as 8 bytes LE"},
@@ -108,7 +108,7 @@ constexpr std::array kChecks = {
     Check{"out-of-bounds", kBoth, kWire, "Ground rules",
           "A value out of bounds drops the frame it is in, and is counted."},
     Check{"newest-wins", kBoth, kSession, kNewest,
-          "it counts only with a higher tick or sequence than any of these before (else stale)"},
+          "it counts only with a higher tick, sequence or number than any of these before (else stale)"},
     Check{"golden-frame", kBoth, kWire, "Golden datagrams", "Bytes in hex, then what they say."},
     Check{"rekey-followed", kBoth, kWire, kSuite1, "the next one (it then moves on, once such a datagram has opened)"},
     Check{"old-key-overlap", kBoth, kWire, kSuite1, "for 2 s after moving on the one before"},

@@ -268,7 +268,7 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
       .random = random,
       .answer = answered.datagram,
       .session = ToySession(head->suite, id, answered.server_to_client, answered.client_to_server, fault_, now),
-      .open = plain,
+      .open = false,
       .waiting = {},
       .answered = {}};
   members_.push_back(std::move(member));

@@ -247,7 +247,7 @@ TEST_F(Handshake, TheDoorIsSilentForAnythingThatIsNoHello) {
   longer.push_back(std::byte{0});
   silent(longer, "one byte too long");
   for (const auto& other : examples::datagrams()) {
-    if (other.name != "hello") silent(other.bytes, other.name);
+    if (other.name.rfind("hello", 0) != 0) silent(other.bytes, other.name);
   }
 }
 

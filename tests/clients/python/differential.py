@@ -193,7 +193,7 @@ class Dice(random.Random):
             return self.choice(_TEXTS)
         if kind == field.TYPE_ENUM:  # type: ignore[attr-defined]
             return self.choice([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, -1, 1000])
-        if kind == field.TYPE_SFIXED64:  # type: ignore[attr-defined]
+        if kind in (field.TYPE_SFIXED64, field.TYPE_SINT64):  # type: ignore[attr-defined]
             edges = [0, 1, -1, 1 << 60, -(1 << 60), (1 << 60) + 1, -(1 << 60) - 1, (1 << 63) - 1, -(1 << 63)]
             return self.choice([*edges, *[self.randrange(10**12)] * 60])
         return self.whole(32 if kind in (field.TYPE_UINT32, field.TYPE_FIXED32) else 64)  # type: ignore[attr-defined]
