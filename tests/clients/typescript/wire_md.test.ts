@@ -163,7 +163,7 @@ describe("WIRE.md", () => {
   });
 
   it("control, its answer and bye say what the page says", () => {
-    const request = { kind: "setStateRate", hz: 500 };
+    const request = { kind: "setStateRate", hz: 500, device: 0 };
     assert.deepEqual(contentOf("control").frames, [{ kind: "control", value: { id: 7, request } }]);
     const acknowledged = { id: 7, code: Code.OK, detail: "500 Hz" };
     assert.deepEqual(contentOf("control-ack").frames, [{ kind: "controlAck", value: acknowledged }]);
