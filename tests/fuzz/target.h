@@ -5,7 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <ios>
 #include <span>
+#include <streambuf>
+#include <string_view>
 
 // What the fuzz targets have in common. A property that fails ends the process: that is how libFuzzer is told.
 
@@ -14,6 +17,32 @@ namespace tendon::fuzz {
 inline void require(bool property) {
   if (!property) std::abort();
 }
+
+inline std::string_view text(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// The input as a file that can be read and sought in, without a copy of it.
+class InputBuffer : public std::streambuf {
+ public:
+  explicit InputBuffer(std::span<const std::byte> bytes) {
+    char* const begin = const_cast<char*>(text(bytes).data());  // NOLINT: streambuf asks for it, and never writes
+    setg(begin, begin, begin + bytes.size());
+  }
+
+ protected:
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
+    const off_type end = egptr() - eback();
+    const off_type base = from == std::ios_base::beg ? 0 : from == std::ios_base::end ? end : gptr() - eback();
+    const off_type to = base + offset;
+    if (to < 0 || to > end) return pos_type(off_type{-1});
+    setg(eback(), eback() + to, egptr());
+    return pos_type(to);
+  }
+  pos_type seekpos(pos_type to, std::ios_base::openmode which) override {
+    return seekoff(off_type(to), std::ios_base::beg, which);
+  }
+};
 
 /// The input as a sequence of small decisions and of pieces; when it is used up, zeros and empty pieces.
 class Input {

@@ -127,6 +127,7 @@ class Reader {
     if (from_.bad()) fail("cannot be read");
     if (from_.eof()) fail("the last line is not complete; remove it to use the trace without it");
     if (line_.size() > kMaxTraceLine) fail("the line is longer than " + std::to_string(kMaxTraceLine) + " bytes");
+    if (line_.find('\r') != std::string::npos) fail("there is a carriage return, expected lines that end with \\n");
     return true;
   }
 

@@ -165,6 +165,11 @@ TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
   EXPECT_EQ(refusal("# tendon-trace 1\n# seed\n"), "run.csv:2: # seed has no value");
   EXPECT_EQ(refusal("# tendon-trace 1\n# benign up -1\n"),
             "run.csv:2: benign up is \"-1\", expected a delay of 0 ns or more");
+  // Nothing could write such a text again.
+  EXPECT_EQ(refusal("# tendon-trace 1\n# down a\rb\n"),
+            "run.csv:2: there is a carriage return, expected lines that end with \\n");
+  EXPECT_EQ(refusal(with_lines("# note a\rb\n")),
+            "run.csv:4: there is a carriage return, expected lines that end with \\n");
   EXPECT_EQ(refusal("# tendon-trace 1\n# tables 12 34\n"),
             "run.csv:2: tables is \"12\", expected 16 hexadecimal digits");
   EXPECT_EQ(refusal("# tendon-trace 1\nup,0,0\n").substr(0, 36), "run.csv:2: expected the column names");

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string_view>
+
+#include "server/scene.h"
+#include "tests/fuzz/target.h"
+
+// A scene file: refused by a SceneError, or a scene that the device and the haptic loop take without a complaint.
+
+using namespace tendon;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text = fuzz::text(std::as_bytes(std::span(data, size)));
+  if (text.find('/') != std::string_view::npos) return -1;  // a recorded motion may be any file of this machine
+  try {
+    const Scene scene = parse_scene(text, "scene", "/nowhere");
+    static Mailboxes mail({.steps = 2, .flight = 2, .datagrams = 2});
+    SimulatedDevice device(scene.device);
+    const HapticLoop loop(scene.loop, device, mail);
+    fuzz::require(loop.stats().steps == 0 && scene.text == text);
+  } catch (const SceneError& refused) {
+    fuzz::require(std::string_view(refused.what()).starts_with("scene:"));
+  }
+  return 0;
+}
