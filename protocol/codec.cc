@@ -359,7 +359,7 @@ bool read(const pb::DeviceDescription& from, DeviceDescription& to) {
   const auto read_dof = [](std::uint32_t dof, std::uint32_t& known) { return (known = dof) >= 1 && dof <= 6; };
   if (from.has_workspace_min_m() != from.has_workspace_max_m()) return false;
   if (from.has_workspace_min_m()) {
-    auto& box = to.workspace.emplace();
+    DeviceDescription::Box& box = to.workspace.emplace(DeviceDescription::Box{});
     if (!read(from.workspace_min_m(), box.min) || !read(from.workspace_max_m(), box.max)) return false;
     if ((box.min.array() > box.max.array()).any()) return false;
   }
