@@ -10,6 +10,7 @@
 
 // A fuzz target over the files of a folder, without libFuzzer: any compiler and any sanitizer can do it.
 
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 int main(int argc, char** argv) {
