@@ -23,10 +23,9 @@ const Control* OutgoingRequests::next_due(LocalTime now) const noexcept {
 
 void OutgoingRequests::sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept {
   Slot& sent = slot(id);
-  const Duration longest = std::max(timeout, kMaxWait);
   Duration wait = timeout;
-  for (int i = 0; i < sent.times_sent && wait < longest; ++i) wait *= 2;
-  sent.due = now + std::min(wait, longest);
+  for (int i = 0; i < sent.times_sent && wait < kMaxWait; ++i) wait *= 2;
+  sent.due = now + std::min(wait, kMaxWait);
   ++sent.times_sent;
 }
 

@@ -22,7 +22,9 @@ namespace tendon {
 /// The asking end.
 class OutgoingRequests {
  public:
-  /// Waits double with every repetition up to this: twice within a 2 s timeout. A longer round trip wins.
+  /// Waits double with every repetition up to this: twice within a 2 s timeout. Also where the round trip is longer:
+  /// what has been slow for a while and lost a copy must not then wait for all that time; a copy a second costs
+  /// nothing.
   static constexpr Duration kMaxWait = std::chrono::seconds(1);
 
   /// Queues a request and returns its id; empty when kRequestWindow are open.
@@ -30,7 +32,7 @@ class OutgoingRequests {
 
   /// The first request to be sent (again) now; null when none is.
   const Control* next_due(LocalTime now) const noexcept;
-  /// It has been sent; it is due again after `timeout`, doubled for every time before.
+  /// It has been sent; it is due again after `timeout`, doubled for every time before, at most kMaxWait.
   void sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept;
   /// When the next one is due: LocalTime::min() = it was never sent, LocalTime::max() = none.
   LocalTime next_due_time() const noexcept;

@@ -144,7 +144,7 @@ constexpr std::array kChecks = {
           "The requester numbers its requests 1, 2, 3 …, has at most 16 open"},
     Check{"request-repeated", kClient, kSession, kRequests, "repeats each until its answer has come"},
     Check{"request-resend-rate", kClient, kSession, kSent,
-          "max(20 ms, SRTT + 4 RTTVAR), doubled with every repetition up to 1 s"},
+          "max(20 ms, SRTT + 4 RTTVAR), doubled with every repetition, at most 1 s in all"},
     Check{"request-stops", kClient, kSession, kRequests, "The answer is the acknowledgement."},
     // The end.
     Check{"bye-silence", kBoth, kSession, kStates, "nothing is sent, believed or counted any more"},

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .limits import REQUEST_WINDOW
 from .messages import NEVER, Code, Control, ControlAck, Instant, Request
 
-_MAX_WAIT = 1_000_000_000  # ns; waits double up to this. A longer round trip wins.
+_MAX_WAIT = 1_000_000_000  # ns; waits double up to this, also where the round trip is longer
 
 
 @dataclass(slots=True)
@@ -47,7 +47,7 @@ class OutgoingRequests:
     def sent(self, number: int, now: int, timeout: int) -> None:
         """It is due again after `timeout`, doubled for every time it was sent before."""
         asked = self._open[number]
-        asked.due = now + min(timeout << min(asked.times_sent, 32), max(timeout, _MAX_WAIT))
+        asked.due = now + min(timeout << min(asked.times_sent, 32), _MAX_WAIT)
         asked.times_sent += 1
 
     def next_due(self) -> Instant:

@@ -5,7 +5,7 @@
 import type { Control, ControlAck } from "./codec.js";
 import { kRequestWindow } from "./limits.js";
 import { Code, type Request } from "./messages.js";
-import { earliest, kNever, kSecond, latest, type Nanoseconds } from "./time.js";
+import { earliest, kNever, kSecond, type Nanoseconds } from "./time.js";
 
 const kMaxId = 0xffffffff;
 
@@ -38,12 +38,11 @@ export class OutgoingRequests {
     return this.#asked.find(({ due, answer }) => !answer && (due === undefined || due <= now))?.control;
   }
 
-  /** It has been sent; it is due again after `timeout`, doubled for every time before. */
+  /** It has been sent; it is due again after `timeout`, doubled for every time before, at most `kMaxWait`. */
   sent(id: number, now: Nanoseconds, timeout: Nanoseconds): void {
     const asked = this.#find(id);
     if (!asked) return;
-    const longest = latest(timeout, OutgoingRequests.kMaxWait);
-    asked.due = now + earliest(timeout << BigInt(Math.min(asked.timesSent, 30)), longest);
+    asked.due = now + earliest(timeout << BigInt(Math.min(asked.timesSent, 30)), OutgoingRequests.kMaxWait);
     ++asked.timesSent;
   }
 
