@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/lab/cost.h"
 
-#include <linux/perf_event.h>
-#include <sys/ioctl.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -21,6 +16,7 @@
 #include "tests/lab/experiment.h"
 #include "tests/lab/gnuplot.h"
 #include "tests/lab/json.h"
+#include "tests/lab/meter.h"
 #include "tests/lab/panels.h"
 #include "tests/lab/paper.h"
 
@@ -39,34 +35,6 @@ void keep(const T& value) {
   asm volatile("" : : "g"(&value) : "memory");
 }
 
-/// Instructions of this thread in user space; absent when the kernel does not allow it.
-class InstructionCounter {
- public:
-  InstructionCounter() {
-    perf_event_attr attributes{};
-    attributes.type = PERF_TYPE_HARDWARE;
-    attributes.size = sizeof(attributes);
-    attributes.config = PERF_COUNT_HW_INSTRUCTIONS;
-    attributes.exclude_kernel = 1;
-    attributes.exclude_hv = 1;
-    file_ = static_cast<int>(::syscall(SYS_perf_event_open, &attributes, 0, -1, -1, 0));
-  }
-  ~InstructionCounter() {
-    if (file_ >= 0) ::close(file_);
-  }
-  InstructionCounter(const InstructionCounter&) = delete;
-  InstructionCounter& operator=(const InstructionCounter&) = delete;
-
-  std::optional<std::uint64_t> count() const {
-    std::uint64_t value = 0;
-    if (file_ < 0 || ::read(file_, &value, sizeof(value)) != sizeof(value)) return std::nullopt;
-    return value;
-  }
-
- private:
-  int file_ = -1;
-};
-
 struct Line {
   std::string kind;  ///< floor, law, part, estimator, least squares
   std::string name;
@@ -75,30 +43,30 @@ struct Line {
   std::optional<double> force_error{};  ///< N, rms, with it
 };
 
-class Meter {
+/// Batches of a step.
+class Bench {
  public:
-  explicit Meter(int batches) : batches_(batches) {}
+  explicit Bench(int batches) : batches_(batches) {}
 
   template <class Step>
   Line measure(std::string kind, std::string name, Step step) const {
-    using Clock = std::chrono::steady_clock;
     std::vector<double> times;
     std::vector<double> instructions;
     for (int b = 0; b < batches_ + 1; ++b) {
-      const auto counted = counter_.count();
-      const auto start = Clock::now();
+      const Meter::Reading before = meter_.read();
       for (std::size_t i = 0; i < kBatch; ++i) step(i);
-      const std::chrono::duration<double, std::nano> took = Clock::now() - start;
-      const auto then = counter_.count();
+      const Meter::Reading took = meter_.read() - before;
       if (b == 0) continue;  // caches are cold
-      times.push_back(took.count() / static_cast<double>(kBatch));
-      if (counted && then) instructions.push_back(static_cast<double>(*then - *counted) / static_cast<double>(kBatch));
+      times.push_back(1e9 * took.wall / static_cast<double>(kBatch));
+      if (took.instructions) {
+        instructions.push_back(static_cast<double>(*took.instructions) / static_cast<double>(kBatch));
+      }
     }
     Line line{.kind = std::move(kind), .name = std::move(name), .nanoseconds = median(times)};
     if (!instructions.empty()) line.instructions = median(instructions);
     return line;
   }
-  bool counts() const { return counter_.count().has_value(); }
+  bool counts() const { return meter_.read().instructions.has_value(); }
 
  private:
   static double median(std::vector<double> values) {
@@ -106,7 +74,7 @@ class Meter {
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
   }
-  InstructionCounter counter_;
+  Meter meter_;
   int batches_;
 };
 
@@ -131,13 +99,13 @@ Experiment pressing(const LimiterConfig& config, double stiffness = kStiffness) 
 
 double force_error(const Experiment& set) { return outcome(run(set), set.period).force_error; }
 
-Line law_line(const Meter& meter, const std::string& kind, const std::string& name, const LimiterConfig& config) {
+Line law_line(const Bench& bench, const std::string& kind, const std::string& name, const LimiterConfig& config) {
   std::array<Vec3, kBatch> places;
   const PrescribedMotion motion = paper_motion(kFriction, kPaperEncoder);
   for (std::size_t i = 0; i < kBatch; ++i) places[i] = motion.position(static_cast<double>(i) * 4e-3);
   Limiter law(config);
   Vec3 applied = Vec3::Zero();
-  Line line = meter.measure(kind, name, [&](std::size_t i) {
+  Line line = bench.measure(kind, name, [&](std::size_t i) {
     const Vec3 dx = (places[i] - places[i == 0 ? kBatch - 1 : i - 1]) / 4;
     law.observe({.applied = applied, .dx = dx, .held = std::chrono::milliseconds(1)});
     applied = law.limit({.force = -kStiffness * places[i], .stiffness = kStiffness * Mat3::Identity()}).force;
@@ -155,14 +123,14 @@ double estimated(const std::optional<OutputEstimator::Config>& estimator) {
   return force_error(set);
 }
 
-Line estimator_line(const Meter& meter, const std::string& name, OutputEstimator::Model model) {
+Line estimator_line(const Bench& bench, const std::string& name, OutputEstimator::Model model) {
   OutputEstimator::Config config;
   config.model = model;
   config.resolution = kPaperEncoder;
   OutputEstimator estimator(config);
   const PrescribedMotion motion = paper_motion(kFriction, 0);
   std::int64_t step = 0;
-  Line line = meter.measure("estimator", name, [&](std::size_t) {
+  Line line = bench.measure("estimator", name, [&](std::size_t) {
     const LocalTime at{std::chrono::milliseconds(step)};
     const Motion hand{.at = at, .position = motion.position(static_cast<double>(step) * 1e-3)};
     estimator.observe(hand);
@@ -175,10 +143,10 @@ Line estimator_line(const Meter& meter, const std::string& name, OutputEstimator
 }
 
 template <class Fit, int M, class Scalar>
-Line fit_line(const Meter& meter, const std::string& name) {
+Line fit_line(const Bench& bench, const std::string& name) {
   Fit fit;
   std::size_t n = 0;
-  return meter.measure("least squares", name, [&](std::size_t) {
+  return bench.measure("least squares", name, [&](std::size_t) {
     Eigen::Matrix<Scalar, M, 1> regressor;
     for (int i = 0; i < M; ++i)
       regressor[i] = static_cast<Scalar>(((n * 7 + static_cast<std::size_t>(i) * 13) % 101)) / 101;
@@ -189,24 +157,24 @@ Line fit_line(const Meter& meter, const std::string& name) {
 }
 
 template <int M>
-void fit_lines(const Meter& meter, std::vector<Line>& lines) {
+void fit_lines(const Bench& bench, std::vector<Line>& lines) {
   const std::string order = ", order " + std::to_string(M) + ", ";
-  lines.push_back(fit_line<UdLeastSquares<M, double>, M, double>(meter, "UD" + order + "float64"));
-  lines.push_back(fit_line<UdLeastSquares<M, float>, M, float>(meter, "UD" + order + "float32"));
-  lines.push_back(fit_line<QrLeastSquares<M, double>, M, double>(meter, "QR" + order + "float64"));
-  lines.push_back(fit_line<QrLeastSquares<M, float>, M, float>(meter, "QR" + order + "float32"));
+  lines.push_back(fit_line<UdLeastSquares<M, double>, M, double>(bench, "UD" + order + "float64"));
+  lines.push_back(fit_line<UdLeastSquares<M, float>, M, float>(bench, "UD" + order + "float32"));
+  lines.push_back(fit_line<QrLeastSquares<M, double>, M, double>(bench, "QR" + order + "float64"));
+  lines.push_back(fit_line<QrLeastSquares<M, float>, M, float>(bench, "QR" + order + "float32"));
 }
 
-std::vector<Line> measure(const Meter& meter) {
+std::vector<Line> measure(const Bench& bench) {
   std::vector<Line> lines;
-  lines.push_back(meter.measure("floor", "nothing", [](std::size_t i) { keep(i); }));
+  lines.push_back(bench.measure("floor", "nothing", [](std::size_t i) { keep(i); }));
   for (const LawInfo& law : laws()) {
-    lines.push_back(law_line(meter, "law", std::string(law.name), limiter(law.law)));
+    lines.push_back(law_line(bench, "law", std::string(law.name), limiter(law.law)));
   }
   const auto part = [&](const char* name, const auto& add) {
     LimiterConfig config = limiter(Law::kAolPlus);
     add(config.parts);
-    lines.push_back(law_line(meter, "part", name, config));
+    lines.push_back(law_line(bench, "part", name, config));
   };
   using Parts = AolPlus<1, 3>::Parts;
   part("energy_cap", [](Parts& p) { p.energy_cap.emplace(); });
@@ -221,24 +189,24 @@ std::vector<Line> measure(const Meter& meter) {
   lines.back().kind = "estimator";
   lines.back().name = "none: the force is held";
   lines.back().force_error = estimated({});
-  lines.push_back(estimator_line(meter, "polynomial", OutputEstimator::Model::kPolynomial));
-  lines.push_back(estimator_line(meter, "spring and bias", OutputEstimator::Model::kSpringAndBias));
-  lines.push_back(estimator_line(meter, "output error", OutputEstimator::Model::kOutputError));
-  fit_lines<1>(meter, lines);
-  fit_lines<2>(meter, lines);
-  fit_lines<3>(meter, lines);
-  fit_lines<4>(meter, lines);
+  lines.push_back(estimator_line(bench, "polynomial", OutputEstimator::Model::kPolynomial));
+  lines.push_back(estimator_line(bench, "spring and bias", OutputEstimator::Model::kSpringAndBias));
+  lines.push_back(estimator_line(bench, "output error", OutputEstimator::Model::kOutputError));
+  fit_lines<1>(bench, lines);
+  fit_lines<2>(bench, lines);
+  fit_lines<3>(bench, lines);
+  fit_lines<4>(bench, lines);
   return lines;
 }
 
 }  // namespace
 
 void cost(const CostOptions& options, std::ostream& out) {
-  const Meter meter(options.batches);
-  const std::vector<Line> lines = measure(meter);
+  const Bench bench(options.batches);
+  const std::vector<Line> lines = measure(bench);
   if (!options.json) {
     out << "One step of each, median of " << options.batches << " batches of " << kBatch << "; commit " << kCommit
-        << (meter.counts() ? "" : "\nInstructions: this kernel does not let us count them.") << "\n\n"
+        << (bench.counts() ? "" : "\nInstructions: this kernel does not let us count them.") << "\n\n"
         << "                                             ns  instructions  force error N\n";
   }
   for (const Line& line : lines) {

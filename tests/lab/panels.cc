@@ -24,6 +24,10 @@ const char* words(Curve::Style style) {
       return "using 1:2 with points pt 7 ps 0.7 lc rgb ";
     case Curve::Style::kDashed:
       return "using 1:2 with lines lw 2 dt 2 lc rgb ";
+    case Curve::Style::kBold:
+      return "using 1:2 with lines lw 5 lc rgb ";
+    case Curve::Style::kBelow:
+      return "using 1:2 with filledcurves x1 fs solid 1 noborder lc rgb ";
     case Curve::Style::kLine:
       break;
   }

@@ -16,6 +16,8 @@ struct Curve {
     kDashed,
     kArea,  ///< between −y and y
     kPoints,
+    kBold,   ///< a line that matters more than the others
+    kBelow,  ///< between the x axis and y
   };
   std::string name;
   const char* colour;  ///< one of gnuplot.h

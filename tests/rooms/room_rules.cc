@@ -100,7 +100,7 @@ const Names kClockReaders = {"server/clock.h",
                              "tests/e2e/",
                              "tests/realtime/",
                              "tests/core/time_test.cc",
-                             "tests/lab/cost.cc",
+                             "tests/lab/meter.cc",
                              "tests/injector/real_time.cc",
                              "tests/conformance/udp_wire.cc",
                              "*_main.cc"};

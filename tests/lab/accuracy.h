@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "clients/softbody/body.h"
+#include "tests/lab/meter.h"
+#include "tests/lab/pressed_block.h"
+
+namespace tendon::lab {
+
+/// A model on a mesh: `n` cells along x, and as many to a length along y and z.
+struct Candidate {
+  softbody::ModelKind model;
+  softbody::Element element;
+  int n;
+
+  std::string name() const;  ///< "linear-hex8-sri"
+};
+
+/// How a model answers one load. Shares, of the true stiffness: total = model + discretisation + solver. The parts are
+/// NaN where a model has no endlessly fine mesh, or none that stands the load.
+struct Accuracy {
+  double k = 0;               ///< N/m, force over depth
+  double total = 0;           ///< k/truth − 1
+  double model = 0;           ///< of its law, on an endlessly fine mesh
+  double discretisation = 0;  ///< of its law on its mesh, solved exactly
+  double solver = 0;          ///< what it answers, less that
+  double tangent = 0;         ///< error of the tangent stiffness
+
+  /// |model| + |discretisation| + |solver|: what is left when errors do not happen to cancel each other on this mesh.
+  double without_luck() const noexcept { return std::abs(model) + std::abs(discretisation) + std::abs(solver); }
+};
+
+/// A candidate, measured.
+struct AccuracyPoint {
+  Candidate candidate;
+  softbody::Body::Size size{};
+  std::array<Accuracy, 2> at_load{};  ///< PressedBlock::loads
+  double lateral = 0;                 ///< largest error across of a press straight down, over the largest true force
+  double force_error = 0;             ///< N, rms along the script
+  double force_most = 0;              ///< N, largest
+  double force_relative = 0;          ///< rms, over that of the true force
+  double setup_s = 0;                 ///< of processor time, as are the next two
+  double update_ms_p50 = 0;
+  double update_ms_p99 = 0;
+  std::optional<double> instructions{};  ///< of an update, median; empty when the kernel does not count them
+};
+
+/// Measures one. Throws what the model throws when there is none of that kind on that mesh.
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter);
+
+/// The points that no other is both quicker and closer than, by time; closer without luck, so that whose parts are not
+/// known is not among them.
+std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load);
+
+struct AccuracyOptions {
+  PressedBlock block;
+  std::vector<softbody::ModelKind> models;  ///< none: all
+  std::vector<softbody::Element> elements;  ///< none: all
+  std::vector<int> resolutions{4, 6, 8, 12, 16};
+  Truth::Config truth;
+  double slowest_ms = 200;                     ///< a refinement ladder ends where an update would take longer …
+  double longest_setup_s = 30;                 ///< … or the set-up
+  std::optional<std::filesystem::path> out{};  ///< folder for accuracy.csv and the figures
+  bool json = false;
+  bool progress = false;  ///< on standard error
+};
+
+/// `tendon-lab accuracy`: what accuracy costs in time, model by model and mesh by mesh.
+void accuracy(const AccuracyOptions& options, std::ostream& out);
+
+/// One line of JSON; `commit` is that of the build.
+std::string to_json(const AccuracyPoint& point, Truth& truth);
+
+}  // namespace tendon::lab
