@@ -8,23 +8,87 @@
 #include <string>
 #include <utility>
 
+#include "clients/softbody/explicit.h"
+#include "clients/softbody/friction.h"
 #include "clients/softbody/gmsh.h"
 #include "clients/softbody/linear.h"
+#include "clients/softbody/mass_spring.h"
+#include "clients/softbody/modal.h"
+#include "clients/softbody/projective.h"
+#include "clients/softbody/xpbd.h"
 
 namespace tendon::softbody {
 namespace {
 
+using enum EffectKind;
+
+constexpr std::array kEffects{
+    EffectInfo{kContact, "contact", "the tool can touch the body"},
+    EffectInfo{kGeometricNonlinearity, "geometric-nonlinearity", "large rotations"},
+    EffectInfo{kMaterialNonlinearity, "material-nonlinearity", "large strains"},
+    EffectInfo{kGravity, "gravity", "the body sags under its weight"},
+    EffectInfo{kInertia, "inertia", "it swings: every answer is a step of time"},
+    EffectInfo{kDamping, "damping", "a bath slows every particle"},
+    EffectInfo{kViscosity, "viscosity", "the material resists being deformed quickly"},
+    EffectInfo{kFriction, "friction", "the tool drags on the surface"},
+};
+
+constexpr EffectSet kSmall{kContact};
+constexpr EffectSet kLargeRotations{kContact, kGeometricNonlinearity};
+constexpr EffectSet kLargeStrains{kContact, kGeometricNonlinearity, kMaterialNonlinearity};
+constexpr EffectSet kAll{kGravity, kInertia, kDamping, kViscosity, kFriction};
+constexpr EffectSet kAllButViscosity{kGravity, kInertia, kDamping, kFriction};
+constexpr EffectSet kOfSteps{kGravity, kDamping, kFriction};
+
 constexpr std::array kModels{
-    ModelInfo{ModelKind::kLinear, Law::kLinear, "linear", "small strains; one solution with a kept factor", false,
+    ModelInfo{ModelKind::kLinear, Law::kLinear, "linear", "small strains; one solution with a kept factor", kSmall,
+              kAll, false},
+    ModelInfo{ModelKind::kCondensed,
+              Law::kLinear,
+              "condensed",
+              "the same answers from a table of the surface: the fastest",
+              kSmall,
+              {kFriction},
               false},
-    ModelInfo{ModelKind::kCondensed, Law::kLinear, "condensed",
-              "the same answers from a table of the surface: the fastest", false, false},
     ModelInfo{ModelKind::kCorotational, Law::kCorotational, "corotational",
-              "large rotations, small strains; Newton at every answer", true, false},
+              "large rotations, small strains; Newton at every answer", kLargeRotations, kAll, false},
     ModelInfo{ModelKind::kStVenantKirchhoff, Law::kStVenantKirchhoff, "stvk",
-              "large rotations; for comparison only: it collapses under a hard press", true, false},
+              "large rotations; for comparison only: it collapses under a hard press", kLargeRotations, kAll, false},
     ModelInfo{ModelKind::kNeoHookean, Law::kNeoHookean, "neo-hookean",
-              "large rotations and strains; recovers from being turned inside out", true, true},
+              "large rotations and strains; recovers from being turned inside out", kLargeStrains, kAll, false},
+    ModelInfo{ModelKind::kMassSpring, Law::kLinear, "mass-spring",
+              "for comparison: springs along the edges, which know no Poisson ratio", kLargeRotations, kAll, true},
+    ModelInfo{ModelKind::kTensorMass,
+              Law::kLinear,
+              "tensor-mass",
+              "for comparison: small strains in explicit steps",
+              {kContact, kInertia},
+              kOfSteps,
+              false},
+    ModelInfo{ModelKind::kTled,
+              Law::kStVenantKirchhoff,
+              "tled",
+              "for comparison: stvk in explicit steps",
+              {kContact, kGeometricNonlinearity, kInertia},
+              kOfSteps,
+              false},
+    ModelInfo{ModelKind::kXpbd,
+              Law::kNeoHookean,
+              "xpbd",
+              "for comparison: as stiff as its step and its iterations make it",
+              {kContact, kGeometricNonlinearity, kMaterialNonlinearity, kInertia},
+              kOfSteps,
+              true},
+    ModelInfo{ModelKind::kProjective, Law::kCorotational, "projective",
+              "for comparison: elements as rigid as possible, a few rounds for each answer", kLargeRotations,
+              kAllButViscosity, false},
+    ModelInfo{ModelKind::kModal,
+              Law::kLinear,
+              "modal",
+              "for comparison: a few swings of the body, too stiff where it is touched",
+              kSmall,
+              {kFriction},
+              false},
 };
 
 Mesh mesh_of(const BodyConfig& config) {
@@ -46,10 +110,23 @@ Solid solid_of(const BodyConfig& config) {
   return {std::move(mesh), config.element, config.material, info(config.model).law, std::move(fixed)};
 }
 
+ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& surface) {
+  ModalModel::Config modal{.swings = config.swings, .patches = {}};
+  const double reach = config.reach.value_or(config.patch_radius);
+  const int count = config.static_modes;
+  const auto along = [&](int i) { return count > 1 ? reach * (2.0 * i / (count - 1) - 1) : 0; };
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < count; ++j)
+      modal.patches.emplace_back(surface.across(config.middle) + Vec2(along(i), along(j)));
+  }
+  return modal;
+}
+
 std::unique_ptr<Model> model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+  const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
   switch (config.model) {
     case ModelKind::kLinear:
-      return std::make_unique<LinearModel>(solid, surface);
+      return std::make_unique<LinearModel>(solid, surface, config.effects);
     case ModelKind::kCondensed:
       return std::make_unique<CondensedModel>(
           solid, surface,
@@ -57,13 +134,46 @@ std::unique_ptr<Model> model_of(const BodyConfig& config, const Solid& solid, co
     case ModelKind::kCorotational:
     case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
+      return std::make_unique<QuasiStaticModel>(solid, surface, newton, config.effects);
+    case ModelKind::kMassSpring:
+      return std::make_unique<MassSpringModel>(solid, surface, newton, config.effects);
+    case ModelKind::kTensorMass:
+    case ModelKind::kTled:
+      return std::make_unique<ExplicitModel>(solid, surface, config.effects);
+    case ModelKind::kXpbd:
+      return std::make_unique<XpbdModel>(solid, surface, config.iterations, config.effects);
+    case ModelKind::kProjective:
+      return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, config.effects);
+    case ModelKind::kModal:
       break;
   }
-  return std::make_unique<QuasiStaticModel>(solid, surface,
-                                            QuasiStaticModel::Config{.max_iterations = config.max_iterations});
+  return std::make_unique<ModalModel>(solid, surface, modal_config(config, surface));
+}
+
+/// No effect may be in a config and be left out silently.
+const BodyConfig& checked(const BodyConfig& config) {
+  const ModelInfo& model = info(config.model);
+  const EffectSet simulated = effects_of(config);
+  for (const EffectInfo& effect : kEffects) {
+    if (simulated.has(effect.kind) && !model.always.has(effect.kind) && !model.may.has(effect.kind)) {
+      throw std::invalid_argument("the model \"" + std::string(model.name) + "\" does not simulate " +
+                                  std::string(effect.name));
+    }
+  }
+  if (model.tetrahedra && config.element != Element::kTet4) {
+    throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
+  }
+  return config;
+}
+
+std::optional<Friction> friction_of(const BodyConfig& config) {
+  if (!config.friction) return std::nullopt;
+  return Friction(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
 }  // namespace
+
+std::span<const EffectInfo> effects() noexcept { return kEffects; }
 
 std::span<const ModelInfo> models() noexcept { return kModels; }
 
@@ -74,12 +184,22 @@ std::optional<ModelKind> model_named(std::string_view name) noexcept {
   return found == kModels.end() ? std::nullopt : std::optional(found->kind);
 }
 
+EffectSet effects_of(const BodyConfig& config) {
+  EffectSet set = info(config.model).always;
+  if (config.effects.gravity) set.add(kGravity);
+  if (config.effects.inertia) set.add(kInertia);
+  if (config.effects.damping) set.add(kDamping);
+  if (config.effects.viscosity) set.add(kViscosity);
+  if (config.friction) set.add(kFriction);
+  return set;
+}
+
 struct Body::Parts {
   explicit Parts(const BodyConfig& config)
-      : solid(solid_of(config)),
+      : solid(solid_of(checked(config))),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
         model(model_of(config, solid, surface)),
-        contact(*model, surface, config.tool_radius, config.side) {
+        contact(*model, surface, config.tool_radius, config.side, friction_of(config)) {
     const auto found = surface.patch(surface.across(config.middle));
     if (!found) throw std::invalid_argument("the middle of the touched side is not on the body");
     patch = *found;
@@ -100,6 +220,12 @@ Body& Body::operator=(Body&&) noexcept = default;
 Feel Body::touch(const Vec3& tool) { return parts_->contact.at(tool); }
 
 Reaction Body::press(Given given, double value) { return parts_->model->press(parts_->patch, given, value); }
+
+Reaction Body::settle(Given given, double value) {
+  return softbody::settle(*parts_->model, parts_->patch, given, value);
+}
+
+double Body::step() const noexcept { return parts_->model->step(); }
 
 Vec3 Body::touch_point() const {
   Vec3 point = Vec3::Zero();

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <span>
@@ -11,20 +13,69 @@
 #include <variant>
 
 #include "clients/softbody/contact.h"
+#include "clients/softbody/effects.h"
+#include "clients/softbody/material.h"
 #include "clients/softbody/quasi_static.h"
 
 namespace tendon::softbody {
 
+/// What a scene can list under `effects`; what it does not list is not simulated.
+enum class EffectKind : std::uint8_t {
+  kContact,
+  kGeometricNonlinearity,
+  kMaterialNonlinearity,
+  kGravity,
+  kInertia,
+  kDamping,
+  kViscosity,
+  kFriction
+};
+struct EffectInfo {
+  EffectKind kind;
+  std::string_view name;
+  std::string_view what;  ///< one line
+};
+std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
+
+class EffectSet {
+ public:
+  constexpr EffectSet() = default;
+  constexpr EffectSet(std::initializer_list<EffectKind> kinds) {
+    for (const EffectKind kind : kinds) add(kind);
+  }
+  constexpr void add(EffectKind kind) { bits_ |= bit(kind); }
+  constexpr bool has(EffectKind kind) const { return (bits_ & bit(kind)) != 0; }
+
+ private:
+  static constexpr unsigned bit(EffectKind kind) { return 1U << static_cast<unsigned>(kind); }
+  unsigned bits_ = 0;
+};
+
 /// The models that a scene can choose, each a file of this folder.
-enum class ModelKind : std::uint8_t { kLinear, kCondensed, kCorotational, kStVenantKirchhoff, kNeoHookean };
+enum class ModelKind : std::uint8_t {
+  kLinear,
+  kCondensed,
+  kCorotational,
+  kStVenantKirchhoff,
+  kNeoHookean,
+  kMassSpring,
+  kTensorMass,
+  kTled,
+  kXpbd,
+  kProjective,
+  kModal
+};
 
 struct ModelInfo {
   ModelKind kind;
   Law law;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  bool large_rotations;   ///< simulates the effect "geometric-nonlinearity"
-  bool large_strains;     ///< simulates the effect "material-nonlinearity"
+  EffectSet always;       ///< simulates these, whatever is listed
+  EffectSet may;          ///< simulates these when they are listed
+  bool tetrahedra;        ///< wants a mesh of tet4
+
+  bool has_time() const noexcept { return always.has(EffectKind::kInertia); }  ///< also when nothing is listed
 };
 
 /// Every model, in the order in which tables list them.
@@ -53,16 +104,26 @@ struct BodyConfig {
   Element element = Element::kHex8Sri;
   Material material;
   ModelKind model = ModelKind::kCondensed;
-  int max_iterations = QuasiStaticModel::Config{}.max_iterations;
-  double clamped_below = 0;  ///< m; nodes up to so far above the lowest one are held. The lowest ones always are
+  int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< of those that end when they are done
+  int iterations = 10;                                             ///< of those that always do so many
+  int swings = 30;                                                 ///< kModal
+  int static_modes = 0;   ///< kModal: so many patches along each axis of a square of 2 `reach`; 1: the middle's alone
+  EffectsConfig effects;  ///< what acts on all of the body
+  std::optional<double> friction;  ///< coefficient
+  double clamped_below = 0;        ///< m; nodes up to so far above the lowest one are held. The lowest ones always are
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
-  std::optional<double> reach;        ///< m, how far from `middle` it can be touched (kCondensed); empty: anywhere
-  Vec3 middle = Vec3::Zero();         ///< m; its place across `towards_tool` counts
-  double tool_radius = 0;             ///< m; 0: a point
+  /// m, how far from `middle` it can be touched (kCondensed, kModal); empty: anywhere, and no further than a patch for
+  /// static modes.
+  std::optional<double> reach;
+  Vec3 middle = Vec3::Zero();  ///< m; its place across `towards_tool` counts
+  double tool_radius = 0;      ///< m; 0: a point
   PatchContact::Side side = PatchContact::Side::kUnilateral;
 };
+
+/// The effects that `config` simulates, those of its model included.
+EffectSet effects_of(const BodyConfig& config);
 
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
@@ -73,10 +134,15 @@ class Body {
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
+  /// What a tool there feels. A body with time goes on by one step.
   Feel touch(const Vec3& tool);
 
-  /// The model under a patch around the middle: stiffness and force of scripted presses.
+  /// The model under a patch around the middle: stiffness and force of scripted presses. A body with time goes on by
+  /// one step; `settle` waits until it is at rest, and a model that is never done until it is done.
   Reaction press(Given given, double value);
+  Reaction settle(Given given, double value);
+
+  double step() const noexcept;  ///< s, that an answer lasts; 0: at rest at every instant
 
   /// The point of the surface at rest above `middle`, and the way to the tool there; body frame.
   Vec3 touch_point() const;
@@ -87,7 +153,7 @@ class Body {
     std::size_t elements;
     std::size_t free;       ///< displacements to be found
     std::size_t touchable;  ///< nodes
-    std::size_t bytes;      ///< kept by the model
+    std::size_t bytes;      ///< kept by the model, effects included
   };
   Size size() const;
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
+#include "clients/softbody/friction.h"
 #include "clients/softbody/model.h"
 
 namespace tendon::softbody {
@@ -11,17 +13,20 @@ namespace tendon::softbody {
 struct Feel {
   Vec3 force = Vec3::Zero();      ///< N, on the hand
   Mat3 stiffness = Mat3::Zero();  ///< N/m, −∂force/∂position, symmetric, not negative
-  double gap = 0;                 ///< m, from the tool to the body at rest, along the normal; below 0: inside
-  double valid_radius = 0;        ///< m, how far the tool may move before `force` and `stiffness` are another's
-  double error = 0;               ///< N, the solver's estimate of its own
+  /// m, from the tool to the body along the normal: as it lies, and where it touches as it would lie at rest; below 0:
+  /// inside.
+  double gap = 0;
+  double valid_radius = 0;  ///< m, how far the tool may move before `force` and `stiffness` are another's
+  double error = 0;         ///< N, the solver's estimate of its own
   bool touching = false;
 };
 
-/// A tool that a patch of a body gives way to, without friction.
+/// A tool that a patch of a body gives way to.
 ///
-/// The force is the slope of one energy, E(q) = least elastic energy with the tool at q, so the body at rest never
-/// gives out more than was put in, however the tool goes. With the middle c of the patch across, the height h(c) of the
-/// surface at rest (its mean over the patch), the depth δ = h(c) − q·n and the body's reaction F(δ, c):
+/// Without friction the force is the slope of one energy, E(q) = least elastic energy with the tool at q, so the body
+/// at rest never gives out more than was put in, however the tool goes. With the middle c of the patch across, the
+/// height h(c) of the surface at rest (its mean over the patch), the depth δ = h(c) − q·n and the body's reaction F(δ,
+/// c):
 ///
 ///     force = F·n + F·(∂depth/∂c − ∂h/∂c)
 ///
@@ -29,7 +34,8 @@ struct Feel {
 ///
 ///     K = k·v·vᵀ + (second derivatives by c),   v = n + 2 ∂depth/∂c − ∂h/∂c,   k = ∂F/∂δ
 ///
-/// the first term is given, which is never negative.
+/// the first term is given, which is never negative. Of a body with time each answer lasts one Model::step(); friction
+/// adds its force and stiffness across.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PatchContact {
@@ -40,18 +46,22 @@ class PatchContact {
   };
 
   /// `tool_radius`: 0 is a point; a sphere touches so much earlier. Model and surface must outlive this.
-  PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side);
+  PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
+               std::optional<Friction> friction = {});
 
   /// The tool's middle at `tool`, m, in the body's frame. Where its patch is not on the body it feels nothing, and
   /// nor does it when `tool` is not finite.
   Feel at(const Vec3& tool);
 
  private:
+  void rub(const Vec2& place, double normal_force, Feel& feel);
+
   Model& model_;
   const TouchSurface& surface_;
   double tool_radius_;
   Side side_;
   bool stuck_ = false;
+  std::optional<Friction> friction_;
 };
 
 }  // namespace tendon::softbody

@@ -7,10 +7,11 @@
 namespace tendon::softbody {
 namespace {
 
-Factor factor_of(const Solid& solid) {
+Factor factor_of(const Solid& solid, const Effects& effects) {
   if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, stiffness);
+  for (const auto& effect : effects) effect->add_stiffness(stiffness);
   Factor factor(stiffness);
   if (!factor.factorize(stiffness)) {
     throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
@@ -18,36 +19,46 @@ Factor factor_of(const Solid& solid) {
   return factor;
 }
 
-/// 1 N against the normal, shared by the patch's nodes.
-VectorXd load(const Solid& solid, const Vec3& normal, const std::vector<int>& nodes, const VectorXd& weights) {
-  VectorXd all = VectorXd::Zero(solid.size());
-  for (Eigen::Index i = 0; i < weights.size(); ++i) {
-    all.segment<3>(3 * nodes[static_cast<std::size_t>(i)]) = -weights[i] * normal;
-  }
-  return solid.to_free(all);
-}
+}  // namespace
 
-/// How deep each node of the patch is under 1 N → the reaction of a linear body.
 Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value) {
   const double compliance = patch.weights.dot(depth_per_newton);
   Reaction reaction;
   reaction.stiffness = 1 / compliance;
-  reaction.force = given == Given::kForce ? value : value / compliance;
-  reaction.depth = given == Given::kDepth ? value : value * compliance;
+  reaction.force = constrained_force(given, value, 0, compliance);
+  reaction.depth = given == Given::kDepth ? value : reaction.force * compliance;
   reaction.slope = reaction.force * (patch.slopes * depth_per_newton);
   return reaction;
 }
 
-}  // namespace
-
-LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface)
-    : solid_(solid), normal_(surface.normal()), factor_(factor_of(solid)) {}
+LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects)
+    : solid_(solid),
+      normal_(surface.normal()),
+      factor_(factor_of(solid, {})),
+      step_(effects.has_time() ? effects.step : 0),
+      effects_(effects_at_rest(effects, solid)) {
+  if (!effects_.empty() || effects.has_time()) {
+    const VectorXd rest = untouched();
+    rest_ = VectorXd::Zero(solid.size());
+    solid.add_free(rest, rest_);
+    add_effects_of_time(effects_, effects, solid, rest);
+    factor_ = factor_of(solid, effects_);
+  }
+}
 
 VectorXd LinearModel::displacements(const Patch& patch) const {
-  return factor_.solve(load(solid_, normal_, patch.nodes, patch.weights));
+  return factor_.solve(solid_.to_free(patch_load(solid_, normal_, patch)));
+}
+
+VectorXd LinearModel::untouched() const {
+  const VectorXd zero = VectorXd::Zero(solid_.free_count());
+  VectorXd force = zero;
+  for (const auto& effect : effects_) effect->add_force(zero, force);
+  return factor_.solve(force);
 }
 
 Reaction LinearModel::press(const Patch& patch, Given given, double value) {
+  if (!effects_.empty()) return press_among_effects(patch, given, value);
   VectorXd all = VectorXd::Zero(solid_.size());
   solid_.add_free(displacements(patch), all);
   VectorXd depth(patch.weights.size());
@@ -57,9 +68,31 @@ Reaction LinearModel::press(const Patch& patch, Given given, double value) {
   return linear_reaction(patch, depth, given, value);
 }
 
+Reaction LinearModel::press_among_effects(const Patch& patch, Given given, double value) {
+  const VectorXd per_newton = displacements(patch);
+  VectorXd u = untouched();
+  const VectorXd load = solid_.to_free(patch_load(solid_, normal_, patch));
+  const double compliance = load.dot(per_newton);
+  Reaction reaction;
+  reaction.force = constrained_force(given, value, load.dot(u), compliance);
+  u += reaction.force * per_newton;
+  for (const auto& effect : effects_) effect->advance(u);
+
+  VectorXd all = VectorXd::Zero(solid_.size());
+  solid_.add_free(u, all);
+  reaction.depth = depth_below(patch, normal_, all);
+  reaction.slope = slope_below(patch, normal_, all);
+  reaction.stiffness = step_ > 0 ? secant(reaction, depth_below(patch, normal_, rest_)) : 1 / compliance;
+  return reaction;
+}
+
+std::size_t LinearModel::bytes() const noexcept {
+  return factor_.bytes() + softbody::bytes(effects_) + static_cast<std::size_t>(rest_.size()) * sizeof(double);
+}
+
 CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
     : nodes_(nodes), row_of_(solid.mesh().nodes.size(), -1) {
-  const Factor factor = factor_of(solid);
+  const Factor factor = factor_of(solid, {});
   const auto count = static_cast<Eigen::Index>(nodes_.size());
   for (Eigen::Index i = 0; i < count; ++i) row_of_[at(nodes_[static_cast<std::size_t>(i)])] = static_cast<int>(i);
   table_.resize(count, count);
@@ -68,7 +101,10 @@ CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, 
     const Eigen::Index some = std::min(kAtOnce, count - first);
     MatrixXd loads(solid.free_count(), some);
     for (Eigen::Index j = 0; j < some; ++j) {
-      loads.col(j) = load(solid, surface.normal(), {nodes_[static_cast<std::size_t>(first + j)]}, VectorXd::Ones(1));
+      Patch alone;
+      alone.nodes = {nodes_[static_cast<std::size_t>(first + j)]};
+      alone.weights = VectorXd::Ones(1);
+      loads.col(j) = solid.to_free(patch_load(solid, surface.normal(), alone));
     }
     // The same functional reads the depth that wrote the load: the table is symmetric by its making.
     const MatrixXd solution = factor.solve(loads);

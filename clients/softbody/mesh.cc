@@ -133,6 +133,22 @@ double longest_edge(const Mesh& mesh, std::span<const int> element) {
   return longest;
 }
 
+/// Calls `use(shape functions, Jacobian's determinant, weight)` at points that integrate a polynomial of an element's
+/// own order squared.
+template <class Use>
+void for_points(const Mesh& mesh, int element, Use use) {
+  const auto nodes = mesh.element(element);
+  const Element full = std::ranges::find(elements(), mesh.shape, &ElementInfo::shape)->element;
+  for (const QuadraturePoint& point : quadrature(full)) {
+    const ShapeValues shape = shape_at(mesh.shape, point.at);
+    Mat3 jacobian = Mat3::Zero();
+    for (int i = 0; i < nodes_of(mesh.shape); ++i) {
+      jacobian += mesh.nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
+    }
+    use(shape, jacobian.determinant(), point.weight);
+  }
+}
+
 std::vector<int> corners_on(const Mesh& mesh, const Facet& facet) {
   std::vector<int> nodes = nodes_on(mesh, facet);
   std::erase_if(nodes, [&](int node) {
@@ -228,26 +244,34 @@ Mesh cylinder(Shape shape, double radius, double height, int across, int up) {
 }
 
 double check(const Mesh& mesh, std::string_view name) {
-  const Element element = std::ranges::find(elements(), mesh.shape, &ElementInfo::shape)->element;
   double volume = 0;
   for (int e = 0; e < mesh.element_count(); ++e) {
-    const auto nodes = mesh.element(e);
-    const double longest = longest_edge(mesh, nodes);
-    for (const QuadraturePoint& point : quadrature(element)) {
-      const ShapeValues shape = shape_at(mesh.shape, point.at);
-      Mat3 jacobian = Mat3::Zero();
-      for (int i = 0; i < nodes_of(mesh.shape); ++i) {
-        jacobian += mesh.nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
-      }
-      const double determinant = jacobian.determinant();
+    const double longest = longest_edge(mesh, mesh.element(e));
+    for_points(mesh, e, [&](const ShapeValues&, double determinant, double weight) {
       if (!(determinant > kLeastQuality * longest * longest * longest)) {
         throw std::invalid_argument(std::string(name) + ": element " + std::to_string(e + 1) +
                                     (determinant < 0 ? " is turned inside out" : " has no volume"));
       }
-      volume += point.weight * determinant;
-    }
+      volume += weight * determinant;
+    });
   }
   return volume;
+}
+
+std::vector<double> nodal_volumes(const Mesh& mesh) {
+  std::vector<double> volumes(mesh.nodes.size());
+  for (int e = 0; e < mesh.element_count(); ++e) {
+    const auto nodes = mesh.element(e);
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(nodes.size()));
+    double volume = 0;
+    for_points(mesh, e, [&](const ShapeValues& shape, double determinant, double weight) {
+      squares += weight * determinant * shape.value.cwiseAbs2();
+      volume += weight * determinant;
+    });
+    squares *= volume / squares.sum();
+    for (std::size_t i = 0; i < nodes.size(); ++i) volumes[at(nodes[i])] += squares[static_cast<Eigen::Index>(i)];
+  }
+  return volumes;
 }
 
 std::vector<Facet> surface(const Mesh& mesh) {

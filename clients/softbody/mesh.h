@@ -41,6 +41,10 @@ double check(const Mesh& mesh, std::string_view name);
 /// hands out slivers below 1e-4.
 inline constexpr double kLeastQuality = 1e-9;
 
+/// The share of each node in the volume of the body, m³, all above 0: the diagonal of the consistent mass matrix,
+/// scaled so that their sum is the volume (Hinton, Rock & Zienkiewicz 1976).
+std::vector<double> nodal_volumes(const Mesh& mesh);
+
 /// A face of an element that no other element has: the body's surface.
 struct Facet {
   int element;

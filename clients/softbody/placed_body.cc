@@ -2,6 +2,7 @@
 #include "clients/softbody/placed_body.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 namespace tendon::softbody {
 
@@ -18,10 +19,31 @@ Feel PlacedBody::touch(const Vec3& position) {
 }
 
 Touch PlacedBody::answer(const DeviceState& hand) {
-  const Feel feel = touch(hand.position);
+  const Feel feel = body_.step() > 0 ? follow(hand) : touch(hand.position);
   Touch touch = feel.force;
   touch.stiffness = feel.stiffness;
   return touch;
+}
+
+Feel PlacedBody::follow(const DeviceState& hand) {
+  const Duration step = std::max(Duration(1), from_seconds(body_.step()));
+  const Duration past = followed_ ? hand.sampled - followed_->sampled : Duration(-1);
+  if (past < Duration(0) || past > kMostBehind) {
+    followed_ = {hand.sampled, hand.position, Duration(0), touch(hand.position)};
+    return followed_->feel;
+  }
+  const Vec3 from = followed_->position;
+  Duration owed = followed_->owed + past;
+  const auto steps = owed / step;
+  for (auto i = steps; i > 0; --i) {
+    owed -= step;
+    const double share = past > Duration(0) ? std::min(1.0, seconds(owed) / seconds(past)) : 0;  // still ahead
+    followed_->feel = touch(hand.position + share * (from - hand.position));
+  }
+  followed_->sampled = hand.sampled;
+  followed_->position = hand.position;
+  followed_->owed = owed;
+  return followed_->feel;
 }
 
 }  // namespace tendon::softbody

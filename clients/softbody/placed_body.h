@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
+#include <optional>
+
 #include "clients/cpp/force_client.h"
 #include "clients/softbody/scene.h"
 
@@ -12,16 +15,30 @@ class PlacedBody {
   /// Throws std::invalid_argument when the scene makes no body.
   explicit PlacedBody(const Scene& scene);
 
-  /// What the hand is to feel at `position` (m, device frame); all vectors in the device frame.
+  /// What the hand is to feel at `position` (m, device frame); all vectors in the device frame. A body with time goes
+  /// on by one step.
   Feel touch(const Vec3& position);
 
-  /// The same as an answer to the server: force and stiffness.
+  /// The same as an answer to the server: force and stiffness. A body with time goes on from the hand's last place to
+  /// this one, by as many steps as went by between the two samples; when that is none, the answer is the last one.
+  /// After more than `kMostBehind`, or when the server's clock is set back, it takes one step instead: a pause is not
+  /// made up for.
   Touch answer(const DeviceState& hand);
+  static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
  private:
+  Feel follow(const DeviceState& hand);
+  struct Followed {
+    PeerTime sampled;
+    Vec3 position;
+    Duration owed;  ///< less than a step, that is yet to be simulated
+    Feel feel;
+  };
+
   Body body_;
   Mat3 to_device_;
   Vec3 origin_;  ///< of the body's frame, in the device's
+  std::optional<Followed> followed_;
 };
 
 }  // namespace tendon::softbody

@@ -12,27 +12,61 @@ namespace {
 constexpr double kDecrease = 1e-4;
 constexpr double kShortest = 1.0 / 1024;
 
+/// m: errors of the force that so much more depth would explain are none, also where there is no force to compare them
+/// with.
+constexpr double kUnseen = 1e-12;
+
 }  // namespace
 
-QuasiStaticModel::QuasiStaticModel(const Solid& solid, const TouchSurface& surface, const Config& config)
-    : solid_(solid),
+QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
+                                   const EffectsConfig& effects)
+    : elastic_(elastic),
       normal_(surface.normal()),
       config_(config),
-      stiffness_(solid.pattern()),
+      stiffness_(elastic.pattern()),
       factor_(stiffness_),
-      u_(VectorXd::Zero(solid.size())) {
+      u_(VectorXd::Zero(elastic.size())),
+      step_(effects.has_time() ? effects.step : 0),
+      effects_(effects_at_rest(effects, elastic)) {
   if (config.max_iterations < 1) throw std::invalid_argument("`max_iterations`: expected 1 or more");
   if (!(config.tolerance > 0)) throw std::invalid_argument("`tolerance`: expected more than 0");
-  solid_.stiffness(u_, Solid::Curvature::kExact, stiffness_);
+  stiffness(Elastic::Curvature::kExact);
   if (!factor_.factorize(stiffness_)) {
     throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
   }
+  if (!effects_.empty()) release();
+  if (!effects_.empty() || effects.has_time()) rest_ = u_;
+  add_effects_of_time(effects_, effects, elastic, elastic.to_free(u_));
+}
+
+double QuasiStaticModel::energy() const {
+  double sum = elastic_.energy(u_);
+  for (const auto& effect : effects_) sum += effect->energy(elastic_.to_free(u_));
+  return sum;
+}
+
+Elastic::Forces QuasiStaticModel::forces() const {
+  Elastic::Forces all = elastic_.forces(u_);
+  all.force = elastic_.to_free(all.force);
+  for (const auto& effect : effects_) {
+    const VectorXd free = elastic_.to_free(u_);
+    VectorXd force = VectorXd::Zero(free.size());
+    effect->add_force(free, force);
+    all.force -= force;
+    all.energy += effect->energy(free);
+  }
+  return all;
+}
+
+void QuasiStaticModel::stiffness(Elastic::Curvature curvature) {
+  elastic_.stiffness(u_, curvature, stiffness_);
+  for (const auto& effect : effects_) effect->add_stiffness(stiffness_);
 }
 
 QuasiStaticModel::Step QuasiStaticModel::solve(const VectorXd& internal, const VectorXd& load) {
-  solid_.stiffness(u_, Solid::Curvature::kExact, stiffness_);
+  stiffness(Elastic::Curvature::kExact);
   if (!factor_.factorize(stiffness_)) {
-    solid_.stiffness(u_, Solid::Curvature::kWithoutNegative, stiffness_);
+    stiffness(Elastic::Curvature::kWithoutNegative);
     // Where points are crushed flat nothing may be left in some direction: a millionth of the largest entry is.
     for (double shift = 0; !factor_.factorize(stiffness_);) {
       double largest = 0;
@@ -55,8 +89,8 @@ bool QuasiStaticModel::go(const VectorXd& step, const VectorXd& load, double for
   const double work = force * load.dot(step);
   for (double share = 1; share >= kShortest; share /= 2) {
     u_ = start;
-    solid_.add_free(share * step, u_);
-    const double change = solid_.energy(u_) - energy - share * work;
+    elastic_.add_free(share * step, u_);
+    const double change = this->energy() - energy - share * work;
     if (change <= kDecrease * share * slope + 1e-14 * std::abs(energy)) return true;
   }
   u_ = start;
@@ -67,48 +101,58 @@ double QuasiStaticModel::newton(const VectorXd& load, Given given, double value,
   double error = std::numeric_limits<double>::infinity();
   for (iterations_ = 0; iterations_ < config_.max_iterations;) {
     ++iterations_;
-    const Solid::Forces now = solid_.forces(u_);
-    const VectorXd internal = solid_.to_free(now.force);
+    const Elastic::Forces now = forces();
+    const VectorXd& internal = now.force;
     const Step step = solve(internal, load);
     const double compliance = load.dot(step.by_tool);
-    const double depth = load.dot(solid_.to_free(u_));
+    const double depth = load.dot(elastic_.to_free(u_));
     reaction.stiffness = 1 / compliance;
-    reaction.force = given == Given::kForce ? value : (value - depth - load.dot(step.by_itself)) / compliance;
+    reaction.force = constrained_force(given, value, depth + load.dot(step.by_itself), compliance);
     const VectorXd move = step.by_itself + reaction.force * step.by_tool;
     // −slope = moveᵀ K move: twice the energy that is still to be lost, which a force error of √(… K) would explain.
     const double slope = (internal - reaction.force * load).dot(move);
     error = std::sqrt(std::max(0.0, -slope) * reaction.stiffness);
     const bool moved = go(move, load, reaction.force, slope, now.energy);
-    if (!moved || error <= config_.tolerance * std::abs(reaction.force)) break;
+    const double enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
+    if (!moved || error <= enough) break;
   }
   return error;
 }
 
 Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) {
-  VectorXd all = VectorXd::Zero(solid_.size());
-  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
-    all.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]) = -patch.weights[i] * normal_;
-  }
   Reaction reaction;
-  reaction.error = newton(solid_.to_free(all), given, value, reaction);
-  reaction.depth = all.dot(u_);
-  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
-    const int node = patch.nodes[static_cast<std::size_t>(i)];
-    reaction.slope -= patch.slopes.col(i) * normal_.dot(u_.segment<3>(3 * node));
+  if (patch.nodes.empty()) {
+    release();
+    return reaction;
   }
+  const VectorXd load = elastic_.to_free(patch_load(elastic_, normal_, patch));
+  reaction.error = newton(load, given, value, reaction);
+  for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
+  reaction.depth = depth_below(patch, normal_, u_);
+  reaction.slope = slope_below(patch, normal_, u_);
+  if (step_ > 0) reaction.stiffness = secant(reaction, depth_below(patch, normal_, rest_));
   return reaction;
 }
 
 double QuasiStaticModel::release() {
   Reaction free;
-  VectorXd nothing = VectorXd::Zero(solid_.free_count());
+  VectorXd nothing = VectorXd::Zero(elastic_.free_count());
   nothing[0] = 1;  // any direction, with no force along it
   newton(nothing, Given::kForce, 0, free);
-  return solid_.energy(u_);
+  for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
+  return energy();
 }
 
 std::size_t QuasiStaticModel::bytes() const noexcept {
-  return stiffness_.bytes() + factor_.bytes() + static_cast<std::size_t>(u_.size()) * sizeof(double);
+  return stiffness_.bytes() + factor_.bytes() + softbody::bytes(effects_) +
+         static_cast<std::size_t>(u_.size() + rest_.size()) * sizeof(double);
+}
+
+VectorXd shape_at_rest(const Elastic& elastic, const TouchSurface& surface, EffectsConfig loads) {
+  loads.inertia = false;
+  loads.damping.reset();
+  loads.viscosity.reset();
+  return QuasiStaticModel(elastic, surface, {}, loads).displacements();
 }
 
 }  // namespace tendon::softbody

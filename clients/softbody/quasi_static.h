@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "clients/softbody/effects.h"
 #include "clients/softbody/model.h"
-#include "clients/softbody/solid.h"
 
 namespace tendon::softbody {
 
 /// Large rotations and strains, at rest at every instant: Newton's method on the elastic energy, with the tool's depth
-/// as a constraint. It begins where the last answer ended. Without inertia: no velocity, no mass.
+/// as a constraint. It begins where the last answer ended. Without inertia: no velocity, no mass. Effects that act on
+/// all of the body add their energies; with inertia that is the implicit Euler method, solved to the end.
 ///
 /// Each step solves with the exact second derivative; where that is not positive definite, with the one whose negative
 /// eigenvalues are taken out of every point of integration. A line search keeps the energy going down, so that a body
@@ -18,16 +19,20 @@ class QuasiStaticModel : public Model {
     int max_iterations = 30;  ///< of an answer; what is then missing is Reaction::error
     double tolerance = 1e-6;  ///< of the force, relative
   };
-  QuasiStaticModel(const Solid& solid, const TouchSurface& surface, const Config& config);
+  /// `elastic` must outlive this. It begins at rest, under its weight if it has any.
+  QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
+                   const EffectsConfig& effects = {});
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  double step() const noexcept override { return step_; }
+  bool still() const noexcept override { return effects_.empty(); }
   std::size_t bytes() const noexcept override;
 
   int iterations() const noexcept { return iterations_; }  ///< of the last answer
   const VectorXd& displacements() const noexcept { return u_; }
   /// Puts the nodes elsewhere, m; the fixed ones too.
   void set_displacements(const VectorXd& u) { u_ = u; }
-  /// Lets go of the tool and finds the shape at rest. The energy that is left, J.
+  /// Lets go of the tool and finds the shape at rest, or after a step of time. The energy that is left, J.
   double release();
 
  private:
@@ -35,18 +40,27 @@ class QuasiStaticModel : public Model {
     VectorXd by_itself;  ///< K⁻¹(−internal force)
     VectorXd by_tool;    ///< K⁻¹ w
   };
+  double energy() const;
+  Elastic::Forces forces() const;
+  void stiffness(Elastic::Curvature curvature);
   Step solve(const VectorXd& internal, const VectorXd& load);
   /// Goes along `step` as far as the energy less the tool's work goes down. False when it does not.
   bool go(const VectorXd& step, const VectorXd& load, double force, double slope, double energy);
   double newton(const VectorXd& load, Given given, double value, Reaction& reaction);
 
-  const Solid& solid_;
+  const Elastic& elastic_;
   Vec3 normal_;
   Config config_;
   SymmetricMatrix stiffness_;
   Factor factor_;
   VectorXd u_;
+  double step_;
+  Effects effects_;
+  VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without effects
   int iterations_ = 0;
 };
+
+/// Where a body that nothing touches is at rest, m, all nodes: `loads` counts, what has time does not.
+VectorXd shape_at_rest(const Elastic& elastic, const TouchSurface& surface, EffectsConfig loads);
 
 }  // namespace tendon::softbody

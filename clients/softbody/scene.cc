@@ -22,16 +22,6 @@ constexpr std::uintmax_t kMaxSceneBytes = 16'384;
 constexpr double kMaxLength = 1e3;  // m: whoever writes more has mistaken the unit
 constexpr std::int64_t kMaxCells = 200;
 
-struct EffectInfo {
-  std::string_view name;
-  std::string_view what;
-};
-constexpr std::array kEffects{
-    EffectInfo{"contact", "the tool can touch the body"},
-    EffectInfo{"geometric-nonlinearity", "large rotations"},
-    EffectInfo{"material-nonlinearity", "large strains"},
-};
-
 template <class Infos>
 std::string names(const Infos& infos) {
   std::string all;
@@ -197,6 +187,9 @@ void read_body(Table table, const std::filesystem::path& directory, BodyConfig& 
   body.material.young = material.number("young_pa", 0, false, 1e12, 1);
   const double poisson = material.number("poisson", 0, true, 0.4999, 1);
   body.material.poisson = poisson;
+  if (body.effects.gravity || body.effects.inertia || body.effects.damping) {
+    body.effects.density = material.number("density_kg_per_m3", 0, false, 1e6, 1);
+  }
   material.check_unknown();
   table.check_unknown();
 }
@@ -216,30 +209,45 @@ void read_touch(Table table, BodyConfig& body) {
   table.check_unknown();
 }
 
-/// The effects that are listed must be those that the model simulates, no more and no fewer.
-void read_effects(Table& root, const ModelInfo& model) {
+/// The effects that are listed must be those that the model simulates: all that it always does, and no others than it
+/// can.
+void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   const toml::node& node = root.need("effects", "a list of effects");
   const auto* list = node.as_array();
   if (list == nullptr) root.fail(node, "effects", "expected a list of effects");
-  std::set<std::string> listed;
+  EffectSet listed;
   for (const toml::node& each : *list) {
     const auto* name = each.as_string();
     if (name == nullptr) root.fail(each, "effects", "expected names in quotes");
-    if (std::ranges::find(kEffects, **name, &EffectInfo::name) == kEffects.end()) {
-      root.fail(each, "effects", "unknown effect \"" + **name + "\"; expected one of " + names(kEffects));
+    const auto found = std::ranges::find(effects(), std::string_view(**name), &EffectInfo::name);
+    if (found == effects().end()) {
+      root.fail(each, "effects", "unknown effect \"" + **name + "\"; expected one of " + names(effects()));
     }
-    if (!listed.insert(**name).second) root.fail(each, "effects", "\"" + **name + "\" is listed twice");
+    if (listed.has(found->kind)) root.fail(each, "effects", "\"" + **name + "\" is listed twice");
+    listed.add(found->kind);
+    if (!model.always.has(found->kind) && !model.may.has(found->kind)) {
+      root.fail(each, "effects",
+                "the model \"" + std::string(model.name) + "\" does not simulate \"" + **name + "\", which is listed");
+    }
   }
-  const auto want = [&](const std::string& effect, bool simulated) {
-    if (listed.contains(effect) == simulated) return;
-    root.fail(node, "effects",
-              "the model \"" + std::string(model.name) + "\" " +
-                  (simulated ? "simulates \"" + effect + "\", which is not listed"
-                             : "does not simulate \"" + effect + "\", which is listed"));
-  };
-  want("contact", true);
-  want("geometric-nonlinearity", model.large_rotations);
-  want("material-nonlinearity", model.large_strains);
+  for (const EffectInfo& effect : effects()) {
+    if (model.always.has(effect.kind) && !listed.has(effect.kind)) {
+      root.fail(node, "effects",
+                "the model \"" + std::string(model.name) + "\" simulates \"" + std::string(effect.name) +
+                    "\", which is not listed");
+    }
+  }
+  // Each key is asked for only when its effect is listed: without it, it is an unknown key.
+  constexpr double kMost = 1e6;
+  EffectsConfig& config = body.effects;
+  config.inertia = listed.has(EffectKind::kInertia);
+  if (listed.has(EffectKind::kGravity)) {
+    config.gravity = root.vector("gravity_m_per_s2", kMost, 1, Vec3(0, 0, -9.81));
+  }
+  if (listed.has(EffectKind::kDamping)) config.damping = root.number("damping_per_s", 0, false, kMost, 1);
+  if (listed.has(EffectKind::kViscosity)) config.viscosity = root.number("viscosity_ms", 0, false, kMost, 1e3);
+  if (listed.has(EffectKind::kFriction)) body.friction = root.number("friction", 0, true, 10, 1);
+  if (config.has_time()) config.step = root.number("step_ms", 0, false, 1e3, 1e3);
 }
 
 }  // namespace
@@ -258,11 +266,26 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   Table model = root.table("model");
   scene.body.model = model.choice("kind", names(models()), model_named);
   const ModelInfo& chosen = info(scene.body.model);
-  if (chosen.law != Law::kLinear) {
-    scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+  switch (chosen.kind) {
+    case ModelKind::kCorotational:
+    case ModelKind::kStVenantKirchhoff:
+    case ModelKind::kNeoHookean:
+    case ModelKind::kMassSpring:
+      scene.body.max_iterations = model.count("max_iterations", 1000, scene.body.max_iterations);
+      break;
+    case ModelKind::kXpbd:
+    case ModelKind::kProjective:
+      scene.body.iterations = model.count("iterations", 1000, scene.body.iterations);
+      break;
+    case ModelKind::kModal:
+      scene.body.swings = model.count("swings", 10'000, scene.body.swings);
+      if (model.find("static_modes") != nullptr) scene.body.static_modes = model.count("static_modes", 20);
+      break;
+    default:
+      break;
   }
   model.check_unknown();
-  read_effects(root, chosen);
+  read_effects(root, chosen, scene.body);
   read_body(root.table("body"), directory, scene.body);
   read_touch(root.table("touch"), scene.body);
   if (root.find("place") != nullptr) {
@@ -289,8 +312,12 @@ Scene read_scene(const std::filesystem::path& file) {
 std::string scene_reference() {
   std::ostringstream text;
   text << "effects = [...]          what is simulated; nothing else is\n";
-  for (const auto& each : kEffects) text << "    " << each.name << ": " << each.what << '\n';
-  text << "[body]\n"
+  for (const auto& each : effects()) text << "    " << each.name << ": " << each.what << '\n';
+  text << "gravity_m_per_s2 = [0, 0, -9.81]     in the body's frame; this and the next only with their effect\n"
+          "damping_per_s, viscosity_ms (the stress is that of the strain and so long of its rate), friction (a "
+          "coefficient)\n"
+          "step_ms                  how long an answer lasts, with inertia, damping or viscosity\n"
+          "[body]\n"
           "shape                    block, cylinder or file\n"
           "element                  how it is cut:\n";
   for (const auto& each : elements()) text << "    " << each.name << ": " << each.what << '\n';
@@ -300,16 +327,22 @@ std::string scene_reference() {
           "clamped_below_mm = 0     nodes up to so far above the lowest are held\n"
           "[body.material]\n"
           "young_pa, poisson        0 to 0.4999\n"
+          "density_kg_per_m3        with gravity, inertia or damping\n"
           "[model]\n"
           "kind                     how it is computed:\n";
   for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
-  text << "max_iterations = " << BodyConfig{}.max_iterations
-       << "      of one answer, for those that iterate\n"
+  const BodyConfig defaults;
+  text << "max_iterations = " << defaults.max_iterations
+       << "      of one answer: corotational, stvk, neo-hookean, mass-spring\n"
+          "iterations = "
+       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
+       << "              of modal\n"
+          "static_modes = 0         of modal: so many patches along each side of what is touched, at most 20\n"
           "[touch]\n"
           "patch_radius_mm          the tool presses on a patch of this size\n"
           "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
           "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
-          "reach_mm                 for condensed: touched only so far from the middle. Without: anywhere\n"
+          "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
           "tool_radius_mm = 0       a point, or a sphere, which touches so much earlier\n"
           "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
           "[place]\n"
@@ -321,22 +354,36 @@ std::string scene_reference() {
 std::string explain(const Scene& scene) {
   const ModelInfo& model = info(scene.body.model);
   const ElementInfo& element = info(scene.body.element);
+  const EffectSet simulated = effects_of(scene.body);
   Body body(scene.body);
   const Body::Size size = body.size();
-  const Reaction small = body.press(Given::kDepth, 1e-5);
+  // So little that it is linear, and by force: under its weight the surface is not where the mesh has it.
+  const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
+  const Reaction small = body.settle(Given::kForce, push);
   std::ostringstream text;
   text << "simulated:\n  contact: " << (scene.body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
-       << ", without friction, on a patch of " << 1e3 * scene.body.patch_radius << " mm\n  elasticity: " << model.name
-       << ", " << model.what << '\n';
-  if (model.large_rotations) text << "  geometric-nonlinearity\n";
-  if (model.large_strains) text << "  material-nonlinearity\n";
+       << ", on a patch of " << 1e3 * scene.body.patch_radius << " mm\n  elasticity: " << model.name << ", "
+       << model.what << '\n';
+  for (const EffectInfo& effect : effects()) {
+    if (effect.kind != EffectKind::kContact && simulated.has(effect.kind)) {
+      text << "  " << effect.name << ": " << effect.what << '\n';
+    }
+  }
   text << "not simulated:\n";
-  if (!model.large_rotations)
-    text << "  geometric-nonlinearity: a large rotation would make forces that are not there\n";
-  if (!model.large_strains) text << "  material-nonlinearity\n";
-  text << "  gravity, inertia, viscosity, friction, cutting, self-collision, plasticity: there is no code for them; no "
-          "velocity and no mass is kept\n"
-       << "cost:\n  mesh: " << size.nodes << " nodes, " << size.elements << " elements (" << element.name << ": "
+  for (const EffectInfo& effect : effects()) {
+    if (simulated.has(effect.kind)) continue;
+    text << "  " << effect.name
+         << (effect.kind == EffectKind::kGeometricNonlinearity ? ": a large rotation makes forces that are not there"
+                                                               : "")
+         << '\n';
+  }
+  text << "  cutting, self-collision, plasticity: there is no code for them\n";
+  if (body.step() > 0) {
+    text << "time: every answer is a step of " << 1e3 * body.step() << " ms\n";
+  } else {
+    text << "time: at rest at every instant; no velocity is kept\n";
+  }
+  text << "cost:\n  mesh: " << size.nodes << " nodes, " << size.elements << " elements (" << element.name << ": "
        << element.what << ")\n  unknowns: " << size.free << "\n  touchable nodes: " << size.touchable
        << "\n  model: " << static_cast<double>(size.bytes) / 1e6 << " MB\n"
        << "at first touch: " << small.stiffness << " N/m\n";

@@ -3,6 +3,7 @@
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <stdexcept>
 
 namespace tendon::softbody {
@@ -22,6 +23,12 @@ View view(const SymmetricMatrix& matrix) {
 }  // namespace
 
 VectorXd SymmetricMatrix::times(const VectorXd& x) const { return view(*this).selfadjointView<Eigen::Lower>() * x; }
+
+int SymmetricMatrix::slot(int row, int column) const {
+  const auto begin = rows.begin() + column_starts[static_cast<std::size_t>(column)];
+  const auto end = rows.begin() + column_starts[static_cast<std::size_t>(column) + 1];
+  return static_cast<int>(std::lower_bound(begin, end, row) - rows.begin());
+}
 
 std::size_t SymmetricMatrix::bytes() const noexcept {
   return (column_starts.size() + rows.size()) * sizeof(int) + values.size() * sizeof(double);

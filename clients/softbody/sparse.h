@@ -19,6 +19,7 @@ struct SymmetricMatrix {
   std::vector<double> values;
 
   VectorXd times(const VectorXd& x) const;
+  int slot(int row, int column) const;  ///< where an entry of the lower triangle is in `values`; it must be there
   std::size_t bytes() const noexcept;
 };
 

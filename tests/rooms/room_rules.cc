@@ -59,10 +59,12 @@ struct Door {
 const std::vector<Door>& front_doors() {
   static const std::vector<Door> kDoors = {
       {"Asio", {"asio.hpp", "asio/"}, {"server/udp_link.cc", "clients/cpp/udp_transport.cc"}},
+      {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/sparse.cc"}},
       {"CLI11", {"CLI/"}, {"server/main.cc", "clients/cpp/options.cc", "*_main.cc"}},
       {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/crypto.cc"}},
       {"protobuf", {"google/protobuf/", "*.pb.h"}, {"protocol/codec.cc", "server/recording_codec.cc"}},
+      {"Spectra", {"Spectra/"}, {"clients/softbody/spectrum.cc"}},
       {"spdlog", {"spdlog/"}, {"server/log.cc"}},
       {"toml++", {"toml++/"}, {"server/scene.cc", "clients/softbody/scene.cc"}},
       {"zlib", {"zlib.h"}, {"server/mcap_format.cc"}},

@@ -27,17 +27,64 @@ TEST(PlacedBody, PushesTheHandBackAlongTheWayItCame) {
   EXPECT_EQ(touch.stiffness, feel.stiffness);
 }
 
+/// A scene of one of the models, with the effects that it cannot do without.
+std::string scene_of(const ModelInfo& model) {
+  std::string text = with("\"condensed\"", "\"" + std::string(model.name) + "\"");
+  std::string names;
+  for (const EffectInfo& effect : effects()) {
+    if (!model.always.has(effect.kind)) continue;
+    names += (names.empty() ? "[\"" : ", \"") + std::string(effect.name) + '"';
+  }
+  if (model.has_time()) {
+    names += ", \"damping\"]\nstep_ms = 1\ndamping_per_s = 40";
+    text.replace(text.find("poisson"), 7, "density_kg_per_m3 = 1000, poisson");
+  } else {
+    names += ']';
+  }
+  text.replace(text.find("[\"contact\"]"), 11, names);
+  if (model.tetrahedra) text.replace(text.find("hex8-sri"), 8, "tet4");
+  return text;
+}
+
+DeviceState hand_at(double depth, Duration at) {
+  DeviceState hand;
+  hand.sampled = PeerTime(at);
+  hand.position = Vec3(0.01 + depth, 0, 0);
+  return hand;
+}
+
 TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
   for (const ModelInfo& model : models()) {
-    std::string text = with("\"condensed\"", "\"" + std::string(model.name) + "\"");
-    std::string effects = "[\"contact\"";
-    if (model.large_rotations) effects += ", \"geometric-nonlinearity\"";
-    if (model.large_strains) effects += ", \"material-nonlinearity\"";
-    text.replace(text.find("[\"contact\""), 10, effects);
-    PlacedBody body(parse_scene(text, "s.toml", "."));
-    const double stiffness = -body.touch(Vec3(0.01001, 0, 0)).force.x() / 1e-5;
-    EXPECT_NEAR(stiffness, 470, 1) << model.name;
+    PlacedBody body(parse_scene(scene_of(model), "s.toml", "."));
+    double stiffness = 0;
+    for (int i = 0; i < 60; ++i) {  // 0.6 s
+      stiffness = -body.answer(hand_at(1e-4, std::chrono::milliseconds(10 * i))).force.x() / 1e-4;
+    }
+    const double expected =
+        Body(parse_scene(scene_of(model), "s.toml", ".").body).settle(Given::kDepth, 1e-4).force / 1e-4;
+    EXPECT_NEAR(stiffness / expected, 1, 2e-3) << model.name;
+    if (!model.tetrahedra && model.kind != ModelKind::kProjective && model.kind != ModelKind::kModal) {
+      EXPECT_NEAR(stiffness, 470, 3) << model.name;
+    }
   }
+}
+
+TEST(PlacedBody, ABodyWithTimeGoesOnByTheTimeBetweenTheSamplesHoweverOftenItIsAsked) {
+  const Scene scene = parse_scene(scene_of(info(ModelKind::kTensorMass)), "s.toml", ".");
+  PlacedBody often(scene);
+  PlacedBody seldom(scene);
+  Vec3 force;
+  for (int i = 0; i <= 40; ++i) {  // 10 ms in quarters of a millisecond, at an even speed
+    force = often.answer(hand_at(1e-5 * i, std::chrono::microseconds(250 * i))).force;
+  }
+  seldom.answer(hand_at(0, Duration(0)));
+  const Vec3 at_once = seldom.answer(hand_at(4e-4, std::chrono::milliseconds(10))).force;
+  EXPECT_LT((force - at_once).norm(), 1e-9);
+  EXPECT_LT(force.x(), -0.01);
+  // A pause is not made up for, and time that goes back stops nothing.
+  const Vec3 after_a_pause = often.answer(hand_at(4e-4, std::chrono::seconds(100))).force;
+  EXPECT_EQ(after_a_pause, seldom.answer(hand_at(4e-4, std::chrono::seconds(1))).force);
+  EXPECT_TRUE(often.answer(hand_at(4e-4, Duration(0))).force.allFinite());
 }
 
 }  // namespace

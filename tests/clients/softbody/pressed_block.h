@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "clients/softbody/body.h"
 #include "clients/softbody/solid.h"
 
 namespace tendon::softbody::testing {
@@ -16,6 +17,18 @@ inline Solid pressed_block(Element element, int n, double poisson, Law law = Law
   Mesh mesh = block(info(element).shape, Vec3(0.1, 0.1, 0.05), {n, n, n / 2});
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
   return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, std::move(fixed)};
+}
+
+/// The same as values, for every model. Those with time are slowed enough to be at rest soon.
+inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
+  BodyConfig config;
+  config.shape = BlockShape{Vec3(0.1, 0.1, 0.05), {n, n, n / 2}};
+  config.element = element;
+  config.material = {.young = 1e4, .poisson = 0.45};
+  config.model = model;
+  config.patch_radius = kB1PatchRadius;
+  if (info(model).has_time()) config.effects = {.density = 1000, .step = 1e-3, .inertia = true, .damping = 40};
+  return config;
 }
 
 }  // namespace tendon::softbody::testing

@@ -36,7 +36,7 @@ TEST(SoftbodyScene, EveryValueArrives) {
 TEST(SoftbodyScene, AnUnknownEffectIsAnErrorWithItsLine) {
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\n  \"contact\",\n  \"gravitation\"]")),
             "s.toml:3: effects: unknown effect \"gravitation\"; expected one of contact, geometric-nonlinearity, "
-            "material-nonlinearity");
+            "material-nonlinearity, gravity, inertia, damping, viscosity, friction");
 }
 
 TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
@@ -48,6 +48,31 @@ TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
             "s.toml:1: effects: the model \"neo-hookean\" simulates \"geometric-nonlinearity\", which is not listed");
   EXPECT_EQ(refusal(with("effects = [\"contact\"]\n", "")),
             "s.toml: effects: expected a list of effects, found nothing");
+}
+
+TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
+  std::string text = with("\"condensed\"", "\"linear\"");
+  text.replace(text.find("[\"contact\"]"), 11,
+               "[\"contact\", \"gravity\", \"inertia\", \"damping\", \"viscosity\", \"friction\"]\nstep_ms = 2\n"
+               "gravity_m_per_s2 = [0, 0, -1]\ndamping_per_s = 3\nviscosity_ms = 4\nfriction = 0.5");
+  text.replace(text.find("poisson"), 7, "density_kg_per_m3 = 900, poisson");
+  const BodyConfig body = parse_scene(text, "s.toml", ".").body;
+  EXPECT_TRUE(body.effects.inertia);
+  EXPECT_EQ(body.effects.step, 0.002);
+  EXPECT_EQ(body.effects.gravity, Vec3(0, 0, -1));
+  EXPECT_EQ(body.effects.damping, 3);
+  EXPECT_EQ(body.effects.viscosity, 0.004);
+  EXPECT_EQ(body.effects.density, 900);
+  EXPECT_EQ(body.friction, 0.5);
+  EXPECT_EQ(refusal(with("[body]", "friction = 0.5\n[body]")),
+            "s.toml:2: friction: unknown key; expected one of body, effects, model, place, touch");
+  EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\", \"friction\"]")),
+            "s.toml: friction: expected a number of at least 0 and at most 10, found nothing");
+  EXPECT_EQ(refusal(with("[\"contact\"]", "[\"contact\",\n\"inertia\"]")),
+            "s.toml:2: effects: the model \"condensed\" does not simulate \"inertia\", which is listed");
+  text.replace(text.find("density_kg_per_m3 = 900, "), 25, "");
+  EXPECT_EQ(refusal(text),
+            "s.toml: body.material.density_kg_per_m3: expected a number above 0 and at most 1e+06, found nothing");
 }
 
 TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
