@@ -9,6 +9,9 @@
 namespace tendon {
 namespace {
 
+/// Four readings, each cut to whole nanoseconds, and a middle.
+constexpr double kRounding = 3;
+
 double ns_between(LocalTime from, LocalTime to) noexcept { return static_cast<double>((to - from).count()); }
 
 }  // namespace
@@ -26,10 +29,12 @@ std::optional<ClockOffsetEstimator::Sample> ClockOffsetEstimator::sample_of(cons
   Duration round_trip = ours - theirs;
   // An answer held for long by a peer with a faster clock.
   if (seconds(round_trip) < -fastest_drift_ * seconds(theirs)) return std::nullopt;
+  const double doubt = static_cast<double>(round_trip.count()) + fastest_drift_ * static_cast<double>(ours.count());
   round_trip = std::max(round_trip, Duration::zero());
   const std::int64_t there = (e.received.time_since_epoch() - e.sent.time_since_epoch()).count();
   const std::int64_t back = (e.answered.time_since_epoch() - e.answered_at.time_since_epoch()).count();
-  return Sample{e.sent + ours / 2, there + (back - there) / 2, round_trip.count()};
+  return Sample{e.sent + ours / 2, there + (back - there) / 2, round_trip.count(),
+                std::llround(std::ceil(std::max(doubt, 0.0) + kRounding))};
 }
 
 template <class Visit>
@@ -41,10 +46,7 @@ void ClockOffsetEstimator::for_each(Visit visit) const noexcept {
 ClockOffsetEstimator::Interval ClockOffsetEstimator::permitted(LocalTime at, std::int64_t reference) const noexcept {
   Interval interval{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   for_each([&](const Sample& sample) {
-    // Both clocks may have moved against each other within the exchange, too.
-    const double slack =
-        static_cast<double>(sample.round_trip) / 2 +
-        fastest_drift_ * (std::abs(ns_between(sample.at, at)) + static_cast<double>(sample.round_trip));
+    const double slack = static_cast<double>(sample.doubt) / 2 + fastest_drift_ * std::abs(ns_between(sample.at, at));
     const auto offset = static_cast<double>(sample.offset_ns - reference);
     interval.low = std::max(interval.low, offset - slack);
     interval.high = std::min(interval.high, offset + slack);
@@ -57,7 +59,7 @@ void ClockOffsetEstimator::observe(const ClockExchange& exchange) noexcept {
   if (!sample) return;
 
   const Interval before = permitted(sample->at, sample->offset_ns);
-  const double slack = static_cast<double>(sample->round_trip) * (0.5 + fastest_drift_);
+  const double slack = static_cast<double>(sample->doubt) / 2;
   if (before.low > slack || before.high < -slack) {
     ++steps_;
     finished_ = 0;
@@ -68,7 +70,7 @@ void ClockOffsetEstimator::observe(const ClockExchange& exchange) noexcept {
     block_started_ = sample->at;
     exchanges_ = 0;
   }
-  if (!best_ || sample->round_trip < best_->round_trip) best_ = sample;
+  if (!best_ || sample->doubt < best_->doubt) best_ = sample;
   ++exchanges_;
   if (exchanges_ >= kExchangesPerBlock && sample->at - block_started_ >= kLeastBlock) {
     blocks_[finished_++ % kBlocks] = *best_;
@@ -80,8 +82,8 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
   std::int64_t least = std::numeric_limits<std::int64_t>::max();
   const Sample* anchor = nullptr;
   for_each([&](const Sample& sample) {
-    if (sample.round_trip >= least) return;
-    least = sample.round_trip;
+    if (sample.doubt >= least) return;
+    least = sample.doubt;
     anchor = &sample;
   });
   if (anchor == nullptr) return std::nullopt;
@@ -91,7 +93,7 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
   double sum_t = 0;
   double sum_o = 0;
   const auto weight = [&](const Sample& sample) {
-    return 1 / static_cast<double>(kResolution.count() + sample.round_trip - least);
+    return 1 / static_cast<double>(kResolution.count() + sample.doubt - least);
   };
   for_each([&](const Sample& sample) {
     weights += weight(sample);
@@ -117,7 +119,7 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
   return Estimate{.offset = Duration(anchor->offset_ns + std::llround(offset)),
                   .drift = drift,
                   .error_bound = Duration(std::llround(std::ceil(bound))),
-                  .least_round_trip = Duration(least)};
+                  .least_round_trip = Duration(anchor->round_trip)};
 }
 
 }  // namespace tendon

@@ -20,15 +20,17 @@ struct ClockExchange {
 
 /// How far the peer's clock is ahead of ours, how fast it drifts, and how wrong that can be at most.
 ///
-/// An exchange says of the offset θ (peer − ours), with both delays unknown but not negative:
+/// An exchange says of the offset θ (peer − ours) at its middle, with both delays unknown but not negative, when θ
+/// drifts by at most ρ:
 ///
-///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ − θᵢ| ≤ δᵢ/2
+///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ(tᵢ) − θᵢ| ≤ (δᵢ + ρ (T4 − T1)) / 2 = eᵢ
 ///
-/// so those with a short round trip δ say most. Time is cut into blocks; of each only the exchange with the least δ is
-/// kept, and a line is laid through them with weights 1 / (δ₀ + δᵢ − δ_min). The line is then moved into what all of
-/// them permit at time t when no clock drifts faster than ρ:
+/// so those with a short round trip δ say most, unless the peer has held its answer for long: all that time the clocks
+/// drift, and with a fast one δ even looks short. Time is cut into blocks; of each only the exchange with the least e
+/// is kept, and a line is laid through them with weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into what
+/// all of them permit at time t:
 ///
-///     maxᵢ (θᵢ − δᵢ/2 − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + δᵢ/2 + ρ|t − tᵢ|)
+///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
 ///
 /// and its distance from the farther end is the error bound: not a guess, a proof (given ρ). When nothing is permitted
 /// the peer's clock has been set: the past is forgotten and counted in `steps`.
@@ -46,10 +48,10 @@ class ClockOffsetEstimator {
   static constexpr Duration kResolution = std::chrono::microseconds(100);
 
   struct Estimate {
-    Duration offset{};       ///< peer's reading − ours, at the time asked for
-    double drift = 0;        ///< s/s, how fast it grows
-    Duration error_bound{};  ///< |true offset − offset| ≤ this
-    Duration least_round_trip{};
+    Duration offset{};            ///< peer's reading − ours, at the time asked for
+    double drift = 0;             ///< s/s, how fast it grows
+    Duration error_bound{};       ///< |true offset − offset| ≤ this
+    Duration least_round_trip{};  ///< of the exchange that says most
 
     PeerTime to_peer(LocalTime ours) const noexcept { return PeerTime(ours.time_since_epoch() + offset); }
     LocalTime to_local(PeerTime theirs) const noexcept { return LocalTime(theirs.time_since_epoch() - offset); }
@@ -74,6 +76,7 @@ class ClockOffsetEstimator {
     LocalTime at;             ///< the middle of the exchange on our clock
     std::int64_t offset_ns;   ///< θ
     std::int64_t round_trip;  ///< δ, ns, ≥ 0
+    std::int64_t doubt;       ///< 2 e, ns
   };
   struct Interval {
     double low;  ///< ns, from `reference`

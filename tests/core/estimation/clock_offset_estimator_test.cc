@@ -26,13 +26,14 @@ struct Hosts {
   double drift = 0;
   std::function<Duration(Dice&)> there;
   std::function<Duration(Dice&)> back;
+  std::function<Duration(Dice&)> holds = [](Dice&) { return microseconds(200); };
 
   Duration true_offset(LocalTime at) const { return offset + from_seconds(drift * seconds(at - kStart)); }
   PeerTime peer(LocalTime at) const { return PeerTime(at.time_since_epoch() + true_offset(at)); }
 
   ClockExchange exchange(LocalTime at, Dice& dice) const {
     const LocalTime heard = at + there(dice);
-    const LocalTime answered = heard + microseconds(200);
+    const LocalTime answered = heard + holds(dice);
     return {at, peer(heard), peer(answered), answered + back(dice)};
   }
 };
@@ -94,6 +95,20 @@ TEST(ClockOffsetEstimator, ItsBoundHoldsForEveryDriftAndAsymmetryItPromisesItFor
                       .there = [=](Dice& d) { return from_seconds(d.within(0, longest_there)); },
                       .back = [=](Dice& d) { return from_seconds(d.within(0, longest_back)); }};
     EXPECT_EQ(score(hosts, dice.milliseconds(1, 500), std::chrono::seconds(60), seed).broken_bounds, 0) << seed;
+  }
+}
+
+// A peer that hears nothing new from us, but goes on talking, echoes our last datagram for as long.
+TEST(ClockOffsetEstimator, ItsBoundHoldsForAPeerThatHoldsItsAnswersAndDriftsAsFastAsIsPromised) {
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    Dice dice(seed);
+    const double longest_hold = dice.decades(-3, 0.3);
+    const Hosts hosts{.offset = from_seconds(dice.within(-1e6, 1e6)),
+                      .drift = dice.chance(0.5) ? 200e-6 : -200e-6,
+                      .there = [](Dice& d) { return from_seconds(d.decades(-4, -2)); },
+                      .back = [](Dice& d) { return from_seconds(d.decades(-4, -2)); },
+                      .holds = [=](Dice& d) { return from_seconds(d.within(0, longest_hold)); }};
+    EXPECT_EQ(score(hosts, milliseconds(100), std::chrono::seconds(60), seed).broken_bounds, 0) << seed;
   }
 }
 
