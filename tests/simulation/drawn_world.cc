@@ -91,6 +91,8 @@ injector::Window draw_window(Dice& dice, double lasts_ms) {
   return window;
 }
 
+}  // namespace
+
 injector::Profile draw_bad_weather(Dice& dice) {
   injector::Profile p;
   if (dice.chance(0.15)) {
@@ -128,6 +130,8 @@ injector::Profile draw_bad_weather(Dice& dice) {
   }
   return p;
 }
+
+namespace {
 
 Network::Weather draw_weather(Dice& dice, DrawnWorld& world) {
   Network::Weather weather{draw_bad_weather(dice), draw_bad_weather(dice)};
@@ -238,7 +242,7 @@ DrawnClient draw_client(Dice& dice, DrawnClient::Kind kind, std::size_t number) 
   client.joins = dice.chance(0.6) ? Duration::zero() : dice.milliseconds(0, 2000);
   if (dice.chance(0.5)) {
     client.clock.offset = from_seconds(dice.within(-1000, 1000));
-    client.clock.drift_ppb = static_cast<std::int64_t>(dice.within(-100'000, 100'000));
+    client.clock.drift_ppb = static_cast<std::int64_t>(dice.within(-200'000, 200'000));
     if (dice.chance(0.1)) client.clock.steps.push_back({whole_ms(dice, 500, 3000), dice.milliseconds(1, 50)});
   }
   if (kind == DrawnClient::Kind::kRogue) {
@@ -264,6 +268,32 @@ void draw_clients(Dice& dice, DrawnWorld& world) {
     world.clients.push_back(std::move(client));
   }
   std::ranges::stable_sort(world.clients, {}, &DrawnClient::joins);
+}
+
+/// Half of the worlds speak suite 1, and most of those renew keys so often that an outage is longer than some are good
+/// for. There addresses may change at any time, in fair weather too: a session follows. Drawn apart, so that nothing
+/// else of a world depends on it.
+void draw_suite(Dice dice, DrawnWorld& world) {
+  if (dice.chance(0.5)) return;
+  Ratchet secrets(dice.bits());
+  for (DrawnClient& client : world.clients) {
+    const bool rogue = client.kind == DrawnClient::Kind::kRogue;
+    const bool observes = client.kind == DrawnClient::Kind::kObserver || client.rogue.role == Role::kObserver;
+    const ClientKey key{
+        .name = client.config.name, .role = observes ? Role::kObserver : Role::kController, .key = secrets.next()};
+    world.config.keys.push_back(key);
+    (rogue ? client.rogue.key : client.config.key) = key.key;
+  }
+  if (dice.chance(0.7)) {
+    world.config.rekey = {.datagrams = static_cast<std::uint64_t>(dice.decades(2, 4)),
+                          .age = dice.milliseconds(500, 5000),
+                          .overlap = dice.milliseconds(100, 2000)};
+  }
+  if (dice.chance(0.3)) {
+    const Duration rebind = whole_ms(dice, 300, 3000);
+    world.config.weather.up.rebind = rebind;
+    for (DrawnWorld::Change& change : world.changes) change.weather.up.rebind = rebind;
+  }
 }
 
 }  // namespace
@@ -320,12 +350,13 @@ DrawnWorld draw_world(std::uint64_t seed, double force_scale) {
   world.clears = whole_ms(dice, 1500, 4500);
   if (dice.chance(0.4)) world.changes.push_back({whole_ms(dice, 300, 1400), draw_weather(dice, world)});
   Network::Weather fair;
-  // A round trip below what clocks drift while an echo is held (5 µs) would come out negative and be left out.
+  // A round trip below what clocks drift while an echo is held (10 µs) would come out negative and be left out.
   world.one_way_up = whole_ms(dice, 1, 20);
   world.one_way_down = whole_ms(dice, 1, 20);
   fair.up.delay = injector::ConstantDelay{world.one_way_up};
   fair.down.delay = injector::ConstantDelay{world.one_way_down};
   world.changes.push_back({world.clears, fair});
+  draw_suite(Dice(~seed), world);
   return world;
 }
 
@@ -354,6 +385,9 @@ std::string describe(const DrawnWorld& world) {
   if (config.latest_wake > Duration::zero()) text += ", woken up to " + ms(config.latest_wake) + " late";
   if (world.pauses()) text += ", pauses of " + ms(config.pause);
   if (world.port.unseen > 0) text += ", readings fail";
+  text += world.sealed() ? "; suite 1, a key for " + std::to_string(config.rekey.datagrams) + " datagrams or " +
+                               ms(config.rekey.age)
+                         : "; suite 0";
   for (const DrawnClient& client : world.clients) {
     switch (client.kind) {
       case DrawnClient::Kind::kController:

@@ -10,11 +10,13 @@
 #include "clients/cpp/force_client.h"
 #include "devices/simulated/simulated_device.h"
 #include "tests/injector/peer_clock.h"
+#include "tests/injector/profile.h"
 #include "tests/simulation/adversary.h"
 #include "tests/simulation/network.h"
 #include "tests/simulation/rogue.h"
 #include "tests/simulation/watched_device.h"
 #include "tests/simulation/world.h"
+#include "tests/support/dice.h"
 
 namespace tendon::simulation {
 
@@ -64,8 +66,10 @@ struct DrawnWorld {
   std::vector<DrawnClient> clients;  ///< in the order in which they join: their handles in the world
   double garbage_hz = 0;             ///< datagrams of random bytes, until it clears
 
-  /// Bits are flipped: what then gets past the checksum of UDP is believed, as long as the cipher is `plain`.
-  bool damages = false;
+  bool damages = false;  ///< bits are flipped
+  bool sealed() const { return !config.keys.empty(); }
+  /// In suite 0 a flipped bit that gets past the checksum of UDP is believed.
+  bool believes_damage() const { return damages && !sealed(); }
   bool pauses() const { return config.pause_probability > 0; }
   bool rogue() const;
   bool exact() const;  ///< a simulated device whose truth the account of the port must match
@@ -73,6 +77,9 @@ struct DrawnWorld {
 
 /// `force_scale` other than 1: the device, an adversary, gives out so much more than it is told to.
 DrawnWorld draw_world(std::uint64_t seed, double force_scale = 1);
+
+/// One direction of a bad network: any model of the injector but changes of address and flipped bits.
+injector::Profile draw_bad_weather(Dice& dice);
 
 /// All of it, for people.
 std::string describe(const DrawnWorld& world);

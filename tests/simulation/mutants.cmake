@@ -53,3 +53,15 @@ tendon_mutant(older-force SOURCE protocol/session.cc LIBRARY tendon_protocol
 tendon_mutant(no-return SOURCE clients/cpp/force_client.cc LIBRARY tendon_client
   REPLACE "now >= retry_" "false"
   ORACLES "calm|recovery")
+# Datagrams of the next key open, but that key never becomes the present one: the one after it is unknown.
+tendon_mutant(deaf-to-new-keys SOURCE protocol/seal.cc LIBRARY tendon_protocol
+  REPLACE "if (ahead == 1) {" "if (false) {"
+  ORACLES "recovery")
+# A guest whose address has changed is heard, and answered where it was before.
+tendon_mutant(no-roaming SOURCE server/network_loop.cc LIBRARY tendon_loops
+  REPLACE "if (newest && guest->address != from) {" "if (false) {"
+  ORACLES "recovery|counters")
+# The error bound of a clock is a third of what it may be.
+tendon_mutant(bold-clock SOURCE core/estimation/clock_offset_estimator.cc LIBRARY tendon_core
+  REPLACE "const double bound = std::max(" "const double bound = 1.0 / 3 * std::max("
+  ORACLES "clock")

@@ -194,6 +194,7 @@ bool Network::take_news_of_server() { return server_->take_news(); }
 bool Network::take_news_of(std::uint32_t link) { return clients_[link]->end.take_news(); }
 std::size_t Network::unread_by_server() const { return server_->unread(); }
 std::size_t Network::unread_by(std::uint32_t link) const { return clients_[link]->end.unread(); }
+std::uint64_t Network::arrived_at_server() const { return server_->arrived(); }
 std::uint64_t Network::arrived_at(std::uint32_t link) const { return clients_[link]->end.arrived(); }
 std::size_t Network::on_their_way_up(std::uint32_t link) const { return clients_[link]->on_their_way_up; }
 Address Network::outside(std::uint32_t link) const { return clients_[link]->outside; }

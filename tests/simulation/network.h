@@ -71,7 +71,8 @@ class Network {
   /// Datagrams that have arrived and were not taken out.
   std::size_t unread_by_server() const;
   std::size_t unread_by(std::uint32_t link) const;
-  /// Datagrams that have come to a client so far.
+  /// Datagrams that have come to the server, to a client, so far.
+  std::uint64_t arrived_at_server() const;
   std::uint64_t arrived_at(std::uint32_t link) const;
   /// Datagrams on their way from a client to the server.
   std::size_t on_their_way_up(std::uint32_t link) const;

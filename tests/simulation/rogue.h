@@ -24,6 +24,7 @@ class Rogue final : public Guest {
     Role role = Role::kController;
     std::uint64_t seed = 0;
     LocalTime quits{};
+    std::optional<Key> key{};  ///< suite 1
   };
 
   Rogue(Link& link, const Address& server, const Config& config)
@@ -51,6 +52,7 @@ class Rogue final : public Guest {
     config.hello.name = "rogue";
     config.hello.features = {std::string(kFeatureLocalModel)};
     for (std::byte& b : config.random) b = static_cast<std::byte>(dice_.bits());
+    if (config_.key) config.secret = {.key = *config_.key, .ephemeral = Ratchet(dice_.bits()).next()};
     handshake_.emplace(config, now);
   }
 
@@ -75,7 +77,7 @@ class Rogue final : public Guest {
     if (const auto* accepted = std::get_if<ClientHandshake::Accepted>(&outcome)) {
       Session::Config config;
       config.connection_id = accepted->connection_id;
-      session_.emplace(config, now);
+      accepted->keys ? session_.emplace(config, *accepted->keys, now) : session_.emplace(config, now);
     }  // refused: it stays away, and silent
   }
 

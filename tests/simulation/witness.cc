@@ -12,8 +12,10 @@ namespace tendon::simulation {
 namespace {
 
 constexpr double kRounding = 1e-9;  ///< J, and N where forces are compared
-/// A session's own hold of an echo, measured by a clock that drifts by 100 ppm: 50 ms of it are 5 µs.
+/// A session's own hold of an echo, measured by a clock that drifts by 200 ppm: 50 ms of it are 10 µs.
 constexpr Duration kRoundTripError = std::chrono::microseconds(30);
+/// Each reading of a clock is cut to whole nanoseconds.
+constexpr Duration kClockRounding{4};
 /// Every end of a client that is served sends and receives at least once in this time.
 constexpr Duration kServed = std::chrono::milliseconds(400);
 
@@ -31,6 +33,8 @@ constexpr std::array kOracles = {
     OracleInfo{Oracle::kCounters, "counters", "sent = received + lost + in flight; every datagram is counted once"},
     OracleInfo{Oracle::kRoundTrip, "round-trip",
                "the round trip measured is that of the network, whatever the clocks say"},
+    OracleInfo{Oracle::kClock, "clock",
+               "what the server says of a controller's clock is within the bound it publishes"},
     OracleInfo{Oracle::kRecovery, "recovery", "after bad weather everybody is served again within the promised time"},
     OracleInfo{Oracle::kCalm, "calm", "nobody wants to be called again and again"},
 };
@@ -44,7 +48,7 @@ std::string ms(Duration duration) { return number(seconds(duration) * 1e3) + " m
 
 Duration longest_validity(const DrawnWorld& world) {
   const Duration most = world.config.loop.control.hold.max_valid_for;
-  if (world.damages || world.rogue()) return most;
+  if (world.believes_damage() || world.rogue()) return most;
   Duration longest{};
   for (const DrawnClient& client : world.clients) {
     if (client.kind != DrawnClient::Kind::kController) continue;
@@ -53,6 +57,12 @@ Duration longest_validity(const DrawnWorld& world) {
   }
   // It travels in whole microseconds, rounded up.
   return std::min(longest + std::chrono::microseconds(1), most);
+}
+
+/// Every datagram that a client has taken out of its link is one of these.
+std::uint64_t counted(const ForceClient::Stats& stats) {
+  const LinkStats& link = stats.link;
+  return link.datagrams_received + link.duplicated + link.malformed + link.forged + link.old_key + stats.strangers;
 }
 
 }  // namespace
@@ -82,7 +92,8 @@ Witness::Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& por
         // The limit counts at most the longest hold of each interval; pauses add nothing.
         return from_seconds(2 * control.max_force / control.max_slew) + 2 * control.limiter.longest_hold;
       }()),
-      may_replay_ticks_(drawn.rogue() || drawn.damages) {}
+      may_replay_ticks_(drawn.rogue() || drawn.believes_damage()),
+      clocks_step_(std::ranges::any_of(drawn.clients, [](const DrawnClient& c) { return !c.clock.steps.empty(); })) {}
 
 void Witness::report(Oracle oracle, std::string what) {
   if (!breach_) breach_ = Breach{oracle, world_.now(), std::move(what)};
@@ -175,9 +186,9 @@ void Witness::see_age(const StepRecord& step) {
 
 void Witness::see(const World::Turn& turn) {
   if (!turn.client) {
-    const std::uint64_t forces = world_.server().stats().forces;
-    if (forces != forces_) last_force_ = world_.now();
-    forces_ = forces;
+    const std::uint64_t arrived = world_.network().arrived_at_server();
+    const bool more = std::exchange(server_wants_more_, turn.wants_more);
+    if (std::exchange(arrived_, arrived) != arrived || more) see_server();
     if (!turn.wants_more && world_.network().unread_by_server() > 0) {
       report(Oracle::kDrained, "the server has left " + std::to_string(world_.network().unread_by_server()));
     }
@@ -185,6 +196,28 @@ void Witness::see(const World::Turn& turn) {
              world_.alive(link) && !turn.wants_more && world_.network().unread_by(link) > 0) {
     report(Oracle::kDrained,
            "client " + std::to_string(link) + " has left " + std::to_string(world_.network().unread_by(link)));
+  }
+}
+
+/// After a turn in which it has received something.
+void Witness::see_server() {
+  const NetworkLoop::Stats server = world_.server().stats();
+  if (std::exchange(forces_, server.forces) != server.forces) last_force_ = world_.now();
+  if (!clocks_step_ && !drawn_.believes_damage()) see_clock(server);
+}
+
+void Witness::see_clock(const NetworkLoop::Stats& server) {
+  if (!server.controller_clock) return;
+  const std::string& holder = server.channels.front().holder;
+  for (std::size_t i = 0; i < drawn_.clients.size(); ++i) {
+    if (drawn_.clients[i].kind != DrawnClient::Kind::kController || drawn_.clients[i].config.name != holder) continue;
+    const Duration truth = world_.clock(i).reading(world_.now()) - world_.now();
+    const Duration error = std::chrono::abs(server.controller_clock->offset - truth);
+    if (error > server.controller_clock->error_bound + kClockRounding) {
+      report(Oracle::kClock, "the clock of " + holder + " is " + ms(truth) + " ahead, and not " +
+                                 ms(server.controller_clock->offset) + " ± " +
+                                 ms(server.controller_clock->error_bound));
+    }
   }
 }
 
@@ -197,11 +230,10 @@ void Witness::see_recovered() {
   for (std::size_t i = 0; i < marks_.size(); ++i) {
     if (!world_.alive(i)) continue;
     const ForceClient::Stats stats = world_.client(i).stats();
-    marks_[i] = {
-        .sessions = stats.sessions,
-        .states = stats.states,
-        .arrived = world_.network().arrived_at(static_cast<std::uint32_t>(i)),
-        .accounted = stats.link.datagrams_received + stats.link.duplicated + stats.link.malformed + stats.strangers};
+    marks_[i] = {.sessions = stats.sessions,
+                 .states = stats.states,
+                 .arrived = world_.network().arrived_at(static_cast<std::uint32_t>(i)),
+                 .accounted = counted(stats)};
   }
   forces_then_ = forces_;
   checked_recovery_ = true;
@@ -256,8 +288,7 @@ void Witness::see_counters() {
     if (!world_.alive(i) || world_.client(i).phase() != ForceClient::Phase::kOpen) continue;
     const ForceClient::Stats stats = world_.client(i).stats();
     const auto link = static_cast<std::uint32_t>(i);
-    const std::uint64_t accounted =
-        stats.link.datagrams_received + stats.link.duplicated + stats.link.malformed + stats.strangers;
+    const std::uint64_t accounted = counted(stats);
     if (world_.network().arrived_at(link) - marks_[i].arrived != accounted - marks_[i].accounted) {
       report(Oracle::kCounters, drawn_.clients[i].config.name + " received " +
                                     std::to_string(world_.network().arrived_at(link) - marks_[i].arrived) +
@@ -289,9 +320,9 @@ void Witness::see_end() {
                                number(port_.energy()) + " J");
   }
   // A flipped bit that the checksum of UDP does not see may be a number far ahead, behind which all true ones are late:
-  // until ciphers authenticate datagrams, only safety is promised then.
+  // where no cipher authenticates datagrams, only safety is promised then.
   const bool long_enough = recovered_by_ && world_.now() - *recovered_by_ >= kServed;
-  if (!long_enough || drawn_.damages) return;
+  if (!long_enough || drawn_.believes_damage()) return;
   see_served();
   see_counters();
 }

@@ -28,6 +28,7 @@ enum class Oracle : std::uint8_t {
   kDrained,
   kCounters,
   kRoundTrip,
+  kClock,
   kRecovery,
   kCalm,
 };
@@ -96,6 +97,8 @@ class Witness {
   double account() const;
   void see_energy(const StepRecord& step);
   void see_age(const StepRecord& step);
+  void see_server();
+  void see_clock(const NetworkLoop::Stats& server);
   void see_round_trip(const char* whose, Duration round_trip);
   void see_counters();
   void see_served();
@@ -111,7 +114,10 @@ class Witness {
   bool may_replay_ticks_;  ///< a rogue answers old steps again, or damage makes a force look so
 
   std::optional<Breach> breach_;
-  std::uint64_t forces_ = 0;  ///< that the server has handed to the haptic loop
+  bool clocks_step_ = false;        ///< of a controller
+  std::uint64_t arrived_ = 0;       ///< at the server
+  bool server_wants_more_ = false;  ///< since its last turn
+  std::uint64_t forces_ = 0;        ///< that the server has handed to the haptic loop
   std::optional<LocalTime> last_force_;
   LocalTime answered_ = LocalTime::min();  ///< when the motion was sampled which the rendered force answers
   std::optional<LocalTime> silent_since_;  ///< there should be no force

@@ -61,6 +61,9 @@ World::World(const Config& config, Device& device)
             network.devices = {about};
             network.max_observers = config.max_observers;
             network.adapt_state_rate = config.adapt_state_rate;
+            network.keys = config.keys;
+            network.rekey = config.rekey;
+            network.session_life = config.session_life;
             return network;
           }(),
           network_.server(), {mail_.get()}),

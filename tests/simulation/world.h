@@ -60,6 +60,9 @@ class World {
     Mailboxes::Capacities mail{.steps = 16, .flight = 2048, .datagrams = 1};
     std::size_t max_observers = 8;
     bool adapt_state_rate = false;
+    std::vector<ClientKey> keys{};  ///< of those who may come in, by suite 1; empty: everybody, by suite 0
+    Rekey rekey{};                  ///< of what the server says
+    Duration session_life = Session::Config{}.life;  ///< by the server
 
     static Network::Weather bad();
   };
@@ -79,6 +82,7 @@ class World {
   bool alive(std::size_t handle) const { return clients_[handle].client != nullptr; }
   ForceClient& client(std::size_t handle) { return *clients_[handle].client; }
   Address client_address(std::size_t handle) const { return clients_[handle].address; }
+  const injector::DriftingClock& clock(std::size_t handle) const { return clients_[handle].clock; }
   /// SIGKILL: it neither says Bye nor anything else, ever again.
   void kill(std::size_t handle);
 
