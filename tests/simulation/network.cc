@@ -157,8 +157,8 @@ void Network::launch_down(const Address& to, std::span<const std::byte> datagram
   launch((*client)->down, {link, injector::Direction::kDown, to.port}, decision, datagram);
 }
 
-void Network::launch(Way& way, const Tag& tag, const injector::Decision& decision,
-                     std::span<const std::byte> datagram) {
+void Network::launch(Way& way, Tag tag, const injector::Decision& decision, std::span<const std::byte> datagram) {
+  tag.damaged = decision.flipped_bit || (decision.truncated_to && *decision.truncated_to < datagram.size());
   const std::size_t before = flight_.size();
   flight_.launch(decision, datagram, tag, way.history.get());
   const std::size_t launched = flight_.size() - before;
@@ -175,7 +175,12 @@ void Network::deliver(LocalTime now) {
   now_ = now;
   while (const auto due = flight_.next_due(now)) {
     Client& client = *clients_[due->tag.link];
-    if (due->tag.direction == injector::Direction::kUp) {
+    const bool up = due->tag.direction == injector::Direction::kUp;
+    if (watch_arrivals_ && (up || due->tag.port == client.outside.port)) {
+      const bool whole = !due->tag.damaged || due->copy != injector::Copy::kFirst;
+      watch_arrivals_({due->tag.direction, due->tag.link, due->datagram, whole});
+    }
+    if (up) {
       Address from = client.address;
       from.port = due->tag.port;
       --client.on_their_way_up;

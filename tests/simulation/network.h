@@ -34,6 +34,13 @@ class Network {
   };
   /// Decides instead of an injector where it returns one: a recorded network.
   using Players = std::function<std::unique_ptr<injector::Decider>(injector::Direction, std::uint32_t link)>;
+  /// A datagram that comes to the server or to a client.
+  struct Arrival {
+    injector::Direction direction;
+    std::uint32_t link;
+    std::span<const std::byte> datagram;
+    bool whole;  ///< as it was sent
+  };
   /// Sees every decision.
   using Watch = std::function<void(injector::Direction, std::uint32_t link, const injector::Decision&)>;
 
@@ -86,6 +93,8 @@ class Network {
   const Counts& counts() const noexcept { return counts_; }
   std::size_t in_flight() const noexcept { return flight_.size(); }
   void watch(Watch watch) { watch_ = std::move(watch); }
+  /// Called with each that comes, before whom it comes to can read it; not with forgeries.
+  void watch_arrivals(std::function<void(const Arrival&)> watch) { watch_arrivals_ = std::move(watch); }
 
  private:
   class End;
@@ -99,18 +108,20 @@ class Network {
     std::uint32_t link = 0;
     injector::Direction direction{};
     std::uint16_t port = 0;  ///< of the client, as the server sees it
+    bool damaged = false;    ///< unless it is a copy
   };
 
   Way make_way(injector::Direction direction, std::uint32_t link);
   void launch_up(std::uint32_t link, std::span<const std::byte> datagram);
   void launch_down(const Address& to, std::span<const std::byte> datagram);
-  void launch(Way& way, const Tag& tag, const injector::Decision& decision, std::span<const std::byte> datagram);
+  void launch(Way& way, Tag tag, const injector::Decision& decision, std::span<const std::byte> datagram);
 
   std::uint64_t seed_;
   Weather weather_;
   Address server_address_;
   Players players_;
   Watch watch_;
+  std::function<void(const Arrival&)> watch_arrivals_;
   LocalTime now_{};
   std::unique_ptr<End> server_;
   std::vector<std::unique_ptr<Client>> clients_;

@@ -110,18 +110,32 @@ std::size_t World::add_guest(const std::function<std::unique_ptr<Guest>(Link&, c
   return clients_.size() - 1;
 }
 
-void World::restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics) {
+template <class Callback>
+void World::restart(std::size_t handle, const ForceClient::Config& config, Callback callback) {
   Client& client = clients_[handle];
   network_.open(client.address);
-  client.client = std::make_unique<ForceClient>(*client.link, server_address_, config, std::move(physics),
+  client.client = std::make_unique<ForceClient>(*client.link, server_address_, config, std::move(callback),
                                                 client.clock.reading(now_));
   client.due = now_;
+}
+
+void World::restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics) {
+  restart(handle, config, std::move(physics));
+}
+
+void World::restart_observer(std::size_t handle, const ForceClient::Config& config, Watch watch) {
+  restart(handle, config, std::move(watch));
 }
 
 void World::kill(std::size_t handle) {
   clients_[handle].client.reset();
   clients_[handle].guest.reset();
   clients_[handle].due = LocalTime::max();
+}
+
+void World::stop(std::size_t handle) {
+  clients_[handle].client->stop(clients_[handle].clock.reading(now_));
+  kill(handle);
 }
 
 void World::step_haptic() {

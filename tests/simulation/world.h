@@ -77,14 +77,17 @@ class World {
                              const injector::DriftingClock& clock = {});
   std::size_t add_observer(const ForceClient::Config& config, Watch watch, const injector::DriftingClock& clock = {});
   std::size_t add_guest(const std::function<std::unique_ptr<Guest>(Link& link, const Address& server)>& make);
-  /// In place of a client that was killed: at the same address, with the same clock.
+  /// In place of a client that has gone: at the same address, with the same clock.
   void restart_controller(std::size_t handle, const ForceClient::Config& config, Physics physics);
+  void restart_observer(std::size_t handle, const ForceClient::Config& config, Watch watch);
   bool alive(std::size_t handle) const { return clients_[handle].client != nullptr; }
   ForceClient& client(std::size_t handle) { return *clients_[handle].client; }
   Address client_address(std::size_t handle) const { return clients_[handle].address; }
   const injector::DriftingClock& clock(std::size_t handle) const { return clients_[handle].clock; }
   /// SIGKILL: it neither says Bye nor anything else, ever again.
   void kill(std::size_t handle);
+  /// It says Bye, and is gone. Clients only.
+  void stop(std::size_t handle);
 
   /// Called with every haptic step, in order, at once.
   void watch_steps(std::function<void(const StepRecord&)> watch) { watch_steps_ = std::move(watch); }
@@ -121,6 +124,8 @@ class World {
     LocalTime due{};
   };
   Client& place(const injector::DriftingClock& clock);
+  template <class Callback>
+  void restart(std::size_t handle, const ForceClient::Config& config, Callback callback);
   void turn_client(std::size_t handle);
   void step_haptic();
   void turn_server();

@@ -4,13 +4,19 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <ctime>
 #include <exception>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
 
+#include "tests/lab/json.h"
+#include "tests/simulation/day.h"
 #include "tests/simulation/runner.h"
 #include "tests/simulation/second_look.h"
 #include "tests/simulation/shrink_world.h"
@@ -87,6 +93,71 @@ void add_shrink(CLI::App& app, ShrinkArguments& arguments) {
       "\nExit: 0 done; 1 that world breaks no promise, or not because of the network; 2 wrong usage.");
 }
 
+struct DayArguments {
+  DayConfig config;
+  double hours = 25;
+  bool json = false;
+};
+
+int day(const DayArguments& arguments) {
+  DayConfig config = arguments.config;
+  config.length = from_seconds(arguments.hours * 3600);
+  const DayReport report = run_day(config);
+  const std::vector<std::pair<const char*, std::variant<std::uint64_t, double>>> figures = {
+      {"seed", config.seed},
+      {"hours", arguments.hours},
+      {"loop_hz", std::uint64_t{config.loop_hz}},
+      {"troubles", report.troubles},
+      {"byes", report.byes},
+      {"deaths", report.deaths},
+      {"takeovers", report.takeovers},
+      {"sessions", report.sessions},
+      {"expired", report.expired},
+      {"longest_session_s", seconds(report.longest_session)},
+      {"rekeys", report.rekeys},
+      {"changes_of_address", report.roamed},
+      {"haptic_steps", report.steps},
+      {"forces", report.forces},
+      {"datagrams_sent", report.network.sent},
+      {"datagrams_lost", report.network.lost},
+      {"copies", report.network.copies},
+      {"forged", report.forged},
+      {"requests", report.requests},
+      {"carried_out", report.carried_out},
+      {"slowest_recovery_s", seconds(report.slowest_recovery)},
+      {"clock_error_us", seconds(report.clock_error) * 1e6},
+      {"clock_bound_us", seconds(report.clock_bound) * 1e6},
+      {"heap_first_half_bytes", std::uint64_t{report.heap_first_half}},
+      {"heap_second_half_bytes", std::uint64_t{report.heap_second_half}},
+      {"cpu_s", static_cast<double>(std::clock()) / CLOCKS_PER_SEC},
+  };
+  lab::JsonLine line;
+  for (const auto& [name, value] : figures) {
+    std::visit([&, key = name](auto number) { line.add(key, number); }, value);
+    if (!arguments.json) std::visit([key = name](auto number) { std::cout << key << ' ' << number << '\n'; }, value);
+  }
+  if (arguments.json) std::cout << line.add("broken", report.broken).str() << '\n';
+  if (report.broken && !arguments.json) std::cout << "broken at " << *report.broken << '\n';
+  return report.broken ? kFailed : kDone;
+}
+
+void add_day(CLI::App& app, DayArguments& arguments) {
+  CLI::App* const verb = app.add_subcommand("day", "A day in suite 1, in which no session may ever be wedged");
+  verb->add_option("--seed", arguments.config.seed, "of weather, leave-takings and keys")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--hours", arguments.hours, "virtual hours; a session lives for 24")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--loop-hz", arguments.config.loop_hz, "haptic steps, states and forces per second")
+      ->check(CLI::Range(100U, 4000U))
+      ->capture_default_str();
+  verb->add_flag("--json", arguments.json, "one JSON object instead of the lines");
+  verb->footer(
+      "\nExample: an hour, in seconds\n  tendon-worlds day --seed 7 --hours 1\n"
+      "\nExit: 0 every promise was kept; 1 one was broken; 2 wrong usage.");
+}
+
 void add_replay(CLI::App& app, SecondLookOptions& options) {
   CLI::App* const verb = app.add_subcommand(
       "replay", "A scene and a wall over a recorded network, in virtual time, with one law after the other");
@@ -122,6 +193,8 @@ int main_of(int argc, char** argv) {
   SecondLookOptions replay_options;
   add_run(app, run_arguments);
   add_shrink(app, shrink_arguments);
+  DayArguments day_arguments;
+  add_day(app, day_arguments);
   add_replay(app, replay_options);
   try {
     app.parse(argc, argv);
@@ -131,6 +204,7 @@ int main_of(int argc, char** argv) {
   }
   try {
     if (app.got_subcommand("run")) return run(run_arguments);
+    if (app.got_subcommand("day")) return day(day_arguments);
     if (app.got_subcommand("shrink")) {
       return shrink_world(shrink_arguments.seed, shrink_arguments.out, std::cout) ? kDone : kFailed;
     }
