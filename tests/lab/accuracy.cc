@@ -16,6 +16,8 @@
 #include "clients/softbody/quasi_static.h"
 #include "clients/softbody/solid.h"
 #include "server/build_info.h"
+#include "tests/injector/injector.h"
+#include "tests/injector/named_profiles.h"
 #include "tests/lab/gnuplot.h"
 #include "tests/lab/json.h"
 #include "tests/lab/panels.h"
@@ -52,14 +54,14 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
 
 /// The same law on the same mesh, solved until rounding is all that is left.
 std::array<Stiffness, 2> exact(const PressedBlock& block, const Candidate& candidate) {
-  const Law law = info(candidate.model).law;
+  const softbody::Law law = info(candidate.model).law;
   Mesh mesh = softbody::block(info(candidate.element).shape, block.size, cells_of(block, candidate.n));
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
   const Solid solid(std::move(mesh), candidate.element, block.material, law, std::move(fixed));
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block.patch_radius);
   const Patch patch = *top.patch(top.across(block.touch_point()));
   std::unique_ptr<Model> model;
-  if (law == Law::kLinear) {
+  if (law == softbody::Law::kLinear) {
     model = std::make_unique<LinearModel>(solid, top);
   } else {
     model = std::make_unique<QuasiStaticModel>(solid, top, QuasiStaticModel::Config{.tolerance = 1e-10});
@@ -91,6 +93,12 @@ double quantile(std::vector<double> values, double share) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), at, values.end());
   return *at;
+}
+
+Route route_of(const Network& network, double update_ms) {
+  return {.there = injector::resolve_profile(network.name, injector::Direction::kDown),
+          .back = injector::resolve_profile(network.name, injector::Direction::kUp),
+          .compute = from_seconds(1e-3 * update_ms)};
 }
 
 /// What the meter itself costs.
@@ -142,42 +150,52 @@ void follow_script(Body& body, const std::vector<Touched>& script, AccuracyPoint
 }
 
 /// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
-std::vector<std::pair<const char*, double>> figures(const AccuracyPoint& p, Truth& truth) {
+using Figures = std::vector<std::pair<const char*, double>>;
+Figures figures(const AccuracyPoint& p, Truth& truth) {
   const Accuracy& small = p.at_load[0];
   const Accuracy& hard = p.at_load[1];
   const auto& loads = truth.block().loads;
-  return {{"n", p.candidate.n},
-          {"nodes", static_cast<double>(p.size.nodes)},
-          {"k_n_per_m", small.k},
-          {"error_percent", 100 * small.total},
-          {"update_ms_p50", p.update_ms_p50},
-          {"setup_s", p.setup_s},
-          {"bytes", static_cast<double>(p.size.bytes)},
-          {"load_n", loads[0]},
-          {"error_n", loads[0] * small.total},
-          {"model_percent", 100 * small.model},
-          {"discretisation_percent", 100 * small.discretisation},
-          {"solver_percent", 100 * small.solver},
-          {"tangent_error_percent", 100 * small.tangent},
-          {"hard_load_n", loads[1]},
-          {"hard_k_n_per_m", hard.k},
-          {"hard_error_percent", 100 * hard.total},
-          {"hard_error_n", loads[1] * hard.total},
-          {"hard_model_percent", 100 * hard.model},
-          {"hard_discretisation_percent", 100 * hard.discretisation},
-          {"hard_solver_percent", 100 * hard.solver},
-          {"hard_tangent_error_percent", 100 * hard.tangent},
-          {"script_rms_error_n", p.force_error},
-          {"script_largest_error_n", p.force_most},
-          {"script_rms_error_percent", 100 * p.force_relative},
-          {"spurious_lateral_percent", 100 * p.lateral},
-          {"update_ms_p99", p.update_ms_p99},
-          {"hz", 1e3 / p.update_ms_p50},
-          {"instructions", p.instructions.value_or(kNoNumber)},
-          {"elements", static_cast<double>(p.size.elements)},
-          {"free", static_cast<double>(p.size.free)},
-          {"truth_k_n_per_m", truth.stiffness(0).secant},
-          {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
+  Figures all{{"n", p.candidate.n},
+              {"nodes", static_cast<double>(p.size.nodes)},
+              {"k_n_per_m", small.k},
+              {"error_percent", 100 * small.total},
+              {"update_ms_p50", p.update_ms_p50},
+              {"setup_s", p.setup_s},
+              {"bytes", static_cast<double>(p.size.bytes)},
+              {"load_n", loads[0]},
+              {"error_n", loads[0] * small.total},
+              {"model_percent", 100 * small.model},
+              {"discretisation_percent", 100 * small.discretisation},
+              {"solver_percent", 100 * small.solver},
+              {"tangent_error_percent", 100 * small.tangent},
+              {"hard_load_n", loads[1]},
+              {"hard_k_n_per_m", hard.k},
+              {"hard_error_percent", 100 * hard.total},
+              {"hard_error_n", loads[1] * hard.total},
+              {"hard_model_percent", 100 * hard.model},
+              {"hard_discretisation_percent", 100 * hard.discretisation},
+              {"hard_solver_percent", 100 * hard.solver},
+              {"hard_tangent_error_percent", 100 * hard.tangent},
+              {"script_rms_error_n", p.force_error},
+              {"script_largest_error_n", p.force_most},
+              {"script_rms_error_percent", 100 * p.force_relative},
+              {"spurious_lateral_percent", 100 * p.lateral},
+              {"update_ms_p99", p.update_ms_p99},
+              {"hz", 1e3 / p.update_ms_p50},
+              {"instructions", p.instructions.value_or(kNoNumber)},
+              {"elements", static_cast<double>(p.size.elements)},
+              {"free", static_cast<double>(p.size.free)},
+              {"truth_k_n_per_m", truth.stiffness(0).secant},
+              {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
+  if (p.felt) {
+    all.insert(all.end(), {{"felt_error_percent", 100 * p.felt->force_error},
+                           {"felt_error_held_percent", 100 * p.felt->held_error},
+                           {"felt_stiffness_percent", 100 * p.felt->displayed},
+                           {"felt_limited_percent", 100 * p.felt->limited_share},
+                           {"felt_vibration_m_s", p.felt->vibration},
+                           {"felt_latency_ms", 1e3 * p.felt->latency}});
+  }
+  return all;
 }
 
 void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth) {
@@ -226,7 +244,7 @@ std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const Accura
     }
     if (options.progress) std::cerr << "\r" << name << "            " << std::flush;
     try {
-      points.push_back(measure(candidate, truth, meter));
+      points.push_back(measure(candidate, truth, meter, options.network));
     } catch (const std::exception& error) {
       left_out.push_back(name + ": " + error.what());
     }
@@ -263,6 +281,19 @@ void write_row(std::ostream& out, const AccuracyPoint& p) {
                 p.setup_s, static_cast<double>(p.size.bytes) / 1e6);
   out << line.data();
 }
+
+void write_felt(std::ostream& out, const AccuracyPoint& p) {
+  std::array<char, 160> line{};
+  std::snprintf(line.data(), line.size(), "%-24s %3d %9.4f %+8.1f %8.1f %8.1f %8.0f %8.0f %9.2f %9.0f\n",
+                p.candidate.name().c_str(), p.candidate.n, p.update_ms_p50, 100 * p.at_load[0].total,
+                100 * p.felt->force_error, 100 * p.felt->held_error, 100 * p.felt->displayed,
+                100 * p.felt->limited_share, 1e3 * p.felt->vibration, 1e3 * p.felt->latency);
+  out << line.data();
+}
+
+constexpr const char* kFeltHeading =
+    "                              update  error %        felt error %   shows %  limited vibration   latency\n"
+    "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
 
 constexpr const char* kHeading =
     "                                           error %   error % | of the hard load's    | tangent  script lateral |"
@@ -328,8 +359,7 @@ Panel error_over_n(const std::vector<std::vector<AccuracyPoint>>& ladders) {
   }
   Panel panel{.title = "|error| of K, %, over cells along x: " + std::string(info(kind).name),
               .x_label = "n",
-              .x_range = {{0.9 * least, 1.1 * most}},
-              .log_x = true,
+              .x_range = {{least - 0.5, most + 0.5}},
               .log_y = true};
   for (const auto& ladder : ladders) {
     if (ladder.front().candidate.model != kind) continue;
@@ -349,7 +379,8 @@ std::string load_text(double newtons) { return JsonLine::number(newtons) + " N";
 
 std::string Candidate::name() const { return std::string(info(model).name) + "-" + std::string(info(element).name); }
 
-AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter) {
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
+                      const std::optional<Network>& network) {
   const PressedBlock& block = truth.block();
   AccuracyPoint point{.candidate = candidate};
   const Meter::Reading before = meter.read();
@@ -358,6 +389,7 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& met
   point.size = body.size();
   time_updates(body, truth.script(), meter, point);
   follow_script(body, truth.script(), point);
+  if (network) point.felt = felt(body, truth, route_of(*network, point.update_ms_p50), network->seed);
   const std::array<Stiffness, 2> mesh = exact(block, candidate);
   for (std::size_t load = 0; load < mesh.size(); ++load) {
     point.at_load[load] = accuracy_at(body.press(Given::kForce, block.loads[load]), mesh[load], truth, candidate, load);
@@ -378,6 +410,15 @@ std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::
   return points;
 }
 
+const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms) {
+  const AccuracyPoint* best = nullptr;
+  for (const AccuracyPoint& p : points) {
+    if (!p.felt || !(p.update_ms_p50 <= budget_ms) || !(p.felt->vibration <= kMostVibration)) continue;
+    if (best == nullptr || p.felt->force_error < best->felt->force_error) best = &p;
+  }
+  return best;
+}
+
 std::string to_json(const AccuracyPoint& point, Truth& truth) {
   JsonLine line;
   line.add("model", point.candidate.name());
@@ -385,38 +426,151 @@ std::string to_json(const AccuracyPoint& point, Truth& truth) {
   return line.add("commit", kCommit).str();
 }
 
+namespace {
+
+/// "420.2"
+std::string with_tenths(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1f", value);
+  return text.data();
+}
+
+void write_truth(std::ostream& out, Truth& truth) {
+  const auto& loads = truth.block().loads;
+  out << "The truth: " << with_tenths(truth.limit(softbody::Law::kLinear, 0)->secant)
+      << " N/m while strains are small, " << with_tenths(truth.stiffness(0).secant) << " N/m under "
+      << load_text(loads[0]) << ", " << with_tenths(truth.stiffness(1).secant) << " N/m under " << load_text(loads[1])
+      << "; its own meshes leave " << with_tenths(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n";
+}
+
+/// Which one to take.
+void write_answer(std::ostream& out, const AccuracyOptions& options, const std::vector<AccuracyPoint>& points,
+                  Truth& truth) {
+  const double budget = options.budget_ms.value_or(std::numeric_limits<double>::infinity());
+  const AccuracyPoint* const best = closest_at_the_hand(points, budget);
+  if (options.json) {
+    if (!options.budget_ms) return;  // all points are there to choose from
+    JsonLine line;
+    line.add("budget_ms", budget).add("network", options.network->name);
+    if (best != nullptr) {
+      line.add("model", best->candidate.name());
+      for (const auto& [name, value] : figures(*best, truth)) line.add(name, value);
+    } else {
+      line.add("model", std::optional<double>());
+    }
+    out << line.add("commit", kCommit).str() << "\n";
+  } else if (best == nullptr) {
+    out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
+  } else {
+    out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
+    if (options.budget_ms) out << ", in " << JsonLine::number(budget) << " ms";
+    out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
+        << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
+        << with_tenths(100 * best->at_load[0].total) << " %.\n";
+  }
+}
+
+/// ms, the median of both ways.
+double round_trip_ms(const Network& network) {
+  const Route route = route_of(network, 0);
+  std::vector<double> ms;
+  injector::Injector there(route.there, network.seed, 0, injector::Direction::kDown, LocalTime{});
+  injector::Injector back(route.back, network.seed, 0, injector::Direction::kUp, LocalTime{});
+  for (int i = 0; i < 2000; ++i) {
+    const LocalTime sent{std::chrono::milliseconds(i)};
+    const LocalTime arrived = there.decide({.arrival = sent, .size = 200}).release;
+    ms.push_back(1e3 * seconds(back.decide({.arrival = arrived, .size = 200}).release - sent));
+  }
+  return quantile(ms, 0.5);
+}
+
+/// Of all elements of a model the ladder with the point that is felt best.
+std::vector<const std::vector<AccuracyPoint>*> felt_best(const std::vector<std::vector<AccuracyPoint>>& ladders) {
+  std::vector<const std::vector<AccuracyPoint>*> best;
+  const auto least = [](const std::vector<AccuracyPoint>& ladder) {
+    double error = std::numeric_limits<double>::infinity();
+    for (const AccuracyPoint& p : ladder) error = std::min(error, p.felt->force_error);
+    return error;
+  };
+  for (const auto& ladder : ladders) {
+    const auto same = std::ranges::find_if(
+        best, [&](const auto* known) { return known->front().candidate.model == ladder.front().candidate.model; });
+    if (same == best.end()) {
+      best.push_back(&ladder);
+    } else if (least(ladder) < least(**same)) {
+      *same = &ladder;
+    }
+  }
+  return best;
+}
+
+/// What refining a model brings to the hand, over `x` of its points.
+template <class X>
+Panel felt_over(const std::string& title, const std::string& label,
+                const std::vector<std::vector<AccuracyPoint>>& ladders, bool log_x, X x) {
+  Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};
+  std::pair<double, double> range{std::numeric_limits<double>::infinity(), 0};
+  for (const auto* ladder : felt_best(ladders)) {
+    Curve curve{.name = ladder->front().candidate.name(), .colour = colour_of(panel.curves.size() / 2)};
+    for (const AccuracyPoint& p : *ladder) {
+      range = {std::min<double>(range.first, x(p)), std::max<double>(range.second, x(p))};
+      curve.points.emplace_back(x(p), 100 * p.felt->force_error);
+    }
+    panel.curves.push_back(curve);
+    curve.name.clear();
+    curve.style = Curve::Style::kPoints;
+    panel.curves.push_back(curve);
+  }
+  panel.x_range = {{range.first / 1.1, range.second * 1.1}};
+  return panel;
+}
+
+void draw(const AccuracyOptions& options, const std::vector<std::vector<AccuracyPoint>>& ladders) {
+  const auto& loads = options.block.loads;
+  std::vector<Panel> panels{
+      error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0, 0),
+      error_over_time("… under " + load_text(loads[1]), ladders, 0, 1), error_over_n(ladders)};
+  if (options.network) {
+    panels.push_back(error_over_time(
+        "… under " + load_text(loads[0]) + ", over that and " + options.network->name + ", there and back", ladders,
+        round_trip_ms(*options.network), 0));
+    panels.push_back(felt_over("Error at the hand, %, over cells along x", "n", ladders, false,
+                               [](const AccuracyPoint& p) { return p.candidate.n; }));
+    panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
+                               [](const AccuracyPoint& p) { return p.update_ms_p50; }));
+  }
+  draw_panels(*options.out / "accuracy", "What accuracy costs in time",
+              "processor time of one core; commit " + std::string(kCommit), panels);
+}
+
+}  // namespace
+
 void accuracy(const AccuracyOptions& options, std::ostream& out) {
   if (options.resolutions.empty() || options.resolutions.front() < 1 ||
       !std::ranges::is_sorted(options.resolutions, std::less_equal<>())) {
     throw std::invalid_argument("--n: expected ascending numbers of cells, as in 4,8,16");
   }
+  if (options.budget_ms && !options.network) throw std::invalid_argument("--budget-ms: say --network too");
+  if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
   if (options.progress) std::cerr << "the truth …" << std::flush;
   Truth truth(options.block, options.truth);
   const Meter meter;
-  const auto& loads = options.block.loads;
+  const bool rows = !options.json && !options.budget_ms;
+  if (rows) {
+    write_truth(out, truth);
+    out << kHeading;
+  }
   std::vector<std::string> left_out;
   std::vector<std::vector<AccuracyPoint>> ladders;
-  if (!options.json) {
-    const auto number = [](double value) {
-      std::array<char, 32> text{};
-      std::snprintf(text.data(), text.size(), "%.1f", value);
-      return std::string(text.data());
-    };
-    out << "The truth: " << number(truth.limit(Law::kLinear, 0)->secant) << " N/m while strains are small, "
-        << number(truth.stiffness(0).secant) << " N/m under " << load_text(loads[0]) << ", "
-        << number(truth.stiffness(1).secant) << " N/m under " << load_text(loads[1]) << "; its own meshes leave "
-        << number(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n"
-        << kHeading;
-  }
   std::vector<AccuracyPoint> all;
   for (const ModelKind model : models_of(options)) {
     for (const Element element : elements_of(options)) {
       std::vector<AccuracyPoint> points = ladder(model, element, options, truth, meter, left_out);
       for (const AccuracyPoint& point : points) {
-        if (options.json) {
-          out << to_json(point, truth) << std::endl;
-        } else {
+        if (rows) {
           write_row(out, point);
+        } else if (!options.budget_ms) {
+          out << to_json(point, truth) << std::endl;
         }
       }
       all.insert(all.end(), points.begin(), points.end());
@@ -424,24 +578,22 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
     }
   }
   if (options.progress) std::cerr << "\n";
-  if (!options.json) {
+  if (rows) {
     out << "\nThe best, small load: nothing else is both quicker and closer (errors that cancel do not count):\n"
         << kHeading;
     for (const AccuracyPoint& point : pareto_front(all, 0)) write_row(out, point);
+    if (options.network) {
+      out << "\nAt the hand, behind " << options.network->name << ":\n" << kFeltHeading;
+      for (const AccuracyPoint& point : all) write_felt(out, point);
+    }
     for (const std::string& one : left_out) out << "left out: " << one << "\n";
   }
+  if (options.network) write_answer(out, options, all, truth);
   if (options.out) {
     std::filesystem::create_directories(*options.out);
     write_csv(*options.out / "accuracy.csv", all, truth);
-    if (!ladders.empty()) {
-      const std::vector<Panel> panels{
-          error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0,
-                          0),
-          error_over_time("… under " + load_text(loads[1]), ladders, 0, 1), error_over_n(ladders)};
-      draw_panels(*options.out / "accuracy", "What accuracy costs in time",
-                  "processor time of one core; commit " + std::string(kCommit), panels);
-    }
-    if (!options.json) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
+    if (!ladders.empty()) draw(options, ladders);
+    if (rows) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
   }
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <ostream>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "clients/softbody/body.h"
+#include "tests/lab/felt.h"
 #include "tests/lab/meter.h"
 #include "tests/lab/pressed_block.h"
 
@@ -52,14 +54,27 @@ struct AccuracyPoint {
   double update_ms_p50 = 0;
   double update_ms_p99 = 0;
   std::optional<double> instructions{};  ///< of an update, median; empty when the kernel does not count them
+  std::optional<Felt> felt{};            ///< behind the network, if one was asked for
 };
 
-/// Measures one. Throws what the model throws when there is none of that kind on that mesh.
-AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter);
+/// A network by its name in tendon-inject, or a line of its profiles.
+struct Network {
+  std::string name;
+  std::uint64_t seed = 1;
+};
+
+/// Measures one. Throws what the model throws when there is none of that kind on that mesh, and std::invalid_argument
+/// when there is no such network.
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
+                      const std::optional<Network>& network = {});
 
 /// The points that no other is both quicker and closer than, by time; closer without luck, so that whose parts are not
 /// known is not among them.
 std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load);
+
+/// Of those that need at most `budget_ms` for an update and leave a free hand quiet, the one whose force at the hand
+/// is closest to the truth; none when there is none. For points with `felt`.
+const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms);
 
 struct AccuracyOptions {
   PressedBlock block;
@@ -67,8 +82,11 @@ struct AccuracyOptions {
   std::vector<softbody::Element> elements;  ///< none: all
   std::vector<int> resolutions{4, 6, 8, 12, 16};
   Truth::Config truth;
-  double slowest_ms = 200;                     ///< a refinement ladder ends where an update would take longer …
-  double longest_setup_s = 30;                 ///< … or the set-up
+  double slowest_ms = 200;           ///< a refinement ladder ends where an update would take longer …
+  double longest_setup_s = 30;       ///< … or the set-up
+  std::optional<Network> network{};  ///< what is left at the hand behind it
+  /// Answers one question: what is best at the hand of that which needs at most so long for an update.
+  std::optional<double> budget_ms{};
   std::optional<std::filesystem::path> out{};  ///< folder for accuracy.csv and the figures
   bool json = false;
   bool progress = false;  ///< on standard error

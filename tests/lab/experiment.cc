@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "core/energy_ledger.h"
+#include "tests/injector/injector.h"
 #include "tests/support/dice.h"
 
 namespace tendon::lab {
@@ -15,17 +16,26 @@ namespace {
 
 constexpr double kMeanOver = 0.05;         // s, what is slower than this is not vibration
 constexpr double kLongestLatency = 0.5;    // s
+constexpr std::uint32_t kDatagram = 200;   // bytes
 constexpr double kCorrelationStep = 2e-3;  // s, between the samples that are correlated
 
 /// The environment and the network to it: takes motions, gives forces when it is time.
 class Remote {
  public:
-  Remote(const Environment& environment, std::uint64_t seed) : environment_(environment), dice_(seed) {}
+  Remote(const Environment& environment, std::uint64_t seed) : environment_(environment), dice_(seed) {
+    if (!environment.route) return;
+    there_.emplace(environment.route->there, seed, 0, injector::Direction::kDown, LocalTime{});
+    back_.emplace(environment.route->back, seed, 0, injector::Direction::kUp, LocalTime{});
+  }
 
   /// Where the hand had been resting when the clock starts: that has been answered.
   RemoteForce at_rest(const Motion& hand) { return answer(hand, hand.at); }
 
   void observe(const Motion& hand) {
+    if (there_) {
+      send(hand);
+      return;
+    }
     if (hand.at < next_) return;
     next_ += environment_.period;
     // Drawn even if not used, so that every law meets the same fate of the same datagram.
@@ -51,6 +61,34 @@ class Remote {
   }
 
  private:
+  void send(const Motion& hand) {
+    const injector::Decision way = there_->decide({.arrival = hand.at, .size = kDatagram});
+    if (way.verdict != injector::Verdict::kDrop) waiting_.push_back({way.release, hand});
+    work(hand.at);
+  }
+
+  /// What the engine has begun by `now`, when all motions that had come to it by then are known.
+  void work(LocalTime now) {
+    while (true) {
+      auto first = LocalTime::max();
+      for (const Waiting& one : waiting_) first = std::min(first, one.arrival);
+      const LocalTime start = std::max(first, free_);
+      if (start > now) return;
+      Motion newest = answered_;
+      std::erase_if(waiting_, [&](const Waiting& one) {
+        if (one.arrival > start) return false;
+        if (one.hand.at > newest.at) newest = one.hand;
+        return true;
+      });
+      if (newest.at <= answered_.at) continue;  // all of them were older than one that overtook them
+      answered_ = newest;
+      free_ = start + environment_.route->compute;
+      const injector::Decision way = back_->decide({.arrival = free_, .size = kDatagram});
+      const RemoteForce force = answer(newest, way.release);
+      if (way.verdict != injector::Verdict::kDrop) under_way_.push_back(force);
+    }
+  }
+
   RemoteForce answer(const Motion& hand, LocalTime received) {
     const double t = seconds(hand.at.time_since_epoch());
     RemoteForce force{.sequence = ++sequence_,
@@ -72,6 +110,16 @@ class Remote {
   std::uint64_t sequence_ = 0;
   std::uint64_t delivered_ = 0;
   std::deque<RemoteForce> under_way_;
+
+  struct Waiting {
+    LocalTime arrival;
+    Motion hand;
+  };
+  std::optional<injector::Injector> there_;
+  std::optional<injector::Injector> back_;
+  std::vector<Waiting> waiting_;  ///< at the engine or on their way there
+  Motion answered_{.at = LocalTime::min()};
+  LocalTime free_{};  ///< when the engine has answered that
 };
 
 HapticController::Config controller(const Experiment& experiment) {
@@ -140,6 +188,8 @@ std::vector<Moment> run(const Experiment& experiment) {
   Hand hand = std::visit([](const auto& kind) { return Hand(kind); }, experiment.hand);
   EnergyLedger ledger(hand.friction());
 
+  const Environment::Force& truth =
+      experiment.environment.truth ? experiment.environment.truth : experiment.environment.force;
   std::vector<Moment> record;
   record.reserve(static_cast<std::size_t>(experiment.length / experiment.period));
   Vec3 applied = Vec3::Zero();
@@ -159,7 +209,7 @@ std::vector<Moment> run(const Experiment& experiment) {
     moment.t = seconds(now.time_since_epoch());
     moment.position = hand.position();
     moment.velocity = hand.velocity();
-    moment.true_force = experiment.environment.force(moment.t, hand.position());
+    moment.true_force = truth(moment.t, hand.position());
     moment.energy = ledger.energy();
     applied = hand.apply(moment.step.force);
     moment.step.force = applied;

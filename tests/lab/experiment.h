@@ -10,8 +10,17 @@
 
 #include "core/haptic_controller.h"
 #include "devices/simulated/simulated_device.h"
+#include "tests/injector/profile.h"
 
 namespace tendon::lab {
+
+/// An engine that takes time, behind a network that tendon-inject knows. The device's motions go there once a period
+/// of its loop; when the engine is free it answers the newest that has come, and never queues.
+struct Route {
+  injector::Profile there;  ///< of motions
+  injector::Profile back;   ///< of forces
+  Duration compute{};       ///< for an answer
+};
 
 /// A remote environment behind a network, as values in and values out: what it answers to a place and a time. When the
 /// clock starts the hand has been resting where it is for so long that the answer to that is already there.
@@ -23,8 +32,11 @@ struct Environment {
   Stiffness stiffness{};  ///< −∂F/∂x, N/m, sent along as local model; left out: none is sent
   Duration period = std::chrono::milliseconds(1);  ///< of its forces
   Duration delay{};                                ///< from the motion being sampled to the force being there
-  Duration jitter{};  ///< at most so much longer; later forces overtake earlier ones, which then are dropped
-  double loss = 0;    ///< share of its forces that never arrive
+  Duration jitter{};             ///< at most so much longer; later forces overtake earlier ones, which then are dropped
+  double loss = 0;               ///< share of its forces that never arrive
+  std::optional<Route> route{};  ///< instead of the four above
+  /// N, on the hand, what an environment without error would answer: Moment::true_force. Left out: `force`.
+  Force truth{};
 };
 
 /// A hand that goes its way whatever it feels. Displayed stiffness is measured on it.
@@ -54,7 +66,7 @@ struct Moment {
   double t = 0;                    ///< s
   Vec3 position = Vec3::Zero();    ///< m, true
   Vec3 velocity = Vec3::Zero();    ///< m/s, true
-  Vec3 true_force = Vec3::Zero();  ///< N, what the environment would have answered here and now
+  Vec3 true_force = Vec3::Zero();  ///< N, Environment::truth here and now
   double energy = 0;               ///< J, of the true ledger: exact positions, the friction that the device has
 };
 

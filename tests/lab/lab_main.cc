@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cstdint>
 #include <exception>
 #include <iostream>
 #include <stdexcept>
@@ -14,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "tests/injector/named_profiles.h"
 #include "tests/lab/accuracy.h"
 #include "tests/lab/boundary.h"
 #include "tests/lab/compare.h"
@@ -213,6 +215,8 @@ struct AccuracyArguments {
   double patch_radius_mm = 20;
   std::vector<double> patch_centre_mm = {0, 0};
   std::vector<double> loads_n = {0.3, 1};
+  std::string network;
+  std::uint64_t seed = 1;
 };
 
 /// "100x100x50", mm → m.
@@ -283,6 +287,12 @@ void add_accuracy(CLI::App& app, AccuracyArguments& arguments) {
   verb->add_option("--longest-setup-s", options.longest_setup_s, "… and this for its set-up")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  verb->add_option("--network", arguments.network,
+                   "what is left at the hand behind it: " + injector::names_of_profiles())
+      ->type_name("NAME|LINE");
+  verb->add_option("--seed", arguments.seed, "of the network")->capture_default_str();
+  verb->add_option("--budget-ms", options.budget_ms, "only say what is best at the hand in so long an update")
+      ->check(CLI::PositiveNumber);
   verb->add_option("--truth-cells", options.truth.cells, "of the mesh of the truth, to the patch's radius")
       ->check(CLI::Range(2.0, 8.0))
       ->capture_default_str();
@@ -292,7 +302,8 @@ void add_accuracy(CLI::App& app, AccuracyArguments& arguments) {
   verb->footer(
       "\nExample: which element, quickly\n"
       "  tendon-lab accuracy --models condensed --n 4,8,16 --longest-setup-s 5\n"
-      "all of it, in a quarter of an hour or more\n  tendon-lab accuracy --out figures\n"
+      "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
+      "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
   verb->callback([&arguments, &options, models, elements] {
     options.models = named(arguments.models, softbody::model_named, models);
@@ -302,6 +313,8 @@ void add_accuracy(CLI::App& app, AccuracyArguments& arguments) {
                      .patch_radius = 1e-3 * arguments.patch_radius_mm,
                      .patch_centre = {1e-3 * arguments.patch_centre_mm.at(0), 1e-3 * arguments.patch_centre_mm.at(1)},
                      .loads = {arguments.loads_n.at(0), arguments.loads_n.at(1)}};
+    if (!arguments.network.empty()) options.network = {.name = arguments.network, .seed = arguments.seed};
+    if (options.budget_ms) options.slowest_ms = *options.budget_ms;
     options.progress = isatty(STDERR_FILENO) != 0;
     accuracy(options, std::cout);
   });
