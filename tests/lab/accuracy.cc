@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/softbody/explicit.h"
 #include "clients/softbody/linear.h"
 #include "clients/softbody/mesh.h"
 #include "clients/softbody/quasi_static.h"
@@ -30,6 +31,8 @@ using namespace softbody;
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kLeastUpdates = 400;  // timed, unless …
 constexpr double kLongestTiming = 4;        // s
+constexpr double kReach = 0.3;              // patch radii, that a table of the surface holds
+constexpr int kStaticModes = 3;             // along each axis of that, of a modal body
 /// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
 constexpr double kJustNoticeable = 15;  // %
 
@@ -40,6 +43,15 @@ std::array<int, 3> cells_of(const PressedBlock& block, int n) {
   return {n, along(1), along(2)};
 }
 
+/// The block of water's density, cut up and held.
+constexpr double kDensity = 1000;  // kg/m³
+
+Solid solid_of(const PressedBlock& block, const Candidate& candidate) {
+  Mesh mesh = softbody::block(info(candidate.element).shape, block.size, cells_of(block, candidate.n));
+  const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
+  return {std::move(mesh), candidate.element, block.material, info(candidate.model).law, fixed};
+}
+
 BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
   BodyConfig config;
   config.shape = BlockShape{block.size, cells_of(block, candidate.n)};
@@ -47,21 +59,29 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
   config.material = block.material;
   config.model = candidate.model;
   config.patch_radius = block.patch_radius;
-  config.reach = 0.3 * block.patch_radius;
+  config.reach = kReach * block.patch_radius;
   config.middle = block.touch_point();
+  config.static_modes = kStaticModes;
+  if (info(candidate.model).has_time()) {
+    // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
+    // is pressed together, and none longer than a period of the device.
+    const double step = std::min(1e-3, 0.7 * largest_step(solid_of(block, candidate), kDensity));
+    config.effects = {.density = kDensity, .step = step, .inertia = true, .damping = 40};
+  }
   return config;
 }
 
+/// Whether a model becomes its law as the mesh is refined. Springs along edges and elements that are each as rigid as
+/// possible become something else, that has no name.
+bool follows_its_law(ModelKind model) { return model != ModelKind::kMassSpring && model != ModelKind::kProjective; }
+
 /// The same law on the same mesh, solved until rounding is all that is left.
 std::array<Stiffness, 2> exact(const PressedBlock& block, const Candidate& candidate) {
-  const softbody::Law law = info(candidate.model).law;
-  Mesh mesh = softbody::block(info(candidate.element).shape, block.size, cells_of(block, candidate.n));
-  Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
-  const Solid solid(std::move(mesh), candidate.element, block.material, law, std::move(fixed));
+  const Solid solid = solid_of(block, candidate);
   const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block.patch_radius);
   const Patch patch = *top.patch(top.across(block.touch_point()));
   std::unique_ptr<Model> model;
-  if (law == softbody::Law::kLinear) {
+  if (solid.law() == softbody::Law::kLinear) {
     model = std::make_unique<LinearModel>(solid, top);
   } else {
     model = std::make_unique<QuasiStaticModel>(solid, top, QuasiStaticModel::Config{.tolerance = 1e-10});
@@ -82,6 +102,10 @@ Accuracy accuracy_at(const Reaction& reaction, const Stiffness& mesh, Truth& tru
   result.total = result.k / right.secant - 1;
   result.tangent = reaction.stiffness / right.tangent - 1;
   result.solver = (result.k - mesh.secant) / right.secant;
+  if (!follows_its_law(candidate.model)) {
+    result.model = result.discretisation = result.solver = kNoNumber;
+    return result;
+  }
   const auto limit = truth.limit(info(candidate.model).law, load);
   result.model = limit ? limit->secant / right.secant - 1 : kNoNumber;
   result.discretisation = limit ? (mesh.secant - limit->secant) / right.secant : kNoNumber;
@@ -111,19 +135,30 @@ double floor_of(const Meter& meter) {
   return quantile(idle, 0.5);
 }
 
+/// The tool goes from one place of the script to the next, in as many steps as a body with time makes meanwhile.
+template <class Touch>
+void walk(const Body& body, const std::vector<Touched>& script, std::size_t to, Touch touch) {
+  const int steps =
+      body.step() > 0 ? std::max(1, static_cast<int>(std::lround(Truth::kScriptInterval / body.step()))) : 1;
+  const Vec3& from = script[to == 0 ? 0 : to - 1].tool;
+  for (int step = 1; step <= steps; ++step) touch(from + static_cast<double>(step) / steps * (script[to].tool - from));
+}
+
 void time_updates(Body& body, const std::vector<Touched>& script, const Meter& meter, AccuracyPoint& point) {
   const double floor = floor_of(meter);
   std::vector<double> times;
   std::vector<double> instructions;
   const Meter::Reading start = meter.read();
   do {
-    for (const Touched& there : script) {
-      const Meter::Reading before = meter.read();
-      const Feel feel = body.touch(there.tool);
-      const Meter::Reading took = meter.read() - before;
-      if (!feel.touching) continue;
-      times.push_back(std::max(0.0, took.processor - floor));
-      if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
+    for (std::size_t i = 0; i < script.size(); ++i) {
+      walk(body, script, i, [&](const Vec3& tool) {
+        const Meter::Reading before = meter.read();
+        const Feel feel = body.touch(tool);
+        const Meter::Reading took = meter.read() - before;
+        if (!feel.touching) return;
+        times.push_back(std::max(0.0, took.processor - floor));
+        if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
+      });
     }
   } while (!times.empty() && times.size() < kLeastUpdates && (meter.read() - start).processor < kLongestTiming);
   point.update_ms_p50 = 1e3 * quantile(times, 0.5);
@@ -137,7 +172,9 @@ void follow_script(Body& body, const std::vector<Touched>& script, AccuracyPoint
   double largest = 0;
   double aside = 0;
   for (std::size_t i = 0; i < script.size(); ++i) {
-    const Vec3 error = body.touch(script[i].tool).force - script[i].force;
+    Vec3 force;
+    walk(body, script, i, [&](const Vec3& tool) { force = body.touch(tool).force; });
+    const Vec3 error = force - script[i].force;
     squares += error.squaredNorm();
     true_squares += script[i].force.squaredNorm();
     largest = std::max(largest, script[i].force.norm());
@@ -182,6 +219,7 @@ Figures figures(const AccuracyPoint& p, Truth& truth) {
               {"spurious_lateral_percent", 100 * p.lateral},
               {"update_ms_p99", p.update_ms_p99},
               {"hz", 1e3 / p.update_ms_p50},
+              {"step_ms", p.step_ms},
               {"instructions", p.instructions.value_or(kNoNumber)},
               {"elements", static_cast<double>(p.size.elements)},
               {"free", static_cast<double>(p.size.free)},
@@ -233,6 +271,7 @@ double predicted(const std::vector<AccuracyPoint>& ladder, int n, double Accurac
 std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const AccuracyOptions& options, Truth& truth,
                                   const Meter& meter, std::vector<std::string>& left_out) {
   std::vector<AccuracyPoint> points;
+  if (info(model).tetrahedra && element != Element::kTet4) return points;
   for (const int n : options.resolutions) {
     const Candidate candidate{model, element, n};
     const std::string name = candidate.name() + " n=" + std::to_string(n);
@@ -387,12 +426,15 @@ AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& met
   Body body(body_of(block, candidate));
   point.setup_s = (meter.read() - before).processor;
   point.size = body.size();
+  point.step_ms = 1e3 * body.step();
   time_updates(body, truth.script(), meter, point);
   follow_script(body, truth.script(), point);
-  if (network) point.felt = felt(body, truth, route_of(*network, point.update_ms_p50), network->seed);
+  if (network)
+    point.felt = felt(body, truth, route_of(*network, std::max(point.update_ms_p50, point.step_ms)), network->seed);
   const std::array<Stiffness, 2> mesh = exact(block, candidate);
   for (std::size_t load = 0; load < mesh.size(); ++load) {
-    point.at_load[load] = accuracy_at(body.press(Given::kForce, block.loads[load]), mesh[load], truth, candidate, load);
+    point.at_load[load] =
+        accuracy_at(body.settle(Given::kForce, block.loads[load]), mesh[load], truth, candidate, load);
   }
   return point;
 }

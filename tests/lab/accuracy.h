@@ -53,6 +53,7 @@ struct AccuracyPoint {
   double setup_s = 0;                 ///< of processor time, as are the next two
   double update_ms_p50 = 0;
   double update_ms_p99 = 0;
+  double step_ms = 0;                    ///< of the body's own time, that an update lasts; 0: it has none
   std::optional<double> instructions{};  ///< of an update, median; empty when the kernel does not count them
   std::optional<Felt> felt{};            ///< behind the network, if one was asked for
 };

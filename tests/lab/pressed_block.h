@@ -79,7 +79,8 @@ class Truth {
   softbody::Vec3 force(const softbody::Vec3& tool);
 
   /// A tool that presses as deep as the first load goes, slides by a quarter of the patch's radius and comes off again,
-  /// in 3 s looked at 33 times a second.
+  /// looked at every `kScriptInterval`.
+  static constexpr double kScriptInterval = 0.03;  ///< s
   const std::vector<Touched>& script();
 
  private:
