@@ -11,7 +11,7 @@ namespace {
 DayConfig short_day(std::uint64_t seed) {
   DayConfig config;
   config.seed = seed;
-  config.length = std::chrono::minutes(7);
+  config.length = std::chrono::minutes(6);
   config.loop_hz = 200;
   config.rekey.datagrams = 4000;  // Z's datagrams reach this first, those of the observers the age
   config.rekey.age = std::chrono::seconds(40);

@@ -102,6 +102,7 @@ struct DayArguments {
 int day(const DayArguments& arguments) {
   DayConfig config = arguments.config;
   config.length = from_seconds(arguments.hours * 3600);
+  config.rekey.datagrams = config.rekey.datagrams * config.loop_hz / DayConfig{}.loop_hz;  // after as long at any rate
   const DayReport report = run_day(config);
   const std::vector<std::pair<const char*, std::variant<std::uint64_t, double>>> figures = {
       {"seed", config.seed},
