@@ -340,8 +340,13 @@ class Day {
     recover(world_.now());
   }
 
-  /// The same key at another address, while the one before is there: it is told, and stays away.
+  /// The same key at another address, while the one before is there: it is told, and stays away. (Where it could not be
+  /// told, its address having changed in that instant, it comes back after its timeout and takes the place again.)
   void take_over() {
+    Network::Weather calm = fair();
+    calm.up.rebind = {};
+    world_.network().change(calm, world_.now());
+    world_.run_for(kLook);
     const std::size_t before = std::exchange(z_, kZ + kZElsewhere - z_);
     ++report_.takeovers;
     come_back(z_);
