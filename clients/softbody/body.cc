@@ -166,9 +166,9 @@ const BodyConfig& checked(const BodyConfig& config) {
   return config;
 }
 
-std::optional<Friction> friction_of(const BodyConfig& config) {
-  if (!config.friction) return std::nullopt;
-  return Friction(*config.friction, sideways_stiffness(config.material, config.patch_radius));
+std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
+  if (!config.friction) return nullptr;
+  return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
 }
 
 }  // namespace
@@ -240,7 +240,8 @@ const Vec3& Body::normal() const { return parts_->surface.normal(); }
 
 Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),
-          static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(), parts_->model->bytes()};
+          static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
+          parts_->model->bytes() + parts_->contact.bytes()};
 }
 
 }  // namespace tendon::softbody

@@ -5,12 +5,13 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace tendon::softbody {
 
 PatchContact::PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
-                           std::optional<Friction> friction)
-    : model_(model), surface_(surface), tool_radius_(tool_radius), side_(side), friction_(friction) {
+                           std::unique_ptr<Friction> friction)
+    : model_(model), surface_(surface), tool_radius_(tool_radius), side_(side), friction_(std::move(friction)) {
   if (!(tool_radius >= 0) || !std::isfinite(tool_radius)) {
     throw std::invalid_argument("the tool's radius: expected 0 or more");
   }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <memory>
 
 #include "clients/softbody/friction.h"
 #include "clients/softbody/model.h"
@@ -47,11 +48,13 @@ class PatchContact {
 
   /// `tool_radius`: 0 is a point; a sphere touches so much earlier. Model and surface must outlive this.
   PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
-               std::optional<Friction> friction = {});
+               std::unique_ptr<Friction> friction = {});
 
   /// The tool's middle at `tool`, m, in the body's frame. Where its patch is not on the body it feels nothing, and
   /// nor does it when `tool` is not finite.
   Feel at(const Vec3& tool);
+
+  std::size_t bytes() const noexcept { return friction_ ? friction_->bytes() : 0; }  ///< of effects
 
  private:
   void rub(const Vec2& place, double normal_force, Feel& feel);
@@ -61,7 +64,7 @@ class PatchContact {
   double tool_radius_;
   Side side_;
   bool stuck_ = false;
-  std::optional<Friction> friction_;
+  std::unique_ptr<Friction> friction_;
 };
 
 }  // namespace tendon::softbody

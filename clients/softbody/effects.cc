@@ -22,13 +22,6 @@ void want_positive(double value, const std::string& name) {
 
 }  // namespace
 
-VectorXd lumped_mass(const Elastic& elastic, double density) {
-  const std::vector<double> volumes = nodal_volumes(elastic.mesh());
-  VectorXd all(elastic.size());
-  for (int i = 0; i < elastic.size(); ++i) all[i] = density * volumes[at(i / 3)];
-  return elastic.to_free(all);
-}
-
 Gravity::Gravity(const Elastic& elastic, const Vec3& acceleration, double density)
     : weight_(
           lumped_mass(elastic, density).cwiseProduct(elastic.to_free(acceleration.replicate(elastic.size() / 3, 1)))) {}
@@ -95,6 +88,16 @@ void check_only_with_inertia(const EffectsConfig& config) {
   check(config);
   if (!config.inertia) throw std::invalid_argument("this model is made of steps of time: it wants inertia");
   if (config.viscosity) throw std::invalid_argument("this model does not simulate viscosity");
+}
+
+void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to) {
+  const VectorXd free = elastic.to_free(u);
+  VectorXd force = VectorXd::Zero(free.size());
+  for (const auto& effect : effects) {
+    effect->add_force(free, force);
+    to.energy += effect->energy(free);
+  }
+  to.force -= force;
 }
 
 Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic) {

@@ -30,9 +30,6 @@ class Effect {
   virtual std::size_t bytes() const noexcept = 0;
 };
 
-/// The kg that are at each free displacement.
-VectorXd lumped_mass(const Elastic& elastic, double density);
-
 /// Weight: −Σ m g·u.
 class Gravity : public Effect {
  public:
@@ -123,6 +120,9 @@ using Effects = std::vector<std::unique_ptr<Effect>>;
 /// What acts on a body at rest too; and what acts only on one that moves, here from rest at u (m, free displacements).
 Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic);
 void add_effects_of_time(Effects& effects, const EffectsConfig& config, const Elastic& elastic, const VectorXd& u);
+
+/// Their energy and forces at u (m, all nodes), to those of elasticity; the forces of free displacements.
+void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to);
 
 std::size_t bytes(const Effects& effects) noexcept;
 

@@ -68,6 +68,13 @@ std::size_t Elastic::mesh_bytes() const noexcept {
          (free_of_.size() + all_of_.size()) * sizeof(int) + pattern_.bytes();
 }
 
+VectorXd lumped_mass(const Elastic& elastic, double density) {
+  const std::vector<double> volumes = nodal_volumes(elastic.mesh());
+  VectorXd all(elastic.size());
+  for (int i = 0; i < elastic.size(); ++i) all[i] = density * volumes[at(i / 3)];
+  return elastic.to_free(all);
+}
+
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch) {
   VectorXd all = VectorXd::Zero(elastic.size());
   for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {

@@ -77,6 +77,9 @@ class Elastic {
   SymmetricMatrix pattern_;
 };
 
+/// The kg that are at each free displacement.
+VectorXd lumped_mass(const Elastic& elastic, double density);
+
 /// 1 N on the patch, against the normal, as forces on all nodes.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 

@@ -69,7 +69,8 @@ ProjectiveModel::ProjectiveModel(const Solid& solid, const TouchSurface& surface
       u_(VectorXd::Zero(solid.size())) {
   if (iterations < 1) throw std::invalid_argument("`iterations`: expected 1 or more");
   if (effects.viscosity) throw std::invalid_argument("this model does not simulate viscosity");
-  if (effects_.empty() && !effects.has_time()) return;
+  const bool among_effects = effects.gravity || effects.has_time();
+  if (!among_effects) return;
   for (int i = 0; i < kRoundsToRest && !effects_.empty(); ++i) press({}, Given::kForce, 0);
   rest_ = u_;
   if (!effects.has_time()) return;

@@ -48,13 +48,7 @@ double QuasiStaticModel::energy() const {
 Elastic::Forces QuasiStaticModel::forces() const {
   Elastic::Forces all = elastic_.forces(u_);
   all.force = elastic_.to_free(all.force);
-  for (const auto& effect : effects_) {
-    const VectorXd free = elastic_.to_free(u_);
-    VectorXd force = VectorXd::Zero(free.size());
-    effect->add_force(free, force);
-    all.force -= force;
-    all.energy += effect->energy(free);
-  }
+  if (!effects_.empty()) add_forces(effects_, elastic_, u_, all);
   return all;
 }
 

@@ -18,7 +18,6 @@ XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterat
       slowing_(1 / (1 + effects.damping.value_or(0) * effects.step)),
       mu_(solid.material().mu()),
       lambda_(solid.material().lambda()),
-      gravity_(effects.gravity.value_or(Vec3::Zero())),
       per_mass_(VectorXd::Zero(solid.size())),
       u_(VectorXd::Zero(solid.size())),
       velocity_(VectorXd::Zero(solid.size())) {
@@ -31,6 +30,8 @@ XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterat
   }
   solid.add_free(lumped_mass(solid, effects.density).cwiseInverse(), per_mass_);
   if (effects.gravity) {
+    fall_ = dt_ * effects.gravity->replicate(solid.size() / 3, 1);
+    fall_ = (per_mass_.array() > 0).select(fall_, 0);
     rest_ = shape_at_rest(solid, surface, effects);
     u_ = rest_;
   }
@@ -77,9 +78,7 @@ Reaction XpbdModel::press(const Patch& patch, Given given, double value) {
         dt_ * dt_ * patch.weights[i] * patch.weights[i] * normal_.cwiseAbs2().dot(per_mass_.segment<3>(3 * node));
   }
 
-  if (rest_.size() > 0) {
-    for (Eigen::Index i = 0; i < velocity_.size(); ++i) velocity_[i] += per_mass_[i] > 0 ? dt_ * gravity_[i % 3] : 0;
-  }
+  if (fall_.size() > 0) velocity_ += fall_;
   if (slowing_ < 1) velocity_ *= slowing_;
   u_ += dt_ * velocity_;
   Reaction reaction;
@@ -106,7 +105,8 @@ Reaction XpbdModel::press(const Patch& patch, Given given, double value) {
 
 std::size_t XpbdModel::bytes() const noexcept {
   return tets_.size() * sizeof(Tet) +
-         static_cast<std::size_t>(per_mass_.size() + u_.size() + velocity_.size() + rest_.size()) * sizeof(double);
+         static_cast<std::size_t>(per_mass_.size() + u_.size() + velocity_.size() + fall_.size() + rest_.size()) *
+             sizeof(double);
 }
 
 }  // namespace tendon::softbody

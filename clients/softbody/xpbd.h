@@ -47,11 +47,11 @@ class XpbdModel : public Model {
   double slowing_;  ///< 1/(1 + rate dt); 1 without damping
   double mu_;
   double lambda_;
-  Vec3 gravity_ = Vec3::Zero();  ///< m/s²
   std::vector<Tet> tets_;
   VectorXd per_mass_;  ///< 1/kg, all nodes; 0 where they are held
   VectorXd u_;         ///< m, all nodes
   VectorXd velocity_;  ///< m/s
+  VectorXd fall_;      ///< m/s, what the weight adds to the velocity in a step; empty without gravity
   VectorXd rest_;      ///< m, the shape at rest under the weight; empty without gravity
 };
 
