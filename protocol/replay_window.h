@@ -40,14 +40,16 @@ class ReplayWindow {
     ++count_;
   }
 
-  /// Bit i: (number − 1 − i) is known to have been inserted.
+  /// Bit i: (number − 1 − i) is known to have been inserted. `number` is not above the highest.
   std::uint32_t mask_before(std::uint64_t number) const noexcept {
-    std::uint32_t mask = 0;
-    for (std::uint64_t i = 0; i < 32 && i < number; ++i) {
-      const std::uint64_t earlier = number - 1 - i;
-      if (highest_ - earlier < kRemembered && (words_[word(earlier)] & bit(earlier)) != 0) mask |= 1U << i;
-    }
-    return mask;
+    // The 64 numbers before it, its predecessor in the uppermost bit.
+    const std::uint64_t into = number % 64;
+    const std::uint64_t whole = words_[word(number - 64)];
+    const std::uint64_t before = into == 0 ? whole : words_[word(number)] << (64 - into) | whole >> into;
+    const std::uint64_t behind = highest_ - number;
+    const std::uint64_t known = behind < kRemembered ? kRemembered - 1 - behind : 0;
+    const std::uint32_t of_these = known < 32 ? (1U << known) - 1 : ~0U;
+    return reversed(static_cast<std::uint32_t>(before >> 32)) & of_these;
   }
 
   bool empty() const noexcept { return empty_; }
@@ -58,6 +60,14 @@ class ReplayWindow {
  private:
   static std::size_t word(std::uint64_t number) noexcept { return (number / 64) % (kBits / 64); }
   static std::uint64_t bit(std::uint64_t number) noexcept { return std::uint64_t{1} << (number % 64); }
+
+  static std::uint32_t reversed(std::uint32_t bits) noexcept {
+    bits = (bits & 0x5555'5555U) << 1 | (bits >> 1 & 0x5555'5555U);
+    bits = (bits & 0x3333'3333U) << 2 | (bits >> 2 & 0x3333'3333U);
+    bits = (bits & 0x0F0F'0F0FU) << 4 | (bits >> 4 & 0x0F0F'0F0FU);
+    bits = (bits & 0x00FF'00FFU) << 8 | (bits >> 8 & 0x00FF'00FFU);
+    return bits << 16 | bits >> 16;
+  }
 
   std::array<std::uint64_t, kBits / 64> words_{};
   std::uint64_t highest_ = 0;

@@ -55,11 +55,12 @@ bool IncomingRequests::take(const Control& control) {
   Slot& mine = slot(control.id);
   if (control.id < next_) {
     // Older than what the slot remembers: a late copy of a request whose answer has long arrived.
-    if (mine.control.id == control.id && mine.stage == Slot::Stage::kAnswered) mine.due = true;
+    if (mine.control.id == control.id && mine.stage == Slot::Stage::kAnswered) set_due(mine, true);
     return true;
   }
   if (control.id - next_ >= limits::kRequestWindow) return false;
   if (mine.stage == Slot::Stage::kTaken) return false;  // cannot know the answer to the one 16 before
+  set_due(mine, false);
   mine = {.stage = Slot::Stage::kArrived, .control = control, .answer = {}, .due = false};
   return true;
 }
@@ -80,14 +81,20 @@ void IncomingRequests::answer(ControlAck ack) {
   if (mine.control.id != ack.id || mine.stage != Slot::Stage::kTaken) return;
   mine.stage = Slot::Stage::kAnswered;
   mine.answer = std::move(ack);
-  mine.due = true;
+  set_due(mine, true);
+}
+
+void IncomingRequests::set_due(Slot& slot, bool due) noexcept {
+  due_ += (due ? 1 : 0) - (slot.due ? 1 : 0);
+  slot.due = due;
 }
 
 const ControlAck* IncomingRequests::next_due() const noexcept {
+  if (due_ == 0) return nullptr;
   const auto due = std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.due; });
   return due == slots_.end() ? nullptr : &due->answer;
 }
 
-void IncomingRequests::sent(std::uint32_t id) noexcept { slot(id).due = false; }
+void IncomingRequests::sent(std::uint32_t id) noexcept { set_due(slot(id), false); }
 
 }  // namespace tendon

@@ -81,9 +81,11 @@ class IncomingRequests {
     bool due = false;
   };
   Slot& slot(std::uint32_t id) noexcept { return slots_[id % limits::kRequestWindow]; }
+  void set_due(Slot& slot, bool due) noexcept;
 
   std::array<Slot, limits::kRequestWindow> slots_;
   std::uint32_t next_ = 1;  ///< the next request to hand out
+  int due_ = 0;             ///< slots that are: asked for at every datagram, and hardly ever any
 };
 
 }  // namespace tendon

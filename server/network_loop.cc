@@ -99,12 +99,15 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
-  const bool more = drain(now);
+  // What is newest leaves before anything else is looked at: a state waits for no system call.
   publish(now);
+  const bool more = drain(now);
   report(now);
   for (Guest& guest : guests_) {
     guest.session.tick(now);
-    serve(now, guest);
+    take_events(now, guest);
+    if (guest.role == Role::kController) stats_.controller = guest.session.stats();
+    send_all(now, guest);
   }
   std::erase_if(guests_, [](const Guest& guest) { return guest.gone; });
   stats_.half_open_forgotten +=
@@ -150,6 +153,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       ++stats_.roamed;
     }
     if (newest) measure(now, *guest);
+    take_events(now, *guest);  // a force waits for no further system call
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
     if (!waiting->session.receive(now, datagram)) return;
@@ -559,9 +563,10 @@ void NetworkLoop::publish(LocalTime now) {
       guest.session.send(*state);
     }
   }
+  for (Guest& guest : guests_) send_all(now, guest);
 }
 
-void NetworkLoop::serve(LocalTime now, Guest& guest) {
+void NetworkLoop::take_events(LocalTime now, Guest& guest) {
   while (const auto event = guest.session.next_event()) {
     std::visit(Overloaded{
                    [&](const Session::ForceArrived& arrived) { take_force(now, guest, arrived.command); },
@@ -574,8 +579,6 @@ void NetworkLoop::serve(LocalTime now, Guest& guest) {
                },
                *event);
   }
-  if (guest.role == Role::kController) stats_.controller = guest.session.stats();
-  send_all(now, guest);
 }
 
 void NetworkLoop::send_all(LocalTime now, Guest& guest) {

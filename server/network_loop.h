@@ -200,7 +200,7 @@ class NetworkLoop {
   static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
                                  const std::vector<Seat>& seats);
   void open(LocalTime now, Guest guest);
-  void serve(LocalTime now, Guest& guest);
+  void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
   void take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted);

@@ -76,17 +76,13 @@ void UdpLink::send(const Address& to, std::span<const std::byte> datagram) {
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
   // Not through Asio: it has no way to tell the full size of a datagram that was cut.
   udp::endpoint endpoint;
-  iovec piece{buffer.data(), buffer.size()};
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
-    msghdr message{};
-    message.msg_name = endpoint.data();
-    message.msg_namelen = static_cast<socklen_t>(endpoint.capacity());
-    message.msg_iov = &piece;
-    message.msg_iovlen = 1;
-    const ssize_t size = ::recvmsg(fd(), &message, MSG_TRUNC | MSG_DONTWAIT);
+    auto length = static_cast<socklen_t>(endpoint.capacity());
+    const ssize_t size =
+        ::recvfrom(fd(), buffer.data(), buffer.size(), MSG_TRUNC | MSG_DONTWAIT, endpoint.data(), &length);
     if (size == 0 || (size < 0 && errno == EINTR)) continue;
     if (size < 0) return 0;
-    endpoint.resize(message.msg_namelen);
+    endpoint.resize(length);
     from = to_address(endpoint);
     return static_cast<std::size_t>(size);
   }

@@ -92,6 +92,7 @@ bool ForceClient::give_lease() {
 
 LocalTime ForceClient::turn(LocalTime now) {
   if (stats_.phase == Phase::kStopped) return LocalTime::max();
+  flush(now);  // the force of the last turn waits for no system call
   const bool more = drain(now);
   tick(now);
   flush(now);

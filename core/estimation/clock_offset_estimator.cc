@@ -89,26 +89,28 @@ std::optional<ClockOffsetEstimator::Estimate> ClockOffsetEstimator::estimate(Loc
   if (anchor == nullptr) return std::nullopt;
 
   // Everything relative to the best sample: offsets themselves may be beyond what a double holds to the nanosecond.
-  double weights = 0;
-  double sum_t = 0;
-  double sum_o = 0;
-  const auto weight = [&](const Sample& sample) {
-    return 1 / static_cast<double>(kResolution.count() + sample.doubt - least);
+  struct Point {
+    double weight, t, offset;
   };
+  std::array<Point, kBlocks + 1> points;
+  std::size_t count = 0;
+  Point sum{};
   for_each([&](const Sample& sample) {
-    weights += weight(sample);
-    sum_t += weight(sample) * ns_between(anchor->at, sample.at);
-    sum_o += weight(sample) * static_cast<double>(sample.offset_ns - anchor->offset_ns);
+    const double weight = 1 / static_cast<double>(kResolution.count() + sample.doubt - least);
+    const Point point{weight, ns_between(anchor->at, sample.at),
+                      static_cast<double>(sample.offset_ns - anchor->offset_ns)};
+    sum = {sum.weight + weight, sum.t + weight * point.t, sum.offset + weight * point.offset};
+    points[count++] = point;
   });
-  const double mean_t = sum_t / weights;
-  const double mean_o = sum_o / weights;
+  const double mean_t = sum.t / sum.weight;
+  const double mean_o = sum.offset / sum.weight;
   double tt = 0;
   double to = 0;
-  for_each([&](const Sample& sample) {
-    const double t = ns_between(anchor->at, sample.at) - mean_t;
-    tt += weight(sample) * t * t;
-    to += weight(sample) * t * static_cast<double>(sample.offset_ns - anchor->offset_ns);
-  });
+  for (std::size_t i = 0; i < count; ++i) {
+    const double t = points[i].t - mean_t;
+    tt += points[i].weight * t * t;
+    to += points[i].weight * t * points[i].offset;
+  }
   const double drift = tt > 0 ? std::clamp(to / tt, -fastest_drift_, fastest_drift_) : 0;
 
   const Interval interval = permitted(at, anchor->offset_ns);

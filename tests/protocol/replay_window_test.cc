@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <set>
+#include <vector>
 
 namespace tendon {
 namespace {
@@ -36,6 +38,8 @@ TEST(ReplayWindow, TellsThe32NumbersBeforeOne) {
   for (const std::uint64_t n : {10U, 67U, 97U, 98U, 100U}) window.insert(n);
   EXPECT_EQ(window.mask_before(100), (1U << 1U) | (1U << 2U));  // 98, 97; 67 is one too far
   EXPECT_EQ(window.mask_before(99), 1U | (1U << 1U) | (1U << 31U));
+  window.insert(128);
+  EXPECT_EQ(window.mask_before(128), 1U << 27U | 1U << 29U | 1U << 30U);  // across a word
 }
 
 TEST(ReplayWindow, SurvivesTheLargestNumber) {
@@ -61,8 +65,12 @@ RC_GTEST_PROP(ReplayWindow, DecidesAsASetWithAHorizonDoes, ()) {
     model.insert(number);
     highest = *model.rbegin();
     RC_ASSERT(window.missing() == highest + 1 - model.size());
-    for (std::uint64_t i = 0; i < 32 && i < highest; ++i) {
-      RC_ASSERT((window.mask_before(highest) >> i & 1U) == model.count(highest - 1 - i));
+    const std::uint64_t behind = *rc::gen::element<std::uint64_t>(0, 1, 40, 1940, 1960, 1983, 1984, 5000);
+    for (const std::uint64_t told : {highest, highest - std::min(behind, highest)}) {
+      for (std::uint64_t i = 0; i < 32; ++i) {
+        const bool known = i < told && highest - (told - 1 - i) < ReplayWindow::kRemembered;
+        RC_ASSERT((window.mask_before(told) >> i & 1U) == (known ? model.count(told - 1 - i) : 0));
+      }
     }
   }
 }

@@ -1,0 +1,430 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tendon-bench-roundtrip: from a state handed over to the force that answers it, decoded in its box, over the loopback
+// and back through a client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes
+// between the same two processes and the same kinds of sockets that waits in the same way. The two take turns in
+// blocks, so that what else the machine does falls on both. For suite 1 there is a second floor: the ping-pong that
+// seals and opens each datagram with libsodium, and does nothing else.
+#include <netinet/in.h>
+#include <poll.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "clients/cpp/force_client.h"
+#include "clients/cpp/udp_transport.h"
+#include "protocol/codec.h"
+#include "protocol/crypto.h"
+#include "server/clock.h"
+#include "server/network_loop.h"
+#include "server/udp_link.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+/// Nothing on a loopback takes so long: something is broken.
+constexpr Duration kGiveUp = std::chrono::seconds(10);
+constexpr Duration kHapticPeriod = milliseconds(1);
+/// At the beginning of each block, not counted: caches, and the processor's clock.
+constexpr int kWarmUp = 50;
+
+struct Options {
+  int blocks = 40;
+  int exchanges = 500;  ///< of each kind in a block
+  int fifo = 0;         ///< SCHED_FIFO priority of both processes; 0: as it is
+  bool json = false;
+};
+
+enum class Wait : std::uint8_t { kBusy, kBlocking };
+
+/// What the other process is to do. In memory that both share.
+struct Orders {
+  enum Job : int { kRest, kEcho, kSealedEcho, kTendon, kQuit };
+  std::atomic<int> job{kRest};
+  std::atomic<int> at_work{kRest};  ///< what it does
+  std::atomic<int> echo_bytes{0};   ///< what it echoes with
+};
+
+/// One end of a bare ping-pong. The server's is one socket for whoever comes, as a server's is; the client's is
+/// connected. `sealed`: what follows the first 16 bytes is sealed and opened by libsodium.
+class BareSocket {
+ public:
+  BareSocket(int fd, const Address* peer, Wait wait, bool sealed) : fd_(fd), wait_(wait), sealed_(sealed) {
+    if (peer != nullptr) to_ = to_sockaddr(*peer);
+  }
+
+  void send(std::size_t size) {
+    if (sealed_) {
+      const auto body = std::span(buffer_).subspan(kHeaderSize, size - kHeaderSize);
+      crypto::seal(key_, 0, std::span(buffer_).first(kHeaderSize), body.first(body.size() - crypto::kTagSize), body);
+    }
+    const auto* const to = to_ ? reinterpret_cast<const sockaddr*>(&*to_) : nullptr;
+    if (::sendto(fd_, buffer_.data(), size, 0, to, to_ ? sizeof *to_ : 0) < 0) {
+      throw std::system_error(errno, std::generic_category(), "send");
+    }
+  }
+  /// True when a datagram has come; waits as long as it may.
+  bool receive() {
+    if (wait_ == Wait::kBlocking) {
+      pollfd readable{fd_, POLLIN, 0};
+      const timespec time{0, 1'000'000};
+      ::ppoll(&readable, 1, &time, nullptr);
+    }
+    sockaddr_in from{};
+    socklen_t length = sizeof from;
+    const ssize_t size = ::recvfrom(fd_, buffer_.data(), buffer_.size(), MSG_DONTWAIT,
+                                    to_ ? reinterpret_cast<sockaddr*>(&from) : nullptr, to_ ? &length : nullptr);
+    if (size <= 0 || !sealed_) return size > 0;
+    const auto body = std::span(buffer_).subspan(kHeaderSize, static_cast<std::size_t>(size) - kHeaderSize);
+    return crypto::open(key_, 0, std::span(buffer_).first(kHeaderSize), body,
+                        body.first(body.size() - crypto::kTagSize));
+  }
+
+  static sockaddr_in to_sockaddr(const Address& ipv4) {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(ipv4.port);
+    std::copy(ipv4.ip.end() - 4, ipv4.ip.end(), reinterpret_cast<std::uint8_t*>(&to.sin_addr));
+    return to;
+  }
+
+ private:
+  int fd_;
+  Wait wait_;
+  bool sealed_;
+  Key key_;
+  std::optional<sockaddr_in> to_;
+  std::array<std::byte, kMaxDatagram> buffer_{};
+};
+
+/// The server's link; between its system calls it looks into the box, as the haptic thread does on a core of its own.
+class WatchedLink : public Link {
+ public:
+  WatchedLink(UdpLink& link, Mailboxes& mail) : link_(link), mail_(mail) {}
+
+  void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    look();
+    return link_.receive(from, buffer);
+  }
+  void look() {
+    const RemoteForce* const force = mail_.forces.front().take();
+    if (force == nullptr) return;
+    answered_tick = force->answers_tick;
+    seen = clock::now();
+  }
+
+  std::uint64_t answered_tick = 0;  ///< by the newest force in the box
+  LocalTime seen{};                 ///< when it was there
+
+ private:
+  UdpLink& link_;
+  Mailboxes& mail_;
+};
+
+void connect(int fd, const Address& to) {
+  const sockaddr_in address = BareSocket::to_sockaddr(to);
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::system_error(errno, std::generic_category(), "cannot connect a bare socket");
+  }
+}
+
+void enter_fifo(int priority) {
+  ::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
+  if (priority == 0) return;
+  sched_param param{};
+  param.sched_priority = priority;
+  if (::sched_setscheduler(0, SCHED_FIFO, &param) != 0) {
+    throw std::system_error(errno, std::generic_category(), "SCHED_FIFO " + std::to_string(priority));
+  }
+}
+
+/// The other process: a wall at x = 0, or the echo.
+void serve(Orders& orders, const Address& server, int echo, Wait wait, const std::optional<Key>& key) {
+  UdpTransport transport(server);
+  ForceClient::Config config;
+  config.name = "wall";
+  config.key = key;
+  config.seed = 7;
+  ForceClient client(
+      transport, server, config,
+      [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },
+      clock::now());
+  BareSocket bare(echo, nullptr, wait, false);
+  BareSocket sealed(echo, nullptr, wait, true);
+  for (;;) {
+    const int job = orders.job.load(std::memory_order_acquire);
+    orders.at_work.store(job, std::memory_order_release);
+    if (job == Orders::kQuit) return;
+    if (job == Orders::kEcho || job == Orders::kSealedEcho) {
+      BareSocket& socket = job == Orders::kEcho ? bare : sealed;
+      if (socket.receive()) socket.send(static_cast<std::size_t>(orders.echo_bytes.load(std::memory_order_relaxed)));
+    } else if (job == Orders::kTendon) {
+      const LocalTime now = clock::now();
+      const LocalTime next = client.turn(now);
+      if (wait == Wait::kBlocking) transport.wait(std::min<Duration>(next - now, milliseconds(1)));
+    } else {
+      std::this_thread::sleep_for(microseconds(50));
+    }
+  }
+}
+
+struct Figures {
+  Duration p50{};
+  Duration p99{};
+};
+Figures figures(std::vector<Duration> times) {
+  std::sort(times.begin(), times.end());
+  return {times[times.size() / 2], times[times.size() * 99 / 100]};
+}
+
+struct Result {
+  std::size_t n = 0;
+  Figures bare;
+  Figures sealed;  ///< suite 1: as `bare`, with libsodium at both ends
+  Figures tendon;
+  Figures until_step;  ///< from then to the next haptic step
+  std::size_t state_bytes = 0;
+  std::size_t force_bytes = 0;
+};
+
+class Bench {
+ public:
+  Bench(const Options& options, Wait wait, bool sealed)
+      : options_(options), wait_(wait), sealed_(sealed), key_(Ratchet(3).next()) {
+    NetworkLoop::Config config;
+    config.devices = {{.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}}};
+    if (sealed) config.keys = {{.name = "wall", .role = Role::kController, .key = key_}};
+    network_.emplace(config, watched_, std::vector{&mail_});
+    connect(bare_client_.fd(), bare_server_.local_address());
+    void* const shared = ::mmap(nullptr, sizeof(Orders), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
+    orders_ = new (shared) Orders;
+    const Address server = link_.local_address();
+    child_ = ::fork();
+    if (child_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+    if (child_ == 0) {
+      try {
+        enter_fifo(options.fifo);
+        serve(*orders_, server, bare_client_.fd(), wait, sealed ? std::optional(key_) : std::nullopt);
+        ::_exit(kDone);
+      } catch (const std::exception& error) {
+        std::fprintf(stderr, "tendon-bench-roundtrip: %s\n", error.what());
+        ::_exit(kFailed);
+      }
+    }
+  }
+  ~Bench() {
+    orders_->job = Orders::kQuit;
+    ::waitpid(child_, nullptr, 0);
+    ::munmap(orders_, sizeof(Orders));
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+
+  Result run() {
+    order(Orders::kTendon);
+    exchange();  // the handshake
+    for (int i = 0; i < kWarmUp; ++i) exchange();
+    std::vector<Duration> bare;
+    std::vector<Duration> sealed;
+    std::vector<Duration> tendon;
+    for (int block = 0; block < options_.blocks; ++block) {
+      orders_->echo_bytes = static_cast<int>(force_bytes_);
+      ping_pong(Orders::kEcho, bare);
+      if (sealed_) ping_pong(Orders::kSealedEcho, sealed);
+      order(Orders::kTendon);
+      for (int i = -kWarmUp; i < options_.exchanges; ++i) {
+        const Duration took = exchange();
+        if (i >= 0) tendon.push_back(took);
+      }
+    }
+    std::vector<Duration> until_step;
+    for (const Duration took : tendon) until_step.push_back(kHapticPeriod - took % kHapticPeriod);
+    return {tendon.size(), figures(bare), sealed_ ? figures(sealed) : Figures{}, figures(tendon), figures(until_step),
+            state_bytes_,  force_bytes_};
+  }
+
+ private:
+  static void check(LocalTime began) {
+    if (clock::now() - began > kGiveUp) throw std::runtime_error("the other process does not answer");
+  }
+
+  void ping_pong(Orders::Job job, std::vector<Duration>& times) {
+    const Address peer = bare_client_.local_address();
+    BareSocket socket(bare_server_.fd(), &peer, wait_, job == Orders::kSealedEcho);
+    order(job);
+    for (int i = -kWarmUp; i < options_.exchanges; ++i) {
+      const LocalTime began = clock::now();
+      socket.send(state_bytes_);
+      while (!socket.receive()) check(began);
+      if (i >= 0) times.push_back(clock::now() - began);
+    }
+  }
+
+  void order(Orders::Job job) {
+    orders_->job.store(job, std::memory_order_release);
+    const LocalTime began = clock::now();
+    while (orders_->at_work.load(std::memory_order_acquire) != job) {
+      check(began);
+      std::this_thread::sleep_for(microseconds(20));
+    }
+  }
+
+  /// A state into its box, and rounds of the network loop until the force that answers it is in its own.
+  Duration exchange() {
+    DeviceState state;
+    state.tick = ++tick_;
+    state.position = Vec3(0.0123, -0.0456, 0.0789);
+    state.velocity = Vec3(0.1, -0.2, 0.3);
+    state.force_applied = Vec3(-1.5, 2.5, 0.25);
+    state.energy = 0.0123;
+    state.permitted_force = 3.4;
+    state.force_sequence = tick_;
+    state.force_age = milliseconds(7);
+    state.mode = Mode::kActive;
+    const LocalTime began = clock::now();
+    state.sampled = PeerTime(began.time_since_epoch());
+    mail_.state.put(state);
+    network_->turn(began);
+    for (LocalTime put = began;;) {
+      if (wait_ == Wait::kBlocking) link_.wait(milliseconds(1));
+      const LocalTime now = clock::now();
+      network_->turn(now);
+      watched_.look();
+      if (watched_.answered_tick == tick_) {
+        see_sizes();
+        return watched_.seen - began;
+      }
+      check(began);
+      // The other one is not there yet, or the datagram is lost.
+      if (now - put > milliseconds(200)) {
+        put = now;
+        state.tick = ++tick_;
+        mail_.state.put(state);
+      }
+    }
+  }
+
+  /// What the log thread does in production.
+  void see_sizes() {
+    while (const DatagramRecord* record = mail_.datagrams.front()) {
+      (record->direction == DatagramRecord::Direction::kOut ? state_bytes_ : force_bytes_) = record->size;
+      mail_.datagrams.pop();
+    }
+  }
+
+  Options options_;
+  Wait wait_;
+  bool sealed_;
+  Key key_;
+  Mailboxes mail_{{.steps = 16, .flight = 16, .datagrams = 1024}};
+  UdpLink link_{parse_address("127.0.0.1:0")};
+  WatchedLink watched_{link_, mail_};
+  std::optional<NetworkLoop> network_;
+  UdpLink bare_server_{parse_address("127.0.0.1:0")};
+  UdpLink bare_client_{parse_address("127.0.0.1:0")};
+  Orders* orders_ = nullptr;
+  pid_t child_ = 0;
+  std::uint64_t tick_ = 0;
+  std::size_t state_bytes_ = 0;
+  std::size_t force_bytes_ = 0;
+};
+
+double us(Duration d) { return 1e6 * seconds(d); }
+
+void print(const Options& options, Wait wait, bool sealed, const Result& r) {
+  const char* const style = wait == Wait::kBusy ? "busy-polling" : "blocking";
+  const double p50 = us(r.tendon.p50) / us(r.bare.p50);
+  const double p99 = us(r.tendon.p99) / us(r.bare.p99);
+  const double to_sealed = sealed ? us(r.tendon.p50) / us(r.sealed.p50) : p50;
+  if (options.json) {
+    double load = 0;
+    ::getloadavg(&load, 1);
+    std::printf(
+        "{\"wait\":\"%s\",\"suite\":%d,\"n\":%zu,\"state_bytes\":%zu,\"force_bytes\":%zu,\"bare_p50_us\":%.2f,"
+        "\"bare_p99_us\":%.2f,\"bare_sealed_p50_us\":%.2f,\"tendon_p50_us\":%.2f,\"tendon_p99_us\":%.2f,"
+        "\"p50_ratio\":%.3f,\"p99_ratio\":%.3f,\"p50_ratio_sealed\":%.3f,\"until_step_p50_us\":%.1f,\"fifo\":%d,"
+        "\"load\":%.2f}\n",
+        style, sealed ? 1 : 0, r.n, r.state_bytes, r.force_bytes, us(r.bare.p50), us(r.bare.p99), us(r.sealed.p50),
+        us(r.tendon.p50), us(r.tendon.p99), p50, p99, to_sealed, us(r.until_step.p50), options.fifo, load);
+  } else {
+    std::printf("%-13s %5d %7zu  %4zu/%-4zu %8.1f %8.1f %8.1f %8.1f %8.1f %7.2f %7.2f %8.2f %10.0f\n", style,
+                sealed ? 1 : 0, r.n, r.state_bytes, r.force_bytes, us(r.bare.p50), us(r.bare.p99),
+                us(sealed ? r.sealed.p50 : r.bare.p50), us(r.tendon.p50), us(r.tendon.p99), p50, p99, to_sealed,
+                us(r.until_step.p50));
+  }
+  std::fflush(stdout);
+}
+
+int main_of(int argc, char** argv) {
+  CLI::App app("From a state to the force that answers it, over the loopback, beside a bare ping-pong of datagrams",
+               "tendon-bench-roundtrip");
+  Options options;
+  app.add_option("--blocks", options.blocks, "in which both take turns")->check(CLI::Range(1, 100'000));
+  app.add_option("--exchanges", options.exchanges, "of each kind in a block")->check(CLI::Range(10, 1'000'000));
+  app.add_option("--fifo", options.fifo, "real-time priority of both processes, on a machine with other work")
+      ->check(CLI::Range(0, 99));
+  app.add_flag("--json", options.json, "one JSON object a line instead of the table");
+  app.get_formatter()->column_width(32);
+  app.footer(
+      "\nExample:\n  tendon-bench-roundtrip --fifo 50\n\nExit: 0 done; 1 it could not be measured; 2 wrong usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kWrongUsage;
+  }
+  try {
+    if (!options.json) {
+      std::printf(
+          "                              bytes  bare ping-pong   sealed     state to force   ratio to bare    to      "
+          "to the step\n"
+          "wait          suite       n  there/back p50 µs   p99 µs   p50 µs   p50 µs   p99 µs     p50     p99   sealed "
+          "    p50 µs\n");
+      std::fflush(stdout);
+    }
+    for (const Wait wait : {Wait::kBusy, Wait::kBlocking}) {
+      for (const bool sealed : {false, true}) {
+        Bench bench(options, wait, sealed);  // forks before it has a priority of its own
+        enter_fifo(options.fifo);
+        print(options, wait, sealed, bench.run());
+      }
+    }
+    return kDone;
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-bench-roundtrip: " << error.what() << '\n';
+    return kFailed;
+  }
+}
+
+}  // namespace
+}  // namespace tendon
+
+int main(int argc, char** argv) { return tendon::main_of(argc, argv); }
