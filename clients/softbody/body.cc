@@ -15,6 +15,7 @@
 #include "clients/softbody/mass_spring.h"
 #include "clients/softbody/modal.h"
 #include "clients/softbody/projective.h"
+#include "clients/softbody/sphere.h"
 #include "clients/softbody/xpbd.h"
 
 namespace tendon::softbody {
@@ -163,6 +164,11 @@ const BodyConfig& checked(const BodyConfig& config) {
   if (model.tetrahedra && config.element != Element::kTet4) {
     throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
   }
+  if (config.tool == BodyConfig::Tool::kSphere) {
+    if (config.model != ModelKind::kCondensed) throw std::invalid_argument("a sphere wants the model \"condensed\"");
+    if (config.friction) throw std::invalid_argument("a sphere has no friction");
+    if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument("a sphere does not stick");
+  }
   return config;
 }
 
@@ -203,13 +209,17 @@ struct Body::Parts {
     const auto found = surface.patch(surface.across(config.middle));
     if (!found) throw std::invalid_argument("the middle of the touched side is not on the body");
     patch = *found;
+    if (config.tool == BodyConfig::Tool::kSphere) {
+      sphere.emplace(dynamic_cast<const CondensedModel&>(*model), surface, config.tool_radius);
+    }
   }
 
   Solid solid;
   TouchSurface surface;
   std::unique_ptr<Model> model;
   PatchContact contact;
-  Patch patch;  ///< around the middle
+  std::optional<SphereContact> sphere;  ///< instead of `contact`
+  Patch patch;                          ///< around the middle
 };
 
 Body::Body(const BodyConfig& config) : parts_(std::make_unique<Parts>(config)) {}
@@ -217,7 +227,7 @@ Body::~Body() = default;
 Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
-Feel Body::touch(const Vec3& tool) { return parts_->contact.at(tool); }
+Feel Body::touch(const Vec3& tool) { return parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool); }
 
 Reaction Body::press(Given given, double value) { return parts_->model->press(parts_->patch, given, value); }
 

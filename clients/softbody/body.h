@@ -119,6 +119,9 @@ struct BodyConfig {
   std::optional<double> reach;
   Vec3 middle = Vec3::Zero();  ///< m; its place across `towards_tool` counts
   double tool_radius = 0;      ///< m; 0: a point
+  /// What touches: a patch of fixed size, or a rigid sphere of `tool_radius` whose contact grows (kCondensed alone).
+  enum class Tool : std::uint8_t { kPatch, kSphere };
+  Tool tool = Tool::kPatch;
   PatchContact::Side side = PatchContact::Side::kUnilateral;
 };
 

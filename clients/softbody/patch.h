@@ -50,7 +50,8 @@ class TouchSurface {
   /// The patch around `middle`. None where less of it lies on the body than `least_covered`.
   std::optional<Patch> patch(const Vec2& middle, double least_covered = 0.5) const;
 
-  /// The height of a node, m: its position along the normal.
+  /// A node's position across, and its height, the one along the normal; m.
+  const Vec2& place(int node) const { return places_[static_cast<std::size_t>(node)]; }
   double height(int node) const { return heights_[static_cast<std::size_t>(node)]; }
 
  private:

@@ -200,6 +200,12 @@ void read_touch(Table table, BodyConfig& body) {
   body.patch_radius = table.length("patch_radius_mm");
   body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
   if (table.find("reach_mm") != nullptr) body.reach = table.length("reach_mm");
+  if (table.find("tool") != nullptr) {
+    body.tool = table.choice("tool", "patch, sphere", [](std::string_view name) {
+      if (name == "patch") return std::optional(BodyConfig::Tool::kPatch);
+      return name == "sphere" ? std::optional(BodyConfig::Tool::kSphere) : std::nullopt;
+    });
+  }
   if (table.find("side") != nullptr) {
     body.side = table.choice("side", "unilateral, bilateral", [](std::string_view name) {
       if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
@@ -343,7 +349,8 @@ std::string scene_reference() {
           "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
           "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
           "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
-          "tool_radius_mm = 0       a point, or a sphere, which touches so much earlier\n"
+          "tool = \"patch\"           or sphere: rigid, its contact grows as it is pressed in; condensed alone\n"
+          "tool_radius_mm = 0       how much earlier a patch touches; the sphere's\n"
           "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
           "[place]\n"
           "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
@@ -362,8 +369,9 @@ std::string explain(const Scene& scene) {
   const Reaction small = body.settle(Given::kForce, push);
   std::ostringstream text;
   text << "simulated:\n  contact: " << (scene.body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
-       << ", on a patch of " << 1e3 * scene.body.patch_radius << " mm\n  elasticity: " << model.name << ", "
-       << model.what << '\n';
+       << (scene.body.tool == BodyConfig::Tool::kSphere ? ", a sphere of " : ", on a patch of ")
+       << 1e3 * (scene.body.tool == BodyConfig::Tool::kSphere ? scene.body.tool_radius : scene.body.patch_radius)
+       << " mm\n  elasticity: " << model.name << ", " << model.what << '\n';
   for (const EffectInfo& effect : effects()) {
     if (effect.kind != EffectKind::kContact && simulated.has(effect.kind)) {
       text << "  " << effect.name << ": " << effect.what << '\n';

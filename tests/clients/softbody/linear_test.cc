@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/clients/softbody/half_space.h"
 #include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody {
@@ -52,37 +53,6 @@ TEST(Reference, ErrorsShrinkAtTheElementsOwnOrder) {
   EXPECT_NEAR(std::log2(coarse / fine), 2, 0.3);
 }
 
-/// Layers from 0 to `length`, the first `first` thick, each thicker than the one before by the same factor.
-std::vector<double> graded(double first, double length, int count) {
-  double low = 1;
-  double high = 4;
-  for (int i = 0; i < 60; ++i) {
-    const double q = 0.5 * (low + high);
-    (first * (std::pow(q, count) - 1) / (q - 1) > length ? high : low) = q;
-  }
-  std::vector<double> layers{0};
-  double step = first;
-  for (int i = 0; i < count; ++i, step *= low) layers.push_back(layers.back() + step);
-  return layers;
-}
-
-/// A quarter of a half space, up to z = 0, touched in the corner x = y = 0.
-Solid quarter_of_half_space(Element element, double first, double length, int count, const Material& material) {
-  const std::vector<double> out = graded(first, length, count);
-  std::vector<double> down;
-  for (auto layer = out.rbegin(); layer != out.rend(); ++layer) down.push_back(-*layer);
-  Mesh mesh = block(info(element).shape, out, out, down);
-  Fixed fixed(3 * mesh.nodes.size(), false);
-  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
-    const Vec3& node = mesh.nodes[i];
-    const bool far = node.x() > length - 1e-9 || node.y() > length - 1e-9 || node.z() < -length + 1e-9;
-    fixed[3 * i] = far || node.x() < 1e-9;
-    fixed[3 * i + 1] = far || node.y() < 1e-9;
-    fixed[3 * i + 2] = far;
-  }
-  return {std::move(mesh), element, material, Law::kLinear, std::move(fixed)};
-}
-
 TEST(Reference, AHalfSpaceGivesWayUnderThePatchAsBoussinesqSays) {
   // The mean depth under the patch's own pressure, by Hankel's transform of both (Sonine's integral):
   //     C = (1 − ν²)/(πEa) ∫₀^∞ (48 J₃(k)/k³)² dk
@@ -95,7 +65,7 @@ TEST(Reference, AHalfSpaceGivesWayUnderThePatchAsBoussinesqSays) {
   const double a = 0.01;
   const double compliance = (1 - 0.09) / (std::numbers::pi * material.young * a) * integral;
 
-  const Solid quarter = quarter_of_half_space(Element::kHex27, a / 3, 60 * a, 7, material);
+  const Solid quarter = testing::quarter_of_half_space(Element::kHex27, testing::graded(a / 3, 60 * a, 7), material);
   const TouchSurface top(quarter.mesh(), Vec3::UnitZ(), a);
   const Patch patch = *top.patch(Vec2::Zero(), 0.2);
   const double quarter_stiffness = LinearModel(quarter, top).press(patch, Given::kForce, 1).stiffness;
