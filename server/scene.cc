@@ -809,7 +809,8 @@ std::string advice(std::string_view unknown, const std::vector<std::string_view>
   std::string_view closest;
   std::size_t fewest = unknown.size() <= kLongestWord ? unknown.size() / 3 + 1 : 0;
   for (const std::string_view key : known) {
-    if (fewest == 0) break;
+    const auto [shorter, longer] = std::minmax({unknown.size(), key.size()});
+    if (longer - shorter >= fewest) continue;  // that many letters are missing at least
     if (const std::size_t count = edits(unknown, key); count < fewest) {
       fewest = count;
       closest = key;
