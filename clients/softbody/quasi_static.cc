@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace tendon::softbody {
 namespace {
@@ -11,6 +12,17 @@ namespace {
 /// Armijo's share of the predicted decrease that a step must bring, and the shortest step tried.
 constexpr double kDecrease = 1e-4;
 constexpr double kShortest = 1.0 / 1024;
+
+/// A factor serves as long as each step with it leaves so much of the energy that is to be lost: a quarter of the
+/// error.
+constexpr double kSlow = 1.0 / 16;
+
+/// Of the stiffness that goes with an answer: what the next round takes off is a part of it.
+constexpr double kTangentPrecision = 2e-3;
+constexpr int kTangentRounds = 5;
+
+/// m, to measure a slope of the force with: of a body of some mm the next derivative is then 1e-4 of it.
+constexpr double kNudge = 1e-7;
 
 /// m: errors of the force that so much more depth would explain are none, also where there is no force to compare them
 /// with.
@@ -31,18 +43,13 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
   if (config.max_iterations < 1) throw std::invalid_argument("`max_iterations`: expected 1 or more");
   if (!(config.tolerance > 0)) throw std::invalid_argument("`tolerance`: expected more than 0");
   stiffness(Elastic::Curvature::kExact);
-  if (!factor_.factorize(stiffness_)) {
+  stale_ = !factor_.factorize(stiffness_);
+  if (stale_) {
     throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
   }
   if (!effects_.empty()) release();
   if (!effects_.empty() || effects.has_time()) rest_ = u_;
   add_effects_of_time(effects_, effects, elastic, elastic.to_free(u_));
-}
-
-double QuasiStaticModel::energy() const {
-  double sum = elastic_.energy(u_);
-  for (const auto& effect : effects_) sum += effect->energy(elastic_.to_free(u_));
-  return sum;
 }
 
 Elastic::Forces QuasiStaticModel::forces() const {
@@ -57,59 +64,106 @@ void QuasiStaticModel::stiffness(Elastic::Curvature curvature) {
   for (const auto& effect : effects_) effect->add_stiffness(stiffness_);
 }
 
-QuasiStaticModel::Step QuasiStaticModel::solve(const VectorXd& internal, const VectorXd& load) {
+void QuasiStaticModel::factorize() {
+  ++factors_;
+  stale_ = false;
   stiffness(Elastic::Curvature::kExact);
-  if (!factor_.factorize(stiffness_)) {
-    stiffness(Elastic::Curvature::kWithoutNegative);
-    // Where points are crushed flat nothing may be left in some direction: a millionth of the largest entry is.
-    for (double shift = 0; !factor_.factorize(stiffness_);) {
-      double largest = 0;
-      for (const double value : stiffness_.values) largest = std::max(largest, std::abs(value));
-      shift = shift == 0 ? 1e-6 * largest : 9 * shift;
-      for (int i = 0; i < stiffness_.size; ++i) {
-        stiffness_.values[static_cast<std::size_t>(stiffness_.column_starts[static_cast<std::size_t>(i)])] += shift;
-      }
-      if (!std::isfinite(shift)) throw std::runtime_error("the stiffness of the body is not finite");
+  if (factor_.factorize(stiffness_)) return;
+  stiffness(Elastic::Curvature::kWithoutNegative);
+  // Where points are crushed flat nothing may be left in some direction: a millionth of the largest entry is.
+  for (double shift = 0; !factor_.factorize(stiffness_);) {
+    double largest = 0;
+    for (const double value : stiffness_.values) largest = std::max(largest, std::abs(value));
+    shift = shift == 0 ? 1e-6 * largest : 9 * shift;
+    for (int i = 0; i < stiffness_.size; ++i) {
+      stiffness_.values[static_cast<std::size_t>(stiffness_.column_starts[static_cast<std::size_t>(i)])] += shift;
     }
+    if (!std::isfinite(shift)) throw std::runtime_error("the stiffness of the body is not finite");
   }
+}
+
+QuasiStaticModel::Step QuasiStaticModel::solve(const VectorXd& internal, const VectorXd& load) const {
   MatrixXd right(internal.size(), 2);
   right << -internal, load;
   const MatrixXd solution = factor_.solve(right);
   return {solution.col(0), solution.col(1)};
 }
 
-bool QuasiStaticModel::go(const VectorXd& step, const VectorXd& load, double force, double slope, double energy) {
+bool QuasiStaticModel::go(const VectorXd& step, const VectorXd& load, double force, double slope,
+                          Elastic::Forces& now) {
   const VectorXd start = u_;
   const double work = force * load.dot(step);
   for (double share = 1; share >= kShortest; share /= 2) {
     u_ = start;
     elastic_.add_free(share * step, u_);
-    const double change = this->energy() - energy - share * work;
-    if (change <= kDecrease * share * slope + 1e-14 * std::abs(energy)) return true;
+    Elastic::Forces there = forces();
+    const double change = there.energy - now.energy - share * work;
+    if (change <= kDecrease * share * slope + 1e-14 * std::abs(now.energy)) {
+      now = std::move(there);
+      return true;
+    }
   }
   u_ = start;
   return false;
 }
 
+/// ∂force/∂depth of the present shape, with a factor of an older one. Of all displacements with 1 m of depth the body's
+/// own are the least stiff: theirs are wrong by as much as the factor is old, the stiffness by the square, and every
+/// round takes off the same share of what is left.
+double QuasiStaticModel::tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now) {
+  const double compliance = load.dot(by_tool);
+  const VectorXd start = u_;
+  VectorXd shape = by_tool / compliance;
+  double stiffness = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kTangentRounds; ++i) {
+    u_ = start;
+    elastic_.add_free(kNudge * shape, u_);
+    const VectorXd needed = (forces().force - now.force) / kNudge;
+    const double before = stiffness;
+    stiffness = shape.dot(needed);
+    if (before - stiffness <= kTangentPrecision * stiffness) break;
+    const VectorXd back = factor_.solve(needed);
+    shape -= back - load.dot(back) / compliance * by_tool;
+  }
+  u_ = start;
+  return stiffness;
+}
+
 double QuasiStaticModel::newton(const VectorXd& load, Given given, double value, Reaction& reaction) {
   double error = std::numeric_limits<double>::infinity();
+  double before = std::numeric_limits<double>::infinity();
+  double enough = 0;
+  bool exact = false;  // the factor is that of the present shape
+  VectorXd by_tool;
+  Elastic::Forces now = forces();
   for (iterations_ = 0; iterations_ < config_.max_iterations;) {
     ++iterations_;
-    const Elastic::Forces now = forces();
-    const VectorXd& internal = now.force;
-    const Step step = solve(internal, load);
+    if (stale_) {
+      factorize();
+      exact = true;
+    }
+    const Step step = solve(now.force, load);
     const double compliance = load.dot(step.by_tool);
     const double depth = load.dot(elastic_.to_free(u_));
     reaction.stiffness = 1 / compliance;
     reaction.force = constrained_force(given, value, depth + load.dot(step.by_itself), compliance);
+    by_tool = step.by_tool;
     const VectorXd move = step.by_itself + reaction.force * step.by_tool;
     // −slope = moveᵀ K move: twice the energy that is still to be lost, which a force error of √(… K) would explain.
-    const double slope = (internal - reaction.force * load).dot(move);
+    const double slope = (now.force - reaction.force * load).dot(move);
     error = std::sqrt(std::max(0.0, -slope) * reaction.stiffness);
-    const bool moved = go(move, load, reaction.force, slope, now.energy);
-    const double enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
+    enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
+    stale_ = !exact && -slope > kSlow * before;
+    if (stale_) continue;
+    const bool moved = go(move, load, reaction.force, slope, now);
+    stale_ = !moved && !exact;
+    if (stale_) continue;
+    before = -slope;
     if (!moved || error <= enough) break;
+    exact = false;
   }
+  if (error > enough) stale_ = true;
+  if (step_ == 0 && !exact && !stale_) reaction.stiffness = tangent(load, by_tool, now);
   return error;
 }
 
@@ -134,7 +188,7 @@ double QuasiStaticModel::release() {
   nothing[0] = 1;  // any direction, with no force along it
   newton(nothing, Given::kForce, 0, free);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
-  return energy();
+  return forces().energy;
 }
 
 std::size_t QuasiStaticModel::bytes() const noexcept {

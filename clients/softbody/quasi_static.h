@@ -10,9 +10,11 @@ namespace tendon::softbody {
 /// as a constraint. It begins where the last answer ended. Without inertia: no velocity, no mass. Effects that act on
 /// all of the body add their energies; with inertia that is the implicit Euler method, solved to the end.
 ///
-/// Each step solves with the exact second derivative; where that is not positive definite, with the one whose negative
-/// eigenvalues are taken out of every point of integration. A line search keeps the energy going down, so that a body
-/// that was turned inside out (Law::kNeoHookean, kCorotational) finds its way back.
+/// A step solves with a factor that is kept from step to step and from answer to answer, and made anew where it no
+/// longer serves: a hand moves little between two answers, and a factor costs as much as twenty steps. It is made of
+/// the exact second derivative; where that is not positive definite, of the one whose negative eigenvalues are taken
+/// out of every point of integration. A line search keeps the energy going down, so that a body that was turned inside
+/// out (Law::kNeoHookean, kCorotational) finds its way back.
 class QuasiStaticModel : public Model {
  public:
   struct Config {
@@ -29,9 +31,13 @@ class QuasiStaticModel : public Model {
   std::size_t bytes() const noexcept override;
 
   int iterations() const noexcept { return iterations_; }  ///< of the last answer
+  int factors() const noexcept { return factors_; }        ///< made since the beginning
   const VectorXd& displacements() const noexcept { return u_; }
   /// Puts the nodes elsewhere, m; the fixed ones too.
-  void set_displacements(const VectorXd& u) { u_ = u; }
+  void set_displacements(const VectorXd& u) {
+    u_ = u;
+    stale_ = true;
+  }
   /// Lets go of the tool and finds the shape at rest, or after a step of time. The energy that is left, J.
   double release();
 
@@ -40,12 +46,14 @@ class QuasiStaticModel : public Model {
     VectorXd by_itself;  ///< K⁻¹(−internal force)
     VectorXd by_tool;    ///< K⁻¹ w
   };
-  double energy() const;
   Elastic::Forces forces() const;
   void stiffness(Elastic::Curvature curvature);
-  Step solve(const VectorXd& internal, const VectorXd& load);
-  /// Goes along `step` as far as the energy less the tool's work goes down. False when it does not.
-  bool go(const VectorXd& step, const VectorXd& load, double force, double slope, double energy);
+  void factorize();
+  Step solve(const VectorXd& internal, const VectorXd& load) const;
+  /// Goes along `step` as far as the energy less the tool's work goes down. False when it does not. `now` is what acts
+  /// before and after.
+  bool go(const VectorXd& step, const VectorXd& load, double force, double slope, Elastic::Forces& now);
+  double tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now);
   double newton(const VectorXd& load, Given given, double value, Reaction& reaction);
 
   const Elastic& elastic_;
@@ -58,6 +66,8 @@ class QuasiStaticModel : public Model {
   Effects effects_;
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without effects
   int iterations_ = 0;
+  int factors_ = 0;
+  bool stale_ = true;  ///< the factor no longer serves
 };
 
 /// Where a body that nothing touches is at rest, m, all nodes: `loads` counts, what has time does not.
