@@ -107,8 +107,8 @@ Solid solid_of(const BodyConfig& config) {
   double lowest = std::numeric_limits<double>::infinity();
   for (const Vec3& node : mesh.nodes) lowest = std::min(lowest, node.z());
   const double held = lowest + std::max(config.clamped_below, 1e-9);
-  Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
-  return {std::move(mesh), config.element, config.material, info(config.model).law, std::move(fixed)};
+  const Fixed fixed = fix_where(mesh, [&](const Vec3& node) { return node.z() <= held; });
+  return {std::move(mesh), config.element, config.material, info(config.model).law, fixed};
 }
 
 ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& surface) {

@@ -56,7 +56,6 @@ class Inertia : public Effect {
   std::size_t bytes() const noexcept override;
 
  private:
-  double dt_;
   VectorXd weight_;  ///< m/dt², N/m
   VectorXd start_;   ///< u₀, m
   VectorXd ahead_;   ///< u₀ + v₀ dt, m
