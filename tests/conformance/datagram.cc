@@ -88,6 +88,9 @@ bool read(Span bytes, google::protobuf::MessageLite& message) {
   return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
+bool far(double value) { return !(std::abs(value) <= 1e12); }
+bool far(const pb::Vec3& vector) { return far(vector.x()) || far(vector.y()) || far(vector.z()); }
+
 std::string hex(Span bytes, std::size_t most) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string out;

@@ -60,6 +60,10 @@ Bytes bytes_of(const google::protobuf::MessageLite& message);
 /// Reads `message`; false when the bytes are not one.
 bool read(Span bytes, google::protobuf::MessageLite& message);
 
+/// Beyond what any quantity may be: |x| > 10¹², or not a number.
+bool far(double value);
+bool far(const pb::Vec3& vector);
+
 /// "54 11 00 …", cut after `most` bytes.
 std::string hex(Span bytes, std::size_t most = 32);
 /// The bytes that lower-case or upper-case digits, white space allowed, stand for.

@@ -136,6 +136,15 @@ TEST(ConformanceKit, AServerThatKeepsAllRulesPasses) {
   }
 }
 
+TEST(ConformanceKit, AServerThatKnowsNoChannelsPassesAndIsNotJudgedByThem) {
+  for (int suite = 0; suite < 2; ++suite) {
+    const Report all = server_report(suite, Fault::kNone);
+    const Report older = server_report(suite, Fault::kKnowsNoChannels);
+    EXPECT_TRUE(older.passed()) << "suite " << suite << "\n" << told(older);
+    EXPECT_EQ(older.count(Outcome::kNotApplicable), all.count(Outcome::kNotApplicable) + 9) << "suite " << suite;
+  }
+}
+
 TEST(ConformanceKit, AClientThatKeepsAllRulesPasses) {
   for (int suite = 0; suite < 2; ++suite) {
     for (const pb::Role role : {pb::ROLE_CONTROLLER, pb::ROLE_OBSERVER}) {
@@ -178,6 +187,22 @@ INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
                                                      {Fault::kForgetsAnswers, "answer-kept"},
                                                      {Fault::kSilentToUnknownRequests, "request-unknown"},
                                                      {Fault::kTakesAnyRequestId, "request-bounds"},
+                                                     {Fault::kGrantsUnasked, "claims-granted"},
+                                                     {Fault::kGrantsBackwards, "claims-granted"},
+                                                     {Fault::kGrantsAnything, "claim-refused"},
+                                                     {Fault::kDescribesAnother, "describe"},
+                                                     {Fault::kDescribesAnyNumber, "describe-unknown"},
+                                                     {Fault::kAnybodyTakesTheLease, "lease-denied"},
+                                                     {Fault::kDeniesTheHolder, "lease-kept"},
+                                                     {Fault::kKeepsTheLease, "lease-kept"},
+                                                     {Fault::kTakesAnyDeadband, "deadband-bounds"},
+                                                     {Fault::kSendsTheForetold, "deadband"},
+                                                     {Fault::kSilentWithDeadband, "deadband"},
+                                                     {Fault::kDeadbandForEver, "deadband"},
+                                                     {Fault::kTellsNothing, "link-report"},
+                                                     {Fault::kReportsAllTheTime, "link-report"},
+                                                     {Fault::kReportsOfOneNumber, "link-report"},
+                                                     {Fault::kReportsBeyondBounds, "link-report"},
                                                  })),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(Client, BrokenToy,

@@ -23,6 +23,7 @@ constexpr std::string_view kStates = "States";
 constexpr std::string_view kSent = "What is sent when";
 constexpr std::string_view kNewest = "State, force and report: newest wins";
 constexpr std::string_view kRequests = "Requests: exactly once, in order, answered";
+constexpr std::string_view kChannels = "Channels and leases";
 constexpr std::string_view kDropped = "Dropped and counted";
 
 constexpr Side kServer = Side::kServer;
@@ -146,6 +147,21 @@ constexpr std::array kChecks = {
     Check{"request-resend-rate", kClient, kSession, kSent,
           "max(20 ms, SRTT + 4 RTTVAR), doubled with every repetition, at most 1 s in all"},
     Check{"request-stops", kClient, kSession, kRequests, "The answer is the acknowledgement."},
+    // Devices and channels.
+    Check{"claims-granted", kServer, kWire, kAnswer, "one for each claim, in their order"},
+    Check{"claim-refused", kServer, kSession, kOpening,
+          "CODE_INVALID for what is not there (the sentence says what is), twice the same, or a role that is not the "
+          "highest of the claims'."},
+    Check{"describe", kServer, kWire, kData, "what it is: device_name of a Welcome"},
+    Check{"describe-unknown", kServer, kWire, kData, "answered CODE_INVALID beyond the server's last"},
+    Check{"lease-denied", kServer, kSession, kChannels, "not claimed by the asker as a controller | – | CODE_DENIED"},
+    Check{"lease-kept", kServer, kSession, kChannels, "free, or the asker's own | takes it | CODE_OK"},
+    Check{"deadband-bounds", kServer, kWire, kData, "answered CODE_INVALID beyond 0 … 0.5"},
+    Check{"deadband", kServer, kSession, "Narrow links",
+          "after a state with velocity v the next one sent is the first whose velocity differs from v by more than "
+          "max(share · |v|, floor), whose mode is another, or that comes max_silence_us later."},
+    Check{"link-report", kServer, kSession, "Report",
+          "From a controller's first force on, the server tells it once a second how its forces fare (LinkReport)"},
     // The end.
     Check{"bye-silence", kBoth, kSession, kStates, "nothing is sent, believed or counted any more"},
     Check{"bye-thrice", kBoth, kSession, kStates, "Bye is said three times, what was not sent is dropped"},

@@ -50,7 +50,10 @@ class ServerJudge {
   std::vector<Bytes> replies(int port, Duration patience);
   std::optional<Sixteen> cookie(int port, const Attempt& attempt);
   std::optional<Answered> ask(int port, const Attempt& attempt, const Sixteen& cookie);
-  std::optional<Session> enter(pb::Role role);
+  /// What is answered to these words, from a port of their own.
+  std::optional<Answered> ask(const pb::Hello& words);
+  std::optional<Session> enter(pb::Role role) { return enter(hello(role)); }
+  std::optional<Session> enter(const pb::Hello& words);
   Conversation::Setup setup(int port, const Answered& answered) const;
   void expect_silence(std::string_view check, int port, const std::string& after);
 
@@ -62,7 +65,7 @@ class ServerJudge {
   void check_features();
   void check_keys();
   void check_half_open();
-  void check_welcome(const Attempt& attempt, const Answered& answered);
+  void check_welcome(const pb::Hello& words, const Attempt& attempt, const Answered& answered);
   void check_answer_again(Session& session);
   void check_second_controller();
   void check_stray_data();
@@ -74,10 +77,20 @@ class ServerJudge {
   void check_states(const Conversation& talk);
   void check_end();
   void check_hello_limit();
+  pb::Hello claiming(const std::vector<pb::Claim>& claims) const;
+  void check_claims();
+  void check_from_outside(Conversation& observer, std::uint32_t id);
+  void check_reports(const Conversation& talk);
+  std::optional<Session> check_channels();
+  void check_description(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id);
+  void check_lease(Conversation& talk, std::uint32_t& id);
+  void check_deadband(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id);
 
   Wire& wire_;
   const Options& options_;
   Report& report_;
+  bool channels_ = false;                       ///< it offers the feature
+  std::optional<pb::DeviceDescription> about_;  ///< device 0
 };
 
 Bytes32 ServerJudge::random32() {
@@ -147,15 +160,22 @@ Conversation::Setup ServerJudge::setup(int port, const Answered& answered) const
           .version = static_cast<std::uint8_t>(answered.body.welcome().version())};
 }
 
-std::optional<ServerJudge::Session> ServerJudge::enter(pb::Role role) {
+std::optional<Answered> ServerJudge::ask(const pb::Hello& words) {
   const int port = wire_.open_port();
-  const Attempt attempt = this->attempt(hello(role));
+  const Attempt attempt = this->attempt(words);
+  const auto its = cookie(port, attempt);
+  return its ? ask(port, attempt, *its) : std::nullopt;
+}
+
+std::optional<ServerJudge::Session> ServerJudge::enter(const pb::Hello& words) {
+  const int port = wire_.open_port();
+  const Attempt attempt = this->attempt(words);
   const auto cookie = this->cookie(port, attempt);
   const auto answered = cookie ? ask(port, attempt, *cookie) : std::nullopt;
   report_.judge("welcome", answered && answered->body.has_welcome(),
                 answered ? answered->body.ShortDebugString() : "no answer", "a Welcome");
   if (!answered || !answered->body.has_welcome()) return std::nullopt;
-  check_welcome(attempt, *answered);
+  check_welcome(words, attempt, *answered);
   Session session{answered->body.welcome(), attempt, *cookie, Conversation(wire_, report_, setup(port, *answered))};
   const std::size_t before = session.talk.heard().size();
   session.talk.say();
@@ -289,14 +309,11 @@ void ServerJudge::check_cookie() {
 }
 
 void ServerJudge::check_versions() {
-  const auto offer = [&](std::uint32_t min, std::uint32_t max) -> std::optional<Answered> {
-    const int port = wire_.open_port();
+  const auto offer = [&](std::uint32_t min, std::uint32_t max) {
     pb::Hello words = hello(pb::ROLE_OBSERVER);
     words.set_version_min(min);
     words.set_version_max(max);
-    const Attempt attempt = this->attempt(words);
-    const auto its = cookie(port, attempt);
-    return its ? ask(port, attempt, *its) : std::nullopt;
+    return ask(words);
   };
   const auto mismatch = offer(0x7FFFFFFE, 0x7FFFFFFF);
   const pb::Refused refused = mismatch ? mismatch->body.refused() : pb::Refused();
@@ -315,13 +332,10 @@ void ServerJudge::check_versions() {
 }
 
 void ServerJudge::check_features() {
-  const int port = wire_.open_port();
   pb::Hello words = hello(pb::ROLE_OBSERVER);
   words.clear_features();
   words.add_features("no-server-knows-this");
-  const Attempt attempt = this->attempt(words);
-  const auto its = cookie(port, attempt);
-  const auto answered = its ? ask(port, attempt, *its) : std::nullopt;
+  const auto answered = ask(words);
   report_.judge("features", answered && answered->body.has_welcome() && answered->body.welcome().features().empty(),
                 answered ? answered->body.ShortDebugString() : "no answer", "a Welcome without features");
 }
@@ -372,7 +386,7 @@ void ServerJudge::check_half_open() {
                 "silence until the first good Data");
 }
 
-void ServerJudge::check_welcome(const Attempt& attempt, const Answered& answered) {
+void ServerJudge::check_welcome(const pb::Hello& words, const Attempt& attempt, const Answered& answered) {
   const pb::Welcome& welcome = answered.body.welcome();
   const Head& head = answered.head;
   const Head wanted{.type = kAnswerType, .suite = options_.suite(), .connection_id = head.connection_id};
@@ -391,7 +405,8 @@ void ServerJudge::check_welcome(const Attempt& attempt, const Answered& answered
          "position_resolution_m in 0 … 1e12");
   expect(welcome.loop_hz() >= 1 && welcome.loop_hz() <= 1'000'000, "loop_hz in 1 … 1e6");
   expect(welcome.timeout_ms() >= 1 && welcome.timeout_ms() <= 3'600'000, "timeout_ms in 1 … 3 600 000");
-  expect(welcome.features_size() <= 1 && (welcome.features().empty() || welcome.features(0) == "local-model"),
+  const auto offered = [&](const std::string& feature) { return std::ranges::count(words.features(), feature) > 0; };
+  expect(welcome.features_size() <= words.features_size() && std::ranges::all_of(welcome.features(), offered),
          "no feature that was not offered");
 }
 
@@ -416,10 +431,7 @@ void ServerJudge::check_answer_again(Session& session) {
 
 void ServerJudge::check_second_controller() {
   if (options_.key) return report_.not_applicable("one-controller", "the same key takes its own place: see replaced");
-  const int port = wire_.open_port();
-  const Attempt second = attempt(hello(pb::ROLE_CONTROLLER));
-  const auto its = cookie(port, second);
-  const auto answered = its ? ask(port, second, *its) : std::nullopt;
+  const auto answered = ask(hello(pb::ROLE_CONTROLLER));
   report_.judge("one-controller", answered && answered->body.refused().code() == pb::CODE_BUSY,
                 answered ? answered->body.ShortDebugString() : "nothing", "Refused, CODE_BUSY");
 }
@@ -493,15 +505,14 @@ void ServerJudge::check_conversation(Session& session) {
   check_answer_again(session);
   check_second_controller();
   check_requests(talk);
+  // More than a second after the others: there is one more report to come.
+  pb::Datagram last_force;
+  *last_force.add_frames() = forces.frame(forces.next++);
+  talk.confirmed(talk.say(last_force));
   check_observer(talk);
   check_roaming(talk);
-  if (options_.suite() == 1) talk.listen(rekeyed + milliseconds(2300) - talk.now());
-  check_old_key(talk);
-  if (options_.long_checks) {
-    check_rekey_sent(talk);
-  } else {
-    report_.not_applicable("rekey-sent", "takes 610 s: --long");
-  }
+  check_old_key(talk, rekeyed);
+  check_rekey_sent(talk, options_.long_checks);
   if (session.welcome.timeout_ms() > 10'000) {
     report_.not_applicable("timeout", "this server waits for " + std::to_string(session.welcome.timeout_ms()) + " ms");
   } else {
@@ -509,6 +520,7 @@ void ServerJudge::check_conversation(Session& session) {
     say_bye(talk);  // should it still be there
   }
   check_states(talk);
+  check_reports(talk);
 }
 
 std::optional<pb::ControlAck> ServerJudge::request(Conversation& talk, const pb::Control& control) {
@@ -654,6 +666,7 @@ void ServerJudge::check_observer(Conversation& controller) {
   const auto ack = request(talk, rearm);
   report_.judge("rearm-by-controller", ack && ack->code() == pb::CODE_DENIED, ack ? ack->ShortDebugString() : "nothing",
                 "CODE_DENIED to an observer");
+  check_from_outside(talk, 2);
   controller.say();
   say_bye(talk);
 }
@@ -688,10 +701,284 @@ void ServerJudge::check_roaming(Conversation& talk) {
   report_.judge("roaming", talk.confirmed(talk.say()), "nothing comes to the new address", "the session goes on there");
 }
 
+// ---- Devices and channels ----
+
+pb::Claim claim(pb::Role role, const std::string& device = {}, const std::string& channel = {}) {
+  pb::Claim out;
+  out.set_role(role);
+  out.set_device(device);
+  out.set_channel(channel);
+  return out;
+}
+
+pb::Hello ServerJudge::claiming(const std::vector<pb::Claim>& claims) const {
+  const bool controls = std::ranges::count(claims, pb::ROLE_CONTROLLER, &pb::Claim::role) > 0;
+  pb::Hello out = hello(controls ? pb::ROLE_CONTROLLER : pb::ROLE_OBSERVER);
+  out.add_features("channels");
+  *out.mutable_claims() = {claims.begin(), claims.end()};
+  return out;
+}
+
+/// Whether these are the grants to an observer of device 0 who also controls its channel 0, which is free.
+bool first_of_both(const pb::Welcome& welcome) {
+  if (welcome.grants_size() != 2) return false;
+  const pb::Grant& sees = welcome.grants(0);
+  const pb::Grant& controls = welcome.grants(1);
+  return sees.device() == 0 && sees.role() == pb::ROLE_OBSERVER && controls.device() == 0 && controls.channel() == 0 &&
+         controls.role() == pb::ROLE_CONTROLLER;
+}
+
+/// Nobody controls the device, and nobody does afterwards: each Hello stays half-open.
+void ServerJudge::check_claims() {
+  const auto without = ask(claiming({}));
+  const pb::Welcome welcome = without ? without->body.welcome() : pb::Welcome();
+  channels_ = std::ranges::count(welcome.features(), "channels") > 0;
+  if (!channels_) {
+    for (const std::string_view check : {"claims-granted", "claim-refused", "describe", "describe-unknown",
+                                         "lease-denied", "lease-kept", "deadband-bounds", "deadband", "link-report"}) {
+      report_.not_applicable(check, "this server does not offer the feature \"channels\"");
+    }
+    return;
+  }
+  report_.judge("claims-granted", welcome.grants().empty(), welcome.ShortDebugString(),
+                "no grants to a Hello without claims");
+
+  pb::Hello lower_role = claiming({claim(pb::ROLE_CONTROLLER)});
+  lower_role.set_role(pb::ROLE_OBSERVER);
+  const std::vector<std::pair<std::string, pb::Hello>> all = {
+      {"a device that is not there", claiming({claim(pb::ROLE_OBSERVER, "no-server-has-this")})},
+      {"a channel that is not there", claiming({claim(pb::ROLE_CONTROLLER, "", "no-device-has-this")})},
+      {"the same claim twice", claiming({claim(pb::ROLE_CONTROLLER), claim(pb::ROLE_CONTROLLER)})},
+      {"a role that is not the highest of the claims'", lower_role}};
+  for (const auto& [what, words] : all) {
+    const auto answered = ask(words);
+    report_.judge("claim-refused", answered && answered->body.refused().code() == pb::CODE_INVALID,
+                  answered ? answered->body.ShortDebugString() : "nothing", "Refused, CODE_INVALID, to " + what);
+  }
+}
+
+/// Of one who has not claimed the channel as a controller. `id`: its next request.
+void ServerJudge::check_from_outside(Conversation& observer, std::uint32_t id) {
+  if (!channels_) return;
+  pb::Control take;
+  take.set_id(id);
+  take.mutable_take_lease();
+  const auto denied = request(observer, take);
+  report_.judge("lease-denied", denied && denied->code() == pb::CODE_DENIED,
+                denied ? denied->ShortDebugString() : "nothing", "CODE_DENIED to an observer");
+
+  pb::Control describe;
+  describe.set_id(id + 1);
+  describe.mutable_describe();
+  const auto described = request(observer, describe);
+  report_.judge("describe", described && described->code() == pb::CODE_OK && described->has_device(),
+                described ? described->ShortDebugString() : "nothing",
+                "CODE_OK with a description of device 0, to an observer too");
+  if (described && described->has_device()) about_ = described->device();
+}
+
+/// A session that has claimed by name, and still goes on.
+std::optional<ServerJudge::Session> ServerJudge::check_channels() {
+  if (!channels_) return enter(pb::ROLE_CONTROLLER);
+  const bool named = about_ && about_->channels_size() > 0;
+  const std::string device = named ? about_->name() : "";
+  const std::string channel = named ? about_->channels(0).name() : "";
+  auto session = enter(claiming({claim(pb::ROLE_OBSERVER, device), claim(pb::ROLE_CONTROLLER, device, channel)}));
+  if (!session) return session;
+  report_.judge("claims-granted", first_of_both(session->welcome), session->welcome.ShortDebugString(),
+                "two grants, first an observer's of device 0, then the controller's of its channel 0, which is free");
+  std::uint32_t id = 0;
+  check_description(session->talk, session->welcome, id);
+  check_lease(session->talk, id);
+  check_deadband(session->talk, session->welcome, id);
+  return session;
+}
+
+/// Whether all that a description tells is within its bounds.
+bool within_bounds(const pb::DeviceDescription& device) {
+  const auto size = [](double value) { return value >= 0 && value <= 1e12; };
+  const auto dof = [](std::uint32_t count) { return count >= 1 && count <= 6; };
+  const pb::Vec3& low = device.workspace_min_m();
+  const pb::Vec3& high = device.workspace_max_m();
+  const bool box = device.has_workspace_min_m() == device.has_workspace_max_m() && !far(low) && !far(high) &&
+                   low.x() <= high.x() && low.y() <= high.y() && low.z() <= high.z();
+  const auto channel_good = [](const pb::ChannelDescription& channel) {
+    return channel.name().size() <= 24 && (channel.rule() == 1 || channel.rule() == 2) &&
+           channel.lease_ms() <= 3'600'000 && channel.holder().size() <= 24;
+  };
+  return device.name().size() <= 24 && device.model().size() <= 64 && dof(device.position_dof()) &&
+         dof(device.force_dof()) && box && size(device.max_force_n()) && size(device.continuous_force_n()) &&
+         size(device.max_stiffness_npm()) && size(device.position_resolution_m()) && device.loop_hz() >= 1 &&
+         device.loop_hz() <= 1'000'000 && device.channels_size() >= 1 && device.channels_size() <= 8 &&
+         std::ranges::all_of(device.channels(), channel_good);
+}
+
+void ServerJudge::check_description(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id) {
+  const auto describe = [&](std::uint32_t device) {
+    pb::Control control;
+    control.set_id(++id);
+    control.mutable_describe()->set_device(device);
+    return request(talk, control).value_or(pb::ControlAck());
+  };
+  const pb::ControlAck first = describe(0);
+  const pb::DeviceDescription& device = first.device();
+  report_.judge("describe", first.code() == pb::CODE_OK && device.device() == 0 && within_bounds(device),
+                first.ShortDebugString(), "CODE_OK with a description of device 0, values within bounds");
+  const bool agrees = device.model() == welcome.device_name() && device.max_force_n() == welcome.max_force_n() &&
+                      device.position_resolution_m() == welcome.position_resolution_m() &&
+                      device.loop_hz() == welcome.loop_hz();
+  // Of a Welcome that is wrong itself nothing follows.
+  report_.judge("describe", agrees || report_.failed("welcome"), device.ShortDebugString(),
+                "as in the Welcome: " + welcome.ShortDebugString());
+
+  const pb::ControlAck last = describe(15);
+  if (last.code() == pb::CODE_OK && last.device().device() == 15) {
+    report_.not_applicable("describe-unknown", "this server has all 16 devices");
+  } else {
+    report_.judge("describe-unknown", last.code() == pb::CODE_INVALID, last.ShortDebugString(), "CODE_INVALID");
+  }
+}
+
+void ServerJudge::check_lease(Conversation& talk, std::uint32_t& id) {
+  const auto ok = [&](bool take, const std::string& to) {
+    pb::Control control;
+    control.set_id(++id);
+    if (take) {
+      control.mutable_take_lease();
+    } else {
+      control.mutable_give_lease();
+    }
+    const auto ack = request(talk, control);
+    report_.judge("lease-kept", ack && ack->code() == pb::CODE_OK, ack ? ack->ShortDebugString() : "nothing",
+                  "CODE_OK to " + to);
+  };
+  const auto holder_is = [&](const std::string& name, const std::string& after) {
+    pb::Control control;
+    control.set_id(++id);
+    control.mutable_describe();
+    const auto ack = request(talk, control);
+    if (!ack || ack->device().channels().empty()) return;  // "describe" has failed
+    const std::string& told = ack->device().channels(0).holder();
+    report_.judge("lease-kept", told == name, "held by \"" + told + "\" " + after, "held by \"" + name + "\"");
+  };
+  ok(true, "take_lease of the holder");
+  holder_is("conformance", "after take_lease");
+  ok(false, "give_lease of the holder");
+  holder_is("", "after give_lease");
+  ok(false, "give_lease of one who claimed it, but holds it no more");
+  ok(true, "take_lease of a free channel");
+  holder_is("conformance", "after take_lease");
+}
+
+void ServerJudge::check_deadband(Conversation& talk, const pb::Welcome& welcome, std::uint32_t& id) {
+  constexpr double kShare = 0.1;
+  constexpr double kFloor = 0.1;
+  constexpr Duration kLongest = milliseconds(20);
+  const auto set = [&](double share, double floor, std::uint32_t silence_us) {
+    pb::Control control;
+    control.set_id(++id);
+    pb::SetStateDeadband& band = *control.mutable_set_state_deadband();
+    band.set_share(share);
+    band.set_floor_mps(floor);
+    band.set_max_silence_us(silence_us);
+    return request(talk, control).value_or(pb::ControlAck());
+  };
+  const std::vector<std::pair<std::string, pb::ControlAck>> refused = {
+      {"a share of 0.51", set(0.51, kFloor, 20'000)},
+      {"a share of −0.1", set(-0.1, kFloor, 20'000)},
+      {"a floor of 0.11 m/s", set(kShare, 0.11, 20'000)},
+      {"999 µs of silence", set(kShare, kFloor, 999)},
+      {"20 001 µs of silence", set(kShare, kFloor, 20'001)}};
+  for (const auto& [what, ack] : refused) {
+    report_.judge("deadband-bounds", ack.code() == pb::CODE_INVALID, ack.ShortDebugString(), "CODE_INVALID to " + what);
+  }
+
+  // Of the states heard from index `since` on: all, and those that the one before foretells. No clock of ours is in it.
+  struct Count {
+    std::size_t all = 0;
+    std::size_t foretold = 0;
+  };
+  const auto count = [&](std::size_t since) {
+    Count out;
+    std::optional<pb::DeviceState> sent;
+    talk.for_each_frame(since, [&](const pb::Frame& frame) {
+      if (!frame.has_state()) return;
+      const pb::DeviceState& state = frame.state();
+      ++out.all;
+      if (sent) {
+        const pb::Vec3& v = sent->velocity_mps();
+        const pb::Vec3& w = state.velocity_mps();
+        const double changed = std::hypot(w.x() - v.x(), w.y() - v.y(), w.z() - v.z());
+        const bool in_band = changed <= std::max(kShare * std::hypot(v.x(), v.y(), v.z()), kFloor);
+        const bool in_time = state.sampled_ns() - sent->sampled_ns() < kLongest.count();
+        out.foretold += in_band && in_time && state.mode() == sent->mode() ? 1 : 0;
+      }
+      sent = state;
+    });
+    return out;
+  };
+  const auto said = [](const Count& states) {
+    return std::to_string(states.all) + " states, " + std::to_string(states.foretold) + " of them foretold";
+  };
+
+  const pb::ControlAck on = set(kShare, kFloor, 20'000);
+  report_.judge("deadband", on.code() == pb::CODE_OK, on.ShortDebugString(), "CODE_OK to what is within bounds");
+  std::size_t before = talk.heard().size();
+  talk.listen(milliseconds(500));
+  const Count with = count(before);
+  // 25, or as many as there are steps.
+  const std::size_t least = std::min<std::size_t>(12, welcome.loop_hz() / 4);
+  report_.judge("deadband", with.all >= least, said(with) + ", in 500 ms",
+                "one at least each 20 ms; at least " + std::to_string(least));
+  // One that was replaced before it left is one that we do not see, so the next may look foretold.
+  report_.judge("deadband", 10 * with.foretold <= with.all, said(with), "none that the one before foretells");
+
+  const pb::ControlAck off = set(0, 0, 0);
+  report_.judge("deadband", off.code() == pb::CODE_OK, off.ShortDebugString(), "CODE_OK to 0, every state is sent");
+  before = talk.heard().size();
+  constexpr std::size_t kMany = 20;
+  if (welcome.loop_hz() < 100) return;  // the states are too far apart for any to be foretold
+  const bool all = talk.listen_until(kPatience, [&] { return count(before).foretold >= kMany; });
+  report_.judge("deadband", all, said(count(before)) + ", after it was switched off",
+                "every state, also " + std::to_string(kMany) + " that the one before foretells");
+}
+
+void ServerJudge::check_reports(const Conversation& talk) {
+  if (!channels_) return;
+  const pb::LinkReport* previous = nullptr;
+  std::size_t count = 0;
+  std::uint64_t forces = 0;
+  const auto size = [](std::uint64_t ns) { return ns <= std::uint64_t{1} << 60; };
+  const auto time = [](std::int64_t ns) { return ns >= -(std::int64_t{1} << 60) && ns <= std::int64_t{1} << 60; };
+  const auto delays = [&](const pb::Delays& of) { return time(of.median_ns()) && time(of.p99_ns()); };
+  talk.for_each_frame(0, [&](const pb::Frame& frame) {
+    if (!frame.has_report()) return;
+    const pb::LinkReport& report = frame.report();
+    const auto expect = [&](bool kept, const std::string& expected) {
+      report_.judge("link-report", kept, report.ShortDebugString(), expected);
+    };
+    expect(size(report.span_ns()) && size(report.worst_late_ns()) && size(report.longest_gap_ns()) &&
+               size(report.clock_error_ns()) && time(report.until_ns()) && time(report.clock_offset_ns()) &&
+               !far(report.clock_drift_ppm()) && delays(report.round_trip()) && delays(report.to_server()) &&
+               delays(report.to_client()) && report.words().size() <= 128,
+           "values within bounds");
+    expect(report.forces() <= report.received() && report.received() <= talk.next_number(),
+           "no more forces than datagrams, and no more datagrams than were sent");
+    expect(report.number() > (previous == nullptr ? 0 : previous->number()), "a higher number");
+    if (previous != nullptr) {
+      expect(report.until_ns() - previous->until_ns() >= 500'000'000, "once a second, never more often");
+    }
+    ++count;
+    forces += report.forces();
+    previous = &report;
+  });
+  report_.judge("link-report", count >= 2 && forces > 0,
+                std::to_string(count) + " reports of " + std::to_string(forces) + " forces",
+                "two at least: forces were sent in different seconds");
+}
+
 void ServerJudge::check_states(const Conversation& talk) {
   const pb::DeviceState* previous = nullptr;
-  const auto far = [](double value) { return !(std::abs(value) <= 1e12); };
-  const auto bad = [&](const pb::Vec3& vector) { return far(vector.x()) || far(vector.y()) || far(vector.z()); };
   std::size_t count = 0;
   talk.for_each_frame(0, [&](const pb::Frame& frame) {
     report_.judge("states", !frame.has_force() && !frame.has_control(), frame.ShortDebugString(),
@@ -703,7 +990,7 @@ void ServerJudge::check_states(const Conversation& talk) {
         previous == nullptr || (state.tick() > previous->tick() && state.sampled_ns() >= previous->sampled_ns());
     report_.judge("states", goes_on, state.ShortDebugString(), "a higher tick, not sampled before the last");
     const double permitted = state.permitted_force_n();
-    const bool good = !bad(state.position_m()) && !bad(state.velocity_mps()) && !bad(state.force_applied_n()) &&
+    const bool good = !far(state.position_m()) && !far(state.velocity_mps()) && !far(state.force_applied_n()) &&
                       !far(state.energy_j()) && permitted >= 0 && (std::isinf(permitted) || permitted <= 1e12) &&
                       state.mode() >= 1 && state.mode() <= 6 && state.force_age_ns() <= std::uint64_t{1} << 60;
     report_.judge("states", good, state.ShortDebugString(), "values within bounds");
@@ -713,7 +1000,7 @@ void ServerJudge::check_states(const Conversation& talk) {
 }
 
 void ServerJudge::check_end() {
-  auto first = enter(pb::ROLE_CONTROLLER);
+  auto first = check_channels();
   if (!first) return;
   if (options_.suite() == 0) {
     report_.not_applicable("replaced", "suite 0 has no keys");
@@ -760,6 +1047,7 @@ void ServerJudge::judge() {
   check_keys();
   check_half_open();
   check_stray_data();
+  check_claims();
   if (auto session = enter(pb::ROLE_CONTROLLER)) check_conversation(*session);
   check_end();
   check_hello_limit();

@@ -32,8 +32,8 @@ void check_out_of_bounds(Conversation& talk, Evidence& evidence,
 void check_newest_wins(Conversation& talk, Evidence& evidence);
 /// In suite 1 we move on to the next key; the old one is good for a little longer.
 void check_rekey(Conversation& talk);
-/// … and, more than 2 s later, no more.
-void check_old_key(Conversation& talk);
+/// … and, more than 2 s after `renewed`, no more.
+void check_old_key(Conversation& talk, LocalTime renewed);
 /// The peer has nothing to say but that it is there.
 void check_keep_alive(Conversation& talk);
 /// We fall silent, but for what is no sign of life. `timeout` is the peer's.
@@ -42,7 +42,7 @@ void check_timeout(Conversation& talk, Duration timeout);
 void check_bye_silence(Conversation& talk);
 /// The peer has said Bye in what was heard from index `since` on, or is about to.
 void check_byes(Conversation& talk, std::size_t since);
-/// The peer renews its key by itself. Takes more than 600 s.
-void check_rekey_sent(Conversation& talk);
+/// The peer renews its key by itself. Takes more than 600 s, and so is done only if `long_checks`.
+void check_rekey_sent(Conversation& talk, bool long_checks);
 
 }  // namespace tendon::conformance

@@ -16,9 +16,6 @@ constexpr std::uint64_t kRemembered = 1984;
 
 std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
 
-bool far(double value) { return !(std::abs(value) <= 1e12); }
-bool far(const pb::Vec3& vector) { return far(vector.x()) || far(vector.y()) || far(vector.z()); }
-
 bool within_bounds(const pb::DeviceState& state) {
   return !far(state.position_m()) && !far(state.velocity_mps()) && !far(state.force_applied_n()) &&
          !far(state.energy_j()) && state.permitted_force_n() >= 0 && state.mode() >= 1 && state.mode() <= 6;
@@ -40,6 +37,22 @@ bool within_bounds(const pb::Frame& frame) {
 bool has_unknown(const pb::Datagram& body) {
   const auto unknown = [](const auto& message) { return !message.GetReflection()->GetUnknownFields(message).empty(); };
   return unknown(body) || std::ranges::any_of(body.frames(), unknown);
+}
+
+/// A toy has one device with one channel.
+constexpr std::string_view kDevice = "arm";
+constexpr std::string_view kChannel = "wall";
+
+/// Whether a toy has what is claimed, and the role is the highest of it.
+bool claims_good(const pb::Hello& hello) {
+  std::set<pb::Role> roles;
+  for (const pb::Claim& claim : hello.claims()) {
+    const bool channel_good =
+        claim.role() == pb::ROLE_OBSERVER || claim.channel().empty() || claim.channel() == kChannel;
+    if (!(claim.device().empty() || claim.device() == kDevice) || !channel_good) return false;
+    if (!roles.insert(claim.role()).second) return false;
+  }
+  return roles.empty() || *roles.rbegin() == hello.role();
 }
 
 Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
@@ -256,7 +269,21 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
   if (taken && !key_ && hello.role() == pb::ROLE_CONTROLLER && !is(Fault::kTwoControllers) && !again) {
     return refuse(port, *greeting, pb::CODE_BUSY);
   }
+  const bool knows_channels = !is(Fault::kKnowsNoChannels);
+  if (knows_channels && !claims_good(hello) && !is(Fault::kGrantsAnything))
+    return refuse(port, *greeting, pb::CODE_INVALID);
   pb::Answer yes = welcome_to(hello, version);
+  if (knows_channels) {
+    if (std::ranges::count(hello.features(), "channels") > 0) yes.mutable_welcome()->add_features("channels");
+    for (const pb::Claim& claim : hello.claims()) yes.mutable_welcome()->add_grants()->set_role(claim.role());
+  }
+  if (is(Fault::kGrantsUnasked) && hello.claims().empty()) {
+    yes.mutable_welcome()->add_grants()->set_role(hello.role());
+  }
+  if (is(Fault::kGrantsBackwards)) {
+    auto& grants = *yes.mutable_welcome()->mutable_grants();
+    std::reverse(grants.begin(), grants.end());
+  }
   if (is(Fault::kBadWelcome)) yes.mutable_welcome()->set_loop_hz(0);
   if (is(Fault::kInventsFeatures) && yes.welcome().features().empty()) yes.mutable_welcome()->add_features("telepathy");
   const std::uint32_t id = next_id_++;
@@ -264,6 +291,7 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
   send(port, answered.datagram);
   Member member{
       .port = port,
+      .name = hello.name(),
       .role = hello.role(),
       .random = random,
       .answer = answered.datagram,
@@ -276,6 +304,7 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
 
 void ToyServer::open(LocalTime now, Member& member) {
   member.open = true;
+  member.reported = now;
   for (Member& other : members_) {
     if (&other == &member || !other.open || other.session.closed || other.role != pb::ROLE_CONTROLLER ||
         member.role != pb::ROLE_CONTROLLER) {
@@ -284,6 +313,55 @@ void ToyServer::open(LocalTime now, Member& member) {
     const pb::Code code = is(Fault::kWrongReplacedCode) ? pb::CODE_OK : pb::CODE_REPLACED;
     for (Bytes& bye : other.session.say_bye(now, code)) send(other.port, std::move(bye));
   }
+  if (member.role == pb::ROLE_CONTROLLER && holder() == nullptr) holder_ = member.session.connection_id();
+}
+
+const ToyServer::Member* ToyServer::holder() const {
+  const auto found = std::ranges::find_if(members_, [&](const Member& member) {
+    return member.session.connection_id() == holder_ && !member.session.closed;
+  });
+  return found == members_.end() ? nullptr : &*found;
+}
+
+pb::DeviceDescription ToyServer::describe() const {
+  const pb::Answer answer = welcome_to({}, 1);
+  const pb::Welcome& welcome = answer.welcome();
+  pb::DeviceDescription out;
+  out.set_name(std::string(kDevice));
+  out.set_model(welcome.device_name());
+  out.set_position_dof(3);
+  out.set_force_dof(3);
+  out.set_max_force_n(welcome.max_force_n());
+  out.set_loop_hz(is(Fault::kDescribesAnother) ? 500 : welcome.loop_hz());
+  pb::ChannelDescription& channel = *out.add_channels();
+  channel.set_name(std::string(kChannel));
+  channel.set_rule(pb::CHANNEL_RULE_SUM);
+  if (const Member* const member = holder()) channel.set_holder(member->name);
+  return out;
+}
+
+pb::Code ToyServer::set_deadband(Member& member, const pb::SetStateDeadband& asked) const {
+  const std::uint32_t silence_us = asked.max_silence_us();
+  const bool good = silence_us == 0 || (silence_us >= 1000 && silence_us <= 20'000 && asked.share() >= 0 &&
+                                        asked.share() <= 0.5 && asked.floor_mps() >= 0 && asked.floor_mps() <= 0.1);
+  if (!good && !is(Fault::kTakesAnyDeadband)) return pb::CODE_INVALID;
+  const bool stays = is(Fault::kDeadbandForEver) && silence_us == 0;
+  if (!stays && !is(Fault::kSendsTheForetold)) member.silence = silence_us / 1000;
+  return pb::CODE_OK;
+}
+
+std::optional<pb::Frame> ToyServer::report(LocalTime now, Member& member) const {
+  const Duration period = is(Fault::kReportsAllTheTime) ? milliseconds(50) : Duration(seconds(1));
+  if (member.forces == 0 || now - member.reported < period || is(Fault::kTellsNothing)) return std::nullopt;
+  pb::Frame frame;
+  pb::LinkReport& report = *frame.mutable_report();
+  report.set_number(is(Fault::kReportsOfOneNumber) ? 1 : ++member.reports);
+  report.set_until_ns(ns(now));
+  report.set_span_ns(is(Fault::kReportsBeyondBounds) ? 1ULL << 61 : static_cast<std::uint64_t>(period.count()));
+  report.set_forces(std::exchange(member.forces, is(Fault::kReportsAllTheTime) ? 1 : 0));
+  report.set_received(member.session.received());
+  member.reported = now;
+  return frame;
 }
 
 void ToyServer::receive(LocalTime now, int port, Span datagram) {
@@ -312,6 +390,7 @@ void ToyServer::take(Member& member, const pb::Frame& frame) {
   if (frame.has_force() && controls && (frame.force().sequence() > member.sequence || is(Fault::kOlderWins))) {
     member.sequence = frame.force().sequence();
     rendered_ = member.sequence;
+    ++member.forces;
   }
   if (!frame.has_control()) return;
   const pb::Control& control = frame.control();
@@ -344,6 +423,27 @@ void ToyServer::execute(Member& member, const pb::Control& control) {
     member.every = std::max(1U, 1000 / std::max(1U, std::min(1000U, control.set_state_rate().hz())));
   } else if (control.has_rearm()) {
     if (member.role != pb::ROLE_CONTROLLER && !is(Fault::kObserversRearm)) ack.set_code(pb::CODE_DENIED);
+  } else if (control.has_describe()) {
+    if (control.describe().device() == 0 || is(Fault::kDescribesAnyNumber)) {
+      *ack.mutable_device() = describe();
+    } else {
+      ack.set_code(pb::CODE_INVALID);
+    }
+  } else if (control.has_take_lease()) {
+    const bool may = is(Fault::kDeniesTheHolder)
+                         ? member.session.connection_id() != holder_
+                         : is(Fault::kAnybodyTakesTheLease) || holder() == nullptr || holder() == &member;
+    if (member.role != pb::ROLE_CONTROLLER && !is(Fault::kAnybodyTakesTheLease)) {
+      ack.set_code(pb::CODE_DENIED);
+    } else if (may) {
+      holder_ = member.session.connection_id();
+    } else {
+      ack.set_code(pb::CODE_BUSY);
+    }
+  } else if (control.has_give_lease()) {
+    if (holder() == &member && !is(Fault::kKeepsTheLease)) holder_ = 0;
+  } else if (control.has_set_state_deadband()) {
+    ack.set_code(set_deadband(member, control.set_state_deadband()));
   } else {
     ack.set_code(pb::CODE_UNSUPPORTED);
     if (is(Fault::kSilentToUnknownRequests)) return;
@@ -359,7 +459,10 @@ void ToyServer::tick(LocalTime now) {
   for (Member& member : members_) {
     if (member.session.closed || !(member.open || is(Fault::kStatesWhileHalfOpen))) continue;
     std::vector<pb::Frame> frames = std::exchange(member.due, {});
-    if (tick_ % member.every == 0) {
+    if (auto told = report(now, member)) frames.push_back(std::move(*told));
+    const bool foretold = tick_ - member.said_at < member.silence;  // its hand rests
+    if (tick_ % member.every == 0 && !foretold && !(member.silence > 0 && is(Fault::kSilentWithDeadband))) {
+      member.said_at = tick_;
       frames.emplace_back();
       pb::DeviceState& state = *frames.back().mutable_state();
       state.set_tick(is(Fault::kTicksGoBack) ? 1'000'000 - tick_ : tick_);

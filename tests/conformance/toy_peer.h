@@ -74,6 +74,23 @@ enum class Fault : std::uint8_t {
   kForgetsAnswers,
   kSilentToUnknownRequests,
   kTakesAnyRequestId,
+  kGrantsUnasked,
+  kGrantsBackwards,
+  kGrantsAnything,
+  kDescribesAnother,
+  kDescribesAnyNumber,
+  kAnybodyTakesTheLease,
+  kDeniesTheHolder,
+  kKeepsTheLease,
+  kTakesAnyDeadband,
+  kSendsTheForetold,
+  kSilentWithDeadband,
+  kDeadbandForEver,
+  kTellsNothing,
+  kReportsAllTheTime,
+  kReportsOfOneNumber,
+  kReportsBeyondBounds,
+  kKnowsNoChannels,  ///< no fault: an older server
   // A client's.
   kShortHello,
   kHelloWithConnection,
@@ -137,6 +154,7 @@ class ToySession {
   bool silent_too_long(LocalTime now) const;
   bool over(LocalTime now, Duration timeout) const;
   std::uint32_t connection_id() const noexcept { return connection_id_; }
+  std::uint64_t received() const noexcept { return seen_.size(); }
   bool closed = false;
 
  private:
@@ -173,13 +191,19 @@ class ToyServer : public ToyPeer {
  private:
   struct Member {
     int port;
+    std::string name;
     pb::Role role;
     Sixteen random;
     Bytes answer;
     ToySession session;
     bool open;
-    std::uint32_t every = 10;  ///< ms
+    std::uint32_t every = 10;   ///< ms
+    std::uint32_t silence = 0;  ///< ms, of a deadband
+    std::uint64_t said_at = 0;  ///< tick of the last state
     std::uint64_t sequence = 0;
+    std::uint64_t forces = 0;  ///< since the last report
+    std::uint64_t reports = 0;
+    LocalTime reported{};
     std::map<std::uint32_t, pb::Control> waiting;
     std::map<std::uint32_t, pb::ControlAck> answered;
     std::uint32_t next_request = 1;
@@ -190,6 +214,10 @@ class ToyServer : public ToyPeer {
   void refuse(int port, const Greeting& greeting, pb::Code code);
   void take(Member& member, const pb::Frame& frame);
   void execute(Member& member, const pb::Control& control);
+  pb::Code set_deadband(Member& member, const pb::SetStateDeadband& asked) const;
+  pb::DeviceDescription describe() const;
+  const Member* holder() const;
+  std::optional<pb::Frame> report(LocalTime now, Member& member) const;
   void open(LocalTime now, Member& member);
 
   std::optional<Key> key_;
@@ -198,6 +226,7 @@ class ToyServer : public ToyPeer {
   std::uint32_t next_id_ = 7;
   std::uint64_t tick_ = 0;
   std::uint64_t rendered_ = 0;
+  std::uint32_t holder_ = 0;  ///< connection id
   double hellos_ = 40;
   LocalTime hellos_at_{};
 };
