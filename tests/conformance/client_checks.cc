@@ -2,7 +2,6 @@
 #include "tests/conformance/client_checks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <set>

@@ -2,7 +2,6 @@
 #include "tests/conformance/toy_peer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
