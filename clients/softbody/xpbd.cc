@@ -11,8 +11,7 @@
 namespace tendon::softbody {
 
 XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterations, const EffectsConfig& effects)
-    : solid_(solid),
-      normal_(surface.normal()),
+    : normal_(surface.normal()),
       dt_(effects.step),
       iterations_(iterations),
       slowing_(1 / (1 + effects.damping.value_or(0) * effects.step)),

@@ -40,7 +40,6 @@ class XpbdModel : public Model {
   };
   void relax(Tet& tet);
 
-  const Solid& solid_;
   Vec3 normal_;
   double dt_;
   int iterations_;

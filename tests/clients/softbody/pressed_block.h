@@ -15,8 +15,8 @@ inline constexpr double kB1PatchRadius = 0.02;            // m
 
 inline Solid pressed_block(Element element, int n, double poisson, Law law = Law::kLinear) {
   Mesh mesh = block(info(element).shape, Vec3(0.1, 0.1, 0.05), {n, n, n / 2});
-  Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
-  return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, std::move(fixed)};
+  const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
+  return {std::move(mesh), element, {.young = 1e4, .poisson = poisson}, law, fixed};
 }
 
 /// The same as values, for every model. Those with time are slowed enough to be at rest soon.
