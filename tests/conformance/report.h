@@ -13,7 +13,7 @@ namespace tendon::conformance {
 enum class Side : std::uint8_t { kServer = 1, kClient = 2, kBoth = 3 };
 
 /// One rule of the documents. `sentence` stands there word for word, below the heading `section`
-/// (tests/conformance/report_test.cc looks it up).
+/// (tests/conformance/documents_test.cc looks it up).
 struct Check {
   std::string_view name;
   Side side;

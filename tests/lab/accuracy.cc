@@ -114,7 +114,7 @@ Accuracy accuracy_at(const Reaction& reaction, const Stiffness& mesh, Truth& tru
 
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return kNoNumber;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
