@@ -42,6 +42,13 @@ TEST(ReplayWindow, TellsThe32NumbersBeforeOne) {
   EXPECT_EQ(window.mask_before(128), 1U << 27U | 1U << 29U | 1U << 30U);  // across a word
 }
 
+TEST(ReplayWindow, TellsNothingOfWhatItNoLongerRemembers) {
+  ReplayWindow window;
+  for (std::uint64_t n = 0; n <= 3008; ++n) window.insert(n);
+  EXPECT_EQ(window.mask_before(3008 - 1960), (1U << 23U) - 1);  // of 1983 numbers below the highest, 23 are left
+  EXPECT_EQ(window.mask_before(3008 - ReplayWindow::kRemembered + 1), 0U);
+}
+
 TEST(ReplayWindow, SurvivesTheLargestNumber) {
   ReplayWindow window;
   window.insert(3);

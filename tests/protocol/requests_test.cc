@@ -29,5 +29,20 @@ TEST(OutgoingRequests, AreSentAgainAfterASecondAtTheLatestHoweverSlowTheLinkHasB
   }
 }
 
+TEST(IncomingRequests, AnAnswerThatIsDueStaysDueWhenItsRequestComesAgain) {
+  IncomingRequests requests;
+  const Control control{.id = 1, .request = SetStateRate{.hz = 100}};
+  ASSERT_TRUE(requests.take(control));
+  ASSERT_TRUE(requests.next());
+  EXPECT_EQ(requests.next_due(), nullptr);
+  requests.answer({.id = 1, .code = Code::kOk, .detail = {}});
+  ASSERT_TRUE(requests.take(control));
+  ASSERT_NE(requests.next_due(), nullptr);
+  requests.sent(1);
+  EXPECT_EQ(requests.next_due(), nullptr);
+  ASSERT_TRUE(requests.take(control));
+  EXPECT_NE(requests.next_due(), nullptr);
+}
+
 }  // namespace
 }  // namespace tendon
