@@ -60,7 +60,7 @@ Solid graded(const PressedBlock& block, Law law, double cells) {
                               layers(-half.y(), half.y(), c.y(), a, fine),
                               layers(0, block.size.z(), block.size.z(), a / 2, fine));
   Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
-  return {std::move(mesh), element, block.material, law, std::move(fixed)};
+  return {std::move(mesh), element, block.material, law, fixed};
 }
 
 Patch patch_of(const TouchSurface& top, const PressedBlock& block) {
