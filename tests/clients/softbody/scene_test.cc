@@ -33,6 +33,15 @@ TEST(SoftbodyScene, EveryValueArrives) {
   EXPECT_EQ(scene.at, Vec3(0.01, 0, 0));
 }
 
+TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
+  for (const char* name : {"softbody.toml", "liver.toml"}) {
+    const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / name);
+    EXPECT_EQ(warnings(scene.body), std::vector<std::string>{}) << name;
+    Body body(scene.body);
+    EXPECT_GT(body.press(Given::kLeastDepth, 0.001).force, 0.1) << name;
+  }
+}
+
 TEST(SoftbodyScene, AnUnknownEffectIsAnErrorWithItsLine) {
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\n  \"contact\",\n  \"gravitation\"]")),
             "s.toml:3: effects: unknown effect \"gravitation\"; expected one of contact, geometric-nonlinearity, "
