@@ -26,6 +26,8 @@ void sleep_until(LocalTime deadline) noexcept {
   }
 }
 
+Duration processor_time() noexcept { return read(CLOCK_THREAD_CPUTIME_ID); }
+
 Duration unix_offset() noexcept { return read(CLOCK_REALTIME) - read(CLOCK_MONOTONIC); }
 
 }  // namespace tendon::clock

@@ -16,6 +16,9 @@ LocalTime now() noexcept;
 /// Sleeps until `deadline` on the absolute time line, so that errors do not add up.
 void sleep_until(LocalTime deadline) noexcept;
 
+/// Processor time of the calling thread since it began.
+Duration processor_time() noexcept;
+
 /// Unix time − local time, at this moment: for recordings, whose readers know calendars.
 Duration unix_offset() noexcept;
 

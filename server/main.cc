@@ -14,6 +14,8 @@
 #include "devices/simulated/profiles.h"
 #include "protocol/limits.h"
 #include "server/build_info.h"
+#include "server/clock.h"
+#include "server/explain.h"
 #include "server/key_folder.h"
 #include "server/log.h"
 #include "server/randomness.h"
@@ -163,6 +165,14 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   return 0;
 }
 
+int explain_each(const std::vector<std::filesystem::path>& files, bool json) {
+  for (const Scene& scene : read_scenes(files)) {
+    const Explanation explanation = explain(scene, clock::processor_time);
+    std::cout << (json ? in_json(scene, explanation) + "\n" : in_words(scene, explanation));
+  }
+  return 0;
+}
+
 /// The name becomes a file's name and a word in the log.
 void check_key_name(const std::string& name) {
   const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
@@ -220,6 +230,10 @@ int main(int argc, char** argv) {
   keygen->add_option("name", key_name, "Of the client, as it is to be called here")->required();
   keygen->add_option("--out", key_file, "Write to this file instead of NAME.key");
   keygen->add_flag("--observer", observer, "A key that may look, but not send forces");
+  auto* explainer = app.add_subcommand(
+      "explain", "What a scene runs, what not, and what each part adds to a haptic step: `tendond explain demo.toml`");
+  explainer->add_option("scene", scene_files, "Scene files")->required();
+  explainer->add_flag("--json", json, "One JSON object per scene on stdout");
   app.set_version_flag("--version", std::string(kVersion) + " (" + std::string(kCommit) + ")");
   try {
     app.parse(argc, argv);
@@ -238,12 +252,13 @@ int main(int argc, char** argv) {
       check_key_name(key_name);
       return make_key(key_name, key_file.empty() ? key_name + ".key" : key_file, observer);
     }
-    if (scene_option->count() == 0) throw CLI::RequiredError("scene");
+    if (!*explainer && scene_option->count() == 0) throw CLI::RequiredError("scene");
   } catch (const CLI::ParseError& problem) {
     return app.exit(problem) == 0 ? 0 : 2;
   }
 
   try {
+    if (*explainer) return explain_each(scene_files, json);
     std::vector<Scene> scenes = read_scenes(scene_files);
     if (!record.empty()) scenes.front().recording = record;
     if (!listen.empty()) scenes.front().network.listen = parse_address(listen);
