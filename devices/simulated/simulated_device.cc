@@ -2,6 +2,7 @@
 #include "devices/simulated/simulated_device.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -52,6 +53,8 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   expect(config_.max_substep > Duration::zero(), "max_substep", seconds(config_.max_substep), "a duration above 0 s");
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
+  take_substeps_ =
+      substeps_with(config_.coulomb_friction.has_value(), hand_.has_value(), config_.amplifier_bandwidth.has_value());
 
   info_ = {.name = config_.name,
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
@@ -73,64 +76,90 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
     last_read_ = now;
     settle_energies();
   }
-  PositionSample sample{now, config_.encoder_step ? counted(truth_.position, *config_.encoder_step) : truth_.position};
-  if (config_.force_sensor) {
-    const auto& resolution = config_.force_sensor->resolution;
-    sample.hand_force = resolution ? counted(truth_.hand_force, *resolution) : truth_.hand_force;
-  }
+  PositionSample sample{now, truth_.position, {}};
+  if (config_.encoder_step) sample.position = counted(truth_.position, *config_.encoder_step);
+  if (config_.force_sensor) sample.hand_force = sensed_force();
   return sample;
+}
+
+Vec3 SimulatedDevice::sensed_force() const noexcept {
+  const auto& resolution = config_.force_sensor->resolution;
+  return resolution ? counted(truth_.hand_force, *resolution) : truth_.hand_force;
 }
 
 Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {
   command_ = Vec3::Zero();
-  if (force.allFinite()) command_ = config_.max_force ? saturated(force, *config_.max_force) : force;
-  until_watchdog_ = config_.watchdog;
+  if (force.allFinite()) command_ = force;
+  if (config_.max_force) command_ = saturated(command_, *config_.max_force);
+  if (config_.watchdog) until_watchdog_ = config_.watchdog;
   return command_;
 }
 
 void SimulatedDevice::advance(Duration gap) noexcept {
-  if (until_watchdog_ && gap > *until_watchdog_) {
-    const Duration before = *until_watchdog_;
-    until_watchdog_.reset();
-    integrate(before);
-    command_.setZero();
-    truth_.watchdog_fired = true;
-    integrate(gap - before);
-    return;
-  }
-  if (until_watchdog_) *until_watchdog_ -= gap;
+  if (until_watchdog_) gap = live_with_watchdog(gap);
   integrate(gap);
+}
+
+/// What is left of the gap after the watchdog has taken the force away, or all of it when it does not.
+Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
+  if (gap <= *until_watchdog_) {
+    *until_watchdog_ -= gap;
+    return gap;
+  }
+  const Duration before = *until_watchdog_;
+  until_watchdog_.reset();
+  integrate(before);
+  command_.setZero();
+  truth_.watchdog_fired = true;
+  return gap - before;
 }
 
 void SimulatedDevice::integrate(Duration span) noexcept {
   if (span <= Duration::zero()) return;
   const auto substeps = (span + config_.max_substep - Duration(1)) / config_.max_substep;
-  const double h = seconds(span) / static_cast<double>(substeps);
-  const double begin = seconds(lived_);
+  (this->*take_substeps_)(substeps, seconds(span) / static_cast<double>(substeps));
   lived_ += span;
+}
 
-  const double mass = hand_ ? config_.mass + hand_->mass() : config_.mass;
+SimulatedDevice::Substeps SimulatedDevice::substeps_with(bool coulomb, bool hand, bool lag) {
+  using Self = SimulatedDevice;
+  constexpr std::array<Substeps, 8> kAll = {
+      &Self::take_substeps<false, false, false>, &Self::take_substeps<false, false, true>,
+      &Self::take_substeps<false, true, false>,  &Self::take_substeps<false, true, true>,
+      &Self::take_substeps<true, false, false>,  &Self::take_substeps<true, false, true>,
+      &Self::take_substeps<true, true, false>,   &Self::take_substeps<true, true, true>};
+  return kAll.at((coulomb ? 4U : 0U) + (hand ? 2U : 0U) + (lag ? 1U : 0U));
+}
+
+template <bool kCoulomb, bool kHand, bool kLag>
+void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
+  const double begin = seconds(lived_);
+  double mass = config_.mass;
+  if constexpr (kHand) mass += hand_->mass();
   double resistance = mass;
   if (config_.viscous_friction) resistance += h / 2 * *config_.viscous_friction;
-  if (hand_) resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
-
+  if constexpr (kHand) resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
   Lag lag;
-  if (config_.amplifier_bandwidth) {
+  if constexpr (kLag) {
     lag.h_over_tau = h * 2 * std::numbers::pi * *config_.amplifier_bandwidth;
     lag.reached = -std::expm1(-lag.h_over_tau);
   }
-  for (Duration::rep i = 0; i < substeps; ++i) {
+  for (Duration::rep i = 0; i < count; ++i) {
     const Vec3 v0 = truth_.velocity;
-    truth_.device_force = force_over(lag);
+    if constexpr (kLag) {
+      truth_.device_force = force_over(lag);
+    } else {
+      truth_.device_force = command_;
+    }
     Vec3 push = truth_.device_force;
     Vec3 drive;
-    if (hand_) {
+    if constexpr (kHand) {
       drive = hand_->drive(begin + h * (static_cast<double>(i) + 0.5), truth_.position);
       push += drive;
     }
 
     Vec3 mean = mass * v0 + h / 2 * push;
-    if (config_.coulomb_friction) {
+    if constexpr (kCoulomb) {
       const double momentum = mean.norm();
       const double lost = h / 2 * *config_.coulomb_friction;
       mean *= momentum > lost ? (1 - lost / momentum) / resistance : 0.0;
@@ -139,10 +168,10 @@ void SimulatedDevice::integrate(Duration span) noexcept {
     }
 
     truth_.velocity = 2 * mean - v0;
-    if (config_.coulomb_friction && truth_.velocity.dot(mean) <= 0 && push.norm() <= *config_.coulomb_friction) {
-      truth_.velocity.setZero();
+    if constexpr (kCoulomb) {
+      if (truth_.velocity.dot(mean) <= 0 && push.norm() <= *config_.coulomb_friction) truth_.velocity.setZero();
     }
-    if (hand_) {
+    if constexpr (kHand) {
       const Vec3 pull = drive - (hand_->damping() + h / 2 * hand_->stiffness()) * mean;
       drive_work_ += h * pull.dot(mean);
       truth_.hand_force = pull - hand_->mass() / h * (truth_.velocity - v0);
@@ -151,10 +180,8 @@ void SimulatedDevice::integrate(Duration span) noexcept {
   }
 }
 
-/// The mean force of the motors over the next substep: the command, or the exact mean of the first-order
-/// response to it.
+/// The mean force of the motors over the next substep: the exact mean of the first-order response to the command.
 Vec3 SimulatedDevice::force_over(const Lag& lag) noexcept {
-  if (!amplifier_force_) return command_;
   const Vec3 missing = command_ - *amplifier_force_;
   *amplifier_force_ += missing * lag.reached;
   return command_ - missing * (lag.reached / lag.h_over_tau);

@@ -16,7 +16,8 @@ namespace tendon {
 ///
 /// Forces in N on the handle: F_device is what the device exerts on the hand, F_hand what the hand
 /// exerts on the device. Friction is isotropic. Each effect is one that the configuration lists or that
-/// does not exist: what is left out costs an empty optional and a branch.
+/// does not exist: what is left out costs an empty optional, and in a substep nothing: each combination of
+/// effects has a loop of its own.
 ///
 /// **Time.** The device lives from `read` to `read`: the first one sets the instant 0, each later one
 /// moves the world on to its `now` with the force that `apply` left there. Encoder and force change at
@@ -110,13 +111,20 @@ class SimulatedDevice final : public Device {
     double reached = 1;     ///< 1 − e^(−h/τ)
     double h_over_tau = 0;  ///< h/τ
   };
+  Vec3 sensed_force() const noexcept;
   void advance(Duration gap) noexcept;
+  Duration live_with_watchdog(Duration gap) noexcept;
   void integrate(Duration span) noexcept;
+  using Substeps = void (SimulatedDevice::*)(Duration::rep count, double h) noexcept;
+  static Substeps substeps_with(bool coulomb, bool hand, bool lag);
+  template <bool kCoulomb, bool kHand, bool kLag>
+  void take_substeps(Duration::rep count, double h) noexcept;
   Vec3 force_over(const Lag& lag) noexcept;
   void settle_energies() noexcept;
 
   Config config_;
   std::optional<OperatorHand> hand_;
+  Substeps take_substeps_;
   DeviceInfo info_;
   std::optional<LocalTime> last_read_;
   Duration lived_{};                        ///< since the first read

@@ -5,15 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <map>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "tests/support/callgrind.h"
 
 namespace tendon::softbody {
 namespace {
@@ -31,47 +30,12 @@ struct Body {
   Cost cost;
 };
 
-/// In a folder of its own, which is gone when this is.
-class Folder {
- public:
-  Folder() {
-    std::string name = std::filesystem::temp_directory_path() / "tendon-proof-XXXXXX";
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// The instructions of one file of callgrind's.
-double total(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  for (std::string line; std::getline(stream, line);) {
-    if (line.starts_with("totals: ") || line.starts_with("summary: ")) return std::stod(line.substr(line.find(' ')));
-  }
-  ADD_FAILURE() << file << " has no total";
-  return 0;
-}
-
 std::vector<Body> count(const std::string& program, const std::string& which) {
-  const Folder folder;
-  const std::string out = folder.path() / "count";
-  const std::string command = "cd " + folder.path().string() +
-                              " && OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 valgrind -q --tool=callgrind "
-                              "--toggle-collect=touch_in_turn --dump-after=touch_in_turn --callgrind-out-file=" +
-                              out + " " + program + " " + which + " > bodies";
-  EXPECT_EQ(std::system(command.c_str()), 0) << command;
   std::vector<Body> bodies;
-  std::ifstream lines(folder.path() / "bodies");
-  for (Body body; lines >> body.model >> body.effect >> body.cost.heap >> body.cost.bytes;) {
-    const std::string few = out + "." + std::to_string(2 * bodies.size() + 1);
-    const std::string more = out + "." + std::to_string(2 * bodies.size() + 2);
-    body.cost.instructions = (total(more) - total(few)) / kSteps;
+  for (const auto& [line, instructions] : testing::count_instructions(program, which, "touch_in_turn")) {
+    Body body;
+    std::istringstream(line) >> body.model >> body.effect >> body.cost.heap >> body.cost.bytes;
+    body.cost.instructions = instructions / kSteps;
     bodies.push_back(body);
   }
   return bodies;
@@ -105,12 +69,7 @@ std::string table(const std::vector<Body>& bodies) {
   return text.str();
 }
 
-class EffectsProof : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (std::system("command -v valgrind > /dev/null") != 0) GTEST_SKIP() << "skipped: there is no valgrind";
-  }
-};
+using EffectsProof = testing::InstructionTest;
 
 TEST_F(EffectsProof, WhatIsNotListedCostsNoInstructionAndNoByte) {
   const std::vector<Body> whole = count(TENDON_PROOF_WHOLE, "none");

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What effects_proof_test.cc counts instructions of: a simulated device in a hand, one after the other.
+//
+//     device-proof none     with nothing listed that it can do without
+//     device-proof each     with one effect more at a time
+//
+// A line for each: the name of the effect. Callgrind counts within `live_in_turn`, and writes a file each time it
+// returns.
+#include <iostream>
+#include <string_view>
+
+#include "devices/simulated/simulated_device.h"
+
+using namespace tendon;
+
+namespace {
+
+SimulatedDevice::Config bare() {
+  SimulatedDevice::Config config;
+  config.mass = 0.1;
+  config.hand =
+      OperatorHand::Config{.stiffness = 300,
+                           .damping = 3,
+                           .mass = 0.05,
+                           .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5})};
+  return config;
+}
+
+}  // namespace
+
+/// A name that callgrind finds: not inlined, not mangled.
+extern "C" [[gnu::noinline]] void live_in_turn(SimulatedDevice& device, int from, int to) {
+  for (int i = from; i < to; ++i) {
+    const auto sample = device.read(LocalTime(std::chrono::milliseconds(i)));
+    device.apply(-500 * sample->position);
+  }
+}
+
+namespace {
+
+void prove(std::string_view name, const SimulatedDevice::Config& config) {
+  SimulatedDevice device(config);
+  live_in_turn(device, 0, 500);
+  live_in_turn(device, 500, 1500);
+  std::cout << name << '\n';
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string_view which = argc == 2 ? argv[1] : "";
+  if (which != "none" && which != "each") return 2;
+  prove("none", bare());
+  if (which == "none") return 0;
+  const auto with = [](std::string_view name, void (*list)(SimulatedDevice::Config&)) {
+    SimulatedDevice::Config config = bare();
+    list(config);
+    prove(name, config);
+  };
+  with("viscous friction", [](SimulatedDevice::Config& config) { config.viscous_friction = 0.3; });
+  with("Coulomb friction", [](SimulatedDevice::Config& config) { config.coulomb_friction = 0.1; });
+  with("encoder", [](SimulatedDevice::Config& config) { config.encoder_step = 30e-6; });
+  with("saturation", [](SimulatedDevice::Config& config) { config.max_force = 8; });
+  with("amplifier", [](SimulatedDevice::Config& config) { config.amplifier_bandwidth = 200; });
+  with("force sensor", [](SimulatedDevice::Config& config) { config.force_sensor.emplace(); });
+  with("watchdog", [](SimulatedDevice::Config& config) { config.watchdog = std::chrono::milliseconds(5); });
+}
