@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -21,6 +22,8 @@ constexpr double kPiece = 0.1;
 /// touched.
 constexpr int kMostCuts = 32;
 
+constexpr int kMostFacetNodes = 9;
+
 }  // namespace
 
 TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double radius)
@@ -37,13 +40,12 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
     heights_.push_back(normal_.dot(node));
   }
   for (const Facet& facet : surface(mesh)) add(mesh, facet);
-  if (pieces_.empty()) throw std::invalid_argument("no side of the body faces the tool");
-  std::ranges::sort(pieces_, {}, [](const Piece& piece) { return piece.at.x(); });
-  for (const auto& facet : facets_) nodes_.insert(nodes_.end(), facet.begin(), facet.end());
+  if (facets_.empty()) throw std::invalid_argument("no side of the body faces the tool");
+  for (const Pieces& facet : facets_) nodes_.insert(nodes_.end(), facet.nodes.begin(), facet.nodes.end());
   std::ranges::sort(nodes_);
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
-  for (auto& facet : facets_) {
-    for (int& node : facet) node = static_cast<int>(std::ranges::lower_bound(nodes_, node) - nodes_.begin());
+  for (Pieces& facet : facets_) {
+    for (int& node : facet.nodes) node = static_cast<int>(std::ranges::lower_bound(nodes_, node) - nodes_.begin());
   }
 }
 
@@ -59,25 +61,27 @@ void TouchSurface::add(const Mesh& mesh, const Facet& facet) {
   const int cuts =
       std::clamp(static_cast<int>(std::ceil(size / (std::numbers::sqrt2 * kPiece * radius_))), 1, kMostCuts);
 
+  struct Piece {
+    Vec2 at;
+    double area;
+    VectorXd shares;
+  };
   std::vector<Piece> pieces;
   const auto add_piece = [&](double s, double t, double reference_area) {
     const ShapeValues shape = shape_at(mesh.shape, face.origin + s * face.along_s + t * face.along_t);
     Mat3 jacobian = Mat3::Zero();
     Vec3 place = Vec3::Zero();
-    Piece piece{Vec2::Zero(), 0, static_cast<int>(facets_.size()), {}};
-    piece.shares.resize(static_cast<Eigen::Index>(nodes.size()));
+    VectorXd shares(static_cast<Eigen::Index>(nodes.size()));
     Eigen::Index next = 0;
     for (int i = 0; i < shape.value.size(); ++i) {
       const Vec3& node = mesh.nodes[at(element[at(i)])];
       jacobian += node * shape.gradient.col(i).transpose();
       place += shape.value[i] * node;
-      if (std::ranges::find(nodes, element[at(i)]) != nodes.end()) piece.shares[next++] = shape.value[i];
+      if (std::ranges::find(nodes, element[at(i)]) != nodes.end()) shares[next++] = shape.value[i];
     }
     const Vec3 area = (jacobian * face.along_s).cross(jacobian * face.along_t);
     if (area.dot(normal_) < kLeastFacing * area.norm()) return;
-    piece.at = across(place);
-    piece.area = reference_area * area.dot(normal_);
-    pieces.push_back(piece);
+    pieces.push_back({across(place), reference_area * area.dot(normal_), shares});
   };
   const double step = (triangle ? 1.0 : 2.0) / cuts;
   for (int i = 0; i < cuts; ++i) {
@@ -91,15 +95,28 @@ void TouchSurface::add(const Mesh& mesh, const Facet& facet) {
     }
   }
   if (pieces.empty()) return;
-  pieces_.insert(pieces_.end(), pieces.begin(), pieces.end());
-  facets_.push_back(nodes);
+  const auto count = static_cast<Eigen::Index>(pieces.size());
+  Pieces& all = facets_.emplace_back();
+  all.nodes = nodes;
+  all.at.resize(2, count);
+  all.area.resize(count);
+  all.shares.resize(static_cast<Eigen::Index>(nodes.size()), count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Piece& piece = pieces[static_cast<std::size_t>(i)];
+    all.at.col(i) = piece.at;
+    all.area[i] = piece.area;
+    all.shares.col(i) = piece.shares;
+  }
+  all.middle = all.at.rowwise().mean();
+  all.reach = (all.at.colwise() - all.middle).colwise().norm().maxCoeff();
 }
 
 std::vector<int> TouchSurface::nodes_of_patches(const Vec2& middle, double reach) const {
   std::vector<bool> near(nodes_.size());
-  for (const Piece& piece : pieces_) {
-    if ((piece.at - middle).norm() > reach + radius_) continue;
-    for (const int node : facets_[at(piece.facet)]) near[at(node)] = true;
+  for (const Pieces& facet : facets_) {
+    const double nearest = (facet.at.colwise() - middle).colwise().norm().minCoeff();
+    if (nearest > reach + radius_) continue;
+    for (const int node : facet.nodes) near[at(node)] = true;
   }
   std::vector<int> nodes;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -110,25 +127,32 @@ std::vector<int> TouchSurface::nodes_of_patches(const Vec2& middle, double reach
 
 std::optional<Patch> TouchSurface::patch(const Vec2& middle, double least_covered) const {
   if (!middle.allFinite()) return std::nullopt;
-  const auto by_x = [](const Piece& piece) { return piece.at.x(); };
-  const auto begin = std::ranges::lower_bound(pieces_, middle.x() - radius_, {}, by_x);
-  const auto end = std::ranges::upper_bound(pieces_, middle.x() + radius_, {}, by_x);
   const double top = 3 / (std::numbers::pi * radius_ * radius_);
   std::vector<Vec3> sums(nodes_.size(), Vec3::Zero());  // weight, slope x, slope y
   std::vector<bool> below(nodes_.size());
   Vec3 total = Vec3::Zero();
   int count = 0;
-  for (auto piece = begin; piece != end; ++piece) {
-    const Vec2 from = (piece->at - middle) / radius_;
-    const double left = 1 - from.squaredNorm();
-    if (left <= 0) continue;
-    const double scale = top * piece->area * left;
-    const Vec3 share(scale * left, 4 * scale * from.x() / radius_, 4 * scale * from.y() / radius_);
-    total += share;
-    const auto& nodes = facets_[at(piece->facet)];
-    for (Eigen::Index i = 0; i < piece->shares.size(); ++i) {
-      const std::size_t node = at(nodes[static_cast<std::size_t>(i)]);
-      sums[node] += piece->shares[i] * share;
+  for (const Pieces& facet : facets_) {
+    if ((facet.middle - middle).squaredNorm() >= (radius_ + facet.reach) * (radius_ + facet.reach)) continue;
+    std::array<Vec3, kMostFacetNodes> of_facet;
+    of_facet.fill(Vec3::Zero());
+    const std::size_t corners = facet.nodes.size();
+    bool touched = false;
+    for (Eigen::Index i = 0; i < facet.area.size(); ++i) {
+      const Vec2 from = (facet.at.col(i) - middle) / radius_;
+      const double left = 1 - from.squaredNorm();
+      if (left <= 0) continue;
+      const double scale = top * facet.area[i] * left;
+      const Vec3 share(scale * left, 4 * scale * from.x() / radius_, 4 * scale * from.y() / radius_);
+      total += share;
+      const double* const shares = facet.shares.col(i).data();
+      for (std::size_t corner = 0; corner < corners; ++corner) of_facet[corner] += shares[corner] * share;
+      touched = true;
+    }
+    if (!touched) continue;
+    for (std::size_t corner = 0; corner < corners; ++corner) {
+      const std::size_t node = at(facet.nodes[corner]);
+      sums[node] += of_facet[corner];
       count += below[node] ? 0 : 1;
       below[node] = true;
     }

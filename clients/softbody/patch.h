@@ -55,12 +55,14 @@ class TouchSurface {
   double height(int node) const { return heights_[static_cast<std::size_t>(node)]; }
 
  private:
-  /// A small piece of a facet.
-  struct Piece {
-    Vec2 at;
-    double area;
-    int facet;
-    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 9, 1> shares;  ///< of the facet's nodes
+  /// A facet, cut into small pieces.
+  struct Pieces {
+    std::vector<int> nodes;                       ///< of the facet, as indices of nodes_
+    Eigen::Matrix<double, 2, Eigen::Dynamic> at;  ///< m, the middle of each piece, across
+    VectorXd area;                                ///< m², of each, seen along the normal
+    MatrixXd shares;                              ///< of the nodes (rows) in each piece (columns)
+    Vec2 middle;
+    double reach = 0;  ///< m, from the middle to the piece that is farthest from it
   };
 
   void add(const Mesh& mesh, const Facet& facet);
@@ -70,8 +72,7 @@ class TouchSurface {
   Eigen::Matrix<double, 2, 3> across_;
   std::vector<Vec2> places_;  ///< of all nodes of the mesh, across
   std::vector<double> heights_;
-  std::vector<std::vector<int>> facets_;  ///< where in nodes_ those of each are
-  std::vector<Piece> pieces_;             ///< sorted by at.x
+  std::vector<Pieces> facets_;
   std::vector<int> nodes_;
 };
 
