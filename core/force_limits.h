@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/motion.h"
@@ -24,14 +25,15 @@ inline Limited saturate(const Vec3& wanted, double max) noexcept {
 }
 
 /// Bounds how fast a force may change: ‖F − F_before‖ ≤ rate · elapsed, with rate in N/s. What is left
-/// of the change keeps its direction. An infinite rate changes nothing.
+/// of the change keeps its direction. An infinite rate changes nothing; in an interval that is not positive nothing
+/// may change.
 ///
 /// Thread-safe, realtime-safe.
 inline Limited limit_slew(const Vec3& wanted, const Vec3& before, double rate, Duration elapsed) noexcept {
   if (std::isinf(rate)) return {wanted, {}};  // ∞ · 0 s would not be a number
   const Vec3 change = wanted - before;
   const double size = change.norm();
-  const double allowed = rate * seconds(elapsed);
+  const double allowed = rate * std::max(0.0, seconds(elapsed));
   if (size <= allowed) return {wanted, {}};
   return {before + change * (allowed / size), Reason::kSlew};
 }

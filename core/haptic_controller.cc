@@ -20,6 +20,7 @@ HapticController::HapticController(const Config& config)
   positive(config.max_force, "max_force");
   positive(config.max_slew, "max_slew");
   if (!std::isfinite(config.max_force)) throw std::invalid_argument("max_force must be finite");
+  if (config.max_speed) positive(*config.max_speed, "max_speed");
   if (config.watchdog < Duration::zero()) throw std::invalid_argument("watchdog must not be negative");
   if (config.admittance) admittance_.emplace(*config.admittance);
   if (config.friction_map) {
@@ -64,11 +65,17 @@ void HapticController::follow_tool(Step& step) noexcept {
   }
 }
 
+bool HapticController::jumped(const Motion& hand) const noexcept {
+  if (!config_.max_speed || !last_) return false;
+  return (hand.position - last_->position).norm() > *config_.max_speed * seconds(hand.at - last_->at);
+}
+
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force) noexcept {
-  if (!hand.position.allFinite()) {
-    fault_ = Fault::kPositionNotFinite;
+  const bool finite = hand.position.allFinite();
+  if (!finite || jumped(hand)) {
+    fault_ = finite ? Fault::kPositionJumped : Fault::kPositionNotFinite;
     Step blind = step_unseen(hand.at, applied);
-    blind.reasons |= Reason::kNotFinite;
+    if (!finite) blind.reasons |= Reason::kNotFinite;
     return blind;
   }
 

@@ -60,6 +60,7 @@ class HapticController {
     kNone,
     kPositionNotFinite,  ///< the device measured NaN or infinity
     kDeviceSilent,       ///< max_missed readings in a row failed
+    kPositionJumped,     ///< … or a position that no hand comes to at max_speed
   };
 
   struct Config {
@@ -76,6 +77,10 @@ class HapticController {
     std::vector<ChannelRule> channels = {ChannelRule::kSum};
     /// Readings that may fail in a row before it is a fault: 20 ms at 1 kHz, what libfranka allows.
     std::uint32_t max_missed = 20;
+    /// m/s; > 0. What seems to move faster is no hand but an encoder that has wrapped or lost count: a fault, and no
+    /// motion to the account, which would take 0.2 m in a millisecond for 32 J of friction at 0.8 N·s/m. Empty: every
+    /// position is believed.
+    std::optional<double> max_speed{};
   };
 
   /// Throws std::invalid_argument naming the field when a value is impossible.
@@ -106,6 +111,7 @@ class HapticController {
   void book(const Motion& hand, const Vec3& applied, Step& step) noexcept;
   void book_unseen(const Vec3& applied, Duration held) noexcept;
   void follow_tool(Step& step) noexcept;
+  bool jumped(const Motion& hand) const noexcept;
 
   Config config_;
   Limiter limiter_;

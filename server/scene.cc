@@ -45,6 +45,7 @@ constexpr Unit kNoUnit = {"", "", 1};
 constexpr std::array kUnits = {
     Unit{"_n_s_per_m", "N·s/m", 1},
     Unit{"_m_per_s2", "m/s²", 1},
+    Unit{"_m_per_s", "m/s", 1},
     Unit{"_n_per_m", "N/m", 1},
     Unit{"_n_per_s", "N/s", 1},
     Unit{"_hz", "Hz", 1},
@@ -693,6 +694,9 @@ void declare_scene(Table& scene, Draft& draft) {
     loop.key("longest_hold_us", draft.longest_hold, kAboveZero,
              "T_max of the limiter: a force held for longer is an overrun. Not below the period",
              Absent{.text = "2 periods"});
+    loop.key("max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
+             "a position that no hand comes to at this speed is a fault: an encoder that wraps or loses count",
+             Absent{.text = "every position is believed"});
   });
 
   scene.table("limiter", [&draft](Table& limiter) {

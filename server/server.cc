@@ -46,6 +46,8 @@ const char* describe(HapticController::Fault fault) {
       return "the device measured a position that is not a number";
     case HapticController::Fault::kDeviceSilent:
       return "the device has stopped answering";
+    case HapticController::Fault::kPositionJumped:
+      return "the device's position has jumped further than a hand can move: its encoder has wrapped or lost count";
   }
   return "unknown";
 }

@@ -176,6 +176,25 @@ TEST(HapticController, NotANumberPositionGivesZeroForceFreezesTheLedgerAndLatche
   EXPECT_LE(seen.energy, energy);
 }
 
+TEST(HapticController, APositionThatNoHandComesToIsAFaultGivesZeroForceAndEarnsNothing) {
+  HapticController::Config c = config();
+  c.max_speed = 10;
+  Bench bench(c);
+  bench.move_to(0);
+  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.want(-0.5);
+  bench.move_to(0.02 + 0.0099);
+  ASSERT_EQ(bench.controller.fault(), HapticController::Fault::kNone);
+  const double energy = bench.last.energy;
+  const Step jump = bench.move_to(0.0299 + 0.0101);
+  EXPECT_EQ(bench.controller.fault(), HapticController::Fault::kPositionJumped);
+  EXPECT_EQ(jump.force, Vec3::Zero());
+  EXPECT_LE(jump.energy, energy);
+  const Step there = bench.move_to(0.04);
+  EXPECT_EQ(there.mode, Mode::kFault);
+  EXPECT_LE(there.energy, energy);
+}
+
 TEST(HapticController, AFaultIsLeftOnlyByRearmAndForcesAreRampedInAgain) {
   HapticController::Config c = config();
   c.hold.ramp_in = milliseconds(100);
@@ -203,6 +222,21 @@ TEST(HapticController, ASilentDeviceGetsZeroForceAndIsAFaultAfterTwentyMisses) {
     bench.applied = step.force;
   }
   EXPECT_EQ(bench.controller.fault(), HapticController::Fault::kDeviceSilent);
+}
+
+TEST(HapticController, WhenTimeGoesBackTheForceStaysAsItIs) {
+  HapticController::Config c = config();
+  c.max_slew = 500;
+  Bench bench(c);
+  bench.move_to(0);
+  for (int i = 1; i <= 400; ++i) bench.move_to(i * 2e-4);
+  bench.want(-2);
+  bench.move_to(0.08);
+  bench.move_to(0.08);
+  const double before = bench.applied.x();
+  ASSERT_LT(before, -0.5);
+  EXPECT_EQ(bench.move_to(0.08, -milliseconds(1)).force.x(), before);
+  EXPECT_EQ(bench.move_to(0.08, Duration::zero()).force.x(), before);
 }
 
 TEST(HapticController, TheForceNeverGrowsFasterThanTheSlewLimit) {

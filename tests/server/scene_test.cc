@@ -134,6 +134,7 @@ direction = [0, 0, 2]
 [loop]
 period_us = 500
 longest_hold_us = 1500
+max_speed_m_per_s = 10
 [limiter]
 kind = "aol-per-axis"
 coulomb_friction_n = 0.1
@@ -173,6 +174,7 @@ path = "run.mcap"
   const HapticController::Config& control = scene.loop.control;
   EXPECT_EQ(scene.loop.period, 500us);
   EXPECT_EQ(control.limiter.longest_hold, 1500us);
+  EXPECT_EQ(control.max_speed, 10);
   EXPECT_EQ(control.watchdog, 5500us);
   EXPECT_EQ(control.limiter.law, Law::kAolPerAxis);
   EXPECT_EQ(control.limiter.friction.coulomb, 0.1);
@@ -423,8 +425,9 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
       {"[recording]\nfilename = \"x\"\n", "s.toml:5: recording.filename: unknown key; known here: path"},
       {"[device.gravity]\n",
        "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand"},
-      {"[loop]\n" + std::string(10'000, 'x') + " = 1\n",
-       "s.toml:5: loop." + std::string(10'000, 'x') + ": unknown key; known here: period_us, longest_hold_us"},
+      {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
+                                                             ": unknown key; known here: period_us, longest_hold_us, "
+                                                             "max_speed_m_per_s"},
   });
 }
 
