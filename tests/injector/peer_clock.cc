@@ -50,17 +50,17 @@ LocalTime DriftingClock::reading(LocalTime truth) const noexcept {
   return truth + ahead;
 }
 
-LocalTime DriftingClock::truth(LocalTime reading) const noexcept {
+LocalTime DriftingClock::truth(LocalTime reading, LocalTime earliest) const noexcept {
   // Between two steps: elapsed + ⌊elapsed · drift⌋ ≥ wanted, and as elapsed is whole, ⌊elapsed · (1 + drift)⌋ ≥ wanted,
   // so elapsed ≥ ⌈wanted / (1 + drift)⌉.
   Duration ahead = config_.offset;
-  Duration from = Duration::min();
+  Duration from = earliest == LocalTime::min() ? Duration::min() : earliest - start_;
   for (auto step = config_.steps.begin();; ++step) {
     const Duration wanted = reading - start_ - ahead;
     const Duration elapsed = std::max(-scaled(-wanted, kBillion, kBillion + config_.drift_ppb), from);
     if (step == config_.steps.end() || elapsed < step->at) return start_ + elapsed;
     ahead += step->change;
-    from = step->at;
+    from = std::max(from, step->at);
   }
 }
 

@@ -48,8 +48,9 @@ class DriftingClock {
   /// What the peer calls its local time. `truth` within ±70 years of start.
   LocalTime reading(LocalTime truth) const noexcept;
 
-  /// The first true time at which the clock reads `reading` or later: when a timer of the peer rings.
-  LocalTime truth(LocalTime reading) const noexcept;
+  /// The first true time, from `from` on, at which the clock reads `reading` or later: when a timer of the peer rings.
+  /// (A clock that is set back reads everything in between twice.)
+  LocalTime truth(LocalTime reading, LocalTime from = LocalTime::min()) const noexcept;
 
  private:
   Config config_;

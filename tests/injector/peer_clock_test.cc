@@ -33,6 +33,15 @@ TEST(DriftingClock, DriftIsExactAfterYears) {
   EXPECT_EQ(clock.reading(at(50 * 365 * 24h)), at(50 * 365 * 24h - 50 * 365 * 24 * 3600ns));
 }
 
+TEST(DriftingClock, ATimerThatIsSetAfterTheClockWasSetBackRingsWhenItReadsThatAgain) {
+  const DriftingClock clock({.offset = 1s, .drift_ppb = 0, .steps = {{10s, -3s}, {20s, 1s}}});
+  EXPECT_EQ(clock.truth(at(10s)), at(9s));
+  EXPECT_EQ(clock.truth(at(10s), at(9500ms)), at(9500ms));
+  EXPECT_EQ(clock.truth(at(10s), at(10s)), at(12s));
+  EXPECT_EQ(clock.truth(at(5s), at(15s)), at(15s));
+  EXPECT_EQ(clock.truth(at(19s), at(15s)), at(20s));
+}
+
 TEST(DriftingClock, ATimerOfThePeerRingsWhenItsClockFirstReadsSoMuch) {
   std::mt19937_64 random(3);
   for (int run = 0; run < 300; ++run) {

@@ -175,7 +175,7 @@ void World::turn_client(std::size_t handle) {
   const LocalTime reading = client.clock.reading(now_);
   const LocalTime due = client.client ? client.client->turn(reading) : client.guest->turn(reading);
   // `never` is no reading of any clock.
-  client.due = due == LocalTime::max() ? due : std::max(client.clock.truth(due), now_ + Duration(1));
+  client.due = due == LocalTime::max() ? due : client.clock.truth(due, now_ + Duration(1));
   if (watch_turns_) watch_turns_({handle, due <= reading});
 }
 
