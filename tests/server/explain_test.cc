@@ -21,9 +21,9 @@ std::function<Duration()> ticking() {
   return [now = Duration{}]() mutable { return now += 1us; };
 }
 
-/// Whatever a scene may leave out of a haptic step: the effects of the device, and the tables that are parts.
+/// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
 std::set<std::string> optional_parts() {
-  std::set<std::string> keys = {"device.hand", "limiter", "admittance"};
+  std::set<std::string> keys = {"device.hand", "loop.max_speed_m_per_s", "limiter", "admittance"};
   std::istringstream reference(scene_reference());
   std::string table;
   for (std::string line; std::getline(reference, line);) {
