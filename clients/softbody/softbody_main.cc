@@ -6,20 +6,47 @@
 #include <string_view>
 
 #include "clients/cpp/options.h"
+#include "clients/cpp/self_test.h"
 #include "clients/softbody/placed_body.h"
 
 using namespace tendon;
 
+namespace {
+
+/// What a self-test presses a body by: 3 mm, and as far aside, so that it stays on the surface that a scene has.
+constexpr double kWay = 0.003;
+
+int test(const softbody::Scene& scene, const Options& options) {
+  softbody::PlacedBody body(scene);
+  SelfTestScript script;
+  script.start = scene.at + kWay * scene.towards_hand;
+  script.into = -scene.towards_hand;
+  script.depth = 2 * kWay;
+  script.slide = kWay;
+  if (options.client.rate_hz > 0) script.rate_hz = options.client.rate_hz;
+  const SelfTest result = self_test([&](const DeviceState& hand) { return body.answer(hand); }, script);
+  std::cout << (options.json ? result.json() : result.text());
+  return result.passed() ? 0 : 1;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  const bool explains = argc > 1 && std::string_view(argv[1]) == "explain";
-  Options options{.client = {.name = explains ? "tendon-softbody explain" : "tendon-softbody", .rate_hz = 500}};
+  const std::string_view first = argc > 1 ? argv[1] : "";
+  const bool explains = first == "explain";
+  const bool tests = first == "selftest";
+  const int skip = explains || tests ? 1 : 0;
+  Options options{.client = {.name = "tendon-softbody", .rate_hz = 500}};
+  if (skip == 1) options.client.name += ' ' + std::string(first);
   std::string file;
-  CommandLine line(explains
-                       ? "Says what a scene simulates, what not, and what each part costs; no server is needed."
-                       : "A soft body that the hand can touch; `tendon-softbody explain SCENE` says what it simulates.",
+  CommandLine line(explains ? "Says what a scene simulates, what not, and what each part costs; no server is needed."
+                   : tests
+                       ? "Presses a scene by a script and says what of it would be felt as wrong; no server is needed."
+                       : "A soft body that the hand can touch; `tendon-softbody explain SCENE` says what it simulates, "
+                         "`tendon-softbody selftest SCENE` whether it is passive.",
                    options);
   line.add_argument("SCENE", file, "Scene file; its keys:\n" + softbody::scene_reference());
-  if (const auto exit_code = line.parse(explains ? argc - 1 : argc, explains ? argv + 1 : argv)) return *exit_code;
+  if (const auto exit_code = line.parse(argc - skip, argv + skip)) return *exit_code;
 
   try {
     const softbody::Scene scene = softbody::read_scene(file);
@@ -30,6 +57,7 @@ int main(int argc, char** argv) {
     for (const std::string& warning : softbody::warnings(scene.body)) {
       std::cerr << "tendon-softbody: warning: " << warning << '\n';
     }
+    if (tests) return test(scene, options);
     softbody::PlacedBody body(scene);
     return run(options, [&](const DeviceState& hand) { return body.answer(hand); });
   } catch (const std::exception& error) {

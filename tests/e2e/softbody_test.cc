@@ -49,6 +49,16 @@ TEST(Softbody, AHandFeelsASoftBlockAsStiffAsTheSceneMakesIt) {
   EXPECT_GT(as_stiff, deep / 2);
 }
 
+TEST(Softbody, PassesItsSelfTest) {
+  const ScratchFolder folder;
+  Process tested(program("tendon-softbody"), {"selftest", softbody_scene(), "--rate-hz", "200", "--json"},
+                 folder.path());
+  EXPECT_EQ(tested.wait(), 0) << tested.out() << tested.err();
+  const std::string stiff = R"("verdict":"passed","what":"its stiffness is that of its force, 0.006 m)";
+  EXPECT_NE(tested.out().find(stiff), std::string::npos) << tested.out();
+  EXPECT_EQ(tested.out().find(R"("verdict":"failed")"), std::string::npos);
+}
+
 TEST(Softbody, ExplainsASceneWithoutAServerAndNamesTheLineOfAMistake) {
   const ScratchFolder folder;
   Process explain(program("tendon-softbody"), {"explain", softbody_scene()}, folder.path());

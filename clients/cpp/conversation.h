@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+#include "clients/cpp/force_client.h"
+
+// An engine's side of a conversation in a file: each state that its callback was given, and what it answered. With it a
+// bug that a hand has found happens again without the hand, the device and the network, and a change of an engine that
+// was to change nothing is shown to have changed nothing, bit for bit.
+//
+// Text: a first line `tendon conversation 1`, then a line for each answer, of words with a space between: tick, sampled
+// (ns, server clock), position, velocity, force_applied (three each), energy, permitted_force, reasons, force_sequence,
+// force_age (ns), mode, device, channel (see DeviceState), then the force, and where the engine gave one the stiffness,
+// row by row. Integers are decimal, the others hexadecimal (1.8p+1 = 3), which is exact.
+
+namespace tendon {
+
+/// `engine`, of whose every answer a line goes to `to`, which must outlive it. What `engine` throws passes through, and
+/// leaves no line. A stream that takes no more (a full disk) stops the recording, not the engine: see its state.
+Physics recorded(Physics engine, std::ostream& to);
+
+/// What a replay found.
+struct Replay {
+  struct Difference {
+    std::uint64_t line = 0;  ///< of the file
+    std::uint64_t tick = 0;
+    Touch was;
+    Touch is;
+  };
+  std::uint64_t answers = 0;
+  std::uint64_t differing = 0;      ///< of these, not the same bits; a NaN is like any other NaN
+  double largest_n = 0;             ///< N, of their forces' differences; 0 where there is none, or none is finite
+  std::optional<Difference> first;  ///< of those that differ
+  /// In a sentence: "1200 answers, all the same".
+  std::string text() const;
+};
+
+/// Gives the recorded states to `engine`, in their order, and compares its answers with the recorded ones. Throws
+/// std::runtime_error, "line 7: …", when that is no whole recording; what `engine` throws passes through.
+Replay replay(std::istream& from, const Physics& engine);
+
+}  // namespace tendon
