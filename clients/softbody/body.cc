@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -24,33 +25,35 @@ namespace {
 using enum EffectKind;
 
 constexpr std::array kEffects{
-    EffectInfo{kContact, "contact", "the tool can touch the body"},
-    EffectInfo{kGeometricNonlinearity, "geometric-nonlinearity", "large rotations"},
-    EffectInfo{kMaterialNonlinearity, "material-nonlinearity", "large strains"},
-    EffectInfo{kGravity, "gravity", "the body sags under its weight"},
-    EffectInfo{kInertia, "inertia", "it swings: every answer is a step of time"},
-    EffectInfo{kDamping, "damping", "a bath slows every particle"},
-    EffectInfo{kViscosity, "viscosity", "the material resists being deformed quickly"},
-    EffectInfo{kFriction, "friction", "the tool drags on the surface"},
+    EffectInfo{kContact, "contact", "the tool can touch the body", {}},
+    EffectInfo{kGeometricNonlinearity, "geometric-nonlinearity", "large rotations", {}},
+    EffectInfo{kMaterialNonlinearity, "material-nonlinearity", "large strains", {}},
+    EffectInfo{kGravity, "gravity", "the body sags under its weight", {}},
+    EffectInfo{kInertia, "inertia", "it swings: every answer is a step of time", {}},
+    EffectInfo{kDamping, "damping", "a bath slows every particle", {}},
+    EffectInfo{kViscosity, "viscosity", "the material resists being deformed quickly", {}},
+    EffectInfo{kFriction, "friction", "the tool drags on the surface", {}},
+    EffectInfo{kCutting,
+               "cutting",
+               "the body comes apart along planned cuts, at a time or under a force",
+               {kInertia, kDamping, kViscosity}},
+    EffectInfo{kStiffening, "stiffening", "Young's modulus changes over time", {kGravity, kInertia, kDamping}},
 };
 
 constexpr EffectSet kSmall{kContact};
 constexpr EffectSet kLargeRotations{kContact, kGeometricNonlinearity};
 constexpr EffectSet kLargeStrains{kContact, kGeometricNonlinearity, kMaterialNonlinearity};
-constexpr EffectSet kAll{kGravity, kInertia, kDamping, kViscosity, kFriction};
-constexpr EffectSet kAllButViscosity{kGravity, kInertia, kDamping, kFriction};
+constexpr EffectSet kAll{kGravity, kInertia, kDamping, kViscosity, kFriction, kCutting, kStiffening};
+constexpr EffectSet kAllOfSprings{kGravity, kInertia, kDamping, kViscosity, kFriction, kStiffening};
+constexpr EffectSet kAllOfRounds{kGravity, kInertia, kDamping, kFriction, kStiffening};
+constexpr EffectSet kOfTables{kFriction, kStiffening};
 constexpr EffectSet kOfSteps{kGravity, kDamping, kFriction};
 
 constexpr std::array kModels{
     ModelInfo{ModelKind::kLinear, Law::kLinear, "linear", "small strains; one solution with a kept factor", kSmall,
               kAll, false},
-    ModelInfo{ModelKind::kCondensed,
-              Law::kLinear,
-              "condensed",
-              "the same answers from a table of the surface: the fastest",
-              kSmall,
-              {kFriction},
-              false},
+    ModelInfo{ModelKind::kCondensed, Law::kLinear, "condensed",
+              "the same answers from a table of the surface: the fastest", kSmall, kOfTables, false},
     ModelInfo{ModelKind::kCorotational, Law::kCorotational, "corotational",
               "large rotations, small strains; Newton at every answer", kLargeRotations, kAll, false},
     ModelInfo{ModelKind::kStVenantKirchhoff, Law::kStVenantKirchhoff, "stvk",
@@ -58,7 +61,8 @@ constexpr std::array kModels{
     ModelInfo{ModelKind::kNeoHookean, Law::kNeoHookean, "neo-hookean",
               "large rotations and strains; recovers from being turned inside out", kLargeStrains, kAll, false},
     ModelInfo{ModelKind::kMassSpring, Law::kLinear, "mass-spring",
-              "for comparison: springs along the edges, which know no Poisson ratio", kLargeRotations, kAll, true},
+              "for comparison: springs along the edges, which know no Poisson ratio", kLargeRotations, kAllOfSprings,
+              true},
     ModelInfo{ModelKind::kTensorMass,
               Law::kLinear,
               "tensor-mass",
@@ -82,14 +86,9 @@ constexpr std::array kModels{
               true},
     ModelInfo{ModelKind::kProjective, Law::kCorotational, "projective",
               "for comparison: elements as rigid as possible, a few rounds for each answer", kLargeRotations,
-              kAllButViscosity, false},
-    ModelInfo{ModelKind::kModal,
-              Law::kLinear,
-              "modal",
-              "for comparison: a few swings of the body, too stiff where it is touched",
-              kSmall,
-              {kFriction},
-              false},
+              kAllOfRounds, false},
+    ModelInfo{ModelKind::kModal, Law::kLinear, "modal",
+              "for comparison: a few swings of the body, too stiff where it is touched", kSmall, kOfTables, false},
 };
 
 Mesh mesh_of(const BodyConfig& config) {
@@ -123,7 +122,7 @@ ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& su
   return modal;
 }
 
-std::unique_ptr<Model> model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+std::unique_ptr<Model> unchanging_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
   switch (config.model) {
     case ModelKind::kLinear:
@@ -151,6 +150,12 @@ std::unique_ptr<Model> model_of(const BodyConfig& config, const Solid& solid, co
   return std::make_unique<ModalModel>(solid, surface, modal_config(config, surface));
 }
 
+std::unique_ptr<Model> model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+  std::unique_ptr<Model> model = unchanging_model_of(config, solid, surface);
+  if (config.stiffening) return std::make_unique<StiffeningModel>(std::move(model), *config.stiffening);
+  return model;
+}
+
 /// No effect may be in a config and be left out silently.
 const BodyConfig& checked(const BodyConfig& config) {
   const ModelInfo& model = info(config.model);
@@ -160,6 +165,12 @@ const BodyConfig& checked(const BodyConfig& config) {
       throw std::invalid_argument("the model \"" + std::string(model.name) + "\" does not simulate " +
                                   std::string(effect.name));
     }
+    for (const EffectInfo& other : kEffects) {
+      if (simulated.has(effect.kind) && simulated.has(other.kind) && effect.not_with.has(other.kind)) {
+        throw std::invalid_argument(std::string(effect.name) + " is not simulated together with " +
+                                    std::string(other.name));
+      }
+    }
   }
   if (model.tetrahedra && config.element != Element::kTet4) {
     throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
@@ -167,6 +178,7 @@ const BodyConfig& checked(const BodyConfig& config) {
   if (config.tool == BodyConfig::Tool::kSphere) {
     if (config.model != ModelKind::kCondensed) throw std::invalid_argument("a sphere wants the model \"condensed\"");
     if (config.friction) throw std::invalid_argument("a sphere has no friction");
+    if (config.stiffening) throw std::invalid_argument("a sphere wants a body that does not stiffen");
     if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument("a sphere does not stick");
   }
   return config;
@@ -175,6 +187,11 @@ const BodyConfig& checked(const BodyConfig& config) {
 std::unique_ptr<Friction> friction_of(const BodyConfig& config) {
   if (!config.friction) return nullptr;
   return std::make_unique<Friction>(*config.friction, sideways_stiffness(config.material, config.patch_radius));
+}
+
+Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
+  if (auto found = surface.patch(surface.across(middle))) return *std::move(found);
+  throw std::invalid_argument("the middle of the touched side is not on the body");
 }
 
 }  // namespace
@@ -197,6 +214,8 @@ EffectSet effects_of(const BodyConfig& config) {
   if (config.effects.damping) set.add(kDamping);
   if (config.effects.viscosity) set.add(kViscosity);
   if (config.friction) set.add(kFriction);
+  if (!config.cuts.empty()) set.add(kCutting);
+  if (config.stiffening) set.add(kStiffening);
   return set;
 }
 
@@ -205,29 +224,89 @@ struct Body::Parts {
       : solid(solid_of(checked(config))),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
         model(model_of(config, solid, surface)),
-        contact(*model, surface, config.tool_radius, config.side, friction_of(config)) {
-    const auto found = surface.patch(surface.across(config.middle));
-    if (!found) throw std::invalid_argument("the middle of the touched side is not on the body");
-    patch = *found;
+        contact(*model, surface, config.tool_radius, config.side, friction_of(config)),
+        patch(middle_patch(surface, config.middle)) {
     if (config.tool == BodyConfig::Tool::kSphere) {
       sphere.emplace(dynamic_cast<const CondensedModel&>(*model), surface, config.tool_radius);
     }
+    if (config.stiffening) stiffening = &dynamic_cast<StiffeningModel&>(*model);
+    if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
+
+  void cut(PlannedCut::When when, double value);
+  void note(Feel& feel);
+
+  /// Cuts that are yet to be made, and what they will need.
+  struct Planned {
+    Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed, const TouchSurface& surface);
+    Cutting cuts;
+    EffectsConfig effects;
+    Vec3 middle;
+  };
 
   Solid solid;
   TouchSurface surface;
   std::unique_ptr<Model> model;
   PatchContact contact;
-  std::optional<SphereContact> sphere;  ///< instead of `contact`
-  Patch patch;                          ///< around the middle
+  std::optional<SphereContact> sphere;    ///< instead of `contact`
+  Patch patch;                            ///< around the middle
+  StiffeningModel* stiffening = nullptr;  ///< the model, where it is one
+  std::unique_ptr<Planned> cutting;
 };
+
+/// Makes the cuts once on the mesh alone: a plan that goes wrong is refused before anything is touched.
+Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
+                              const TouchSurface& surface)
+    : cuts(config.cuts), effects(config.effects), middle(config.middle) {
+  Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
+  for (Cutting trial = cuts; trial.left() > 0;) {
+    const std::span<const Cut> made = trial.make_next();
+    const std::string which = "`cutting`: cut " + std::to_string(made.size());
+    if (divide(mesh, fixed, made.last(1)).opened == 0) {
+      throw std::invalid_argument(which + " lies between no two elements of the body");
+    }
+    body = divide(body.mesh, body.fixed, made);
+    try {
+      middle_patch(TouchSurface(body.mesh, surface.normal(), surface.radius()), middle);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(which + " leaves nothing to be touched: " + error.what());
+    }
+  }
+}
+
+void Body::Parts::cut(PlannedCut::When when, double value) {
+  while (cutting->cuts.due(when, value)) {
+    const Division division = divide(solid.mesh(), solid.fixed(), cutting->cuts.make_next());
+    solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed);
+    surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
+    patch = middle_patch(surface, cutting->middle);
+    model->cut(division, cutting->effects);
+    if (when == PlannedCut::When::kForce) return;  // the force on what is left is not known yet
+  }
+}
+
+void Body::Parts::note(Feel& feel) {
+  feel.topology_changed = cutting->cuts.take_changed();
+  cut(PlannedCut::When::kForce, feel.force.dot(surface.normal()));
+}
 
 Body::Body(const BodyConfig& config) : parts_(std::make_unique<Parts>(config)) {}
 Body::~Body() = default;
 Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
-Feel Body::touch(const Vec3& tool) { return parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool); }
+Feel Body::touch(const Vec3& tool) {
+  Feel feel = parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool);
+  if (parts_->cutting) parts_->note(feel);
+  return feel;
+}
+
+void Body::tick(double time) {
+  if (parts_->stiffening) parts_->stiffening->tick(time);
+  if (parts_->cutting) parts_->cut(PlannedCut::When::kTime, time);
+}
+
+bool Body::has_clock() const noexcept { return parts_->stiffening || parts_->cutting; }
 
 Reaction Body::press(Given given, double value) { return parts_->model->press(parts_->patch, given, value); }
 
@@ -251,7 +330,7 @@ const Vec3& Body::normal() const { return parts_->surface.normal(); }
 Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
-          parts_->model->bytes() + parts_->contact.bytes()};
+          parts_->model->bytes() + parts_->contact.bytes() + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
 }
 
 }  // namespace tendon::softbody

@@ -11,11 +11,14 @@
 #include <span>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "clients/softbody/contact.h"
+#include "clients/softbody/cutting.h"
 #include "clients/softbody/effects.h"
 #include "clients/softbody/material.h"
 #include "clients/softbody/quasi_static.h"
+#include "clients/softbody/stiffening.h"
 
 namespace tendon::softbody {
 
@@ -28,14 +31,10 @@ enum class EffectKind : std::uint8_t {
   kInertia,
   kDamping,
   kViscosity,
-  kFriction
+  kFriction,
+  kCutting,
+  kStiffening
 };
-struct EffectInfo {
-  EffectKind kind;
-  std::string_view name;
-  std::string_view what;  ///< one line
-};
-std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
 
 class EffectSet {
  public:
@@ -50,6 +49,14 @@ class EffectSet {
   static constexpr unsigned bit(EffectKind kind) { return 1U << static_cast<unsigned>(kind); }
   unsigned bits_ = 0;
 };
+
+struct EffectInfo {
+  EffectKind kind;
+  std::string_view name;
+  std::string_view what;  ///< one line
+  EffectSet not_with;     ///< is not simulated together with these
+};
+std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
 
 /// The models that a scene can choose, each a file of this folder.
 enum class ModelKind : std::uint8_t {
@@ -110,7 +117,9 @@ struct BodyConfig {
   int static_modes = 0;   ///< kModal: so many patches along each axis of a square of 2 `reach`; 1: the middle's alone
   EffectsConfig effects;  ///< what acts on all of the body
   std::optional<double> friction;  ///< coefficient
-  double clamped_below = 0;        ///< m; nodes up to so far above the lowest one are held. The lowest ones always are
+  std::vector<PlannedCut> cuts;    ///< in their order
+  std::optional<StiffnessOverTime> stiffening;
+  double clamped_below = 0;  ///< m; nodes up to so far above the lowest one are held. The lowest ones always are
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
@@ -131,14 +140,20 @@ EffectSet effects_of(const BodyConfig& config);
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
  public:
-  /// Throws std::invalid_argument with a sentence when the values make no body.
+  /// Throws std::invalid_argument with a sentence when the values make no body, or their cuts leave none to be touched.
   explicit Body(const BodyConfig& config);
   ~Body();
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// What a tool there feels. A body with time goes on by one step.
+  /// What a tool there feels. A body with time goes on by one step. A cut that waits for this answer's force is made
+  /// after it: the next answer is that of the cut body, and says so.
   Feel touch(const Vec3& tool);
+
+  /// `time` s have gone by since the scene began: Young's modulus becomes that of then, and cuts that are due are made.
+  /// No cut is undone by an earlier time.
+  void tick(double time);
+  bool has_clock() const noexcept;  ///< whether tick() is of any use
 
   /// The model under a patch around the middle: stiffness and force of scripted presses. A body with time goes on by
   /// one step; `settle` waits until it is at rest, and a model that is never done until it is done.

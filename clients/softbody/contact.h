@@ -20,6 +20,7 @@ struct Feel {
   double valid_radius = 0;  ///< m, how far the tool may move before `force` and `stiffness` are another's
   double error = 0;         ///< N, the solver's estimate of its own
   bool touching = false;
+  bool topology_changed = false;  ///< it is the first since the body was cut: what was felt before was another body
 };
 
 /// A tool that a patch of a body gives way to.

@@ -4,14 +4,20 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "clients/softbody/cutting.h"
+
 namespace tendon::softbody {
 namespace {
 
-Factor factor_of(const Solid& solid, const Effects& effects) {
+SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
   if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, stiffness);
   for (const auto& effect : effects) effect->add_stiffness(stiffness);
+  return stiffness;
+}
+
+Factor factor_of(const SymmetricMatrix& stiffness) {
   Factor factor(stiffness);
   if (!factor.factorize(stiffness)) {
     throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
@@ -34,16 +40,22 @@ Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, G
 LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects)
     : solid_(solid),
       normal_(surface.normal()),
-      factor_(factor_of(solid, {})),
+      factor_(factor_of(stiffness_of(solid, {}))),
       step_(effects.has_time() ? effects.step : 0),
       effects_(effects_at_rest(effects, solid)) {
-  if (!effects_.empty() || effects.has_time()) {
+  if (effects.has_time()) {
     const VectorXd rest = untouched();
     rest_ = VectorXd::Zero(solid.size());
     solid.add_free(rest, rest_);
     add_effects_of_time(effects_, effects, solid, rest);
-    factor_ = factor_of(solid, effects_);
+    factor_ = factor_of(stiffness_of(solid, effects_));
   }
+}
+
+void LinearModel::cut(const Division& division, const EffectsConfig& effects) {
+  effects_ = effects_at_rest(effects, solid_);
+  const SymmetricMatrix stiffness = stiffness_of(solid_, effects_);
+  if (division.lost > 0 || !factor_.split(stiffness, twins(solid_, division))) factor_ = factor_of(stiffness);
 }
 
 VectorXd LinearModel::displacements(const Patch& patch) const {
@@ -92,7 +104,7 @@ std::size_t LinearModel::bytes() const noexcept {
 
 CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
     : nodes_(nodes), row_of_(solid.mesh().nodes.size(), -1) {
-  const Factor factor = factor_of(solid, {});
+  const Factor factor = factor_of(stiffness_of(solid, {}));
   const auto count = static_cast<Eigen::Index>(nodes_.size());
   for (Eigen::Index i = 0; i < count; ++i) row_of_[at(nodes_[static_cast<std::size_t>(i)])] = static_cast<int>(i);
   table_.resize(count, count);

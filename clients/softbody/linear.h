@@ -17,6 +17,7 @@ class LinearModel : public Model {
   LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {});
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  void cut(const Division& division, const EffectsConfig& effects) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   std::size_t bytes() const noexcept override;
@@ -33,7 +34,7 @@ class LinearModel : public Model {
   Factor factor_;
   double step_;
   Effects effects_;
-  VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without effects
+  VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
 };
 
 /// The reaction of a linear body, from how deep each node of the patch is under 1 N on it.

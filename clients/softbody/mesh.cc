@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 namespace tendon::softbody {
@@ -158,6 +160,21 @@ std::vector<int> corners_on(const Mesh& mesh, const Facet& facet) {
   return nodes;
 }
 
+/// The faces of all elements, by what `name` calls their corners.
+template <class Name>
+auto faces_by(const Mesh& mesh, Name name) {
+  std::map<std::vector<std::decay_t<decltype(name(0))>>, std::vector<Facet>> sharing;
+  for (int e = 0; e < mesh.element_count(); ++e) {
+    for (int face = 0; face < static_cast<int>(faces(mesh.shape).size()); ++face) {
+      std::vector<std::decay_t<decltype(name(0))>> corners;
+      for (const int node : corners_on(mesh, {e, face})) corners.push_back(name(node));
+      std::ranges::sort(corners);
+      sharing[std::move(corners)].push_back({e, face});
+    }
+  }
+  return sharing;
+}
+
 }  // namespace
 
 std::span<const int> Mesh::element(int index) const noexcept {
@@ -275,20 +292,24 @@ std::vector<double> nodal_volumes(const Mesh& mesh) {
 }
 
 std::vector<Facet> surface(const Mesh& mesh) {
-  std::map<std::vector<int>, std::vector<Facet>> sharing;
-  for (int e = 0; e < mesh.element_count(); ++e) {
-    for (int face = 0; face < static_cast<int>(faces(mesh.shape).size()); ++face) {
-      std::vector<int> corners = corners_on(mesh, {e, face});
-      std::ranges::sort(corners);
-      sharing[std::move(corners)].push_back({e, face});
-    }
-  }
+  const auto place = [&](int node) {
+    const Vec3& at_rest = mesh.nodes[at(node)];
+    return std::array{at_rest.x(), at_rest.y(), at_rest.z()};
+  };
   std::vector<Facet> alone;
-  for (const auto& [corners, facets] : sharing) {
+  for (const auto& [corners, facets] : faces_by(mesh, place)) {
     if (facets.size() == 1) alone.push_back(facets.front());
   }
   std::ranges::sort(alone, {}, [](const Facet& facet) { return std::pair(facet.element, facet.face); });
   return alone;
+}
+
+std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh) {
+  std::vector<std::pair<Facet, Facet>> shared;
+  for (const auto& [corners, facets] : faces_by(mesh, std::identity())) {
+    if (facets.size() == 2) shared.emplace_back(facets.front(), facets.back());
+  }
+  return shared;
 }
 
 std::vector<int> nodes_on(const Mesh& mesh, const Facet& facet) {

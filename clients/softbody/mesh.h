@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "clients/softbody/element.h"
@@ -45,12 +46,18 @@ inline constexpr double kLeastQuality = 1e-9;
 /// scaled so that their sum is the volume (Hinton, Rock & Zienkiewicz 1976).
 std::vector<double> nodal_volumes(const Mesh& mesh);
 
-/// A face of an element that no other element has: the body's surface.
+/// A face of an element.
 struct Facet {
   int element;
   int face;
 };
+
+/// Those where no other lies: the body's surface. The two sides of a cut that is not open yet lie on each other, and
+/// are none.
 std::vector<Facet> surface(const Mesh& mesh);
+
+/// Those that two elements share.
+std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh);
 
 /// The nodes on a facet.
 std::vector<int> nodes_on(const Mesh& mesh, const Facet& facet);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace tendon::softbody {
 namespace {
@@ -21,6 +22,10 @@ double constrained_force(Given given, double value, double untouched, double com
 
 double secant(const Reaction& reaction, double rest) {
   return reaction.depth > rest && reaction.force > 0 ? reaction.force / (reaction.depth - rest) : 0;
+}
+
+void Model::cut(const Division&, const EffectsConfig&) {
+  throw std::logic_error("a model was cut that is not one of those that can be");
 }
 
 Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance, double most) {

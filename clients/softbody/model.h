@@ -8,6 +8,9 @@
 
 namespace tendon::softbody {
 
+struct Division;
+struct EffectsConfig;
+
 /// What is given, and what is asked for.
 enum class Given : std::uint8_t {
   kDepth,       ///< m, how deep the mean of the patch is held; the force is asked for, and may pull
@@ -46,6 +49,11 @@ class Model {
   /// The body's answer to one patch; a model with a state goes on from where the last call left it, by one step of
   /// time if it has time. A patch without nodes is a tool that is elsewhere.
   virtual Reaction press(const Patch& patch, Given given, double value) = 0;
+
+  /// The body has been cut: what this was made of is there, in its old place, as the cut has left it. Goes on from the
+  /// shape that it had, with the system that it had as far as that serves. Throws std::logic_error where
+  /// ModelInfo::may does not have kCutting.
+  virtual void cut(const Division& division, const EffectsConfig& effects);
 
   /// s, how long a press lasts. 0: the body is at rest at every instant.
   virtual double step() const noexcept { return 0; }

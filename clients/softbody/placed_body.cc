@@ -19,10 +19,16 @@ Feel PlacedBody::touch(const Vec3& position) {
 }
 
 Touch PlacedBody::answer(const DeviceState& hand) {
+  if (body_.has_clock()) tick(hand.sampled);
   const Feel feel = body_.step() > 0 ? follow(hand) : touch(hand.position);
   Touch touch = feel.force;
   touch.stiffness = feel.stiffness;
   return touch;
+}
+
+void PlacedBody::tick(PeerTime sampled) {
+  if (!first_) first_ = sampled;
+  body_.tick(seconds(sampled - *first_));
 }
 
 Feel PlacedBody::follow(const DeviceState& hand) {

@@ -22,11 +22,12 @@ class PlacedBody {
   /// The same as an answer to the server: force and stiffness. A body with time goes on from the hand's last place to
   /// this one, by as many steps as went by between the two samples; when that is none, the answer is the last one.
   /// After more than `kMostBehind`, or when the server's clock is set back, it takes one step instead: a pause is not
-  /// made up for.
+  /// made up for. What a scene plans over time counts from the first answer's sample.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
  private:
+  void tick(PeerTime sampled);
   Feel follow(const DeviceState& hand);
   struct Followed {
     PeerTime sampled;
@@ -37,7 +38,8 @@ class PlacedBody {
 
   Body body_;
   Mat3 to_device_;
-  Vec3 origin_;  ///< of the body's frame, in the device's
+  Vec3 origin_;                    ///< of the body's frame, in the device's
+  std::optional<PeerTime> first_;  ///< when the hand was where it was answered first; of bodies with a clock
   std::optional<Followed> followed_;
 };
 

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/softbody/cutting.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -48,7 +50,7 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
     throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
   }
   if (!effects_.empty()) release();
-  if (!effects_.empty() || effects.has_time()) rest_ = u_;
+  if (effects.has_time()) rest_ = u_;
   add_effects_of_time(effects_, effects, elastic, elastic.to_free(u_));
 }
 
@@ -180,6 +182,16 @@ Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) 
   reaction.slope = slope_below(patch, normal_, u_);
   if (step_ > 0) reaction.stiffness = secant(reaction, depth_below(patch, normal_, rest_));
   return reaction;
+}
+
+void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effects) {
+  const VectorXd before = std::move(u_);
+  u_.resize(elastic_.size());
+  for (int i = 0; i < u_.size(); ++i) u_[i] = before[3 * division.node_before[at(i / 3)] + i % 3];
+  effects_ = effects_at_rest(effects, elastic_);
+  stiffness_ = elastic_.pattern();
+  factor_ = Factor(stiffness_);  // a split one would not serve: under load the shape is another after the first step
+  stale_ = true;
 }
 
 double QuasiStaticModel::release() {

@@ -26,6 +26,7 @@ class QuasiStaticModel : public Model {
                    const EffectsConfig& effects = {});
 
   Reaction press(const Patch& patch, Given given, double value) override;
+  void cut(const Division& division, const EffectsConfig& effects) override;
   double step() const noexcept override { return step_; }
   bool still() const noexcept override { return effects_.empty(); }
   std::size_t bytes() const noexcept override;
@@ -64,7 +65,7 @@ class QuasiStaticModel : public Model {
   VectorXd u_;
   double step_;
   Effects effects_;
-  VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without effects
+  VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
   int iterations_ = 0;
   int factors_ = 0;
   bool stale_ = true;  ///< the factor no longer serves

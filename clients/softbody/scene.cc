@@ -133,6 +133,40 @@ class Table {
     return {*table, path_ + std::string(key) + ".", file_};
   }
 
+  std::vector<Table> tables(std::string_view key, const std::string& expected) {
+    const toml::node& node = need(key, expected);
+    const auto* array = node.as_array();
+    if (array == nullptr || array->empty()) fail(node, key, "expected " + expected);
+    std::vector<Table> all;
+    for (const toml::node& each : *array) {
+      const auto* table = each.as_table();
+      if (table == nullptr) fail(each, key, "expected " + expected);
+      all.emplace_back(*table, path_ + std::string(key) + '[' + std::to_string(all.size() + 1) + "].", file_);
+    }
+    return all;
+  }
+
+  /// Where this table is.
+  [[noreturn]] void fail(const std::string& what) const { fail(table_, "", what); }
+
+  /// Numbers above `least` (or equal to it, with `or_equal`).
+  std::vector<double> numbers(std::string_view key, double least, bool or_equal) {
+    std::ostringstream expected;
+    expected << "a list of numbers " << (or_equal ? "of at least " : "above ") << least;
+    const toml::node& node = need(key, expected.str());
+    const auto* array = node.as_array();
+    if (array == nullptr || array->empty()) fail(node, key, "expected " + expected.str());
+    std::vector<double> all;
+    for (const toml::node& each : *array) {
+      const std::optional<double> value = each.value<double>();
+      if (!value || each.is_boolean() || !std::isfinite(*value) || !(or_equal ? *value >= least : *value > least)) {
+        fail(each, key, "expected " + expected.str());
+      }
+      all.push_back(*value);
+    }
+    return all;
+  }
+
   void check_unknown() const {
     for (const auto& [key, node] : table_) {
       if (!known_.contains(key.str())) {
@@ -215,6 +249,35 @@ void read_touch(Table table, BodyConfig& body) {
   table.check_unknown();
 }
 
+std::vector<PlannedCut> read_cuts(Table& root) {
+  std::vector<PlannedCut> cuts;
+  for (Table& table : root.tables("cutting", "one or more tables [[cutting]]")) {
+    PlannedCut& cut = cuts.emplace_back();
+    cut.cut.corner = table.vector("corner_mm", 1e3 * kMaxLength, 1e3);
+    cut.cut.along = table.vector("along_mm", 1e3 * kMaxLength, 1e3);
+    cut.cut.deep = table.vector("deep_mm", 1e3 * kMaxLength, 1e3);
+    const bool timed = table.find("at_s") != nullptr;
+    if (timed == (table.find("above_n") != nullptr)) table.fail("expected either at_s or above_n");
+    cut.when = timed ? PlannedCut::When::kTime : PlannedCut::When::kForce;
+    cut.value = timed ? table.number("at_s", 0, true, 1e9, 1) : table.number("above_n", 0, false, 1e6, 1);
+    table.check_unknown();
+  }
+  return cuts;
+}
+
+StiffnessOverTime read_stiffening(Table table) {
+  StiffnessOverTime law;
+  law.at = table.numbers("at_s", 0, true);
+  law.factor = table.numbers("factor", 0, false);
+  try {
+    check(law);
+  } catch (const std::invalid_argument& error) {
+    table.fail(error.what());
+  }
+  table.check_unknown();
+  return law;
+}
+
 /// The effects that are listed must be those that the model simulates: all that it always does, and no others than it
 /// can.
 void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
@@ -235,6 +298,12 @@ void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
       root.fail(each, "effects",
                 "the model \"" + std::string(model.name) + "\" does not simulate \"" + **name + "\", which is listed");
     }
+    for (const EffectInfo& other : effects()) {
+      if (listed.has(other.kind) && (found->not_with.has(other.kind) || other.not_with.has(found->kind))) {
+        root.fail(each, "effects",
+                  "\"" + **name + "\" is not simulated together with \"" + std::string(other.name) + '"');
+      }
+    }
   }
   for (const EffectInfo& effect : effects()) {
     if (model.always.has(effect.kind) && !listed.has(effect.kind)) {
@@ -253,6 +322,8 @@ void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   if (listed.has(EffectKind::kDamping)) config.damping = root.number("damping_per_s", 0, false, kMost, 1);
   if (listed.has(EffectKind::kViscosity)) config.viscosity = root.number("viscosity_ms", 0, false, kMost, 1e3);
   if (listed.has(EffectKind::kFriction)) body.friction = root.number("friction", 0, true, 10, 1);
+  if (listed.has(EffectKind::kCutting)) body.cuts = read_cuts(root);
+  if (listed.has(EffectKind::kStiffening)) body.stiffening = read_stiffening(root.table("stiffening"));
   if (config.has_time()) config.step = root.number("step_ms", 0, false, 1e3, 1e3);
 }
 
@@ -323,6 +394,12 @@ std::string scene_reference() {
           "damping_per_s, viscosity_ms (the stress is that of the strain and so long of its rate), friction (a "
           "coefficient)\n"
           "step_ms                  how long an answer lasts, with inertia, damping or viscosity\n"
+          "[[cutting]]              a cut, a table for each, made in their order; it runs along the faces of elements\n"
+          "corner_mm, along_mm, deep_mm     a parallelogram: one corner and two sides, in the body's frame at rest\n"
+          "at_s                     made so long after the first answer; or in place of it\n"
+          "above_n                  made after an answer of more newtons along the normal\n"
+          "[stiffening]             Young's modulus, of which the material says how much it is at a factor of 1\n"
+          "at_s, factor             [times after the first answer], [factors]; straight in between\n"
           "[body]\n"
           "shape                    block, cylinder or file\n"
           "element                  how it is cut:\n";
@@ -385,7 +462,7 @@ std::string explain(const Scene& scene) {
                                                                : "")
          << '\n';
   }
-  text << "  cutting, self-collision, plasticity: there is no code for them\n";
+  text << "  self-collision, plasticity: there is no code for them\n";
   if (body.step() > 0) {
     text << "time: every answer is a step of " << 1e3 * body.step() << " ms\n";
   } else {

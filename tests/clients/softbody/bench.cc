@@ -5,9 +5,12 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
+#include <memory>
 #include <string>
+#include <type_traits>
 
 #include "clients/softbody/body.h"
+#include "clients/softbody/linear.h"
 #include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody {
@@ -44,6 +47,51 @@ void in_steps(benchmark::State& state, ModelKind model, int iterations) {
   answer(state, config);
 }
 
+/// What a cut through half of the width and state.range(1) mm deep costs the model: with the system that it had, and
+/// with a new one. The mesh, the solid and the surface are made anew in either case, and are not counted.
+template <class CutModel>
+void cut(benchmark::State& state, Law law, bool anew) {
+  const int n = static_cast<int>(state.range(0));
+  const Solid whole = testing::pressed_block(Element::kHex8Sri, n, 0.45, law);
+  const TouchSurface top(whole.mesh(), Vec3::UnitZ(), testing::kB1PatchRadius);
+  const double depth = 1e-3 * static_cast<double>(state.range(1));
+  const Cut made{Vec3(0, -0.025, 0.05 - depth), Vec3(0, 0.05, 0), Vec3(0, 0, depth)};
+  const Division division = divide(whole.mesh(), whole.fixed(), {&made, 1});
+  const Solid parted(division.mesh, whole.element(), whole.material(), law, division.fixed);
+  const TouchSurface parted_top(parted.mesh(), Vec3::UnitZ(), testing::kB1PatchRadius);
+  const auto construct = [&](const Solid& solid, const TouchSurface& surface) {
+    if constexpr (std::is_same_v<CutModel, LinearModel>) {
+      return std::make_unique<CutModel>(solid, surface);
+    } else {
+      return std::make_unique<CutModel>(solid, surface, QuasiStaticModel::Config{});
+    }
+  };
+  double force = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    Solid solid = whole;
+    std::unique_ptr<Model> model = construct(solid, top);
+    model->press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-3);
+    solid = parted;
+    state.ResumeTiming();
+    if (anew) {
+      model = construct(parted, parted_top);
+    } else {
+      model->cut(division, {});
+    }
+    force = model->press(*parted_top.patch(Vec2::Zero()), Given::kDepth, 1e-3).force;
+  }
+  state.counters["force_n"] = force;
+  state.counters["twins"] = static_cast<double>(twins(parted, division).size());
+}
+
+void cut_linear(benchmark::State& state, bool anew) { cut<LinearModel>(state, Law::kLinear, anew); }
+void cut_neo_hookean(benchmark::State& state, bool anew) { cut<QuasiStaticModel>(state, Law::kNeoHookean, anew); }
+
+BENCHMARK_CAPTURE(cut_linear, kept, false)->ArgsProduct({{8, 16}, {12, 25}});
+BENCHMARK_CAPTURE(cut_linear, anew, true)->ArgsProduct({{8, 16}, {12, 25}});
+BENCHMARK_CAPTURE(cut_neo_hookean, kept, false)->ArgsProduct({{8}, {12, 25}});
+BENCHMARK_CAPTURE(cut_neo_hookean, anew, true)->ArgsProduct({{8}, {12, 25}});
 BENCHMARK_CAPTURE(still, condensed_hex8_sri, ModelKind::kCondensed, Element::kHex8Sri)->Arg(8)->Arg(16);
 BENCHMARK_CAPTURE(still, condensed_hex27, ModelKind::kCondensed, Element::kHex27)->Arg(4)->Arg(8)->Arg(10);
 BENCHMARK_CAPTURE(still, linear_hex8_sri, ModelKind::kLinear, Element::kHex8Sri)->Arg(8)->Arg(16);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// In place of effects.cc and friction.cc, in a program that is built without effects (CMakeLists.txt).
+// In place of cutting.cc, effects.cc, friction.cc and stiffening.cc, in a program that is built without effects
+// (CMakeLists.txt).
 #include <cstdlib>
 
+#include "clients/softbody/cutting.h"
 #include "clients/softbody/effects.h"
 #include "clients/softbody/friction.h"
+#include "clients/softbody/stiffening.h"
 
 namespace tendon::softbody {
 namespace {
@@ -23,5 +26,19 @@ std::size_t bytes(const Effects&) noexcept { return 0; }
 Friction::Friction(double, double) : coefficient_(0), stiffness_(0) { abort_with(coefficient_ + stiffness_); }
 Friction::Drag Friction::move(const Vec2&, double) { std::abort(); }
 double sideways_stiffness(const Material&, double) { std::abort(); }
+
+Division divide(const Mesh&, const Fixed&, std::span<const Cut>) { std::abort(); }
+std::vector<int> twins(const Elastic&, const Division&) { std::abort(); }
+Cutting::Cutting(std::vector<PlannedCut>) { abort_with(changed_ ? 1 : 0); }
+bool Cutting::due(PlannedCut::When, double) const noexcept { return false; }
+std::span<const Cut> Cutting::make_next() { return made_; }
+bool Cutting::take_changed() noexcept { return false; }
+std::size_t Cutting::bytes() const noexcept { return 0; }
+
+double StiffnessOverTime::factor_at(double) const { std::abort(); }
+void check(const StiffnessOverTime&) {}
+StiffeningModel::StiffeningModel(std::unique_ptr<Model>, StiffnessOverTime) { abort_with(factor_); }
+Reaction StiffeningModel::press(const Patch&, Given, double) { std::abort(); }
+std::size_t StiffeningModel::bytes() const noexcept { return 0; }
 
 }  // namespace tendon::softbody

@@ -69,6 +69,24 @@ TEST(PlacedBody, AnswersForEveryModelThatASceneCanName) {
   }
 }
 
+TEST(PlacedBody, WhatIsPlannedOverTimeCountsFromTheFirstAnswersSample) {
+  std::string text = with("\"condensed\"", "\"linear\"");
+  text.replace(text.find("[\"contact\"]"), 11, "[\"contact\", \"cutting\", \"stiffening\"]");
+  text +=
+      "[[cutting]]\ncorner_mm = [0, -60, 25]\nalong_mm = [0, 120, 0]\ndeep_mm = [0, 0, 30]\nat_s = 1\n"
+      "[stiffening]\nat_s = [2, 4]\nfactor = [1, 3]\n";
+  PlacedBody body(parse_scene(text, "s.toml", "."));
+  const auto force = [&](int ms) { return -body.answer(hand_at(1e-3, std::chrono::milliseconds(ms))).force.x(); };
+  const double whole = force(70'000);
+  EXPECT_EQ(force(70'900), whole);
+  const double cut = force(71'000);
+  EXPECT_LT(cut, 0.99 * whole);
+  EXPECT_EQ(force(72'000), cut);
+  EXPECT_NEAR(force(73'000) / cut, 2, 1e-9);
+  EXPECT_NEAR(force(75'000) / cut, 3, 1e-9);
+  EXPECT_NEAR(force(60'000) / cut, 1, 1e-9);  // set back: the modulus of before, but no cut heals
+}
+
 TEST(PlacedBody, ABodyWithTimeGoesOnByTheTimeBetweenTheSamplesHoweverOftenItIsAsked) {
   const Scene scene = parse_scene(scene_of(info(ModelKind::kTensorMass)), "s.toml", ".");
   PlacedBody often(scene);

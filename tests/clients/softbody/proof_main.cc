@@ -47,6 +47,12 @@ void list(EffectKind effect, BodyConfig& config) {
     case EffectKind::kFriction:
       config.friction = 0.3;
       break;
+    case EffectKind::kCutting:  // one that does not come about
+      config.cuts = {{{Vec3(0, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0, 0, 0.03)}, PlannedCut::When::kForce, 1e6}};
+      break;
+    case EffectKind::kStiffening:
+      config.stiffening = StiffnessOverTime{.at = {0, 10}, .factor = {1, 2}};
+      break;
     default:
       break;
   }
@@ -56,7 +62,10 @@ void list(EffectKind effect, BodyConfig& config) {
 
 /// A name that callgrind finds: not inlined, not mangled.
 extern "C" [[gnu::noinline]] void touch_in_turn(Body& body, int steps) {
-  for (int i = 0; i < steps; ++i) body.touch(Vec3(0.0005 * i, 0, 0.0485 - 1e-5 * i));
+  for (int i = 0; i < steps; ++i) {
+    body.tick(0.01 * i);
+    body.touch(Vec3(0.0005 * i, 0, 0.0485 - 1e-5 * i));
+  }
 }
 
 namespace {

@@ -45,7 +45,7 @@ TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
 TEST(SoftbodyScene, AnUnknownEffectIsAnErrorWithItsLine) {
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\n  \"contact\",\n  \"gravitation\"]")),
             "s.toml:3: effects: unknown effect \"gravitation\"; expected one of contact, geometric-nonlinearity, "
-            "material-nonlinearity, gravity, inertia, damping, viscosity, friction");
+            "material-nonlinearity, gravity, inertia, damping, viscosity, friction, cutting, stiffening");
 }
 
 TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
@@ -82,6 +82,70 @@ TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
   text.replace(text.find("density_kg_per_m3 = 900, "), 25, "");
   EXPECT_EQ(refusal(text),
             "s.toml: body.material.density_kg_per_m3: expected a number above 0 and at most 1e+06, found nothing");
+}
+
+constexpr std::string_view kCut =
+    "[[cutting]]\ncorner_mm = [0, -60, 25]\nalong_mm = [0, 120, 0]\ndeep_mm = [0, 0, 30]\n";
+
+/// kGood with a model and effects, and tables behind it.
+std::string listing(const std::string& model, const std::string& effects, const std::string& tables) {
+  std::string text = with("condensed", model);
+  text.replace(text.find("[\"contact\"]"), 11, effects);
+  return text + tables;
+}
+
+TEST(SoftbodyScene, CutsAndAModulusOverTimeArrive) {
+  std::string tables;
+  tables.append(kCut).append("at_s = 2\n").append(kCut).append("above_n = 0.5\n");
+  tables.append("[stiffening]\nat_s = [0, 4]\nfactor = [1, 2]\n");
+  const std::string text = listing("linear", "[\"contact\", \"cutting\", \"stiffening\"]", tables);
+  const BodyConfig body = parse_scene(text, "s.toml", ".").body;
+  ASSERT_EQ(body.cuts.size(), 2U);
+  EXPECT_EQ(body.cuts[0].cut.corner, Vec3(0, -0.06, 0.025));
+  EXPECT_EQ(body.cuts[0].cut.along, Vec3(0, 0.12, 0));
+  EXPECT_EQ(body.cuts[0].cut.deep, Vec3(0, 0, 0.03));
+  EXPECT_EQ(body.cuts[0].when, PlannedCut::When::kTime);
+  EXPECT_EQ(body.cuts[0].value, 2);
+  EXPECT_EQ(body.cuts[1].when, PlannedCut::When::kForce);
+  EXPECT_EQ(body.cuts[1].value, 0.5);
+  ASSERT_TRUE(body.stiffening);
+  EXPECT_EQ(body.stiffening->factor_at(2), 1.5);
+  const std::string explained = explain(parse_scene(text, "s.toml", "."));
+  EXPECT_NE(explained.find("\n  cutting: "), std::string::npos) << explained;
+  EXPECT_NE(explained.find("\n  stiffening: "), std::string::npos) << explained;
+}
+
+TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
+  const std::string cut(kCut);
+  const std::string effects = "[\"contact\",\n\"cutting\"]";
+  for (const std::string model : {"condensed", "modal"}) {
+    EXPECT_EQ(refusal(listing(model, effects, cut + "at_s = 1\n")),
+              "s.toml:2: effects: the model \"" + model + "\" does not simulate \"cutting\", which is listed");
+  }
+  EXPECT_EQ(refusal(listing("linear", "[\"contact\", \"cutting\",\n\"viscosity\"]", cut + "at_s = 1\n")),
+            "s.toml:2: effects: \"viscosity\" is not simulated together with \"cutting\"");
+  EXPECT_EQ(refusal(listing("linear", "[\"contact\", \"gravity\",\n\"stiffening\"]", "")),
+            "s.toml:2: effects: \"stiffening\" is not simulated together with \"gravity\"");
+  EXPECT_EQ(refusal(listing("linear", effects, "")),
+            "s.toml: cutting: expected one or more tables [[cutting]], found nothing");
+  EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", cut + "at_s = 1\n")),
+            "s.toml:15: cutting: unknown key; expected one of body, effects, model, place, touch");
+  EXPECT_EQ(refusal(listing("linear", effects, cut)), "s.toml:16: cutting[1].: expected either at_s or above_n");
+  EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\nabove_n = 1\n")),
+            "s.toml:16: cutting[1].: expected either at_s or above_n");
+  EXPECT_EQ(refusal(listing("linear", effects, cut + "at_s = 1\n" + cut + "at_s = 1\nwidth_mm = 3\n")),
+            "s.toml:26: cutting[2].width_mm: unknown key; expected one of above_n, along_mm, at_s, corner_mm, deep_mm");
+}
+
+TEST(SoftbodyScene, WhatIsWrongWithAModulusOverTimeIsNamed) {
+  const std::string effects = "[\"contact\", \"stiffening\"]";
+  EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [0, 1]\nfactor = [1, 0]\n")),
+            "s.toml:17: stiffening.factor: expected a list of numbers above 0");
+  EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [1, 0]\nfactor = [1, 2]\n")),
+            "s.toml:15: stiffening.: `stiffening.at`: expected ascending times, one or more");
+  EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [0]\nfactor = [1]\nyoung = 3\n")),
+            "s.toml:18: stiffening.young: unknown key; expected one of at_s, factor");
+  EXPECT_EQ(refusal(listing("condensed", effects, "")), "s.toml: stiffening: expected a table, found nothing");
 }
 
 TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
