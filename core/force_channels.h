@@ -40,7 +40,7 @@ class ForceChannels {
 
   std::size_t size() const noexcept { return channels_.size(); }
 
-  /// A newer force of one channel; false when it was refused because it is not finite.
+  /// A newer force of one channel; false when it was refused because it is not sound.
   bool observe(std::size_t channel, const RemoteForce& force) noexcept {
     return channels_[channel].held.observe(force);
   }

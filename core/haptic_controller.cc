@@ -97,6 +97,7 @@ Step HapticController::step(const Motion& hand, const Vec3& applied, const std::
   if (const auto& newest = held_.newest(wanted.channel)) {
     step.force_sequence = newest->sequence;
     step.loop_age = hand.at - newest->answers;
+    step.force_error = newest->error;
   }
 
   step.force = step.wanted;

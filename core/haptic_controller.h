@@ -28,10 +28,11 @@ struct Step {
   double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
   Reasons reasons;            ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
-  std::uint32_t channel = 0;         ///< `mode`, `force_sequence` and the ages are of this channel's force
-  std::uint64_t force_sequence = 0;  ///< the remote force in use; 0 = none
-  Duration force_age{};              ///< since it arrived
-  Duration loop_age{};               ///< since the motion it answers was sampled
+  std::uint32_t channel = 0;            ///< `mode`, `force_sequence` and the ages are of this channel's force
+  std::uint64_t force_sequence = 0;     ///< the remote force in use; 0 = none
+  Duration force_age{};                 ///< since it arrived
+  Duration loop_age{};                  ///< since the motion it answers was sampled
+  std::optional<double> force_error{};  ///< N, what its engine thinks that it may be wrong by; empty: it does not say
 };
 
 /// The heart: from one look at the hand to the force it is to feel.
@@ -87,7 +88,7 @@ class HapticController {
   explicit HapticController(const Config& config);
 
   /// A newer remote force has come, for a channel below their number. Returns false when it was refused because it is
-  /// not finite.
+  /// not sound (HeldForce).
   bool observe(const RemoteForce& force, std::size_t channel = 0) noexcept { return held_.observe(channel, force); }
 
   /// The remote environment `source` has left a channel.

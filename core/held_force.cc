@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/estimation/answer.h"
+
 namespace tendon {
 
 HeldForce::HeldForce(const Config& config) : config_(config) {
@@ -20,6 +22,9 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
   at_least(config.safe_stop, config.hold, "safe_stop");
   at_least(config.ramp_in, Duration::zero(), "ramp_in");
   at_least(config.max_valid_for, Duration(1), "max_valid_for");
+  if (!(config.max_stiffness > 0)) {
+    throw std::invalid_argument("max_stiffness must be above zero, got " + std::to_string(config.max_stiffness));
+  }
   if (config.adaptive_local_model && config.output_estimator) {
     throw std::invalid_argument("adaptive_local_model and output_estimator both say what lies between two forces");
   }
@@ -28,16 +33,15 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
 }
 
 bool HeldForce::observe(const RemoteForce& force) noexcept {
-  if (!force.force.allFinite()) return false;
-  if (force.model && !(force.model->at.allFinite() && force.model->stiffness.allFinite())) return false;
+  if (!is_sound(force)) return false;
   if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop || newest_->source != force.source) {
     engaged_ = force.received;
     from_ = rendered_;
     if (local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
   }
-  if (local_model_) local_model_->observe(force);
-  if (estimator_) estimator_->correct(force);
-  newest_ = force;
+  newest_ = believed(force, config_.max_stiffness);
+  if (local_model_) local_model_->observe(*newest_);
+  if (estimator_) estimator_->correct(*newest_);
   mode_ = Mode::kActive;
   return true;
 }
@@ -52,15 +56,8 @@ Prediction HeldForce::follow(const Motion& hand) const noexcept {
   if (local_model_) {
     if (const auto blended = local_model_->predict(hand)) return *blended;
   }
-  if (estimator_) {
-    if (const auto learned = estimator_->predict(hand)) return *learned;
-  }
-  Prediction sent{.force = newest_->force, .stiffness = Mat3::Zero()};
-  if (newest_->model && !estimator_) {
-    sent.force -= newest_->model->stiffness * (hand.position - newest_->model->at);
-    sent.stiffness = newest_->model->stiffness;
-  }
-  return sent;
+  if (!estimator_) return reconstruct(*newest_, hand.position);
+  return estimator_->predict(hand).value_or(Prediction{.force = newest_->force, .stiffness = Mat3::Zero()});
 }
 
 HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {

@@ -24,13 +24,17 @@ namespace tendon {
 ///
 /// F(x) follows the hand between two arrivals:
 ///
-///     without a part         force, or force − K (x − at) when the remote environment sent a local model
-///     adaptive_local_model   the same, but a new model is blended in          (AdaptiveLocalModel)
-///     output_estimator       a model of the environment, learned on the way   (OutputEstimator)
+///     without a part         as the remote environment's local model says, with its contact and its table, or the
+///                            force alone when it sent none                      (reconstruct, estimation/answer.h)
+///     adaptive_local_model   its stiffness, but a new one is blended in          (AdaptiveLocalModel)
+///     output_estimator       a model of the environment, learned on the way      (OutputEstimator)
+///
+/// Of what was sent that is followed which can be believed (answer.h): no stiffness above `max_stiffness`, no model
+/// when the answer says that the body is another one now.
 ///
 /// The first force ever, the first one after a safe stop, and the first one of another source are ramped in linearly
 /// over `ramp_in`, from what is rendered at that moment: the hand is never kicked by an engine that comes back, or by
-/// one that takes over. A force that is not finite is refused, and the one before it ages on.
+/// one that takes over. An answer that is not sound (answer.h) is refused, and the one before it ages on.
 ///
 /// It decides what is *wanted*; that it cannot hurt is the business of the limiter downstream.
 ///
@@ -47,6 +51,8 @@ class HeldForce {
     Duration ramp_in = std::chrono::milliseconds(100);
     /// No engine can ask to be believed for longer.
     Duration max_valid_for = std::chrono::milliseconds(500);
+    /// N/m, > 0: the stiffest that is followed between two forces. Above what grounded devices render stably at 1 kHz.
+    double max_stiffness = 5000;
     /// At most one of these. What is empty is not there and costs nothing.
     std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
     std::optional<OutputEstimator::Config> output_estimator{};
@@ -61,10 +67,10 @@ class HeldForce {
   };
 
   /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive,
-  /// safe_stop is shorter than hold, a part cannot be, or both are there.
+  /// safe_stop is shorter than hold, max_stiffness is not above zero, a part cannot be, or both are there.
   explicit HeldForce(const Config& config);
 
-  /// Takes a newer force. Returns false, and changes nothing, when it is not finite.
+  /// Takes a newer force. Returns false, and changes nothing, when it is not sound.
   bool observe(const RemoteForce& force) noexcept;
 
   /// The remote environment `source` has left: its force, when it is the one that is held, is no longer fresh from now
@@ -81,7 +87,7 @@ class HeldForce {
   /// What is wanted at `hand.position` at `hand.at`. Once in each haptic step: an estimator learns from it.
   Wanted wanted(const Motion& hand) noexcept;
 
-  /// The force that is held; empty when idle.
+  /// The force that is held, as it is believed; empty when idle.
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
 
  private:

@@ -194,9 +194,60 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   to.set_channel(from.channel);
 }
 
+bool all_bounded(const auto& numbers) noexcept { return (numbers.array().abs() <= limits::kMaxValue).all(); }
+
+bool in_bounds(const ForceTable& table) noexcept {
+  return table.size >= ForceTable::kMinEntries && table.size <= ForceTable::kMaxEntries && bounded(table.first) &&
+         bounded(table.step) && table.step > 0 &&
+         std::all_of(table.force.begin(), table.force.begin() + table.size, [](double f) { return bounded(f); });
+}
+
+bool in_bounds(const Contact& contact) noexcept {
+  return std::abs(contact.normal.norm() - 1) <= Contact::kUnitTolerance && bounded(contact.gap) &&
+         (!contact.table || in_bounds(*contact.table));
+}
+
+bool in_bounds(const LocalModel& model) noexcept {
+  const bool anywhere = model.valid_radius == std::numeric_limits<double>::infinity();
+  return all_bounded(model.at) && all_bounded(model.stiffness) && (anywhere || bounded(model.valid_radius)) &&
+         model.valid_radius >= 0 && (!model.contact || in_bounds(*model.contact));
+}
+
+/// Whether all of `from` fits; the values are for in_bounds.
+bool read(const pb::ForceTable& from, ForceTable& to) noexcept {
+  to.first = from.first_depth_m();
+  to.step = from.step_m();
+  const auto& force = from.force_n();
+  const auto size = static_cast<std::size_t>(force.size());
+  if (size > ForceTable::kMaxEntries) return false;
+  to.size = static_cast<std::uint32_t>(size);
+  std::copy(force.begin(), force.end(), to.force.begin());
+  return true;
+}
+
+void write(const ForceTable& from, pb::ForceTable& to) {
+  to.set_first_depth_m(from.first);
+  to.set_step_m(from.step);
+  to.clear_force_n();
+  const auto size = std::min<std::size_t>(from.size, ForceTable::kMaxEntries);
+  for (std::size_t i = 0; i < size; ++i) to.add_force_n(from.force[i]);
+}
+
+bool read(const pb::Contact& from, Contact& to) noexcept {
+  read(from.normal(), to.normal);
+  to.gap = from.gap_m();
+  return !from.has_table() || read(from.table(), to.table.emplace());
+}
+
+void write(const Contact& from, pb::Contact& to) {
+  write(from.normal, *to.mutable_normal());
+  to.set_gap_m(from.gap);
+  to.clear_table();
+  if (from.table) write(*from.table, *to.mutable_table());
+}
+
 bool read(const pb::LocalModel& from, LocalModel& to) noexcept {
   const auto& k = from.stiffness_npm();
-  if (!std::all_of(k.begin(), k.end(), bounded)) return false;
   switch (k.size()) {
     case 1:
       to.stiffness = k.Get(0) * Mat3::Identity();
@@ -210,13 +261,19 @@ bool read(const pb::LocalModel& from, LocalModel& to) noexcept {
     default:
       return false;
   }
-  return read(from.at_m(), to.at);
+  read(from.at_m(), to.at);
+  if (from.has_valid_radius_m()) to.valid_radius = from.valid_radius_m();
+  return !from.has_contact() || read(from.contact(), to.contact.emplace());
 }
 
 /// The shortest of the three forms that says the same.
 void write(const LocalModel& from, pb::LocalModel& to) {
   write(from.at, *to.mutable_at_m());
   const Mat3& k = from.stiffness;
+  to.clear_valid_radius_m();
+  if (from.valid_radius != std::numeric_limits<double>::infinity()) to.set_valid_radius_m(from.valid_radius);
+  to.clear_contact();
+  if (from.contact) write(*from.contact, *to.mutable_contact());
   auto& out = *to.mutable_stiffness_npm();
   out.Clear();
   const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
@@ -237,9 +294,12 @@ bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept {
   to.valid_for = std::chrono::microseconds(from.valid_for_us());
   to.model.reset();
   if (from.has_model() && !read(from.model(), to.model.emplace())) return false;
-  return to.sequence > 0 && read(from.force_n(), to.force) && to.valid_for > Duration::zero() &&
-         to.valid_for <= limits::kMaxValidFor && read_device(from.device(), to.device) &&
-         read_channel(from.channel(), to.channel);
+  to.topology_changed = from.topology_changed();
+  to.error.reset();
+  if (from.has_error_n()) to.error = from.error_n();
+  read(from.force_n(), to.force);
+  return to.sequence > 0 && in_bounds(to) && to.valid_for > Duration::zero() && to.valid_for <= limits::kMaxValidFor &&
+         read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
 }
 
 void write(const ForceCommand& from, pb::ForceCommand& to) {
@@ -257,6 +317,9 @@ void write(const ForceCommand& from, pb::ForceCommand& to) {
   to.set_valid_for_us(static_cast<std::uint32_t>(us.count()));
   to.set_device(from.device);
   to.set_channel(from.channel);
+  to.set_topology_changed(from.topology_changed);
+  to.clear_error_n();
+  if (from.error) to.set_error_n(*from.error);
 }
 
 bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
@@ -631,6 +694,11 @@ std::optional<Header> handshake_header(std::span<const std::byte> datagram, Data
 }
 
 }  // namespace
+
+bool in_bounds(const ForceCommand& command) noexcept {
+  return all_bounded(command.force) && (!command.model || in_bounds(*command.model)) &&
+         (!command.error || (bounded(*command.error) && *command.error >= 0));
+}
 
 std::array<std::byte, kHeaderSize> encode_header(const Header& header) noexcept {
   std::array<std::byte, kHeaderSize> bytes;

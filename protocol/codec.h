@@ -86,6 +86,10 @@ struct Bye {
   Code code = Code::kOk;
   std::string reason;
 };
+/// Whether a peer takes what is said of the force itself: `force`, `model` and `error` are within their bounds
+/// (WIRE.md).
+bool in_bounds(const ForceCommand& command) noexcept;
+
 using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport>;
 
 /// Writes one Data datagram after the other, in the clear. Keeps its protobuf objects: after the first of

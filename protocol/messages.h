@@ -65,10 +65,12 @@ struct ForceCommand {
   std::uint64_t sequence = 0;       ///< 1, 2, 3 … per session, device and channel
   std::uint64_t based_on_tick = 0;  ///< DeviceState::tick of that device that it was computed from
   Vec3 force = Vec3::Zero();        ///< N, on the hand
-  std::optional<LocalModel> model;
+  std::optional<LocalModel> model{};
   Duration valid_for{};  ///< counted from arrival; > 0, at most 10 s; travels in whole µs, rounded up
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
+  bool topology_changed = false;  ///< the body has been cut or torn since the answer before: no model is relied on
+  std::optional<double> error{};  ///< N, what the engine thinks that `force` may be wrong by
 };
 
 /// Two quantiles of a delay; below zero only where two clocks had to be compared.

@@ -623,6 +623,8 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.model = command.model;
   force.valid_for = command.valid_for;
   force.source = channel.holder;
+  force.topology_changed = command.topology_changed;
+  force.error = command.error;
   device.mail->forces[command.channel].put(force);
   ++channel.forces;
   ++stats_.forces;

@@ -90,6 +90,7 @@ std::string encode(const StepRecord& step) {
   out.set_loop_age_ns(step.loop_age.count());
   out.set_channel(step.channel);
   if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
+  if (step.force_error) out.set_force_error_n(*step.force_error);
   return out.SerializeAsString();
 }
 
@@ -148,6 +149,7 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.loop_age = Duration(in.loop_age_ns());
   out.channel = in.channel();
   if (in.has_hand_force_n()) out.hand_force = vec3(in.hand_force_n());
+  if (in.has_force_error_n()) out.force_error = in.force_error_n();
   return out;
 }
 

@@ -631,7 +631,6 @@ void declare_between(Table& force, HeldForce::Config& hold) {
   force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
     keys.key("share", config.share, Number{.least = 0.01, .most = 1},
              "of the stiffness that the engine sends; below 1 when that is an estimate itself");
-    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "whatever the engine says");
     keys.key("max_blend_ms", config.max_blend, kAboveZero, "a new model is blended in for one engine period, or this");
   });
   force.part("output_estimator", hold.output_estimator, [](Table& keys, OutputEstimator::Config& config) {
@@ -741,6 +740,8 @@ void declare_scene(Table& scene, Draft& draft) {
     force.key("ramp_in_ms", control.hold.ramp_in, kZeroOrMore, "the first force is ramped in for this long");
     force.key("max_valid_for_ms", control.hold.max_valid_for, kAboveZero,
               "a force is valid for no longer than this, whatever its sender asks for");
+    force.key("max_stiffness_n_per_m", control.hold.max_stiffness, kAboveZero,
+              "of what an engine sends with its forces, nothing stiffer is followed");
     declare_between(force, control.hold);
   });
 

@@ -47,8 +47,6 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   return config;
 }
 
-bool usable(const auto& numbers) { return (numbers.array().abs() <= limits::kMaxValue).all(); }  // false for NaN
-
 }  // namespace
 
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now)
@@ -322,24 +320,31 @@ bool ForceClient::call(LocalTime now) {
 }
 
 void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& answered) {
-  if (!usable(touch.force) || (touch.stiffness && !usable(*touch.stiffness))) {
-    ++stats_.forces_unusable;
-    return;
-  }
-  if (deadband_ && !deadband_->passes(now, touch.force)) {
-    ++stats_.forces_alike;
-    return;
-  }
   ForceCommand command;
-  command.valid_for = valid_for(answered.tick);
-  command.sequence = ++sequence_;
   command.based_on_tick = answered.tick;
   command.force = touch.force;
   command.device = place_.device;
   command.channel = place_.channel;
+  command.topology_changed = touch.topology_changed;
+  command.error = touch.error;
   const auto& agreed = welcome_->features;
   const bool with_model = std::find(agreed.begin(), agreed.end(), kFeatureLocalModel) != agreed.end();
-  if (touch.stiffness && with_model) command.model = LocalModel{answered.position, *touch.stiffness};
+  if ((touch.stiffness || touch.contact) && with_model) {
+    command.model = LocalModel{.at = answered.position,
+                               .stiffness = touch.stiffness.value_or(Mat3(Mat3::Zero())),
+                               .valid_radius = touch.valid_radius,
+                               .contact = touch.contact};
+  }
+  if (!in_bounds(command)) {
+    ++stats_.forces_unusable;
+    return;
+  }
+  if (deadband_ && !deadband_->passes(now, touch.force) && !touch.topology_changed) {
+    ++stats_.forces_alike;
+    return;
+  }
+  command.valid_for = valid_for(answered.tick);
+  command.sequence = ++sequence_;
   answered_tick_ = answered.tick;
   session_->send(command);
   ++stats_.forces;

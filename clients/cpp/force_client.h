@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -24,8 +25,14 @@ struct Touch {
   Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
 
   Vec3 force = Vec3::Zero();  ///< N, on the hand: a wall that resists motion along +x sends −x
-  /// Used when the server has agreed to `kFeatureLocalModel`.
-  std::optional<Mat3> stiffness;  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
+  // What lets the device loop follow the hand until the next answer (core/estimation/answer.h), as much of it as the
+  // engine knows; used when the server has agreed to `kFeatureLocalModel`.
+  std::optional<Mat3> stiffness{};  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
+  double valid_radius = std::numeric_limits<double>::infinity();  ///< m, how far from there the stiffness holds
+  std::optional<Contact> contact{};  ///< the surface, with the force at other depths in a table where that is known
+  /// The body has been cut or torn since the answer before: neither's stiffness and table are relied on.
+  bool topology_changed = false;
+  std::optional<double> error{};  ///< N, what the engine thinks that `force` may be wrong by; recorded with it
 };
 
 /// The physics engine, seen from here: device state in, force out. It may take its time: while it
@@ -50,7 +57,7 @@ using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)
 /// * **Force.** Each carries the tick it answers, a sequence number (1, 2, 3 … per session) and how
 ///   long it is valid (see Config::valid_for). It leaves in the turn after the one that computed it,
 ///   which is due at once: the datagram's time stamp must not be older than the physics' work.
-///   A force or stiffness that is not finite, or beyond limits::kMaxValue, is counted and not sent;
+///   An answer with a number that is not finite or out of its bounds (WIRE.md) is counted and not sent;
 ///   the server then treats this client as one that is late.
 /// * **Taken over.** Where a program with the same key has taken our place we do not come back: the two would
 ///   take turns for ever.
@@ -85,7 +92,7 @@ class ForceClient {
     Duration valid_for{};
     /// Forces that a hand cannot tell from the last one sent are not sent (Weber's law): a tenth of the datagrams at 1
     /// kHz, where those are dear. Compares forces; a stiffness that alone has changed waits for the next one, at most
-    /// for the longest silence. Empty: every force is sent.
+    /// for the longest silence, a changed topology does not. Empty: every force is sent.
     std::optional<Deadband::Config> deadband{};
     /// States that we can foretell are not sent to us: most of them, where they are dear. With rate_hz = r the callback
     /// is then called at multiples of 1/r with the state as it is foretold for that instant, its tick and time of

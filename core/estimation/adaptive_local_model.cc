@@ -1,33 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/estimation/adaptive_local_model.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
+#include "core/estimation/answer.h"
+
 namespace tendon {
-namespace {
-
-/// The nearest stiffness that stores energy and loses none.
-Mat3 conservative(const Mat3& stiffness, double max) noexcept {
-  const Mat3 symmetric = (stiffness + stiffness.transpose()) / 2;
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(symmetric);
-  const Vec3 bounded = solver.eigenvalues().cwiseMax(0).cwiseMin(max);
-  if (bounded == solver.eigenvalues()) return symmetric;  // exactly what was sent
-  return solver.eigenvectors() * bounded.asDiagonal() * solver.eigenvectors().transpose();
-}
-
-}  // namespace
-
 AdaptiveLocalModel::AdaptiveLocalModel(const Config& config) : config_(config) {
   if (!(config.share > 0 && config.share <= 1)) {
     throw std::invalid_argument("share must be in (0, 1], got " + std::to_string(config.share));
-  }
-  if (!(std::isfinite(config.max_stiffness) && config.max_stiffness > 0)) {
-    throw std::invalid_argument("max_stiffness must be finite and positive, got " +
-                                std::to_string(config.max_stiffness));
   }
   if (config.max_blend < Duration::zero()) {
     throw std::invalid_argument("max_blend must not be negative, got " + std::to_string(config.max_blend.count()) +
@@ -37,15 +20,16 @@ AdaptiveLocalModel::AdaptiveLocalModel(const Config& config) : config_(config) {
 
 bool AdaptiveLocalModel::observe(const RemoteForce& force) noexcept {
   if (has_answer_ && force.answers <= answers_) return false;
-  if (!force.force.allFinite()) return false;
-  Line line{force.force, Mat3::Zero()};
-  if (force.model) {
-    if (!force.model->at.allFinite() || !force.model->stiffness.allFinite()) return false;
-    line.stiffness = config_.share * conservative(force.model->stiffness, config_.max_stiffness);
-    line.at_origin += line.stiffness * force.model->at;
-  }
+  if (!is_sound(force)) return false;
+  Line line{.at_origin = force.force, .model = force.model.value_or(LocalModel{})};
+  line.model.stiffness *= config_.share;
+  line.at_origin += line.model.stiffness * line.model.at;
   if (has_answer_) {
-    old_ = shown(force.received);
+    const double share = share_of_new(force.received);
+    old_ = {.at_origin = old_.at_origin + share * (new_.at_origin - old_.at_origin),
+            .model = {.at = new_.model.at,
+                      .stiffness = old_.model.stiffness + share * (new_.model.stiffness - old_.model.stiffness),
+                      .valid_radius = new_.model.valid_radius}};
     blend_ = std::min(force.answers - answers_, config_.max_blend);
   } else {
     old_ = line;
@@ -59,16 +43,24 @@ bool AdaptiveLocalModel::observe(const RemoteForce& force) noexcept {
 
 std::optional<Prediction> AdaptiveLocalModel::predict(const Motion& hand) const noexcept {
   if (!has_answer_ || !hand.position.allFinite()) return std::nullopt;
-  const Line line = shown(hand.at);
-  return Prediction{line.at_origin - line.stiffness * hand.position, line.stiffness};
+  const double share = share_of_new(hand.at);
+  Prediction now = at(new_, hand.position);
+  if (share >= 1) return now;
+  const Prediction before = at(old_, hand.position);
+  now.force = before.force + share * (now.force - before.force);
+  now.stiffness = before.stiffness + share * (now.stiffness - before.stiffness);
+  return now;
 }
 
-AdaptiveLocalModel::Line AdaptiveLocalModel::shown(LocalTime at) const noexcept {
-  const Duration elapsed = at - received_;
-  if (elapsed >= blend_) return new_;
-  const double share = std::max(0.0, seconds(elapsed) / seconds(blend_));
-  return {old_.at_origin + share * (new_.at_origin - old_.at_origin),
-          old_.stiffness + share * (new_.stiffness - old_.stiffness)};
+Prediction AdaptiveLocalModel::at(const Line& line, const Vec3& position) noexcept {
+  const Vec3 trusted = within(line.model, position);
+  return {.force = line.at_origin - line.model.stiffness * trusted,
+          .stiffness = trusted == position ? line.model.stiffness : Mat3(Mat3::Zero())};
+}
+
+double AdaptiveLocalModel::share_of_new(LocalTime now) const noexcept {
+  const Duration elapsed = now - received_;
+  return elapsed >= blend_ ? 1 : std::max(0.0, seconds(elapsed) / seconds(blend_));
 }
 
 }  // namespace tendon

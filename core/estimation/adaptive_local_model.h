@@ -14,7 +14,7 @@ namespace tendon {
 ///
 /// The model of answer j, and what is said at time t after the next one was received at t_r:
 ///
-///     F_j(x) = f_j − K_loc (x − x_j),   K_loc = share · K_j, symmetric, eigenvalues in [0, max_stiffness]
+///     F_j(x) = f_j − share · K_j (x′ − x_j),   x′ the position nearest to x in the model's valid radius of x_j
 ///     F(x, t) = (1 − s) F_{j−1}(x) + s F_j(x),   s = clamp((t − t_r)/slow period, 0, 1)
 ///
 /// so a new answer that differs by ΔF at the same x adds ΔF · dt/period per step instead of ΔF at once;
@@ -23,20 +23,18 @@ namespace tendon {
 /// old and new model are the same line and nothing lags. The slow period is the time between the motions
 /// that two answers belong to, at most `max_blend`.
 ///
-/// A force without a model is the model with K = 0: it is held, and blended in like any other.
+/// A force without a model is the model with K = 0: it is held, and blended in like any other. Contact and table of an
+/// answer are not read: they cannot be blended.
 ///
-/// Source: Barbagli et al., IJRR 24(9), 2005 (recalled): stable when K_loc ≤ the true stiffness. The
-/// antisymmetric part of K is dropped because following it round a circle makes energy, and negative
-/// stiffness because it can only come from an environment that is not passive.
+/// Source: Barbagli et al., IJRR 24(9), 2005 (recalled): stable when share · K ≤ the true stiffness. K is expected to
+/// be one that can be believed (answer.h).
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class AdaptiveLocalModel {
  public:
   struct Config {
-    /// K_loc over the stiffness that was sent, (0, 1]; below 1 when the engine's is itself an estimate.
+    /// Of the stiffness that was sent, (0, 1]; below 1 when the engine's is itself an estimate.
     double share = 1;
-    /// N/m
-    double max_stiffness = 5000;
     /// The longest blend; a slower engine is believed after this.
     Duration max_blend = std::chrono::milliseconds(100);
   };
@@ -53,12 +51,13 @@ class AdaptiveLocalModel {
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 
  private:
-  /// F(x) = at_origin − stiffness · x: a blend of two is one of the same kind.
+  /// F(x) = at_origin − model.stiffness · x′: a blend of two is one of the same kind where they are valid.
   struct Line {
     Vec3 at_origin = Vec3::Zero();
-    Mat3 stiffness = Mat3::Zero();
+    LocalModel model{};
   };
-  Line shown(LocalTime at) const noexcept;
+  static Prediction at(const Line& line, const Vec3& position) noexcept;
+  double share_of_new(LocalTime now) const noexcept;
 
   Config config_;
   Line old_;

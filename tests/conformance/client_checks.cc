@@ -413,14 +413,8 @@ void ClientJudge::check_forces(const Session& session, const std::set<std::uint6
         ticks.contains(force.based_on_tick()) && (force.based_on_tick() >= tick || report_.failed("newest-wins")),
         force.ShortDebugString(), "the tick of a state that was said, not below " + std::to_string(tick));
     tick = std::max(tick, force.based_on_tick());
-    const int entries = force.model().stiffness_npm_size();
-    const bool model_good =
-        !force.has_model() || (!far(force.model().at_m()) && (entries == 1 || entries == 3 || entries == 9) &&
-                               std::ranges::none_of(force.model().stiffness_npm(), [](double k) { return far(k); }));
-    report_.judge(
-        "force-bounds",
-        !far(force.force_n()) && model_good && force.valid_for_us() >= 1 && force.valid_for_us() <= 10'000'000,
-        force.ShortDebugString(), "values within bounds, valid_for_us 1 … 10 000 000");
+    report_.judge("force-bounds", within_bounds(force), force.ShortDebugString(),
+                  "values within bounds, valid_for_us 1 … 10 000 000");
   });
   if (observer) {
     for (const std::string_view check : {"forces", "force-answers", "force-bounds"}) {

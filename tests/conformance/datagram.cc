@@ -92,6 +92,36 @@ bool read(Span bytes, google::protobuf::MessageLite& message) {
 bool far(double value) { return !(std::abs(value) <= 1e12); }
 bool far(const pb::Vec3& vector) { return far(vector.x()) || far(vector.y()) || far(vector.z()); }
 
+namespace {
+
+bool any_far(const google::protobuf::RepeatedField<double>& values) {
+  return std::ranges::any_of(values, [](double value) { return far(value); });
+}
+
+bool within_bounds(const pb::Contact& contact) {
+  const pb::Vec3& n = contact.normal();
+  const pb::ForceTable& table = contact.table();
+  const int entries = table.force_n_size();
+  return std::abs(std::hypot(n.x(), n.y(), n.z()) - 1) <= 1e-3 && !far(contact.gap_m()) &&
+         (!contact.has_table() || (entries >= 2 && entries <= 16 && !any_far(table.force_n()) &&
+                                   !far(table.first_depth_m()) && !far(table.step_m()) && table.step_m() > 0));
+}
+
+bool within_bounds(const pb::LocalModel& model) {
+  const int entries = model.stiffness_npm_size();
+  const double radius = model.valid_radius_m();
+  return !far(model.at_m()) && (entries == 1 || entries == 3 || entries == 9) && !any_far(model.stiffness_npm()) &&
+         (!far(radius) || std::isinf(radius)) && radius >= 0 &&
+         (!model.has_contact() || within_bounds(model.contact()));
+}
+
+}  // namespace
+
+bool within_bounds(const pb::ForceCommand& force) {
+  return !far(force.force_n()) && force.valid_for_us() >= 1 && force.valid_for_us() <= 10'000'000 &&
+         (!force.has_model() || within_bounds(force.model())) && !far(force.error_n()) && force.error_n() >= 0;
+}
+
 std::string hex(Span bytes, std::size_t most) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string out;

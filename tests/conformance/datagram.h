@@ -63,6 +63,8 @@ bool read(Span bytes, google::protobuf::MessageLite& message);
 /// Beyond what any quantity may be: |x| > 10¹², or not a number.
 bool far(double value);
 bool far(const pb::Vec3& vector);
+/// WIRE.md's bounds of a ForceCommand, but for its sequence, device and channel.
+bool within_bounds(const pb::ForceCommand& force);
 
 /// "54 11 00 …", cut after `most` bytes.
 std::string hex(Span bytes, std::size_t most = 32);

@@ -452,6 +452,20 @@ void damage_force(std::vector<std::function<void(pb::Frame&)>>& out, void (*chan
   out.push_back([change](pb::Frame& frame) { change(*frame.mutable_force()); });
 }
 
+/// Sound as they are made.
+pb::Contact& contact(pb::ForceCommand& force) {
+  force.mutable_model()->add_stiffness_npm(0);
+  pb::Contact& made = *force.mutable_model()->mutable_contact();
+  made.mutable_normal()->set_x(-1);
+  return made;
+}
+pb::ForceTable& table(pb::ForceCommand& force) {
+  pb::ForceTable& made = *contact(force).mutable_table();
+  made.set_step_m(0.001);
+  made.mutable_force_n()->Resize(2, 0.0);
+  return made;
+}
+
 void ServerJudge::check_conversation(Session& session) {
   Conversation& talk = session.talk;
   Evidence forces;
@@ -499,6 +513,18 @@ void ServerJudge::check_conversation(Session& session) {
   damage_force(damages, [](pb::ForceCommand& force) {
     force.mutable_model()->add_stiffness_npm(std::numeric_limits<double>::infinity());
   });
+  damage_force(damages, [](pb::ForceCommand& force) { force.set_error_n(-1); });
+  damage_force(damages, [](pb::ForceCommand& force) {
+    force.mutable_model()->add_stiffness_npm(1);
+    force.mutable_model()->set_valid_radius_m(-1);
+  });
+  damage_force(damages, [](pb::ForceCommand& force) { contact(force).mutable_normal()->set_x(2); });
+  damage_force(damages, [](pb::ForceCommand& force) { contact(force).set_gap_m(kNaN); });
+  damage_force(damages, [](pb::ForceCommand& force) { table(force).set_step_m(0); });
+  damage_force(damages, [](pb::ForceCommand& force) { table(force).set_first_depth_m(kNaN); });
+  damage_force(damages, [](pb::ForceCommand& force) { table(force).set_force_n(1, kNaN); });
+  damage_force(damages, [](pb::ForceCommand& force) { table(force).mutable_force_n()->RemoveLast(); });
+  damage_force(damages, [](pb::ForceCommand& force) { table(force).mutable_force_n()->Resize(17, 0.0); });
   check_out_of_bounds(talk, forces, damages);
   check_newest_wins(talk, forces);
   check_window(talk, forces);

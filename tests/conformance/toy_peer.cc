@@ -20,16 +20,9 @@ bool within_bounds(const pb::DeviceState& state) {
          !far(state.energy_j()) && state.permitted_force_n() >= 0 && state.mode() >= 1 && state.mode() <= 6;
 }
 
-bool within_bounds(const pb::ForceCommand& force) {
-  const int entries = force.model().stiffness_npm_size();
-  return force.sequence() > 0 && !far(force.force_n()) && force.valid_for_us() >= 1 &&
-         force.valid_for_us() <= 10'000'000 && (!force.has_model() || entries == 1 || entries == 3 || entries == 9) &&
-         std::ranges::none_of(force.model().stiffness_npm(), [](double k) { return far(k); });
-}
-
 bool within_bounds(const pb::Frame& frame) {
   if (frame.has_state()) return within_bounds(frame.state());
-  if (frame.has_force()) return within_bounds(frame.force());
+  if (frame.has_force()) return frame.force().sequence() > 0 && conformance::within_bounds(frame.force());
   return true;
 }
 

@@ -329,12 +329,14 @@ TEST(HapticController, ReportsTheAgeOfTheWholeLoop) {
   remote.answers = LocalTime(milliseconds(10));
   remote.received = LocalTime(milliseconds(50));
   remote.valid_for = milliseconds(100);
+  remote.error = 0.25;
   bench.controller.observe(remote);
   bench.now = milliseconds(59);
   const Step step = bench.move_to(0);
   EXPECT_EQ(step.force_sequence, 9U);
   EXPECT_EQ(step.force_age, milliseconds(10));
   EXPECT_EQ(step.loop_age, milliseconds(50));
+  EXPECT_EQ(step.force_error, 0.25);
 }
 
 TEST(HapticController, RefusesImpossibleLimits) {

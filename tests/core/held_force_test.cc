@@ -84,6 +84,57 @@ RemoteForce spring_at(Duration answers, Duration received, double x, double stif
   return remote;
 }
 
+RemoteForce on_a_table(Duration received) {
+  RemoteForce remote = force_at(received, Vec3(-1, 0, 0));
+  remote.model = LocalModel{Vec3(0.01, 0, 0), Vec3(100, 0, 0).asDiagonal()};
+  remote.model->contact = Contact{.normal = -Vec3::UnitX(),
+                                  .gap = -0.01,
+                                  .table = ForceTable{.first = -0.01, .step = 0.01, .size = 3, .force = {0, 1, 4}}};
+  return remote;
+}
+
+TEST(HeldForce, FollowsTheHandAlongTheEnginesTable) {
+  HeldForce held(without_ramp());
+  ASSERT_TRUE(held.observe(on_a_table(Duration::zero())));
+  EXPECT_NEAR(held.wanted(at(milliseconds(1), Vec3(0.015, 0, 0))).force.x(), -2.5, 1e-12);
+  EXPECT_NEAR(held.wanted(at(milliseconds(1), Vec3(0.015, 0, 0))).stiffness(0, 0), 300, 1e-9);
+  EXPECT_NEAR(held.wanted(at(milliseconds(1), Vec3(-0.005, 0, 0))).force.x(), 0, 1e-12);
+}
+
+TEST(HeldForce, OfABodyThatHasBeenCutTheForceAloneIsHeld) {
+  HeldForce held(without_ramp());
+  held.observe(on_a_table(Duration::zero()));
+  RemoteForce cut = on_a_table(milliseconds(5));
+  cut.topology_changed = true;
+  ASSERT_TRUE(held.observe(cut));
+  EXPECT_EQ(held.wanted(at(milliseconds(6), Vec3(0.02, 0, 0))).force, cut.force);
+  EXPECT_EQ(held.wanted(at(milliseconds(6), Vec3(0.02, 0, 0))).stiffness, Mat3::Zero());
+  held.observe(on_a_table(milliseconds(10)));
+  EXPECT_NEAR(held.wanted(at(milliseconds(11), Vec3(0.02, 0, 0))).force.x(), -4, 1e-12);
+}
+
+TEST(HeldForce, BlendsNoModelOfABodyThatHasBeenCut) {
+  HeldForce::Config config = without_ramp();
+  config.adaptive_local_model.emplace();
+  HeldForce held(config);
+  RemoteForce cut = on_a_table(Duration::zero());
+  cut.topology_changed = true;
+  held.observe(cut);
+  EXPECT_EQ(held.wanted(at(milliseconds(1), Vec3(0.02, 0, 0))).force, cut.force);
+}
+
+TEST(HeldForce, NeitherStiffnessNorTableIsFollowedBeyondTheStiffestThatIsBelieved) {
+  HeldForce::Config config = without_ramp();
+  config.max_stiffness = 50;
+  HeldForce held(config);
+  held.observe(on_a_table(Duration::zero()));
+  EXPECT_NEAR(held.wanted(at(milliseconds(1), Vec3(0.02, 0, 0))).force.x(), -1.5, 1e-12);
+  RemoteForce spring = force_at(milliseconds(2), Vec3(-1, 0, 0));
+  spring.model = LocalModel{Vec3(0.01, 0, 0), Vec3(100, -100, 0).asDiagonal()};
+  held.observe(spring);
+  EXPECT_NEAR((held.wanted(at(milliseconds(3), Vec3(0.02, 1, 0))).force - Vec3(-1.5, 0, 0)).norm(), 0, 1e-9);
+}
+
 TEST(HeldForce, TellsTheLimiterHowStiffTheEnvironmentIsAndFadesThatToo) {
   HeldForce held(without_ramp());
   held.observe(force_at(Duration::zero(), Vec3(-1, 0, 0)));
@@ -140,13 +191,16 @@ TEST(HeldForce, RefusesTwoWaysAtOnceToFollowTheHand) {
   EXPECT_THROW(HeldForce{config}, std::invalid_argument);
 }
 
-TEST(HeldForce, RefusesWhatIsNotFiniteAndAgesTheForceBefore) {
+TEST(HeldForce, RefusesWhatIsNotSoundAndAgesTheForceBefore) {
   HeldForce held(without_ramp());
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
   EXPECT_FALSE(held.observe(force_at(milliseconds(20), Vec3(std::nan(""), 0, 0))));
   RemoteForce bad_model = force_at(milliseconds(20), Vec3(1, 0, 0));
   bad_model.model = LocalModel{Vec3::Zero(), Mat3::Constant(std::numeric_limits<double>::infinity())};
   EXPECT_FALSE(held.observe(bad_model));
+  RemoteForce bad_table = on_a_table(milliseconds(20));
+  bad_table.model->contact->table->force[1] = std::nan("");
+  EXPECT_FALSE(held.observe(bad_table));
   EXPECT_EQ(held.wanted(at(milliseconds(40))).mode, Mode::kHolding);
   EXPECT_EQ(held.wanted(at(milliseconds(40))).force.x(), 2);
 }
@@ -165,12 +219,15 @@ TEST(HeldForce, ReleaseEndsValidityAtOnce) {
   EXPECT_EQ(held.wanted(at(milliseconds(100))).mode, Mode::kDecaying);
 }
 
-TEST(HeldForce, RefusesImpossibleTimes) {
+TEST(HeldForce, RefusesWhatCannotBeMeant) {
   HeldForce::Config config;
   config.safe_stop = milliseconds(10);
   EXPECT_THROW(HeldForce{config}, std::invalid_argument);
   config = {};
   config.decay = Duration::zero();
+  EXPECT_THROW(HeldForce{config}, std::invalid_argument);
+  config = {};
+  config.max_stiffness = 0;
   EXPECT_THROW(HeldForce{config}, std::invalid_argument);
 }
 

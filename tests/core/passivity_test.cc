@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/haptic_controller.h"
+#include "tests/support/any_contact.h"
 #include "tests/support/dice.h"
 
 namespace tendon {
@@ -77,6 +78,9 @@ Outcome run(std::uint64_t seed, Law limiter) {
         case 5:
           remote.force = -stiffness * x;
           remote.model = LocalModel{x, Mat3::Identity() * stiffness};
+          if (dice.chance(0.3)) remote.model->valid_radius = dice.decades(-5, 0);
+          if (dice.chance(0.5)) remote.model->contact = any_contact(dice, x);
+          remote.topology_changed = dice.chance(0.05);
           break;
         default:
           remote.force = applied.norm() > 0 ? Vec3(applied * 1e3) : dice.direction();

@@ -88,12 +88,24 @@ void print(Line& line, const DeviceState& state) {
        << state.force_age << state.mode;
 }
 
+void print(Line& line, const LocalModel& model) {
+  line << "model" << model.at;
+  const Vec3 zero = Vec3::Zero();  // added, it turns −0 into 0: k · 0 is either
+  for (int row = 0; row < 3; ++row) line << Vec3(model.stiffness.row(row).transpose() + zero);
+  line << model.valid_radius;
+  if (!model.contact) return;
+  line << "contact" << model.contact->normal << model.contact->gap;
+  if (!model.contact->table) return;
+  const ForceTable& table = *model.contact->table;
+  line << "table" << table.first << table.step;
+  for (std::size_t i = 0; i < table.size; ++i) line << table.force[i];
+}
+
 void print(Line& line, const ForceCommand& force) {
   line << "force" << force.sequence << force.based_on_tick << force.force << force.valid_for;
-  if (!force.model) return;
-  line << "model" << force.model->at;
-  const Vec3 zero = Vec3::Zero();  // added, it turns −0 into 0: k · 0 is either
-  for (int row = 0; row < 3; ++row) line << Vec3(force.model->stiffness.row(row).transpose() + zero);
+  if (force.model) print(line, *force.model);
+  if (force.topology_changed) line << "changed";
+  if (force.error) line << "error" << *force.error;
 }
 
 void print(Line& line, const Control& control) {

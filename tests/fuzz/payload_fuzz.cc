@@ -29,8 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(s.datagrams_received + s.malformed == 1 && s.forged == 0 && s.old_key == 0);
   while (const auto event = session.next_event()) {
     if (const auto* force = std::get_if<Session::ForceArrived>(&*event)) {
-      fuzz::require(force->command.force.allFinite() && force->command.valid_for > Duration::zero());
-      fuzz::require(!force->command.model || force->command.model->stiffness.allFinite());
+      fuzz::require(in_bounds(force->command) && force->command.valid_for > Duration::zero());
     } else if (const auto* state = std::get_if<Session::StateArrived>(&*event)) {
       fuzz::require(state->state.position.allFinite() && state->state.velocity.allFinite());
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {

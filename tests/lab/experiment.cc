@@ -98,9 +98,9 @@ class Remote {
                       .force = environment_.force(t, hand.position),
                       .model = {},
                       .valid_for = std::chrono::hours(1)};
-    if (environment_.stiffness) {
-      force.model = {.at = hand.position, .stiffness = environment_.stiffness(t, hand.position)};
-    }
+    if (environment_.stiffness || environment_.surface) force.model = {.at = hand.position};
+    if (environment_.stiffness) force.model->stiffness = environment_.stiffness(t, hand.position);
+    if (environment_.surface) force.model->contact = environment_.surface(t, hand.position);
     return force;
   }
 

@@ -27,9 +27,11 @@ struct Route {
 struct Environment {
   using Force = std::function<Vec3(double t, const Vec3& position)>;
   using Stiffness = std::function<Mat3(double t, const Vec3& position)>;
+  using Surface = std::function<Contact(double t, const Vec3& position)>;
 
   Force force;            ///< N, on the hand, `t` seconds after the start: the truth
   Stiffness stiffness{};  ///< −∂F/∂x, N/m, sent along as local model; left out: none is sent
+  Surface surface{};      ///< sent along, with its table if it has one; left out: none is sent
   Duration period = std::chrono::milliseconds(1);  ///< of its forces
   Duration delay{};                                ///< from the motion being sampled to the force being there
   Duration jitter{};             ///< at most so much longer; later forces overtake earlier ones, which then are dropped

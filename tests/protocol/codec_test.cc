@@ -102,7 +102,21 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
     in.model = LocalModel{.at = any_vector(), .stiffness = any_value() * Mat3::Identity()};
     if (form == 2) in.model->stiffness = any_vector().asDiagonal();
     if (form == 3) in.model->stiffness << any_vector(), any_vector(), any_vector();
+    if (*rc::gen::arbitrary<bool>()) in.model->valid_radius = std::abs(any_value());
+    if (*rc::gen::arbitrary<bool>()) {
+      Contact& contact = in.model->contact.emplace(Contact{.normal = Vec3(0.6, 0, -0.8), .gap = any_value()});
+      if (*rc::gen::arbitrary<bool>()) {
+        ForceTable& table =
+            contact.table.emplace(ForceTable{.first = any_value(), .step = std::abs(any_value()) + 1e-9});
+        table.step = std::min(table.step, limits::kMaxValue);
+        table.size =
+            static_cast<std::uint32_t>(*rc::gen::inRange(ForceTable::kMinEntries, ForceTable::kMaxEntries + 1));
+        for (std::size_t i = 0; i < table.size; ++i) table.force[i] = any_value();
+      }
+    }
   }
+  in.topology_changed = *rc::gen::arbitrary<bool>();
+  if (*rc::gen::arbitrary<bool>()) in.error = std::abs(any_value());
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -119,7 +133,23 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   if (in.model) {
     RC_ASSERT(out.model->at == in.model->at);
     RC_ASSERT(out.model->stiffness == in.model->stiffness);
+    RC_ASSERT(out.model->valid_radius == in.model->valid_radius);
+    RC_ASSERT(out.model->contact.has_value() == in.model->contact.has_value());
+    if (const auto& contact = in.model->contact) {
+      RC_ASSERT(out.model->contact->normal == contact->normal);
+      RC_ASSERT(out.model->contact->gap == contact->gap);
+      RC_ASSERT(out.model->contact->table.has_value() == contact->table.has_value());
+      if (contact->table) {
+        const ForceTable& table = *out.model->contact->table;
+        RC_ASSERT(table.first == contact->table->first);
+        RC_ASSERT(table.step == contact->table->step);
+        RC_ASSERT(table.size == contact->table->size);
+        RC_ASSERT(table.force == contact->table->force);
+      }
+    }
   }
+  RC_ASSERT(out.topology_changed == in.topology_changed);
+  RC_ASSERT(out.error == in.error);
 }
 
 Duration any_length() { return Duration{*rc::gen::inRange<std::int64_t>(0, limits::kMaxTime.count())}; }
@@ -271,6 +301,20 @@ TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"NaN stiffness", [](ForceCommand& f) { f.model->stiffness(1, 2) = kNan; }},
       {"infinite stiffness", [](ForceCommand& f) { f.model->stiffness(2, 2) = kInf; }},
       {"infinite position", [](ForceCommand& f) { f.model->at.x() = kInf; }},
+      {"NaN radius", [](ForceCommand& f) { f.model->valid_radius = kNan; }},
+      {"negative radius", [](ForceCommand& f) { f.model->valid_radius = -0.001; }},
+      {"NaN normal", [](ForceCommand& f) { f.model->contact->normal.y() = kNan; }},
+      {"no normal", [](ForceCommand& f) { f.model->contact->normal.setZero(); }},
+      {"a normal that is no unit vector", [](ForceCommand& f) { f.model->contact->normal *= 1.0011; }},
+      {"NaN gap", [](ForceCommand& f) { f.model->contact->gap = kNan; }},
+      {"NaN depth", [](ForceCommand& f) { f.model->contact->table->first = kNan; }},
+      {"no step", [](ForceCommand& f) { f.model->contact->table->step = 0; }},
+      {"negative step", [](ForceCommand& f) { f.model->contact->table->step = -0.001; }},
+      {"infinite step", [](ForceCommand& f) { f.model->contact->table->step = kInf; }},
+      {"NaN in the table", [](ForceCommand& f) { f.model->contact->table->force[2] = kNan; }},
+      {"a table of one", [](ForceCommand& f) { f.model->contact->table->size = 1; }},
+      {"negative error", [](ForceCommand& f) { f.error = -0.1; }},
+      {"NaN error", [](ForceCommand& f) { f.error = kNan; }},
       {"sequence 0", [](ForceCommand& f) { f.sequence = 0; }},
       {"valid for nothing", [](ForceCommand& f) { f.valid_for = Duration{}; }},
       {"valid for less than nothing", [](ForceCommand& f) { f.valid_for = Duration{-1}; }},
@@ -278,7 +322,7 @@ TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"valid for 2³² µs + 1 s", [](ForceCommand& f) { f.valid_for = std::chrono::microseconds(4'295'967'296); }},
   };
   for (const BadForce& bad : cases) {
-    ForceCommand force = examples::force();
+    ForceCommand force = examples::force_with_all();
     bad.spoil(force);
     DataReader reader;
     const auto* content = read(reader, data(1, {}, force, examples::state()));

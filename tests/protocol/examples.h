@@ -52,6 +52,21 @@ inline ForceCommand force() {
           .valid_for = std::chrono::milliseconds(20)};
 }
 
+/// With all that an answer can say: 2 mm deep in a surface that looks along −x, and what more and less depth would
+/// give.
+inline ForceCommand force_with_all() {
+  ForceCommand all = force();
+  all.sequence = 101;
+  all.model->valid_radius = 0.0025;
+  all.model->contact =
+      Contact{.normal = {-1, 0, 0},
+              .gap = -0.002,
+              .table = ForceTable{.first = -0.002, .step = 0.001, .size = 4, .force = {0, 0.75, 2, 3.5}}};
+  all.topology_changed = true;
+  all.error = 0.125;
+  return all;
+}
+
 inline Control state_deadband() {
   return {.id = 9,
           .request = SetStateDeadband{.share = 0.1, .floor = 0.001, .max_silence = std::chrono::milliseconds(20)}};
@@ -229,6 +244,7 @@ inline std::vector<Named> datagrams() {
        data(56, {}, Control{.id = 1, .request = LeaseLost{.device = 1, .channel = 1, .to = "wall"}})},
       {"report", data(57, {}, report())},
       {"state-deadband", data(58, {}, state_deadband())},
+      {"force-with-all", data(59, {}, force_with_all())},
   };
 }
 

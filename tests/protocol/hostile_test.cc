@@ -59,7 +59,10 @@ class Target {
     } else if (const auto* commanded = std::get_if<Session::ForceArrived>(&event)) {
       const ForceCommand& f = commanded->command;
       EXPECT_TRUE(bounded(f.force));
-      EXPECT_TRUE(!f.model || (bounded(f.model->at) && f.model->stiffness.allFinite()));
+      EXPECT_TRUE(!f.model || (bounded(f.model->at) && f.model->stiffness.allFinite() && f.model->valid_radius >= 0));
+      if (f.model && f.model->contact && f.model->contact->table) {
+        EXPECT_LE(f.model->contact->table->size, ForceTable::kMaxEntries);
+      }
       EXPECT_TRUE(f.valid_for > Duration{} && f.valid_for <= limits::kMaxValidFor);
     } else if (const auto* closed = std::get_if<Session::Closed>(&event)) {
       EXPECT_LE(closed->reason.size(), limits::kMaxDetail);

@@ -156,6 +156,7 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"answer to a request", false, 258, 0, at(258, ack)},
       {"report on a client's forces", false, 261, 0, at(261, examples::report())},
       {"deadband of states", true, 264, 0, at(264, examples::state_deadband())},
+      {"force with all that it can say", true, 265, 0, at(265, examples::force_with_all())},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

@@ -104,6 +104,12 @@ TEST(HapticController, NoLawAndNoPartMakesAHeapCallInTheLoop) {
           force.received = now;
           force.force = -2000 * x;
           if (n % 20 == 0) force.model = LocalModel{x, Mat3::Identity() * 2000};
+          if (n % 40 == 0) {
+            force.model->contact =
+                Contact{.normal = -Vec3::UnitX(),
+                        .gap = 0,
+                        .table = ForceTable{.first = 0, .step = 0.01, .size = 3, .force = {0, 1, 4}}};
+          }
           force.valid_for = milliseconds(30);
           controller.observe(force);
         }

@@ -68,6 +68,7 @@ StepRecord any_step() {
   step.force_sequence = *rc::gen::arbitrary<std::uint64_t>();
   step.force_age = any_duration();
   step.loop_age = any_duration();
+  if (*rc::gen::arbitrary<bool>()) step.force_error = any_double();
   return step;
 }
 

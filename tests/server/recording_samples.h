@@ -59,6 +59,7 @@ inline StepRecord sample_step(std::uint64_t tick) {
   step.channel = static_cast<std::uint32_t>(tick % 3);
   step.force_age = std::chrono::milliseconds(3);
   step.loop_age = std::chrono::milliseconds(43);
+  if (tick % 2 == 0) step.force_error = 0.125;
   return step;
 }
 
@@ -97,7 +98,8 @@ inline bool same(const StepRecord& a, const StepRecord& b) {
          same(a.was_applied, b.was_applied) && same(a.wanted, b.wanted) && same(a.permitted, b.permitted) &&
          same(a.force, b.force) && same(a.applied, b.applied) && same(a.energy, b.energy) && a.reasons == b.reasons &&
          a.mode == b.mode && a.force_sequence == b.force_sequence && a.force_age == b.force_age &&
-         a.loop_age == b.loop_age && a.channel == b.channel;
+         a.loop_age == b.loop_age && a.channel == b.channel && a.force_error.has_value() == b.force_error.has_value() &&
+         same(a.force_error.value_or(0), b.force_error.value_or(0));
 }
 inline bool same(const DatagramRecord& a, const DatagramRecord& b) {
   const auto kept = [](const DatagramRecord& r) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tests/injector/named_profiles.h"
+#include "tests/support/any_contact.h"
 
 namespace tendon::simulation {
 
@@ -417,6 +418,18 @@ std::string describe(const DrawnWorld& world) {
   return text;
 }
 
+namespace {
+
+/// What else an engine can say of its answer, true or not.
+void say_more(Dice& dice, const DeviceState& hand, Touch& touch) {
+  if (dice.chance(0.3)) touch.valid_radius = dice.decades(-5, 0);
+  if (dice.chance(0.5)) touch.contact = any_contact(dice, hand.position);
+  touch.topology_changed = dice.chance(0.05);
+  if (dice.chance(0.5)) touch.error = dice.decades(-3, 1);
+}
+
+}  // namespace
+
 Physics make_physics(const DrawnClient& client) {
   const double k = client.stiffness;
   return [client, k, dice = Dice(client.seed)](const DeviceState& hand) mutable -> Touch {
@@ -430,6 +443,7 @@ Physics make_physics(const DrawnClient& client) {
         const double depth = std::max(0.0, hand.position.x());
         Touch touch = Vec3(-k * depth, 0, 0);
         if (depth > 0) touch.stiffness = Vec3(k, 0, 0).asDiagonal();
+        say_more(dice, hand, touch);
         return touch;
       }
       case Engine::kMillion:
@@ -439,6 +453,7 @@ Physics make_physics(const DrawnClient& client) {
       case Engine::kNegative: {
         Touch touch = Vec3(k * hand.position + 10 * hand.velocity);
         touch.stiffness = Mat3(-k * Mat3::Identity());
+        say_more(dice, hand, touch);
         return touch;
       }
       case Engine::kPushesAlong:

@@ -119,6 +119,14 @@ class Rogue final : public Guest {
       command.model =
           LocalModel{state.position, Mat3(Mat3::Identity() * dice_.decades(0, 6) * (dice_.chance(0.5) ? -1 : 1))};
       if (dice_.chance(0.1)) command.model->stiffness(0, 1) = std::nan("");
+      if (dice_.chance(0.2)) command.model->valid_radius = dice_.chance(0.5) ? std::nan("") : -dice_.decades(-3, 0);
+      if (dice_.chance(0.5)) {
+        ForceTable steep{.first = -0.01, .step = dice_.decades(-9, 1), .size = 2, .force = {0, dice_.decades(0, 12)}};
+        if (dice_.chance(0.2)) steep.size = 1;
+        if (dice_.chance(0.2)) steep.force[1] = kInf;
+        command.model->contact = Contact{.normal = dice_.direction(), .gap = 0, .table = steep};
+        if (dice_.chance(0.2)) command.model->contact->normal *= 1e6;
+      }
     }
     command.valid_for = dice_.chance(0.1) ? Duration::zero() : from_seconds(dice_.decades(-4, 1));
     session_->send(command);

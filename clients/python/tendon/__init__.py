@@ -18,8 +18,10 @@ from .guest import RefusedForGood
 from .keys import read_key
 from .messages import (
     Code,
+    Contact,
     Delays,
     DeviceState,
+    ForceTable,
     LinkReport,
     LinkStats,
     Mode,
@@ -34,10 +36,12 @@ __all__ = [
     "Client",
     "Code",
     "Config",
+    "Contact",
     "Delays",
     "DeviceState",
     "ForceClient",
     "ForceDeadband",
+    "ForceTable",
     "LinkReport",
     "LinkStats",
     "Mode",

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import inf
+from math import hypot, inf
 from typing import TypeVar, Union, cast
 
 from google.protobuf.message import DecodeError
@@ -25,6 +25,7 @@ from .messages import (
     ChannelRule,
     Claim,
     Code,
+    Contact,
     Control,
     ControlAck,
     Delays,
@@ -32,6 +33,7 @@ from .messages import (
     DeviceDescription,
     DeviceState,
     ForceCommand,
+    ForceTable,
     Frame,
     GiveLease,
     Grant,
@@ -266,6 +268,41 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
     )
 
 
+def is_radius(metres: float) -> bool:
+    return metres == inf or 0 <= metres <= limits.MAX_VALUE
+
+
+def is_contact(contact: Contact) -> bool:
+    """Whether a peer takes it: every number is within its bounds."""
+    table = contact.table
+    numbers = [*contact.normal, contact.gap]
+    if table is not None:
+        if not (table.step > 0 and limits.MIN_TABLE <= len(table.force) <= limits.MAX_TABLE):
+            return False
+        numbers += [table.first, table.step, *table.force]
+    bounded = all(abs(number) <= limits.MAX_VALUE for number in numbers)  # nor is NaN
+    return bounded and abs(hypot(*contact.normal) - 1) <= limits.UNIT_TOLERANCE
+
+
+def _read_contact(message: pb.Contact) -> Contact:
+    table = None
+    if message.HasField("table"):
+        table = ForceTable(message.table.first_depth_m, message.table.step_m, tuple(message.table.force_n))
+    contact = Contact(_vector(message.normal), message.gap_m, table)
+    if not is_contact(contact):
+        raise _OutOfBounds
+    return contact
+
+
+def _write_contact(contact: Contact) -> pb.Contact:
+    x, y, z = contact.normal
+    message = pb.Contact(normal=pb.Vec3(x=x, y=y, z=z), gap_m=contact.gap)
+    if contact.table is not None:
+        table = contact.table
+        message.table.CopyFrom(pb.ForceTable(first_depth_m=table.first, step_m=table.step, force_n=table.force))
+    return message
+
+
 def _read_model(message: pb.LocalModel) -> LocalModel:
     k = [_number(value) for value in message.stiffness_npm]
     stiffness: Mat3
@@ -277,7 +314,15 @@ def _read_model(message: pb.LocalModel) -> LocalModel:
         stiffness = ((k[0], k[1], k[2]), (k[3], k[4], k[5]), (k[6], k[7], k[8]))
     else:
         raise _OutOfBounds
-    return LocalModel(at=_vector(message.at_m), stiffness=stiffness)
+    valid_radius = message.valid_radius_m if message.HasField("valid_radius_m") else inf
+    if not is_radius(valid_radius):
+        raise _OutOfBounds
+    return LocalModel(
+        at=_vector(message.at_m),
+        stiffness=stiffness,
+        valid_radius=valid_radius,
+        contact=_read_contact(message.contact) if message.HasField("contact") else None,
+    )
 
 
 def _write_model(model: LocalModel) -> pb.LocalModel:
@@ -286,7 +331,12 @@ def _write_model(model: LocalModel) -> pb.LocalModel:
     entries: list[float] = [a, b, c, d, e, f, g, h, i]
     if not any((b, c, d, f, g, h)):
         entries = [a] if a == e == i else [a, e, i]
-    return pb.LocalModel(at_m=_write_vector(model.at), stiffness_npm=entries)
+    return pb.LocalModel(
+        at_m=_write_vector(model.at),
+        stiffness_npm=entries,
+        valid_radius_m=None if model.valid_radius == inf else model.valid_radius,
+        contact=None if model.contact is None else _write_contact(model.contact),
+    )
 
 
 def _read_force(message: pb.ForceCommand) -> ForceCommand:
@@ -298,6 +348,8 @@ def _read_force(message: pb.ForceCommand) -> ForceCommand:
         model=_read_model(message.model) if message.HasField("model") else None,
         device=_device(message.device),
         channel=_channel(message.channel),
+        topology_changed=message.topology_changed,
+        error=_magnitude(message.error_n) if message.HasField("error_n") else None,
     )
 
 
@@ -493,6 +545,8 @@ def _write_frame(frame: Frame) -> pb.Frame:
             valid_for_us=frame.valid_for_us,
             device=frame.device,
             channel=frame.channel,
+            topology_changed=frame.topology_changed,
+            error_n=frame.error,
         )
         return pb.Frame(force=force)
     if isinstance(frame, DeviceState):

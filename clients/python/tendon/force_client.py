@@ -11,16 +11,19 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import cast
 
-from . import limits
+from . import codec, limits
 from .deadband import Deadband, ForceDeadband, foretell, objection
 from .handshake import ClientHandshake
 from .messages import (
     FEATURE_LOCAL_MODEL,
     NEVER,
+    ZERO,
     Code,
+    Contact,
     ControlAck,
     DeviceState,
     ForceCommand,
+    ForceTable,
     Hello,
     Instant,
     LinkReport,
@@ -189,7 +192,7 @@ class ForceClient:
             self._greet(now)
 
     def send(self, hand: DeviceState, touch: Touch) -> None:
-        """Answers a state. A force or stiffness that is not finite, or out of bounds, is counted and not sent;
+        """Answers a state. What has a number that is not finite, or out of bounds, is counted and not sent;
         the server then treats this client as one that is late. Raises ValueError when it has a wrong shape,
         PermissionError for an observer.
 
@@ -199,22 +202,40 @@ class ForceClient:
             raise PermissionError("an observer sends no force: role=Role.CONTROLLER")
         force = _vector(touch.force)
         stiffness = None if touch.stiffness is None else _matrix(touch.stiffness)
+        contact = None if touch.contact is None else _contact(touch.contact)
         session = self._session
         if session is None or self.welcome is None:
             return
-        if not (_usable(force) and (stiffness is None or all(map(_usable, stiffness)))):
+        if not (
+            _usable(force)
+            and (stiffness is None or all(map(_usable, stiffness)))
+            and (contact is None or codec.is_contact(contact))
+            and codec.is_radius(touch.valid_radius)
+            and (touch.error is None or 0 <= touch.error <= limits.MAX_VALUE)
+        ):
             self._stats.forces_unusable += 1
             return
-        if self._deadband is not None and not self._deadband.passes(session.latest, force):
+        alike = self._deadband is not None and not self._deadband.passes(session.latest, force)
+        if alike and not touch.topology_changed:
             self._stats.forces_alike += 1
             return
         model = None
-        if stiffness is not None and FEATURE_LOCAL_MODEL in self.welcome.features:
-            model = LocalModel(hand.position, stiffness)
+        if (stiffness is not None or contact is not None) and FEATURE_LOCAL_MODEL in self.welcome.features:
+            model = LocalModel(hand.position, stiffness or (ZERO, ZERO, ZERO), touch.valid_radius, contact)
         valid_for_us = self._valid_for_us(hand.tick, self.welcome.loop_hz)
         self._sequence += 1
         self._answered_tick = hand.tick
-        session.send(ForceCommand(self._sequence, hand.tick, force, valid_for_us, model))
+        session.send(
+            ForceCommand(
+                self._sequence,
+                hand.tick,
+                force,
+                valid_for_us,
+                model,
+                topology_changed=touch.topology_changed,
+                error=touch.error,
+            )
+        )
         self._stats.forces += 1
 
     def rearm(self) -> bool:
@@ -408,3 +429,11 @@ def _matrix(stiffness: Stiffness) -> Mat3:
         return (a, b, c)
     x, y, z = _vector(cast("Sequence[float]", stiffness), expected)
     return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
+
+
+def _contact(contact: Contact) -> Contact:
+    """The same in Python's own numbers."""
+    table = contact.table
+    if table is not None:
+        table = ForceTable(float(table.first), float(table.step), tuple(map(float, table.force)))
+    return Contact(_vector(contact.normal, "a normal of three numbers"), float(contact.gap), table)

@@ -9,6 +9,11 @@ MAX_VALUE = 1e12
 """Largest magnitude of any physical quantity in SI units, per component."""
 MAX_TIME_NS = 1 << 60
 """Largest distance of any clock reading from its zero."""
+UNIT_TOLERANCE = 1e-3
+"""Of a normal's length."""
+MIN_TABLE = 2
+MAX_TABLE = 16
+"""Entries of a table of forces."""
 MAX_VALID_FOR_US = 10_000_000
 """A force cannot be promised for longer."""
 MAX_FRAMES = 64

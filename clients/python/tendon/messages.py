@@ -96,11 +96,32 @@ class DeviceState:
 
 
 @dataclass(frozen=True, slots=True)
+class ForceTable:
+    """The force along a contact's normal at other depths: entry i with the tool `first + i · step` deeper than where it is
+    answered, that is at `at − depth · normal`; a line in between, beyond the ends as at the ends."""
+
+    first: float  # m; below 0: nearer to the hand
+    step: float  # m, above 0
+    force: Sequence[float]  # N along +normal, 2 … 16 entries
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A surface that the tool touches or is about to. It only pushes, unless a table says otherwise."""
+
+    normal: Sequence[float]  # unit vector, out of the body, to the hand
+    gap: float  # m, from the surface to the tool along the normal; below 0: so deep is it pressed in
+    table: ForceTable | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class LocalModel:
     """The remote environment near one position: F(x) = force − stiffness · (x − at)."""
 
     at: Vec3  # m
     stiffness: Mat3  # N/m, row by row
+    valid_radius: float = inf  # m, how far from `at` the stiffness holds
+    contact: Contact | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +135,8 @@ class ForceCommand:
     model: LocalModel | None = None
     device: int = 0
     channel: int = 0
+    topology_changed: bool = False  # cut or torn since the answer before: neither's model is relied on
+    error: float | None = None  # N, what the engine thinks that `force` may be wrong by
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,11 +368,15 @@ class Touch:
     `stiffness` is −∂force/∂position at the state's position, in N/m, a spring is positive: one number k
     for k·I, three for the diagonal, or the 3 × 3 matrix. With it the device loop follows the hand until
     the next force (when the server has agreed to FEATURE_LOCAL_MODEL). Any sequences will do, NumPy
-    arrays among them.
+    arrays among them. The rest is for engines that know it: protocol/WIRE.md says what the server makes of it.
     """
 
     force: Sequence[float] = ZERO  # N on the hand
     stiffness: Stiffness | None = None
+    valid_radius: float = inf  # m, how far from the state's position the stiffness holds
+    contact: Contact | None = None  # the surface, with the force at other depths in a table where that is known
+    topology_changed: bool = False  # cut or torn since the answer before: neither's stiffness and table are relied on
+    error: float | None = None  # N, what the engine thinks that the force may be wrong by
 
 
 @dataclass(slots=True)

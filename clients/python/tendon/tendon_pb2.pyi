@@ -68,6 +68,16 @@ class Claim(_message.Message):
     role: Role
     def __init__(self, device: _Optional[str] = ..., channel: _Optional[str] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
 
+class Contact(_message.Message):
+    __slots__ = ["gap_m", "normal", "table"]
+    GAP_M_FIELD_NUMBER: _ClassVar[int]
+    NORMAL_FIELD_NUMBER: _ClassVar[int]
+    TABLE_FIELD_NUMBER: _ClassVar[int]
+    gap_m: float
+    normal: Vec3
+    table: ForceTable
+    def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., gap_m: _Optional[float] = ..., table: _Optional[_Union[ForceTable, _Mapping]] = ...) -> None: ...
+
 class Control(_message.Message):
     __slots__ = ["describe", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
@@ -199,22 +209,36 @@ class Echo(_message.Message):
     def __init__(self, peer_tx_time_ns: _Optional[int] = ..., rx_time_ns: _Optional[int] = ..., peer_packet_number: _Optional[int] = ..., received_mask: _Optional[int] = ...) -> None: ...
 
 class ForceCommand(_message.Message):
-    __slots__ = ["based_on_tick", "channel", "device", "force_n", "model", "sequence", "valid_for_us"]
+    __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "model", "sequence", "topology_changed", "valid_for_us"]
     BASED_ON_TICK_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ERROR_N_FIELD_NUMBER: _ClassVar[int]
     FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MODEL_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    TOPOLOGY_CHANGED_FIELD_NUMBER: _ClassVar[int]
     VALID_FOR_US_FIELD_NUMBER: _ClassVar[int]
     based_on_tick: int
     channel: int
     device: int
+    error_n: float
     force_n: Vec3
     model: LocalModel
     sequence: int
+    topology_changed: bool
     valid_for_us: int
-    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
+    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ...) -> None: ...
+
+class ForceTable(_message.Message):
+    __slots__ = ["first_depth_m", "force_n", "step_m"]
+    FIRST_DEPTH_M_FIELD_NUMBER: _ClassVar[int]
+    FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    STEP_M_FIELD_NUMBER: _ClassVar[int]
+    first_depth_m: float
+    force_n: _containers.RepeatedScalarFieldContainer[float]
+    step_m: float
+    def __init__(self, first_depth_m: _Optional[float] = ..., step_m: _Optional[float] = ..., force_n: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Frame(_message.Message):
     __slots__ = ["bye", "control", "control_ack", "force", "report", "state"]
@@ -321,12 +345,16 @@ class LinkReport(_message.Message):
     def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., forces: _Optional[int] = ..., late_server: _Optional[int] = ..., late_network: _Optional[int] = ..., late_engine: _Optional[int] = ..., worst_late_ns: _Optional[int] = ..., longest_gap_ns: _Optional[int] = ..., round_trip: _Optional[_Union[Delays, _Mapping]] = ..., to_server: _Optional[_Union[Delays, _Mapping]] = ..., to_client: _Optional[_Union[Delays, _Mapping]] = ..., clock_offset_ns: _Optional[int] = ..., clock_drift_ppm: _Optional[float] = ..., clock_error_ns: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., reordered: _Optional[int] = ..., duplicated: _Optional[int] = ..., words: _Optional[str] = ...) -> None: ...
 
 class LocalModel(_message.Message):
-    __slots__ = ["at_m", "stiffness_npm"]
+    __slots__ = ["at_m", "contact", "stiffness_npm", "valid_radius_m"]
     AT_M_FIELD_NUMBER: _ClassVar[int]
+    CONTACT_FIELD_NUMBER: _ClassVar[int]
     STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    VALID_RADIUS_M_FIELD_NUMBER: _ClassVar[int]
     at_m: Vec3
+    contact: Contact
     stiffness_npm: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ...) -> None: ...
+    valid_radius_m: float
+    def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ..., valid_radius_m: _Optional[float] = ..., contact: _Optional[_Union[Contact, _Mapping]] = ...) -> None: ...
 
 class Rearm(_message.Message):
     __slots__ = ["device"]

@@ -5,7 +5,7 @@ import { create, fromBinary, toBinary, type DescMessage, type MessageShape } fro
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
-  Claim, Delays, DeviceDescription, DeviceState, ForceCommand, Grant, Hello, LinkReport, LocalModel, Refused, Request, Stiffness, Vec3, Welcome,
+  Claim, Contact, Delays, DeviceDescription, DeviceState, ForceCommand, Grant, Hello, LinkReport, LocalModel, Refused, Request, Stiffness, Vec3, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -299,8 +299,50 @@ export const isStiffness = (stiffness: Stiffness): boolean =>
 /** All of them within bounds. */
 export const isForce = isVec3;
 
+/** Every number of it is within its bounds. */
+export function isContact({ normal, gap, table }: Contact): boolean {
+  const isTable = !table || (table.step > 0 && isBounded(table.step) && isBounded(table.first) &&
+    table.force.length >= limits.kMinTable && table.force.length <= limits.kMaxTable && table.force.every(isBounded));
+  return isVec3(normal) && Math.abs(Math.hypot(normal.x, normal.y, normal.z) - 1) <= limits.kUnitTolerance &&
+    isBounded(gap) && isTable;
+}
+/** Infinity is as good as absent. */
+export const isRadius = (metres: number | undefined): boolean =>
+  metres === undefined || metres === Infinity || isMagnitude(metres);
+export const isError = (newtons: number | undefined): boolean => newtons === undefined || isMagnitude(newtons);
+
+function readContact({ normal, gapM, table }: pb.Contact): Contact {
+  return {
+    normal: readVec3(normal), gap: gapM,
+    ...(table && { table: { first: table.firstDepthM, step: table.stepM, force: table.forceN } }),
+  };
+}
+
+function writeContact({ normal, gap, table }: Contact): pb.Contact {
+  return create(pb.ContactSchema, {
+    normal: writeVec3(normal), gapM: gap,
+    ...(table && { table: { firstDepthM: table.first, stepM: table.step, forceN: [...table.force] } }),
+  });
+}
+
+const readModel = ({ atM, stiffnessNpm, validRadiusM, contact }: pb.LocalModel): LocalModel => ({
+  at: readVec3(atM), stiffness: stiffnessNpm,
+  ...(validRadiusM !== undefined && validRadiusM !== Infinity && { validRadius: validRadiusM }),
+  ...(contact && { contact: readContact(contact) }),
+});
+
+const writeModel = ({ at, stiffness, validRadius, contact }: LocalModel): pb.LocalModel =>
+  create(pb.LocalModelSchema, {
+    atM: writeVec3(at), stiffnessNpm: [...stiffness],
+    ...(validRadius !== undefined && validRadius !== Infinity && { validRadiusM: validRadius }),
+    ...(contact && { contact: writeContact(contact) }),
+  });
+
+const isModel = ({ at, stiffness, validRadius, contact }: LocalModel): boolean =>
+  isVec3(at) && isStiffness(stiffness) && isRadius(validRadius) && (!contact || isContact(contact));
+
 function readForce(from: pb.ForceCommand): ForceCommand | undefined {
-  const model: LocalModel | undefined = from.model && { at: readVec3(from.model.atM), stiffness: from.model.stiffnessNpm };
+  const model = from.model && readModel(from.model);
   const command: ForceCommand = {
     sequence: from.sequence,
     basedOnTick: from.basedOnTick,
@@ -309,9 +351,11 @@ function readForce(from: pb.ForceCommand): ForceCommand | undefined {
     validForUs: from.validForUs,
     device: from.device,
     channel: from.channel,
+    ...(from.topologyChanged && { topologyChanged: true }),
+    ...(from.errorN !== undefined && { error: from.errorN }),
   };
   const good = isDevice(command.device) && isChannel(command.channel) && command.sequence > 0n && isVec3(command.force) && command.validForUs >= 1 &&
-    command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || (isVec3(model.at) && isStiffness(model.stiffness)));
+    command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || isModel(model)) && isError(command.error);
   return good ? command : undefined;
 }
 
@@ -320,10 +364,12 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
     sequence: from.sequence,
     basedOnTick: from.basedOnTick,
     forceN: writeVec3(from.force),
-    ...(from.model && { model: { atM: writeVec3(from.model.at), stiffnessNpm: [...from.model.stiffness] } }),
+    ...(from.model && { model: writeModel(from.model) }),
     validForUs: from.validForUs,
     device: from.device,
     channel: from.channel,
+    topologyChanged: from.topologyChanged ?? false,
+    ...(from.error !== undefined && { errorN: from.error }),
   });
 
 const isLength = (ns: bigint): boolean => ns <= limits.kMaxTime; // of time; it has no sign on the wire

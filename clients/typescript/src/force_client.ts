@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 import { randomBytes } from "@noble/hashes/utils";
-import { isForce, isStiffness } from "./codec.js";
+import { isContact, isError, isForce, isRadius, isStiffness } from "./codec.js";
 import { Deadband, foretell, forceDeadbandObjection, stateDeadbandObjection, type ForceDeadband } from "./deadband.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, kFeatureLocalModel, kProtocolVersion, Role, type DeviceState, type LinkReport, type StateDeadband, type Stiffness,
+  Code, type Contact, kFeatureLocalModel, kProtocolVersion, Role, type DeviceState, type LinkReport, type StateDeadband, type Stiffness,
   type Vec3, type Welcome,
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
@@ -21,6 +21,14 @@ export interface Touch {
    * a wall with normal n: k·n·nᵀ. Used when the server has agreed to it.
    */
   readonly stiffness?: Stiffness | undefined;
+  /** m, how far from there the stiffness holds. */
+  readonly validRadius?: number | undefined;
+  /** The surface, with the force at other depths in a table where that is known. */
+  readonly contact?: Contact | undefined;
+  /** The body has been cut or torn since the answer before: neither's stiffness and table are relied on. */
+  readonly topologyChanged?: boolean | undefined;
+  /** N, what the engine thinks that the force may be wrong by. */
+  readonly error?: number | undefined;
 }
 
 /** The physics engine, seen from here. While it computes, newer states replace older ones. */
@@ -385,17 +393,19 @@ export class ForceClient {
     return fromMilliseconds(1000 / this.#welcome!.loopHz);
   }
 
-  #answer(now: Nanoseconds, { force, stiffness }: Touch, hand: DeviceState): void {
+  #answer(now: Nanoseconds, touch: Touch, hand: DeviceState): void {
     if (!this.#session || !this.#welcome) return; // the callback has called stop()
-    if (!isForce(force) || (stiffness && !isStiffness(stiffness))) {
+    const { force, stiffness, validRadius, contact, topologyChanged, error } = touch;
+    if (!isForce(force) || (stiffness && !isStiffness(stiffness)) || !isRadius(validRadius) ||
+        (contact && !isContact(contact)) || !isError(error)) {
       ++this.#stats.forcesUnusable;
       return;
     }
-    if (this.#deadband && !this.#deadband.passes(now, force)) {
+    if (this.#deadband && !this.#deadband.passes(now, force) && !topologyChanged) {
       ++this.#stats.forcesAlike;
       return;
     }
-    const withModel = stiffness && this.#welcome.features.includes(kFeatureLocalModel);
+    const withModel = (stiffness ?? contact) && this.#welcome.features.includes(kFeatureLocalModel);
     this.#session.sendForce({
       validForUs: Math.ceil(1000 * this.#validForMs(hand.tick, this.#welcome.loopHz)),
       sequence: ++this.#sequence,
@@ -403,7 +413,9 @@ export class ForceClient {
       force,
       device: hand.device,
       channel: 0,
-      model: withModel ? { at: hand.position, stiffness } : undefined,
+      model: withModel ? { at: hand.position, stiffness: stiffness ?? [0], validRadius, contact } : undefined,
+      topologyChanged,
+      error,
     });
     this.#answeredTick = hand.tick;
     ++this.#stats.forces;

@@ -7,6 +7,11 @@ export const kMaxDatagram = 1200;
 export const kMaxValue = 1e12;
 /** ns; largest distance of any clock reading from its zero. */
 export const kMaxTime = 1n << 60n;
+/** Of a normal's length. */
+export const kUnitTolerance = 1e-3;
+/** Entries of a table of forces. */
+export const kMinTable = 2;
+export const kMaxTable = 16;
 /** ms; a force cannot be promised for longer. */
 export const kMaxValidForMs = 10_000;
 /** Packet numbers are below this: a nonce never comes near the one that renews a key. */

@@ -52,11 +52,36 @@ export interface DeviceState {
   readonly channel: number;
 }
 
+/**
+ * The force along a contact's normal at other depths: entry i with the tool `first + i · step` deeper than where it is
+ * answered, that is at `at − depth · normal`; a line in between, beyond the ends as at the ends.
+ */
+export interface ForceTable {
+  /** m; below 0: nearer to the hand. */
+  readonly first: number;
+  /** m, above 0. */
+  readonly step: number;
+  /** N along +normal, 2 … 16 entries. */
+  readonly force: readonly number[];
+}
+
+/** A surface that the tool touches or is about to. It only pushes, unless a table says otherwise. */
+export interface Contact {
+  /** Unit vector, out of the body, to the hand. */
+  readonly normal: Vec3;
+  /** m, from the surface to the tool along the normal; below 0: so deep is it pressed in. */
+  readonly gap: number;
+  readonly table?: ForceTable | undefined;
+}
+
 /** F(x) = force − stiffness · (x − at): what the force becomes when the hand moves on. */
 export interface LocalModel {
   /** m, the position that the force was computed for. */
   readonly at: Vec3;
   readonly stiffness: Stiffness;
+  /** m, how far from `at` the stiffness holds; absent: nobody says. */
+  readonly validRadius?: number | undefined;
+  readonly contact?: Contact | undefined;
 }
 
 /** The force that the physics wants. */
@@ -72,6 +97,10 @@ export interface ForceCommand {
   readonly validForUs: number;
   readonly device: number;
   readonly channel: number;
+  /** Cut or torn since the answer before: neither's model is relied on. */
+  readonly topologyChanged?: boolean | undefined;
+  /** N, what the engine thinks that the force may be wrong by. */
+  readonly error?: number | undefined;
 }
 
 /**

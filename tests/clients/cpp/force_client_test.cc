@@ -203,6 +203,32 @@ TEST(ForceClient, TheStiffnessIsThatAtThePositionTheForceWasComputedFor) {
   EXPECT_EQ(command.model->stiffness, Mat3(Vec3(100, 100, 100).asDiagonal()));
 }
 
+TEST(ForceClient, AllThatTheEngineKnowsTravels) {
+  World world(11);
+  world.connect({.rate_hz = 100}, [](const DeviceState& hand) {
+    Touch touch = answer(hand);
+    touch.valid_radius = 0.003;
+    touch.contact = Contact{.normal = Vec3::UnitZ(),
+                            .gap = -0.001,
+                            .table = ForceTable{.first = -0.001, .step = 0.001, .size = 3, .force = {0, 1, 3}}};
+    touch.topology_changed = true;
+    touch.error = 0.02;
+    return touch;
+  });
+  world.run(kSecond);
+  ASSERT_FALSE(world.z->forces.empty());
+  const ForceCommand& command = world.z->forces.back().second;
+  ASSERT_TRUE(command.model && command.model->contact && command.model->contact->table);
+  EXPECT_EQ(command.model->stiffness, Mat3::Zero());
+  EXPECT_EQ(command.model->valid_radius, 0.003);
+  EXPECT_EQ(command.model->contact->normal, Vec3::UnitZ());
+  EXPECT_EQ(command.model->contact->gap, -0.001);
+  EXPECT_EQ(command.model->contact->table->size, 3U);
+  EXPECT_EQ(command.model->contact->table->force[2], 3);
+  EXPECT_TRUE(command.topology_changed);
+  EXPECT_EQ(command.error, 0.02);
+}
+
 TEST(ForceClient, KeepsTheStiffnessToItselfWhenTheServerDoesNotKnowLocalModels) {
   World world(11);
   world.z->features = false;

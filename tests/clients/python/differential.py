@@ -76,6 +76,16 @@ def _frame(frame: Frame) -> list[object]:
             words += ["model", *_vector(frame.model.at)]
             for row in frame.model.stiffness:
                 words += [_double(entry + 0.0) for entry in row]  # −0 is 0: k · 0 is either
+            words.append(_double(frame.model.valid_radius))
+            if frame.model.contact is not None:
+                words += ["contact", *_vector(frame.model.contact.normal), _double(frame.model.contact.gap)]
+                table = frame.model.contact.table
+                if table is not None:
+                    words += ["table", *map(_double, (table.first, table.step, *table.force))]
+        if frame.topology_changed:
+            words.append("changed")
+        if frame.error is not None:
+            words += ["error", _double(frame.error)]
         return words
     if isinstance(frame, Control):
         if frame.request is None:

@@ -11,7 +11,19 @@ from stand_in import StandIn
 from test_wire_md import REPORT
 from world import MS, PERFECT, SECOND, Weather, World
 
-from tendon import Code, Config, ForceClient, ForceDeadband, Mode, Phase, Role, SetStateDeadband, Touch
+from tendon import (
+    Code,
+    Config,
+    Contact,
+    ForceClient,
+    ForceDeadband,
+    ForceTable,
+    Mode,
+    Phase,
+    Role,
+    SetStateDeadband,
+    Touch,
+)
 from tendon.codec import (
     AnswerDatagram,
     DatagramType,
@@ -24,7 +36,7 @@ from tendon.codec import (
     write_answer,
 )
 from tendon.handshake import ClientHandshake
-from tendon.messages import Control, DeviceState, ForceCommand, Hello, Rearm, Refused, SetStateRate
+from tendon.messages import Control, DeviceState, ForceCommand, Hello, LocalModel, Rearm, Refused, SetStateRate
 
 KEY = bytes(range(32))
 ZERO = (0.0, 0.0, 0.0)
@@ -281,6 +293,17 @@ def test_numpy_arrays_will_do():
     assert {force.force for force in stage.forces} == {(-0.5, 0.0, 0.0)}
 
 
+def test_all_that_the_engine_knows_travels():
+    contact = Contact((0.0, 0.0, 1.0), -1e-3, ForceTable(-1e-3, 1e-3, (0.0, 1.0, 3.0)))
+    stage = Stage(Config())
+    stage.touch = lambda hand: Touch((0, 0, 1), None, 3e-3, contact, topology_changed=True, error=0.02)
+    stage.run(200 * MS)
+    force = stage.forces[-1]
+    nothing = (0.0, 0.0, 0.0)
+    assert force.model == LocalModel((1e-3, 0.0, 0.0), (nothing, nothing, nothing), 3e-3, contact)
+    assert (force.topology_changed, force.error) == (True, 0.02)
+
+
 def test_without_the_servers_consent_no_local_model_is_sent():
     stage = Stage(Config())
     stage.server.features = ()
@@ -289,7 +312,22 @@ def test_without_the_servers_consent_no_local_model_is_sent():
     assert {force.model for force in stage.forces} == {None}
 
 
-@pytest.mark.parametrize("touch", [Touch((nan, 0, 0)), Touch((0, inf, 0)), Touch((0, 0, 0), 2e12)])
+UNUSABLE = [
+    Touch((nan, 0, 0)),
+    Touch((0, inf, 0)),
+    Touch((0, 0, 0), 2e12),
+    Touch((0, 0, 0), 1, valid_radius=-1e-3),
+    Touch((0, 0, 0), error=nan),
+    Touch((0, 0, 0), contact=Contact((0, 0, 2), 0)),
+    Touch((0, 0, 0), contact=Contact((0, 0, 1), nan)),
+    Touch((0, 0, 0), contact=Contact((0, 0, 1), 0, ForceTable(0, 0, (0, 1)))),
+    Touch((0, 0, 0), contact=Contact((0, 0, 1), 0, ForceTable(0, 1, (0,)))),
+    Touch((0, 0, 0), contact=Contact((0, 0, 1), 0, ForceTable(0, 1, 17 * (0,)))),
+    Touch((0, 0, 0), contact=Contact((0, 0, 1), 0, ForceTable(0, 1, (0, nan)))),
+]
+
+
+@pytest.mark.parametrize("touch", UNUSABLE)
 def test_a_force_that_is_not_usable_is_counted_and_not_sent(touch):
     stage = Stage(Config(rate_hz=100))
     stage.touch = lambda hand: touch

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bytes of WIRE.md are what this client writes, and what it reads."""
 
+from dataclasses import replace
 from math import nan
 
 import pytest
@@ -11,11 +12,13 @@ from tendon.codec import AnswerDatagram, DatagramType, Echo, Header, HelloDatagr
 from tendon.messages import (
     Bye,
     Code,
+    Contact,
     Control,
     ControlAck,
     Delays,
     DeviceState,
     ForceCommand,
+    ForceTable,
     Hello,
     LinkReport,
     LocalModel,
@@ -52,6 +55,17 @@ STATE = DeviceState(
 )
 WALL = ((2000.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 FORCE = ForceCommand(100, 1000, (-2.0, 0.0, 0.0), 20_000, LocalModel((0.01, 0.0, 0.0), WALL))
+FORCE_WITH_ALL = ForceCommand(
+    101,
+    1000,
+    (-2.0, 0.0, 0.0),
+    20_000,
+    LocalModel(
+        (0.01, 0.0, 0.0), WALL, 0.0025, Contact((-1.0, 0.0, 0.0), -0.002, ForceTable(-0.002, 0.001, (0.0, 0.75, 2.0, 3.5)))
+    ),
+    topology_changed=True,
+    error=0.125,
+)
 REPORT = LinkReport(
     number=3,
     until_ns=1_000_000_000,
@@ -78,6 +92,7 @@ FRAMES = {
     "keep-alive": (0, None, []),
     "state": (42, ECHO, [STATE]),
     "force": (43, ECHO, [FORCE]),
+    "force-with-all": (59, None, [FORCE_WITH_ALL]),
     "control": (44, None, [Control(7, SetStateRate(500))]),
     "control-ack": (45, None, [ControlAck(7, Code.OK, "500 Hz")]),
     "bye": (46, None, [Bye(Code.SHUTDOWN, "SIGTERM")]),
@@ -174,6 +189,9 @@ def out_of_bounds():
         values = {name: getattr(FORCE, name) for name in ForceCommand.__slots__}
         return ForceCommand(**{**values, **changes})
 
+    def with_all(**changes):
+        return force(model=replace(FORCE_WITH_ALL.model, **changes))
+
     yield "position", state(position=(1.1e12, 0.0, 0.0))
     yield "velocity NaN", state(velocity=(0.0, nan, 0.0))
     yield "force infinite", state(force_applied=(0.0, 0.0, float("-inf")))
@@ -189,6 +207,15 @@ def out_of_bounds():
     yield "valid for nothing", force(valid_for_us=0)
     yield "valid for too long", force(valid_for_us=10_000_001)
     yield "stiffness", force(model=LocalModel((0.0, 0.0, 0.0), ((2e12, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))))
+    yield "radius", with_all(valid_radius=-1.0)
+    yield "radius NaN", with_all(valid_radius=nan)
+    yield "no normal", with_all(contact=Contact((0.0, 0.0, 0.0), 0.0))
+    yield "gap", with_all(contact=Contact((1.0, 0.0, 0.0), nan))
+    yield "table of one", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 1.0, (1.0,))))
+    yield "table of 17", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 1.0, 17 * (1.0,))))
+    yield "table without a step", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 0.0, (1.0, 2.0))))
+    yield "table NaN", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 1.0, (1.0, nan))))
+    yield "error", force(error=-0.1)
     yield "request 0", Control(0, SetStateRate(1))
     yield "answer to 0", ControlAck(0, Code.OK)
     yield "code 0", ControlAck(1, 0)

@@ -319,6 +319,30 @@ describe("the callback", () => {
     }
   });
 
+  it("sends all that the engine knows, and nothing of it with a number out of its bounds", () => {
+    const kContact = { normal: { x: 0, y: 0, z: 1 }, gap: -1e-3, table: { first: -1e-3, step: 1e-3, force: [0, 1, 3] } };
+    const kAll = { force: kPush, validRadius: 3e-3, contact: kContact, topologyChanged: true, error: 0.02 };
+    const world = new World(1, kFair, {}, { physics: () => kAll });
+    world.runMs(100);
+    const { command } = world.server.forces.at(-1)!;
+    assert.deepEqual([command.topologyChanged, command.error, command.model!.validRadius], [true, 0.02, 3e-3]);
+    assert.deepEqual([command.model!.stiffness, command.model!.contact], [[0], kContact]);
+
+    const table = kContact.table;
+    const spoiled = [
+      { ...kAll, validRadius: -1e-3 }, { ...kAll, error: NaN }, { ...kAll, contact: { ...kContact, gap: NaN } },
+      { ...kAll, contact: { ...kContact, normal: { x: 0, y: 0, z: 2 } } },
+      ...[{ ...table, step: 0 }, { ...table, first: Infinity }, { ...table, force: [1] }, { ...table, force: [0, NaN] },
+        { ...table, force: Array<number>(17).fill(0) }].map((bad) => ({ ...kAll, contact: { ...kContact, table: bad } })),
+    ];
+    for (const touch of spoiled) {
+      const refused = new World(1, kFair, {}, { physics: () => touch });
+      refused.runMs(100);
+      assert.equal(refused.server.forces.length, 0);
+      assert.ok(refused.client.stats().forcesUnusable > 0);
+    }
+  });
+
   it("ends the session with a Bye when it throws, and what it threw comes out", () => {
     const world = new World(1, kFair, { name: "wall" }, { physics: () => { throw new Error("no world"); } });
     assert.throws(() => world.runMs(1000), /no world/);

@@ -162,6 +162,19 @@ describe("WIRE.md", () => {
     }]);
   });
 
+  it("force-with-all says what the page says", () => {
+    const [frame] = contentOf("force-with-all").frames;
+    assert.ok(frame?.kind === "force");
+    const { model, topologyChanged, error } = frame.value;
+    assert.deepEqual([topologyChanged, error], [true, 0.125]);
+    assert.deepEqual(model, {
+      at: { x: 0.01, y: 0, z: 0 }, stiffness: [2000, 0, 0], validRadius: 0.0025,
+      contact: {
+        normal: { x: -1, y: 0, z: 0 }, gap: -0.002, table: { first: -0.002, step: 0.001, force: [0, 0.75, 2, 3.5] },
+      },
+    });
+  });
+
   it("control, its answer and bye say what the page says", () => {
     const request = { kind: "setStateRate", hz: 500, device: 0 };
     assert.deepEqual(contentOf("control").frames, [{ kind: "control", value: { id: 7, request } }]);

@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByL/AQoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBItECCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDSK2AQoMRm9yY2VDb21tYW5kEhAKCHNlcXVlbmNlGAEgASgEEhUKDWJhc2VkX29uX3RpY2sYAiABKAQSIAoHZm9yY2VfbhgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKBW1vZGVsGAQgASgLMhUudGVuZG9uLnYxLkxvY2FsTW9kZWwSFAoMdmFsaWRfZm9yX3VzGAUgASgNEg4KBmRldmljZRgGIAEoDRIPCgdjaGFubmVsGAcgASgNIkYKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABItkCCgdDb250cm9sEgoKAmlkGAEgASgNEjEKDnNldF9zdGF0ZV9yYXRlGAIgASgLMhcudGVuZG9uLnYxLlNldFN0YXRlUmF0ZUgAEiEKBXJlYXJtGAMgASgLMhAudGVuZG9uLnYxLlJlYXJtSAASJwoIZGVzY3JpYmUYBCABKAsyEy50ZW5kb24udjEuRGVzY3JpYmVIABIqCgp0YWtlX2xlYXNlGAUgASgLMhQudGVuZG9uLnYxLlRha2VMZWFzZUgAEioKCmdpdmVfbGVhc2UYBiABKAsyFC50ZW5kb24udjEuR2l2ZUxlYXNlSAASOQoSc2V0X3N0YXRlX2RlYWRiYW5kGAggASgLMhsudGVuZG9uLnYxLlNldFN0YXRlRGVhZGJhbmRIABIqCgpsZWFzZV9sb3N0GAcgASgLMhQudGVuZG9uLnYxLkxlYXNlTG9zdEgAQgQKAm9wIioKDFNldFN0YXRlUmF0ZRIKCgJoehgBIAEoDRIOCgZkZXZpY2UYAiABKA0iTAoQU2V0U3RhdGVEZWFkYmFuZBINCgVzaGFyZRgBIAEoARIRCglmbG9vcl9tcHMYAiABKAESFgoObWF4X3NpbGVuY2VfdXMYAyABKA0iFwoFUmVhcm0SDgoGZGV2aWNlGAEgASgNIhoKCERlc2NyaWJlEg4KBmRldmljZRgBIAEoDSIsCglUYWtlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iLAoJR2l2ZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIjgKCUxlYXNlTG9zdBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIKCgJ0bxgDIAEoCSKGAQoKQ29udHJvbEFjaxIKCgJpZBgBIAEoDRIdCgRjb2RlGAIgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAMgASgJEg8KB3dhaXRfbXMYBCABKA0SLAoGZGV2aWNlGAUgASgLMhwudGVuZG9uLnYxLkRldmljZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24iagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki0QMKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAiq9AQoEQ29kZRIUChBDT0RFX1VOU1BFQ0lGSUVEEAASCwoHQ09ERV9PSxABEhAKDENPREVfSU5WQUxJRBACEhQKEENPREVfVU5TVVBQT1JURUQQAxINCglDT0RFX0JVU1kQBBIPCgtDT0RFX0RFTklFRBAFEhEKDUNPREVfU0hVVERPV04QBhISCg5DT0RFX1RJTUVEX09VVBAHEhAKDENPREVfRVhQSVJFRBAIEhEKDUNPREVfUkVQTEFDRUQQCSpECgRSb2xlEhQKEFJPTEVfVU5TUEVDSUZJRUQQABIRCg1ST0xFX09CU0VSVkVSEAESEwoPUk9MRV9DT05UUk9MTEVSEAJiBnByb3RvMw");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByL/AQoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBItECCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDSLyAQoMRm9yY2VDb21tYW5kEhAKCHNlcXVlbmNlGAEgASgEEhUKDWJhc2VkX29uX3RpY2sYAiABKAQSIAoHZm9yY2VfbhgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKBW1vZGVsGAQgASgLMhUudGVuZG9uLnYxLkxvY2FsTW9kZWwSFAoMdmFsaWRfZm9yX3VzGAUgASgNEg4KBmRldmljZRgGIAEoDRIPCgdjaGFubmVsGAcgASgNEhgKEHRvcG9sb2d5X2NoYW5nZWQYCCABKAgSFAoHZXJyb3JfbhgJIAEoAUgAiAEBQgoKCF9lcnJvcl9uIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi2QIKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGgoIRGVzY3JpYmUSDgoGZGV2aWNlGAEgASgNIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIoYBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSLRAwoKTGlua1JlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZmb3JjZXMYBCABKAQSEwoLbGF0ZV9zZXJ2ZXIYBSABKAQSFAoMbGF0ZV9uZXR3b3JrGAYgASgEEhMKC2xhdGVfZW5naW5lGAcgASgEEhUKDXdvcnN0X2xhdGVfbnMYCCABKAQSFgoObG9uZ2VzdF9nYXBfbnMYCSABKAQSJQoKcm91bmRfdHJpcBgKIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fc2VydmVyGAsgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19jbGllbnQYDCABKAsyES50ZW5kb24udjEuRGVsYXlzEhcKD2Nsb2NrX29mZnNldF9ucxgNIAEoEhIXCg9jbG9ja19kcmlmdF9wcG0YDiABKAESFgoOY2xvY2tfZXJyb3JfbnMYDyABKAQSEAoIcmVjZWl2ZWQYECABKAQSDAoEbG9zdBgRIAEoBBIRCglyZW9yZGVyZWQYEiABKAQSEgoKZHVwbGljYXRlZBgTIAEoBBINCgV3b3JkcxgUIAEoCSIrCgZEZWxheXMSEQoJbWVkaWFuX25zGAEgASgSEg4KBnA5OV9ucxgCIAEoEiKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -333,6 +333,20 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
    * @generated from field: uint32 channel = 7;
    */
   channel: number;
+
+  /**
+   * cut or torn since the answer before this one: neither's model is relied on
+   *
+   * @generated from field: bool topology_changed = 8;
+   */
+  topologyChanged: boolean;
+
+  /**
+   * what the engine thinks that force_n may be wrong by, ≥ 0; absent: it does not say
+   *
+   * @generated from field: optional double error_n = 9;
+   */
+  errorN?: number | undefined;
 };
 
 /**
@@ -345,6 +359,7 @@ export const ForceCommandSchema: GenMessage<ForceCommand> = /*@__PURE__*/
 /**
  * The remote environment near one position, so that the device loop can follow the hand:
  *     F(x) = force_n − stiffness_npm · (x − at_m)
+ * What else it can say WIRE.md describes. A server that does not know the rest follows the stiffness.
  *
  * @generated from message tendon.v1.LocalModel
  */
@@ -361,6 +376,20 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
    * @generated from field: repeated double stiffness_npm = 2 [packed = true];
    */
   stiffnessNpm: number[];
+
+  /**
+   * ≥ 0, how far from at_m the stiffness holds; absent: nobody says
+   *
+   * @generated from field: optional double valid_radius_m = 3;
+   */
+  validRadiusM?: number | undefined;
+
+  /**
+   * optional
+   *
+   * @generated from field: tendon.v1.Contact contact = 4;
+   */
+  contact?: Contact | undefined;
 };
 
 /**
@@ -369,6 +398,76 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
  */
 export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
   messageDesc(file_tendon, 6);
+
+/**
+ * A surface that the tool touches or is about to. It only pushes, unless a table says otherwise.
+ *
+ * @generated from message tendon.v1.Contact
+ */
+export type Contact = Message<"tendon.v1.Contact"> & {
+  /**
+   * out of the body, to the hand; of length 1 ± 0.001
+   *
+   * @generated from field: tendon.v1.Vec3 normal = 1;
+   */
+  normal?: Vec3 | undefined;
+
+  /**
+   * from the surface to the tool along the normal; below 0: so deep is it pressed in
+   *
+   * @generated from field: double gap_m = 2;
+   */
+  gapM: number;
+
+  /**
+   * optional
+   *
+   * @generated from field: tendon.v1.ForceTable table = 3;
+   */
+  table?: ForceTable | undefined;
+};
+
+/**
+ * Describes the message tendon.v1.Contact.
+ * Use `create(ContactSchema)` to create a new message.
+ */
+export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
+  messageDesc(file_tendon, 7);
+
+/**
+ * The force along the normal, at the depths first_depth_m + i · step_m below at_m: at_m − depth · normal.
+ *
+ * @generated from message tendon.v1.ForceTable
+ */
+export type ForceTable = Message<"tendon.v1.ForceTable"> & {
+  /**
+   * below 0: nearer to the hand
+   *
+   * @generated from field: double first_depth_m = 1;
+   */
+  firstDepthM: number;
+
+  /**
+   * > 0
+   *
+   * @generated from field: double step_m = 2;
+   */
+  stepM: number;
+
+  /**
+   * along +normal; 2 … 16 entries
+   *
+   * @generated from field: repeated double force_n = 3 [packed = true];
+   */
+  forceN: number[];
+};
+
+/**
+ * Describes the message tendon.v1.ForceTable.
+ * Use `create(ForceTableSchema)` to create a new message.
+ */
+export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
+  messageDesc(file_tendon, 8);
 
 /**
  * @generated from message tendon.v1.Control
@@ -440,7 +539,7 @@ export type Control = Message<"tendon.v1.Control"> & {
  * Use `create(ControlSchema)` to create a new message.
  */
 export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
-  messageDesc(file_tendon, 7);
+  messageDesc(file_tendon, 9);
 
 /**
  * How many states of a device per second the client wants.
@@ -464,7 +563,7 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
  * Use `create(SetStateRateSchema)` to create a new message.
  */
 export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
-  messageDesc(file_tendon, 8);
+  messageDesc(file_tendon, 10);
 
 /**
  * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the
@@ -501,7 +600,7 @@ export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
  * Use `create(SetStateDeadbandSchema)` to create a new message.
  */
 export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*/
-  messageDesc(file_tendon, 9);
+  messageDesc(file_tendon, 11);
 
 /**
  * Clears a latched fault. Only from a controller of the device.
@@ -520,7 +619,7 @@ export type Rearm = Message<"tendon.v1.Rearm"> & {
  * Use `create(RearmSchema)` to create a new message.
  */
 export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
-  messageDesc(file_tendon, 10);
+  messageDesc(file_tendon, 12);
 
 /**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
@@ -539,7 +638,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 11);
+  messageDesc(file_tendon, 13);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -564,7 +663,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 12);
+  messageDesc(file_tendon, 14);
 
 /**
  * I do not want to be it any more.
@@ -588,7 +687,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 15);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -619,7 +718,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 16);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -664,7 +763,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 17);
 
 /**
  * What a device is and can do.
@@ -765,7 +864,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 18);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -803,7 +902,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 19);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -827,7 +926,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 20);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -972,7 +1071,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 21);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -994,7 +1093,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 22);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -1044,7 +1143,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 23);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -1077,7 +1176,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 24);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -1106,7 +1205,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 25);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -1186,7 +1285,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 26);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -1217,7 +1316,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 27);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -1253,7 +1352,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from enum tendon.v1.Mode

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/remote_force.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+
+/// What an engine can say of a surface while its tool is at `position`, true of a wall at x = 0 or of nothing at all;
+/// sound (core/estimation/answer.h) in any case.
+inline Contact any_contact(Dice& dice, const Vec3& position) {
+  Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
+  if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};
+  if (dice.chance(0.5)) return contact;
+  ForceTable& table = contact.table.emplace(
+      ForceTable{.first = dice.chance(0.7) ? contact.gap : dice.within(-0.02, 0.02), .step = dice.decades(-5, -2)});
+  table.size = static_cast<std::uint32_t>(dice.within(ForceTable::kMinEntries, ForceTable::kMaxEntries + 1));
+  for (std::size_t i = 0; i < table.size; ++i) table.force[i] = (dice.chance(0.8) ? 1 : -1) * dice.decades(-2, 3);
+  return contact;
+}
+
+}  // namespace tendon
