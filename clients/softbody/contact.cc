@@ -55,9 +55,7 @@ Feel PatchContact::at(const Vec3& tool) {
   const Vec3 steepest = n + surface_.from_across(2 * reaction.slope - height_slope);
   feel.stiffness = reaction.stiffness * steepest * steepest.transpose();
   feel.error = reaction.error;
-  // Across, a patch is another one when it has moved by a quarter of its radius; along, when the tool has left.
-  const double along = side_ == Side::kBilateral ? surface_.radius() : std::max(0.0, -feel.gap);
-  feel.valid_radius = std::min(along, surface_.radius() / 4);
+  feel.valid_radius = surface_.radius() / 4;  // across, a patch is another one there
   if (friction_) rub(surface_.across(tool), reaction.force, feel);
   return feel;
 }

@@ -17,8 +17,10 @@ struct Feel {
   /// m, from the tool to the body along the normal: as it lies, and where it touches as it would lie at rest; below 0:
   /// inside.
   double gap = 0;
-  double valid_radius = 0;  ///< m, how far the tool may move before `force` and `stiffness` are another's
-  double error = 0;         ///< N, the solver's estimate of its own
+  /// m, how far the tool may move before `force` and `stiffness` are another's, but for the surface that it may leave
+  /// on the way: that is what `gap` says.
+  double valid_radius = 0;
+  double error = 0;  ///< N, the solver's estimate of its own
   bool touching = false;
   bool topology_changed = false;  ///< it is the first since the body was cut: what was felt before was another body
 };

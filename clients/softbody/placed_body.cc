@@ -3,13 +3,18 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <stdexcept>
 
 namespace tendon::softbody {
 
 PlacedBody::PlacedBody(const Scene& scene)
     : body_(scene.body),
       to_device_(Eigen::Quaterniond::FromTwoVectors(body_.normal(), scene.towards_hand).toRotationMatrix()),
-      origin_(scene.at - to_device_ * body_.touch_point()) {}
+      origin_(scene.at - to_device_ * body_.touch_point()),
+      normal_(to_device_ * body_.normal()),
+      only_pushes_(scene.body.side == PatchContact::Side::kUnilateral),
+      depths_(scene.table) {}
 
 Feel PlacedBody::touch(const Vec3& position) {
   Feel feel = body_.touch(to_device_.transpose() * (position - origin_));
@@ -23,12 +28,32 @@ Touch PlacedBody::answer(const DeviceState& hand) {
   const Feel feel = body_.step() > 0 ? follow(hand) : touch(hand.position);
   Touch touch = feel.force;
   touch.stiffness = feel.stiffness;
+  touch.valid_radius = feel.valid_radius;
+  touch.error = feel.error;
+  touch.topology_changed = feel.topology_changed;
+  if (only_pushes_ && std::isfinite(feel.gap)) {
+    touch.contact = Contact{.normal = normal_, .gap = feel.gap, .table = table(hand.position, feel.gap)};
+  }
   return touch;
 }
 
 void PlacedBody::tick(PeerTime sampled) {
   if (!first_) first_ = sampled;
   body_.tick(seconds(sampled - *first_));
+}
+
+std::optional<ForceTable> PlacedBody::table(const Vec3& position, double gap) {
+  if (depths_ <= 0 || gap > depths_) return std::nullopt;
+  ForceTable table{.first = std::max(gap, -depths_ / 2), .step = depths_ / (ForceTable::kMaxEntries - 1)};
+  for (; table.size < ForceTable::kMaxEntries; ++table.size) {
+    const double depth = table.first + table.size * table.step;
+    try {
+      table.force[table.size] = normal_.dot(touch(position - depth * normal_).force);
+    } catch (const std::out_of_range&) {
+      break;  // so deep it would touch more than was condensed
+    }
+  }
+  return table.size >= ForceTable::kMinEntries ? std::optional(table) : std::nullopt;
 }
 
 Feel PlacedBody::follow(const DeviceState& hand) {
@@ -41,11 +66,14 @@ Feel PlacedBody::follow(const DeviceState& hand) {
   const Vec3 from = followed_->position;
   Duration owed = followed_->owed + past;
   const auto steps = owed / step;
+  bool changed = false;
   for (auto i = steps; i > 0; --i) {
     owed -= step;
     const double share = past > Duration(0) ? std::min(1.0, seconds(owed) / seconds(past)) : 0;  // still ahead
     followed_->feel = touch(hand.position + share * (from - hand.position));
+    changed = changed || followed_->feel.topology_changed;
   }
+  followed_->feel.topology_changed = changed;
   followed_->sampled = hand.sampled;
   followed_->position = hand.position;
   followed_->owed = owed;

@@ -228,7 +228,8 @@ void read_body(Table table, const std::filesystem::path& directory, BodyConfig& 
   table.check_unknown();
 }
 
-void read_touch(Table table, BodyConfig& body) {
+void read_touch(Table table, Scene& scene) {
+  BodyConfig& body = scene.body;
   body.towards_tool = table.direction("from", Vec3::UnitZ());
   body.middle = table.vector("middle_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
   body.patch_radius = table.length("patch_radius_mm");
@@ -245,6 +246,12 @@ void read_touch(Table table, BodyConfig& body) {
       if (name == "unilateral") return std::optional(PatchContact::Side::kUnilateral);
       return name == "bilateral" ? std::optional(PatchContact::Side::kBilateral) : std::nullopt;
     });
+  }
+  if (const toml::node* asked = table.find("table_mm")) {
+    scene.table = table.length("table_mm");
+    if (body.model != ModelKind::kCondensed || body.side != PatchContact::Side::kUnilateral || body.friction) {
+      table.fail(*asked, "table_mm", "only for the model condensed, unilateral and without friction: others remember");
+    }
   }
   table.check_unknown();
 }
@@ -364,7 +371,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   model.check_unknown();
   read_effects(root, chosen, scene.body);
   read_body(root.table("body"), directory, scene.body);
-  read_touch(root.table("touch"), scene.body);
+  read_touch(root.table("touch"), scene);
   if (root.find("place") != nullptr) {
     Table place = root.table("place");
     scene.at = place.vector("at_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
@@ -415,23 +422,26 @@ std::string scene_reference() {
           "kind                     how it is computed:\n";
   for (const auto& each : models()) text << "    " << each.name << ": " << each.what << '\n';
   const BodyConfig defaults;
-  text << "max_iterations = " << defaults.max_iterations
-       << "      of one answer: corotational, stvk, neo-hookean, mass-spring\n"
-          "iterations = "
-       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
-       << "              of modal\n"
-          "static_modes = 0         of modal: so many patches along each side of what is touched, at most 20\n"
-          "[touch]\n"
-          "patch_radius_mm          the tool presses on a patch of this size\n"
-          "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
-          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
-          "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
-          "tool = \"patch\"           or sphere: rigid, its contact grows as it is pressed in; condensed alone\n"
-          "tool_radius_mm = 0       how much earlier a patch touches; the sphere's\n"
-          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
-          "[place]\n"
-          "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
-          "towards_hand = [0, 0, 1] the way from there to the hand, in the device's frame\n";
+  text
+      << "max_iterations = " << defaults.max_iterations
+      << "      of one answer: corotational, stvk, neo-hookean, mass-spring\n"
+         "iterations = "
+      << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
+      << "              of modal\n"
+         "static_modes = 0         of modal: so many patches along each side of what is touched, at most 20\n"
+         "[touch]\n"
+         "patch_radius_mm          the tool presses on a patch of this size\n"
+         "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
+         "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
+         "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
+         "tool = \"patch\"           or sphere: rigid, its contact grows as it is pressed in; condensed alone\n"
+         "tool_radius_mm = 0       how much earlier a patch touches; the sphere's\n"
+         "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
+         "table_mm                 answers bring the force at 16 depths over so much, for a slow network: 17 answers'\n"
+         "                         time. Of condensed, unilateral, without friction\n"
+         "[place]\n"
+         "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
+         "towards_hand = [0, 0, 1] the way from there to the hand, in the device's frame\n";
   return text.str();
 }
 

@@ -16,6 +16,7 @@ struct Scene {
   BodyConfig body;
   Vec3 at = Vec3::Zero();             ///< m, device frame: where the touch point of the body at rest is
   Vec3 towards_hand = Vec3::UnitZ();  ///< unit vector, device frame: the body's way to the tool
+  double table = 0;                   ///< m, the depths that an answer's table of forces covers; 0: it has none
 };
 
 /// What is wrong with a scene: "FILE:LINE: KEY: expected …, found …".

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "core/estimation/answer.h"
 #include "tests/clients/softbody/scene_text.h"
 
 namespace tendon::softbody {
@@ -25,6 +26,51 @@ TEST(PlacedBody, PushesTheHandBackAlongTheWayItCame) {
   const Touch touch = body.answer(hand);
   EXPECT_EQ(touch.force, feel.force);
   EXPECT_EQ(touch.stiffness, feel.stiffness);
+  EXPECT_EQ(touch.valid_radius, feel.valid_radius);
+  EXPECT_EQ(touch.error, feel.error);
+  ASSERT_TRUE(touch.contact);
+  EXPECT_NEAR((touch.contact->normal - -Vec3::UnitX()).norm(), 0, 1e-12);
+  EXPECT_NEAR(touch.contact->gap, -0.002, 1e-9);
+  EXPECT_FALSE(touch.contact->table);
+}
+
+TEST(PlacedBody, ABodyThatSticksSendsNoSurfaceThatOnlyPushes) {
+  PlacedBody body(parse_scene(with("patch_radius_mm", "side = \"bilateral\"\npatch_radius_mm"), "s.toml", "."));
+  DeviceState hand;
+  hand.position = Vec3(0.012, 0, 0);
+  EXPECT_FALSE(body.answer(hand).contact);
+}
+
+/// What a server takes the answer of `body` at `x` to mean `deeper` down.
+Vec3 meant(PlacedBody& body, const Vec3& x, double deeper) {
+  DeviceState hand;
+  hand.position = x;
+  const Touch touch = body.answer(hand);
+  RemoteForce answer{.force = touch.force};
+  answer.model =
+      LocalModel{.at = x, .stiffness = *touch.stiffness, .valid_radius = touch.valid_radius, .contact = touch.contact};
+  EXPECT_TRUE(is_sound(answer));
+  return reconstruct(believed(answer, 1e6), x + deeper * Vec3::UnitX()).force;
+}
+
+TEST(PlacedBody, ATableFollowsASpheresGrowingContactWhereAStiffnessDoesNot) {
+  const auto scene = [](const std::string& more) {
+    std::string text = with("patch_radius_mm", more + "tool = \"sphere\"\ntool_radius_mm = 20\npatch_radius_mm");
+    text.replace(text.find("[4, 4, 2]"), 9, "[12, 12, 6]");
+    return parse_scene(text, "s.toml", ".");
+  };
+  PlacedBody plain(scene(""));
+  PlacedBody tabled(scene("table_mm = 8\n"));
+  const double surface = 0.01 - 0.02;  // the sphere's middle, when it touches
+  for (const double from : {-0.001, 0.002, 0.004}) {
+    for (const double deeper : {-0.002, 0.002}) {
+      const Vec3 x((surface + from) * Vec3::UnitX());
+      const Vec3 truth = plain.touch(x + deeper * Vec3::UnitX()).force;
+      const double table_error = (meant(tabled, x, deeper) - truth).norm();
+      EXPECT_LT(table_error, 0.01 + 0.03 * truth.norm()) << from << ' ' << deeper;
+      EXPECT_LE(table_error, (meant(plain, x, deeper) - truth).norm() + 1e-9) << from << ' ' << deeper;
+    }
+  }
 }
 
 /// A scene of one of the models, with the effects that it cannot do without.

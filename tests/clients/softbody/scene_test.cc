@@ -161,7 +161,10 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
             "s.toml: touch.patch_radius_mm: expected a number above 0 and at most 1e+06, found nothing");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nfriction = 1")),
             "s.toml:12: touch.friction: unknown key; expected one of from, middle_mm, patch_radius_mm, reach_mm, side, "
-            "tool, tool_radius_mm");
+            "table_mm, tool, tool_radius_mm");
+  EXPECT_EQ(
+      refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nside = \"bilateral\"\ntable_mm = 5")),
+      "s.toml:13: touch.table_mm: only for the model condensed, unilateral and without friction: others remember");
   EXPECT_EQ(refusal(with("[-1, 0, 0]", "[0, 0, 0]")),
             "s.toml:14: place.towards_hand: expected a direction, not [0, 0, 0]");
   EXPECT_EQ(refusal("x = "), "s.toml:1: Error while parsing key-value pair: encountered end-of-file");
