@@ -33,7 +33,7 @@ double EnergyLedger::book(double work, double squared_displacement, Duration hel
   const double viscous = held > Duration::zero() ? friction_.viscous * squared_displacement / seconds(held) : 0.0;
   const double income = work + friction_.coulomb * std::sqrt(squared_displacement) + viscous;
   if (std::isfinite(income)) energy_ += income;
-  return energy_;
+  return energy_.value();
 }
 
 double EnergyLedger::observe_unseen(double applied, Duration at_most) noexcept {
@@ -41,7 +41,7 @@ double EnergyLedger::observe_unseen(double applied, Duration at_most) noexcept {
   if (friction_.viscous > 0 && std::isfinite(excess)) {
     energy_ -= seconds(at_most) * excess * excess / (4 * friction_.viscous);
   }
-  return energy_;
+  return energy_.value();
 }
 
 }  // namespace tendon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "core/compensated_sum.h"
 #include "core/friction.h"
 #include "core/motion.h"
 
@@ -55,13 +56,13 @@ class EnergyLedger {
   void adapt(const Friction& friction) noexcept;
 
   /// E, J. Negative only after an interval longer than the limiter was told to expect.
-  double energy() const noexcept { return energy_; }
+  double energy() const noexcept { return energy_.value(); }
 
  private:
   double book(double work, double squared_displacement, Duration held) noexcept;
 
   Friction friction_;
-  double energy_ = 0;
+  CompensatedSum energy_;
 };
 
 }  // namespace tendon

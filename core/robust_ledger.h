@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "core/compensated_sum.h"
 #include "core/control/stability_controller.h"
 #include "core/friction.h"
 
@@ -44,8 +45,8 @@ class RobustLedger {
   /// As EnergyLedger::adapt.
   void adapt(const Friction& friction) noexcept;
 
-  double energy() const noexcept { return energy_; }               ///< E, J
-  double spendable() const noexcept { return energy_ - margin_; }  ///< E − (Δ/2)‖f‖₁, J
+  double energy() const noexcept { return energy_.value(); }        ///< E, J
+  double spendable() const noexcept { return energy() - margin_; }  ///< E − (Δ/2)‖f‖₁, J
   const Friction& friction() const noexcept { return config_.friction; }
 
  private:
@@ -53,7 +54,7 @@ class RobustLedger {
   void restart() noexcept;
 
   Config config_;
-  double energy_ = 0;
+  CompensatedSum energy_;
   double margin_ = 0;                     ///< (Δ/2) ‖force held in the last interval‖₁, J
   Vec<N> last_applied_ = Vec<N>::Zero();  ///< N
 

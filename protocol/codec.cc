@@ -9,6 +9,7 @@
 #include <limits>
 #include <string_view>
 
+#include "core/arithmetic.h"
 #include "protocol/limits.h"
 #include "tendon.pb.h"
 

@@ -3,6 +3,8 @@
 
 #include <stdexcept>
 
+#include "core/arithmetic.h"
+
 namespace tendon {
 
 namespace {
@@ -55,6 +57,7 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
 }
 
 LocalTime HapticLoop::step(LocalTime now) noexcept {
+  const DenormalsOff off;
   if (tick_ == 0) due_ = now;
   take_mail(now);
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/arithmetic.h"
 #include "protocol/limits.h"
 
 namespace tendon {

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/arithmetic.h"
+
 namespace tendon::softbody {
 
 PatchContact::PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,

@@ -67,6 +67,12 @@ TEST(Rooms, AGuestSeesProtocolAndItsOwnFolder) {
             Places{"clients/softbody/a.cc:3"});
 }
 
+TEST(Rooms, EverybodyMayKnowWhatArithmeticIs) {
+  for (const std::string path : {"core/a.cc", "protocol/a.cc", "devices/a.cc", "server/a.cc", "clients/cpp/a.cc"}) {
+    EXPECT_EQ(places(path, kLicence + "#include \"core/arithmetic.h\"\n"), Places{}) << path;
+  }
+}
+
 TEST(Rooms, TestsSeeAll) {
   EXPECT_EQ(places("tests/a.cc", kLicence + "#include <asio.hpp>\n#include <thread>\n#include \"server/z.h\"\n"),
             Places{});

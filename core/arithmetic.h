@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+/// What all numbers of Tendon rest on: IEEE 754 arithmetic as it is written, at the same speed for every value.
+/// Included where NaN is caught and where rounding is made good.
+
+// With -ffast-math std::isfinite(NaN) is true, a clamp of NaN to ±5 N gives −5 N, and a compensated sum is a plain one.
+// GCC says so by __GCC_IEC_559 for any part of it (-fassociative-math …), Clang for -ffast-math and -ffinite-math-only.
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ != 0) || \
+    (defined(__GCC_IEC_559) && __GCC_IEC_559 == 0)
+#error \
+    "Tendon is not built with -ffast-math or a part of it: a NaN would pass every check and reach the hand as a force"
+#endif
+
+namespace tendon {
+
+/// While one lives, its thread takes numbers below 2.2e-308 for 0, as operands and as results. A decaying force or
+/// velocity ends there, and arithmetic on such numbers is slow: some hundred times on x86-64. Set anew for each step
+/// rather than once for each thread: the mode belongs to the thread, and a driver or a library that is loaded late may
+/// change it. The end puts back what was there.
+///
+/// x86-64 and AArch64; elsewhere it does nothing. Realtime-safe: yes.
+class [[nodiscard]] DenormalsOff {
+ public:
+  DenormalsOff() noexcept : before_(mode()) { set_mode(before_ | kFlush); }
+  ~DenormalsOff() { set_mode(before_); }
+  DenormalsOff(const DenormalsOff&) = delete;
+  DenormalsOff& operator=(const DenormalsOff&) = delete;
+
+#if defined(__x86_64__)
+  using Mode = std::uint32_t;
+  static constexpr Mode kFlush = 0x8040;  ///< MXCSR: FTZ (results) and DAZ (operands)
+  static Mode mode() noexcept { return __builtin_ia32_stmxcsr(); }
+  static void set_mode(Mode mode) noexcept { __builtin_ia32_ldmxcsr(mode); }
+#elif defined(__aarch64__)
+  using Mode = std::uint64_t;
+  static constexpr Mode kFlush = 1U << 24U;  ///< FPCR: FZ (both)
+  static Mode mode() noexcept {
+    Mode mode = 0;
+    asm volatile("mrs %0, fpcr" : "=r"(mode));
+    return mode;
+  }
+  static void set_mode(Mode mode) noexcept { asm volatile("msr fpcr, %0" : : "r"(mode)); }
+#else
+  using Mode = std::uint32_t;
+  static constexpr Mode kFlush = 0;
+  static Mode mode() noexcept { return 0; }
+  static void set_mode(Mode) noexcept {}
+#endif
+
+ private:
+  Mode before_;
+};
+
+}  // namespace tendon
