@@ -59,7 +59,7 @@ constexpr std::array kModels{
     ModelInfo{ModelKind::kStVenantKirchhoff, Law::kStVenantKirchhoff, "stvk",
               "large rotations; for comparison only: it collapses under a hard press", kLargeRotations, kAll, false},
     ModelInfo{ModelKind::kNeoHookean, Law::kNeoHookean, "neo-hookean",
-              "large rotations and strains; recovers from being turned inside out", kLargeStrains, kAll, false},
+              "large rotations and strains; no element stays inside out", kLargeStrains, kAll, false},
     ModelInfo{ModelKind::kMassSpring, Law::kLinear, "mass-spring",
               "for comparison: springs along the edges, which know no Poisson ratio", kLargeRotations, kAllOfSprings,
               true},
@@ -225,7 +225,8 @@ struct Body::Parts {
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
         model(model_of(config, solid, surface)),
         contact(*model, surface, config.tool_radius, config.side, friction_of(config)),
-        patch(middle_patch(surface, config.middle)) {
+        patch(middle_patch(surface, config.middle)),
+        knows_turns(info(config.model).always.has(kGeometricNonlinearity)) {
     if (config.tool == BodyConfig::Tool::kSphere) {
       sphere.emplace(dynamic_cast<const CondensedModel&>(*model), surface, config.tool_radius);
     }
@@ -250,6 +251,7 @@ struct Body::Parts {
   PatchContact contact;
   std::optional<SphereContact> sphere;    ///< instead of `contact`
   Patch patch;                            ///< around the middle
+  bool knows_turns;                       ///< simulates large rotations
   StiffeningModel* stiffening = nullptr;  ///< the model, where it is one
   std::unique_ptr<Planned> cutting;
 };
@@ -312,6 +314,18 @@ Reaction Body::press(Given given, double value) { return parts_->model->press(pa
 
 Reaction Body::settle(Given given, double value) {
   return softbody::settle(*parts_->model, parts_->patch, given, value);
+}
+
+double Body::linear_up_to() const {
+  if (parts_->knows_turns) return std::numeric_limits<double>::infinity();
+  const Solid& solid = parts_->solid;
+  const TouchSurface& surface = parts_->surface;
+  const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), parts_->patch));
+  const VectorXd per_newton = LinearModel(solid, surface).displacements(parts_->patch);
+  const double depth = 1e-6 * surface.radius();  // so little that the turn grows with it
+  VectorXd u = VectorXd::Zero(solid.size());
+  solid.add_free(depth / load.dot(per_newton) * per_newton, u);
+  return depth * kLargestTurn / solid.largest_turn(u);
 }
 
 double Body::step() const noexcept { return parts_->model->step(); }

@@ -160,6 +160,12 @@ class Body {
   Reaction press(Given given, double value);
   Reaction settle(Given given, double value);
 
+  /// m, how deep the middle may be pressed before the material turns somewhere by more than kLargestTurn. Beyond that a
+  /// model without geometric nonlinearity takes turns for strains (of 1 − cos), and gives forces that are not there; ∞
+  /// for the others. Makes a factor for it.
+  double linear_up_to() const;
+  static constexpr double kLargestTurn = 0.1;  ///< rad; B1's force is then 5 to 7 % above corotational's
+
   double step() const noexcept;  ///< s, that an answer lasts; 0: at rest at every instant
 
   /// The point of the surface at rest above `middle`, and the way to the tool there; body frame.

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/arithmetic.h"
+
 namespace tendon::softbody {
 
 PlacedBody::PlacedBody(const Scene& scene)
@@ -24,8 +26,10 @@ Feel PlacedBody::touch(const Vec3& position) {
 }
 
 Touch PlacedBody::answer(const DeviceState& hand) {
+  const DenormalsOff off;
   if (body_.has_clock()) tick(hand.sampled);
   const Feel feel = body_.step() > 0 ? follow(hand) : touch(hand.position);
+  deepest_ = std::max(deepest_, -feel.gap);
   Touch touch = feel.force;
   touch.stiffness = feel.stiffness;
   touch.valid_radius = feel.valid_radius;

@@ -28,6 +28,9 @@ class PlacedBody {
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
+  double linear_up_to() const { return body_.linear_up_to(); }  ///< as Body's
+  double deepest() const noexcept { return deepest_; }          ///< m, that the tool has been in the body
+
  private:
   void tick(PeerTime sampled);
   Feel follow(const DeviceState& hand);
@@ -47,6 +50,7 @@ class PlacedBody {
   double depths_;                  ///< m, of the table
   std::optional<PeerTime> first_;  ///< when the hand was where it was answered first; of bodies with a clock
   std::optional<Followed> followed_;
+  double deepest_ = 0;
 };
 
 }  // namespace tendon::softbody

@@ -14,7 +14,8 @@ namespace tendon::softbody {
 /// longer serves: a hand moves little between two answers, and a factor costs as much as twenty steps. It is made of
 /// the exact second derivative; where that is not positive definite, of the one whose negative eigenvalues are taken
 /// out of every point of integration. A line search keeps the energy going down, so that a body that was turned inside
-/// out (Law::kNeoHookean, kCorotational) finds its way back.
+/// out finds its way back (Law::kCorotational), or at least to a rest with every element the right way round: the
+/// neo-Hookean energy has others, in which an edge of the body is wound around itself (kNeoHookean).
 class QuasiStaticModel : public Model {
  public:
   struct Config {

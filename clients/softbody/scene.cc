@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <iomanip>
 #include <iterator>
 #include <optional>
 #include <set>
@@ -468,8 +469,7 @@ std::string explain(const Scene& scene) {
   for (const EffectInfo& effect : effects()) {
     if (simulated.has(effect.kind)) continue;
     text << "  " << effect.name
-         << (effect.kind == EffectKind::kGeometricNonlinearity ? ": a large rotation makes forces that are not there"
-                                                               : "")
+         << (effect.kind == EffectKind::kGeometricNonlinearity ? ": " + turned_too_far(body.linear_up_to()) : "")
          << '\n';
   }
   text << "  self-collision, plasticity: there is no code for them\n";
@@ -483,6 +483,14 @@ std::string explain(const Scene& scene) {
        << "\n  model: " << static_cast<double>(size.bytes) / 1e6 << " MB\n"
        << "at first touch: " << small.stiffness << " N/m\n";
   for (const std::string& warning : warnings(scene.body)) text << "warning: " << warning << '\n';
+  return text.str();
+}
+
+std::string turned_too_far(double linear_up_to) {
+  std::ostringstream text;
+  text << std::setprecision(2) << "pressed deeper than " << 1e3 * linear_up_to
+       << " mm, part of the body turns by more than " << Body::kLargestTurn
+       << " rad, which makes forces that are not there; corotational and neo-hookean know large rotations";
   return text.str();
 }
 

@@ -59,7 +59,16 @@ int main(int argc, char** argv) {
     }
     if (tests) return test(scene, options);
     softbody::PlacedBody body(scene);
-    return run(options, [&](const DeviceState& hand) { return body.answer(hand); });
+    const double linear_up_to = body.linear_up_to();
+    bool told = false;
+    return run(options, [&](const DeviceState& hand) {
+      Touch touch = body.answer(hand);
+      if (!told && body.deepest() > linear_up_to) {
+        told = true;
+        std::cerr << "tendon-softbody: warning: " << softbody::turned_too_far(linear_up_to) << '\n';
+      }
+      return touch;
+    });
   } catch (const std::exception& error) {
     std::cerr << "tendon-softbody: " << error.what() << '\n';
     return 1;

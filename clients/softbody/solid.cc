@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/solid.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <stdexcept>
@@ -138,6 +139,18 @@ int Solid::inverted(const VectorXd& u) const {
     count += bad ? 1 : 0;
   }
   return count;
+}
+
+double Solid::largest_turn(const VectorXd& u) const {
+  double largest = 0;
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    for (int q = 0; q < per_element_; ++q) {
+      const Mat3 turn = nearest_rotation(Mat3::Identity() + local * gradient(e, q).transpose());
+      largest = std::max(largest, Eigen::AngleAxisd(turn).angle());
+    }
+  }
+  return largest;
 }
 
 std::size_t Solid::bytes() const noexcept {

@@ -29,6 +29,8 @@ class Solid : public Elastic {
 
   /// Elements with a point at which det F ≤ 0.
   int inverted(const VectorXd& u) const;
+  /// rad, the largest angle by which the material is turned at a point of integration.
+  double largest_turn(const VectorXd& u) const;
 
   std::size_t bytes() const noexcept override;
 

@@ -125,19 +125,6 @@ TEST(Inertia, OneMassSwingsDampedAndViscousAndUnderItsWeightAsOnPaper) {
   EXPECT_NEAR(largest_step(solid, 1000), 2 / std::sqrt(kSpring / kMass), 1e-6);
 }
 
-TEST(Inertia, ItsRestIsThatOfTheBodyWithoutWhateverTheStep) {
-  for (const ModelKind model : kImplicit) {
-    BodyConfig config = pressed_body(model, Element::kTet4, 4);
-    const Reaction still = Body(config).press(Given::kForce, 0.3);
-    for (const double step : {5e-3, 0.2}) {
-      config.effects = {.density = 1000, .step = step, .inertia = true, .damping = 20};
-      const Reaction found = Body(config).settle(Given::kForce, 0.3);
-      EXPECT_NEAR(found.depth / still.depth, 1, 1e-3) << static_cast<int>(model) << ' ' << step;
-      EXPECT_NEAR(found.stiffness * still.depth / 0.3, 1, 1e-3);
-    }
-  }
-}
-
 TEST(Inertia, AFastPushMeetsTheMassFirst) {
   BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
   const double still = Body(config).press(Given::kDepth, 1e-4).force;

@@ -8,7 +8,6 @@
 
 #include "clients/softbody/linear.h"
 #include "tests/clients/softbody/pressed_block.h"
-#include "tests/support/dice.h"
 
 namespace tendon::softbody {
 namespace {
@@ -104,38 +103,6 @@ TEST(QuasiStatic, OneIterationAtEachAnswerFollowsAMovingToolAndSaysHowFarItIsOff
     EXPECT_NEAR(found.force, truth, 0.03 * truth + 1e-9);
     EXPECT_GE(found.error, std::abs(found.force - truth));
   }
-}
-
-TEST(HardCase, ABlockTurnedInsideOutFindsItsWayBackWithEveryElementTheRightWayRound) {
-  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
-    for (const bool scattered : {false, true}) {
-      Pressed pressed(Element::kTet4, 4, law, 300);
-      Dice dice(7);
-      VectorXd u = VectorXd::Zero(pressed.solid.size());
-      for (std::size_t i = 0; i < pressed.solid.mesh().nodes.size(); ++i) {
-        const Vec3& node = pressed.solid.mesh().nodes[i];
-        if (node.z() < 1e-9) continue;
-        // Mirrored below the floor, or anywhere.
-        const Vec3 drawn(dice.within(-0.05, 0.05), dice.within(-0.05, 0.05), dice.within(0, 0.05));
-        const Vec3 place = scattered ? drawn : Vec3(node.x(), node.y(), -node.z());
-        u.segment<3>(3 * static_cast<Eigen::Index>(i)) = place - node;
-      }
-      pressed.model.set_displacements(u);
-      EXPECT_GT(pressed.solid.inverted(u), 50);
-      pressed.model.release();
-      EXPECT_EQ(pressed.solid.inverted(pressed.model.displacements()), 0) << static_cast<int>(law) << scattered;
-      EXPECT_LT(pressed.model.displacements().cwiseAbs().maxCoeff(), 1e-6) << static_cast<int>(law) << scattered;
-    }
-  }
-}
-
-TEST(HardCase, AToolThatJumps20MillimetresDeepIsAnsweredWithAFiniteForceAndLeavesNoTrace) {
-  Pressed pressed(Element::kHex8Sri, 4, Law::kNeoHookean);
-  const double before = pressed.model.press(pressed.patch, Given::kDepth, 0.002).force;
-  const Reaction deep = pressed.model.press(pressed.patch, Given::kDepth, 0.02);
-  EXPECT_GT(deep.force, before);
-  EXPECT_LT(deep.force, 100);
-  EXPECT_NEAR(pressed.model.press(pressed.patch, Given::kDepth, 0.002).force / before, 1, 1e-6);
 }
 
 TEST(QuasiStatic, WhatCannotBeIsRefused) {
