@@ -19,7 +19,9 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "clients/softbody/cutting.h"
 #include "clients/softbody/explicit.h"
 #include "clients/softbody/gmsh.h"
 #include "clients/softbody/linear.h"
@@ -417,6 +419,57 @@ TEST(HardPhysics, AnExplicitStepIsStableBelowItsLimitAndRefusedAboveIt) {
           .result = "limit " + text(1e3 * limit, 4) + " ms; swings to " + text(below, 2) + " times the start",
           .margin = 100 / below,
           .without = "the check of the step left out: 1.05 is accepted, and beyond 1e100"});
+}
+
+// Oracle: the shape of a body is that of before in the instant of the cut, so its energy is too; then it can only fall.
+TEST(HardPhysics, ACutUnderLoadPutsInNoEnergyAndTheBodyGivesWayWithEach) {
+  double rise = -1;
+  double forgotten = 0;
+  double least = 1;
+  for (const Element element : {Element::kTet4, Element::kHex8Sri}) {
+    for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+      Solid solid = pressed_block(element, 4, 0.45, law);
+      TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+      QuasiStaticModel model(solid, top, {});
+      const auto press = [&] { return model.press(*top.patch(Vec2::Zero()), Given::kDepth, 4e-3); };
+      Reaction before = press();
+      std::vector<Cut> cuts;
+      for (const double x : {0.0, 0.025, -0.025}) {
+        const double energy = solid.energy(model.displacements());
+        const VectorXd whole = model.displacements();
+        cuts.push_back({Vec3(x, -0.06, 0.025), Vec3(0, 0.12, 0), Vec3(0, 0, 0.03)});
+        const Division division = divide(solid.mesh(), solid.fixed(), cuts);
+        solid = Solid(division.mesh, element, solid.material(), law, division.fixed);
+        top = TouchSurface(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+        model.cut(division, {});
+        rise = std::max(rise, solid.energy(model.displacements()) / energy - 1);
+        VectorXd at_rest = VectorXd::Zero(solid.size());
+        at_rest.head(whole.size()) = whole;
+        forgotten = std::max(forgotten, solid.energy(at_rest) / energy);
+
+        const Reaction after = press();
+        const double ratio = after.force / before.force;
+        EXPECT_LT(ratio, 1);
+        least = std::min(least, ratio);
+        EXPECT_LT(after.stiffness, before.stiffness);
+        EXPECT_LE(solid.energy(model.displacements()), energy);
+        const VectorXd forces = solid.forces(model.displacements()).force;
+        const Vec3 sum = forces.reshaped(3, forces.size() / 3).rowwise().sum();
+        EXPECT_LT(sum.norm(), 1e-9 * after.force);
+        before = after;
+      }
+    }
+  }
+  EXPECT_LT(rise, 1e-12);
+  EXPECT_GT(least, 0.1);
+  EXPECT_GT(forgotten, 1.1);
+  report({.hard = "a cut doubles nodes and opens faces in a body that is full of energy",
+          .oracle = "in the same shape the elastic energy is that of before to 1e-12, then it falls; force finite and "
+                    "smaller, stiffness smaller with each of three cuts; the nodes' forces are what the tool pushes",
+          .result = "energy " + text(rise, 2) + " above at most; a cut takes " + text(100 * (1 - least), 2) +
+                    " % of the force at most",
+          .without =
+              "new nodes begin at rest instead of where their twins are: " + text(forgotten, 3) + " times the energy"});
 }
 
 /// B1's nodes, all of them, turned as a rigid body.
