@@ -191,6 +191,9 @@ class Dice(random.Random):
                 inside = getattr(message, field.name)
                 inside.SetInParent()
                 self.fill(inside, depth + 1)
+                if field.name == "normal" and self.random() < 0.7:  # by chance none is a unit vector
+                    length = self.choice([1, 1, 1, 1, 1.0009, 1.0011, -0.9991, 0.9989])
+                    inside.x, inside.y, inside.z = self.choice([(length, 0, 0), (0.6 * length, 0, 0.8 * length)])
             else:
                 setattr(message, field.name, self.value(field))
 
@@ -201,6 +204,8 @@ class Dice(random.Random):
             return self.choice([*_DOUBLES, *good])
         if kind == field.TYPE_STRING:  # type: ignore[attr-defined]
             return self.choice(_TEXTS)
+        if kind == field.TYPE_BOOL:  # type: ignore[attr-defined]
+            return self.choice([False, True])
         if kind == field.TYPE_ENUM:  # type: ignore[attr-defined]
             return self.choice([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, -1, 1000])
         if kind in (field.TYPE_SFIXED64, field.TYPE_SINT64):  # type: ignore[attr-defined]
@@ -275,12 +280,13 @@ def compare(decode_lines: Path, seed: int, count: int) -> tuple[dict[str, int], 
     theirs = done.stdout.splitlines()
     if len(theirs) != len(shown):
         raise RuntimeError(f"decode_lines has answered {len(theirs)} of {len(shown)} lines")
-    told = {"datagrams": len(shown), "refused": 0, "with frames": 0, "with frames out of bounds": 0}
+    told = {"datagrams": len(shown), "refused": 0, "with frames": 0, "with frames out of bounds": 0, "with a contact": 0}
     different = []
     for datagram, cpp in zip(shown, theirs):
         python = verdict(datagram)
         told["refused"] += python.endswith("-")
         told["with frames"] += any(word in python for word in ("state", "force", "control", "ack", "bye"))
+        told["with a contact"] += "contact" in python
         told["with frames out of bounds"] += "invalid" in python and not python.endswith("invalid 0")
         if python != cpp:
             different.append((datagram, cpp, python))

@@ -18,4 +18,5 @@ def test_both_decoders_say_the_same_of_random_and_of_damaged_datagrams(seed):
         pytest.skip(f"{program} is not built; TENDON_TEST_PROGRAMS names another folder")
     told, different = compare(program, seed, 2000)
     assert different == []
+    assert told.pop("with a contact") > 0
     assert min(told.values()) > 100, "the datagrams must be of all kinds"
