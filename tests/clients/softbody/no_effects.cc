@@ -29,6 +29,7 @@ double sideways_stiffness(const Material&, double) { std::abort(); }
 
 Division divide(const Mesh&, const Fixed&, std::span<const Cut>) { std::abort(); }
 std::vector<int> twins(const Elastic&, const Division&) { std::abort(); }
+// NOLINTNEXTLINE(performance-unnecessary-value-param): as it is declared
 Cutting::Cutting(std::vector<PlannedCut>) { abort_with(changed_ ? 1 : 0); }
 bool Cutting::due(PlannedCut::When, double) const noexcept { return false; }
 std::span<const Cut> Cutting::make_next() { return made_; }
@@ -37,6 +38,7 @@ std::size_t Cutting::bytes() const noexcept { return 0; }
 
 double StiffnessOverTime::factor_at(double) const { std::abort(); }
 void check(const StiffnessOverTime&) {}
+// NOLINTNEXTLINE(performance-unnecessary-value-param): as it is declared
 StiffeningModel::StiffeningModel(std::unique_ptr<Model>, StiffnessOverTime) { abort_with(factor_); }
 Reaction StiffeningModel::press(const Patch&, Given, double) { std::abort(); }
 std::size_t StiffeningModel::bytes() const noexcept { return 0; }
