@@ -38,12 +38,22 @@ constexpr std::array kEffects{
                "the body comes apart along planned cuts, at a time or under a force",
                {kInertia, kDamping, kViscosity}},
     EffectInfo{kStiffening, "stiffening", "Young's modulus changes over time", {kGravity, kInertia, kDamping}},
+    EffectInfo{kPlasticity,
+               "plasticity",
+               "pressed hard, the body keeps a dent",
+               {kInertia, kDamping, kViscosity, kCutting, kStiffening}},
+    EffectInfo{kSelfCollision, "self-collision", "the body's own sides cannot go through each other", {}},
 };
+
+constexpr EffectSet operator|(EffectSet set, EffectKind kind) {
+  set.add(kind);
+  return set;
+}
 
 constexpr EffectSet kSmall{kContact};
 constexpr EffectSet kLargeRotations{kContact, kGeometricNonlinearity};
 constexpr EffectSet kLargeStrains{kContact, kGeometricNonlinearity, kMaterialNonlinearity};
-constexpr EffectSet kAll{kGravity, kInertia, kDamping, kViscosity, kFriction, kCutting, kStiffening};
+constexpr EffectSet kAllOfSolids{kGravity, kInertia, kDamping, kViscosity, kFriction, kCutting, kStiffening};
 constexpr EffectSet kAllOfSprings{kGravity, kInertia, kDamping, kViscosity, kFriction, kStiffening};
 constexpr EffectSet kAllOfRounds{kGravity, kInertia, kDamping, kFriction, kStiffening};
 constexpr EffectSet kOfTables{kFriction, kStiffening};
@@ -51,15 +61,18 @@ constexpr EffectSet kOfSteps{kGravity, kDamping, kFriction};
 
 constexpr std::array kModels{
     ModelInfo{ModelKind::kLinear, Law::kLinear, "linear", "small strains; one solution with a kept factor", kSmall,
-              kAll, false},
+              kAllOfSolids | kPlasticity, false},
     ModelInfo{ModelKind::kCondensed, Law::kLinear, "condensed",
               "the same answers from a table of the surface: the fastest", kSmall, kOfTables, false},
     ModelInfo{ModelKind::kCorotational, Law::kCorotational, "corotational",
-              "large rotations, small strains; Newton at every answer", kLargeRotations, kAll, false},
+              "large rotations, small strains; Newton at every answer", kLargeRotations,
+              kAllOfSolids | kPlasticity | kSelfCollision, false},
     ModelInfo{ModelKind::kStVenantKirchhoff, Law::kStVenantKirchhoff, "stvk",
-              "large rotations; for comparison only: it collapses under a hard press", kLargeRotations, kAll, false},
+              "large rotations; for comparison only: it collapses under a hard press", kLargeRotations,
+              kAllOfSolids | kSelfCollision, false},
     ModelInfo{ModelKind::kNeoHookean, Law::kNeoHookean, "neo-hookean",
-              "large rotations and strains; no element stays inside out", kLargeStrains, kAll, false},
+              "large rotations and strains; no element stays inside out", kLargeStrains, kAllOfSolids | kSelfCollision,
+              false},
     ModelInfo{ModelKind::kMassSpring, Law::kLinear, "mass-spring",
               "for comparison: springs along the edges, which know no Poisson ratio", kLargeRotations, kAllOfSprings,
               true},
@@ -123,10 +136,13 @@ ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& su
 }
 
 std::unique_ptr<Model> unchanging_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
-  const QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
+  QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
+  if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
+  const EffectsConfig& effects = config.effects;
+  if (config.plasticity) return std::make_unique<PlasticModel>(solid, surface, newton, effects, *config.plasticity);
   switch (config.model) {
     case ModelKind::kLinear:
-      return std::make_unique<LinearModel>(solid, surface, config.effects);
+      return std::make_unique<LinearModel>(solid, surface, effects);
     case ModelKind::kCondensed:
       return std::make_unique<CondensedModel>(
           solid, surface,
@@ -134,16 +150,16 @@ std::unique_ptr<Model> unchanging_model_of(const BodyConfig& config, const Solid
     case ModelKind::kCorotational:
     case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
-      return std::make_unique<QuasiStaticModel>(solid, surface, newton, config.effects);
+      return std::make_unique<QuasiStaticModel>(solid, surface, newton, effects);
     case ModelKind::kMassSpring:
-      return std::make_unique<MassSpringModel>(solid, surface, newton, config.effects);
+      return std::make_unique<MassSpringModel>(solid, surface, newton, effects);
     case ModelKind::kTensorMass:
     case ModelKind::kTled:
-      return std::make_unique<ExplicitModel>(solid, surface, config.effects);
+      return std::make_unique<ExplicitModel>(solid, surface, effects);
     case ModelKind::kXpbd:
-      return std::make_unique<XpbdModel>(solid, surface, config.iterations, config.effects);
+      return std::make_unique<XpbdModel>(solid, surface, config.iterations, effects);
     case ModelKind::kProjective:
-      return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, config.effects);
+      return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, effects);
     case ModelKind::kModal:
       break;
   }
@@ -198,6 +214,8 @@ Patch middle_patch(const TouchSurface& surface, const Vec3& middle) {
 
 std::span<const EffectInfo> effects() noexcept { return kEffects; }
 
+const EffectInfo& info(EffectKind kind) noexcept { return kEffects[static_cast<std::size_t>(kind)]; }
+
 std::span<const ModelInfo> models() noexcept { return kModels; }
 
 const ModelInfo& info(ModelKind kind) noexcept { return kModels[static_cast<std::size_t>(kind)]; }
@@ -216,6 +234,8 @@ EffectSet effects_of(const BodyConfig& config) {
   if (config.friction) set.add(kFriction);
   if (!config.cuts.empty()) set.add(kCutting);
   if (config.stiffening) set.add(kStiffening);
+  if (config.plasticity) set.add(kPlasticity);
+  if (config.self_collision) set.add(kSelfCollision);
   return set;
 }
 

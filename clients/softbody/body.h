@@ -17,6 +17,7 @@
 #include "clients/softbody/cutting.h"
 #include "clients/softbody/effects.h"
 #include "clients/softbody/material.h"
+#include "clients/softbody/plasticity.h"
 #include "clients/softbody/quasi_static.h"
 #include "clients/softbody/stiffening.h"
 
@@ -33,7 +34,9 @@ enum class EffectKind : std::uint8_t {
   kViscosity,
   kFriction,
   kCutting,
-  kStiffening
+  kStiffening,
+  kPlasticity,
+  kSelfCollision
 };
 
 class EffectSet {
@@ -57,6 +60,7 @@ struct EffectInfo {
   EffectSet not_with;     ///< is not simulated together with these
 };
 std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
+const EffectInfo& info(EffectKind kind) noexcept;
 
 /// The models that a scene can choose, each a file of this folder.
 enum class ModelKind : std::uint8_t {
@@ -119,6 +123,9 @@ struct BodyConfig {
   std::optional<double> friction;  ///< coefficient
   std::vector<PlannedCut> cuts;    ///< in their order
   std::optional<StiffnessOverTime> stiffening;
+  std::optional<Yield> plasticity;
+  std::optional<double>
+      self_collision;        ///< m: so deep are two sides in each other where they press with Young's modulus
   double clamped_below = 0;  ///< m; nodes up to so far above the lowest one are held. The lowest ones always are
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame

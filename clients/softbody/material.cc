@@ -32,18 +32,6 @@ Mat3 isotropic(const Mat3& strain, double mu, double lambda) {
   return 2 * mu * strain + lambda * strain.trace() * Mat3::Identity();
 }
 
-template <class Change>
-Mat9 by_columns(Change change) {
-  Mat9 all;
-  for (int column = 0; column < 9; ++column) {
-    Mat3 df = Mat3::Zero();
-    df(column % 3, column / 3) = 1;
-    const Mat3 dp = change(df);
-    all.col(column) = dp.reshaped();
-  }
-  return all;
-}
-
 Mat9 corotational_tangent(const Mat3& f, double mu, double lambda) {
   const Mat3 r = nearest_rotation(f);
   const Mat3 s = r.transpose() * f;

@@ -33,6 +33,19 @@ void check(const Material& material);
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
+/// A linear map of matrices, as one of columns: `change(dF)` for each entry of dF.
+template <class Change>
+Mat9 by_columns(const Change& change) {
+  Mat9 all;
+  for (int column = 0; column < 9; ++column) {
+    Mat3 df = Mat3::Zero();
+    df(column % 3, column / 3) = 1;
+    const Mat3 dp = change(df);
+    all.col(column) = dp.reshaped();
+  }
+  return all;
+}
+
 /// What a law says at one F.
 struct Stress {
   double energy;  ///< Ψ, J/m³

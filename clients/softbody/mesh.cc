@@ -175,6 +175,17 @@ auto faces_by(const Mesh& mesh, Name name) {
   return sharing;
 }
 
+/// Those of which there is one, in the order of their elements.
+template <class Name>
+std::vector<Facet> alone(const std::map<Name, std::vector<Facet>>& sharing) {
+  std::vector<Facet> alone;
+  for (const auto& [corners, facets] : sharing) {
+    if (facets.size() == 1) alone.push_back(facets.front());
+  }
+  std::ranges::sort(alone, {}, [](const Facet& facet) { return std::pair(facet.element, facet.face); });
+  return alone;
+}
+
 }  // namespace
 
 std::span<const int> Mesh::element(int index) const noexcept {
@@ -296,13 +307,10 @@ std::vector<Facet> surface(const Mesh& mesh) {
     const Vec3& at_rest = mesh.nodes[at(node)];
     return std::array{at_rest.x(), at_rest.y(), at_rest.z()};
   };
-  std::vector<Facet> alone;
-  for (const auto& [corners, facets] : faces_by(mesh, place)) {
-    if (facets.size() == 1) alone.push_back(facets.front());
-  }
-  std::ranges::sort(alone, {}, [](const Facet& facet) { return std::pair(facet.element, facet.face); });
-  return alone;
+  return alone(faces_by(mesh, place));
 }
+
+std::vector<Facet> sides(const Mesh& mesh) { return alone(faces_by(mesh, std::identity())); }
 
 std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh) {
   std::vector<std::pair<Facet, Facet>> shared;

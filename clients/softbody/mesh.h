@@ -56,6 +56,9 @@ struct Facet {
 /// are none.
 std::vector<Facet> surface(const Mesh& mesh);
 
+/// Those of one element alone: the surface, and the two sides of a cut also where they lie on each other.
+std::vector<Facet> sides(const Mesh& mesh);
+
 /// Those that two elements share.
 std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh);
 

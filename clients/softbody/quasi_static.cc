@@ -26,6 +26,11 @@ constexpr int kTangentRounds = 5;
 /// m, to measure a slope of the force with: of a body of some mm the next derivative is then 1e-4 of it.
 constexpr double kNudge = 1e-7;
 
+/// How often the sides that press on each other are looked up for one answer, and the part of their forces that may
+/// then still change.
+constexpr int kLooks = 10;
+constexpr double kParted = 1e-3;
+
 /// m: errors of the force that so much more depth would explain are none, also where there is no force to compare them
 /// with.
 constexpr double kUnseen = 1e-12;
@@ -44,6 +49,7 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
       effects_(effects_at_rest(effects, elastic)) {
   if (config.max_iterations < 1) throw std::invalid_argument("`max_iterations`: expected 1 or more");
   if (!(config.tolerance > 0)) throw std::invalid_argument("`tolerance`: expected more than 0");
+  if (config.self_collision) self_collision_ = std::make_unique<SelfCollision>(elastic, *config.self_collision, u_);
   stiffness(Elastic::Curvature::kExact);
   stale_ = !factor_.factorize(stiffness_);
   if (stale_) {
@@ -58,6 +64,7 @@ Elastic::Forces QuasiStaticModel::forces() const {
   Elastic::Forces all = elastic_.forces(u_);
   all.force = elastic_.to_free(all.force);
   if (!effects_.empty()) add_forces(effects_, elastic_, u_, all);
+  if (self_collision_) self_collision_->add_forces(u_, all);
   return all;
 }
 
@@ -84,10 +91,28 @@ void QuasiStaticModel::factorize() {
   }
 }
 
+MatrixXd QuasiStaticModel::solve(const MatrixXd& forces) const {
+  if (self_collision_) return self_collision_->solve(factor_, forces);
+  return factor_.solve(forces);
+}
+
+void QuasiStaticModel::foresee(const VectorXd& internal, const VectorXd& load, Given given, double value) {
+  const VectorXd b = self_collision_->free_forces(u_) - internal;
+  if (given == Given::kForce) {
+    self_collision_->foresee(factor_, u_, b + value * load, nullptr, 0);
+    return;
+  }
+  const double by = value - load.dot(elastic_.to_free(u_));
+  const double force = self_collision_->foresee(factor_, u_, b, &load, by);
+  if (given != Given::kLeastDepth || force >= 0) return;
+  self_collision_->foresee(factor_, u_, b, nullptr, 0);
+}
+
 QuasiStaticModel::Step QuasiStaticModel::solve(const VectorXd& internal, const VectorXd& load) const {
   MatrixXd right(internal.size(), 2);
   right << -internal, load;
-  const MatrixXd solution = factor_.solve(right);
+  if (self_collision_) right.col(0) -= self_collision_->foreseen_forces(u_);
+  const MatrixXd solution = solve(right);
   return {solution.col(0), solution.col(1)};
 }
 
@@ -124,7 +149,7 @@ double QuasiStaticModel::tangent(const VectorXd& load, const VectorXd& by_tool, 
     const double before = stiffness;
     stiffness = shape.dot(needed);
     if (before - stiffness <= kTangentPrecision * stiffness) break;
-    const VectorXd back = factor_.solve(needed);
+    const VectorXd back = solve(needed);
     shape -= back - load.dot(back) / compliance * by_tool;
   }
   u_ = start;
@@ -144,6 +169,7 @@ double QuasiStaticModel::newton(const VectorXd& load, Given given, double value,
       factorize();
       exact = true;
     }
+    if (self_collision_) foresee(now.force, load, given, value);
     const Step step = solve(now.force, load);
     const double compliance = load.dot(step.by_tool);
     const double depth = load.dot(elastic_.to_free(u_));
@@ -169,6 +195,20 @@ double QuasiStaticModel::newton(const VectorXd& load, Given given, double value,
   return error;
 }
 
+double QuasiStaticModel::part_sides(const VectorXd& load, Given given, double value, Reaction& reaction) {
+  int iterations = iterations_;
+  double error = reaction.error;
+  for (int looks = 1;; ++looks) {
+    const double changed = self_collision_->look(u_);
+    if (changed <= kParted || looks == kLooks) {
+      iterations_ = iterations;
+      return changed <= kParted ? error : error + changed * std::abs(reaction.force);
+    }
+    error = newton(load, given, value, reaction);
+    iterations += iterations_;
+  }
+}
+
 Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) {
   Reaction reaction;
   if (patch.nodes.empty()) {
@@ -177,6 +217,7 @@ Reaction QuasiStaticModel::press(const Patch& patch, Given given, double value) 
   }
   const VectorXd load = elastic_.to_free(patch_load(elastic_, normal_, patch));
   reaction.error = newton(load, given, value, reaction);
+  if (self_collision_) reaction.error = part_sides(load, given, value, reaction);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
   reaction.depth = depth_below(patch, normal_, u_);
   reaction.slope = slope_below(patch, normal_, u_);
@@ -189,6 +230,7 @@ void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effect
   u_.resize(elastic_.size());
   for (int i = 0; i < u_.size(); ++i) u_[i] = before[3 * division.node_before[at(i / 3)] + i % 3];
   effects_ = effects_at_rest(effects, elastic_);
+  if (self_collision_) self_collision_ = std::make_unique<SelfCollision>(elastic_, *config_.self_collision, u_);
   stiffness_ = elastic_.pattern();
   factor_ = Factor(stiffness_);  // a split one would not serve: under load the shape is another after the first step
   stale_ = true;
@@ -198,13 +240,15 @@ double QuasiStaticModel::release() {
   Reaction free;
   VectorXd nothing = VectorXd::Zero(elastic_.free_count());
   nothing[0] = 1;  // any direction, with no force along it
-  newton(nothing, Given::kForce, 0, free);
+  free.error = newton(nothing, Given::kForce, 0, free);
+  if (self_collision_) part_sides(nothing, Given::kForce, 0, free);
   for (const auto& effect : effects_) effect->advance(elastic_.to_free(u_));
   return forces().energy;
 }
 
 std::size_t QuasiStaticModel::bytes() const noexcept {
   return stiffness_.bytes() + factor_.bytes() + softbody::bytes(effects_) +
+         (self_collision_ ? self_collision_->bytes() : 0) +
          static_cast<std::size_t>(u_.size() + rest_.size()) * sizeof(double);
 }
 

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
+#include <optional>
+
 #include "clients/softbody/effects.h"
 #include "clients/softbody/model.h"
+#include "clients/softbody/self_collision.h"
 
 namespace tendon::softbody {
 
@@ -19,8 +23,9 @@ namespace tendon::softbody {
 class QuasiStaticModel : public Model {
  public:
   struct Config {
-    int max_iterations = 30;  ///< of an answer; what is then missing is Reaction::error
-    double tolerance = 1e-6;  ///< of the force, relative
+    int max_iterations = 30;                    ///< of an answer; what is then missing is Reaction::error
+    double tolerance = 1e-6;                    ///< of the force, relative
+    std::optional<double> self_collision = {};  ///< Pa/m, see there
   };
   /// `elastic` must outlive this. It begins at rest, under its weight if it has any.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
@@ -35,6 +40,7 @@ class QuasiStaticModel : public Model {
   int iterations() const noexcept { return iterations_; }  ///< of the last answer
   int factors() const noexcept { return factors_; }        ///< made since the beginning
   const VectorXd& displacements() const noexcept { return u_; }
+  const SelfCollision* self_collision() const noexcept { return self_collision_.get(); }  ///< null: not simulated
   /// Puts the nodes elsewhere, m; the fixed ones too.
   void set_displacements(const VectorXd& u) {
     u_ = u;
@@ -51,12 +57,17 @@ class QuasiStaticModel : public Model {
   Elastic::Forces forces() const;
   void stiffness(Elastic::Curvature curvature);
   void factorize();
+  void foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
+  MatrixXd solve(const MatrixXd& forces) const;
   Step solve(const VectorXd& internal, const VectorXd& load) const;
   /// Goes along `step` as far as the energy less the tool's work goes down. False when it does not. `now` is what acts
   /// before and after.
   bool go(const VectorXd& step, const VectorXd& load, double force, double slope, Elastic::Forces& now);
   double tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now);
+  /// The error, N; with the sides of the body that are next to each other as they were last looked up.
   double newton(const VectorXd& load, Given given, double value, Reaction& reaction);
+  /// Looks them up, and goes on until they stay the same. The error, N.
+  double part_sides(const VectorXd& load, Given given, double value, Reaction& reaction);
 
   const Elastic& elastic_;
   Vec3 normal_;
@@ -66,6 +77,7 @@ class QuasiStaticModel : public Model {
   VectorXd u_;
   double step_;
   Effects effects_;
+  std::unique_ptr<SelfCollision> self_collision_;
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
   int iterations_ = 0;
   int factors_ = 0;

@@ -286,6 +286,19 @@ StiffnessOverTime read_stiffening(Table table) {
   return law;
 }
 
+Yield read_plasticity(Table table) {
+  const Yield yield{.stress = table.number("yield_pa", 0, false, 1e12, 1),
+                    .hardening = table.number("hardening_pa", 0, false, 1e12, 1)};
+  table.check_unknown();
+  return yield;
+}
+
+double read_self_collision(Table table) {
+  const double layer = table.number("layer_mm", 0, false, 1e3 * kMaxLength, 1e3);
+  table.check_unknown();
+  return layer;
+}
+
 /// The effects that are listed must be those that the model simulates: all that it always does, and no others than it
 /// can.
 void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
@@ -332,6 +345,8 @@ void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   if (listed.has(EffectKind::kFriction)) body.friction = root.number("friction", 0, true, 10, 1);
   if (listed.has(EffectKind::kCutting)) body.cuts = read_cuts(root);
   if (listed.has(EffectKind::kStiffening)) body.stiffening = read_stiffening(root.table("stiffening"));
+  if (listed.has(EffectKind::kPlasticity)) body.plasticity = read_plasticity(root.table("plasticity"));
+  if (listed.has(EffectKind::kSelfCollision)) body.self_collision = read_self_collision(root.table("self-collision"));
   if (config.has_time()) config.step = root.number("step_ms", 0, false, 1e3, 1e3);
 }
 
@@ -351,7 +366,11 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   Table model = root.table("model");
   scene.body.model = model.choice("kind", names(models()), model_named);
   const ModelInfo& chosen = info(scene.body.model);
+  read_effects(root, chosen, scene.body);
   switch (chosen.kind) {
+    case ModelKind::kLinear:
+      if (!scene.body.plasticity) break;
+      [[fallthrough]];
     case ModelKind::kCorotational:
     case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
@@ -370,7 +389,6 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
       break;
   }
   model.check_unknown();
-  read_effects(root, chosen, scene.body);
   read_body(root.table("body"), directory, scene.body);
   read_touch(root.table("touch"), scene);
   if (root.find("place") != nullptr) {
@@ -408,6 +426,10 @@ std::string scene_reference() {
           "above_n                  made after an answer of more newtons along the normal\n"
           "[stiffening]             Young's modulus, of which the material says how much it is at a factor of 1\n"
           "at_s, factor             [times after the first answer], [factors]; straight in between\n"
+          "[plasticity]             with what stress of a bar the material yields, and what each strain adds to it\n"
+          "yield_pa, hardening_pa   the bar then gives way with E H/(E + H)\n"
+          "[self-collision]         of corotational, stvk, neo-hookean\n"
+          "layer_mm                 so deep are two sides in each other where they press with Young's modulus\n"
           "[body]\n"
           "shape                    block, cylinder or file\n"
           "element                  how it is cut:\n";
@@ -425,7 +447,7 @@ std::string scene_reference() {
   const BodyConfig defaults;
   text
       << "max_iterations = " << defaults.max_iterations
-      << "      of one answer: corotational, stvk, neo-hookean, mass-spring\n"
+      << "      of one answer: corotational, stvk, neo-hookean, mass-spring, and linear with plasticity\n"
          "iterations = "
       << defaults.iterations << "          of every answer: xpbd, projective\nswings = " << defaults.swings
       << "              of modal\n"
@@ -443,46 +465,6 @@ std::string scene_reference() {
          "[place]\n"
          "at_mm = [0, 0, 0]        where in the device's frame the middle of the touched side is\n"
          "towards_hand = [0, 0, 1] the way from there to the hand, in the device's frame\n";
-  return text.str();
-}
-
-std::string explain(const Scene& scene) {
-  const ModelInfo& model = info(scene.body.model);
-  const ElementInfo& element = info(scene.body.element);
-  const EffectSet simulated = effects_of(scene.body);
-  Body body(scene.body);
-  const Body::Size size = body.size();
-  // So little that it is linear, and by force: under its weight the surface is not where the mesh has it.
-  const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
-  const Reaction small = body.settle(Given::kForce, push);
-  std::ostringstream text;
-  text << "simulated:\n  contact: " << (scene.body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
-       << (scene.body.tool == BodyConfig::Tool::kSphere ? ", a sphere of " : ", on a patch of ")
-       << 1e3 * (scene.body.tool == BodyConfig::Tool::kSphere ? scene.body.tool_radius : scene.body.patch_radius)
-       << " mm\n  elasticity: " << model.name << ", " << model.what << '\n';
-  for (const EffectInfo& effect : effects()) {
-    if (effect.kind != EffectKind::kContact && simulated.has(effect.kind)) {
-      text << "  " << effect.name << ": " << effect.what << '\n';
-    }
-  }
-  text << "not simulated:\n";
-  for (const EffectInfo& effect : effects()) {
-    if (simulated.has(effect.kind)) continue;
-    text << "  " << effect.name
-         << (effect.kind == EffectKind::kGeometricNonlinearity ? ": " + turned_too_far(body.linear_up_to()) : "")
-         << '\n';
-  }
-  text << "  self-collision, plasticity: there is no code for them\n";
-  if (body.step() > 0) {
-    text << "time: every answer is a step of " << 1e3 * body.step() << " ms\n";
-  } else {
-    text << "time: at rest at every instant; no velocity is kept\n";
-  }
-  text << "cost:\n  mesh: " << size.nodes << " nodes, " << size.elements << " elements (" << element.name << ": "
-       << element.what << ")\n  unknowns: " << size.free << "\n  touchable nodes: " << size.touchable
-       << "\n  model: " << static_cast<double>(size.bytes) / 1e6 << " MB\n"
-       << "at first touch: " << small.stiffness << " N/m\n";
-  for (const std::string& warning : warnings(scene.body)) text << "warning: " << warning << '\n';
   return text.str();
 }
 

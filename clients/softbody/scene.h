@@ -42,8 +42,4 @@ std::vector<std::string> warnings(const BodyConfig& body);
 /// The same, once the tool is deeper than Body::linear_up_to(), m.
 std::string turned_too_far(double linear_up_to);
 
-/// What is simulated, what is not, and what each part costs in memory; with the warnings that concern it. Builds the
-/// body.
-std::string explain(const Scene& scene);
-
 }  // namespace tendon::softbody

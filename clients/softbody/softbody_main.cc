@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-softbody: the reference physics engine, a guest like any other.
+#include <ctime>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "clients/cpp/options.h"
 #include "clients/cpp/self_test.h"
+#include "clients/softbody/explain.h"
 #include "clients/softbody/placed_body.h"
 
 using namespace tendon;
@@ -51,7 +53,9 @@ int main(int argc, char** argv) {
   try {
     const softbody::Scene scene = softbody::read_scene(file);
     if (explains) {
-      std::cout << softbody::explain(scene);
+      const softbody::Explanation explanation = softbody::explain(
+          scene, [] { return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC); });
+      std::cout << (options.json ? in_json(scene, explanation) : in_words(scene, explanation));
       return 0;
     }
     for (const std::string& warning : softbody::warnings(scene.body)) {

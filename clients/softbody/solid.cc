@@ -9,11 +9,6 @@
 #include <utility>
 
 namespace tendon::softbody {
-namespace {
-
-using ElementMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3 * kMaxNodes, 3 * kMaxNodes>;
-
-}  // namespace
 
 Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed)
     : Elastic(std::move(at_rest), fixed),
@@ -81,51 +76,19 @@ double Solid::energy(const VectorXd& u) const {
 }
 
 Solid::Forces Solid::forces(const VectorXd& u) const {
-  Forces all{0, VectorXd::Zero(size())};
-  for (int e = 0; e < mesh().element_count(); ++e) {
-    const Nodal local = displacements(u, e);
-    Nodal force = Nodal::Zero(3, local.cols());
-    for (int q = 0; q < per_element_; ++q) {
-      const Point& point = points_[at(e * per_element_ + q)];
-      const auto g = gradient(e, q);
-      const Stress here = stress(law_, Mat3::Identity() + local * g.transpose(), point.mu, point.lambda);
-      all.energy += point.volume * here.energy;
-      force += point.volume * here.piola * g;
-    }
-    const auto nodes = mesh().element(e);
-    for (int i = 0; i < local.cols(); ++i) all.force.segment<3>(3 * nodes[at(i)]) += force.col(i);
-  }
-  return all;
+  return sum_forces(u, [this](int element, int index, const Mat3& f) {
+    const Point& here = point(element, index);
+    return stress(law_, f, here.mu, here.lambda);
+  });
 }
 
 void Solid::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
-  std::ranges::fill(to.values, 0.0);
-  const int nodes = nodes_of(mesh().shape);
-  ElementMatrix k(3 * nodes, 3 * nodes);
-  auto slot = slots_.begin();
-  for (int e = 0; e < mesh().element_count(); ++e) {
-    const Nodal local = displacements(u, e);
-    k.setZero();
-    for (int q = 0; q < per_element_; ++q) {
-      const Point& point = points_[at(e * per_element_ + q)];
-      const auto g = gradient(e, q);
-      Mat9 a = point.volume * tangent(law_, Mat3::Identity() + local * g.transpose(), point.mu, point.lambda);
-      if (curvature == Curvature::kWithoutNegative) a = without_negative(a);
-      for (int j = 0; j < nodes; ++j) {
-        Eigen::Matrix<double, 9, 3> strained = a.middleCols<3>(0) * g(0, j);
-        strained += a.middleCols<3>(3) * g(1, j);
-        strained += a.middleCols<3>(6) * g(2, j);
-        for (int i = 0; i < nodes; ++i) {
-          k.block<3, 3>(3 * i, 3 * j) += g(0, i) * strained.middleRows<3>(0) + g(1, i) * strained.middleRows<3>(3) +
-                                         g(2, i) * strained.middleRows<3>(6);
-        }
-      }
-    }
-    for (const double entry : k.reshaped()) {
-      if (*slot >= 0) to.values[at(*slot)] += entry;
-      ++slot;
-    }
-  }
+  const auto tangent_at = [&](int element, int index, const Mat3& f) -> Mat9 {
+    const Point& here = point(element, index);
+    const Mat9 exact = tangent(law_, f, here.mu, here.lambda);
+    return curvature == Curvature::kExact ? exact : without_negative(exact);
+  };
+  sum_stiffness(u, tangent_at, to);
 }
 
 int Solid::inverted(const VectorXd& u) const {

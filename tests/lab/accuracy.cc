@@ -7,8 +7,10 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
+#include <map>
 #include <memory>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "clients/softbody/explicit.h"
@@ -29,10 +31,14 @@ namespace {
 using namespace softbody;
 
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kLeastUpdates = 400;  // timed, unless …
-constexpr double kLongestTiming = 4;        // s
-constexpr double kReach = 0.3;              // patch radii, that a table of the surface holds
-constexpr int kStaticModes = 3;             // along each axis of that, of a modal body
+constexpr std::size_t kManyUpdates = 400;  // timed; fewer if …
+constexpr double kSettled = 0.03;          // two times through the script have so nearly the same median, or after …
+constexpr double kLongestTiming = 4;       // s
+constexpr std::size_t kFirstUpdates = 10;  // show whether it is far too slow
+constexpr int kMostPresses = 10;           // of Newton's method, for an answer under a load
+constexpr double kReach = 0.3;             // patch radii, that a table of the surface holds
+constexpr int kStaticModes = 3;            // along each axis of that, of a modal body
+constexpr double kUnfeltMs = 0.1;          // a tenth of a period of the device: nobody feels who is quicker by less
 /// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
 constexpr double kJustNoticeable = 15;  // %
 
@@ -46,10 +52,10 @@ std::array<int, 3> cells_of(const PressedBlock& block, int n) {
 /// The block of water's density, cut up and held.
 constexpr double kDensity = 1000;  // kg/m³
 
-Solid solid_of(const PressedBlock& block, const Candidate& candidate) {
+Solid solid_of(const PressedBlock& block, const Candidate& candidate, softbody::Law law, const Material& material) {
   Mesh mesh = softbody::block(info(candidate.element).shape, block.size, cells_of(block, candidate.n));
   const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
-  return {std::move(mesh), candidate.element, block.material, info(candidate.model).law, fixed};
+  return {std::move(mesh), candidate.element, material, law, fixed};
 }
 
 BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
@@ -65,51 +71,105 @@ BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
   if (info(candidate.model).has_time()) {
     // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
     // is pressed together, and none longer than a period of the device.
-    const double step = std::min(1e-3, 0.7 * largest_step(solid_of(block, candidate), kDensity));
+    const double step = std::min(
+        1e-3, 0.7 * largest_step(solid_of(block, candidate, info(candidate.model).law, block.material), kDensity));
     config.effects = {.density = kDensity, .step = step, .inertia = true, .damping = 40};
   }
   return config;
 }
 
-/// Whether a model becomes its law as the mesh is refined. Springs along edges and elements that are each as rigid as
-/// possible become something else, that has no name.
-bool follows_its_law(ModelKind model) { return model != ModelKind::kMassSpring && model != ModelKind::kProjective; }
-
-/// The same law on the same mesh, solved until rounding is all that is left.
-std::array<Stiffness, 2> exact(const PressedBlock& block, const Candidate& candidate) {
-  const Solid solid = solid_of(block, candidate);
-  const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block.patch_radius);
-  const Patch patch = *top.patch(top.across(block.touch_point()));
-  std::unique_ptr<Model> model;
-  if (solid.law() == softbody::Law::kLinear) {
-    model = std::make_unique<LinearModel>(solid, top);
-  } else {
-    model = std::make_unique<QuasiStaticModel>(solid, top, QuasiStaticModel::Config{.tolerance = 1e-10});
+/// What a model becomes on a fine mesh: see Accuracy.
+Material material_of(const PressedBlock& block, ModelKind model) {
+  switch (model) {
+    case ModelKind::kProjective:
+      return {.young = 2 * block.material.mu(), .poisson = 0};
+    case ModelKind::kMassSpring:
+      return {.young = block.material.young, .poisson = 0.25};
+    default:
+      return block.material;
   }
-  std::array<Stiffness, 2> result;
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    const Reaction reaction = model->press(patch, Given::kForce, block.loads[i]);
-    result[i] = {reaction.force / reaction.depth, reaction.stiffness};
-  }
-  return result;
 }
 
-Accuracy accuracy_at(const Reaction& reaction, const Stiffness& mesh, Truth& truth, const Candidate& candidate,
-                     std::size_t load) {
-  const Stiffness right = truth.stiffness(load);
-  Accuracy result;
-  result.k = reaction.force / reaction.depth;
-  result.total = result.k / right.secant - 1;
-  result.tangent = reaction.stiffness / right.tangent - 1;
-  result.solver = (result.k - mesh.secant) / right.secant;
-  if (!follows_its_law(candidate.model)) {
-    result.model = result.discretisation = result.solver = kNoNumber;
+/// What the law of a model makes of its mesh, solved until rounding is all that is left. Models with a law in common
+/// share the answers.
+class OnMesh {
+ public:
+  explicit OnMesh(const PressedBlock& block) : block_(block) {}
+
+  const std::array<Stiffness, 2>& of(const Candidate& candidate) {
+    const Material material = material_of(block_, candidate.model);
+    const Key key{info(candidate.model).law, candidate.element, candidate.n, material.young, material.poisson};
+    const auto known = known_.find(key);
+    return known != known_.end() ? known->second : known_.emplace(key, found(candidate, material)).first->second;
+  }
+
+ private:
+  using Key = std::tuple<softbody::Law, Element, int, double, double>;
+
+  std::array<Stiffness, 2> found(const Candidate& candidate, const Material& material) const {
+    const Solid solid = solid_of(block_, candidate, info(candidate.model).law, material);
+    const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block_.patch_radius);
+    const Patch patch = *top.patch(top.across(block_.touch_point()));
+    std::unique_ptr<Model> model;
+    if (solid.law() == softbody::Law::kLinear) {
+      model = std::make_unique<LinearModel>(solid, top);
+    } else {
+      model = std::make_unique<QuasiStaticModel>(solid, top, QuasiStaticModel::Config{.tolerance = 1e-10});
+    }
+    std::array<Stiffness, 2> result;
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      const Reaction reaction = model->press(patch, Given::kForce, block_.loads[i]);
+      result[i] = {reaction.force / reaction.depth, reaction.stiffness};
+    }
     return result;
   }
-  const auto limit = truth.limit(info(candidate.model).law, load);
-  result.model = limit ? limit->secant / right.secant - 1 : kNoNumber;
-  result.discretisation = limit ? (mesh.secant - limit->secant) / right.secant : kNoNumber;
-  return result;
+
+  const PressedBlock& block_;
+  std::map<Key, std::array<Stiffness, 2>> known_;
+};
+
+/// A body with time waits until it is at rest, and rounds until they change nothing. Newton's method is there at once;
+/// or never, where the body collapses.
+Reaction at_rest(Body& body, ModelKind model, double load) {
+  if (body.step() > 0 || model == ModelKind::kProjective) return body.settle(Given::kForce, load);
+  Reaction reaction;
+  for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
+    reaction = body.press(Given::kForce, load);
+  }
+  return reaction;
+}
+
+/// What a settled answer comes to; whose fault it is is not known yet.
+Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right) {
+  const double k = reaction.force / reaction.depth;
+  return {.k = k,
+          .total = k / right.secant - 1,
+          .model = kNoNumber,
+          .discretisation = kNoNumber,
+          .solver = kNoNumber,
+          .tangent = reaction.stiffness / right.tangent - 1};
+}
+
+void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
+  const ModelKind model = point.candidate.model;
+  const Material material = material_of(truth.block(), model);
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    const auto limit = truth.limit(info(model).law, material, load);
+    if (!limit) continue;
+    Accuracy& error = point.at_load[load];
+    const double right = truth.stiffness(load).secant;
+    const double mesh = on_mesh.of(point.candidate)[load].secant;
+    if (model == ModelKind::kMassSpring) {
+      // They have settled, on a mesh whose error is that of the body with ν = 1/4.
+      error.model = limit->secant * error.k / mesh / right - 1;
+      error.discretisation = error.total - error.model;
+      error.solver = 0;
+    } else {
+      error.model = limit->secant / right - 1;
+      error.discretisation = (mesh - limit->secant) / right;
+      error.solver = (error.k - mesh) / right;
+    }
+  }
 }
 
 double quantile(std::vector<double> values, double share) {
@@ -144,36 +204,35 @@ void walk(const Body& body, const std::vector<Touched>& script, std::size_t to, 
   for (int step = 1; step <= steps; ++step) touch(from + static_cast<double>(step) / steps * (script[to].tool - from));
 }
 
-void time_updates(Body& body, const std::vector<Touched>& script, const Meter& meter, AccuracyPoint& point) {
+/// Follows the script and times the updates; again, as often as their median asks for.
+void follow_script(Body& body, const std::vector<Touched>& script, const Meter& meter, double slowest_ms,
+                   AccuracyPoint& point) {
   const double floor = floor_of(meter);
   std::vector<double> times;
   std::vector<double> instructions;
-  const Meter::Reading start = meter.read();
-  do {
-    for (std::size_t i = 0; i < script.size(); ++i) {
-      walk(body, script, i, [&](const Vec3& tool) {
-        const Meter::Reading before = meter.read();
-        const Feel feel = body.touch(tool);
-        const Meter::Reading took = meter.read() - before;
-        if (!feel.touching) return;
-        times.push_back(std::max(0.0, took.processor - floor));
-        if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
-      });
+  const auto touch = [&](const Vec3& tool) {
+    const Meter::Reading before = meter.read();
+    const Feel feel = body.touch(tool);
+    const Meter::Reading took = meter.read() - before;
+    if (feel.touching) {
+      times.push_back(std::max(0.0, took.processor - floor));
+      if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
+      // Twice as long is no accident of a busy machine.
+      if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
+        throw TooSlow("an update takes more than " + JsonLine::number(slowest_ms) + " ms");
+      }
     }
-  } while (!times.empty() && times.size() < kLeastUpdates && (meter.read() - start).processor < kLongestTiming);
-  point.update_ms_p50 = 1e3 * quantile(times, 0.5);
-  point.update_ms_p99 = 1e3 * quantile(times, 0.99);
-  if (!instructions.empty()) point.instructions = quantile(instructions, 0.5);
-}
+    return feel.force;
+  };
 
-void follow_script(Body& body, const std::vector<Touched>& script, AccuracyPoint& point) {
+  const Meter::Reading start = meter.read();
   double squares = 0;
   double true_squares = 0;
   double largest = 0;
   double aside = 0;
   for (std::size_t i = 0; i < script.size(); ++i) {
-    Vec3 force;
-    walk(body, script, i, [&](const Vec3& tool) { force = body.touch(tool).force; });
+    Vec3 force = Vec3::Zero();
+    walk(body, script, i, [&](const Vec3& tool) { force = touch(tool); });
     const Vec3 error = force - script[i].force;
     squares += error.squaredNorm();
     true_squares += script[i].force.squaredNorm();
@@ -184,6 +243,16 @@ void follow_script(Body& body, const std::vector<Touched>& script, AccuracyPoint
   point.force_error = std::sqrt(squares / static_cast<double>(script.size()));
   point.force_relative = std::sqrt(squares / true_squares);
   point.lateral = aside / largest;
+
+  bool settled = times.empty();
+  while (!settled && times.size() < kManyUpdates && (meter.read() - start).processor < kLongestTiming) {
+    const double before = quantile(times, 0.5);
+    for (std::size_t i = 0; i < script.size(); ++i) walk(body, script, i, touch);
+    settled = std::abs(quantile(times, 0.5) / before - 1) < kSettled;
+  }
+  point.update_ms_p50 = 1e3 * quantile(times, 0.5);
+  point.update_ms_p99 = 1e3 * quantile(times, 0.99);
+  if (!instructions.empty()) point.instructions = quantile(instructions, 0.5);
 }
 
 /// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
@@ -255,11 +324,10 @@ void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoin
 
 // ---- The refinement ladders -----------------------------------------------------------------------------------------
 
-/// What a larger n would cost, from the last two: cost ∝ n^p. From one alone p = 6, which is a factor's.
-double predicted(const std::vector<AccuracyPoint>& ladder, int n, double AccuracyPoint::*cost) {
+/// What a larger n would cost, from the last two: cost ∝ n^p; from one alone with the p that is given.
+double predicted(const std::vector<AccuracyPoint>& ladder, int n, double AccuracyPoint::*cost, double power) {
   if (ladder.empty()) return 0;
   const AccuracyPoint& last = ladder.back();
-  double power = 6;
   if (ladder.size() > 1) {
     const AccuracyPoint& before = ladder[ladder.size() - 2];
     power = std::log(last.*cost / before.*cost) / std::log(static_cast<double>(last.candidate.n) / before.candidate.n);
@@ -267,23 +335,33 @@ double predicted(const std::vector<AccuracyPoint>& ladder, int n, double Accurac
   return last.*cost * std::pow(static_cast<double>(n) / last.candidate.n, power);
 }
 
-/// The same model and element on finer and finer meshes, up to what an update and a set-up may cost.
-std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const AccuracyOptions& options, Truth& truth,
-                                  const Meter& meter, std::vector<std::string>& left_out) {
+constexpr double kPowerOfFactors = 6;
+constexpr double kPowerOfSolutions = 4;
+constexpr double kPowerOfMeasuring = 2;  // much of it is the loop at the hand, which knows no mesh
+
+/// The same model and element on finer and finer meshes, up to what an update, a set-up and all of the measuring may
+/// cost. `measured` makes a point of a candidate, or throws.
+template <class Measured>
+std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const AccuracyOptions& options,
+                                  std::vector<std::string>& left_out, Measured measured) {
   std::vector<AccuracyPoint> points;
   if (info(model).tetrahedra && element != Element::kTet4) return points;
+  const double longest_setup = options.longest_setup_s.value_or(options.budget_ms ? 5 : 30);
   for (const int n : options.resolutions) {
     const Candidate candidate{model, element, n};
     const std::string name = candidate.name() + " n=" + std::to_string(n);
-    const double update = predicted(points, n, &AccuracyPoint::update_ms_p50);
-    const double setup = predicted(points, n, &AccuracyPoint::setup_s);
-    if (update > options.slowest_ms || setup > options.longest_setup_s) {
+    if (predicted(points, n, &AccuracyPoint::update_ms_p50, kPowerOfSolutions) > options.slowest_ms ||
+        predicted(points, n, &AccuracyPoint::setup_s, kPowerOfFactors) > longest_setup ||
+        predicted(points, n, &AccuracyPoint::measuring_s, kPowerOfMeasuring) > options.longest_point_s) {
       left_out.push_back(name + ": would take too long");
       break;
     }
     if (options.progress) std::cerr << "\r" << name << "            " << std::flush;
     try {
-      points.push_back(measure(candidate, truth, meter, options.network));
+      points.push_back(measured(candidate));
+    } catch (const TooSlow& error) {
+      left_out.push_back(name + ": " + error.what());
+      break;
     } catch (const std::exception& error) {
       left_out.push_back(name + ": " + error.what());
     }
@@ -291,8 +369,12 @@ std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const Accura
   return points;
 }
 
+bool for_comparison(ModelKind kind) { return kind == ModelKind::kStVenantKirchhoff || kind >= ModelKind::kMassSpring; }
+
 std::vector<ModelKind> models_of(const AccuracyOptions& options) {
   if (!options.models.empty()) return options.models;
+  // The quickest first: it is what the others have to beat.
+  if (options.budget_ms) return {ModelKind::kCondensed, ModelKind::kCorotational, ModelKind::kNeoHookean};
   std::vector<ModelKind> all;
   for (const ModelInfo& model : models()) all.push_back(model.kind);
   return all;
@@ -346,69 +428,101 @@ const char* colour_of(std::size_t i) {
   return kColours.at(i % kColours.size());
 }
 
-/// |error| over time; a line per model and element, in its model's colour.
-Panel error_over_time(const std::string& title, const std::vector<std::vector<AccuracyPoint>>& ladders, double extra_ms,
-                      std::size_t load) {
+/// A line for a model, the same in all panels; broken for those that are there for comparison …
+Curve curve_of(ModelKind kind) {
+  return {.name = std::string(info(kind).name),
+          .colour = colour_of(static_cast<std::size_t>(kind)),
+          .style = for_comparison(kind) ? Curve::Style::kDashed : Curve::Style::kLine};
+}
+
+/// … whose points are rings.
+Curve::Style points_on(const Curve& line) {
+  return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
+}
+
+/// Draws a curve and its points; points alone where they make no line.
+void add_with_points(Panel& panel, Curve curve) {
+  Curve points{.name = "", .colour = curve.colour, .points = curve.points, .style = points_on(curve)};
+  if (curve.points.size() < 2) {
+    points.name = std::move(curve.name);
+  } else {
+    panel.curves.push_back(std::move(curve));
+  }
+  panel.curves.push_back(std::move(points));
+}
+
+using Ladders = std::vector<std::vector<AccuracyPoint>>;
+
+std::vector<ModelKind> kinds_in(const Ladders& ladders) {
+  std::vector<ModelKind> kinds;
+  for (const auto& ladder : ladders) {
+    if (kinds.empty() || kinds.back() != ladder.front().candidate.model)
+      kinds.push_back(ladder.front().candidate.model);
+  }
+  return kinds;
+}
+
+/// All of a model, or of all of them.
+std::vector<AccuracyPoint> points_of(const Ladders& ladders, std::optional<ModelKind> kind) {
+  std::vector<AccuracyPoint> points;
+  for (const auto& ladder : ladders) {
+    if (!kind || ladder.front().candidate.model == *kind) points.insert(points.end(), ladder.begin(), ladder.end());
+  }
+  return points;
+}
+
+/// |error| over time: a point for everything, a line for each model through those that nothing else of the same model
+/// is both quicker and closer than.
+Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
   Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
   const auto place = [&](const AccuracyPoint& p) {
     return std::pair(p.update_ms_p50 + extra_ms, std::max(0.01, 100 * std::abs(p.at_load.at(load).total)));
   };
-  double quickest = std::numeric_limits<double>::infinity();
-  double slowest = 0;
-  std::vector<AccuracyPoint> all;
-  for (const auto& ladder : ladders) {
-    for (const AccuracyPoint& p : ladder) {
-      quickest = std::min(quickest, place(p).first);
-      slowest = std::max(slowest, place(p).first);
-      all.push_back(p);
-    }
+  const std::vector<AccuracyPoint> all = points_of(ladders, {});
+  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
+  for (const AccuracyPoint& p : all) {
+    range = {std::min(range.first, place(p).first), std::max(range.second, place(p).first)};
   }
-  panel.x_range = {{quickest / 1.5, slowest * 1.5}};
+  panel.x_range = {{range.first / 1.5, range.second * 1.5}};
   panel.curves.push_back({.name = "not noticed",
                           .colour = kGrey,
-                          .points = {{quickest / 1.5, kJustNoticeable}, {slowest * 1.5, kJustNoticeable}},
+                          .points = {{panel.x_range->first, kJustNoticeable}, {panel.x_range->second, kJustNoticeable}},
                           .style = Curve::Style::kBelow});
   Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
   for (const AccuracyPoint& p : pareto_front(all, load)) front.points.push_back(place(p));
   panel.curves.push_back(front);
-  std::vector<ModelKind> seen;
-  for (const auto& ladder : ladders) {
-    const ModelKind kind = ladder.front().candidate.model;
-    const auto known = std::ranges::find(seen, kind);
-    const auto colour = colour_of(static_cast<std::size_t>(known - seen.begin()));
-    Curve curve{.name = known == seen.end() ? std::string(info(kind).name) : std::string(), .colour = colour};
-    if (known == seen.end()) seen.push_back(kind);
-    for (const AccuracyPoint& p : ladder) curve.points.push_back(place(p));
-    panel.curves.push_back(curve);
-    curve.name.clear();
-    curve.style = Curve::Style::kPoints;
-    panel.curves.push_back(curve);
+  for (const ModelKind kind : kinds_in(ladders)) {
+    Curve line = curve_of(kind);
+    Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
+    for (const AccuracyPoint& p : points_of(ladders, kind)) points.points.push_back(place(p));
+    // A model that collapses on a fine mesh has no parts, and no such points: its name still goes with its colour.
+    for (const AccuracyPoint& p : pareto_front(points_of(ladders, kind), load)) line.points.push_back(place(p));
+    if (line.points.size() < 2) points.name = std::move(line.name);
+    if (line.points.size() >= 2) panel.curves.push_back(std::move(line));
+    panel.curves.push_back(std::move(points));
   }
   return panel;
 }
 
 /// |error| of each element over n, for the first model: what refining brings.
-Panel error_over_n(const std::vector<std::vector<AccuracyPoint>>& ladders) {
+Panel error_over_n(const Ladders& ladders) {
   const ModelKind kind = ladders.front().front().candidate.model;
-  double least = std::numeric_limits<double>::infinity();
-  double most = 0;
-  for (const auto& ladder : ladders) {
-    least = std::min<double>(least, ladder.front().candidate.n);
-    most = std::max<double>(most, ladder.back().candidate.n);
-  }
-  Panel panel{.title = "|error| of K, %, over cells along x: " + std::string(info(kind).name),
+  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
+  Panel panel{.title = "|error| of K, %, over cells along x, an element each: " + std::string(info(kind).name),
               .x_label = "n",
-              .x_range = {{least - 0.5, most + 0.5}},
               .log_y = true};
+  std::size_t colour = 0;
   for (const auto& ladder : ladders) {
     if (ladder.front().candidate.model != kind) continue;
-    Curve curve{.name = std::string(info(ladder.front().candidate.element).name),
-                .colour = colour_of(panel.curves.size())};
+    range = {std::min<double>(range.first, ladder.front().candidate.n),
+             std::max<double>(range.second, ladder.back().candidate.n)};
+    Curve curve{.name = std::string(info(ladder.front().candidate.element).name), .colour = colour_of(colour++)};
     for (const AccuracyPoint& p : ladder) {
       curve.points.emplace_back(p.candidate.n, std::max(0.01, 100 * std::abs(p.at_load[0].total)));
     }
-    panel.curves.push_back(curve);
+    add_with_points(panel, std::move(curve));
   }
+  panel.x_range = {{range.first - 0.5, range.second + 0.5}};
   return panel;
 }
 
@@ -418,25 +532,70 @@ std::string load_text(double newtons) { return JsonLine::number(newtons) + " N";
 
 std::string Candidate::name() const { return std::string(info(model).name) + "-" + std::string(info(element).name); }
 
-AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
-                      const std::optional<Network>& network) {
+namespace {
+
+/// A candidate on its way to a point: what has been measured of it, and the body for what has not.
+struct Trial {
+  AccuracyPoint point;
+  Body body;
+};
+
+/// What it costs and answers. Whose fault its errors are, and what is left at the hand, is not asked.
+Trial tried(const Candidate& candidate, Truth& truth, const Meter& meter, double slowest_ms) {
   const PressedBlock& block = truth.block();
-  AccuracyPoint point{.candidate = candidate};
   const Meter::Reading before = meter.read();
-  Body body(body_of(block, candidate));
+  Trial trial{.point = {.candidate = candidate}, .body = Body(body_of(block, candidate))};
+  AccuracyPoint& point = trial.point;
   point.setup_s = (meter.read() - before).processor;
-  point.size = body.size();
-  point.step_ms = 1e3 * body.step();
-  time_updates(body, truth.script(), meter, point);
-  follow_script(body, truth.script(), point);
-  if (network)
-    point.felt = felt(body, truth, route_of(*network, std::max(point.update_ms_p50, point.step_ms)), network->seed);
-  const std::array<Stiffness, 2> mesh = exact(block, candidate);
-  for (std::size_t load = 0; load < mesh.size(); ++load) {
-    point.at_load[load] =
-        accuracy_at(body.settle(Given::kForce, block.loads[load]), mesh[load], truth, candidate, load);
+  point.size = trial.body.size();
+  point.step_ms = 1e3 * trial.body.step();
+  follow_script(trial.body, truth.script(), meter, slowest_ms, point);
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    point.at_load[load] = accuracy_of(at_rest(trial.body, candidate.model, block.loads[load]), truth.stiffness(load));
   }
-  return point;
+  return trial;
+}
+
+void feel(Trial& trial, Truth& truth, const Network& network, double longest_s) {
+  AccuracyPoint& point = trial.point;
+  point.felt =
+      felt(trial.body, truth, route_of(network, std::max(point.update_ms_p50, point.step_ms)), network.seed, longest_s);
+}
+
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh, const Meter& meter,
+                      const std::optional<Network>& network, const Patience& patience) {
+  // What is found once for all points is none of this one's work.
+  truth.script();
+  truth.limit(info(candidate.model).law, material_of(truth.block(), candidate.model), 0);
+  const Meter::Reading before = meter.read();
+  Trial trial = tried(candidate, truth, meter, patience.update_ms);
+  split_error(trial.point, truth, on_mesh);
+  if (network) feel(trial, truth, *network, patience.felt_s);
+  trial.point.measuring_s = (meter.read() - before).processor;
+  return trial.point;
+}
+
+double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50, p.step_ms, kUnfeltMs}); }
+
+}  // namespace
+
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
+                      const std::optional<Network>& network, const Patience& patience) {
+  OnMesh on_mesh(truth.block());
+  return measure(candidate, truth, on_mesh, meter, network, patience);
+}
+
+bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others) {
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    const Accuracy& own = point.at_load[load];
+    const double error = std::isfinite(own.without_luck()) ? own.without_luck() : std::abs(own.total);
+    const bool beaten = std::ranges::any_of(others, [&](const AccuracyPoint& other) {
+      // The same mesh by another way is not closer.
+      return at_the_hand_ms(other) <= at_the_hand_ms(point) && 0.999 * other.at_load[load].without_luck() <= error;
+    });
+    if (!beaten && std::isfinite(error)) return true;
+  }
+  return false;
 }
 
 std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load) {
@@ -450,6 +609,24 @@ std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::
     return false;
   });
   return points;
+}
+
+double cost_exponent(const std::vector<AccuracyPoint>& ladder) {
+  const auto count = static_cast<double>(ladder.size());
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double xy = 0;
+  for (const AccuracyPoint& p : ladder) {
+    const double unknowns = std::log(static_cast<double>(p.size.free));
+    const double cost = std::log(p.update_ms_p50);
+    x += unknowns;
+    y += cost;
+    xx += unknowns * unknowns;
+    xy += unknowns * cost;
+  }
+  const double spread = count * xx - x * x;
+  return spread > 1e-9 * count * xx ? (count * xy - x * y) / spread : kNoNumber;
 }
 
 const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms) {
@@ -485,31 +662,83 @@ void write_truth(std::ostream& out, Truth& truth) {
       << "; its own meshes leave " << with_tenths(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n";
 }
 
+/// What refining costs: a line for each ladder.
+void write_exponents(std::ostream& out, const Ladders& ladders) {
+  out << "\nAn update takes as long as its unknowns to the power of\n";
+  for (const auto& ladder : ladders) {
+    if (ladder.size() < 2) continue;
+    std::array<char, 160> line{};
+    std::snprintf(line.data(), line.size(), "%-24s %5.2f   n = %d to %d, %zu to %zu unknowns, %.4f to %.4f ms\n",
+                  ladder.front().candidate.name().c_str(), cost_exponent(ladder), ladder.front().candidate.n,
+                  ladder.back().candidate.n, ladder.front().size.free, ladder.back().size.free,
+                  ladder.front().update_ms_p50, ladder.back().update_ms_p50);
+    out << line.data();
+  }
+}
+
 /// Which one to take.
-void write_answer(std::ostream& out, const AccuracyOptions& options, const std::vector<AccuracyPoint>& points,
+void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
                   Truth& truth) {
-  const double budget = options.budget_ms.value_or(std::numeric_limits<double>::infinity());
-  const AccuracyPoint* const best = closest_at_the_hand(points, budget);
   if (options.json) {
-    if (!options.budget_ms) return;  // all points are there to choose from
     JsonLine line;
-    line.add("budget_ms", budget).add("network", options.network->name);
-    if (best != nullptr) {
+    line.add("budget_ms", *options.budget_ms).add("network", options.network->name);
+    if (best) {
       line.add("model", best->candidate.name());
       for (const auto& [name, value] : figures(*best, truth)) line.add(name, value);
     } else {
       line.add("model", std::optional<double>());
     }
     out << line.add("commit", kCommit).str() << "\n";
-  } else if (best == nullptr) {
+  } else if (!best) {
     out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
   } else {
     out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
-    if (options.budget_ms) out << ", in " << JsonLine::number(budget) << " ms";
+    if (options.budget_ms) out << ", in " << JsonLine::number(*options.budget_ms) << " ms";
     out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
         << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
         << with_tenths(100 * best->at_load[0].total) << " %.\n";
   }
+}
+
+/// The answer to AccuracyOptions::budget_ms.
+std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& truth, OnMesh& on_mesh,
+                                         const Meter& meter) {
+  std::vector<Trial> kept;
+  std::vector<AccuracyPoint> rivals;  // points of the same
+  const auto keep = [&](Trial trial) {
+    if (!may_be_best(trial.point, rivals)) return;  // whoever's fault its errors are
+    split_error(trial.point, truth, on_mesh);
+    if (!may_be_best(trial.point, rivals)) return;
+    std::erase_if(kept, [&](const Trial& one) { return !may_be_best(one.point, {trial.point}); });
+    kept.push_back(std::move(trial));
+    rivals.clear();
+    for (const Trial& one : kept) rivals.push_back(one.point);
+  };
+  std::vector<std::string> left_out;
+  for (const ModelKind model : models_of(options)) {
+    for (const Element element : elements_of(options)) {
+      ladder(model, element, options, left_out, [&](const Candidate& candidate) {
+        const Meter::Reading before = meter.read();
+        Trial trial = tried(candidate, truth, meter, *options.budget_ms);
+        trial.point.measuring_s = (meter.read() - before).processor;
+        AccuracyPoint point = trial.point;
+        if (point.update_ms_p50 <= *options.budget_ms) keep(std::move(trial));
+        return point;
+      });
+    }
+  }
+  std::vector<AccuracyPoint> at_hand;
+  for (Trial& trial : kept) {
+    if (options.progress) {
+      std::cerr << "\rat the hand: " << trial.point.candidate.name() << " n=" << trial.point.candidate.n
+                << "            " << std::flush;
+    }
+    feel(trial, truth, *options.network, std::numeric_limits<double>::infinity());
+    at_hand.push_back(trial.point);
+  }
+  if (options.progress) std::cerr << "\n";
+  const AccuracyPoint* const best = closest_at_the_hand(at_hand, *options.budget_ms);
+  return best == nullptr ? std::nullopt : std::optional(*best);
 }
 
 /// ms, the median of both ways.
@@ -527,7 +756,7 @@ double round_trip_ms(const Network& network) {
 }
 
 /// Of all elements of a model the ladder with the point that is felt best.
-std::vector<const std::vector<AccuracyPoint>*> felt_best(const std::vector<std::vector<AccuracyPoint>>& ladders) {
+std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
   std::vector<const std::vector<AccuracyPoint>*> best;
   const auto least = [](const std::vector<AccuracyPoint>& ladder) {
     double error = std::numeric_limits<double>::infinity();
@@ -548,26 +777,23 @@ std::vector<const std::vector<AccuracyPoint>*> felt_best(const std::vector<std::
 
 /// What refining a model brings to the hand, over `x` of its points.
 template <class X>
-Panel felt_over(const std::string& title, const std::string& label,
-                const std::vector<std::vector<AccuracyPoint>>& ladders, bool log_x, X x) {
+Panel felt_over(const std::string& title, const std::string& label, const Ladders& ladders, bool log_x, X x) {
   Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};
   std::pair<double, double> range{std::numeric_limits<double>::infinity(), 0};
   for (const auto* ladder : felt_best(ladders)) {
-    Curve curve{.name = ladder->front().candidate.name(), .colour = colour_of(panel.curves.size() / 2)};
+    Curve curve = curve_of(ladder->front().candidate.model);
     for (const AccuracyPoint& p : *ladder) {
       range = {std::min<double>(range.first, x(p)), std::max<double>(range.second, x(p))};
       curve.points.emplace_back(x(p), 100 * p.felt->force_error);
     }
-    panel.curves.push_back(curve);
-    curve.name.clear();
-    curve.style = Curve::Style::kPoints;
-    panel.curves.push_back(curve);
+    add_with_points(panel, std::move(curve));
   }
-  panel.x_range = {{range.first / 1.1, range.second * 1.1}};
+  panel.x_range =
+      log_x ? std::pair(range.first / 1.5, range.second * 1.5) : std::pair(range.first - 0.5, range.second + 0.5);
   return panel;
 }
 
-void draw(const AccuracyOptions& options, const std::vector<std::vector<AccuracyPoint>>& ladders) {
+void draw(const AccuracyOptions& options, const Ladders& ladders) {
   const auto& loads = options.block.loads;
   std::vector<Panel> panels{
       error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0, 0),
@@ -576,8 +802,8 @@ void draw(const AccuracyOptions& options, const std::vector<std::vector<Accuracy
     panels.push_back(error_over_time(
         "… under " + load_text(loads[0]) + ", over that and " + options.network->name + ", there and back", ladders,
         round_trip_ms(*options.network), 0));
-    panels.push_back(felt_over("Error at the hand, %, over cells along x", "n", ladders, false,
-                               [](const AccuracyPoint& p) { return p.candidate.n; }));
+    panels.push_back(felt_over("Error at the hand, %, over cells along x, each model with its best element", "n",
+                               ladders, false, [](const AccuracyPoint& p) { return p.candidate.n; }));
     panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
                                [](const AccuracyPoint& p) { return p.update_ms_p50; }));
   }
@@ -593,28 +819,40 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
     throw std::invalid_argument("--n: expected ascending numbers of cells, as in 4,8,16");
   }
   if (options.budget_ms && !options.network) throw std::invalid_argument("--budget-ms: say --network too");
+  if (options.budget_ms && options.out) {
+    throw std::invalid_argument("--out: there is no figure with --budget-ms, which measures no more than it must");
+  }
   if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
   if (options.progress) std::cerr << "the truth …" << std::flush;
   Truth truth(options.block, options.truth);
+  truth.script();  // all that every point needs of it, so that the first one is not charged with it
   const Meter meter;
-  const bool rows = !options.json && !options.budget_ms;
+  OnMesh on_mesh(options.block);
+  if (options.budget_ms) {
+    write_answer(out, options, best_within(options, truth, on_mesh, meter), truth);
+    return;
+  }
+  const bool rows = !options.json;
   if (rows) {
     write_truth(out, truth);
     out << kHeading;
   }
   std::vector<std::string> left_out;
-  std::vector<std::vector<AccuracyPoint>> ladders;
+  Ladders ladders;
   std::vector<AccuracyPoint> all;
   for (const ModelKind model : models_of(options)) {
     for (const Element element : elements_of(options)) {
-      std::vector<AccuracyPoint> points = ladder(model, element, options, truth, meter, left_out);
-      for (const AccuracyPoint& point : points) {
+      std::vector<AccuracyPoint> points = ladder(model, element, options, left_out, [&](const Candidate& candidate) {
+        const AccuracyPoint point = measure(candidate, truth, on_mesh, meter, options.network,
+                                            {.update_ms = options.slowest_ms, .felt_s = options.longest_point_s});
         if (rows) {
           write_row(out, point);
-        } else if (!options.budget_ms) {
-          out << to_json(point, truth) << std::endl;
+        } else {
+          out << to_json(point, truth) << "\n";
         }
-      }
+        out.flush();
+        return point;
+      });
       all.insert(all.end(), points.begin(), points.end());
       if (!points.empty()) ladders.push_back(std::move(points));
     }
@@ -624,13 +862,21 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
     out << "\nThe best, small load: nothing else is both quicker and closer (errors that cancel do not count):\n"
         << kHeading;
     for (const AccuracyPoint& point : pareto_front(all, 0)) write_row(out, point);
+    write_exponents(out, ladders);
     if (options.network) {
-      out << "\nAt the hand, behind " << options.network->name << ":\n" << kFeltHeading;
+      out << "\nAt the hand, behind " << options.network->name << ", seed " << options.network->seed << ":\n"
+          << kFeltHeading;
       for (const AccuracyPoint& point : all) write_felt(out, point);
     }
     for (const std::string& one : left_out) out << "left out: " << one << "\n";
   }
-  if (options.network) write_answer(out, options, all, truth);
+  if (options.network && rows) {
+    std::vector<AccuracyPoint> asked = all;
+    if (options.models.empty()) std::erase_if(asked, [](const auto& p) { return for_comparison(p.candidate.model); });
+    if (const AccuracyPoint* const best = closest_at_the_hand(asked, std::numeric_limits<double>::infinity())) {
+      write_answer(out, options, *best, truth);
+    }
+  }
   if (options.out) {
     std::filesystem::create_directories(*options.out);
     write_csv(*options.out / "accuracy.csv", all, truth);

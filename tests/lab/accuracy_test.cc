@@ -6,6 +6,8 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace tendon::lab {
 namespace {
@@ -127,6 +129,102 @@ TEST(Accuracy, TheParetoFrontKeepsWhatNothingElseIsBothQuickerAndCloserThan) {
   EXPECT_EQ(front[1].update_ms_p50, 3);  // the last is right by luck, and not among them
 }
 
+TEST(Accuracy, TheExponentOfItsCostIsThatOfItsLadderAndOneMeshHasNone) {
+  const auto ladder = [](double power) {
+    std::vector<AccuracyPoint> points;
+    for (const std::size_t free : {150U, 972U, 6936U}) {
+      AccuracyPoint p{.candidate = {ModelKind::kLinear, Element::kTet4, 4}};
+      p.size.free = free;
+      p.update_ms_p50 = 0.01 * std::pow(static_cast<double>(free), power);
+      points.push_back(p);
+    }
+    return points;
+  };
+  EXPECT_NEAR(cost_exponent(ladder(1.4)), 1.4, 1e-12);
+  EXPECT_NEAR(cost_exponent(ladder(0)), 0, 1e-12);
+  EXPECT_TRUE(std::isnan(cost_exponent({ladder(1).front()})));
+  EXPECT_TRUE(std::isnan(cost_exponent({})));
+}
+
+TEST(Accuracy, WhatIsAsRigidAsPossibleIsABodyWithoutLambdaAndItsRoundsEndThere) {
+  const AccuracyPoint point = measure({ModelKind::kProjective, Element::kHex8Sri, 4}, truth(), Meter());
+  for (const Accuracy& at : point.at_load) {
+    EXPECT_NEAR(at.model + at.discretisation + at.solver, at.total, 1e-12);
+    EXPECT_LT(std::abs(at.solver), 1e-3);
+    EXPECT_GT(at.discretisation, 0.02);
+    EXPECT_LT(at.model, -0.3);  // without resistance against volume
+  }
+}
+
+TEST(Accuracy, WhatSpringsBecomeOnAFineMeshHardlyDependsOnTheMeshThatItIsSeenOn) {
+  const auto at = [](int n) {
+    const AccuracyPoint point = measure({ModelKind::kMassSpring, Element::kTet4, n}, truth(), Meter());
+    EXPECT_NEAR(point.at_load[0].model + point.at_load[0].discretisation, point.at_load[0].total, 1e-12);
+    return point.at_load[0];
+  };
+  const Accuracy coarse = at(4);
+  const Accuracy fine = at(8);
+  EXPECT_GT(coarse.total - fine.total, 0.3);
+  EXPECT_LT(std::abs(coarse.model - fine.model), 0.1);
+}
+
+TEST(Accuracy, WhatIsFarTooSlowIsNotMeasuredToItsEnd) {
+  EXPECT_THROW(measure({ModelKind::kCorotational, Element::kHex8Sri, 4}, truth(), Meter(), {}, {.update_ms = 1e-4}),
+               TooSlow);
+  EXPECT_THROW(
+      measure({ModelKind::kLinear, Element::kHex8Sri, 4}, truth(), Meter(), Network{.name = "lan"}, {.felt_s = 0}),
+      TooSlow);
+}
+
+TEST(Accuracy, OnlyWhatNothingElseIsAsQuickAndCloserThanMayBeBestAtTheHand) {
+  const auto point = [](double ms, double small, double hard) {
+    AccuracyPoint p{.candidate = {ModelKind::kLinear, Element::kTet4, 4}};
+    p.update_ms_p50 = ms;
+    p.at_load[0] = {.total = small, .model = small};
+    p.at_load[1] = {.total = hard, .model = hard};
+    return p;
+  };
+  const std::vector<AccuracyPoint> others{point(2, 0.05, 0.1)};
+  EXPECT_FALSE(may_be_best(point(3, 0.06, 0.2), others));
+  EXPECT_FALSE(may_be_best(point(2, 0.05, 0.1), others));
+  EXPECT_TRUE(may_be_best(point(3, 0.04, 0.2), others));
+  EXPECT_TRUE(may_be_best(point(3, 0.06, 0.09), others));
+  EXPECT_TRUE(may_be_best(point(1, 0.5, 0.5), others));
+  EXPECT_TRUE(may_be_best(point(3, 0.5, 0.5), {}));
+  // Nobody feels a hundredth of a millisecond.
+  EXPECT_FALSE(may_be_best(point(0.01, 0.06, 0.2), {point(0.05, 0.05, 0.1)}));
+  // An answer lasts as long as the body's own step.
+  AccuracyPoint steps = point(1, 0.06, 0.2);
+  steps.step_ms = 4;
+  EXPECT_FALSE(may_be_best(steps, others));
+  // Errors that cancel do not count, once they are known.
+  AccuracyPoint lucky = point(3, 0.01, 0.01);
+  EXPECT_TRUE(may_be_best(lucky, others));
+  for (Accuracy& at : lucky.at_load) at = {.total = 0.01, .model = -0.2, .discretisation = 0.21};
+  EXPECT_FALSE(may_be_best(lucky, others));
+}
+
+TEST(Accuracy, TheAnswerWithinABudgetIsTheClosestOfThoseThatAreQuickEnough) {
+  AccuracyOptions options;
+  options.block = truth().block();
+  options.block.loads = {0.01, 0.02};  // next to no strain, which is quick
+  options.truth = kCoarse;
+  options.models = {ModelKind::kCondensed, ModelKind::kLinear};
+  options.elements = {Element::kHex8Sri, Element::kHex27Sri};
+  options.resolutions = {3, 4};
+  options.network = Network{.name = "lan"};
+  options.budget_ms = 1000;
+  options.json = true;
+  std::ostringstream out;
+  accuracy(options, out);
+  EXPECT_NE(out.str().find("\"model\":\"condensed-hex27-sri\",\"n\":4,"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("\"felt_error_percent\":"), std::string::npos) << out.str();
+  options.budget_ms = 1e-9;
+  out.str("");
+  accuracy(options, out);
+  EXPECT_NE(out.str().find("\"model\":null"), std::string::npos) << out.str();
+}
+
 TEST(Accuracy, APointInJsonBeginsAsTheManualSays) {
   const std::string line = to_json(measure({ModelKind::kLinear, Element::kHex8Sri, 4}, truth(), Meter()), truth());
   std::size_t at = 0;
@@ -149,6 +247,7 @@ TEST(Accuracy, RefusesWhatMakesNoBlock) {
   EXPECT_THROW(accuracy(with([](auto& o) { o.block.loads = {1, 0.3}; }), out), std::invalid_argument);
   EXPECT_THROW(accuracy(with([](auto& o) { o.block.patch_centre.x() = 1; }), out), std::invalid_argument);
   EXPECT_THROW(accuracy(with([](auto& o) { o.resolutions = {8, 4}; }), out), std::invalid_argument);
+  EXPECT_THROW(accuracy(with([](auto& o) { o.budget_ms = 5; }), out), std::invalid_argument);
 }
 
 }  // namespace

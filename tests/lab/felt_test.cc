@@ -67,6 +67,26 @@ TEST(Felt, AStiffnessThatIsSentAlongMakesUpForMostOfTheWait) {
   EXPECT_LT(here.force_error, 0.7 * here.held_error);
 }
 
+// It is struck by every count of the encoder, its force goes to and fro between nothing and too much, and the limiter
+// takes half of that away; but it is where the hand is.
+TEST(Felt, ABodyOfManyShortStepsKeepsUpWithTheHand) {
+  const PressedBlock& block = truth().block();
+  BodyConfig config;
+  config.shape = softbody::BlockShape{block.size, {4, 4, 2}};
+  config.element = softbody::Element::kHex8Sri;
+  config.material = block.material;
+  config.patch_radius = block.patch_radius;
+  config.model = softbody::ModelKind::kTensorMass;
+  config.effects = {.density = 1000, .step = 2e-4, .inertia = true, .damping = 40};
+  Body body(config);
+  const Felt quick = felt(body, truth(), route("base=0.05ms", 0.2), 1);
+  EXPECT_GT(quick.displayed, 0.4);
+  EXPECT_LT(quick.latency, 0.006);
+  // Five times as slow as the hand's time: it is still where the hand was.
+  const Felt slow = felt(body, truth(), route("base=0.05ms", 1), 1);
+  EXPECT_LT(slow.displayed, 0.8 * quick.displayed);
+}
+
 /// Forces of an engine that answers with the time at which the motion was sampled, in ms.
 std::vector<double> answered(const Route& route, std::vector<double>* asked = nullptr) {
   Experiment set;

@@ -3,8 +3,14 @@
 
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 
 namespace tendon::lab {
+
+/// Something costs more time than was asked for.
+struct TooSlow : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// What something costs: the lab's only look at a clock, and at the processor's counter of instructions.
 ///

@@ -16,6 +16,7 @@ struct Curve {
     kDashed,
     kArea,  ///< between −y and y
     kPoints,
+    kRings,
     kBold,   ///< a line that matters more than the others
     kBelow,  ///< between the x axis and y
   };

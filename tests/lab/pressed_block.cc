@@ -125,7 +125,7 @@ Stiffness Truth::stiffness(std::size_t load) {
 double Truth::uncertainty() {
   if (!uncertainty_) {
     uncertainty_ = std::abs(linear_stiffness(block_, config_.cells / kCoarser) / linear_ - 1);
-    const auto coarse = ratios(Law::kNeoHookean, config_.cells_for_large / kCoarser)[1];
+    const auto coarse = ratios(Law::kNeoHookean, block_.material, config_.cells_for_large / kCoarser)[1];
     if (coarse) *uncertainty_ += std::abs(coarse->secant * linear_ / stiffness(1).secant - 1);
   }
   return *uncertainty_;
@@ -159,27 +159,33 @@ const std::vector<Touched>& Truth::script() {
   return script_;
 }
 
-Truth::AtLoads Truth::ratios(Law law, double cells) const {
-  const double linear = linear_stiffness(block_, cells);
-  const Solid solid = graded(block_, law, cells);
-  const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block_.patch_radius);
+Truth::AtLoads Truth::ratios(Law law, const Material& material, double cells) const {
+  PressedBlock block = block_;
+  block.material = material;
+  const double linear = linear_stiffness(block, cells);
+  const Solid solid = graded(block, law, cells);
+  const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block.patch_radius);
   QuasiStaticModel model(solid, top, {});
   AtLoads result;
   for (std::size_t load = 0; load < result.size(); ++load) {
-    const Reaction reaction = model.press(patch_of(top, block_), Given::kForce, block_.loads[load]);
+    const Reaction reaction = model.press(patch_of(top, block), Given::kForce, block.loads[load]);
     if (!(reaction.error <= 1e-3 * reaction.force) || solid.inverted(model.displacements()) > 0) break;
     result[load] = Stiffness{reaction.force / reaction.depth / linear, reaction.stiffness / linear};
   }
   return result;
 }
 
-std::optional<Stiffness> Truth::limit(Law law, std::size_t load) {
-  if (law == Law::kLinear) return Stiffness{linear_, linear_};
-  const auto [found, is_new] = limits_.try_emplace(law);
+std::optional<Stiffness> Truth::limit(Law law, const Material& material, std::size_t load) {
+  const auto [found, is_new] = limits_.try_emplace({law, material.young, material.poisson});
   if (is_new) {
-    found->second = ratios(law, config_.cells_for_large);
+    PressedBlock other = block_;
+    other.material = material;
+    const bool same = material.young == block_.material.young && material.poisson == block_.material.poisson;
+    const double linear = same ? linear_ : linear_stiffness(other, config_.cells);
+    found->second = law == Law::kLinear ? AtLoads{Stiffness{1, 1}, Stiffness{1, 1}}
+                                        : ratios(law, material, config_.cells_for_large);
     for (auto& at : found->second) {
-      if (at) at = Stiffness{at->secant * linear_, at->tangent * linear_};
+      if (at) at = Stiffness{at->secant * linear, at->tangent * linear};
     }
   }
   return found->second.at(load);

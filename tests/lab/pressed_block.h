@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "clients/softbody/body.h"
@@ -70,7 +71,9 @@ class Truth {
 
   /// What the law `law` alone would make of it on an endlessly fine mesh: the truth and a model's own error. Empty when
   /// that body collapses under the load.
-  std::optional<Stiffness> limit(softbody::Law law, std::size_t load);
+  std::optional<Stiffness> limit(softbody::Law law, std::size_t load) { return limit(law, block_.material, load); }
+  /// The same of a body of another material.
+  std::optional<Stiffness> limit(softbody::Law law, const softbody::Material& material, std::size_t load);
 
   double uncertainty();  ///< relative, of the stiffness under the second load
 
@@ -91,13 +94,14 @@ class Truth {
   };
   const Factor& factor();
   using AtLoads = std::array<std::optional<Stiffness>, 2>;
-  AtLoads ratios(softbody::Law law, double cells) const;  ///< of K to the linear one, empty from where it collapses on
+  /// Of K to the linear one, empty from where it collapses on.
+  AtLoads ratios(softbody::Law law, const softbody::Material& material, double cells) const;
 
   PressedBlock block_;
   Config config_;
   std::unique_ptr<Fine> fine_;
-  double linear_ = 0;  ///< N/m
-  std::map<softbody::Law, AtLoads> limits_;
+  double linear_ = 0;                                                    ///< N/m
+  std::map<std::tuple<softbody::Law, double, double>, AtLoads> limits_;  ///< by law, Young's modulus, Poisson's ratio
   std::optional<double> uncertainty_;
   std::optional<Factor> factor_;
   std::vector<Touched> script_;

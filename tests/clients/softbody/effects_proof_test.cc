@@ -4,6 +4,8 @@
 // whole program, against a program that was built without them (CMakeLists.txt says how).
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <iomanip>
 #include <iostream>
@@ -30,13 +32,19 @@ struct Body {
   Cost cost;
 };
 
+/// The least of three runs: within CHOLMOD some hundred instructions are there in one run and not in the next.
 std::vector<Body> count(const std::string& program, const std::string& which) {
   std::vector<Body> bodies;
-  for (const auto& [line, instructions] : testing::count_instructions(program, which, "touch_in_turn")) {
-    Body body;
-    std::istringstream(line) >> body.model >> body.effect >> body.cost.heap >> body.cost.bytes;
-    body.cost.instructions = instructions / kSteps;
-    bodies.push_back(body);
+  for (int run = 0; run < 3; ++run) {
+    std::size_t next = 0;
+    for (const auto& [line, instructions] : testing::count_instructions(program, which, "touch_in_turn")) {
+      Body body;
+      std::istringstream(line) >> body.model >> body.effect >> body.cost.heap >> body.cost.bytes;
+      body.cost.instructions = instructions / kSteps;
+      if (next == bodies.size()) bodies.push_back(body);
+      double& least = bodies[next++].cost.instructions;
+      least = std::min(least, body.cost.instructions);
+    }
   }
   return bodies;
 }
@@ -44,8 +52,8 @@ std::vector<Body> count(const std::string& program, const std::string& which) {
 /// The README's table.
 std::string table(const std::vector<Body>& bodies) {
   std::ostringstream text;
-  text << "| model | without | gravity | inertia | damping | viscosity | friction | cutting | stiffening "
-          "|\n|---|---|---|---|---|---|---|---|---|";
+  text << "| model | without | gravity | inertia | damping | viscosity | friction | cutting | stiffening | "
+          "plasticity |\n|---|---|---|---|---|---|---|---|---|---|";
   std::map<std::string, Cost> bare;
   for (const Body& body : bodies) {
     if (body.effect == "none") bare[body.model] = body.cost;
@@ -59,7 +67,7 @@ std::string table(const std::vector<Body>& bodies) {
     if (model == "neo-hookean") continue;  // how many steps its Newton's method takes is another for another shape
     text << "\n| " << model << " | " << number(cost.instructions) << ", " << cost.bytes << " B |";
     for (const std::string effect :
-         {"gravity", "inertia", "damping", "viscosity", "friction", "cutting", "stiffening"}) {
+         {"gravity", "inertia", "damping", "viscosity", "friction", "cutting", "stiffening", "plasticity"}) {
       for (const Body& body : bodies) {
         if (body.model != model || body.effect != effect) continue;
         text << ' ' << number(body.cost.instructions - cost.instructions) << ", " << body.cost.bytes - cost.bytes
@@ -103,7 +111,7 @@ TEST_F(EffectsProof, WhatIsListedCostsSome) {
     if (body.model == "neo-hookean" || (little && body.model != "condensed")) continue;
     EXPECT_GT(body.cost.instructions, none.at(body.model).instructions) << body.model << ' ' << body.effect;
   }
-  EXPECT_EQ(listed, 7U + 2 + 7 + 3);
+  EXPECT_EQ(listed, 8U + 2 + 8 + 3);
   std::cout << table(bodies) << '\n';
 }
 

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// In place of cutting.cc, effects.cc, friction.cc and stiffening.cc, in a program that is built without effects
-// (CMakeLists.txt).
+// In place of cutting.cc, effects.cc, friction.cc, self_collision.cc and stiffening.cc, in a program that is built
+// without effects (CMakeLists.txt).
 #include <cstdlib>
 
 #include "clients/softbody/cutting.h"
 #include "clients/softbody/effects.h"
 #include "clients/softbody/friction.h"
+#include "clients/softbody/self_collision.h"
 #include "clients/softbody/stiffening.h"
 
 namespace tendon::softbody {
@@ -35,6 +36,13 @@ bool Cutting::due(PlannedCut::When, double) const noexcept { return false; }
 std::span<const Cut> Cutting::make_next() { return made_; }
 bool Cutting::take_changed() noexcept { return false; }
 std::size_t Cutting::bytes() const noexcept { return 0; }
+
+double SelfCollision::look(const VectorXd&) { std::abort(); }
+double SelfCollision::foresee(const Factor&, const VectorXd&, const VectorXd&, const VectorXd*, double) {
+  std::abort();
+}
+VectorXd SelfCollision::forces(const VectorXd&) const { std::abort(); }
+std::size_t SelfCollision::bytes() const noexcept { return 0; }
 
 double StiffnessOverTime::factor_at(double) const { std::abort(); }
 void check(const StiffnessOverTime&) {}

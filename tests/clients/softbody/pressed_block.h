@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <utility>
+
 #include "clients/softbody/body.h"
+#include "clients/softbody/quasi_static.h"
 #include "clients/softbody/solid.h"
 
 namespace tendon::softbody::testing {
@@ -30,5 +33,18 @@ inline BodyConfig pressed_body(ModelKind model, Element element, int n) {
   if (info(model).has_time()) config.effects = {.density = 1000, .step = 1e-3, .inertia = true, .damping = 40};
   return config;
 }
+
+/// B1 in the hands of Newton's method, and the patch in the middle of its top.
+struct PressedByNewton {
+  explicit PressedByNewton(Element element, int n, Law law, int max_iterations = 30)
+      : solid(pressed_block(element, n, 0.45, law)),
+        top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
+        model(solid, top, {.max_iterations = max_iterations}),
+        patch(*top.patch(Vec2::Zero())) {}
+  Solid solid;
+  TouchSurface top;
+  QuasiStaticModel model;
+  Patch patch;
+};
 
 }  // namespace tendon::softbody::testing

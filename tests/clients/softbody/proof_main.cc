@@ -53,6 +53,12 @@ void list(EffectKind effect, BodyConfig& config) {
     case EffectKind::kStiffening:
       config.stiffening = StiffnessOverTime{.at = {0, 10}, .factor = {1, 2}};
       break;
+    case EffectKind::kPlasticity:
+      config.plasticity = Yield{.stress = 100, .hardening = 1e4};
+      break;
+    case EffectKind::kSelfCollision:
+      config.self_collision = 1e-4;
+      break;
     default:
       break;
   }

@@ -14,18 +14,7 @@ namespace {
 
 using testing::kB1PatchRadius;
 using testing::pressed_block;
-
-struct Pressed {
-  explicit Pressed(Element element, int n, Law law, int max_iterations = 30)
-      : solid(pressed_block(element, n, 0.45, law)),
-        top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius),
-        model(solid, top, {.max_iterations = max_iterations}),
-        patch(*top.patch(Vec2::Zero())) {}
-  Solid solid;
-  TouchSurface top;
-  QuasiStaticModel model;
-  Patch patch;
-};
+using testing::PressedByNewton;
 
 constexpr Law kLaws[] = {Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
 
@@ -35,7 +24,7 @@ TEST(QuasiStatic, SmallPressesAreAnsweredAsByTheLinearModel) {
     const TouchSurface top(linear.mesh(), Vec3::UnitZ(), kB1PatchRadius);
     const double expected = LinearModel(linear, top).press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-6).force;
     for (const Law law : kLaws) {
-      Pressed pressed(element, 4, law);
+      PressedByNewton pressed(element, 4, law);
       const Reaction found = pressed.model.press(pressed.patch, Given::kDepth, 1e-6);
       EXPECT_NEAR(found.force / expected, 1, 2e-4) << static_cast<int>(law);
       EXPECT_NEAR(found.depth, 1e-6, 1e-12);
@@ -45,7 +34,7 @@ TEST(QuasiStatic, SmallPressesAreAnsweredAsByTheLinearModel) {
 
 TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
   for (const Law law : kLaws) {
-    Pressed pressed(Element::kHex8Sri, 4, law);
+    PressedByNewton pressed(Element::kHex8Sri, 4, law);
     const double h = 1e-5;
     const auto press = [&](double depth) {
       const Reaction reaction = pressed.model.press(pressed.patch, Given::kDepth, depth);
@@ -62,9 +51,9 @@ TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
 
 TEST(QuasiStatic, TheSameForceComesFromDepthAsFromForceAndFromOneStepAsFromMany) {
   for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
-    Pressed at_once(Element::kHex8Sri, 4, law);
+    PressedByNewton at_once(Element::kHex8Sri, 4, law);
     const Reaction deep = at_once.model.press(at_once.patch, Given::kDepth, 0.01);
-    Pressed slowly(Element::kHex8Sri, 4, law);
+    PressedByNewton slowly(Element::kHex8Sri, 4, law);
     for (const double depth : {0.002, 0.004, 0.006, 0.008}) slowly.model.press(slowly.patch, Given::kDepth, depth);
     EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kDepth, 0.01).force / deep.force, 1, 1e-6);
     EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kForce, deep.force).depth, 0.01, 1e-7);
@@ -73,7 +62,7 @@ TEST(QuasiStatic, TheSameForceComesFromDepthAsFromForceAndFromOneStepAsFromMany)
 
 TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
   for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
-    Pressed kept(Element::kHex8Sri, 4, law);
+    PressedByNewton kept(Element::kHex8Sri, 4, law);
     int answers = 0;
     for (double time = 0; time < 2; time += 0.01) {  // 100 answers a second, 0.5 to 2.5 mm deep
       const double depth = 0.0015 + 0.001 * std::sin(5 * time);
@@ -81,7 +70,7 @@ TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
       EXPECT_LE(kept.model.iterations(), 12);
       EXPECT_LE(found.error, 1e-5 * found.force);
       if (++answers % 20 != 0) continue;
-      Pressed anew(Element::kHex8Sri, 4, law);
+      PressedByNewton anew(Element::kHex8Sri, 4, law);
       EXPECT_NEAR(found.force / anew.model.press(anew.patch, Given::kDepth, depth).force, 1, 1e-6);
       const double h = 1e-6;
       const double high = anew.model.press(anew.patch, Given::kDepth, depth + h).force;
@@ -93,8 +82,8 @@ TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
 }
 
 TEST(QuasiStatic, OneIterationAtEachAnswerFollowsAMovingToolAndSaysHowFarItIsOff) {
-  Pressed exact(Element::kHex8Sri, 4, Law::kNeoHookean);
-  Pressed hasty(Element::kHex8Sri, 4, Law::kNeoHookean, 1);
+  PressedByNewton exact(Element::kHex8Sri, 4, Law::kNeoHookean);
+  PressedByNewton hasty(Element::kHex8Sri, 4, Law::kNeoHookean, 1);
   for (int i = 1; i <= 20; ++i) {
     const double depth = 5e-4 * i;
     const double truth = exact.model.press(exact.patch, Given::kDepth, depth).force;

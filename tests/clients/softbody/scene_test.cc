@@ -10,7 +10,9 @@
 namespace tendon::softbody {
 namespace {
 
+using testing::kCut;
 using testing::kGood;
+using testing::listing;
 using testing::with;
 
 std::string refusal(const std::string& text) {
@@ -45,7 +47,8 @@ TEST(SoftbodyScene, ThoseThatAreShippedMakeBodiesThatNobodyHasToBeWarnedOf) {
 TEST(SoftbodyScene, AnUnknownEffectIsAnErrorWithItsLine) {
   EXPECT_EQ(refusal(with("[\"contact\"]", "[\n  \"contact\",\n  \"gravitation\"]")),
             "s.toml:3: effects: unknown effect \"gravitation\"; expected one of contact, geometric-nonlinearity, "
-            "material-nonlinearity, gravity, inertia, damping, viscosity, friction, cutting, stiffening");
+            "material-nonlinearity, gravity, inertia, damping, viscosity, friction, cutting, stiffening, plasticity, "
+            "self-collision");
 }
 
 TEST(SoftbodyScene, WhatIsListedIsWhatTheModelSimulatesNoMoreAndNoFewer) {
@@ -84,16 +87,6 @@ TEST(SoftbodyScene, AnEffectsKeysAreKnownOnlyWhereItIsListed) {
             "s.toml: body.material.density_kg_per_m3: expected a number above 0 and at most 1e+06, found nothing");
 }
 
-constexpr std::string_view kCut =
-    "[[cutting]]\ncorner_mm = [0, -60, 25]\nalong_mm = [0, 120, 0]\ndeep_mm = [0, 0, 30]\n";
-
-/// kGood with a model and effects, and tables behind it.
-std::string listing(const std::string& model, const std::string& effects, const std::string& tables) {
-  std::string text = with("condensed", model);
-  text.replace(text.find("[\"contact\"]"), 11, effects);
-  return text + tables;
-}
-
 TEST(SoftbodyScene, CutsAndAModulusOverTimeArrive) {
   std::string tables;
   tables.append(kCut).append("at_s = 2\n").append(kCut).append("above_n = 0.5\n");
@@ -110,9 +103,6 @@ TEST(SoftbodyScene, CutsAndAModulusOverTimeArrive) {
   EXPECT_EQ(body.cuts[1].value, 0.5);
   ASSERT_TRUE(body.stiffening);
   EXPECT_EQ(body.stiffening->factor_at(2), 1.5);
-  const std::string explained = explain(parse_scene(text, "s.toml", "."));
-  EXPECT_NE(explained.find("\n  cutting: "), std::string::npos) << explained;
-  EXPECT_NE(explained.find("\n  stiffening: "), std::string::npos) << explained;
 }
 
 TEST(SoftbodyScene, WhatIsWrongWithACutIsNamed) {
@@ -148,6 +138,48 @@ TEST(SoftbodyScene, WhatIsWrongWithAModulusOverTimeIsNamed) {
   EXPECT_EQ(refusal(listing("condensed", effects, "")), "s.toml: stiffening: expected a table, found nothing");
 }
 
+TEST(SoftbodyScene, AYieldArrivesAndWhatIsWrongWithItIsNamed) {
+  const std::string effects = "[\"contact\", \"geometric-nonlinearity\",\n\"plasticity\"]";
+  const std::string table = "[plasticity]\nyield_pa = 500\nhardening_pa = 2000\n";
+  const Scene scene = parse_scene(listing("corotational", effects, table), "s.toml", ".");
+  ASSERT_TRUE(scene.body.plasticity);
+  EXPECT_EQ(scene.body.plasticity->stress, 500);
+  EXPECT_EQ(scene.body.plasticity->hardening, 2000);
+  EXPECT_NE(scene_reference().find("\n    plasticity: "), std::string::npos);
+  EXPECT_EQ(
+      parse_scene(listing("linear\"\nmax_iterations = 7 #", "[\"contact\", \"plasticity\"]", table), "s.toml", ".")
+          .body.max_iterations,
+      7);
+  EXPECT_EQ(refusal(listing("corotational", effects, "[plasticity]\nyield_pa = 0\nhardening_pa = 1\n")),
+            "s.toml:17: plasticity.yield_pa: expected a number above 0 and at most 1e+12");
+  EXPECT_EQ(refusal(listing("corotational", effects, "[plasticity]\nyield_pa = 1\n")),
+            "s.toml: plasticity.hardening_pa: expected a number above 0 and at most 1e+12, found nothing");
+  EXPECT_EQ(refusal(listing("corotational", effects, table + "creep = 1\n")),
+            "s.toml:19: plasticity.creep: unknown key; expected one of hardening_pa, yield_pa");
+  EXPECT_EQ(refusal(listing("linear", "[\"contact\"]", table)),
+            "s.toml:15: plasticity: unknown key; expected one of body, effects, model, place, touch");
+  for (const std::string model : {"condensed", "modal", "neo-hookean", "stvk", "mass-spring", "tled"}) {
+    EXPECT_EQ(refusal(listing(model, "[\"contact\",\n\"plasticity\"]", table)),
+              "s.toml:2: effects: the model \"" + model + "\" does not simulate \"plasticity\", which is listed");
+  }
+  for (const std::string other : {"inertia", "damping", "viscosity", "cutting", "stiffening"}) {
+    EXPECT_EQ(refusal(listing("linear", "[\"contact\", \"" + other + "\",\n\"plasticity\"]", table)),
+              "s.toml:2: effects: \"plasticity\" is not simulated together with \"" + other + '"');
+  }
+}
+
+TEST(SoftbodyScene, ALayerBetweenTheSidesArrivesAndWhatIsWrongWithItIsNamed) {
+  const std::string effects = "[\"contact\", \"geometric-nonlinearity\",\n\"self-collision\"]";
+  const Scene scene =
+      parse_scene(listing("corotational", effects, "[self-collision]\nlayer_mm = 0.2\n"), "s.toml", ".");
+  ASSERT_TRUE(scene.body.self_collision);
+  EXPECT_NEAR(*scene.body.self_collision, 2e-4, 1e-18);
+  EXPECT_EQ(refusal(listing("corotational", effects, "[self-collision]\nlayer_mm = 0\n")),
+            "s.toml:17: self-collision.layer_mm: expected a number above 0 and at most 1e+06");
+  EXPECT_EQ(refusal(listing("linear", "[\"contact\",\n\"self-collision\"]", "")),
+            "s.toml:2: effects: the model \"linear\" does not simulate \"self-collision\", which is listed");
+}
+
 TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
   EXPECT_EQ(refusal(with("cells = [4, 4, 2]", "cells = [4, 4]")),
             "s.toml:5: body.cells: expected three whole numbers from 1 to 200");
@@ -169,18 +201,6 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
             "s.toml:14: place.towards_hand: expected a direction, not [0, 0, 0]");
   EXPECT_EQ(refusal("x = "), "s.toml:1: Error while parsing key-value pair: encountered end-of-file");
   EXPECT_THROW(read_scene("/nowhere/s.toml"), SceneError);
-}
-
-TEST(SoftbodyScene, ExplainSaysWhatIsSimulatedWhatNotAndWarnsOfElementsThatLock) {
-  const std::string text = explain(parse_scene(kGood, "s.toml", "."));
-  for (const std::string_view part : {"simulated:\n  contact: unilateral", "condensed", "not simulated:", "gravity",
-                                      "75 nodes, 32 elements", "unknowns: 150", "touchable nodes: 25"}) {
-    EXPECT_NE(text.find(part), std::string::npos) << part << '\n' << text;
-  }
-  EXPECT_EQ(text.find("warning"), std::string::npos);
-  std::string locking = with("hex8-sri", "tet4");
-  locking.replace(locking.find("0.45"), 4, "0.49");
-  EXPECT_NE(explain(parse_scene(locking, "s.toml", ".")).find("warning: tet4 locks"), std::string::npos);
 }
 
 }  // namespace

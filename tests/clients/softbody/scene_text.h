@@ -29,4 +29,15 @@ inline std::string with(std::string_view old, std::string_view replacement) {
   return text;
 }
 
+/// A cut, but for when it is made.
+inline constexpr std::string_view kCut =
+    "[[cutting]]\ncorner_mm = [0, -60, 25]\nalong_mm = [0, 120, 0]\ndeep_mm = [0, 0, 30]\n";
+
+/// kGood with a model and effects, and tables behind it.
+inline std::string listing(const std::string& model, const std::string& effects, const std::string& tables) {
+  std::string text = with("condensed", model);
+  text.replace(text.find("[\"contact\"]"), 11, effects);
+  return text + tables;
+}
+
 }  // namespace tendon::softbody::testing

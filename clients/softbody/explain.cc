@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/explain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <utility>
+
+namespace tendon::softbody {
+namespace {
+
+constexpr double kWay = 0.003;  // m
+constexpr int kAnswers = 40;    // there and back
+constexpr int kMostRounds = 4;
+constexpr double kEnough = 3;       // s: no further round after so much processor time
+constexpr double kInterval = 0.01;  // s, between two answers
+
+BodyConfig without(BodyConfig body, EffectKind effect) {
+  switch (effect) {
+    case EffectKind::kGravity:
+      body.effects.gravity.reset();
+      break;
+    case EffectKind::kInertia:
+      body.effects.inertia = false;
+      break;
+    case EffectKind::kDamping:
+      body.effects.damping.reset();
+      break;
+    case EffectKind::kViscosity:
+      body.effects.viscosity.reset();
+      break;
+    case EffectKind::kFriction:
+      body.friction.reset();
+      break;
+    case EffectKind::kCutting:
+      body.cuts.clear();
+      break;
+    case EffectKind::kStiffening:
+      body.stiffening.reset();
+      break;
+    case EffectKind::kPlasticity:
+      body.plasticity.reset();
+      break;
+    case EffectKind::kSelfCollision:
+      body.self_collision.reset();
+      break;
+    case EffectKind::kContact:
+    case EffectKind::kGeometricNonlinearity:
+    case EffectKind::kMaterialNonlinearity:
+      break;
+  }
+  return body;
+}
+
+Explanation::Cost press_and_come_back(const BodyConfig& config, const std::function<double()>& processor_time) {
+  Body body(config);
+  const Vec3 surface = body.touch_point();
+  const double start = processor_time();
+  for (int i = 0; i < kAnswers; ++i) {
+    const double depth = kWay * (1 - std::abs(2.0 * i / kAnswers - 1));
+    body.tick(kInterval * i);
+    body.touch(surface + (config.tool_radius - depth) * body.normal());
+  }
+  return {(processor_time() - start) / kAnswers, static_cast<std::int64_t>(body.size().bytes)};
+}
+
+std::string milliseconds(double s, double resolution) {
+  std::ostringstream text;
+  if (std::abs(s) < resolution) text << "< ";
+  text << std::setprecision(3) << 1e3 * (std::abs(s) < resolution ? resolution : s) << " ms";
+  return text.str();
+}
+
+}  // namespace
+
+Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
+  Body body(scene.body);
+  // So little that it is linear, and by force: under its weight the surface is not where the mesh has it.
+  const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
+  Explanation out{.parts = {},
+                  .all = {},
+                  .size = body.size(),
+                  .step = body.step(),
+                  .stiffness = body.settle(Given::kForce, push).stiffness,
+                  .linear_up_to = body.linear_up_to()};
+
+  std::vector<BodyConfig> bodies{scene.body, scene.body};  // the second to see how far the first can be trusted
+  const EffectSet simulated = effects_of(scene.body);
+  const EffectSet always = info(scene.body.model).always;
+  for (const EffectInfo& effect : effects()) {
+    out.parts.push_back({effect.kind, simulated.has(effect.kind), {}});
+    if (!simulated.has(effect.kind) || always.has(effect.kind)) continue;
+    out.parts.back().adds = Explanation::Cost{};
+    bodies.push_back(without(scene.body, effect.kind));
+  }
+  std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
+  const double start = processor_time();
+  for (int round = 0; round < kMostRounds && (round == 0 || processor_time() - start < kEnough); ++round) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Explanation::Cost cost = press_and_come_back(bodies[i], processor_time);
+      least[i] = {std::min(least[i].answer_s, cost.answer_s), cost.bytes};
+    }
+  }
+  out.all = least[0];
+  out.resolution_s = std::abs(least[0].answer_s - least[1].answer_s);
+  std::size_t next = 2;
+  for (Explanation::Part& part : out.parts) {
+    if (!part.adds) continue;
+    const Explanation::Cost& less = least[next++];
+    part.adds = {out.all.answer_s - less.answer_s, out.all.bytes - less.bytes};
+  }
+  return out;
+}
+
+std::string in_words(const Scene& scene, const Explanation& explanation) {
+  const BodyConfig& body = scene.body;
+  const ModelInfo& model = info(body.model);
+  const ElementInfo& element = info(body.element);
+  const Body::Size& size = explanation.size;
+  std::ostringstream text;
+  text << "simulated:\n  contact: " << (body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
+       << (body.tool == BodyConfig::Tool::kSphere ? ", a sphere of " : ", on a patch of ")
+       << 1e3 * (body.tool == BodyConfig::Tool::kSphere ? body.tool_radius : body.patch_radius)
+       << " mm\n  elasticity: " << model.name << ", " << model.what << '\n';
+  for (const auto& [kind, simulated, adds] : explanation.parts) {
+    if (!simulated || kind == EffectKind::kContact) continue;
+    const EffectInfo& effect = info(kind);
+    text << "  " << effect.name << ": " << effect.what;
+    if (adds) {
+      text << "; adds " << milliseconds(adds->answer_s, explanation.resolution_s) << " and " << adds->bytes << " B";
+    }
+    text << '\n';
+  }
+  text << "not simulated:\n";
+  for (const auto& [kind, simulated, adds] : explanation.parts) {
+    if (simulated) continue;
+    text << "  " << info(kind).name
+         << (kind == EffectKind::kGeometricNonlinearity ? ": " + turned_too_far(explanation.linear_up_to) : "") << '\n';
+  }
+  if (explanation.step > 0) {
+    text << "time: every answer is a step of " << 1e3 * explanation.step << " ms\n";
+  } else {
+    text << "time: at rest at every instant; no velocity is kept\n";
+  }
+  text << "cost:\n  mesh: " << size.nodes << " nodes, " << size.elements << " elements (" << element.name << ": "
+       << element.what << ")\n  unknowns: " << size.free << "\n  touchable nodes: " << size.touchable
+       << "\n  model: " << static_cast<double>(size.bytes) / 1e6
+       << " MB\n  an answer: " << milliseconds(explanation.all.answer_s, 0)
+       << " of processor time, measured here and now while pressed by " << 1e3 * kWay << " mm, ± "
+       << milliseconds(explanation.resolution_s, 0) << "\nat first touch: " << explanation.stiffness << " N/m\n";
+  for (const std::string& warning : warnings(body)) text << "warning: " << warning << '\n';
+  return text.str();
+}
+
+std::string in_json(const Scene& scene, const Explanation& explanation) {
+  std::ostringstream text;
+  text << std::setprecision(9) << R"({"model":")" << info(scene.body.model).name << R"(","element":")"
+       << info(scene.body.element).name << R"(","nodes":)" << explanation.size.nodes << R"(,"elements":)"
+       << explanation.size.elements << R"(,"unknowns":)" << explanation.size.free << R"(,"touchable_nodes":)"
+       << explanation.size.touchable << R"(,"bytes":)" << explanation.size.bytes << R"(,"step_s":)" << explanation.step
+       << R"(,"k_n_per_m":)" << explanation.stiffness << R"(,"linear_up_to_m":)";
+  if (std::isfinite(explanation.linear_up_to)) {
+    text << explanation.linear_up_to;
+  } else {
+    text << "null";
+  }
+  text << R"(,"answer_s":)" << explanation.all.answer_s << R"(,"resolution_s":)" << explanation.resolution_s
+       << R"(,"effects":[)";
+  const char* comma = "";
+  for (const auto& [kind, simulated, adds] : explanation.parts) {
+    text << std::exchange(comma, ",") << R"({"name":")" << info(kind).name << R"(","simulated":)"
+         << (simulated ? "true" : "false");
+    if (adds) text << R"(,"adds_s":)" << adds->answer_s << R"(,"adds_bytes":)" << adds->bytes;
+    text << '}';
+  }
+  text << R"(],"warnings":[)";
+  comma = "";
+  for (const std::string& warning : warnings(scene.body)) text << std::exchange(comma, ",") << std::quoted(warning);
+  text << "]}\n";
+  return text.str();
+}
+
+}  // namespace tendon::softbody

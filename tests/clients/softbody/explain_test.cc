@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/explain.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/clients/softbody/pressed_block.h"
+#include "tests/clients/softbody/scene_text.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::kCut;
+using testing::kGood;
+using testing::listing;
+using testing::pressed_body;
+using testing::with;
+
+/// A clock that says one after the other of `times`, and then the last.
+std::function<double()> saying(std::vector<double> times) {
+  return [times, next = std::size_t{0}]() mutable { return times[std::min(next++, times.size() - 1)]; };
+}
+
+std::string explained(const Scene& scene) { return in_words(scene, explain(scene, saying({0, 1e6}))); }
+
+TEST(SoftbodyExplain, SaysWhatIsSimulatedWhatNotAndWarnsOfElementsThatLock) {
+  const std::string text = explained(parse_scene(kGood, "s.toml", "."));
+  for (const std::string_view part : {"simulated:\n  contact: unilateral", "condensed", "not simulated:", "gravity",
+                                      "75 nodes, 32 elements", "unknowns: 150", "touchable nodes: 25"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << '\n' << text;
+  }
+  EXPECT_EQ(text.find("warning"), std::string::npos);
+  std::string locking = with("hex8-sri", "tet4");
+  locking.replace(locking.find("0.45"), 4, "0.49");
+  EXPECT_NE(explained(parse_scene(locking, "s.toml", ".")).find("warning: tet4 locks"), std::string::npos);
+}
+
+TEST(SoftbodyExplain, EveryEffectIsNamedWhereItIsListedAndWhereItIsNot) {
+  const std::string text = listing("linear", "[\"contact\", \"cutting\"]", std::string(kCut) + "at_s = 1\n");
+  const std::string cutting = explained(parse_scene(text, "s.toml", "."));
+  const std::size_t rest = cutting.find("not simulated:");
+  for (const EffectInfo& effect : effects()) {
+    const std::size_t line = cutting.find("\n  " + std::string(effect.name));
+    ASSERT_NE(line, std::string::npos) << effect.name << '\n' << cutting;
+    const bool listed = effect.kind == EffectKind::kContact || effect.kind == EffectKind::kCutting;
+    EXPECT_EQ(line < rest, listed) << effect.name << '\n' << cutting;
+  }
+}
+
+TEST(SoftbodyExplain, WhatAnEffectAddsIsTheDifferenceToTheBodyWithoutIt) {
+  Scene scene{.body = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4)};
+  const auto bytes = [](const BodyConfig& body) { return static_cast<std::int64_t>(Body(body).size().bytes); };
+  const std::int64_t bare = bytes(scene.body);
+  scene.body.effects.density = 1000;
+  scene.body.effects.gravity = Vec3(0, 0, -9.81);
+  // The scene takes 10 s, then 12 s, the one without gravity 4 s; 40 answers each; after that it is late.
+  const Explanation explanation = explain(scene, saying({0, 0, 10, 10, 22, 22, 26, 26}));
+  EXPECT_NEAR(explanation.all.answer_s, 0.25, 1e-12);
+  EXPECT_NEAR(explanation.resolution_s, 0.05, 1e-12);
+  for (const Explanation::Part& part : explanation.parts) {
+    EXPECT_EQ(part.simulated, part.kind == EffectKind::kContact || part.kind == EffectKind::kGravity);
+    ASSERT_EQ(part.adds.has_value(), part.kind == EffectKind::kGravity);
+    if (!part.adds) continue;
+    EXPECT_NEAR(part.adds->answer_s, 0.15, 1e-12);
+    EXPECT_EQ(part.adds->bytes, bytes(scene.body) - bare);
+    EXPECT_GT(part.adds->bytes, 0);
+  }
+  EXPECT_NE(in_words(scene, explanation).find("gravity: the body sags under its weight; adds 150 ms and "),
+            std::string::npos)
+      << in_words(scene, explanation);
+  const auto json = nlohmann::json::parse(in_json(scene, explanation));
+  EXPECT_EQ(json["model"], "linear");
+  EXPECT_EQ(json["unknowns"], 150);
+  EXPECT_NEAR(json["linear_up_to_m"].get<double>(), Body(scene.body).linear_up_to(), 1e-9);
+  EXPECT_EQ(json["effects"].size(), effects().size());
+  for (const auto& effect : json["effects"]) EXPECT_EQ(effect.contains("adds_s"), effect["name"] == "gravity");
+  EXPECT_TRUE(json["warnings"].empty());
+}
+
+}  // namespace
+}  // namespace tendon::softbody
