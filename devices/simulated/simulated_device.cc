@@ -79,6 +79,7 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
   PositionSample sample{now, truth_.position, {}};
   if (config_.encoder_step) sample.position = counted(truth_.position, *config_.encoder_step);
   if (config_.force_sensor) sample.hand_force = sensed_force();
+  if (config_.button_after) sample.buttons = lived_ >= *config_.button_after ? 1 : 0;
   return sample;
 }
 

@@ -69,6 +69,7 @@ class SimulatedDevice final : public Device {
     std::optional<Duration> watchdog;  ///< without an `apply` for so long the force is zero until the next one
 
     std::optional<OperatorHand::Config> hand;
+    std::optional<Duration> button_after;  ///< so long after the first `read` the hand presses button 0, and holds it
 
     /// > 0. 50 µs is 20 substeps per haptic period at 1 kHz. It puts the stiffness at which a sampled spring loses
     /// stability (75 g, 1 kHz) within 1.4e-6 of the exact one at 0.26 N·s/m, and 2.8e-5 at 5. The error goes with the

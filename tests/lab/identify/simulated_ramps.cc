@@ -23,34 +23,42 @@ class Noise {
   std::mt19937_64 random_;
 };
 
-RampRun simulated_ramp(const RampExperiment& experiment, double rate, Noise& noise) {
-  SimulatedDevice device(experiment.device);
-  const double t = seconds(experiment.period);
-  const auto steps = experiment.longest / experiment.period;
+}  // namespace
+
+RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan) {
   RampRun run;
-  LocalTime now{};
-  for (Duration::rep i = 0; i < steps; ++i, now += experiment.period) {
-    const double x = device.read(now)->position.x();
-    const double at = static_cast<double>(i) * t;
-    run.samples.push_back({.t = at, .position = x, .force = rate * at});
-    if (std::abs(x - run.samples.front().position) > experiment.travel) break;
-    device.apply({rate * at + experiment.force_noise * noise() + experiment.bias, 0, 0});
+  double force = 0;
+  for (Duration at{}; at < plan.longest; at += plan.period) {
+    const auto sample = device.read(begin + at);
+    if (sample) force = plan.rate * seconds(at);
+    if (sample && !run.samples.empty() && std::abs(sample->position.x() - run.samples.front().position) > plan.travel) {
+      break;
+    }
+    const double disturbance = plan.disturbance ? plan.disturbance() : 0;
+    const double written = device.apply({force + disturbance, 0, 0}).x() - disturbance;
+    if (sample) run.samples.push_back({.t = seconds(at), .position = sample->position.x(), .force = written});
   }
+  device.apply(Vec3::Zero());
   return run;
 }
-
-}  // namespace
 
 std::vector<RampRun> simulated_ramps(const RampExperiment& experiment) {
   if (!(experiment.travel > 0)) throw std::invalid_argument("travel: expected more than 0 m");
   if (!(experiment.period > Duration::zero())) throw std::invalid_argument("period: expected more than 0 s");
   Noise noise(experiment.seed);
+  RampPlan plan{
+      .travel = experiment.travel, .period = experiment.period, .longest = experiment.longest, .disturbance = [&] {
+        return experiment.force_noise * noise() + experiment.bias;
+      }};
   std::vector<RampRun> runs;
   for (const double rate : experiment.rates) {
     if (!(rate > 0)) throw std::invalid_argument("rates: expected more than 0 N/s");
     for (int i = 0; i < experiment.repeats; ++i) {
-      runs.push_back(simulated_ramp(experiment, rate, noise));
-      runs.push_back(simulated_ramp(experiment, -rate, noise));
+      for (const double signed_rate : {rate, -rate}) {
+        SimulatedDevice device(experiment.device);
+        plan.rate = signed_rate;
+        runs.push_back(run_ramp(device, LocalTime{}, plan));
+      }
     }
   }
   return runs;

@@ -2,12 +2,29 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/identification/ramp_run.h"
+#include "devices/device.h"
 #include "devices/simulated/simulated_device.h"
 
 namespace tendon::lab {
+
+/// One run of the friction experiment on a device that nobody touches: from rest, a force along x that rises from zero.
+struct RampPlan {
+  double rate = 0.1;     ///< N/s, not 0; below 0: towards −x
+  double travel = 0.25;  ///< m, after which it ends
+  Duration period = std::chrono::milliseconds(1);
+  Duration longest = std::chrono::seconds(20);
+  /// N, what the motors do besides, each period; empty: nothing.
+  std::function<double()> disturbance{};
+};
+
+/// Runs it, from `begin` on, and records what a program beside the device would: positions as they are read, and the
+/// force that the device says it has written, but for the disturbance. While a reading does not come the force stays as
+/// it is. Ends with zero force.
+RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan);
 
 /// The friction experiment of the paper (Tables II, III) on a simulated device: from rest, a force that rises from zero
 /// at a constant rate, until the handle has travelled through its workspace.

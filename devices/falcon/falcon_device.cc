@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/falcon/falcon_device.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdlib>
+#include <span>
+#include <utility>
+
+namespace tendon {
+namespace {
+
+using namespace usb::ftdi;  // NOLINT(google-build-using-namespace): the requests below are all its
+using namespace std::chrono_literals;
+using falcon::Counts;
+using falcon::Reply;
+
+/// 1.5 Mbaud. The last byte of a reply flushes it: without that it waits for the latency timer, up to 1 ms.
+constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, flush_at(falcon::kPacketEnd),
+                                 kPurgeOne,  kPurgeOther};
+
+/// A device with firmware answers within 2 ms; libnifalcon asks some hundred times before it believes that it has none.
+constexpr Duration kProbing = 300ms;
+/// Then the plug is looked at again: somebody may have switched the device's own supply on.
+constexpr Duration kRest = 2s;
+/// A reply later than this is lost, and asked for again.
+constexpr Duration kAnswerTime = 5ms;
+/// No force on a device that nobody has heard of for so long: ten periods.
+constexpr Duration kQuiet = 10ms;
+/// After this it is as good as unplugged. A loop that was stopped for so long by its machine has its replies waiting,
+/// and takes them first.
+constexpr Duration kLost = 100ms;
+
+/// One garbled byte can say that all legs are homed, or that one is not; ten replies in a row cannot.
+constexpr int kSureReplies = 10;
+
+/// A mm is at most 55 counts of a motor within 50 mm of the centre: 3 m/s there, 5 m/s at the centre. A handle that
+/// nobody holds does not get to 3 m/s within the workspace.
+constexpr double kMostCountsPerSecond = 165e3;
+/// For replies that come closer together than they were taken.
+constexpr double kMoreCounts = 30;
+
+constexpr Counts kNoTorque{};
+
+}  // namespace
+
+FalconDevice::FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe)
+    : info_{.name = "Novint Falcon",
+            .max_force = 8,  // CHAI3D's device table. Of ±4096 counts: 16 N along z, 6 to 8 N across it
+            .position_resolution = 43e-6,
+            .force_resolution = 0.01,  // a count of each motor, within 50 mm of the centre
+            .watchdog = Duration::zero()},
+      firmware_(std::move(config.firmware)),
+      pipe_(std::move(pipe)),
+      loader_(firmware_) {}
+
+bool FalconDevice::streaming() const noexcept {
+  const State state = this->state();
+  return (state == State::kOpening && set_up_) || state == State::kUnhomed || state == State::kHomed;
+}
+
+void FalconDevice::enter(State state) noexcept {
+  state_.store(state, std::memory_order_relaxed);
+  entered_ = now_;
+  switch (state) {
+    case State::kOpening:
+      setup_ = Setup(kRunMode);
+      set_up_ = false;
+      asked_.reset();
+      newest_.reset();
+      held_ = kNoTorque;
+      break;
+    case State::kFirmware:
+      loader_.restart();
+      resting_ = firmware_.empty();
+      break;
+    case State::kAbsent:
+    case State::kUnhomed:
+    case State::kHomed:
+      homed_replies_ = 0;
+      located_ = false;
+      break;
+  }
+}
+
+void FalconDevice::follow_connection() noexcept {
+  const std::uint32_t connection = pipe_->connection();
+  if (connection == connection_) return;
+  connection_ = connection;
+  loaded_ = false;
+  enter(connection == 0 ? State::kAbsent : State::kOpening);
+}
+
+void FalconDevice::give_up() noexcept {
+  pipe_->reopen();
+  enter(State::kAbsent);
+}
+
+std::optional<PositionSample> FalconDevice::read(LocalTime now) noexcept {
+  now_ = now;
+  fresh_ = false;
+  follow_connection();
+  if (state() == State::kAbsent) return std::nullopt;
+  receive();
+  advance();
+  if (state() != State::kHomed || !fresh_) return std::nullopt;
+  return PositionSample{.at = now,
+                        .position = pose_->position - falcon::kCentre,
+                        .hand_force = std::nullopt,
+                        .buttons = newest_->buttons};
+}
+
+void FalconDevice::receive() noexcept {
+  std::array<std::uint8_t, usb::kPacketSize> packet;
+  while (const std::size_t size = pipe_->read(packet)) {
+    const auto bytes = payload(std::span(packet).first(size));
+    if (state() == State::kFirmware) {
+      loader_.receive(bytes);
+    } else if (streaming()) {
+      parser_.feed(bytes);
+      while (const auto reply = parser_.next()) believe(*reply);
+    }
+  }
+  left_out_bytes_.count.store(parser_.left_out(), std::memory_order_relaxed);
+}
+
+bool FalconDevice::plausible(const Reply& reply) const noexcept {
+  if (!newest_) return true;
+  const double most = kMoreCounts + kMostCountsPerSecond * seconds(now_ - heard_);
+  for (std::size_t leg = 0; leg < reply.encoders.size(); ++leg) {
+    if (std::abs(reply.encoders[leg] - newest_->encoders[leg]) > most) return false;
+  }
+  return true;
+}
+
+void FalconDevice::believe(const Reply& reply) noexcept {
+  const bool homed = reply.homed == Reply::kAllHomed;
+  const bool in_step = plausible(reply);
+  asked_.reset();
+  heard_ = now_;
+  // A leg that finds its home, or loses it, jumps.
+  if (state() == State::kHomed && homed && !in_step) {
+    implausible_.add();
+    return;
+  }
+  replies_.add();
+  believed_ = now_;
+  newest_ = reply;
+  if (homed) {
+    homed_replies_ = in_step ? std::max(homed_replies_, 0) + 1 : 0;
+  } else {
+    homed_replies_ = std::min(homed_replies_, 0) - 1;
+  }
+  if (homed_replies_ <= -kSureReplies) moved_origin_ = false;
+  if (state() == State::kOpening || (state() == State::kHomed && !homed)) enter(State::kUnhomed);
+  if (state() == State::kUnhomed && homed_replies_ >= kSureReplies && !moved_origin_) enter(State::kHomed);
+  if (state() == State::kHomed) locate(reply);
+}
+
+void FalconDevice::locate(const Reply& reply) noexcept {
+  const Vec3 angles = falcon::angles_at(reply.encoders);
+  auto pose = located_ ? falcon::pose_with(angles, pose_->position) : std::nullopt;
+  if (!pose) pose = falcon::pose_with(angles, falcon::kCentre);
+  located_ = fresh_ = pose.has_value();
+  if (pose) {
+    pose_ = pose;
+  } else {
+    unreachable_.add();
+  }
+}
+
+void FalconDevice::advance() noexcept {
+  const Duration here = now_ - entered_;
+  switch (state()) {
+    case State::kOpening:
+      if (!set_up_) {
+        set_up_ = setup_.step(*pipe_);
+        if (set_up_) {
+          parser_.clear();
+          entered_ = now_;
+        }
+      } else if (here >= kProbing) {
+        if (loaded_) failed_loads_.add();
+        enter(State::kFirmware);
+        resting_ = resting_ || loaded_;
+      }
+      break;
+    case State::kFirmware:
+      if (resting_) {
+        if (here >= kRest) give_up();
+        break;
+      }
+      switch (loader_.step(now_, *pipe_)) {
+        case falcon::FirmwareLoader::Progress::kBusy:
+          break;
+        case falcon::FirmwareLoader::Progress::kDone:
+          loaded_ = true;
+          moved_origin_ = false;  // the boot loader answered: nothing is left of it
+          enter(State::kOpening);
+          break;
+        case falcon::FirmwareLoader::Progress::kFailed:
+          failed_loads_.add();
+          resting_ = true;
+          entered_ = now_;
+          break;
+      }
+      break;
+    case State::kUnhomed:
+    case State::kHomed:
+      if (now_ - heard_ >= kLost) {
+        silences_.add();
+        give_up();
+      } else if (now_ - believed_ >= kLost) {
+        lost_counts_.add();
+        moved_origin_ = true;
+        enter(firmware_.empty() ? State::kUnhomed : State::kFirmware);
+      }
+      break;
+    case State::kAbsent:
+      break;
+  }
+}
+
+Vec3 FalconDevice::apply(const Vec3& force) noexcept {
+  if (!streaming()) return Vec3::Zero();
+  const bool ready = state() == State::kHomed && located_ && now_ - believed_ < kQuiet;
+  const Counts wanted = ready ? falcon::counts_for(*pose_, force) : kNoTorque;
+  const bool lost = asked_ && now_ - *asked_ >= kAnswerTime;
+  const bool let_go = wanted == kNoTorque && held_ != kNoTorque;
+  if (!asked_ || lost || let_go) {
+    const falcon::Command command{.torque = wanted, .homing = true, .lamps = ready ? falcon::kGreen : falcon::kRed};
+    if (pipe_->write(falcon::encode(command))) {
+      if (lost) unanswered_.add();
+      asked_ = now_;
+      held_ = wanted;
+    }
+  }
+  return pose_ && held_ != kNoTorque ? falcon::force_of(*pose_, held_) : Vec3::Zero();
+}
+
+FalconDevice::Stats FalconDevice::stats() const noexcept {
+  return {.replies = replies_.value(),
+          .implausible = implausible_.value(),
+          .unreachable = unreachable_.value(),
+          .left_out_bytes = left_out_bytes_.value(),
+          .unanswered = unanswered_.value(),
+          .silences = silences_.value(),
+          .lost_counts = lost_counts_.value(),
+          .failed_loads = failed_loads_.value()};
+}
+
+}  // namespace tendon

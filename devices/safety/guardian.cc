@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/safety/guardian.h"
+
+#include <fcntl.h>
+#include <linux/usbdevice_fs.h>
+#include <sys/ioctl.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <type_traits>
+
+namespace tendon {
+
+namespace {
+
+constexpr int kTries = 5;
+constexpr unsigned kTryTime_ms = 10;
+
+/// What the server tells its guardian; with a descriptor beside it, unless the device is to be forgotten.
+struct Order {
+  std::size_t device;
+  ZeroPacket zero;
+};
+static_assert(std::is_trivially_copyable_v<Order>);
+
+bool send_order(int socket, const Order& order, int fd) noexcept {
+  iovec part{.iov_base = const_cast<Order*>(&order), .iov_len = sizeof(order)};  // NOLINT: sendmsg only reads it
+  alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(int))> control{};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  if (fd >= 0) {
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    cmsghdr* header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(sizeof(fd));
+    std::memcpy(CMSG_DATA(header), &fd, sizeof(fd));
+  }
+  return sendmsg(socket, &message, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof(order));
+}
+
+/// What the guardian keeps of a device.
+struct Charge {
+  int fd = -1;
+  std::optional<ZeroPacket> zero;
+};
+
+/// The next order. False at the end: nobody can give any more.
+bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges) noexcept {
+  alignas(Order) std::array<std::byte, sizeof(Order)> bytes{};
+  iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
+  alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(int))> control{};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  ssize_t size = 0;
+  do {
+    size = recvmsg(socket, &message, MSG_CMSG_CLOEXEC);
+  } while (size < 0 && errno == EINTR);
+  if (size != static_cast<ssize_t>(bytes.size())) return false;
+
+  int fd = -1;
+  if (const cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr && header->cmsg_type == SCM_RIGHTS) {
+    std::memcpy(&fd, CMSG_DATA(header), sizeof(fd));
+  }
+  const auto* order = reinterpret_cast<const Order*>(bytes.data());
+  Charge& charge = charges[order->device];
+  if (charge.fd >= 0) close(charge.fd);
+  charge = {fd, order->zero};
+  return true;
+}
+
+[[noreturn]] void stand_guard(int socket) noexcept {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) std::signal(signal, SIG_IGN);
+  setsid();
+  prctl(PR_SET_NAME, "tendon-guardian", 0UL, 0UL, 0UL);
+  // Whoever reads what the server says is to see its end; and nothing of the server's is to be kept open.
+  if (const int null = open("/dev/null", O_RDWR | O_CLOEXEC); null >= 0) {
+    for (const int standard : {0, 1, 2}) dup2(null, standard);
+  }
+  if (socket > 3) close_range(3, static_cast<unsigned>(socket) - 1, 0);
+  close_range(static_cast<unsigned>(socket) + 1, ~0U, 0);
+
+  std::array<Charge, Guardian::kDevices> charges;
+  while (take_order(socket, charges)) {
+  }
+  for (const Charge& charge : charges) {
+    if (charge.fd >= 0) charge.zero->send(charge.fd);
+  }
+  _exit(0);
+}
+
+}  // namespace
+
+ZeroPacket::ZeroPacket(bool usb, std::uint8_t endpoint, std::span<const std::byte> bytes)
+    : size_(static_cast<std::uint8_t>(bytes.size())), endpoint_(endpoint), usb_(usb) {
+  if (bytes.empty() || bytes.size() > kMost) {
+    throw std::invalid_argument("a zero packet: expected 1 to 64 bytes, got " + std::to_string(bytes.size()));
+  }
+  std::copy(bytes.begin(), bytes.end(), bytes_.begin());
+}
+
+ZeroPacket ZeroPacket::usb(std::uint8_t endpoint, std::span<const std::byte> bytes) { return {true, endpoint, bytes}; }
+
+ZeroPacket ZeroPacket::written(std::span<const std::byte> bytes) { return {false, 0, bytes}; }
+
+bool ZeroPacket::send_once(int fd) const noexcept {
+  std::array<std::byte, kMost> bytes = bytes_;
+  if (!usb_) return write(fd, bytes.data(), size_) == size_;
+  usbdevfs_bulktransfer transfer{.ep = endpoint_, .len = size_, .timeout = kTryTime_ms, .data = bytes.data()};
+  return ioctl(fd, USBDEVFS_BULK, &transfer) == size_;
+}
+
+bool ZeroPacket::send(int fd) const noexcept {
+  for (int i = 0; i < kTries; ++i) {
+    if (send_once(fd)) return true;
+    if (errno == ENODEV || errno == EBADF || errno == EPIPE) return false;  // nobody is there to feel anything
+    if (errno != ETIMEDOUT) usleep(kTryTime_ms * 1000);
+  }
+  return false;
+}
+
+Guardian::Guardian() {
+  std::array<int, 2> ends{};
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    throw std::system_error(errno, std::generic_category(), "no socket for the guardian");
+  }
+  pid_ = fork();
+  if (pid_ == 0) {
+    close(ends[0]);
+    stand_guard(ends[1]);
+  }
+  const int error = errno;
+  close(ends[1]);
+  if (pid_ < 0) {
+    close(ends[0]);
+    throw std::system_error(error, std::generic_category(), "no process for the guardian");
+  }
+  socket_ = ends[0];
+}
+
+Guardian::~Guardian() {
+  close(socket_);
+  while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
+  }
+}
+
+bool Guardian::guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept {
+  return device < kDevices && fd >= 0 && send_order(socket_, {device, zero}, fd);
+}
+
+bool Guardian::forget(std::size_t device) noexcept {
+  static const std::byte kNothing{};
+  return device < kDevices && send_order(socket_, {device, ZeroPacket::written({&kNothing, 1})}, -1);
+}
+
+}  // namespace tendon

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/safety/safe_device.h"
+
+#include <algorithm>
+#include <numbers>
+#include <stdexcept>
+
+#include "core/expect.h"
+
+namespace tendon {
+
+namespace {
+
+/// So long a handle must have been still before it is said to rest: longer than a tremor (8 to 12 Hz) turns round.
+constexpr Duration kRest = std::chrono::milliseconds(50);
+/// A reading that is late by so much is no end of rest: a device's answers come when they come.
+constexpr Duration kBlind = std::chrono::milliseconds(10);
+/// After a pause the force may not have grown for as long as the pause lasted.
+constexpr Duration kLongestStep = std::chrono::milliseconds(10);
+
+template <class Part, class Config, class... More>
+std::optional<Part> made(const std::optional<Config>& config, More... more) {
+  if (!config) return std::nullopt;
+  return Part(*config, more...);
+}
+
+DeviceInfo limited_info(DeviceInfo info, const std::optional<ForceLimit>& limit) {
+  if (limit) info.max_force = info.max_force > 0 ? std::min(info.max_force, limit->max()) : limit->max();
+  return info;
+}
+
+}  // namespace
+
+std::string_view to_string(SafetyState state) noexcept {
+  switch (state) {
+    case SafetyState::kAbsent:
+      return "absent";
+    case SafetyState::kOpening:
+      return "opening";
+    case SafetyState::kFirmware:
+      return "firmware";
+    case SafetyState::kUnhomed:
+      return "unhomed";
+    case SafetyState::kHomed:
+      return "homed";
+    case SafetyState::kArmed:
+      return "armed";
+    case SafetyState::kFault:
+      return "fault";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(SafetyFault fault) noexcept {
+  switch (fault) {
+    case SafetyFault::kNone:
+      return "none";
+    case SafetyFault::kForceNotFinite:
+      return "a force was asked for that is not a number";
+    case SafetyFault::kPositionNotFinite:
+      return "the device measured a position that is not a number";
+    case SafetyFault::kPositionJumped:
+      return "the device's position has jumped further than a hand can move";
+    case SafetyFault::kTooFast:
+      return "the handle was faster than a hand that holds it";
+    case SafetyFault::kCommandSilent:
+      return "no force was commanded in time";
+    case SafetyFault::kDeviceSilent:
+      return "the device gave no position in time";
+    case SafetyFault::kDeviceLost:
+      return "the device was unplugged or has lost its origin";
+  }
+  return "unknown";
+}
+
+SafeDevice::SafeDevice(const Config& config, Device& device)
+    : arming_(config.arming),
+      device_(device),
+      growth_limit_(made<GrowthLimit>(config.growth_limit)),
+      force_limit_(made<ForceLimit>(config.force_limit)),
+      heat_limit_(made<HeatLimit>(config.heat_limit)),
+      workspace_(made<Workspace>(config.workspace)),
+      ramp_in_(made<RampIn>(config.ramp_in)),
+      speed_trip_(made<SpeedTrip>(config.speed_trip, device.info().position_resolution)),
+      step_bound_(made<StepBound>(config.step_bound, device.info().position_resolution)),
+      command_watchdog_(made<Watchdog>(config.command_watchdog, "command_watchdog")),
+      link_watchdog_(made<Watchdog>(config.link_watchdog, "link_watchdog")),
+      dead_man_(made<DeadManSwitch>(config.dead_man)) {
+  expect_above_zero(arming_.rest_speed, "arming.rest_speed");
+  expect_above_zero(arming_.rest_force, "arming.rest_force");
+  expect_above_zero(seconds(arming_.patience), "arming.patience");
+  if (arming_.by == Arming::By::kDeadMan && !dead_man_) {
+    throw std::invalid_argument("dead_man: expected to be listed, because the device is armed by its button");
+  }
+  info_ = limited_info(device.info(), force_limit_);
+  if (arming_.by == Arming::By::kStart) request_until_ = LocalTime::max();
+  publish();
+}
+
+void SafeDevice::arm() noexcept {
+  if (arming_.by == Arming::By::kDeadMan || stage_ == Stage::kArmed || !now_) return;
+  request_until_ = std::max(request_until_, *now_ + arming_.patience);
+}
+
+std::optional<PositionSample> SafeDevice::read(LocalTime now) noexcept {
+  passed_ = now_ ? std::max(now - *now_, Duration::zero()) : Duration::zero();
+  now_ = now;
+  if (heat_limit_) heat_limit_->observe(applied_.norm(), passed_);
+  auto sample = device_.read(now);
+  if (sample && !accept(*sample)) sample.reset();
+  if (now - heard_at_ > kBlind) rest_.reset();
+  watch_silence();
+  publish();
+  return sample;
+}
+
+bool SafeDevice::accept(const PositionSample& sample) noexcept {
+  if (device_.state() != State::kHomed) {
+    forget_motion();
+    return false;
+  }
+  if (!sample.position.allFinite()) {
+    trip(SafetyFault::kPositionNotFinite);
+    forget_motion();
+    return false;
+  }
+  if (step_bound_ && last_ && step_bound_->tripped(last_->position, sample.position, sample.at - last_->at)) {
+    trip(SafetyFault::kPositionJumped);
+    forget_motion();
+    last_ = sample;  // where it is from now on
+    return false;
+  }
+  last_ = sample;
+  heard_at_ = sample.at;
+  if (speed_trip_ && speed_trip_->tripped(sample.at, sample.position)) trip(SafetyFault::kTooFast);
+  watch_rest(sample);
+  watch_button(sample.buttons);
+  return true;
+}
+
+void SafeDevice::watch_rest(const PositionSample& sample) noexcept {
+  const double near = arming_.rest_speed * seconds(kRest) + std::numbers::sqrt3 * info_.position_resolution;
+  if (!rest_ || (sample.position - rest_->position).norm() > near) rest_ = sample;
+}
+
+void SafeDevice::watch_button(std::uint32_t buttons) noexcept {
+  if (!dead_man_) return;
+  const bool held = dead_man_->held(buttons);
+  if (!held && stage_ == Stage::kArmed) {
+    stage_ = stopping_ ? Stage::kFault : Stage::kWaiting;
+    stopping_.reset();
+  }
+  if (arming_.by == Arming::By::kDeadMan) {
+    if (held && !button_held_) request_until_ = LocalTime::max();
+    if (!held) request_until_ = LocalTime::min();
+  }
+  button_held_ = held;
+}
+
+void SafeDevice::watch_silence() noexcept {
+  if (stage_ != Stage::kArmed) return;
+  if (command_watchdog_ && command_watchdog_->tripped(*now_ - applied_at_)) {
+    trip(SafetyFault::kCommandSilent, command_watchdog_->ramp());
+  }
+  if (link_watchdog_ && link_watchdog_->tripped(*now_ - heard_at_)) {
+    trip(SafetyFault::kDeviceSilent, link_watchdog_->ramp());
+  }
+}
+
+void SafeDevice::trip(SafetyFault fault, Duration ramp) noexcept {
+  if (stage_ != Stage::kArmed) return;
+  if (!stopping_) {
+    last_fault_ = fault;
+    ++faults_;
+    stopping_ = RampOut{*now_, ramp};
+  }
+  if (ramp == Duration::zero()) stopping_->time = ramp;
+  if (stopped()) stage_ = Stage::kFault;
+}
+
+bool SafeDevice::stopped() const noexcept { return stopping_ && stopping_->share(*now_) == 0; }
+
+void SafeDevice::forget_motion() noexcept {
+  last_.reset();
+  rest_.reset();
+  if (speed_trip_) speed_trip_->forget();
+}
+
+bool SafeDevice::may_be_armed(const Vec3& asked) const noexcept {
+  return now_ && *now_ <= request_until_ && device_.state() == State::kHomed && rest_ &&
+         last_->at - rest_->at >= kRest && asked.norm() <= arming_.rest_force && (!dead_man_ || button_held_) &&
+         !(link_watchdog_ && link_watchdog_->tripped(*now_ - heard_at_));
+}
+
+Vec3 SafeDevice::limited(const Vec3& asked) const noexcept {
+  Vec3 force = asked;
+  const auto give = [&force](double share) { force *= share; };
+  if (force_limit_) give(force_limit_->share(force));
+  if (heat_limit_) give(heat_limit_->share(force));
+  if (workspace_ && last_) give(workspace_->share(force, last_->position));
+  if (ramp_in_) give(ramp_in_->share(*now_ - armed_at_));
+  if (stopping_) give(stopping_->share(*now_));
+  if (growth_limit_) give(growth_limit_->share(force, applied_, std::min(passed_, kLongestStep)));
+  return force;
+}
+
+Vec3 SafeDevice::apply(const Vec3& force) noexcept {
+  const bool finite = force.allFinite();
+  if (!finite) trip(SafetyFault::kForceNotFinite);
+  if (device_.state() != State::kHomed) trip(SafetyFault::kDeviceLost);
+  if (stage_ == Stage::kArmed && stopped()) stage_ = Stage::kFault;
+  if (stage_ != Stage::kArmed && finite && may_be_armed(force)) {
+    stage_ = Stage::kArmed;
+    stopping_.reset();
+    request_until_ = LocalTime::min();
+    armed_at_ = *now_;
+    ++times_armed_;
+  }
+  applied_ = device_.apply(stage_ == Stage::kArmed ? limited(force) : Vec3(Vec3::Zero()));
+  if (now_) applied_at_ = *now_;
+  publish();
+  return applied_;
+}
+
+SafetyState SafeDevice::safety_state() const noexcept {
+  static_assert(static_cast<int>(SafetyState::kHomed) == static_cast<int>(State::kHomed));
+  if (stage_ == Stage::kArmed) return SafetyState::kArmed;
+  if (stage_ == Stage::kFault) return SafetyState::kFault;
+  return static_cast<SafetyState>(device_.state());
+}
+
+void SafeDevice::publish() noexcept {
+  status_.store(static_cast<std::uint64_t>(safety_state()) | static_cast<std::uint64_t>(last_fault_) << 8U |
+                    static_cast<std::uint64_t>(faults_) << 32U,
+                std::memory_order_relaxed);
+}
+
+SafeDevice::Status SafeDevice::status() const noexcept {
+  const std::uint64_t status = status_.load(std::memory_order_relaxed);
+  return {static_cast<SafetyState>(status & 0xFFU), static_cast<SafetyFault>(status >> 8U & 0xFFU),
+          static_cast<std::uint32_t>(status >> 32U)};
+}
+
+}  // namespace tendon

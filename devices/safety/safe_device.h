@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "devices/device.h"
+#include "devices/safety/force_shares.h"
+#include "devices/safety/trips.h"
+
+namespace tendon {
+
+/// Where a device stands between the plug and the force. Only in `kArmed` is there any.
+enum class SafetyState : std::uint8_t {
+  kAbsent,    ///< kAbsent … kHomed: Device::State of the device inside
+  kOpening,   //
+  kFirmware,  //
+  kUnhomed,   //
+  kHomed,     ///< ready, and waiting to be armed
+  kArmed,     ///< gives forces
+  kFault,     ///< was armed, and something happened: no force until it is armed again
+};
+std::string_view to_string(SafetyState state) noexcept;
+
+/// Why an armed device gives no force any more.
+enum class SafetyFault : std::uint8_t {
+  kNone,
+  kForceNotFinite,     ///< NaN or infinity was asked for
+  kPositionNotFinite,  ///< … or measured
+  kPositionJumped,     ///< StepBound
+  kTooFast,            ///< SpeedTrip
+  kCommandSilent,      ///< nobody called `apply` in time (Watchdog)
+  kDeviceSilent,       ///< the device gave no position in time (Watchdog)
+  kDeviceLost,         ///< it is not homed any more: unplugged, or lost its origin
+};
+/// A sentence for people: "the handle was faster than a hand".
+std::string_view to_string(SafetyFault fault) noexcept;
+
+/// The safety layer: a device around any other, between the control law and the motors.
+///
+///     F ← 0                              unless armed; F with a NaN or infinity is a fault
+///     F ← s F, 0 ≤ s ≤ 1                 for each part that is listed: growth, size, heat, workspace, ramp-in, and the
+///                                        ramp to zero of a watchdog that has tripped
+///
+/// So for whatever is asked |F_i applied| ≤ |F_i asked| for each component i, as long as the device inside does not
+/// write more than it is told; and `apply` returns what it wrote, so that the energy ledger counts what is left. No
+/// part is on unless it is listed: one that is not costs a branch. What is always there is the state machine:
+///
+///     Absent → Opening → Firmware → Unhomed → Homed ⇄ Armed → Fault → Armed
+///
+/// **Arming** has to be asked for (Arming), and is granted by the first `apply` at which the device is homed, its
+/// handle has gone no further than `rest_speed` allows for 50 ms and was never unseen for more than 10 of them, the
+/// force asked for is at most `rest_force`, and the dead man's button, if there is one, is held. A request that is not
+/// granted within `patience` is forgotten, as is one before the first `read`.
+///
+/// **Faults** are latched, in Armed only: outside it there is no force to take away, and what is wrong there keeps it
+/// from being armed. Force is zero from the next `apply` on; with a watchdog's ramp it stays in Armed, on its way to
+/// zero, until it is there. Letting go of the dead man's button is no fault: Armed → Homed, zero at once.
+///
+/// What this layer cannot do: act while nobody calls it. When the whole process hangs or dies, forces end by the
+/// device's own watchdog, or by the guardian (guardian.h).
+///
+/// Positions that are no numbers or jumped (StepBound) are passed on as not seen.
+///
+/// Thread-safe: no; but `status` may be read from any thread. Realtime-safe: all but the constructor.
+class SafeDevice final : public Device {
+ public:
+  struct Arming {
+    enum class By : std::uint8_t {
+      kRequest,  ///< only `arm`
+      kStart,    ///< the first time by itself, then `arm`
+      kDeadMan,  ///< only by pressing the dead man's button; `arm` does nothing
+    };
+    By by = By::kRequest;
+    double rest_speed = 0.02;  ///< m/s, > 0
+    double rest_force = 0.1;   ///< N, > 0
+    Duration patience = std::chrono::seconds(1);
+  };
+
+  struct Config {
+    Arming arming;
+    std::optional<GrowthLimit::Config> growth_limit;
+    std::optional<ForceLimit::Config> force_limit;
+    std::optional<HeatLimit::Config> heat_limit;
+    std::optional<Workspace::Config> workspace;
+    std::optional<RampIn::Config> ramp_in;
+    std::optional<SpeedTrip::Config> speed_trip;
+    std::optional<StepBound::Config> step_bound;
+    std::optional<Watchdog::Config> command_watchdog;  ///< between two calls of `apply`
+    std::optional<Watchdog::Config> link_watchdog;     ///< since the newest position was sampled
+    std::optional<DeadManSwitch::Config> dead_man;
+  };
+
+  struct Status {
+    SafetyState state = SafetyState::kAbsent;
+    SafetyFault last_fault = SafetyFault::kNone;  ///< also after it was armed again
+    std::uint32_t faults = 0;                     ///< so far
+  };
+
+  /// `device` must outlive it. Throws std::invalid_argument naming the field when a value is impossible.
+  SafeDevice(const Config& config, Device& device);
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  State state() const noexcept override { return device_.state(); }
+  void arm() noexcept override;
+  std::uint32_t times_armed() const noexcept override { return times_armed_; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override;
+  Vec3 apply(const Vec3& force) noexcept override;
+
+  Status status() const noexcept;
+
+ private:
+  enum class Stage : std::uint8_t { kWaiting, kArmed, kFault };
+
+  bool accept(const PositionSample& sample) noexcept;
+  void watch_rest(const PositionSample& sample) noexcept;
+  void watch_button(std::uint32_t buttons) noexcept;
+  void watch_silence() noexcept;
+  void trip(SafetyFault fault, Duration ramp = Duration::zero()) noexcept;
+  void forget_motion() noexcept;
+  bool may_be_armed(const Vec3& asked) const noexcept;
+  bool stopped() const noexcept;
+  Vec3 limited(const Vec3& asked) const noexcept;
+  SafetyState safety_state() const noexcept;
+  void publish() noexcept;
+
+  Arming arming_;
+  Device& device_;
+  DeviceInfo info_;
+  std::optional<GrowthLimit> growth_limit_;
+  std::optional<ForceLimit> force_limit_;
+  std::optional<HeatLimit> heat_limit_;
+  std::optional<Workspace> workspace_;
+  std::optional<RampIn> ramp_in_;
+  std::optional<SpeedTrip> speed_trip_;
+  std::optional<StepBound> step_bound_;
+  std::optional<Watchdog> command_watchdog_;
+  std::optional<Watchdog> link_watchdog_;
+  std::optional<DeadManSwitch> dead_man_;
+
+  Stage stage_ = Stage::kWaiting;
+  std::optional<RampOut> stopping_;             ///< a fault whose force is on its way to zero
+  LocalTime request_until_ = LocalTime::min();  ///< the operator's request to arm is open until then
+  bool button_held_ = true;                     ///< one that is stuck has never been pressed
+
+  std::optional<LocalTime> now_;  ///< of the last `read`
+  Duration passed_{};             ///< between the last two
+  std::optional<PositionSample> last_;
+  /// Since when, and about where, the handle has been at rest; empty when it is not known to be.
+  std::optional<PositionSample> rest_;
+  LocalTime heard_at_{};  ///< when the newest good position was sampled
+  LocalTime applied_at_{};
+  LocalTime armed_at_{};
+  Vec3 applied_ = Vec3::Zero();  ///< N, what the device really holds
+
+  std::uint32_t times_armed_ = 0;
+  SafetyFault last_fault_ = SafetyFault::kNone;
+  std::uint32_t faults_ = 0;
+  std::atomic<std::uint64_t> status_{0};
+};
+
+}  // namespace tendon

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "devices/device.h"
+#include "devices/spacemouse/report.h"
+#include "devices/usb/pipe.h"
+
+namespace tendon {
+
+/// A 3Dconnexion SpaceMouse over a `usb::Pipe`, as a leader without force: how far its cap is pushed is how fast the
+/// position goes (rate control), because it has some millimetres of travel and comes back to the middle by itself.
+///
+///     d = (X, −Z, Y) / 350, no longer than 1;     v = speed · (|d| − dead_band) / (1 − dead_band) · d/|d|, or 0
+///     within; p ← p + v (now − before), each component within ±reach
+///
+/// x right, y up, z towards the user, as the Falcon's. It starts at the origin, and where it was once the plug was out.
+/// Rotation is read and not used. A push that no report has confirmed for 100 ms is over, and no `read` moves further
+/// than 100 ms do. `apply` returns zero, whatever is asked for.
+///
+/// kAbsent while it is not plugged in, else kHomed: it needs no opening. Buttons are those of its report, from bit 0.
+///
+/// Thread-safe: `stats` and `state` from any thread, the rest from one. Realtime-safe: `read` and `apply`.
+class SpaceMouseDevice final : public Device {
+ public:
+  /// Vendor and product, as spacenavd lists them: from the SpaceMouse Plus XT to those with Bluetooth at a cable.
+  static constexpr std::array kIds = std::to_array<usb::Id>(
+      {{0x046D, 0xC603}, {0x046D, 0xC605}, {0x046D, 0xC606}, {0x046D, 0xC621}, {0x046D, 0xC623}, {0x046D, 0xC625},
+       {0x046D, 0xC626}, {0x046D, 0xC627}, {0x046D, 0xC628}, {0x046D, 0xC629}, {0x046D, 0xC62B}, {0x046D, 0xC640},
+       {0x256F, 0xC62E}, {0x256F, 0xC62F}, {0x256F, 0xC631}, {0x256F, 0xC632}, {0x256F, 0xC633}, {0x256F, 0xC635},
+       {0x256F, 0xC636}, {0x256F, 0xC638}, {0x256F, 0xC63A}});
+
+  struct Config {
+    double speed = 0.1;       ///< m/s with the cap at its stop, > 0
+    double dead_band = 0.05;  ///< share of the way to the stop in which nothing moves, 0 ≤ dead_band < 1
+    double reach = 0.05;      ///< m to either side of the origin on each axis, > 0
+  };
+
+  /// Of all connections so far.
+  struct Stats {
+    std::uint64_t reports = 0;  ///< understood
+    std::uint64_t unknown = 0;  ///< other packets
+    std::optional<std::uint8_t> battery_percent{};
+  };
+
+  /// Takes the pipe to a SpaceMouse. Throws std::invalid_argument naming the field, its value and what was expected.
+  SpaceMouseDevice(const Config& config, std::unique_ptr<usb::Pipe> pipe);
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  State state() const noexcept override { return state_.load(std::memory_order_relaxed); }
+  std::optional<PositionSample> read(LocalTime now) noexcept override;
+  Vec3 apply(const Vec3& force) noexcept override;
+
+  Stats stats() const noexcept;
+
+  /// m/s: v of the equation above. Realtime-safe.
+  static Vec3 velocity_for(const Config& config, const spacemouse::Axes& cap) noexcept;
+
+ private:
+  void receive(LocalTime now) noexcept;
+  void let_go() noexcept;
+
+  Config config_;
+  DeviceInfo info_;
+  std::unique_ptr<usb::Pipe> pipe_;
+  std::atomic<State> state_{State::kAbsent};
+  std::uint32_t connection_ = 0;
+  LocalTime before_{};            ///< the last `read`
+  LocalTime pushed_{};            ///< when the last translation was reported
+  Vec3 velocity_ = Vec3::Zero();  ///< since then
+  Vec3 position_ = Vec3::Zero();
+  std::uint32_t buttons_ = 0;
+
+  // One writer.
+  std::atomic<std::uint64_t> reports_{0};
+  std::atomic<std::uint64_t> unknown_{0};
+  std::atomic<std::int16_t> battery_percent_{-1};
+};
+
+}  // namespace tendon

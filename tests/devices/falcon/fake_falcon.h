@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/motion.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+
+/// A Falcon at the end of its cable, as far as this project knows one: FTDI chip, boot loader, firmware, encoders,
+/// motors. Shares no code with the driver. Says what the wire would say at the time it is asked; nothing in it waits or
+/// reads a clock, so it is the same behind a pipe in memory and behind the real libusb.
+class FakeFalcon {
+ public:
+  struct Options {
+    bool has_firmware = true;
+    bool is_homed = false;
+    std::size_t firmware_bytes = 8192;   ///< it runs when it has got so many
+    bool answers_greeting_late = false;  ///< with the 00 in front that some machines see
+    bool knows_flush_character = true;
+    /// The cable feeds the chip only; the motors' own supply keeps firmware and home while it is out.
+    bool own_supply = false;
+    Duration thinking = std::chrono::microseconds(50);
+  };
+
+  enum class Fault {
+    kNone,
+    kSilent,         ///< hears, and does what it is told, but says nothing more
+    kDropsSome,      ///< one reply of three is lost
+    kGarblesSome,    ///< one reply of three has a wrong byte
+    kGarblesAll,     ///< every reply has a nibble that is none
+    kCutsAll,        ///< of every reply the end is missing
+    kSplits,         ///< every reply comes in two IN packets
+    kBabbles,        ///< says bytes of its own beside the replies
+    kBabblesOnly,    ///< and nothing else
+    kJumps,          ///< the encoders have lost count
+    kLosesHome,      ///< says that a leg is not homed
+    kLosesFirmware,  ///< its supply was out: the boot loader runs, and has no firmware
+    kOutOfReach,     ///< encoders that belong to no position
+    kStalls,         ///< refuses requests and data
+  };
+  static constexpr std::array kFaults = {Fault::kSilent,  Fault::kDropsSome, Fault::kGarblesSome,   Fault::kGarblesAll,
+                                         Fault::kCutsAll, Fault::kSplits,    Fault::kBabbles,       Fault::kBabblesOnly,
+                                         Fault::kJumps,   Fault::kLosesHome, Fault::kLosesFirmware, Fault::kOutOfReach,
+                                         Fault::kStalls};
+
+  explicit FakeFalcon(const Options& options);
+
+  // The host's side of the cable.
+  bool plugged() const { return plugged_; }
+  int times_plugged() const { return times_plugged_; }
+  /// A vendor request; false: stalled.
+  bool request(LocalTime now, std::uint8_t request, std::uint16_t value);
+  bool write(LocalTime now, std::span<const std::uint8_t> bytes);
+  /// When an IN transfer that waits would end.
+  LocalTime next_in() const;
+  /// What it would bring: the status bytes and up to 62 others.
+  std::vector<std::uint8_t> take_in(LocalTime now);
+
+  // The user's side.
+  void plug() { plugged_ = true, ++times_plugged_; }
+  void unplug();
+  void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
+  /// The grip all the way out and in again, as the user homes it. Counts only while the host asks for it.
+  void pull_through();
+  void press(std::uint8_t buttons) { buttons_ = buttons; }
+  void set_fault(Fault fault);
+
+  // What an onlooker sees.
+  bool running() const { return mode_ == Mode::kRunning; }
+  bool homed() const { return homed_ == 7; }
+  const std::array<std::int16_t, 3>& torque() const { return torque_; }
+  bool pushes() const { return torque_ != std::array<std::int16_t, 3>{}; }
+  /// N, on the hand, by virtual work from the published geometry.
+  Vec3 force() const;
+  const std::vector<std::uint8_t>& image() const { return image_; }
+  int commands() const { return commands_; }
+  std::uint8_t lamps() const { return lamps_; }
+  int latency_ms() const { return latency_ms_; }
+  bool heard_garbage() const { return heard_garbage_; }
+
+ private:
+  enum class Mode { kGreeting, kGreeted, kLoading, kRunning };
+
+  void reset();
+  void hear(LocalTime at, std::uint8_t byte);
+  void obey(LocalTime at);
+  void reply(LocalTime at);
+  void say(LocalTime at, std::span<const std::uint8_t> bytes);
+  Duration per_byte() const;
+
+  Options options_;
+  Dice dice_{1};
+  Fault fault_ = Fault::kNone;
+  bool plugged_ = true;
+  int times_plugged_ = 1;
+
+  // The chip
+  int latency_ms_ = 16;
+  std::uint16_t divisor_ = 0x4138;
+  std::uint8_t flush_at_ = 0;
+  bool dtr_ = false;
+  LocalTime last_in_{};
+  std::deque<std::pair<LocalTime, std::uint8_t>> rx_;  ///< when each byte has arrived from the processor
+  LocalTime tx_free_{};
+  LocalTime rx_free_{};
+  std::size_t split_left_ = 0;
+
+  // The processor
+  Mode mode_;
+  std::vector<std::uint8_t> heard_;
+  bool heard_garbage_ = false;
+  std::vector<std::uint8_t> image_;
+  std::uint8_t homed_ = 0;
+  bool homing_ = false;
+  int commands_ = 0;
+  int replies_ = 0;
+  std::array<std::int16_t, 3> torque_{};
+  std::uint8_t lamps_ = 0;
+
+  // The hand
+  Vec3 position_{0, 0, 0.125};
+  std::uint8_t buttons_ = 0;
+  std::array<int, 3> origin_{};  ///< what the encoders say too much: unknown until homed
+};
+
+}  // namespace tendon

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tendon {
+
+/// What the loader takes for firmware: its key, and bytes that mean nothing. (Novint's own is never in this tree.)
+inline std::vector<std::uint8_t> fake_firmware(std::size_t size) {
+  std::vector<std::uint8_t> bytes(size);
+  std::uint32_t state = 1;
+  for (auto& byte : bytes) {
+    state = state * 1664525U + 1013904223U;
+    byte = static_cast<std::uint8_t>(state >> 24);
+  }
+  if (size > 1) bytes[0] = 0xAA, bytes[1] = 0x08;
+  return bytes;
+}
+
+/// Of fake_firmware(8192), by another program.
+inline constexpr const char* kFakeFirmwareSha256 = "5372ece9bb03f00dba6ccd932dbe71118da29143ebbc46c3055e97f0d694c4bd";
+
+}  // namespace tendon

@@ -1,0 +1,471 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/falcon/falcon_device.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "devices/safety/safe_device.h"
+#include "tests/devices/falcon/fake_firmware.h"
+#include "tests/devices/falcon/memory_pipe.h"
+
+namespace tendon {
+namespace {
+
+using State = Device::State;
+using Fault = FakeFalcon::Fault;
+using namespace std::chrono_literals;
+
+/// A driver, a cable and a Falcon, one turn of the haptic loop after the other in simulated time.
+struct Bench {
+  explicit Bench(const FakeFalcon::Options& options = {}, std::vector<std::uint8_t> firmware = fake_firmware(4096))
+      : falcon(options), device({.firmware = std::move(firmware)}, std::make_unique<MemoryPipe>(falcon, now)) {}
+
+  void step(const Vec3& force = Vec3::Zero()) {
+    now += 1ms;
+    sample = device.read(now);
+    written = device.apply(force);
+    lawless = falcon.pushes() && !(falcon.running() && falcon.homed()) ? lawless + 1 : 0;
+    most_lawless = std::max(most_lawless, lawless);
+    after_zero = falcon.pushes() ? 0 : after_zero + 1;
+  }
+
+  void run(Duration time, const Vec3& force = Vec3::Zero()) {
+    for (const LocalTime end = now + time; now < end;) step(force);
+  }
+
+  /// At 2 m/s to a place relative to the centre.
+  void move_to(const Vec3& place) {
+    const Vec3 from = grip;
+    const int turns = static_cast<int>((place - from).norm() / 0.002) + 1;
+    for (int turn = 1; turn <= turns; ++turn) {
+      grip = from + (place - from) * turn / turns;
+      falcon.move_to(falcon::kCentre + grip);
+      step();
+    }
+  }
+
+  /// Whether it comes to `state`; homes where that is the way.
+  bool reaches(State state, Duration most, const Vec3& force = Vec3::Zero()) {
+    for (const LocalTime end = now + most; now < end && device.state() != state;) {
+      step(force);
+      if (state == State::kHomed && device.state() == State::kUnhomed) falcon.pull_through();
+    }
+    return device.state() == state;
+  }
+
+  LocalTime now{};
+  FakeFalcon falcon;
+  FalconDevice device;
+  std::optional<PositionSample> sample;
+  Vec3 written = Vec3::Zero();
+  Vec3 grip = Vec3::Zero();
+  int lawless = 0;  ///< turns in a row with torque on a Falcon that has no home
+  int most_lawless = 0;
+  int after_zero = 0;  ///< turns in a row without torque
+};
+
+const Vec3 kForce(1, -2, 2);
+
+FakeFalcon::Options without_firmware() { return {.has_firmware = false, .firmware_bytes = 4096}; }
+
+TEST(FalconDevice, FromThePlugToTheForceItTakesEveryStep) {
+  Bench bench(without_firmware());
+  bench.falcon.unplug();
+  bench.run(100ms, kForce);
+  EXPECT_EQ(bench.device.state(), State::kAbsent);
+  bench.falcon.plug();
+  EXPECT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
+  EXPECT_TRUE(bench.reaches(State::kFirmware, 1s, kForce));
+  EXPECT_TRUE(bench.reaches(State::kOpening, 2s, kForce));  // it has the firmware; does it answer?
+  EXPECT_TRUE(bench.reaches(State::kUnhomed, 1s, kForce));
+  EXPECT_EQ(bench.falcon.image(), fake_firmware(4096));
+  bench.run(1s, kForce);
+  EXPECT_EQ(bench.device.state(), State::kUnhomed);
+  EXPECT_FALSE(bench.sample);
+  EXPECT_EQ(bench.falcon.lamps(), falcon::kRed);
+  bench.falcon.pull_through();
+  EXPECT_TRUE(bench.reaches(State::kHomed, 100ms, kForce));
+  EXPECT_EQ(bench.most_lawless, 0);
+  bench.run(10ms, kForce);
+  EXPECT_TRUE(bench.sample);
+  EXPECT_EQ(bench.falcon.lamps(), falcon::kGreen);
+  EXPECT_NEAR((bench.falcon.force() - kForce).norm(), 0, 0.02);
+  EXPECT_NEAR((bench.written - bench.falcon.force()).norm(), 0, 1e-3);  // it knows its place to half a count
+}
+
+TEST(FalconDevice, OneThatHasItsFirmwareIsNotGivenItAgain) {
+  Bench bench({.has_firmware = true});
+  EXPECT_TRUE(bench.reaches(State::kUnhomed, 200ms));
+  EXPECT_TRUE(bench.falcon.image().empty());
+  EXPECT_EQ(bench.falcon.latency_ms(), 1);
+}
+
+TEST(FalconDevice, WithoutFirmwareItWaitsAndLooksAgain) {
+  Bench bench(without_firmware(), {});
+  EXPECT_TRUE(bench.reaches(State::kFirmware, 1s));
+  bench.run(1s, kForce);
+  EXPECT_EQ(bench.device.state(), State::kFirmware);
+  EXPECT_TRUE(bench.falcon.image().empty());
+  EXPECT_EQ(bench.falcon.commands(), 0);
+  EXPECT_TRUE(bench.reaches(State::kOpening, 3s)) << "somebody else may have loaded it";
+}
+
+TEST(FalconDevice, PositionsAreThoseOfTheGripRelativeToTheCentre) {
+  Dice dice(1);
+  Bench bench({.has_firmware = true, .is_homed = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  for (int i = 0; i < 500; ++i) {
+    const Vec3 to = 0.045 * dice.direction();
+    bench.move_to(to);
+    bench.run(2ms);
+    ASSERT_TRUE(bench.sample);
+    ASSERT_EQ(bench.sample->at, bench.now);
+    ASSERT_LT((bench.sample->position - to).norm(), 150e-6) << "more than counts can be rounded";
+  }
+  EXPECT_EQ(bench.device.stats().implausible, 0U);
+  EXPECT_EQ(bench.device.stats().unreachable, 0U);
+}
+
+TEST(FalconDevice, ButtonsComeWithThePosition) {
+  Bench bench({.has_firmware = true, .is_homed = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  bench.falcon.press(5);
+  bench.run(3ms);
+  ASSERT_TRUE(bench.sample);
+  EXPECT_EQ(bench.sample->buttons, 5U);
+}
+
+// The event character makes the chip send a reply when it is whole, so one is there in every period; without it the
+// latency timer of 1 ms may cost every second one.
+TEST(FalconDevice, EveryPeriodOfAMillisecondHasItsSample) {
+  for (const bool flush : {true, false}) {
+    Bench bench({.has_firmware = true, .is_homed = true, .knows_flush_character = flush});
+    ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+    int seen = 0;
+    for (int i = 0; i < 1000; ++i) {
+      bench.step(kForce);
+      seen += bench.sample ? 1 : 0;
+    }
+    EXPECT_GE(seen, flush ? 1000 : 500);
+    EXPECT_EQ(bench.device.stats().unanswered, 0U);
+  }
+}
+
+TEST(FalconDevice, WhatIsReturnedIsWhatTheMotorsGive) {
+  Dice dice(2);
+  Bench bench({.has_firmware = true, .is_homed = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  for (int i = 0; i < 300; ++i) {
+    bench.move_to(0.045 * dice.direction());
+    const Vec3 wanted = dice.within(0, 40) * dice.direction();
+    bench.run(5ms, wanted);
+    ASSERT_TRUE(bench.sample);
+    // The driver knows the place to a count, so the force to some thousandths.
+    ASSERT_LT((bench.written - bench.falcon.force()).norm(), 0.01 * bench.written.norm() + 1e-3);
+    ASSERT_LE(bench.written.norm(), wanted.norm() + 0.005);  // each torque is rounded by itself
+    ASSERT_GT(bench.written.normalized().dot(wanted.normalized()), 0.99);
+  }
+}
+
+TEST(FalconDevice, AForceThatIsNoNumberIsNone) {
+  Bench bench({.has_firmware = true, .is_homed = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  bench.run(10ms, kForce);
+  ASSERT_TRUE(bench.falcon.pushes());
+  bench.run(5ms, Vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0));
+  EXPECT_FALSE(bench.falcon.pushes());
+  EXPECT_EQ(bench.written, Vec3::Zero());
+}
+
+// The encoders' origin jumps when a leg finds its home: a force at that moment would go anywhere.
+TEST(FalconDevice, NoForceBeforeItIsHomedWhateverIsAskedFor) {
+  Bench bench({.has_firmware = true});
+  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
+  bench.run(5s, kForce);
+  EXPECT_EQ(bench.most_lawless, 0);
+  EXPECT_GT(bench.falcon.commands(), 1000);
+  EXPECT_FALSE(bench.falcon.pushes());
+}
+
+TEST(FalconDevice, OneReplyThatSaysHomedIsNotEnough) {
+  Bench bench({.has_firmware = true});
+  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
+  bench.falcon.pull_through();
+  bench.run(5ms, kForce);
+  EXPECT_EQ(bench.device.state(), State::kUnhomed);
+  EXPECT_FALSE(bench.falcon.pushes());
+  bench.run(20ms, kForce);
+  EXPECT_EQ(bench.device.state(), State::kHomed);
+  EXPECT_TRUE(bench.falcon.pushes());
+}
+
+TEST(FalconDevice, ZeroDoesNotWaitForAReply) {
+  Bench bench({.has_firmware = true, .is_homed = true, .thinking = 4ms});  // every reply is late
+  ASSERT_TRUE(bench.reaches(State::kHomed, 500ms));
+  for (int i = 0; i < 20; ++i) {
+    bench.run(9ms + i * 1ms, kForce);
+    ASSERT_TRUE(bench.falcon.pushes());
+    bench.step(Vec3::Zero());
+    ASSERT_FALSE(bench.falcon.pushes());
+    ASSERT_EQ(bench.written, Vec3::Zero());
+  }
+}
+
+TEST(FalconDevice, ASlowReplyLeavesTheForceThatIsHeld) {
+  Bench bench({.has_firmware = true, .is_homed = true, .thinking = 3ms});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 500ms));
+  bench.run(20ms, kForce);
+  const int before = bench.falcon.commands();
+  for (int i = 0; i < 60; ++i) {
+    bench.step((1 + i % 3) * kForce);
+    ASSERT_NEAR((bench.written - bench.falcon.force()).norm(), 0, 1e-3);
+  }
+  EXPECT_LE(bench.falcon.commands() - before, 60 / 3) << "one request is under way at a time";
+}
+
+TEST(FalconDevice, AfterTheCableWasOutItTakesEveryStepAgain) {
+  for (const bool own_supply : {false, true}) {
+    Bench bench({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096, .own_supply = own_supply});
+    ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+    bench.run(20ms, kForce);
+    ASSERT_TRUE(bench.falcon.pushes());
+    bench.falcon.unplug();
+    bench.step(kForce);
+    EXPECT_EQ(bench.device.state(), State::kAbsent);
+    EXPECT_FALSE(bench.sample);
+    EXPECT_EQ(bench.written, Vec3::Zero());
+    bench.run(1s, kForce);
+    const int before = bench.falcon.commands();
+    bench.falcon.plug();
+    EXPECT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
+    if (own_supply) {
+      // Nobody could tell it while the cable was out: it still pushes. The first command ends that.
+      while (bench.falcon.commands() == before) bench.step(kForce);
+      EXPECT_FALSE(bench.falcon.pushes());
+    } else {
+      EXPECT_TRUE(bench.reaches(State::kFirmware, 1s, kForce));
+    }
+    EXPECT_TRUE(bench.reaches(State::kUnhomed, 2s, kForce));
+    EXPECT_FALSE(bench.falcon.pushes());
+    EXPECT_TRUE(bench.reaches(State::kHomed, 1s, kForce));
+    bench.run(10ms, kForce);
+    EXPECT_TRUE(bench.falcon.pushes());
+  }
+}
+
+TEST(FalconDevice, ACableThatWasOutForAMomentIsNoticed) {
+  Bench bench({.has_firmware = true, .is_homed = true, .own_supply = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  bench.falcon.unplug();
+  bench.falcon.plug();  // between two turns
+  bench.step(kForce);
+  EXPECT_EQ(bench.device.state(), State::kAbsent);
+  EXPECT_TRUE(bench.reaches(State::kHomed, 1s, kForce));
+}
+
+TEST(FalconDevice, ALoopThatWasStoppedTakesUpWhereItWas) {
+  Bench bench({.has_firmware = true, .is_homed = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  bench.run(20ms, kForce);
+  bench.now += 300ms;
+  bench.step(kForce);
+  EXPECT_EQ(bench.device.state(), State::kHomed);
+  EXPECT_TRUE(bench.sample);
+  EXPECT_EQ(bench.device.stats().silences, 0U);
+}
+
+TEST(FalconDevice, AnEncoderThatJumpsForAMomentCostsSamplesAndNothingElse) {
+  Bench bench({.has_firmware = true, .is_homed = true});
+  ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+  bench.run(20ms, kForce);
+  bench.falcon.set_fault(Fault::kJumps);
+  bench.run(1ms, kForce);  // takes the reply from before
+  const auto replies = bench.device.stats().replies;
+  bench.run(4ms, kForce);
+  EXPECT_EQ(bench.device.stats().replies, replies);
+  EXPECT_EQ(bench.device.stats().implausible, 4U);
+  EXPECT_FALSE(bench.sample);
+  bench.falcon.set_fault(Fault::kNone);
+  bench.run(2ms, kForce);
+  EXPECT_TRUE(bench.sample);
+  EXPECT_TRUE(bench.falcon.pushes());
+}
+
+// It still says that it is homed, but its origin is not where it was: whatever we took for the hand's place would be
+// wrong.
+TEST(FalconDevice, AnOriginThatHasMovedIsNotBelievedUntilTheDeviceIsHomedAnew) {
+  for (const bool with_firmware : {false, true}) {
+    Bench bench({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096, .own_supply = true},
+                with_firmware ? fake_firmware(4096) : std::vector<std::uint8_t>{});
+    ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+    bench.run(20ms, kForce);
+    bench.falcon.set_fault(Fault::kJumps);
+    bench.run(200ms, kForce);
+    EXPECT_EQ(bench.device.stats().lost_counts, 1U);
+    if (with_firmware) {
+      EXPECT_EQ(bench.device.state(), State::kFirmware) << "which sets it back";
+    } else {
+      bench.run(2s, kForce);
+      bench.falcon.unplug();  // its motors' supply stays on, and its wrong origin with it
+      bench.run(50ms, kForce);
+      bench.falcon.plug();
+      bench.run(2s, kForce);
+      EXPECT_EQ(bench.device.state(), State::kUnhomed);
+      EXPECT_TRUE(bench.falcon.homed());
+      EXPECT_FALSE(bench.falcon.pushes());
+      bench.falcon.set_fault(Fault::kLosesHome);  // the user has switched it off and on
+    }
+    bench.falcon.set_fault(Fault::kNone);
+    bench.run(100ms, kForce);
+    EXPECT_FALSE(bench.falcon.pushes());
+    EXPECT_TRUE(bench.reaches(State::kHomed, 3s, kForce));
+    bench.run(20ms, kForce);
+    EXPECT_TRUE(bench.falcon.pushes());
+  }
+}
+
+TEST(FalconDevice, InsideTheSafetyLayerAReplugHasToBeHomedAndArmedAgain) {
+  Bench bench({.has_firmware = true, .firmware_bytes = 4096});
+  SafeDevice safe({}, bench.device);
+  const auto run = [&](Duration time, const Vec3& force) {
+    for (const LocalTime end = bench.now + time; bench.now < end;) {
+      bench.now += 1ms;
+      safe.read(bench.now);
+      safe.apply(force);
+      ASSERT_TRUE(!bench.falcon.pushes() || safe.status().state == SafetyState::kArmed);
+    }
+  };
+  for (int plugged = 0; plugged < 2; ++plugged) {
+    run(2s, Vec3::Zero());
+    ASSERT_EQ(safe.state(), State::kUnhomed);
+    safe.arm();
+    run(200ms, Vec3::Zero());
+    EXPECT_NE(safe.status().state, SafetyState::kArmed) << "not homed";
+    bench.falcon.pull_through();
+    run(2s, kForce);
+    EXPECT_FALSE(bench.falcon.pushes()) << "homed, and not armed";
+    safe.arm();
+    run(200ms, Vec3::Zero());
+    ASSERT_EQ(safe.status().state, SafetyState::kArmed);
+    run(200ms, kForce);
+    EXPECT_TRUE(bench.falcon.pushes());
+    bench.falcon.unplug();
+    bench.falcon.plug();
+    run(1ms, kForce);
+    EXPECT_EQ(safe.status().state, SafetyState::kFault);
+    EXPECT_EQ(safe.status().last_fault, SafetyFault::kDeviceLost);
+  }
+}
+
+// --- Every fault at every state --------------------------------------------------------------------------------------
+
+enum class Place { kOpening, kReset, kGreeting, kSending, kUnhomed, kHomed, kPushing };
+constexpr std::array kPlaces = {Place::kOpening, Place::kReset, Place::kGreeting, Place::kSending,
+                                Place::kUnhomed, Place::kHomed, Place::kPushing};
+
+FakeFalcon::Options options_for(Place place, bool own_supply) {
+  const bool loads = place == Place::kReset || place == Place::kGreeting || place == Place::kSending;
+  return {.has_firmware = !loads,
+          .is_homed = place == Place::kHomed || place == Place::kPushing,
+          .firmware_bytes = 4096,
+          .own_supply = own_supply};
+}
+
+void go_to(Bench& bench, Place place) {
+  switch (place) {
+    case Place::kOpening:
+      ASSERT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
+      break;
+    case Place::kReset:
+    case Place::kGreeting:
+    case Place::kSending:
+      ASSERT_TRUE(bench.reaches(State::kFirmware, 1s, kForce));
+      bench.run(place == Place::kReset ? 3ms : place == Place::kGreeting ? 20ms : 200ms, kForce);
+      ASSERT_EQ(bench.device.state(), State::kFirmware);
+      break;
+    case Place::kUnhomed:
+      ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
+      break;
+    case Place::kHomed:
+    case Place::kPushing:
+      ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
+      bench.run(20ms, place == Place::kPushing ? kForce : Vec3::Zero());
+      ASSERT_EQ(bench.falcon.pushes(), place == Place::kPushing);
+      break;
+  }
+}
+
+class FalconFault : public testing::TestWithParam<Fault> {};
+
+bool is_harmless(Fault fault) {
+  return fault == Fault::kDropsSome || fault == Fault::kGarblesSome || fault == Fault::kSplits ||
+         fault == Fault::kBabbles;
+}
+
+TEST_P(FalconFault, EndsInZeroForceAtEveryState) {
+  const Fault fault = GetParam();
+  for (const Place place : kPlaces) {
+    SCOPED_TRACE(static_cast<int>(place));
+    Bench bench(options_for(place, false));
+    go_to(bench, place);
+    ASSERT_EQ(bench.most_lawless, 0);
+
+    bench.falcon.set_fault(fault);
+    bench.run(1s, kForce);
+    if (!is_harmless(fault) && fault != Fault::kStalls) {
+      EXPECT_GE(bench.after_zero, 1000 - 15) << "torque later than 15 ms after the fault";
+      EXPECT_EQ(bench.written, Vec3::Zero());
+      EXPECT_LE(bench.most_lawless, 15);
+    } else if (is_harmless(fault)) {
+      EXPECT_EQ(bench.most_lawless, 0);
+      if (place == Place::kPushing) {
+        EXPECT_TRUE(bench.falcon.pushes()) << "this fault costs samples, not the device";
+        EXPECT_EQ(bench.device.state(), State::kHomed);
+      }
+    } else {
+      // It takes nothing any more, so what it holds is out of our hands.
+      EXPECT_NE(bench.device.state(), State::kHomed);
+      EXPECT_EQ(bench.written, Vec3::Zero());
+    }
+
+    // Once the trouble is over it comes back by itself, and never pushes on the way.
+    bench.falcon.set_fault(Fault::kNone);
+    bench.most_lawless = bench.lawless = 0;
+    EXPECT_TRUE(bench.reaches(State::kHomed, 15s, kForce));
+    bench.run(20ms, kForce);
+    EXPECT_TRUE(bench.falcon.pushes());
+    EXPECT_EQ(bench.most_lawless, 0);
+  }
+}
+
+std::string name_of(const testing::TestParamInfo<Fault>& info) {
+  constexpr std::array kNames = {"None",      "Silent",        "DropsSome",  "GarblesSome", "GarblesAll",
+                                 "CutsAll",   "Splits",        "Babbles",    "BabblesOnly", "Jumps",
+                                 "LosesHome", "LosesFirmware", "OutOfReach", "Stalls"};
+  return kNames[static_cast<std::size_t>(info.param)];
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, FalconFault, testing::ValuesIn(FakeFalcon::kFaults), name_of);
+
+TEST(FalconDevice, UnpluggedAtAnyStateItIsAbsentAtOnce) {
+  for (const Place place : kPlaces) {
+    SCOPED_TRACE(static_cast<int>(place));
+    Bench bench(options_for(place, false));
+    go_to(bench, place);
+    bench.falcon.unplug();
+    bench.step(kForce);
+    EXPECT_EQ(bench.device.state(), State::kAbsent);
+    EXPECT_EQ(bench.written, Vec3::Zero());
+    bench.run(50ms, kForce);
+    bench.falcon.plug();
+    EXPECT_TRUE(bench.reaches(State::kHomed, 15s, kForce));
+    EXPECT_EQ(bench.most_lawless, 0);
+  }
+}
+
+}  // namespace
+}  // namespace tendon
