@@ -52,6 +52,38 @@ constexpr std::array kListables = {
     Listable{"loop.max_speed_m_per_s", "a position that no hand comes to is a fault",
              [](const Scene& scene) { return scene.loop.control.max_speed.has_value(); },
              [](Scene& scene) { scene.loop.control.max_speed.reset(); }},
+    Listable{"safety", "no force unless armed, and none after a fault",
+             [](const Scene& scene) { return scene.safety.has_value(); }, [](Scene& scene) { scene.safety.reset(); }},
+    Listable{"safety.force_limit", "no force is longer",
+             [](const Scene& scene) { return scene.safety && scene.safety->force_limit.has_value(); },
+             [](Scene& scene) { scene.safety->force_limit.reset(); }},
+    Listable{"safety.growth_limit", "no force grows faster",
+             [](const Scene& scene) { return scene.safety && scene.safety->growth_limit.has_value(); },
+             [](Scene& scene) { scene.safety->growth_limit.reset(); }},
+    Listable{"safety.ramp_in", "forces begin slowly after arming",
+             [](const Scene& scene) { return scene.safety && scene.safety->ramp_in.has_value(); },
+             [](Scene& scene) { scene.safety->ramp_in.reset(); }},
+    Listable{"safety.heat_limit", "motors do not burn",
+             [](const Scene& scene) { return scene.safety && scene.safety->heat_limit.has_value(); },
+             [](Scene& scene) { scene.safety->heat_limit.reset(); }},
+    Listable{"safety.workspace", "nothing pushes the hand out of it",
+             [](const Scene& scene) { return scene.safety && scene.safety->workspace.has_value(); },
+             [](Scene& scene) { scene.safety->workspace.reset(); }},
+    Listable{"safety.speed_trip", "a handle that flies gets no force",
+             [](const Scene& scene) { return scene.safety && scene.safety->speed_trip.has_value(); },
+             [](Scene& scene) { scene.safety->speed_trip.reset(); }},
+    Listable{"safety.step_bound", "encoders that wrap or lose count unarm",
+             [](const Scene& scene) { return scene.safety && scene.safety->step_bound.has_value(); },
+             [](Scene& scene) { scene.safety->step_bound.reset(); }},
+    Listable{"safety.command_watchdog", "a loop that stood still is not gone on with",
+             [](const Scene& scene) { return scene.safety && scene.safety->command_watchdog.has_value(); },
+             [](Scene& scene) { scene.safety->command_watchdog.reset(); }},
+    Listable{"safety.link_watchdog", "nor a device that was silent",
+             [](const Scene& scene) { return scene.safety && scene.safety->link_watchdog.has_value(); },
+             [](Scene& scene) { scene.safety->link_watchdog.reset(); }},
+    Listable{"safety.dead_man", "no force unless the button is held",
+             [](const Scene& scene) { return scene.safety && scene.safety->dead_man.has_value(); },
+             [](Scene& scene) { scene.safety->dead_man.reset(); }},
     Listable{"limiter", "keeps the device from giving out energy",
              [](const Scene& scene) { return scene.loop.control.limiter.law != Law::kNone; },
              [](Scene& scene) { scene.loop.control.limiter.law = Law::kNone; }},
@@ -91,7 +123,10 @@ constexpr std::array kListables = {
 class Trial {
  public:
   explicit Trial(const Scene& scene)
-      : device_(scene.device), loop_(scene.loop, device_, *mail_), period_(scene.loop.period) {}
+      : device_(scene.device),
+        safe_(made_safe(scene, device_)),
+        loop_(scene.loop, safe_ ? static_cast<Device&>(*safe_) : device_, *mail_),
+        period_(scene.loop.period) {}
 
   /// ns of a step, mean of kSteps.
   double steps(const std::function<Duration()>& processor_time) {
@@ -121,6 +156,14 @@ class Trial {
 
   static double per_step(Duration total) { return static_cast<double>(total.count()) / kSteps; }
 
+  /// Armed as soon as may be: what is to be measured is what its parts cost at work.
+  static std::unique_ptr<SafeDevice> made_safe(const Scene& scene, Device& device) {
+    if (!scene.safety) return nullptr;
+    SafeDevice::Config config = *scene.safety;
+    config.arming = {.by = SafeDevice::Arming::By::kStart, .rest_speed = 1e3, .rest_force = 1e3};
+    return std::make_unique<SafeDevice>(config, device);
+  }
+
   void answer() {
     const DeviceState* state = mail_->state.take();
     if (state == nullptr) return;
@@ -135,6 +178,7 @@ class Trial {
   }
 
   SimulatedDevice device_;
+  std::unique_ptr<SafeDevice> safe_;  ///< null when the scene lists none
   std::unique_ptr<Mailboxes> mail_ =
       std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1});
   HapticLoop loop_;
@@ -221,7 +265,9 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
            << '\n';
   }
   text << "a whole step: " << std::llround(step_ns) << " ns of processor time, of which " << std::llround(device_ns)
-       << " ns are the simulated device; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n"
+       << " ns are the simulated device"
+       << (scene.falcon || !scene.exerts_force() ? ", which stands in for the real one" : "")
+       << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n"
        << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "
        << (scene.recording ? "a recording" : "no recording") << '\n';

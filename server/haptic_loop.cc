@@ -34,7 +34,8 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
       device_(device),
       mail_(mail),
       controller_(config.control),
-      velocity_(device.info().position_resolution) {
+      velocity_(device.info().position_resolution),
+      force_rounding_squared_(device.info().force_resolution * device.info().force_resolution) {
   if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
   if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
 }
@@ -47,6 +48,7 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         break;
       case HapticOrder::Kind::kRearm:
         controller_.rearm();
+        device_.arm();
         break;
     }
     mail_.orders.pop();
@@ -69,15 +71,24 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
     static_cast<Step&>(record) = controller_.step_unseen(now, applied_);
   }
   applied_ = device_.apply(record.force);
-  if (applied_ != record.force) record.reasons |= Reason::kDeviceClamp;
+  if ((applied_ - record.force).squaredNorm() > force_rounding_squared_) record.reasons |= Reason::kDeviceClamp;
   record.applied = applied_;
   record.tick = ++tick_;
   record.scheduled = due_;
+  watch_device();
   publish(record);
 
   due_ += config_.period;
   if (due_ <= now) due_ = now + config_.period;
   return due_;
+}
+
+void HapticLoop::watch_device() noexcept {
+  homed_once_ = homed_once_ || device_.state() == Device::State::kHomed;
+  const std::uint32_t times_armed = device_.times_armed();
+  // A device that has never been homed is not silent: it is not ready.
+  if (!homed_once_ || times_armed != times_armed_) controller_.rearm();
+  times_armed_ = times_armed;
 }
 
 void HapticLoop::publish(const StepRecord& record) noexcept {
@@ -89,6 +100,7 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   if (fault != HapticController::Fault::kNone && fault_.load(std::memory_order_relaxed) != fault) mail_.flight.freeze();
   fault_.store(fault, std::memory_order_relaxed);
   steps_.store(record.tick, std::memory_order_relaxed);
+  force_.store(record.applied.norm(), std::memory_order_relaxed);
   // One writer: a load and a store are enough.
   const auto count = [](std::atomic<std::uint64_t>& counter) {
     counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
@@ -100,12 +112,16 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   }
 }
 
-void HapticLoop::stop() noexcept { applied_ = device_.apply(Vec3::Zero()); }
+void HapticLoop::stop() noexcept {
+  applied_ = device_.apply(Vec3::Zero());
+  force_.store(applied_.norm(), std::memory_order_relaxed);
+}
 
 HapticLoop::Stats HapticLoop::stats() const noexcept {
-  return {steps_.load(std::memory_order_relaxed), overruns_.load(std::memory_order_relaxed),
+  return {steps_.load(std::memory_order_relaxed),  overruns_.load(std::memory_order_relaxed),
           unseen_.load(std::memory_order_relaxed), Duration(longest_interval_ns_.load(std::memory_order_relaxed)),
-          fault_.load(std::memory_order_relaxed)};
+          fault_.load(std::memory_order_relaxed),  device_.state(),
+          force_.load(std::memory_order_relaxed)};
 }
 
 }  // namespace tendon

@@ -31,6 +31,8 @@ class HapticLoop {
     std::uint64_t unseen = 0;    ///< steps in which the device gave no position
     Duration longest_interval{};
     HapticController::Fault fault = HapticController::Fault::kNone;
+    Device::State device = Device::State::kHomed;
+    double force = 0;  ///< N, norm of what the device holds
   };
 
   /// `device` and `mail` must outlive the loop. Throws std::invalid_argument when a value is impossible.
@@ -47,6 +49,7 @@ class HapticLoop {
 
  private:
   void take_mail(LocalTime now) noexcept;
+  void watch_device() noexcept;
   void publish(const StepRecord& record) noexcept;
 
   Config config_;
@@ -54,14 +57,18 @@ class HapticLoop {
   Mailboxes& mail_;
   HapticController controller_;
   VelocityEstimator velocity_;
+  double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp
   Vec3 applied_ = Vec3::Zero();
   std::uint64_t tick_ = 0;
   LocalTime due_{};
+  bool homed_once_ = false;
+  std::uint32_t times_armed_ = 0;
 
   std::atomic<std::uint64_t> steps_{0};
   std::atomic<std::uint64_t> overruns_{0};
   std::atomic<std::uint64_t> unseen_{0};
   std::atomic<std::int64_t> longest_interval_ns_{0};
+  std::atomic<double> force_{0};
   std::atomic<HapticController::Fault> fault_{HapticController::Fault::kNone};
 };
 

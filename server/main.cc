@@ -11,10 +11,14 @@
 #include <string>
 #include <vector>
 
+#include "devices/falcon/firmware.h"
 #include "devices/simulated/profiles.h"
+#include "devices/usb/usb.h"
 #include "protocol/limits.h"
 #include "server/build_info.h"
 #include "server/clock.h"
+#include "server/devices_report.h"
+#include "server/doctor.h"
 #include "server/explain.h"
 #include "server/key_folder.h"
 #include "server/log.h"
@@ -53,7 +57,7 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s) {
 /// Of all devices together.
 HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   HapticLoop::Stats sum;
-  for (const auto& [name, haptic] : devices) {
+  for (const auto& [name, haptic, safety] : devices) {
     sum.steps += haptic.steps;
     sum.overruns += haptic.overruns;
     sum.unseen += haptic.unseen;
@@ -66,11 +70,18 @@ HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
 /// JSON: a list of the devices, each with its channels. Their names need no escapes; a holder's does not appear.
 std::string by_device(const Server::Summary& summary) {
   std::ostringstream out;
-  for (const auto& [name, haptic] : summary.devices) {
+  for (const auto& [name, haptic, safety] : summary.devices) {
     out << (out.tellp() > 0 ? ",{" : "{") << "\"name\":\"" << name << "\",\"steps\":" << haptic.steps
         << ",\"overruns\":" << haptic.overruns << ",\"unseen\":" << haptic.unseen
         << ",\"longest_interval_us\":" << seconds(haptic.longest_interval) * 1e6
-        << ",\"fault\":" << static_cast<int>(haptic.fault) << ",\"channels\":[";
+        << ",\"fault\":" << static_cast<int>(haptic.fault) << ",\"force_n\":" << haptic.force << ",\"safety\":";
+    if (safety) {
+      out << "{\"state\":\"" << to_string(safety->state) << "\",\"faults\":" << safety->faults << ",\"last_fault\":\""
+          << to_string(safety->last_fault) << "\"}";
+    } else {
+      out << "null";
+    }
+    out << ",\"channels\":[";
     bool first = true;
     for (const auto& channel : summary.network.channels) {
       if (channel.device != name) continue;
@@ -173,6 +184,50 @@ int explain_each(const std::vector<std::filesystem::path>& files, bool json) {
   return 0;
 }
 
+using OptionalPath = std::optional<std::filesystem::path>;
+
+int list_devices(const OptionalPath& firmware, bool accept_unknown_firmware, bool json) {
+  std::optional<std::string> problem;
+  if (firmware) {
+    try {
+      falcon::read_firmware(
+          *firmware, accept_unknown_firmware ? falcon::UnknownFirmware::kAccept : falcon::UnknownFirmware::kRefuse);
+      problem = "";
+    } catch (const std::runtime_error& refused) {
+      problem = refused.what();
+    }
+  }
+  try {
+    const auto devices = report_devices(usb::plugged_in(), problem);
+    std::cout << (json ? in_json(devices) : in_words(devices));
+    return 0;
+  } catch (const std::runtime_error& no_usb) {
+    log::error(no_usb.what());
+    return 1;
+  }
+}
+
+/// What the command line says of the Falcon, in each scene that has one.
+void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool accept_unknown_firmware) {
+  bool any = false;
+  for (Scene& scene : scenes) {
+    if (!scene.falcon) continue;
+    any = true;
+    if (firmware) scene.falcon->firmware = firmware;
+    if (accept_unknown_firmware) scene.falcon->accept_unknown_firmware = true;
+  }
+  if (firmware && !any) throw std::runtime_error("--falcon-firmware: no scene has [device] kind = \"falcon\"");
+}
+
+void switch_limiter_off(std::vector<Scene>& scenes) {
+  for (Scene& scene : scenes) {
+    if (scene.falcon) {
+      throw std::runtime_error("--without-limiter: expected simulated devices only, found a Falcon, " + scene.name);
+    }
+    scene.loop.control.limiter.law = Law::kNone;
+  }
+}
+
 /// The name becomes a file's name and a word in the log.
 void check_key_name(const std::string& name) {
   const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
@@ -219,6 +274,13 @@ int main(int argc, char** argv) {
   app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
   app.add_option("--duration-s", duration_s, "Stop after so many seconds; 0 = at SIGINT or SIGTERM");
   app.add_flag("--without-limiter", without_limiter, "Switch the output limiter off. Simulated devices only");
+  std::string firmware;
+  bool accept_unknown_firmware = false;
+  const auto add_firmware = [&](CLI::App& to) {
+    to.add_option("--falcon-firmware", firmware, "File with a Novint Falcon's firmware, whatever the scene says");
+    to.add_flag("--accept-unknown-firmware", accept_unknown_firmware, "… also one that is none of the known files");
+  };
+  add_firmware(app);
   app.add_flag("--json", json, "One JSON object per line on stdout: listening, stopped");
   app.add_flag("--profiles", profiles, "Print the device profiles, and how each of their numbers is known");
   app.add_flag("--scene-help", scene_help, "Print every key that a scene may have");
@@ -234,6 +296,15 @@ int main(int argc, char** argv) {
       "explain", "What a scene runs, what not, and what each part adds to a haptic step: `tendond explain demo.toml`");
   explainer->add_option("scene", scene_files, "Scene files")->required();
   explainer->add_flag("--json", json, "One JSON object per scene on stdout");
+  auto* devices = app.add_subcommand(
+      "devices", "What is plugged in, what it lacks, and how to mend that: `tendond devices --falcon-firmware FILE`");
+  add_firmware(*devices);
+  devices->add_flag("--json", json, "One JSON object per device on stdout");
+  auto* doctor = app.add_subcommand(
+      "doctor",
+      "How late a haptic thread would wake on this machine, and what to change for it. Takes two seconds and changes "
+      "nothing: `tendond doctor`");
+  doctor->add_flag("--json", json, "One JSON object on stdout");
   app.set_version_flag("--version", std::string(kVersion) + " (" + std::string(kCommit) + ")");
   try {
     app.parse(argc, argv);
@@ -252,19 +323,25 @@ int main(int argc, char** argv) {
       check_key_name(key_name);
       return make_key(key_name, key_file.empty() ? key_name + ".key" : key_file, observer);
     }
-    if (!*explainer && scene_option->count() == 0) throw CLI::RequiredError("scene");
+    if (!*explainer && !*devices && !*doctor && scene_option->count() == 0) throw CLI::RequiredError("scene");
   } catch (const CLI::ParseError& problem) {
     return app.exit(problem) == 0 ? 0 : 2;
   }
 
   try {
+    const OptionalPath firmware_file = firmware.empty() ? OptionalPath() : OptionalPath(firmware);
     if (*explainer) return explain_each(scene_files, json);
+    if (*devices) return list_devices(firmware_file, accept_unknown_firmware, json);
+    if (*doctor) {
+      const Diagnosis diagnosis = diagnose({.now = clock::now, .sleep_until = clock::sleep_until});
+      std::cout << (json ? in_json(diagnosis) + "\n" : in_words(diagnosis));
+      return 0;
+    }
     std::vector<Scene> scenes = read_scenes(scene_files);
     if (!record.empty()) scenes.front().recording = record;
     if (!listen.empty()) scenes.front().network.listen = parse_address(listen);
-    if (without_limiter) {
-      for (Scene& scene : scenes) scene.loop.control.limiter.law = Law::kNone;
-    }
+    set_falcon(scenes, firmware_file, accept_unknown_firmware);
+    if (without_limiter) switch_limiter_off(scenes);
     return run(scenes, duration_s, json);
   } catch (const std::exception& problem) {
     log::error(problem.what());

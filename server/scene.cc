@@ -22,6 +22,7 @@
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/recorded_motion.h"
 #include "protocol/limits.h"
+#include "server/recorded_hand.h"
 
 // In three parts: how values are written (units, rules); which keys there are (the declarations); what
 // walks over the declarations (Reader fills a Draft from a file, Reference prints them) and what is done
@@ -316,6 +317,24 @@ struct Label {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
+/// Where a USB device is plugged in, in the kernel's words.
+struct UsbPort {
+  static std::string expected(const Unit&) { return "a port as `tendond devices` names it, like \"1-2.3\""; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
+    constexpr std::size_t kLongestPort = 32;  // 7 tiers of hubs are the most there can be
+    const auto* text = node.as_string();
+    const auto in_a_port = [](char c) { return (c >= '0' && c <= '9') || c == '-' || c == '.'; };
+    const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= kLongestPort &&
+                      std::all_of((*text)->begin(), (*text)->end(), in_a_port);
+    if (!good) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
+};
+
 struct YesNo {
   static std::string expected(const Unit&) { return "true or false"; }
 
@@ -451,6 +470,7 @@ struct Draft {
   bool has_hand = false;
   ScriptedMotion::Script motion = ScriptedMotion::Sine{};
   std::optional<RecordedMotionFile> recorded_motion;
+  std::optional<std::filesystem::path> replayed;  ///< a recording of tendond
   std::optional<Duration> longest_hold;
   std::optional<double> coulomb_bound;
   std::optional<double> viscous_bound;
@@ -473,7 +493,7 @@ struct Absent {
 };
 constexpr Absent kRequired = {.required = true};
 
-enum class DeviceKind : std::uint8_t { kSimulated };
+enum class DeviceKind : std::uint8_t { kSimulated, kFalcon, kReplay, kSpaceMouse };
 enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
 
 Names<const DeviceProfile*> profile_names() {
@@ -519,6 +539,16 @@ void declare_effects(Table& effects, const DeviceProfile* profile, SimulatedDevi
 }
 
 template <class Table>
+void declare_csv(Table& keys, RecordedMotionFile& file) {
+  keys.key("file", file.path, Path{}, "CSV file, relative to the scene file", kRequired);
+  keys.key("time_column", file.time, Column{}, "time in s");
+  keys.key("position_column", file.position, Column{}, "position along a line", kRequired);
+  keys.key("scale_m", file.scale, kAnyNumber, "how long one unit of the position is; negative turns it round");
+  keys.key("origin_mm", file.origin, Vector{}, "where position 0 lies");
+  keys.key("direction", file.direction, Vector{}, "of the line; its length does not count");
+}
+
+template <class Table>
 void declare_motion(Table& motion, Draft& draft) {
   motion.kind(motion_names(), [&draft](Table& keys, MotionKind kind) {
     switch (kind) {
@@ -548,12 +578,7 @@ void declare_motion(Table& motion, Draft& draft) {
       }
       case MotionKind::kRecorded: {
         auto& file = draft.recorded_motion.emplace();
-        keys.key("file", file.path, Path{}, "CSV file, relative to the scene file", kRequired);
-        keys.key("time_column", file.time, Column{}, "time in s");
-        keys.key("position_column", file.position, Column{}, "position along a line", kRequired);
-        keys.key("scale_m", file.scale, kAnyNumber, "how long one unit of the position is; negative turns it round");
-        keys.key("origin_mm", file.origin, Vector{}, "where position 0 lies");
-        keys.key("direction", file.direction, Vector{}, "of the line; its length does not count");
+        declare_csv(keys, file);
         keys.key("at_end", file.at_end, at_end_names(), "stay at the last sample, or start again");
         return;
       }
@@ -562,11 +587,77 @@ void declare_motion(Table& motion, Draft& draft) {
 }
 
 template <class Table>
+void declare_port(Table& keys, std::string& port) {
+  keys.key("port", port, UsbPort{}, "where it is plugged in, when there are several",
+           Absent{.text = "the first that nobody uses"});
+}
+
+template <class Table>
+void declare_falcon(Table& keys, Draft& draft) {
+  draft.scene.device = find_device_profile("falcon")->device();
+  Scene::Falcon& falcon = draft.scene.falcon.emplace(Scene::Falcon{});
+  declare_port(keys, falcon.port);
+  keys.key("firmware", falcon.firmware, Path{},
+           "the file of your own Novint software, relative to this file; --falcon-firmware overrides it",
+           Absent{.text = "none; only a device that has its firmware already can be used"});
+  keys.key("accept_unknown_firmware", falcon.accept_unknown_firmware, YesNo{},
+           "also a file that is none of the known ones");
+}
+
+/// What stands in where the cost of a step is measured.
+SimulatedDevice::Config stand_in(const char* name) {
+  SimulatedDevice::Config device;
+  device.name = name;
+  device.mass = 0.1;
+  return device;
+}
+
+template <class Table>
+void declare_replay(Table& keys, Draft& draft) {
+  draft.scene.device = stand_in("replay");
+  ReplayDevice::Config& replay = draft.scene.replay.emplace();
+  keys.key("recording", draft.replayed, Path{},
+           "MCAP recording of tendond, relative to this file: the hand of its (first) device",
+           Absent{.text = "none; then there is a table csv"});
+  keys.key("at_end", replay.at_end, at_end_names(), "stay at the last sample, or start again");
+  keys.key("encoder_step_um", replay.position_resolution, kZeroOrMore,
+           "one count of the device that was recorded; 0: its positions were exact");
+  keys.part("csv", draft.recorded_motion, [](Table& csv, RecordedMotionFile& file) { declare_csv(csv, file); });
+}
+
+template <class Table>
+void declare_spacemouse(Table& keys, Draft& draft) {
+  draft.scene.device = stand_in("spacemouse");
+  Scene::SpaceMouse& mouse = draft.scene.spacemouse.emplace(Scene::SpaceMouse{});
+  declare_port(keys, mouse.port);
+  keys.key("speed_m_per_s", mouse.motion.speed, kAboveZero, "of the position, with the cap at its stop");
+  keys.key("dead_band", mouse.motion.dead_band, Number{.least = 0, .most = 0.9},
+           "share of the way to the stop in which nothing moves");
+  keys.key("reach_mm", mouse.motion.reach, kAboveZero, "the position stays within so much of the origin, on each axis");
+}
+
+template <class Table>
 void declare_device(Table& device, Draft& draft) {
-  device.kind(Names<DeviceKind>{{{"simulated", DeviceKind::kSimulated}}}, [&draft](Table& keys, DeviceKind) {
-    SimulatedDevice::Config& config = draft.scene.device;
+  const Names<DeviceKind> kinds{{{"simulated", DeviceKind::kSimulated},
+                                 {"falcon", DeviceKind::kFalcon},
+                                 {"replay", DeviceKind::kReplay},
+                                 {"spacemouse", DeviceKind::kSpaceMouse}}};
+  device.kind(kinds, [&draft](Table& keys, DeviceKind kind) {
     keys.key("name", draft.scene.name, Label{}, "what clients call it that want this one of several",
              Absent{.text = "the name of the scene file"});
+    if (kind == DeviceKind::kFalcon) {
+      declare_falcon(keys, draft);
+      return;
+    }
+    if (kind == DeviceKind::kReplay) {
+      declare_replay(keys, draft);
+      return;
+    }
+    if (kind == DeviceKind::kSpaceMouse) {
+      declare_spacemouse(keys, draft);
+      return;
+    }
+    SimulatedDevice::Config& config = draft.scene.device;
     keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
     if (draft.profile != nullptr) config = draft.profile->device();
     keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
@@ -576,8 +667,81 @@ void declare_device(Table& device, Draft& draft) {
       hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip", kRequired);
       hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip");
       hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle");
+      hand.key("button_after_ms", draft.scene.device.button_after, kZeroOrMore,
+               "after this time it presses button 0, and holds it", Absent{.text = "never"});
       hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
     });
+  });
+}
+
+enum class WorkspaceShape : std::uint8_t { kSphere, kBox };
+
+template <class Table>
+void declare_workspace(Table& workspace, Workspace::Config& config) {
+  const Names<WorkspaceShape> shapes{{{"sphere", WorkspaceShape::kSphere}, {"box", WorkspaceShape::kBox}}};
+  workspace.kind(shapes, [&config](Table& keys, WorkspaceShape shape) {
+    if (shape == WorkspaceShape::kSphere) {
+      auto& sphere = config.shape.emplace<Workspace::Sphere>();
+      keys.key("radius_mm", sphere.radius, kAboveZero, "of the space in which forces are whole", kRequired);
+    } else {
+      auto& box = config.shape.emplace<Workspace::Box>();
+      keys.key("half_mm", box.half, Vector{}, "half the edges of the space in which forces are whole", kRequired);
+    }
+    keys.key("centre_mm", config.centre, Vector{}, "of that space");
+    keys.key("margin_mm", config.margin, kAboveZero, "so far beyond it nothing pushes outwards any more", kRequired);
+  });
+}
+
+template <class Table>
+void declare_watchdog(Table& keys, Watchdog::Config& dog, std::string_view meaning) {
+  keys.key("timeout_ms", dog.timeout, kAboveZero, meaning, kRequired);
+  keys.key("ramp_ms", dog.ramp, kZeroOrMore, "then what is asked for falls to nothing within this time");
+}
+
+/// The safety layer: there when its table is, as is each part of it.
+template <class Table>
+void declare_safety(Table& safety, SafeDevice::Config& config) {
+  using By = SafeDevice::Arming::By;
+  safety.key(
+      "arm", config.arming.by,
+      Names<By>{{{"by request", By::kRequest}, {"at start", By::kStart}, {"by dead man", By::kDeadMan}}},
+      "what gives forces, at first and after a fault: a guest's request (rearm); the first time nobody, then that; "
+      "or nothing but pressing the dead man's button");
+  safety.key("rest_speed_m_per_s", config.arming.rest_speed, kAboveZero,
+             "armed is only a handle that was no faster for 50 ms");
+  safety.key("rest_force_n", config.arming.rest_force, kAboveZero, "… and of which no more force is asked");
+  safety.key("patience_ms", config.arming.patience, kAboveZero, "a request to arm is open for so long");
+  safety.part("force_limit", config.force_limit, [](Table& keys, ForceLimit::Config& part) {
+    keys.key("max_n", part.max, kAboveZero, "no force is longer; its direction is kept", kRequired);
+  });
+  safety.part("growth_limit", config.growth_limit, [](Table& keys, GrowthLimit::Config& part) {
+    keys.key("rate_n_per_s", part.rate, kAboveZero, "no force grows faster; it falls at once", kRequired);
+  });
+  safety.part("ramp_in", config.ramp_in, [](Table& keys, RampIn::Config& part) {
+    keys.key("time_ms", part.time, kAboveZero, "after arming, from nothing to the whole force", kRequired);
+  });
+  safety.part("heat_limit", config.heat_limit, [](Table& keys, HeatLimit::Config& part) {
+    keys.key("peak_n", part.peak, kAboveZero, "of cool motors", kRequired);
+    keys.key("continuous_n", part.continuous, kAboveZero, "what they bear for ever. Not above peak_n", kRequired);
+    keys.key("time_constant_ms", part.time_constant, kAboveZero, "with which they heat up", kRequired);
+  });
+  safety.part("workspace", config.workspace,
+              [](Table& keys, Workspace::Config& part) { declare_workspace(keys, part); });
+  safety.part("speed_trip", config.speed_trip, [](Table& keys, SpeedTrip::Config& part) {
+    keys.key("max_m_per_s", part.max, kAboveZero, "a handle that is faster gets no force any more", kRequired);
+  });
+  safety.part("step_bound", config.step_bound, [](Table& keys, StepBound::Config& part) {
+    keys.key("max_speed_m_per_s", part.max_speed, kAboveZero,
+             "as in [loop], and unarmed: a position that no hand comes to at this speed", kRequired);
+  });
+  safety.part("command_watchdog", config.command_watchdog, [](Table& keys, Watchdog::Config& part) {
+    declare_watchdog(keys, part, "the loop stood still for longer");
+  });
+  safety.part("link_watchdog", config.link_watchdog, [](Table& keys, Watchdog::Config& part) {
+    declare_watchdog(keys, part, "the newest position is older");
+  });
+  safety.part("dead_man", config.dead_man, [](Table& keys, DeadManSwitch::Config& part) {
+    keys.key("button", part.button, Count{31}, "no force unless it is held", kRequired);
   });
 }
 
@@ -677,8 +841,15 @@ void declare_law(Table& limiter, Draft& draft) {
   if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
 }
 
-/// The wire tells the loop's rate in whole Hz, so a period is 1 s or less.
-constexpr Number kPeriod{.least = 1e6 / limits::kMaxLoopHz, .most = 1e6};
+/// 250 Hz to 10 kHz. At 250 Hz the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004); 100 µs is
+/// about what an ordinary kernel wakes a thread too late.
+constexpr Number kPeriod{.least = 100, .most = 4000};
+/// The four of its grip: right, forward, centre, left.
+constexpr std::uint32_t kFalconButtons = 4;
+/// N: how long the forces of engines may be that nobody feels, so that recordings have them as they came.
+constexpr double kUnfelt = 10;
+/// Readings may fail for so long before it is a fault: what libfranka allows.
+constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 /// The wire tells timeouts in whole ms.
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
@@ -697,6 +868,9 @@ void declare_scene(Table& scene, Draft& draft) {
              "a position that no hand comes to at this speed is a fault: an encoder that wraps or loses count",
              Absent{.text = "every position is believed"});
   });
+
+  scene.part("safety", draft.scene.safety,
+             [](Table& safety, SafeDevice::Config& config) { declare_safety(safety, config); });
 
   scene.table("limiter", [&draft](Table& limiter) {
     LimiterConfig& config = draft.scene.loop.control.limiter;
@@ -731,7 +905,7 @@ void declare_scene(Table& scene, Draft& draft) {
   scene.table("force", [&draft](Table& force) {
     HapticController::Config& control = draft.scene.loop.control;
     force.key("max_force_n", draft.max_force, kAboveZero, "no force is longer than this",
-              Absent{.text = "the device's; required when the device has none"});
+              Absent{.text = "the device's; required when the device has none, 10 N when it exerts no forces"});
     force.key("max_slew_n_per_s", control.max_slew, kAboveZeroOrInf, "no force changes faster than this");
     force.key("hold_ms", control.hold.hold, kZeroOrMore, "a force is held for this long after its validity ends");
     force.key("decay_ms", control.hold.decay, kAboveZero, "time constant of its fading after that");
@@ -1054,14 +1228,17 @@ class Settlement {
 
   Scene scene(const std::filesystem::path& directory) {
     settle_motion(directory);
+    settle_falcon(directory);
     settle_network(directory);
     settle_control();
+    settle_replay(directory);
     settle_channels();
     // Rules of the constructors that are not among ours yet.
     Scene& scene = draft_.scene;
     if (draft_.has_hand) scene.device.hand = draft_.hand;
     build("device", [&scene] { SimulatedDevice{scene.device}; });
     build("force", [&scene] { HeldForce{scene.loop.control.hold}; });
+    settle_safety();
     build("limiter", [&scene] { Limiter{scene.loop.control.limiter}; });
     build("loop", [&scene] { HapticController{scene.loop.control}; });
     return std::move(scene);
@@ -1108,6 +1285,47 @@ class Settlement {
     });
   }
 
+  void settle_falcon(const std::filesystem::path& directory) {
+    if (!draft_.scene.falcon) return;
+    auto& firmware = draft_.scene.falcon->firmware;
+    if (firmware) firmware = directory / *firmware;
+    if (draft_.scene.loop.control.limiter.law == Law::kNone) {
+      blame("limiter.kind", {}, "expected a limiter, found \"none\", which is for simulated devices only");
+    }
+  }
+
+  void settle_replay(const std::filesystem::path& directory) {
+    if (!draft_.scene.replay) return;
+    ReplayDevice::Config& replay = *draft_.scene.replay;
+    auto& csv = draft_.recorded_motion;
+    if (draft_.replayed.has_value() == csv.has_value()) {
+      blame("device", {}, std::string("expected either recording or a table csv, found ") + (csv ? "both" : "neither"));
+    }
+    const std::string_view source = csv ? "device.csv.file" : "device.recording";
+    build(source, [&] {
+      try {
+        if (csv) csv->path = directory / csv->path;
+        replay.samples = csv ? ReplayDevice::samples_of(load_recorded_motion(*csv))
+                             : read_recorded_hand(directory / *draft_.replayed);
+      } catch (const std::runtime_error& refused) {
+        blame(source, {}, refused.what());
+      }
+      ReplayDevice{replay};
+    });
+    // Between samples the device is not seen.
+    const HapticLoop::Config& loop = draft_.scene.loop;
+    const Duration most = (loop.control.max_missed - 1) * loop.period;
+    const auto gap = std::ranges::adjacent_find(
+        replay.samples, [most](const auto& one, const auto& next) { return next.at - one.at > most; });
+    if (gap != replay.samples.end()) {
+      blame(source, {},
+            "expected samples no further apart than " + digits(seconds(most) * 1e3) +
+                " ms, because a device that is silent for longer is a fault, found " +
+                digits(seconds(std::next(gap)->at - gap->at) * 1e3) + " ms at " +
+                digits(seconds(gap->at - replay.samples.front().at)) + " s");
+    }
+  }
+
   void settle_channels() {
     Scene& scene = draft_.scene;
     scene.loop.control.channels.clear();
@@ -1119,6 +1337,27 @@ class Settlement {
               "expected a name of its own, found " + in_quotes(scene.channels[i].name) + " again");
       }
     }
+  }
+
+  void settle_safety() {
+    Scene& scene = draft_.scene;
+    // What moves a real hand is never without: then each part is there when it is listed, and arming always.
+    if (scene.falcon && !scene.safety) scene.safety.emplace();
+    if (!scene.safety) return;
+    if (scene.safety->dead_man) {
+      const std::uint32_t button = scene.safety->dead_man->button;
+      if (scene.falcon && button >= kFalconButtons) {
+        blame("safety.dead_man.button", {}, "expected one of a Falcon's, 0 to 3, found " + std::to_string(button));
+      }
+      if (!scene.falcon && !(scene.device.button_after && button == 0)) {
+        blame("safety.dead_man.button", {},
+              "expected button 0 of a hand with button_after_ms: a simulated device has no others");
+      }
+    }
+    build("safety", [&scene] {
+      SimulatedDevice device{scene.device};
+      SafeDevice{*scene.safety, device};
+    });
   }
 
   void settle_network(const std::filesystem::path& directory) {
@@ -1139,6 +1378,7 @@ class Settlement {
 
     // A loop without real-time priority is late by up to a period now and then; each time is an overrun beyond this.
     control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
+    control.max_missed = std::max(2U, static_cast<std::uint32_t>(kMostMissed / loop.period));
     if (control.limiter.longest_hold < loop.period) {
       blame("loop.longest_hold_us", {}, at_least(loop.period, "the period", control.limiter.longest_hold, "_us"));
     }
@@ -1152,10 +1392,11 @@ class Settlement {
             "expected a device with force_sensor among its effects: the tool is driven by the hand's force");
     }
 
-    if (!draft_.max_force && !device.max_force) {
+    const std::optional<double> most = draft_.scene.exerts_force() ? device.max_force : kUnfelt;
+    if (!draft_.max_force && !most) {
       blame("force.max_force_n", {}, "missing, expected a number above 0 N, because the device has no max_force_n");
     }
-    control.max_force = draft_.max_force ? *draft_.max_force : *device.max_force;
+    control.max_force = draft_.max_force ? *draft_.max_force : *most;
 
     // Friction that is isotropic as a vector is less on each axis by itself: Σ f |dx_i| ≤ √3 f ‖dx‖ (control.md 1.6
     // (a)).
@@ -1187,8 +1428,10 @@ class Settlement {
             "expected at most " + with_symbol(digits(most), unit_of(key)) +
                 ", the true friction of the simulated device, found " + digits(*high));
     };
-    check("coulomb_friction_n", draft_.place_coulomb, device.coulomb_friction.value_or(0));
-    check("viscous_friction_n_s_per_m", draft_.place_viscous, device.viscous_friction.value_or(0));
+    if (!draft_.scene.falcon && draft_.scene.exerts_force()) {  // whose true friction nobody knows here
+      check("coulomb_friction_n", draft_.place_coulomb, device.coulomb_friction.value_or(0));
+      check("viscous_friction_n_s_per_m", draft_.place_viscous, device.viscous_friction.value_or(0));
+    }
     auto& map = control.friction_map.emplace();
     map.reach = draft_.reach;
     for (std::size_t i = 0; i < count; ++i) {
@@ -1226,12 +1469,15 @@ class Settlement {
     const std::string full = "limiter." + key;
     const Unit& unit = unit_of(key);
     if (!given && profiles == nullptr) {
-      if (draft_.scene.loop.control.limiter.law == Law::kNone) return 0;
-      blame(full, {}, "missing, expected " + kZeroOrMore.expected(unit) + ", because there is no profile");
+      if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.exerts_force()) return 0;
+      blame(full, {},
+            "missing, expected " + kZeroOrMore.expected(unit) +
+                (draft_.scene.falcon ? ": what tendon-identify finds of this very device, or 0"
+                                     : ", because there is no profile"));
     }
     const double bound = given ? *given : profiles->value * axis_share;
     const double most = truth * axis_share;
-    if (bound > most) {
+    if (bound > most && !draft_.scene.falcon && draft_.scene.exerts_force()) {
       blame(full, {full, "device.effects." + key},
             "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
                 (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +

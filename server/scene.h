@@ -10,7 +10,10 @@
 #include <vector>
 
 #include "core/time.h"
+#include "devices/replay/replay_device.h"
+#include "devices/safety/safe_device.h"
 #include "devices/simulated/simulated_device.h"
+#include "devices/spacemouse/spacemouse_device.h"
 #include "protocol/link.h"
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
@@ -35,14 +38,35 @@ struct Scene {
     Duration lease{};  ///< 0: its holder stays until it leaves
   };
 
+  /// A Novint Falcon.
+  struct Falcon {
+    std::string port{};                               ///< as `tendond devices` names it; empty: the first free one
+    std::optional<std::filesystem::path> firmware{};  ///< empty: one that has its firmware already
+    bool accept_unknown_firmware = false;
+  };
+
+  struct SpaceMouse {
+    std::string port{};  ///< like a Falcon's
+    SpaceMouseDevice::Config motion{};
+  };
+
   std::string name;  ///< of the device, as clients claim it
-  SimulatedDevice::Config device;
+  // At most one of these; without one the device is simulated.
+  std::optional<Falcon> falcon;
+  std::optional<ReplayDevice::Config> replay;
+  std::optional<SpaceMouse> spacemouse;
+  SimulatedDevice::Config
+      device;  ///< of a real device: what is known of it, and what stands in where costs are measured
+  std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
   HapticLoop::Config loop;
   std::vector<Channel> channels = {Channel{}};
   Network network;
   bool has_network = false;                        ///< the file says something about it
   std::optional<std::filesystem::path> recording;  ///< relative to the current directory; empty: nothing is recorded
   std::string text;                                ///< the file, whole, for the recording
+
+  /// Else it is an input only: whatever engines send, nobody feels it.
+  bool exerts_force() const noexcept { return !replay && !spacemouse; }
 };
 
 /// What is wrong with a scene, for the operator to act on:

@@ -4,10 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <utility>
 
+#include "devices/falcon/falcon_device.h"
+#include "devices/falcon/firmware.h"
+#include "devices/falcon/packet.h"
+#include "devices/replay/replay_device.h"
 #include "devices/simulated/simulated_device.h"
+#include "devices/spacemouse/spacemouse_device.h"
+#include "devices/usb/usb.h"
 #include "server/build_info.h"
 #include "server/clock.h"
 #include "server/flight_file.h"
@@ -20,7 +27,8 @@ namespace tendon {
 
 namespace {
 
-constexpr int kHapticPriority = 70;
+/// Above the haptic thread, which waits for it.
+constexpr int kUsbPriority = kHapticPriority + 5;
 constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is told at most this often, with how much of it there was.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
@@ -30,6 +38,8 @@ DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
   about.name = scene.name;
   about.model = device.name;
   about.max_force = scene.loop.control.max_force;
+  if (!scene.exerts_force()) about.max_force = 0;
+  if (scene.safety && device.max_force > 0) about.max_force = std::min(about.max_force, device.max_force);
   about.position_resolution = device.position_resolution;
   about.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(scene.loop.period)));
   for (const Scene::Channel& channel : scene.channels) {
@@ -52,20 +62,92 @@ const char* describe(HapticController::Fault fault) {
   return "unknown";
 }
 
+/// What the operator is told when a real device comes to this state.
+std::string describe(Device::State state, const Scene& scene) {
+  switch (state) {
+    case Device::State::kAbsent:
+      return "the device is not plugged in";
+    case Device::State::kOpening:
+      return "the device is being opened";
+    case Device::State::kFirmware:
+      return scene.falcon && !scene.falcon->firmware
+                 ? "the device has no firmware, and no file was named to give it: --falcon-firmware FILE"
+                 : "the device is being given its firmware";
+    case Device::State::kUnhomed:
+      return "the device has to be homed: pull the grip all the way out, then push it all the way in";
+    case Device::State::kHomed:
+      return scene.falcon ? "the device is homed" : "the device is there";
+  }
+  return "unknown";
+}
+
+/// Tells the guardian when there is a device to guard, and when there is none any more.
+std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene) {
+  static_assert(limits::kMaxDevices <= Guardian::kDevices);
+  const auto bytes = falcon::encode(falcon::kLastCommand);
+  const ZeroPacket zero = ZeroPacket::usb(usb::PipeConfig{}.out, std::as_bytes(std::span(bytes)));
+  return [&guardian, zero, device = scene.loop.device, name = scene.name](int node) {
+    const bool heard = node >= 0 ? guardian.guard(device, node, zero) : guardian.forget(device);
+    if (!heard) log::error(name + ": the guardian process is dead: should this one be killed, forces stay on");
+  };
+}
+
+std::unique_ptr<Guardian> guardian_of(const std::vector<Scene>& scenes) {
+  const bool any =
+      std::any_of(scenes.begin(), scenes.end(), [](const Scene& scene) { return scene.falcon.has_value(); });
+  return any ? std::make_unique<Guardian>() : nullptr;
+}
+
+usb::PipeConfig pipe_for(const Scene& scene, const std::string& port) {
+  usb::PipeConfig pipe{.port = port};
+  pipe.on_start = [] { enter_realtime(kUsbPriority); };  // the haptic thread says what is refused
+  pipe.tell = [name = scene.name](const std::string& why) { log::warn(name + ": " + why); };
+  return pipe;
+}
+
+std::unique_ptr<Device> make_spacemouse(const Scene& scene) {
+  usb::PipeConfig pipe = pipe_for(scene, scene.spacemouse->port);
+  pipe.ids.assign(SpaceMouseDevice::kIds.begin(), SpaceMouseDevice::kIds.end());
+  pipe.transfers = usb::PipeConfig::Transfers::kInterrupt;
+  return std::make_unique<SpaceMouseDevice>(scene.spacemouse->motion, usb::open_pipe(pipe));
+}
+
+std::unique_ptr<Device> make_falcon(const Scene& scene, Guardian& guardian) {
+  const Scene::Falcon& falcon = *scene.falcon;
+  FalconDevice::Config config;
+  if (falcon.firmware) {
+    config.firmware =
+        falcon::read_firmware(*falcon.firmware, falcon.accept_unknown_firmware ? falcon::UnknownFirmware::kAccept
+                                                                               : falcon::UnknownFirmware::kRefuse);
+  }
+  usb::PipeConfig pipe = pipe_for(scene, falcon.port);
+  pipe.ids = {FalconDevice::kId};
+  pipe.opened = tell_guardian(guardian, scene);
+  return std::make_unique<FalconDevice>(std::move(config), usb::open_pipe(pipe));
+}
+
+std::unique_ptr<Device> make_device(const Scene& scene, Guardian* guardian) {
+  if (scene.falcon) return make_falcon(scene, *guardian);
+  if (scene.replay) return std::make_unique<ReplayDevice>(*scene.replay);
+  if (scene.spacemouse) return make_spacemouse(scene);
+  return std::make_unique<SimulatedDevice>(scene.device);
+}
+
 }  // namespace
 
-Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capacities)
+Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capacities, Guardian* guardian)
     : scene(the_scene),
-      device(std::make_unique<SimulatedDevice>(scene.device)),
+      device(make_device(scene, guardian)),
+      safe(scene.safety ? std::make_unique<SafeDevice>(*scene.safety, *device) : nullptr),
       mail(capacities),
-      haptic(scene.loop, *device, mail) {}
+      haptic(scene.loop, safe ? *safe : *device, mail) {}
 
-Server::Lanes Server::lanes_of(const std::vector<Scene>& scenes) {
+Server::Lanes Server::lanes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
   Lanes lanes;
   for (const Scene& scene : scenes) {
     Mailboxes::Capacities capacities;
     if (!lanes.empty()) capacities.datagrams = 1;  // all go to the first
-    lanes.push_back(std::make_unique<Lane>(scene, capacities));
+    lanes.push_back(std::make_unique<Lane>(scene, capacities, guardian));
   }
   return lanes;
 }
@@ -84,7 +166,9 @@ NetworkLoop::Config Server::network_config(const Lanes& lanes) {
   config.first_connection_id |= 1;  // never 0
   if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
   config.server_name = "tendond " + std::string(kVersion);
-  for (const auto& lane : lanes) config.devices.push_back(description_of(lane->scene, lane->device->info()));
+  for (const auto& lane : lanes) {
+    config.devices.push_back(description_of(lane->scene, lane->safe ? lane->safe->info() : lane->device->info()));
+  }
   config.takeover = scene.network.takeover;
   config.max_observers = scene.network.max_observers;
   config.controller_timeout = scene.network.controller_timeout;
@@ -95,7 +179,8 @@ NetworkLoop::Config Server::network_config(const Lanes& lanes) {
 
 Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
-      lanes_(lanes_of(scenes)),
+      guardian_(guardian_of(scenes)),
+      lanes_(lanes_of(scenes, guardian_.get())),
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       network_(network_config(lanes_), link_, mail_of(lanes_)),
       tell_next_(started_ + kTellPeriod) {
@@ -138,7 +223,10 @@ Server::Summary Server::stop() {
   log_thread_.join();
 
   Summary summary;
-  for (const auto& lane : lanes_) summary.devices.push_back({lane->scene.name, lane->haptic.stats()});
+  for (const auto& lane : lanes_) {
+    summary.devices.push_back({lane->scene.name, lane->haptic.stats(), std::nullopt});
+    if (lane->safe) summary.devices.back().safety = lane->safe->status();
+  }
   summary.network = network_.stats();
   if (recorder_) summary.recording = recorder_->status();
   summary.uptime = clock::now() - started_;
@@ -218,7 +306,21 @@ void Server::drain_to_recorder(LocalTime now) {
   }
 }
 
+void Server::report_safety(Lane& lane) {
+  if (!lane.safe) return;
+  const SafeDevice::Status now = lane.safe->status();
+  if (now.faults > lane.told_safety.faults) {
+    log::error(prefix(lane) + "no force any more: " + std::string(to_string(now.last_fault)));
+  }
+  const bool armed = now.state == SafetyState::kArmed;
+  const bool was_armed = lane.told_safety.state == SafetyState::kArmed;
+  if (armed && !was_armed) log::info(prefix(lane) + "the device is armed");
+  if (was_armed && now.state < SafetyState::kArmed) log::info(prefix(lane) + "the device is no longer armed");
+  lane.told_safety = now;
+}
+
 void Server::report_trouble(Lane& lane) {
+  report_safety(lane);
   const HapticLoop::Stats now = lane.haptic.stats();
   if (now.overruns > lane.told.overruns) {
     log::warn(prefix(lane) + std::to_string(now.overruns - lane.told.overruns) +
@@ -226,6 +328,7 @@ void Server::report_trouble(Lane& lane) {
               std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now.longest_interval).count()) +
               " µs");
   }
+  if (now.device != lane.told.device) log::info(prefix(lane) + describe(now.device, lane.scene));
   if (lane.mail.flight.frozen()) {  // each fault freezes it once, and saving thaws it
     log::error(prefix(lane) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");
     save_flight(lane);

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "devices/device.h"
+#include "devices/safety/guardian.h"
+#include "devices/safety/safe_device.h"
 #include "server/byte_sink.h"
 #include "server/doorbell.h"
 #include "server/haptic_loop.h"
@@ -36,6 +38,7 @@ class Server {
   struct DeviceSummary {
     std::string name;
     HapticLoop::Stats haptic;
+    std::optional<SafeDevice::Status> safety;  ///< empty: its scene lists no safety layer
   };
   struct Summary {
     std::vector<DeviceSummary> devices;
@@ -61,21 +64,23 @@ class Server {
  private:
   /// A device and what it needs to itself.
   struct Lane {
-    Lane(const Scene& scene, const Mailboxes::Capacities& capacities);
+    Lane(const Scene& scene, const Mailboxes::Capacities& capacities, Guardian* guardian);
     Scene scene;
     std::unique_ptr<Device> device;
+    std::unique_ptr<SafeDevice> safe;  ///< around it; null when the scene lists none
     Mailboxes mail;
     HapticLoop haptic;
     std::thread thread;
 
     // What run_log has told the operator already.
     HapticLoop::Stats told;
+    SafeDevice::Status told_safety;
     std::uint64_t told_steps_lost = 0;
     int flights = 0;
   };
   using Lanes = std::vector<std::unique_ptr<Lane>>;
 
-  static Lanes lanes_of(const std::vector<Scene>& scenes);
+  static Lanes lanes_of(const std::vector<Scene>& scenes, Guardian* guardian);
   static NetworkLoop::Config network_config(const Lanes& lanes);
   static std::vector<Mailboxes*> mail_of(const Lanes& lanes);
   /// "left: ", where there is more than one.
@@ -86,9 +91,11 @@ class Server {
   void run_log();
   void drain_to_recorder(LocalTime now);
   void report_trouble(Lane& lane);
+  void report_safety(Lane& lane);
   void save_flight(Lane& lane);
 
   LocalTime started_;
+  std::unique_ptr<Guardian> guardian_;  ///< of real devices; null when there are none
   Lanes lanes_;
   UdpLink link_;
   Doorbell stepped_;

@@ -20,9 +20,14 @@ namespace tendon {
 namespace {
 
 constexpr std::string_view kHeader = "tendon conversation 1";
-constexpr std::size_t kStateWords = 19;
-constexpr std::size_t kForceWords = 3;
-constexpr std::size_t kStiffnessWords = 9;
+
+// What an answer may bring besides its force: a word, then its numbers.
+constexpr std::string_view kStiffness = "stiffness";
+constexpr std::string_view kRadius = "radius";
+constexpr std::string_view kContact = "contact";
+constexpr std::string_view kTable = "table";
+constexpr std::string_view kCut = "cut";
+constexpr std::string_view kError = "error";
 
 /// One line, as it grows.
 class Line {
@@ -42,13 +47,13 @@ class Line {
     for (int row = 0; row < values.rows(); ++row)
       for (int col = 0; col < values.cols(); ++col) add(values(row, col));
   }
-  const std::string& text() const { return text_; }
-
- private:
   void add(std::string_view word) {
     if (!text_.empty()) text_ += ' ';
     text_ += word;
   }
+  const std::string& text() const { return text_; }
+
+ private:
   std::string text_;
 };
 
@@ -70,7 +75,32 @@ void add_state(Line& line, const DeviceState& hand) {
 
 void add_touch(Line& line, const Touch& touch) {
   line.add_all(touch.force);
-  if (touch.stiffness) line.add_all(*touch.stiffness);
+  if (touch.stiffness) {
+    line.add(kStiffness);
+    line.add_all(*touch.stiffness);
+  }
+  if (touch.valid_radius != Touch{}.valid_radius) {
+    line.add(kRadius);
+    line.add(touch.valid_radius);
+  }
+  if (touch.contact) {
+    line.add(kContact);
+    line.add_all(touch.contact->normal);
+    line.add(touch.contact->gap);
+    if (const auto& table = touch.contact->table) {
+      line.add(kTable);
+      line.add(table->first);
+      line.add(table->step);
+      const std::uint32_t size = std::min<std::uint32_t>(table->size, ForceTable::kMaxEntries);
+      line.add(size);
+      for (std::uint32_t i = 0; i < size; ++i) line.add(table->force[i]);
+    }
+  }
+  if (touch.topology_changed) line.add(kCut);
+  if (touch.error) {
+    line.add(kError);
+    line.add(*touch.error);
+  }
 }
 
 std::string text_of(const Touch& touch) {
@@ -85,16 +115,18 @@ class Words {
   Words(std::uint64_t line, const std::string& text) : line_(line) {
     std::istringstream stream(text);
     for (std::string word; stream >> word;) words_.push_back(word);
-    const std::size_t answer = words_.size() - std::min(words_.size(), kStateWords);
-    if (answer != kForceWords && answer != kForceWords + kStiffnessWords) {
-      fail("expected " + std::to_string(kStateWords + kForceWords) + " or " +
-           std::to_string(kStateWords + kForceWords + kStiffnessWords) + " words, got " +
-           std::to_string(words_.size()));
-    }
+  }
+
+  /// Whether the next word is this one; it is taken then.
+  bool take_word(std::string_view word) {
+    if (!more() || words_[next_] != word) return false;
+    ++next_;
+    return true;
   }
 
   template <typename Number>
   void take(Number& value) {
+    if (!more()) fail("it ends after " + std::to_string(words_.size()) + " words");
     const std::string& word = words_[next_++];
     const char* const end = word.data() + word.size();
     std::from_chars_result result{};
@@ -110,12 +142,16 @@ class Words {
     for (int row = 0; row < values.rows(); ++row)
       for (int col = 0; col < values.cols(); ++col) take(values(row, col));
   }
-  bool more() const { return next_ < words_.size(); }
-
- private:
+  void expect_no_more() const {
+    if (more()) fail("\"" + words_[next_] + "\" is no part of an answer here");
+  }
   [[noreturn]] void fail(const std::string& what) const {
     throw std::runtime_error("line " + std::to_string(line_) + ": " + what);
   }
+
+ private:
+  bool more() const { return next_ < words_.size(); }
+
   std::uint64_t line_;
   std::vector<std::string> words_;
   std::size_t next_ = 0;
@@ -148,7 +184,27 @@ DeviceState take_state(Words& words) {
 Touch take_touch(Words& words) {
   Touch touch;
   words.take_all(touch.force);
-  if (words.more()) words.take_all(touch.stiffness.emplace());
+  if (words.take_word(kStiffness)) words.take_all(touch.stiffness.emplace());
+  if (words.take_word(kRadius)) words.take(touch.valid_radius);
+  if (words.take_word(kContact)) {
+    Contact& contact = touch.contact.emplace();
+    words.take_all(contact.normal);
+    words.take(contact.gap);
+    if (words.take_word(kTable)) {
+      ForceTable& table = contact.table.emplace();
+      words.take(table.first);
+      words.take(table.step);
+      words.take(table.size);
+      if (table.size > ForceTable::kMaxEntries) {
+        words.fail("expected a table of at most " + std::to_string(ForceTable::kMaxEntries) + " entries, got " +
+                   std::to_string(table.size));
+      }
+      for (std::uint32_t i = 0; i < table.size; ++i) words.take(table.force[i]);
+    }
+  }
+  touch.topology_changed = words.take_word(kCut);
+  if (words.take_word(kError)) words.take(touch.error.emplace());
+  words.expect_no_more();
   return touch;
 }
 
@@ -201,7 +257,7 @@ std::string Replay::text() const {
   vector(first->was.force);
   out << " and is ";
   vector(first->is.force);
-  if (first->was.force == first->is.force) out << "; the stiffness differs";
+  if (first->was.force == first->is.force) out << "; what comes with the force differs";
   return out.str();
 }
 

@@ -14,8 +14,14 @@
 //
 // Text: a first line `tendon conversation 1`, then a line for each answer, of words with a space between: tick, sampled
 // (ns, server clock), position, velocity, force_applied (three each), energy, permitted_force, reasons, force_sequence,
-// force_age (ns), mode, device, channel (see DeviceState), then the force, and where the engine gave one the stiffness,
-// row by row. Integers are decimal, the others hexadecimal (1.8p+1 = 3), which is exact.
+// force_age (ns), mode, device, channel (see DeviceState), then the force, and after it what the engine gave of these,
+// in this order (see Touch):
+//
+//     stiffness    row by row, N/m        contact      the normal, the gap in m
+//     radius       in m                   table        first and step in m, the number of entries, each in N
+//     cut          the topology changed   error        in N
+//
+// Integers are decimal, the others hexadecimal (1.8p+1 = 3), which is exact.
 
 namespace tendon {
 

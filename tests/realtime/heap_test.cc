@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "devices/safety/safe_device.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
 #include "server/haptic_loop.h"
@@ -72,6 +73,37 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   }
   EXPECT_EQ(calls, 0U);
   EXPECT_GT(limited, 500U);
+}
+
+// Every part of the safety layer, armed, at fault, unarmed.
+TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
+  SimulatedDevice::Config still = find_device_profile("falcon")->device();
+  still.hand = OperatorHand::Config{
+      .stiffness = 300, .damping = 20, .mass = 0.05, .motion = ScriptedMotion(ScriptedMotion::Sine{})};
+  SimulatedDevice device(still);
+  SafeDevice::Config config;
+  config.growth_limit = GrowthLimit::Config{.rate = 500};
+  config.force_limit = ForceLimit::Config{.max = 4};
+  config.heat_limit = HeatLimit::Config{.peak = 4, .continuous = 2, .time_constant = milliseconds(100)};
+  config.workspace = Workspace::Config{.shape = Workspace::Sphere{.radius = 1e-3}, .margin = 1e-3};
+  config.ramp_in = RampIn::Config{.time = milliseconds(10)};
+  config.speed_trip = SpeedTrip::Config{.max = 1};
+  config.step_bound = StepBound::Config{.max_speed = 10};
+  config.command_watchdog = Watchdog::Config{.timeout = milliseconds(30), .ramp = milliseconds(10)};
+  config.link_watchdog = config.command_watchdog;
+  SafeDevice safe(config, device);
+  LocalTime now{};
+  const HeapGuard guard;
+  for (int i = 0; i < 100'000; ++i) {
+    now += milliseconds(i % 3000 == 0 ? 100 : 1);
+    safe.read(now);
+    if (i % 500 == 0) safe.arm();
+    const double push = i % 500 < 200 ? 0 : 6 * std::sin(0.02 * i);
+    safe.apply({i % 7000 == 6999 ? std::nan("") : push, 0, 0});
+  }
+  EXPECT_EQ(guard.calls(), 0U);
+  EXPECT_GT(safe.status().faults, 20U);
+  EXPECT_GT(safe.times_armed(), 20U);
 }
 
 // Every law of the catalogue, every part of AOL+, every way to follow the hand between two forces.

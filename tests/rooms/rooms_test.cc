@@ -99,7 +99,9 @@ TEST(Rooms, EveryLibraryHasOneFrontDoor) {
                                                       {"google/protobuf/arena.h", "protocol/codec.cc"},
                                                       {"tendon.pb.h", "protocol/codec.cc"},
                                                       {"recording.pb.h", "server/recording_codec.cc"},
+                                                      {"libusb.h", "devices/usb/with_libusb.cc"},
                                                       {"sodium.h", "protocol/crypto.cc"},
+                                                      {"sodium.h", "devices/falcon/firmware.cc"},
                                                       {"spdlog/spdlog.h", "server/log.cc"},
                                                       {"toml++/toml.h", "server/scene.cc"},
                                                       {"zlib.h", "server/mcap_format.cc"}}) {
@@ -136,7 +138,7 @@ TEST(Rooms, ProtocolDoesNoInputOrOutput) {
 
 TEST(Rooms, OnlyTheClockFilesReadAClock) {
   for (const std::string call : {"std::chrono::steady_clock::now()", "Clock :: now ( )",
-                                 "clock_gettime(CLOCK_MONOTONIC, &t)", "std::time(nullptr)"}) {
+                                 "clock_gettime(CLOCK_MONOTONIC, &t)", "std::time(nullptr)", "std::clock()"}) {
     const auto text = kLicence + "auto t = " + call + ";\n";
     for (const std::string path : {"core/a.cc", "server/network_loop.cc", "devices/a.cc", "protocol/a.cc",
                                    "clients/cpp/force_client.cc", "tests/simulation/world.cc"}) {

@@ -23,12 +23,13 @@ std::function<Duration()> ticking() {
 
 /// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
 std::set<std::string> optional_parts() {
-  std::set<std::string> keys = {"device.hand", "loop.max_speed_m_per_s", "limiter", "admittance"};
+  std::set<std::string> keys = {"device.hand", "loop.max_speed_m_per_s", "safety", "limiter", "admittance"};
   std::istringstream reference(scene_reference());
   std::string table;
   for (std::string line; std::getline(reference, line);) {
     if (line.starts_with('[')) table = line.substr(1, line.find(']') - 1);
-    const bool part = line.starts_with('[') && (table.starts_with("limiter.") || table.starts_with("force."));
+    const bool part = line.starts_with('[') &&
+                      (table.starts_with("safety.") || table.starts_with("limiter.") || table.starts_with("force."));
     if (part) keys.insert(table);
     const bool key = line.starts_with("  ") && line.find_first_of(" ", 2) == std::string::npos;
     if (table == "device.effects" && key && line != "  mass_kg") keys.insert(table + "." + line.substr(2));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -10,9 +11,15 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <variant>
 #include <vector>
 
+#include "devices/replay/replay_device.h"
 #include "devices/simulated/profiles.h"
+#include "server/byte_sink.h"
+#include "server/mailboxes.h"
+#include "server/recorder.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon {
@@ -238,15 +245,79 @@ TEST(Scene, ConvertsUnitsWithoutAnErrorInTheLastDigit) {
   const Scene scene = minimal_and(
       "start_position_mm = [0.1, 15, 0.7]\n"
       "[device.effects]\nencoder_step_um = 43\nwatchdog_ms = 4.35\n"
-      "[loop]\nperiod_us = 1.001\nlongest_hold_us = 1000.001\n"
+      "[loop]\nperiod_us = 100.001\nlongest_hold_us = 1000.001\n"
       "[force]\nhold_ms = 0.1\ndecay_ms = 0.29\n");
   EXPECT_EQ(scene.device.start_position, Vec3(0.0001, 0.015, 0.0007));
   EXPECT_EQ(scene.device.encoder_step, 0.000043);
   EXPECT_EQ(scene.device.watchdog, 4'350'000ns);
-  EXPECT_EQ(scene.loop.period, 1001ns);
+  EXPECT_EQ(scene.loop.period, 100'001ns);
   EXPECT_EQ(scene.loop.control.limiter.longest_hold, 1'000'001ns);
   EXPECT_EQ(scene.loop.control.hold.hold, 100'000ns);
   EXPECT_EQ(scene.loop.control.hold.decay, 290'000ns);
+}
+
+TEST(Scene, LoopsRunFrom250HzTo10KHzAndBearSilenceForTheSameTime) {
+  for (const auto& [period_us, missed] : {std::pair(100, 200U), std::pair(500, 40U), std::pair(4000, 5U)}) {
+    const Scene scene = minimal_and("[loop]\nperiod_us = " + std::to_string(period_us) + "\n");
+    EXPECT_EQ(scene.loop.period, std::chrono::microseconds(period_us));
+    EXPECT_EQ(scene.loop.control.limiter.longest_hold, std::chrono::microseconds(2 * period_us));
+    EXPECT_EQ(scene.loop.control.max_missed, missed);
+  }
+}
+
+TEST(Scene, OfTheSafetyLayerThereIsWhatItLists) {
+  EXPECT_FALSE(minimal_and("").safety);
+  const Scene bare = minimal_and("[safety]\n");
+  ASSERT_TRUE(bare.safety);
+  EXPECT_EQ(bare.safety->arming.by, SafeDevice::Arming::By::kRequest);
+  EXPECT_FALSE(bare.safety->force_limit || bare.safety->growth_limit || bare.safety->ramp_in ||
+               bare.safety->heat_limit || bare.safety->workspace || bare.safety->speed_trip ||
+               bare.safety->step_bound || bare.safety->command_watchdog || bare.safety->link_watchdog ||
+               bare.safety->dead_man);
+  const SafeDevice::Config all = *minimal_and(R"([device.hand]
+stiffness_n_per_m = 300
+button_after_ms = 500
+[device.hand.motion]
+kind = "sine"
+amplitude_mm = 0
+frequency_hz = 0
+[safety]
+arm = "by dead man"
+rest_speed_m_per_s = 0.03
+rest_force_n = 0.2
+patience_ms = 400
+force_limit.max_n = 7
+growth_limit.rate_n_per_s = 500
+ramp_in.time_ms = 200
+heat_limit = {peak_n = 8, continuous_n = 2, time_constant_ms = 30000}
+workspace = {kind = "box", half_mm = [50, 40, 30], centre_mm = [0, 0, 125], margin_mm = 10}
+speed_trip.max_m_per_s = 1.5
+step_bound.max_speed_m_per_s = 10
+command_watchdog = {timeout_ms = 30, ramp_ms = 10}
+link_watchdog.timeout_ms = 20
+dead_man.button = 0
+)")
+                                      .safety;
+  EXPECT_EQ(all.arming.by, SafeDevice::Arming::By::kDeadMan);
+  EXPECT_EQ(all.arming.rest_speed, 0.03);
+  EXPECT_EQ(all.arming.rest_force, 0.2);
+  EXPECT_EQ(all.arming.patience, 400ms);
+  EXPECT_EQ(all.force_limit->max, 7);
+  EXPECT_EQ(all.growth_limit->rate, 500);
+  EXPECT_EQ(all.ramp_in->time, 200ms);
+  EXPECT_EQ(all.heat_limit->peak, 8);
+  EXPECT_EQ(all.heat_limit->continuous, 2);
+  EXPECT_EQ(all.heat_limit->time_constant, 30s);
+  EXPECT_EQ(std::get<Workspace::Box>(all.workspace->shape).half, Vec3(0.05, 0.04, 0.03));
+  EXPECT_EQ(all.workspace->centre, Vec3(0, 0, 0.125));
+  EXPECT_EQ(all.workspace->margin, 0.01);
+  EXPECT_EQ(all.speed_trip->max, 1.5);
+  EXPECT_EQ(all.step_bound->max_speed, 10);
+  EXPECT_EQ(all.command_watchdog->timeout, 30ms);
+  EXPECT_EQ(all.command_watchdog->ramp, 10ms);
+  EXPECT_EQ(all.link_watchdog->timeout, 20ms);
+  EXPECT_EQ(all.link_watchdog->ramp, Watchdog::Config{}.ramp);
+  EXPECT_EQ(all.dead_man->button, 0U);
 }
 
 TEST(Scene, AnEffectThatIsFalseDoesNotExist) {
@@ -270,6 +341,173 @@ TEST(Scene, WithoutAProfileOnlyTheListedEffectsExist) {
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0);
   EXPECT_EQ(scene.loop.control.limiter.friction.viscous, 0);
   EXPECT_EQ(scene.loop.control.max_force, 5);
+}
+
+constexpr std::string_view kFalcon =
+    "[device]\n"
+    "kind = \"falcon\"\n"
+    "[limiter]\n"
+    "coulomb_friction_n = 0.9\n"
+    "viscous_friction_n_s_per_m = 0\n";
+
+TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
+  const Scene scene = parse(std::string(kFalcon), "/scenes");
+  ASSERT_TRUE(scene.falcon);
+  EXPECT_EQ(scene.falcon->port, "");
+  EXPECT_FALSE(scene.falcon->firmware || scene.falcon->accept_unknown_firmware);
+  EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0.9) << "nobody here knows that it has less";
+  EXPECT_EQ(scene.loop.control.max_force, 8);
+  EXPECT_EQ(scene.loop.control.watchdog, 0ns);
+  EXPECT_FALSE(parse(std::string(kMinimal)).falcon);
+
+  const std::string keys =
+      "port = \"1-2.3\"\nfirmware = \"mine.bin\"\naccept_unknown_firmware = true\nname = \"left\"\n";
+  const Scene told =
+      parse("[device]\nkind = \"falcon\"\n" + keys + std::string(kFalcon.substr(kFalcon.find("[l"))), "/scenes");
+  EXPECT_EQ(told.falcon->port, "1-2.3");
+  EXPECT_EQ(told.falcon->firmware, "/scenes/mine.bin");
+  EXPECT_TRUE(told.falcon->accept_unknown_firmware);
+  EXPECT_EQ(told.name, "left");
+  EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "falcon.toml").falcon);
+}
+
+TEST(Scene, AFalconHasNoKeysOfTheSimulatedDeviceAndIsNotWithoutALimiter) {
+  const std::string falcon = "[device]\nkind = \"falcon\"\n";
+  EXPECT_EQ(error_of(falcon + "profile = \"falcon\"\n"),
+            "s.toml:3: device.profile: unknown key; known here: kind, name, port, firmware, accept_unknown_firmware");
+  EXPECT_EQ(error_of(falcon + "port = \"left\"\n"),
+            "s.toml:3: device.port: expected a port as `tendond devices` names it, like \"1-2.3\", found \"left\"");
+  EXPECT_EQ(error_of(falcon + "[limiter]\nkind = \"none\"\n"),
+            "s.toml:4: limiter.kind: expected a limiter, found \"none\", which is for simulated devices only");
+  EXPECT_EQ(
+      error_of(falcon + "[limiter]\nviscous_friction_n_s_per_m = 0\n"),
+      "s.toml:3: limiter.coulomb_friction_n: missing, expected a number of 0 N or more: what tendon-identify finds "
+      "of this very device, or 0");
+}
+
+TEST(Scene, AFalconAlwaysHasToBeArmed) {
+  const Scene scene = parse(std::string(kFalcon));
+  ASSERT_TRUE(scene.safety);
+  EXPECT_EQ(scene.safety->arming.by, SafeDevice::Arming::By::kRequest);
+  EXPECT_EQ(parse(std::string(kFalcon) + "[safety.dead_man]\nbutton = 3\n").safety->dead_man->button, 3U);
+  EXPECT_EQ(error_of(std::string(kFalcon) + "[safety.dead_man]\nbutton = 4\n"),
+            "s.toml:7: safety.dead_man.button: expected one of a Falcon's, 0 to 3, found 4");
+}
+
+// --- Replay
+
+constexpr std::string_view kReplay = "[device]\nkind = \"replay\"\n";
+
+TEST(Scene, AReplayedCsvFileNeedsNothingElseBecauseNobodyFeelsAForce) {
+  const ScratchFolder folder;
+  write(folder.path() / "hand.csv", "t_s,angle\n10,0\n10.01,2\n10.015,4\n");
+  const Scene scene = parse(std::string(kReplay) +
+                                "at_end = \"repeat\"\nencoder_step_um = 30\n[device.csv]\nfile = \"hand.csv\"\n"
+                                "position_column = \"angle\"\nscale_m = 0.5\ndirection = [0, 3, 0]\n",
+                            folder.path());
+  ASSERT_TRUE(scene.replay);
+  EXPECT_FALSE(scene.exerts_force());
+  ASSERT_EQ(scene.replay->samples.size(), 3U);
+  EXPECT_EQ(scene.replay->samples[2].position, Vec3(0, 2, 0));
+  EXPECT_EQ(scene.replay->samples[2].at - scene.replay->samples[0].at, 15ms);
+  EXPECT_EQ(scene.replay->at_end, ReplayDevice::AtEnd::kRepeat);
+  EXPECT_EQ(scene.replay->position_resolution, 3e-5);
+  EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0);
+  EXPECT_TRUE(parse(std::string(kMinimal)).exerts_force());
+}
+
+TEST(Scene, AReplayedRecordingIsTheHandThatWasSeenBitForBit) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  std::vector<StepRecord> steps(40);
+  {
+    FileSink sink(path);
+    Recorder recorder({.scene = {}, .started = LocalTime(1s)}, sink);
+    for (int i = 0; StepRecord & step : steps) {
+      const double x = std::sin(0.1 * i);
+      step.hand = {.at = LocalTime(1s + i * 1ms + i % 3 * 7us), .position = {x, x / 3, -x}, .velocity = Vec3::Zero()};
+      if (i++ % 5 == 4) step.reasons |= Reason::kUnseen;
+      recorder.record(step, 0);
+    }
+    recorder.close();
+  }
+  const Scene scene = parse(std::string(kReplay) + "recording = \"run.mcap\"\n", folder.path());
+  std::erase_if(steps, [](const StepRecord& step) { return step.reasons.has(Reason::kUnseen); });
+  ASSERT_EQ(scene.replay->samples.size(), steps.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    EXPECT_EQ(scene.replay->samples[i].position, steps[i].hand.position);
+    EXPECT_EQ(scene.replay->samples[i].at, steps[i].hand.at.time_since_epoch());
+  }
+}
+
+TEST(Scene, AReplayNamesItsSourceAndWhatIsWrongWithIt) {
+  const ScratchFolder folder;
+  const auto error = [&folder](const std::string& more) -> std::string {
+    try {
+      parse(std::string(kReplay) + more, folder.path());
+    } catch (const SceneError& problem) {
+      return problem.what();
+    }
+    return "none";
+  };
+  const std::string csv = "[device.csv]\nfile = \"hand.csv\"\nposition_column = \"x\"\n";
+  EXPECT_EQ(error(""), "s.toml:1: device: expected either recording or a table csv, found neither");
+  EXPECT_EQ(error("recording = \"a.mcap\"\n" + csv),
+            "s.toml:1: device: expected either recording or a table csv, found both");
+  EXPECT_NE(error("recording = \"a.mcap\"\n").find("s.toml:3: device.recording: "), std::string::npos);
+  EXPECT_NE(error(csv).find("s.toml:4: device.csv.file: "), std::string::npos) << error(csv);
+  write(folder.path() / "hand.csv", "t_s,x\n0,0\n0.01,1\n0.05,2\n");
+  EXPECT_EQ(error(csv),
+            "s.toml:4: device.csv.file: expected samples no further apart than 19 ms, because a device that is silent "
+            "for longer is a fault, found 40 ms at 0.01 s");
+  write(folder.path() / "hand.csv", "t_s,x\n0,0\n0.01,1\n");
+  EXPECT_EQ(error(csv), "none");
+  EXPECT_NE(error(csv + "direction = [0, 0, 0]\n").find("replay.direction (its length)"), std::string::npos);
+}
+
+TEST(Scene, AReplayRunsTheLoopAsTheHandDidAndAFieldOfForceChangesNothing) {
+  const ScratchFolder folder;
+  write(folder.path() / "hand.csv", "t_s,x\n0,0\n0.002,0.001\n0.004,0.002\n0.006,0.003\n");
+  const Scene scene =
+      parse(std::string(kReplay) + "[device.csv]\nfile = \"hand.csv\"\nposition_column = \"x\"\n", folder.path());
+  ReplayDevice device(*scene.replay);
+  Mailboxes mail({.steps = 64, .flight = 2, .datagrams = 1});
+  HapticLoop loop(scene.loop, device, mail);
+  LocalTime now{1s};
+  double asked = 0;
+  for (int i = 0; i < 12; ++i, now += 1ms) {
+    RemoteForce force;
+    force.sequence = static_cast<std::uint64_t>(i + 1);
+    force.received = force.answers = now;
+    force.force = {-3, 0, 0};
+    force.valid_for = 20ms;
+    mail.forces[0].put(force);
+    loop.step(now);
+    const StepRecord* step = mail.steps.front();
+    EXPECT_EQ(step->applied, Vec3::Zero());
+    asked = std::max(asked, step->wanted.norm());
+    if (i % 2 == 0 && i <= 6) {
+      EXPECT_EQ(step->hand.position, scene.replay->samples[static_cast<std::size_t>(i / 2)].position);
+    }
+    mail.steps.pop();
+  }
+  EXPECT_GT(asked, 0);
+  EXPECT_EQ(loop.stats().fault, HapticController::Fault::kNone);
+}
+
+TEST(Scene, ASpaceMouseNeedsNothingElseEither) {
+  const std::string mouse = "[device]\nkind = \"spacemouse\"\n";
+  const Scene plain = parse(mouse);
+  ASSERT_TRUE(plain.spacemouse);
+  EXPECT_FALSE(plain.exerts_force());
+  const Scene told = parse(mouse + "port = \"1-2.3\"\nspeed_m_per_s = 0.3\ndead_band = 0.2\nreach_mm = 70\n");
+  EXPECT_EQ(told.spacemouse->port, "1-2.3");
+  EXPECT_EQ(told.spacemouse->motion.speed, 0.3);
+  EXPECT_EQ(told.spacemouse->motion.dead_band, 0.2);
+  EXPECT_EQ(told.spacemouse->motion.reach, 0.07);
+  EXPECT_EQ(error_of(mouse + "dead_band = 1\n"),
+            "s.toml:3: device.dead_band: expected a number from 0 to 0.9, found 1");
+  EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "spacemouse.toml").spacemouse);
 }
 
 TEST(Scene, PerAxisTheProfilesCoulombFrictionIsSharedByTheAxes) {
@@ -409,6 +647,27 @@ TEST(SceneError, NamesTheLineOfASyntaxError) {
   });
 }
 
+TEST(SceneError, OfTheSafetyLayerNamesTheLine) {
+  expect_errors({
+      {"[safety]\narm = \"now\"\n",
+       "s.toml:5: safety.arm: expected one of \"by request\", \"at start\", \"by dead man\", found \"now\""},
+      {"[safety.force_limit]\n", "s.toml:4: safety.force_limit.max_n: missing, expected a number above 0 N"},
+      {"[safety.heat_limit]\npeak_n = 1\ncontinuous_n = 2\ntime_constant_ms = 1\n",
+       "s.toml:4: safety: heat_limit.peak = 1: expected a finite number, not below continuous"},
+      {"[safety.workspace]\nkind = \"ball\"\n",
+       "s.toml:5: safety.workspace.kind: expected one of \"sphere\", \"box\", found \"ball\""},
+      {"[safety]\narm = \"by dead man\"\n",
+       "s.toml:4: safety: dead_man: expected to be listed, because the device is armed by its button"},
+      {"[safety.dead_man]\nbutton = 0\n",
+       "s.toml:5: safety.dead_man.button: expected button 0 of a hand with button_after_ms: a simulated device has no "
+       "others"},
+      {"[safety.thermal]\n",
+       "s.toml:4: safety.thermal: unknown table; known here: arm, rest_speed_m_per_s, rest_force_n, patience_ms, "
+       "force_limit, growth_limit, ramp_in, heat_limit, workspace, speed_trip, step_bound, command_watchdog, "
+       "link_watchdog, dead_man"},
+  });
+}
+
 TEST(SceneError, TellsTheUnitWhenOnlyThatIsWrong) {
   expect_errors({
       {"[loop]\nperiod_ms = 1\n", "s.toml:5: loop.period_ms: unknown key; period is given in µs: period_us"},
@@ -447,9 +706,10 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
     EXPECT_TRUE(error_of(text).starts_with("s.toml:" + line + ": " + table + ".zzzzzz: unknown key; known here: "))
         << error_of(text);
   }
-  EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
-            "s.toml:4: other: unknown table; known here: device, loop, limiter, admittance, force, channel, network, "
-            "recording");
+  EXPECT_EQ(
+      error_of_minimal_and("[other]\nzzzzzz = 1\n"),
+      "s.toml:4: other: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, network, "
+      "recording");
 }
 
 TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
@@ -463,7 +723,7 @@ TEST(SceneError, ReportsTheFirstMistakeInTheFile) {
             "s.toml:5: network.zzzzzz: unknown key; known here: listen, keys, max_observers, controller_timeout_ms, "
             "observer_timeout_ms, adapt_state_rate, takeover");
   EXPECT_EQ(error_of_minimal_and("[loop]\nperiod_us = \"x\"\n[force]\nhold_us = 1\n"),
-            "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found \"x\"");
+            "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found \"x\"");
 }
 
 TEST(SceneError, AMisspeltRequiredKeyIsNotCalledMissing) {
@@ -507,12 +767,13 @@ TEST(SceneError, TellsWhatWasExpectedAndWhatWasFound) {
 }
 
 TEST(SceneError, RefusesTimesThatNoLoopCanHave) {
-  const std::string period = "s.toml:5: loop.period_us: expected a number from 1 to 1000000 µs, found ";
+  const std::string period = "s.toml:5: loop.period_us: expected a number from 100 to 4000 µs, found ";
   const std::string timeout = "s.toml:5: network.controller_timeout_ms: expected a number from 1 to 3600000 ms, found ";
   expect_errors({
       {"[loop]\nperiod_us = 0\n", period + "0"},
       {"[loop]\nperiod_us = -1000\n", period + "-1000"},
-      {"[loop]\nperiod_us = 1000001\n", period + "1000001"},
+      {"[loop]\nperiod_us = 4000.001\n", period + "4000.001"},
+      {"[loop]\nperiod_us = 99.999\n", period + "99.999"},
       {"[loop]\nperiod_us = inf\n", period + "inf"},
       {"[loop]\nlongest_hold_us = 1e-9\n", "s.toml:5: loop.longest_hold_us: expected a number above 0 µs, found 1e-09"},
       {"[force]\nhold_ms = 1e300\n", "s.toml:5: force.hold_ms: expected a number of at most 3600000 ms, found 1e+300"},
@@ -535,7 +796,9 @@ TEST(SceneError, RefusesForcesThatAreNone) {
 }
 
 TEST(SceneError, NamesTheKindsAndProfilesThatThereAre) {
-  EXPECT_EQ(error_of("[device]\nkind = \"real\"\n"), "s.toml:2: device.kind: expected \"simulated\", found \"real\"");
+  EXPECT_EQ(
+      error_of("[device]\nkind = \"real\"\n"),
+      "s.toml:2: device.kind: expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\", found \"real\"");
   EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\nprofile = \"hawk\"\n"),
             "s.toml:3: device.profile: expected one of \"phantom-premium\", \"touch\", \"falcon\", found \"hawk\"");
   EXPECT_EQ(error_of(std::string(kHand) + "kind = \"cosine\"\n"),
@@ -568,8 +831,10 @@ TEST(SceneError, RefusesPartsThatCannotBe) {
 }
 
 TEST(SceneError, NamesWhatIsMissing) {
-  EXPECT_EQ(error_of(""), "s.toml: device.kind: missing, expected \"simulated\"");
-  EXPECT_EQ(error_of("\n[device]\n"), "s.toml:2: device.kind: missing, expected \"simulated\"");
+  EXPECT_EQ(error_of(""),
+            "s.toml: device.kind: missing, expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\"");
+  EXPECT_EQ(error_of("\n[device]\n"),
+            "s.toml:2: device.kind: missing, expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\"");
   EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\n"),
             "s.toml:1: device.effects.mass_kg: missing, expected a number above 0 kg");
   expect_errors({
@@ -682,9 +947,10 @@ TEST(SceneError, OfAnElementInAListHasTheElementsLine) {
 TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
   std::string deep = "[a";
   while (deep.size() + 4 < kMaxSceneBytes) deep += ".a";
-  EXPECT_EQ(error_of(deep + "]\n"),
-            "s.toml:1: a: unknown table; known here: device, loop, limiter, admittance, force, channel, network, "
-            "recording");
+  EXPECT_EQ(
+      error_of(deep + "]\n"),
+      "s.toml:1: a: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, network, "
+      "recording");
   EXPECT_TRUE(error_of("a = " + std::string(16'000, '[')).starts_with("s.toml:1: not TOML: "));
 }
 
@@ -768,6 +1034,14 @@ TEST(ShippedScenes, TwoEnginesShareADevice) {
             (std::vector{ChannelRule::kSum, ChannelRule::kPriority, ChannelRule::kPriority}));
 }
 
+TEST(ShippedScenes, SafeListsEveryPartOfTheSafetyLayer) {
+  const auto safety = read_scene(std::filesystem::path(TENDON_SCENES) / "safe.toml").safety;
+  ASSERT_TRUE(safety);
+  EXPECT_TRUE(safety->force_limit && safety->growth_limit && safety->ramp_in && safety->heat_limit &&
+              safety->workspace && safety->speed_trip && safety->step_bound && safety->command_watchdog &&
+              safety->link_watchdog && safety->dead_man);
+}
+
 TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {
   EXPECT_EQ(read_scene(std::filesystem::path(TENDON_SCENES) / "minimal.toml").device.name, "falcon");
 }
@@ -786,7 +1060,7 @@ TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
       has("[loop]\n"
           "  period_us\n"
           "      from one haptic step to the next.\n"
-          "      a number from 1 to 1000000 µs. Default: 1000.\n"))
+          "      a number from 100 to 4000 µs. Default: 1000.\n"))
       << text;
   for (const std::string_view key :
        {"[device]", "profile", "start_position_mm", "[device.effects]", "watchdog_ms", "[device.hand]",

@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <vector>
 
 namespace tendon {
 namespace {
@@ -114,7 +116,42 @@ TEST(Conversation, NoticesAStiffnessThatDiffersOrIsGone) {
   });
   EXPECT_EQ(found.differing, 5u);
   EXPECT_EQ(found.largest_n, 0);
-  EXPECT_NE(found.text().find("the stiffness differs"), std::string::npos);
+  EXPECT_NE(found.text().find("what comes with the force differs"), std::string::npos);
+}
+
+TEST(Conversation, KeepsAllThatAnAnswerMayBringAndNoticesEachThatDiffers) {
+  Touch all(Vec3(-1, 0.1, 0));
+  all.stiffness = Mat3(Vec3(500, 0, 0).asDiagonal());
+  all.valid_radius = 0.003;
+  all.contact = Contact{.normal = Vec3(-1, 0, 0), .gap = -0.002, .table = ForceTable{}};
+  all.contact->table->first = -0.001;
+  all.contact->table->step = 0.0005;
+  all.contact->table->size = 3;
+  all.contact->table->force = {0.1, 0.2, 0.4};
+  all.topology_changed = true;
+  all.error = 0.01;
+  const std::string text = conversation([&](const DeviceState&) { return all; }, 2);
+  EXPECT_EQ(replayed(text, [&](const DeviceState&) { return all; }).differing, 0u);
+  const std::vector<std::function<void(Touch&)>> changes = {
+      [](Touch& touch) { touch.stiffness.reset(); },
+      [](Touch& touch) { touch.valid_radius = 0.004; },
+      [](Touch& touch) { touch.valid_radius = Touch{}.valid_radius; },
+      [](Touch& touch) { touch.contact.reset(); },
+      [](Touch& touch) { touch.contact->normal.y() = 1e-300; },
+      [](Touch& touch) { touch.contact->gap = 0; },
+      [](Touch& touch) { touch.contact->table.reset(); },
+      [](Touch& touch) { touch.contact->table->first = 0; },
+      [](Touch& touch) { touch.contact->table->step = 0.001; },
+      [](Touch& touch) { touch.contact->table->size = 2; },
+      [](Touch& touch) { touch.contact->table->force[2] = 0.5; },
+      [](Touch& touch) { touch.topology_changed = false; },
+      [](Touch& touch) { touch.error.reset(); },
+      [](Touch& touch) { touch.error = 0.02; }};
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    Touch other = all;
+    changes[i](other);
+    EXPECT_EQ(replayed(text, [&](const DeviceState&) { return other; }).differing, 2u) << "change " << i;
+  }
 }
 
 TEST(Conversation, TakesANanForANan) {
@@ -156,7 +193,12 @@ TEST(Conversation, ThatIsNoneIsRefusedWithItsLine) {
   EXPECT_EQ(says(""), "line 1: expected \"tendon conversation 1\", got \"\"");
   EXPECT_EQ(says("tendon conversation 2\n"),
             "line 1: expected \"tendon conversation 1\", got \"tendon conversation 2\"");
-  EXPECT_EQ(says(good + "1 2 3\n"), "line 5: expected 22 or 31 words, got 3");
+  EXPECT_EQ(says(good + "1 2 3\n"), "line 5: it ends after 3 words");
+  const std::string whole = good.substr(0, good.size() - 1);
+  EXPECT_EQ(says(whole + " cut stiffness\n"), "line 4: \"stiffness\" is no part of an answer here");
+  EXPECT_EQ(says(whole + " error\n"), "line 4: it ends after 23 words");
+  EXPECT_EQ(says(whole + " contact 1p+0 0p+0 0p+0 0p+0 table 0p+0 1p+0 17\n"),
+            "line 4: expected a table of at most 16 entries, got 17");
   EXPECT_EQ(says(good.substr(0, good.size() - 1)), "line 4: it is cut off");
   std::string wrong = good;
   wrong.replace(wrong.find('\n') + 1, 1, "x");

@@ -217,11 +217,12 @@ Outcome run(Connection& connection, bool with_limiter = true) {
                           .amplifier_bandwidth = std::nullopt,
                           .force_sensor = std::nullopt,
                           .watchdog = std::nullopt,
-                          .hand = OperatorHand::Config{
-                              .stiffness = 300,
-                              .damping = 2,
-                              .mass = 0.05,
-                              .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 0.5})}});
+                          .hand = OperatorHand::Config{.stiffness = 300,
+                                                       .damping = 2,
+                                                       .mass = 0.05,
+                                                       .motion = ScriptedMotion(
+                                                           ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 0.5})},
+                          .button_after = std::nullopt});
   Aol<1, 3> law({{kFriction}, kPeriod});
   Outcome outcome;
   Sight hand{Vec3::Zero(), Vec3::Zero()};

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "devices/usb/usb.h"
+
+namespace tendon {
+
+/// Of what is plugged in, a device that Tendon has a driver for, and what keeps it from being used: `tendond devices`.
+struct DeviceReport {
+  struct Lack {
+    std::string what;
+    std::string mend;  ///< what the user can do about it
+  };
+  std::string name;
+  std::string kind;  ///< of a scene: [device] kind
+  usb::PluggedIn plugged;
+  std::vector<Lack> lacks;
+};
+
+/// `firmware_problem`: why the file that was given for a Falcon's firmware is none; empty when it is; none when no file
+/// was given.
+std::vector<DeviceReport> report_devices(std::span<const usb::PluggedIn> plugged,
+                                         const std::optional<std::string>& firmware_problem);
+
+/// For people; and one JSON object for each device, a line each.
+std::string in_words(std::span<const DeviceReport> devices);
+std::string in_json(std::span<const DeviceReport> devices);
+
+}  // namespace tendon
