@@ -65,20 +65,39 @@ void HapticController::follow_tool(Step& step) noexcept {
   }
 }
 
-bool HapticController::jumped(const Motion& hand) const noexcept {
-  if (!config_.max_speed || !last_) return false;
-  return (hand.position - last_->position).norm() > *config_.max_speed * seconds(hand.at - last_->at);
+bool HapticController::believable(const Motion& hand) const noexcept {
+  if (!hand.position.allFinite()) return false;
+  if (!config_.max_speed || !last_) return true;
+  return (hand.position - last_->position).norm() <= *config_.max_speed * seconds(hand.at - last_->at);
+}
+
+Step HapticController::disbelieve(const Motion& hand, const Vec3& applied) noexcept {
+  const bool finite = hand.position.allFinite();
+  fault_ = finite ? Fault::kPositionJumped : Fault::kPositionNotFinite;
+  Step blind = step_unseen(hand.at, applied);
+  if (!finite) blind.reasons |= Reason::kNotFinite;
+  return blind;
 }
 
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force) noexcept {
-  const bool finite = hand.position.allFinite();
-  if (!finite || jumped(hand)) {
-    fault_ = finite ? Fault::kPositionJumped : Fault::kPositionNotFinite;
-    Step blind = step_unseen(hand.at, applied);
-    if (!finite) blind.reasons |= Reason::kNotFinite;
-    return blind;
+  if (!believable(hand)) return disbelieve(hand, applied);
+  const ForceChannels::Wanted wanted = held_.wanted(hand);
+  Step step = take(hand, applied, hand_force, wanted);
+  if (const auto& newest = held_.newest(wanted.channel)) {
+    step.force_sequence = newest->sequence;
+    step.loop_age = hand.at - newest->answers;
+    step.force_error = newest->error;
   }
+  return step;
+}
 
+Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+                            const ForceChannels::Wanted& wanted) noexcept {
+  return believable(hand) ? take(hand, applied, hand_force, wanted) : disbelieve(hand, applied);
+}
+
+Step HapticController::take(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+                            const ForceChannels::Wanted& wanted) noexcept {
   Step step;
   step.hand = hand;
   step.hand_force = hand_force;
@@ -88,17 +107,12 @@ Step HapticController::step(const Motion& hand, const Vec3& applied, const std::
   started_ = true;
   missed_ = 0;
 
-  const ForceChannels::Wanted wanted = held_.wanted(hand);
   step.wanted = wanted.force;
+  step.stiffness = wanted.stiffness;
   step.mode = wanted.mode;
   step.reasons |= wanted.reasons;
   step.force_age = wanted.age;
   step.channel = static_cast<std::uint32_t>(wanted.channel);
-  if (const auto& newest = held_.newest(wanted.channel)) {
-    step.force_sequence = newest->sequence;
-    step.loop_age = hand.at - newest->answers;
-    step.force_error = newest->error;
-  }
 
   step.force = step.wanted;
   if (!step.force.allFinite()) {

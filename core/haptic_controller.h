@@ -16,13 +16,14 @@
 
 namespace tendon {
 
-/// What one haptic step found and decided. Enough to take the step again.
+/// What one haptic step found and decided. Enough to take the step again (tests/replay).
 struct Step {
   Motion hand;                       ///< the motion it saw; hand.at = when
   Duration held{};                   ///< T_act: length of the interval that this step ended; 0 in the first
   Vec3 was_applied = Vec3::Zero();   ///< N, the force held during it
   std::optional<Vec3> hand_force{};  ///< N, of the hand on the handle, as measured; empty without a force sensor
   Vec3 wanted = Vec3::Zero();        ///< N, what the remote environment asks for, after hold or local model
+  Mat3 stiffness = Mat3::Zero();     ///< N/m, −∂wanted/∂x, as the remote environment says; zero when it does not
   double permitted = 0;  ///< N, the limiter's bound on ‖force‖ (per axis: on the largest component); ∞ when off
   Vec3 force = Vec3::Zero();  ///< N, to be applied now
   double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
@@ -101,6 +102,11 @@ class HapticController {
   /// force.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {}) noexcept;
 
+  /// The same with what the remote environments want told, instead of held from what they sent: how a step that was
+  /// recorded is taken again.
+  Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+            const ForceChannels::Wanted& wanted) noexcept;
+
   /// A haptic step in which the device gave no position: the force to apply is zero.
   Step step_unseen(LocalTime now, const Vec3& applied) noexcept;
 
@@ -109,10 +115,13 @@ class HapticController {
   void rearm() noexcept;
 
  private:
+  bool believable(const Motion& hand) const noexcept;
+  Step disbelieve(const Motion& hand, const Vec3& applied) noexcept;
+  Step take(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+            const ForceChannels::Wanted& wanted) noexcept;
   void book(const Motion& hand, const Vec3& applied, Step& step) noexcept;
   void book_unseen(const Vec3& applied, Duration held) noexcept;
   void follow_tool(Step& step) noexcept;
-  bool jumped(const Motion& hand) const noexcept;
 
   Config config_;
   Limiter limiter_;

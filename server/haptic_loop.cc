@@ -2,6 +2,7 @@
 #include "server/haptic_loop.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include "core/arithmetic.h"
 
@@ -47,7 +48,7 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         controller_.release(now, order->source, order->channel);
         break;
       case HapticOrder::Kind::kRearm:
-        controller_.rearm();
+        rearm();
         device_.arm();
         break;
     }
@@ -75,6 +76,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   record.applied = applied_;
   record.tick = ++tick_;
   record.scheduled = due_;
+  record.rearmed = std::exchange(rearmed_, false);
   watch_device();
   publish(record);
 
@@ -87,8 +89,13 @@ void HapticLoop::watch_device() noexcept {
   homed_once_ = homed_once_ || device_.state() == Device::State::kHomed;
   const std::uint32_t times_armed = device_.times_armed();
   // A device that has never been homed is not silent: it is not ready.
-  if (!homed_once_ || times_armed != times_armed_) controller_.rearm();
+  if (!homed_once_ || times_armed != times_armed_) rearm();
   times_armed_ = times_armed;
+}
+
+void HapticLoop::rearm() noexcept {
+  controller_.rearm();
+  rearmed_ = true;
 }
 
 void HapticLoop::publish(const StepRecord& record) noexcept {

@@ -50,6 +50,7 @@ class HapticLoop {
  private:
   void take_mail(LocalTime now) noexcept;
   void watch_device() noexcept;
+  void rearm() noexcept;
   void publish(const StepRecord& record) noexcept;
 
   Config config_;
@@ -63,6 +64,7 @@ class HapticLoop {
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
+  bool rearmed_ = false;  ///< since the last record
 
   std::atomic<std::uint64_t> steps_{0};
   std::atomic<std::uint64_t> overruns_{0};

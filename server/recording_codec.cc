@@ -91,6 +91,12 @@ std::string encode(const StepRecord& step) {
   out.set_channel(step.channel);
   if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
   if (step.force_error) out.set_force_error_n(*step.force_error);
+  out.set_rearmed(step.rearmed);
+  if (!step.stiffness.isZero(0)) {
+    for (const auto row : step.stiffness.rowwise()) {
+      for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
+    }
+  }
   return out.SerializeAsString();
 }
 
@@ -150,6 +156,13 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.channel = in.channel();
   if (in.has_hand_force_n()) out.hand_force = vec3(in.hand_force_n());
   if (in.has_force_error_n()) out.force_error = in.force_error_n();
+  out.rearmed = in.rearmed();
+  if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
+    if (entries != 9)
+      throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +
+                                  std::to_string(entries) + " numbers instead of 9");
+    for (int i = 0; i < entries; ++i) out.stiffness(i / 3, i % 3) = in.stiffness_wanted_n_per_m(i);
+  }
   return out;
 }
 

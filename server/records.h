@@ -16,6 +16,7 @@ struct StepRecord : Step {
   std::uint64_t tick = 0;
   LocalTime scheduled{};        ///< when the step was due
   Vec3 applied = Vec3::Zero();  ///< N, really written by the device (`force` is what it was told)
+  bool rearmed = false;         ///< the controller was rearmed since the step before
 };
 
 /// One datagram that went in or out.

@@ -1501,13 +1501,48 @@ toml::table parse_toml(std::string_view text, const std::string& name) {
   }
 }
 
+/// "TABLE.KEY=VALUE" → the table's key has that value; "TABLE.KEY=" → it is not there.
+void apply_setting(toml::table& file, const std::string& setting) {
+  const auto refuse = [&setting](const std::string& why) {
+    throw SceneError("setting " + in_quotes(setting) + ": " + why);
+  };
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos || equals == 0) refuse("expected TABLE.KEY=VALUE");
+  std::string_view path = std::string_view(setting).substr(0, equals);
+  const std::string value = setting.substr(equals + 1);
+
+  toml::table* table = &file;
+  for (std::size_t dot = path.find('.'); dot != std::string_view::npos; dot = path.find('.')) {
+    const std::string_view name = path.substr(0, dot);
+    path.remove_prefix(dot + 1);
+    if (!table->contains(name)) {
+      if (value.empty()) return;
+      table->insert(name, toml::table{});
+    }
+    table = table->get_as<toml::table>(name);
+    if (table == nullptr) refuse(in_quotes(name) + " is not a table");
+  }
+  if (value.empty()) {
+    table->erase(path);
+    return;
+  }
+  try {
+    const toml::table parsed = toml::parse("value = " + value);
+    table->insert_or_assign(path, *parsed.get("value"));
+  } catch (const toml::parse_error&) {
+    table->insert_or_assign(path, value);
+  }
+}
+
 }  // namespace
 
-Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory) {
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
+                  std::span<const std::string> settings) {
   if (text.size() > kMaxSceneBytes) {
     throw SceneError(name + ": expected a scene of at most " + std::to_string(kMaxSceneBytes) + " bytes, found more");
   }
-  const toml::table file = parse_toml(text, name);
+  toml::table file = parse_toml(text, name);
+  for (const std::string& setting : settings) apply_setting(file, setting);
   Draft draft;
   draft.scene.text = text;
   draft.scene.has_network = file.contains("network");

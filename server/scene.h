@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -94,7 +95,11 @@ std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files);
 
 /// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for
 /// relative to `directory`.
-Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory);
+///
+/// `settings` change what the text says, each "TABLE.KEY=VALUE" with a value in TOML or a word that needs no quotes;
+/// without a value the key, or the whole table, is taken out. `Scene::text` is the text all the same.
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
+                  std::span<const std::string> settings = {});
 
 /// Every key that a scene may have: meaning, what is accepted in which unit, and what holds without it.
 std::string scene_reference();
