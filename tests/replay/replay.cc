@@ -53,8 +53,8 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
 }
 
 /// Reads the recording once; `visit` has every step, as it was and as it is again. The first record is the scene.
-template <class Visit>
-Gaps for_each_step(const Options& options, Rerun::Held held, const Visit& visit) {
+template <class Visit, class VisitDatagram>
+Gaps read_run(const Options& options, Rerun::Held held, const Visit& visit, const VisitDatagram& visit_datagram) {
   Gaps gaps;
   std::optional<Rerun> rerun;
   RecordingReader reader(options.recording);
@@ -64,6 +64,7 @@ Gaps for_each_step(const Options& options, Rerun::Held held, const Visit& visit)
       gaps.lost_steps += loss->steps;
       gaps.lost_datagrams += loss->datagrams;
     }
+    if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) visit_datagram(*datagram);
     if (const auto* step = std::get_if<StepRecord>(&*record)) visit(*step, rerun->step(*step));
   }
   gaps.truncated = reader.truncated();
@@ -210,10 +211,13 @@ void draw_both(const Options& options, Rerun::Held held, const std::array<lab::R
                                     .columns = lab::trace_columns(runs.size()),
                                     .axis = run.summary.axis})});
   }
-  for_each_step(options, held, [&](const StepRecord& recorded, const StepRecord& again) {
-    drawings[0].trace.observe(recorded);
-    drawings[1].trace.observe(again);
-  });
+  read_run(
+      options, held,
+      [&](const StepRecord& recorded, const StepRecord& again) {
+        drawings[0].trace.observe(recorded);
+        drawings[1].trace.observe(again);
+      },
+      [](const DatagramRecord&) {});
   lab::draw(*options.picture, drawings);
 }
 
@@ -233,12 +237,16 @@ bool replay(const Options& options, std::ostream& out) {
   {
     Progress progress(options.progress);
     std::uint64_t steps = 0;
-    gaps = for_each_step(options, held, [&](const StepRecord& recorded, const StepRecord& again) {
+    const auto visit = [&](const StepRecord& recorded, const StepRecord& again) {
       progress.observe(++steps);
       recorded_run.observe(recorded);
       again_run.observe(again);
       if (same_law) comparison.observe(recorded, again);
       if (csv) csv->observe(recorded, again);
+    };
+    gaps = read_run(options, held, visit, [&](const DatagramRecord& datagram) {  // both had the same network
+      recorded_run.observe(datagram);
+      again_run.observe(datagram);
     });
   }
   if (csv) csv->close();
