@@ -9,6 +9,7 @@
 
 #include "devices/falcon/falcon_device.h"
 #include "devices/spacemouse/spacemouse_device.h"
+#include "devices/woodenhaptics/woodenhaptics_device.h"
 
 namespace tendon {
 namespace {
@@ -18,6 +19,18 @@ std::string id_of(const usb::PluggedIn& plugged) {
   text << std::hex << std::setfill('0') << std::setw(4) << plugged.id.vendor << ':' << std::setw(4)
        << plugged.id.product;
   return text.str();
+}
+
+struct Known {
+  const char* name;
+  const char* kind;
+};
+
+std::optional<Known> driver_for(const usb::Id& id) {
+  if (id == FalconDevice::kId) return Known{"Novint Falcon", "falcon"};
+  if (id == WoodenHapticsDevice::kId) return Known{"WoodenHaptics, or another HID gadget of mbed", "woodenhaptics"};
+  if (std::ranges::find(SpaceMouseDevice::kIds, id) == SpaceMouseDevice::kIds.end()) return std::nullopt;
+  return Known{"3Dconnexion SpaceMouse", "spacemouse"};
 }
 
 /// A string of JSON: sentences may have a path with anything in it.
@@ -43,12 +56,10 @@ std::vector<DeviceReport> report_devices(std::span<const usb::PluggedIn> plugged
                                          const std::optional<std::string>& firmware_problem) {
   std::vector<DeviceReport> reports;
   for (const usb::PluggedIn& one : plugged) {
+    const auto known = driver_for(one.id);
+    if (!known) continue;
     const bool falcon = one.id == FalconDevice::kId;
-    if (!falcon && std::ranges::find(SpaceMouseDevice::kIds, one.id) == SpaceMouseDevice::kIds.end()) continue;
-    DeviceReport report{.name = falcon ? "Novint Falcon" : "3Dconnexion SpaceMouse",
-                        .kind = falcon ? "falcon" : "spacemouse",
-                        .plugged = one,
-                        .lacks = {}};
+    DeviceReport report{.name = known->name, .kind = known->kind, .plugged = one, .lacks = {}};
     if (!one.may_open) {
       report.lacks.push_back(
           {"this user may not open " + one.node,

@@ -266,7 +266,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   }
   text << "a whole step: " << std::llround(step_ns) << " ns of processor time, of which " << std::llround(device_ns)
        << " ns are the simulated device"
-       << (scene.falcon || !scene.exerts_force() ? ", which stands in for the real one" : "")
+       << (scene.moves_a_hand() || !scene.exerts_force() ? ", which stands in for the real one" : "")
        << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n"
        << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "

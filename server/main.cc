@@ -221,8 +221,9 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
 
 void switch_limiter_off(std::vector<Scene>& scenes) {
   for (Scene& scene : scenes) {
-    if (scene.falcon) {
-      throw std::runtime_error("--without-limiter: expected simulated devices only, found a Falcon, " + scene.name);
+    if (scene.moves_a_hand()) {
+      throw std::runtime_error(std::string("--without-limiter: expected simulated devices only, found a ") +
+                               (scene.falcon ? "Falcon" : "WoodenHaptics") + ", " + scene.name);
     }
     scene.loop.control.limiter.law = Law::kNone;
   }

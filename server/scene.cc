@@ -44,20 +44,11 @@ constexpr Unit kNoUnit = {"", "", 1};
 
 /// Longest suffix first.
 constexpr std::array kUnits = {
-    Unit{"_n_s_per_m", "N·s/m", 1},
-    Unit{"_m_per_s2", "m/s²", 1},
-    Unit{"_m_per_s", "m/s", 1},
-    Unit{"_n_per_m", "N/m", 1},
-    Unit{"_n_per_s", "N/s", 1},
-    Unit{"_hz", "Hz", 1},
-    Unit{"_kg", "kg", 1},
-    Unit{"_mj", "mJ", 1e3},
-    Unit{"_mm", "mm", 1e3},
-    Unit{"_ms", "ms", 1e3},
-    Unit{"_um", "µm", 1e6},
-    Unit{"_us", "µs", 1e6},
-    Unit{"_m", "m", 1},
-    Unit{"_n", "N", 1},
+    Unit{"_n_s_per_m", "N·s/m", 1}, Unit{"_m_per_s2", "m/s²", 1}, Unit{"_m_per_s", "m/s", 1},
+    Unit{"_n_per_m", "N/m", 1},     Unit{"_n_per_s", "N/s", 1},   Unit{"_hz", "Hz", 1},
+    Unit{"_kg", "kg", 1},           Unit{"_ma", "mA", 1e3},       Unit{"_mj", "mJ", 1e3},
+    Unit{"_mm", "mm", 1e3},         Unit{"_ms", "ms", 1e3},       Unit{"_um", "µm", 1e6},
+    Unit{"_us", "µs", 1e6},         Unit{"_m", "m", 1},           Unit{"_n", "N", 1},
 };
 
 const Unit& unit_of(std::string_view key) {
@@ -335,6 +326,31 @@ struct UsbPort {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
+/// An arm of Haptikfabriken's whose kinematics are published.
+struct ArmModel {
+  static std::string expected(const Unit&) {
+    std::string text = "one of ";
+    for (const auto& model : woodenhaptics::models()) {
+      text += (&model == woodenhaptics::models().data() ? "" : ", ") + in_quotes(model.name);
+    }
+    return text;
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, const woodenhaptics::Model*& to) {
+    const auto* text = node.as_string();
+    to = text != nullptr ? woodenhaptics::find_model(**text) : nullptr;
+    if (to != nullptr) return {};
+    const bool closed = text != nullptr && woodenhaptics::has_unpublished_kinematics(**text);
+    return Refusal{&node, expected(unit) + (closed ? " (Polhem v2 and v3 have a closed linkage, whose kinematics their "
+                                                     "makers have not published)"
+                                                   : "")};
+  }
+
+  static std::string shown(const Unit&, const woodenhaptics::Model* model) {
+    return model != nullptr ? in_quotes(model->name) : "none";
+  }
+};
+
 struct YesNo {
   static std::string expected(const Unit&) { return "true or false"; }
 
@@ -493,7 +509,7 @@ struct Absent {
 };
 constexpr Absent kRequired = {.required = true};
 
-enum class DeviceKind : std::uint8_t { kSimulated, kFalcon, kReplay, kSpaceMouse };
+enum class DeviceKind : std::uint8_t { kSimulated, kFalcon, kReplay, kSpaceMouse, kWoodenHaptics };
 enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
 
 Names<const DeviceProfile*> profile_names() {
@@ -637,11 +653,23 @@ void declare_spacemouse(Table& keys, Draft& draft) {
 }
 
 template <class Table>
+void declare_woodenhaptics(Table& keys, Draft& draft) {
+  draft.scene.device = stand_in("woodenhaptics");
+  draft.scene.device.watchdog = WoodenHapticsDevice::kWatchdog;
+  Scene::WoodenHaptics& arm = draft.scene.woodenhaptics.emplace(Scene::WoodenHaptics{});
+  declare_port(keys, arm.port);
+  keys.key("model", arm.drive.model, ArmModel{}, "which arm it is", kRequired);
+  keys.key("max_current_ma", arm.drive.max_current, Number{.least = 1, .most = 6000},
+           "of each motor; what the amplifiers can give is the most");
+}
+
+template <class Table>
 void declare_device(Table& device, Draft& draft) {
   const Names<DeviceKind> kinds{{{"simulated", DeviceKind::kSimulated},
                                  {"falcon", DeviceKind::kFalcon},
                                  {"replay", DeviceKind::kReplay},
-                                 {"spacemouse", DeviceKind::kSpaceMouse}}};
+                                 {"spacemouse", DeviceKind::kSpaceMouse},
+                                 {"woodenhaptics", DeviceKind::kWoodenHaptics}}};
   device.kind(kinds, [&draft](Table& keys, DeviceKind kind) {
     keys.key("name", draft.scene.name, Label{}, "what clients call it that want this one of several",
              Absent{.text = "the name of the scene file"});
@@ -655,6 +683,10 @@ void declare_device(Table& device, Draft& draft) {
     }
     if (kind == DeviceKind::kSpaceMouse) {
       declare_spacemouse(keys, draft);
+      return;
+    }
+    if (kind == DeviceKind::kWoodenHaptics) {
+      declare_woodenhaptics(keys, draft);
       return;
     }
     SimulatedDevice::Config& config = draft.scene.device;
@@ -1229,6 +1261,7 @@ class Settlement {
   Scene scene(const std::filesystem::path& directory) {
     settle_motion(directory);
     settle_falcon(directory);
+    settle_woodenhaptics();
     settle_network(directory);
     settle_control();
     settle_replay(directory);
@@ -1289,9 +1322,26 @@ class Settlement {
     if (!draft_.scene.falcon) return;
     auto& firmware = draft_.scene.falcon->firmware;
     if (firmware) firmware = directory / *firmware;
-    if (draft_.scene.loop.control.limiter.law == Law::kNone) {
-      blame("limiter.kind", {}, "expected a limiter, found \"none\", which is for simulated devices only");
+    expect_a_limiter();
+  }
+
+  void expect_a_limiter() const {
+    if (draft_.scene.loop.control.limiter.law != Law::kNone) return;
+    blame("limiter.kind", {}, "expected a limiter, found \"none\", which is for simulated devices only");
+  }
+
+  void settle_woodenhaptics() {
+    if (!draft_.scene.woodenhaptics) return;
+    const WoodenHapticsDevice::Config& drive = draft_.scene.woodenhaptics->drive;
+    const Unit& unit = unit_of("max_current_ma");
+    if (drive.max_current > drive.model->full_scale) {
+      blame("device.max_current_ma", {},
+            "expected at most " + with_symbol(Number::shown(unit, drive.model->full_scale), unit) +
+                ", the full scale of its amplifiers, found " + Number::shown(unit, drive.max_current));
     }
+    draft_.scene.device.max_force = drive.model->max_force;
+    draft_.scene.device.encoder_step = WoodenHapticsDevice::info_of(*drive.model).position_resolution;
+    expect_a_limiter();
   }
 
   void settle_replay(const std::filesystem::path& directory) {
@@ -1342,14 +1392,17 @@ class Settlement {
   void settle_safety() {
     Scene& scene = draft_.scene;
     // What moves a real hand is never without: then each part is there when it is listed, and arming always.
-    if (scene.falcon && !scene.safety) scene.safety.emplace();
+    if (scene.moves_a_hand() && !scene.safety) scene.safety.emplace();
     if (!scene.safety) return;
     if (scene.safety->dead_man) {
       const std::uint32_t button = scene.safety->dead_man->button;
       if (scene.falcon && button >= kFalconButtons) {
         blame("safety.dead_man.button", {}, "expected one of a Falcon's, 0 to 3, found " + std::to_string(button));
       }
-      if (!scene.falcon && !(scene.device.button_after && button == 0)) {
+      if (scene.woodenhaptics && button != 0) {
+        blame("safety.dead_man.button", {}, "expected 0, the switch at its tip, found " + std::to_string(button));
+      }
+      if (!scene.moves_a_hand() && !(scene.device.button_after && button == 0)) {
         blame("safety.dead_man.button", {},
               "expected button 0 of a hand with button_after_ms: a simulated device has no others");
       }
@@ -1428,7 +1481,7 @@ class Settlement {
             "expected at most " + with_symbol(digits(most), unit_of(key)) +
                 ", the true friction of the simulated device, found " + digits(*high));
     };
-    if (!draft_.scene.falcon && draft_.scene.exerts_force()) {  // whose true friction nobody knows here
+    if (!draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {  // whose true friction nobody knows here
       check("coulomb_friction_n", draft_.place_coulomb, device.coulomb_friction.value_or(0));
       check("viscous_friction_n_s_per_m", draft_.place_viscous, device.viscous_friction.value_or(0));
     }
@@ -1472,12 +1525,12 @@ class Settlement {
       if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.exerts_force()) return 0;
       blame(full, {},
             "missing, expected " + kZeroOrMore.expected(unit) +
-                (draft_.scene.falcon ? ": what tendon-identify finds of this very device, or 0"
-                                     : ", because there is no profile"));
+                (draft_.scene.moves_a_hand() ? ": what tendon-identify finds of this very device, or 0"
+                                             : ", because there is no profile"));
     }
     const double bound = given ? *given : profiles->value * axis_share;
     const double most = truth * axis_share;
-    if (bound > most && !draft_.scene.falcon && draft_.scene.exerts_force()) {
+    if (bound > most && !draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {
       blame(full, {full, "device.effects." + key},
             "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
                 (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +

@@ -15,6 +15,7 @@
 #include "devices/safety/safe_device.h"
 #include "devices/simulated/simulated_device.h"
 #include "devices/spacemouse/spacemouse_device.h"
+#include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "protocol/link.h"
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
@@ -51,11 +52,18 @@ struct Scene {
     SpaceMouseDevice::Config motion{};
   };
 
+  /// A WoodenHaptics, or a relative.
+  struct WoodenHaptics {
+    std::string port{};  ///< like a Falcon's
+    WoodenHapticsDevice::Config drive{};
+  };
+
   std::string name;  ///< of the device, as clients claim it
   // At most one of these; without one the device is simulated.
   std::optional<Falcon> falcon;
   std::optional<ReplayDevice::Config> replay;
   std::optional<SpaceMouse> spacemouse;
+  std::optional<WoodenHaptics> woodenhaptics;
   SimulatedDevice::Config
       device;  ///< of a real device: what is known of it, and what stands in where costs are measured
   std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
@@ -68,6 +76,8 @@ struct Scene {
 
   /// Else it is an input only: whatever engines send, nobody feels it.
   bool exerts_force() const noexcept { return !replay && !spacemouse; }
+  /// It is a real device with motors.
+  bool moves_a_hand() const noexcept { return falcon || woodenhaptics; }
 };
 
 /// What is wrong with a scene, for the operator to act on:

@@ -15,6 +15,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "devices/spacemouse/spacemouse_device.h"
 #include "devices/usb/usb.h"
+#include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "server/build_info.h"
 #include "server/clock.h"
 #include "server/flight_file.h"
@@ -74,18 +75,22 @@ std::string describe(Device::State state, const Scene& scene) {
                  ? "the device has no firmware, and no file was named to give it: --falcon-firmware FILE"
                  : "the device is being given its firmware";
     case Device::State::kUnhomed:
-      return "the device has to be homed: pull the grip all the way out, then push it all the way in";
+      return scene.woodenhaptics
+                 ? "the device has to be calibrated: hold the arm in its calibration pose (devices/woodenhaptics) and "
+                   "press the board's button"
+                 : "the device has to be homed: pull the grip all the way out, then push it all the way in";
     case Device::State::kHomed:
-      return scene.falcon ? "the device is homed" : "the device is there";
+      return scene.moves_a_hand() ? "the device is homed" : "the device is there";
   }
   return "unknown";
 }
 
-/// Tells the guardian when there is a device to guard, and when there is none any more.
-std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene) {
+/// Tells the guardian when there is a device to guard, whose last word is `bytes` to `endpoint`, and when there is none
+/// any more.
+std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, std::uint8_t endpoint,
+                                       std::span<const std::uint8_t> bytes) {
   static_assert(limits::kMaxDevices <= Guardian::kDevices);
-  const auto bytes = falcon::encode(falcon::kLastCommand);
-  const ZeroPacket zero = ZeroPacket::usb(usb::PipeConfig{}.out, std::as_bytes(std::span(bytes)));
+  const ZeroPacket zero = ZeroPacket::usb(endpoint, std::as_bytes(bytes));
   return [&guardian, zero, device = scene.loop.device, name = scene.name](int node) {
     const bool heard = node >= 0 ? guardian.guard(device, node, zero) : guardian.forget(device);
     if (!heard) log::error(name + ": the guardian process is dead: should this one be killed, forces stay on");
@@ -93,8 +98,7 @@ std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene) {
 }
 
 std::unique_ptr<Guardian> guardian_of(const std::vector<Scene>& scenes) {
-  const bool any =
-      std::any_of(scenes.begin(), scenes.end(), [](const Scene& scene) { return scene.falcon.has_value(); });
+  const bool any = std::any_of(scenes.begin(), scenes.end(), [](const Scene& scene) { return scene.moves_a_hand(); });
   return any ? std::make_unique<Guardian>() : nullptr;
 }
 
@@ -122,14 +126,25 @@ std::unique_ptr<Device> make_falcon(const Scene& scene, Guardian& guardian) {
   }
   usb::PipeConfig pipe = pipe_for(scene, falcon.port);
   pipe.ids = {FalconDevice::kId};
-  pipe.opened = tell_guardian(guardian, scene);
+  pipe.opened = tell_guardian(guardian, scene, pipe.out, falcon::encode(falcon::kLastCommand));
   return std::make_unique<FalconDevice>(std::move(config), usb::open_pipe(pipe));
+}
+
+std::unique_ptr<Device> make_woodenhaptics(const Scene& scene, Guardian& guardian) {
+  usb::PipeConfig pipe = pipe_for(scene, scene.woodenhaptics->port);
+  pipe.ids = {WoodenHapticsDevice::kId};
+  pipe.in = WoodenHapticsDevice::kIn;
+  pipe.out = WoodenHapticsDevice::kOut;
+  pipe.transfers = usb::PipeConfig::Transfers::kInterrupt;
+  pipe.opened = tell_guardian(guardian, scene, pipe.out, woodenhaptics::encode({}));
+  return std::make_unique<WoodenHapticsDevice>(scene.woodenhaptics->drive, usb::open_pipe(pipe));
 }
 
 std::unique_ptr<Device> make_device(const Scene& scene, Guardian* guardian) {
   if (scene.falcon) return make_falcon(scene, *guardian);
   if (scene.replay) return std::make_unique<ReplayDevice>(*scene.replay);
   if (scene.spacemouse) return make_spacemouse(scene);
+  if (scene.woodenhaptics) return make_woodenhaptics(scene, *guardian);
   return std::make_unique<SimulatedDevice>(scene.device);
 }
 

@@ -9,9 +9,11 @@ cd "$(dirname "$0")/../.."
 runs=${1:-10000000}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(header payload handshake session key scene trace recording falcon_reply falcon_loader falcon_device)
+[ ${#targets[@]} -gt 0 ] || targets=(header payload handshake session key scene trace recording falcon_reply falcon_loader falcon_device
+  spacemouse_report woodenhaptics_report woodenhaptics_device)
 declare -A longest=([header]=64 [payload]=400 [handshake]=24 [session]=24 [key]=160 [scene]=400 [trace]=600 [recording]=600
-  [falcon_reply]=200 [falcon_loader]=60 [falcon_device]=200)
+  [falcon_reply]=200 [falcon_loader]=60 [falcon_device]=200 [spacemouse_report]=64
+  [woodenhaptics_report]=64 [woodenhaptics_device]=200)
 cmake --preset fuzz && cmake --build --preset fuzz
 # Of a stack trace for each allocation nobody has anything, and entropic scheduling costs more than our targets do.
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=1:thread_local_quarantine_size_kb=16

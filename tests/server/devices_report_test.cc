@@ -45,6 +45,18 @@ TEST(DevicesReport, ASpaceMouseWantsNoFirmwareButTheRightToBeOpened) {
   EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
 }
 
+TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubtBecauseOtherGadgetsHaveItsNumber) {
+  std::vector<usb::PluggedIn> plugged = {falcon(true)};
+  plugged[0].id = {0x1234, 0x0006};
+  const auto devices = report_devices(plugged, std::nullopt);
+  ASSERT_EQ(devices.size(), 1U);
+  EXPECT_EQ(devices[0].kind, "woodenhaptics");
+  EXPECT_NE(devices[0].name.find("or another HID gadget of mbed"), std::string::npos);
+  EXPECT_TRUE(devices[0].lacks.empty()) << "it wants no firmware from us";
+  plugged[0].may_open = false;
+  EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
+}
+
 TEST(DevicesReport, SaysWhatIsMissingAndHowToMendIt) {
   const std::vector<usb::PluggedIn> plugged = {falcon(false), falcon(true)};
   const auto devices = report_devices(plugged, std::nullopt);
@@ -74,6 +86,7 @@ TEST(DevicesReport, TheUdevRuleNamesTheDevice) {
   std::ifstream file(std::filesystem::path(TENDON_SCENES).parent_path() / "udev" / "60-tendon.rules");
   const std::string rules(std::istreambuf_iterator<char>(file), {});
   EXPECT_NE(rules.find("ATTR{idVendor}==\"0403\", ATTR{idProduct}==\"cb48\", MODE=\"0660\""), std::string::npos);
+  EXPECT_NE(rules.find("ATTR{idVendor}==\"1234\", ATTR{idProduct}==\"0006\", MODE=\"0660\""), std::string::npos);
 }
 
 }  // namespace

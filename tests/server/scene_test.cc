@@ -510,6 +510,62 @@ TEST(Scene, ASpaceMouseNeedsNothingElseEither) {
   EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "spacemouse.toml").spacemouse);
 }
 
+constexpr std::string_view kArm =
+    "[device]\n"
+    "kind = \"woodenhaptics\"\n"
+    "model = \"polhem_v1\"\n";
+constexpr std::string_view kArmsFriction =
+    "[limiter]\n"
+    "coulomb_friction_n = 0.9\n"
+    "viscous_friction_n_s_per_m = 0\n";
+
+TEST(Scene, AWoodenHapticsIsARealDeviceOfAModelWhoseWatchdogIsCountedOn) {
+  const Scene scene = parse(std::string(kArm) + std::string(kArmsFriction));
+  ASSERT_TRUE(scene.woodenhaptics);
+  EXPECT_TRUE(scene.moves_a_hand());
+  EXPECT_TRUE(scene.exerts_force());
+  EXPECT_EQ(scene.woodenhaptics->drive.model, woodenhaptics::find_model("polhem_v1"));
+  EXPECT_EQ(scene.woodenhaptics->drive.max_current, 2);
+  EXPECT_EQ(scene.woodenhaptics->port, "");
+  EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0.9) << "nobody here knows that it has less";
+  EXPECT_EQ(scene.loop.control.max_force, 5);
+  EXPECT_EQ(scene.loop.control.watchdog, 500ms);
+  EXPECT_EQ(scene.device.encoder_step,
+            WoodenHapticsDevice::info_of(*scene.woodenhaptics->drive.model).position_resolution);
+  ASSERT_TRUE(scene.safety) << "it always has to be armed";
+  EXPECT_EQ(scene.safety->arming.by, SafeDevice::Arming::By::kRequest);
+
+  const Scene told = parse(std::string(kArm) + "port = \"1-2.3\"\nmax_current_ma = 700\n" + std::string(kArmsFriction));
+  EXPECT_EQ(told.woodenhaptics->port, "1-2.3");
+  EXPECT_EQ(told.woodenhaptics->drive.max_current, 0.7);
+  EXPECT_FALSE(parse(std::string(kFalcon)).woodenhaptics);
+  EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "woodenhaptics.toml").woodenhaptics);
+}
+
+TEST(Scene, AWoodenHapticsSaysWhichModelsCanBeDrivenAndWhyTwoCannot) {
+  const std::string kind = "[device]\nkind = \"woodenhaptics\"\n";
+  const std::string models =
+      "expected one of \"woodenhaptics_v2019\", \"woodenhaptics_v2015\", \"polhem_v1\", \"aluhaptics_v2\", "
+      "\"vintage\"";
+  EXPECT_EQ(error_of(kind), "s.toml:1: device.model: missing, " + models);
+  EXPECT_EQ(error_of(kind + "model = \"hawk\"\n"), "s.toml:3: device.model: " + models + ", found \"hawk\"");
+  for (const std::string name : {"polhem_v2", "polhem_v3"}) {
+    EXPECT_EQ(
+        error_of(kind + "model = \"" + name + "\"\n"),
+        "s.toml:3: device.model: " + models +
+            " (Polhem v2 and v3 have a closed linkage, whose kinematics their makers have not published), found \"" +
+            name + "\"");
+  }
+  EXPECT_EQ(error_of(std::string(kArm) + "max_current_ma = 4000\n" + std::string(kArmsFriction)),
+            "s.toml:4: device.max_current_ma: expected at most 3000 mA, the full scale of its amplifiers, found 4000");
+  EXPECT_EQ(error_of(std::string(kArm) + "max_current_ma = 0\n"),
+            "s.toml:4: device.max_current_ma: expected a number from 1 to 6000 mA, found 0");
+  EXPECT_EQ(error_of(std::string(kArm) + "[limiter]\nkind = \"none\"\n"),
+            "s.toml:5: limiter.kind: expected a limiter, found \"none\", which is for simulated devices only");
+  EXPECT_EQ(error_of(std::string(kArm) + std::string(kArmsFriction) + "[safety.dead_man]\nbutton = 1\n"),
+            "s.toml:8: safety.dead_man.button: expected 0, the switch at its tip, found 1");
+}
+
 TEST(Scene, PerAxisTheProfilesCoulombFrictionIsSharedByTheAxes) {
   const Scene scene = minimal_and("[limiter]\nkind = \"aol-per-axis\"\n");
   const DeviceProfile& falcon = *find_device_profile("falcon");
@@ -796,9 +852,9 @@ TEST(SceneError, RefusesForcesThatAreNone) {
 }
 
 TEST(SceneError, NamesTheKindsAndProfilesThatThereAre) {
-  EXPECT_EQ(
-      error_of("[device]\nkind = \"real\"\n"),
-      "s.toml:2: device.kind: expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\", found \"real\"");
+  EXPECT_EQ(error_of("[device]\nkind = \"real\"\n"),
+            "s.toml:2: device.kind: expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\", "
+            "\"woodenhaptics\", found \"real\"");
   EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\nprofile = \"hawk\"\n"),
             "s.toml:3: device.profile: expected one of \"phantom-premium\", \"touch\", \"falcon\", found \"hawk\"");
   EXPECT_EQ(error_of(std::string(kHand) + "kind = \"cosine\"\n"),
@@ -832,9 +888,11 @@ TEST(SceneError, RefusesPartsThatCannotBe) {
 
 TEST(SceneError, NamesWhatIsMissing) {
   EXPECT_EQ(error_of(""),
-            "s.toml: device.kind: missing, expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\"");
+            "s.toml: device.kind: missing, expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\", "
+            "\"woodenhaptics\"");
   EXPECT_EQ(error_of("\n[device]\n"),
-            "s.toml:2: device.kind: missing, expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\"");
+            "s.toml:2: device.kind: missing, expected one of \"simulated\", \"falcon\", \"replay\", \"spacemouse\", "
+            "\"woodenhaptics\"");
   EXPECT_EQ(error_of("[device]\nkind = \"simulated\"\n"),
             "s.toml:1: device.effects.mass_kg: missing, expected a number above 0 kg");
   expect_errors({

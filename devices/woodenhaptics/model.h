@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+/// Haptikfabriken's WoodenHaptics and its relatives: arms of wood or aluminium with three motors, of which drawings,
+/// firmware and host library are published. All facts here are those of github.com/forsslund/haptikfabrikenapi, commit
+/// b8d6c94 of 2021-06-10: src/haptikfabrikenapi.h (the numbers), src/kinematics.cpp, firmware/main.cpp.
+namespace tendon::woodenhaptics {
+
+/// A body of the arm, and the motor that turns it by a cable from a capstan.
+struct Joint {
+  double capstan;          ///< m, diameter at the motor
+  double body;             ///< m, diameter at the body
+  double length;           ///< m, of the body
+  double torque_constant;  ///< N·m/A, of the motor
+  int counts_per_turn;     ///< of the motor's encoder, quadrupled
+  /// Of the body's angle to the count: the published "motor and body aligned" is -1, else 1.
+  int direction;
+  std::int16_t calibration;  ///< the count in the calibration pose
+};
+
+/// Numbers of one arm. Body A turns about the vertical, B and C lift its two links; each motor turns one angle.
+struct Model {
+  std::string_view name;
+  std::array<Joint, 3> joints;
+  std::array<double, 3> origin;  ///< m, of the workspace, from where A's axis meets the base
+  double workspace_radius;       ///< m
+  double full_scale;             ///< A, that the amplifiers are set to give at 90 % of the pulse width
+  double max_force;              ///< N
+};
+
+/// Those that can be driven.
+std::span<const Model> models() noexcept;
+
+/// Null when there is none of that name.
+const Model* find_model(std::string_view name) noexcept;
+
+/// Polhem v2 and v3: a closed linkage, whose kinematics ("polhem.h") its makers have not published. A force in a
+/// direction that was guessed is worse than none.
+bool has_unpublished_kinematics(std::string_view name) noexcept;
+
+}  // namespace tendon::woodenhaptics
