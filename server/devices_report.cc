@@ -60,7 +60,11 @@ std::vector<DeviceReport> report_devices(std::span<const usb::PluggedIn> plugged
     if (!known) continue;
     const bool falcon = one.id == FalconDevice::kId;
     DeviceReport report{.name = known->name, .kind = known->kind, .plugged = one, .lacks = {}};
-    if (!one.may_open) {
+    if (!one.has_node) {
+      report.lacks.push_back({"there is no " + one.node + " here, although the kernel has the device",
+                              "give it to this container: docker run -v /dev/bus/usb:/dev/bus/usb "
+                              "--device-cgroup-rule 'c 189:* rmw'"});
+    } else if (!one.may_open) {
       report.lacks.push_back(
           {"this user may not open " + one.node,
            "copy deploy/udev/60-tendon.rules to /etc/udev/rules.d, run `udevadm control --reload`, plug the device out "

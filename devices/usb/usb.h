@@ -17,6 +17,7 @@ struct PluggedIn {
   Id id;
   std::string port;       ///< as the kernel names it: "1-2.3" is port 3 of the hub at port 2 of bus 1
   std::string node;       ///< "/dev/bus/usb/001/007"
+  bool has_node = true;   ///< false in a container that has not been given it: there is nothing to open
   bool may_open = false;  ///< this process may read and write the node
 };
 

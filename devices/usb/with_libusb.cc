@@ -78,6 +78,7 @@ PluggedIn describe(libusb_device* device) {
   std::snprintf(node.data(), node.size(), "/dev/bus/usb/%03u/%03u", unsigned{libusb_get_bus_number(device)},
                 unsigned{libusb_get_device_address(device)});
   plugged.node = node.data();
+  plugged.has_node = access(node.data(), F_OK) == 0;
   plugged.may_open = access(node.data(), R_OK | W_OK) == 0;
   return plugged;
 }
@@ -268,8 +269,13 @@ void LibusbPipe::tell(const std::string& why) {
 
 int LibusbPipe::open_node() {
   if (config_.node) return config_.node();
+  // Each look is a new one: a list that is kept learns of the plugs from udevd, which not every container or small
+  // system has.
+  libusb_context* looking = nullptr;
+  if (libusb_init(&looking) != LIBUSB_SUCCESS) return -1;
+  const Context look(looking);
   std::string why;  // empty: it is not plugged in, which is nothing to complain of
-  for (libusb_device* device : List(context_.get())) {
+  for (libusb_device* device : List(look.get())) {
     const PluggedIn plugged = describe(device);
     if (std::ranges::find(config_.ids, plugged.id) == config_.ids.end()) continue;
     if (!config_.port.empty() && plugged.port != config_.port) continue;

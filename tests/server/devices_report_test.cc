@@ -57,6 +57,15 @@ TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubtBecauseOtherGadgetsHaveItsNum
   EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
 }
 
+TEST(DevicesReport, ANodeThatIsNotHereIsMendedByTheContainerAndNotByTheRightToOpenIt) {
+  std::vector<usb::PluggedIn> plugged = {falcon(false)};
+  plugged[0].has_node = false;
+  const auto devices = report_devices(plugged, "");
+  ASSERT_EQ(devices[0].lacks.size(), 1U);
+  EXPECT_NE(devices[0].lacks[0].what.find("/dev/bus/usb/001/007"), std::string::npos);
+  EXPECT_NE(devices[0].lacks[0].mend.find("container"), std::string::npos);
+}
+
 TEST(DevicesReport, SaysWhatIsMissingAndHowToMendIt) {
   const std::vector<usb::PluggedIn> plugged = {falcon(false), falcon(true)};
   const auto devices = report_devices(plugged, std::nullopt);
