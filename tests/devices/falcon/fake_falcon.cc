@@ -14,6 +14,15 @@ constexpr std::size_t kPayload = 62;
 /// What stands there when nobody has homed it yet.
 constexpr std::array<int, 3> kNoOrigin = {711, -402, 95};
 
+/// Device, configuration, interface, and two bulk endpoints of 64 bytes: an FT232R with the Falcon's numbers. Those of
+/// its strings are 0: it has none to tell.
+constexpr std::array<std::uint8_t, 50> kDescriptors = {18,   1,    0,    2, 0,  0,   0,   64,   0x03,
+                                                       0x04, 0x48, 0xCB, 0, 4,  0,   0,   0,    1,     //
+                                                       9,    2,    32,   0, 1,  1,   0,   0xC0, 0xFA,  //
+                                                       9,    4,    0,    0, 2,  255, 255, 255,  0,     //
+                                                       7,    5,    0x81, 2, 64, 0,   0,                //
+                                                       7,    5,    0x02, 2, 64, 0,   0};
+
 }  // namespace
 
 FakeFalcon::FakeFalcon(const Options& options)
@@ -21,6 +30,8 @@ FakeFalcon::FakeFalcon(const Options& options)
   homed_ = options.is_homed ? 7 : 0;
   origin_ = options.is_homed ? std::array<int, 3>{} : kNoOrigin;
 }
+
+std::span<const std::uint8_t> FakeFalcon::descriptors() const { return kDescriptors; }
 
 void FakeFalcon::reset() {
   mode_ = Mode::kGreeting;

@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "core/motion.h"
+#include "tests/devices/usb/usb_model.h"
 #include "tests/support/dice.h"
 
 namespace tendon {
 
 /// A Falcon at the end of its cable, as far as this project knows one: FTDI chip, boot loader, firmware, encoders,
-/// motors. Shares no code with the driver. Says what the wire would say at the time it is asked; nothing in it waits or
-/// reads a clock, so it is the same behind a pipe in memory and behind the real libusb.
-class FakeFalcon {
+/// motors. Shares no code with the driver.
+class FakeFalcon final : public UsbModel {
  public:
   struct Options {
     bool has_firmware = true;
@@ -57,17 +57,16 @@ class FakeFalcon {
   // The host's side of the cable.
   bool plugged() const { return plugged_; }
   int times_plugged() const { return times_plugged_; }
-  /// A vendor request; false: stalled.
-  bool request(LocalTime now, std::uint8_t request, std::uint16_t value);
-  bool write(LocalTime now, std::span<const std::uint8_t> bytes);
-  /// When an IN transfer that waits would end.
-  LocalTime next_in() const;
-  /// What it would bring: the status bytes and up to 62 others.
-  std::vector<std::uint8_t> take_in(LocalTime now);
+  std::span<const std::uint8_t> descriptors() const override;
+  bool request(LocalTime now, std::uint8_t request, std::uint16_t value) override;
+  bool write(LocalTime now, std::span<const std::uint8_t> bytes) override;
+  LocalTime next_in() const override;
+  /// The status bytes and up to 62 others.
+  std::vector<std::uint8_t> take_in(LocalTime now) override;
 
   // The user's side.
-  void plug() { plugged_ = true, ++times_plugged_; }
-  void unplug();
+  void plug() override { plugged_ = true, ++times_plugged_; }
+  void unplug() override;
   void move_to(const Vec3& position) { position_ = position; }  ///< m, device frame
   /// The grip all the way out and in again, as the user homes it. Counts only while the host asks for it.
   void pull_through();

@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <deque>
 #include <limits>
 #include <memory>
 #include <stdexcept>
 #include <vector>
 
+#include "tests/devices/spacemouse/fake_spacemouse.h"
 #include "tests/support/dice.h"
 
 namespace tendon {
@@ -19,37 +19,9 @@ using State = Device::State;
 using spacemouse::Axes;
 using namespace std::chrono_literals;
 
-/// A SpaceMouse at its cable, in memory: a report waits until it is read, and is lost with the cable.
-struct FakeMouse {
-  bool split = false;  ///< translation and rotation in two reports
-  std::uint32_t connection = 1;
-  std::uint32_t connections = 1;
-  std::deque<std::vector<std::uint8_t>> reports{};
-
-  void push(const Axes& cap) {
-    std::vector<std::uint8_t> report{1};
-    for (const std::int16_t axis : cap) {
-      report.push_back(static_cast<std::uint8_t>(axis & 255));
-      report.push_back(static_cast<std::uint8_t>(axis >> 8));
-    }
-    if (split) {
-      reports.push_back(report);
-      report = {2, 9, 9, 9, 0, 9, 0};
-    } else {
-      report.insert(report.end(), {9, 9, 9, 0, 9, 0});  // somebody twists it, too
-    }
-    reports.push_back(report);
-  }
-  void unplug() {
-    connection = 0;
-    reports.clear();
-  }
-  void plug() { connection = ++connections; }
-};
-
 class MousePipe final : public usb::Pipe {
  public:
-  explicit MousePipe(FakeMouse& mouse) : mouse_(mouse) {}
+  explicit MousePipe(FakeSpaceMouse& mouse) : mouse_(mouse) {}
   std::uint32_t connection() noexcept override { return mouse_.connection; }
   bool request(const usb::Request&) noexcept override {
     ADD_FAILURE() << "nothing is asked of a SpaceMouse";
@@ -62,15 +34,14 @@ class MousePipe final : public usb::Pipe {
   bool settled() const noexcept override { return true; }
   std::size_t read(std::span<std::uint8_t, usb::kPacketSize> packet) noexcept override {
     if (mouse_.reports.empty()) return 0;
-    const auto report = mouse_.reports.front();
-    mouse_.reports.pop_front();
+    const auto report = mouse_.take_in({});
     std::ranges::copy(report, packet.begin());
     return report.size();
   }
   void reopen() noexcept override { mouse_.plug(); }
 
  private:
-  FakeMouse& mouse_;
+  FakeSpaceMouse& mouse_;
 };
 
 struct Bench {
@@ -93,7 +64,7 @@ struct Bench {
   }
 
   LocalTime now{7s};
-  FakeMouse mouse;
+  FakeSpaceMouse mouse;
   SpaceMouseDevice device;
   std::optional<PositionSample> sample;
 };
@@ -240,7 +211,7 @@ TEST(SpaceMouseDevice, ItExertsNoForceAndSaysSo) {
 }
 
 TEST(SpaceMouseDevice, RefusesWhatIsNoRateControl) {
-  FakeMouse mouse;
+  FakeSpaceMouse mouse;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const SpaceMouseDevice::Config& config :
        {SpaceMouseDevice::Config{.speed = 0}, SpaceMouseDevice::Config{.dead_band = 1},

@@ -19,7 +19,7 @@
 #include "devices/falcon/packet.h"
 #include "devices/safety/guardian.h"
 #include "devices/usb/usb.h"
-#include "tests/devices/falcon/fake_firmware.h"
+#include "tests/devices/usb/falcon_driver.h"
 #include "tests/devices/usb/usbfs_shim.h"
 
 namespace tendon {
@@ -29,40 +29,12 @@ using namespace std::chrono_literals;
 using State = Device::State;
 using Clock = std::chrono::steady_clock;
 
-LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::now().time_since_epoch())); }
-
 std::unique_ptr<usb::Pipe> pipe_to(UsbfsShim& shim) {
   return usb::open_pipe({.node = [&shim] { return shim.node(); }});
 }
 
-/// A driver over libusb, turned at 1 kHz as the haptic thread does.
-struct Loop {
-  explicit Loop(UsbfsShim& shim) : device({.firmware = fake_firmware(4096)}, pipe_to(shim)) {}
-
-  void step(const Vec3& force) {
-    sample = device.read(now());
-    written = device.apply(force);
-    std::this_thread::sleep_until(due += 1ms);
-    if (due < Clock::now() - 1ms) due = Clock::now();
-  }
-
-  template <class Until>
-  bool turns_until(const Until& until, const Vec3& force, Duration most = 10s) {
-    for (const LocalTime end = now() + most; now() < end;) {
-      step(force);
-      if (until()) return true;
-    }
-    return false;
-  }
-
-  bool reaches(State state, const Vec3& force = Vec3::Zero()) {
-    return turns_until([&] { return device.state() == state; }, force);
-  }
-
-  FalconDevice device;
-  std::optional<PositionSample> sample;
-  Vec3 written = Vec3::Zero();
-  Clock::time_point due = Clock::now();
+struct Loop : FalconDriver {
+  explicit Loop(UsbfsShim& shim) : FalconDriver(pipe_to(shim)) {}
 };
 
 const Vec3 kForce(1, -2, 2);
@@ -111,8 +83,8 @@ TEST(LibusbPipe, TellsWhoGuardsTheDeviceItsNodeAndThatNodeTakesTheZeroPacketOfAD
                                                                                  node = opened;
                                                                                },
                                                                            .node = [&] { return shim.node(); }}));
-    for (const LocalTime end = now() + 10s; !pushes(shim) && now() < end; std::this_thread::sleep_for(1ms)) {
-      device.read(now());
+    for (const LocalTime end = real_now() + 10s; !pushes(shim) && real_now() < end; std::this_thread::sleep_for(1ms)) {
+      device.read(real_now());
       device.apply(kForce);
     }
     ASSERT_TRUE(pushes(shim));
@@ -137,13 +109,6 @@ TEST(LibusbPipe, UnpluggedInMidTransferItIsAbsentAndComesBackWithZeroForce) {
     ASSERT_TRUE(loop.reaches(State::kUnhomed, kForce));
     EXPECT_FALSE(pushes(shim)) << "the first thing it is told";
   }
-}
-
-/// Whether it holds within ten seconds.
-template <class Holds>
-bool comes_true(const Holds& holds) {
-  for (int i = 0; i < 10'000 && !holds(); ++i) std::this_thread::sleep_for(1ms);
-  return holds();
 }
 
 const std::vector<std::uint8_t> kPacket(16, 'A');
@@ -201,8 +166,8 @@ TEST(LibusbPipe, AnInterruptEndpointGetsInterruptTransfersAndNoOther) {
     const auto pipe = usb::open_pipe({.transfers = transfers, .node = [&shim] { return shim.node(); }});
     std::array<std::uint8_t, usb::kPacketSize> packet{};
     bool written = false;
-    const LocalTime end = now() + 10s;
-    while ((!written || shim.counts().in == 0 || shim.counts().out == 0) && now() < end) {
+    const LocalTime end = real_now() + 10s;
+    while ((!written || shim.counts().in == 0 || shim.counts().out == 0) && real_now() < end) {
       written = written || (pipe->connection() != 0 && pipe->write(std::array<std::uint8_t, 1>{'<'}));
       pipe->read(packet);
       std::this_thread::sleep_for(1ms);

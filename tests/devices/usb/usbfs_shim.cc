@@ -17,14 +17,6 @@
 namespace tendon {
 namespace {
 
-/// Device, configuration, interface, and two bulk endpoints of 64 bytes: an FT232R with the Falcon's numbers.
-constexpr std::array<std::uint8_t, 50> kDescriptors = {18,   1,    0,    2, 0,  0,   0,   64,   0x03,
-                                                       0x04, 0x48, 0xCB, 0, 4,  1,   2,   3,    1,     //
-                                                       9,    2,    32,   0, 1,  1,   0,   0xC0, 0xFA,  //
-                                                       9,    4,    0,    0, 2,  255, 255, 255,  0,     //
-                                                       7,    5,    0x81, 2, 64, 0,   0,                //
-                                                       7,    5,    0x02, 2, 64, 0,   0};
-
 /// One at a time: a test has one device.
 std::atomic<UsbfsShim*> the_shim{nullptr};
 
@@ -244,16 +236,16 @@ int UsbfsShim::control(unsigned long request, void* argument) {
 
 ssize_t UsbfsShim::read(void* to, std::size_t size) {
   const std::lock_guard lock(mutex_);
-  const auto left = kDescriptors.size() - static_cast<std::size_t>(position_);
-  const std::size_t count = std::min(size, left);
-  std::memcpy(to, kDescriptors.data() + position_, count);
+  const auto left = falcon_.descriptors().subspan(static_cast<std::size_t>(position_));
+  const std::size_t count = std::min(size, left.size());
+  std::memcpy(to, left.data(), count);
   position_ += static_cast<off_t>(count);
   return static_cast<ssize_t>(count);
 }
 
 off_t UsbfsShim::seek(off_t to) {
   const std::lock_guard lock(mutex_);
-  return position_ = std::clamp<off_t>(to, 0, kDescriptors.size());
+  return position_ = std::clamp<off_t>(to, 0, static_cast<off_t>(falcon_.descriptors().size()));
 }
 
 }  // namespace tendon
