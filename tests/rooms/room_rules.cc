@@ -72,6 +72,7 @@ const std::vector<Door>& front_doors() {
       {"Spectra", {"Spectra/"}, {"clients/softbody/spectrum.cc"}},
       {"spdlog", {"spdlog/"}, {"server/log.cc"}},
       {"toml++", {"toml++/"}, {"server/scene.cc", "clients/softbody/scene.cc"}},
+      {"umockdev", {"umockdev.h"}, {"tests/devices/usb/mock_usb.cc"}},
       {"zlib", {"zlib.h"}, {"server/mcap_format.cc"}},
   };
   return kDoors;
