@@ -64,7 +64,9 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   if (estimator_) estimator_->observe(hand);
   if (!newest_) return {};
   Wanted result;
-  result.age = hand.at - newest_->received;
+  // A force may come after the device took the sample that this step is about; an age below zero has no place on the
+  // wire.
+  result.age = std::max(Duration::zero(), hand.at - newest_->received);
   const Duration overdue = result.age - validity();
   // A safe stop is only left by `observe`: a clock that stands still must not revive a force.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
@@ -86,11 +88,11 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
     result.reasons |= Reason::kDecaying;
     gain = std::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
   }
-  const Duration since_engaged = hand.at - engaged_;
+  const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
   Vec3 rest = Vec3::Zero();
   if (since_engaged < config_.ramp_in) {
     result.reasons |= Reason::kRampIn;
-    const double ramp = std::max(0.0, seconds(since_engaged) / seconds(config_.ramp_in));
+    const double ramp = seconds(since_engaged) / seconds(config_.ramp_in);
     rest = from_ * (gain * (1 - ramp));
     gain *= ramp;
   }

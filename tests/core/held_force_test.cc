@@ -47,6 +47,16 @@ TEST(HeldForce, GoesFromValidToHeldToFadingToSafeStop) {
   EXPECT_EQ(held.wanted(at(milliseconds(280))).force, Vec3::Zero());
 }
 
+TEST(HeldForce, AForceThatCameAfterTheSampleWasTakenIsNewAndNotYounger) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(milliseconds(10), Vec3(2, 0, 0)));
+  const auto wanted = held.wanted(at(milliseconds(8)));
+  EXPECT_EQ(wanted.age, Duration::zero());
+  EXPECT_EQ(wanted.mode, Mode::kActive);
+  EXPECT_EQ(wanted.force.x(), 2);
+  EXPECT_EQ(held.wanted(at(milliseconds(11))).age, milliseconds(1));
+}
+
 TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
   HeldForce held({});
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
