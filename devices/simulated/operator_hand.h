@@ -12,8 +12,8 @@ namespace tendon {
 ///     F_hand = k (s − x) + c (ṡ − v) − m_hand dv/dt        (N, on the handle)
 ///
 /// The second-order model with a moving equilibrium point of Hajian and Howe (J. Biomech. Eng.
-/// 119:109, 1997) and Kuchenbecker, Park and Niemeyer (IMECE 2003). A pinch grip has about 100–600
-/// N/m, 2–5 N·s/m, 30–100 g (recalled, not re-checked).
+/// 119:109, 1997) and Kuchenbecker, Park and Niemeyer (IMECE 2003). Numbers of a fingertip, of a hand with a
+/// stylus and of an arm: OperatorProfile.
 ///
 /// Thread-safe: yes, it never changes. Realtime-safe: all but the constructor.
 class OperatorHand {

@@ -5,6 +5,7 @@
 #include <array>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 
 namespace tendon {
 namespace {
@@ -59,6 +60,40 @@ constexpr std::array kProfiles = {
     },
 };
 
+constexpr std::string_view kHajian = "Hajian and Howe, J. Biomech. Eng. 119:109, 1997, pressing with 2-20 N";
+constexpr std::string_view kGrip =
+    "Hasser and Cutkosky 2002; Kuchenbecker, Park and Niemeyer, IMECE 2003; grows with the grip";
+constexpr std::string_view kArm =
+    "Mussa-Ivaldi, Hogan and Bizzi 1985; Dolan et al., IEEE SMC 23, 1993; Tsuji et al. 1995";
+
+constexpr std::array kOperators = {
+    OperatorProfile{
+        .name = "fingertip",
+        .stiffness = {255, 1255, kRecalled, kHajian},
+        .damping = {4, 7.4, kRecalled, kHajian},
+        .mass = {0.005, 0.006, kRecalled, kHajian},
+    },
+    OperatorProfile{
+        .name = "stylus",
+        .stiffness = {100, 600, kRecalled, kGrip},
+        .damping = {2, 5, kRecalled, kGrip},
+        .mass = {0.03, 0.1, kRecalled, kGrip},
+    },
+    OperatorProfile{
+        .name = "arm",
+        .stiffness = {100, 500, kRecalled, kArm},
+        .damping = {5, 30, kRecalled, kArm},
+        .mass = {0.8, 2.5, kRecalled, kArm},
+    },
+};
+
+/// One line of a table for each number: what, value with unit, provenance, source.
+template <class Known>
+void add_line(std::ostream& table, std::string_view what, const std::string& value, const Known& number) {
+  table << "  " << std::left << std::setw(28) << what << std::setw(15) << value << std::setw(10)
+        << to_string(number.provenance) << number.note << '\n';
+}
+
 }  // namespace
 
 std::string_view to_string(Provenance provenance) noexcept {
@@ -96,6 +131,19 @@ const DeviceProfile* find_device_profile(std::string_view name) noexcept {
   return found == kProfiles.end() ? nullptr : found;
 }
 
+OperatorHand::Config OperatorProfile::hand(ScriptedMotion motion) const {
+  return {
+      .stiffness = stiffness.middle(), .damping = damping.middle(), .mass = mass.middle(), .motion = std::move(motion)};
+}
+
+std::span<const OperatorProfile> operator_profiles() noexcept { return kOperators; }
+
+const OperatorProfile* find_operator_profile(std::string_view name) noexcept {
+  const auto* const found = std::find_if(kOperators.begin(), kOperators.end(),
+                                         [name](const OperatorProfile& profile) { return profile.name == name; });
+  return found == kOperators.end() ? nullptr : found;
+}
+
 SimulatedDevice::Config admittance_device() {
   SimulatedDevice::Config config;
   config.name = "admittance";
@@ -111,8 +159,7 @@ std::string provenance_table(const DeviceProfile& profile) {
   const auto line = [&table](std::string_view what, const KnownNumber& number, std::string_view unit) {
     std::ostringstream value;
     value << number.value << ' ' << unit;
-    table << "  " << std::left << std::setw(28) << what << std::setw(15) << value.str() << std::setw(10)
-          << to_string(number.provenance) << number.note << '\n';
+    add_line(table, what, value.str(), number);
   };
   table << profile.name << '\n';
   line("apparent mass", profile.mass, "kg");
@@ -124,6 +171,20 @@ std::string provenance_table(const DeviceProfile& profile) {
   if (profile.watchdog) line("watchdog", *profile.watchdog, "s");
   line("viscous friction, at least", profile.viscous_bound, "N s/m");
   line("Coulomb friction, at least", profile.coulomb_bound, "N");
+  return table.str();
+}
+
+std::string provenance_table(const OperatorProfile& profile) {
+  std::ostringstream table;
+  const auto line = [&table](std::string_view what, const KnownRange& range, std::string_view unit) {
+    std::ostringstream value;
+    value << range.least << '-' << range.most << ' ' << unit;
+    add_line(table, what, value.str(), range);
+  };
+  table << profile.name << " (an operator)\n";
+  line("stiffness", profile.stiffness, "N/m");
+  line("damping", profile.damping, "N s/m");
+  line("mass", profile.mass, "kg");
   return table.str();
 }
 

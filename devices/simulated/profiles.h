@@ -54,11 +54,42 @@ std::span<const DeviceProfile> device_profiles() noexcept;
 /// The one of that name, or null.
 const DeviceProfile* find_device_profile(std::string_view name) noexcept;
 
+/// Between which two values a number lies, and how that came to be known.
+struct KnownRange {
+  double least;
+  double most;
+  Provenance provenance;
+  std::string_view note;  ///< source, or reason
+
+  /// Half way: what a hand has of which no more is known.
+  double middle() const noexcept { return least + (most - least) / 2; }
+};
+
+/// What holds the handle, for a simulated hand that is like it. Each number is a range, because people differ, and
+/// because whoever grips harder is stiffer. A spring, a damper and a mass are the least that tells a hand from a wall;
+/// they miss what a hand does above some 50 Hz, and at next to no grip force.
+struct OperatorProfile {
+  std::string_view name;
+  KnownRange stiffness;  ///< N/m
+  KnownRange damping;    ///< N·s/m
+  KnownRange mass;       ///< kg
+
+  /// The hand in the middle of all three.
+  OperatorHand::Config hand(ScriptedMotion motion) const;
+};
+
+/// All of them: fingertip, stylus, arm.
+std::span<const OperatorProfile> operator_profiles() noexcept;
+
+/// The one of that name, or null.
+const OperatorProfile* find_operator_profile(std::string_view name) noexcept;
+
 /// A heavy device of admittance type, without a hand: 2 kg, 20 N·s/m, 1 N, a force sensor, no other effect. It is
 /// no real device: the numbers are those for which control.md 1.5 tried the admittance form of the limiter.
 SimulatedDevice::Config admittance_device();
 
 /// Every number of the profile, one per line: what, value with unit, provenance, source.
 std::string provenance_table(const DeviceProfile& profile);
+std::string provenance_table(const OperatorProfile& profile);
 
 }  // namespace tendon

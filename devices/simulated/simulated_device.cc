@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <string_view>
@@ -31,6 +32,19 @@ Vec3 saturated(const Vec3& force, double limit) {
   return shape * (limit / length);
 }
 
+void expect_delay(const std::optional<Duration>& delay, std::string_view field) {
+  if (!delay) return;
+  expect(*delay > Duration::zero() && *delay <= SimulatedDevice::kMostDelay, field, seconds(*delay),
+         "above 0 s, and 0.1 s at most (left out when there is none)");
+}
+
+void check(const SimulatedDevice::Config::StructuralMode& mode, double mass) {
+  expect(mode.handle_mass > 0 && mode.handle_mass < mass, "structural_mode.handle_mass", mode.handle_mass,
+         "above 0 kg and below the mass of " + shortest(mass) + " kg, of which it is the part that the hand holds");
+  expect_above_zero(mode.stiffness, "structural_mode.stiffness");
+  expect_not_negative(mode.damping, "structural_mode.damping");
+}
+
 /// The centre of the count that `x` lies in.
 Vec3 counted(const Vec3& x, double step) { return (x.array() / step + 0.5).floor().matrix() * step; }
 
@@ -42,6 +56,12 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   if (config_.start_position) expect_finite(*config_.start_position, "start_position");
   expect_effect(config_.viscous_friction, "viscous_friction");
   expect_effect(config_.coulomb_friction, "coulomb_friction");
+  if (config_.joint_friction) {
+    expect(!config_.coulomb_friction, "coulomb_friction", config_.coulomb_friction.value_or(0),
+           "none besides the friction in the joints");
+    joints_.emplace(*config_.joint_friction);
+  }
+  if (config_.structural_mode) check(*config_.structural_mode, config_.mass);
   expect_effect(config_.encoder_step, "encoder_step");
   expect_effect(config_.max_force, "max_force");
   expect_effect(config_.amplifier_bandwidth, "amplifier_bandwidth");
@@ -50,11 +70,20 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
     expect(*config_.watchdog > Duration::zero(), "watchdog", seconds(*config_.watchdog),
            "a duration above 0 s (left out when there is none)");
   }
+  expect_delay(config_.sample_delay, "sample_delay");
+  expect_delay(config_.force_delay, "force_delay");
+  if (config_.sample_delay || config_.force_delay) {
+    under_way_.emplace(config_.sample_delay.value_or(Duration::zero()) +
+                       config_.force_delay.value_or(Duration::zero()));
+  }
   expect(config_.max_substep > Duration::zero(), "max_substep", seconds(config_.max_substep), "a duration above 0 s");
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
-  take_substeps_ =
-      substeps_with(config_.coulomb_friction.has_value(), hand_.has_value(), config_.amplifier_bandwidth.has_value());
+  const Rub rub = joints_ ? Rub::kJoints : config_.coulomb_friction ? Rub::kHandle : Rub::kNone;
+  take_substeps_ = substeps_with({.rub = rub,
+                                  .hand = hand_.has_value(),
+                                  .lag = config_.amplifier_bandwidth.has_value(),
+                                  .mode = config_.structural_mode.has_value()});
 
   info_ = {.name = config_.name,
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
@@ -63,11 +92,13 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
 
   truth_.position = config_.start_position.value_or(hand_ ? hand_->target(0).position : Vec3::Zero());
   truth_.velocity = config_.start_velocity;
+  motor_velocity_ = config_.start_velocity;
   settle_energies();
 }
 
 std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
   truth_.watchdog_fired = false;
+  if (config_.sample_delay) now -= *config_.sample_delay;
   if (!last_read_) {
     last_read_ = now;
     until_watchdog_ = config_.watchdog;
@@ -77,7 +108,8 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
     settle_energies();
   }
   PositionSample sample{now, truth_.position, {}};
-  if (config_.encoder_step) sample.position = counted(truth_.position, *config_.encoder_step);
+  if (config_.structural_mode) sample.position += truth_.deflection;
+  if (config_.encoder_step) sample.position = counted(sample.position, *config_.encoder_step);
   if (config_.force_sensor) sample.hand_force = sensed_force();
   if (config_.button_after) sample.buttons = lived_ >= *config_.button_after ? 1 : 0;
   return sample;
@@ -89,14 +121,38 @@ Vec3 SimulatedDevice::sensed_force() const noexcept {
 }
 
 Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {
-  command_ = Vec3::Zero();
-  if (force.allFinite()) command_ = force;
-  if (config_.max_force) command_ = saturated(command_, *config_.max_force);
+  Vec3 held = Vec3::Zero();
+  if (force.allFinite()) held = force;
+  if (config_.max_force) held = saturated(held, *config_.max_force);
+  if (under_way_) return send(held);
+  command_ = held;
   if (config_.watchdog) until_watchdog_ = config_.watchdog;
-  return command_;
+  return held;
+}
+
+Vec3 SimulatedDevice::send(const Vec3& force) noexcept {
+  under_way_->send(lived_, force);
+  return force;
 }
 
 void SimulatedDevice::advance(Duration gap) noexcept {
+  if (under_way_) gap = live_to_last_arrival(gap);
+  live(gap);
+}
+
+/// What is left of the gap after the last of the forces that reach the motors in it.
+Duration SimulatedDevice::live_to_last_arrival(Duration gap) noexcept {
+  const Duration end = lived_ + gap;
+  for (const auto* next = under_way_->next(); next != nullptr && next->arrives <= end; next = under_way_->next()) {
+    live(next->arrives - lived_);
+    command_ = next->force;
+    if (config_.watchdog) until_watchdog_ = config_.watchdog;
+    under_way_->pop();
+  }
+  return end - lived_;
+}
+
+void SimulatedDevice::live(Duration gap) noexcept {
   if (until_watchdog_) gap = live_with_watchdog(gap);
   integrate(gap);
 }
@@ -122,57 +178,91 @@ void SimulatedDevice::integrate(Duration span) noexcept {
   lived_ += span;
 }
 
-SimulatedDevice::Substeps SimulatedDevice::substeps_with(bool coulomb, bool hand, bool lag) {
-  using Self = SimulatedDevice;
-  constexpr std::array<Substeps, 8> kAll = {
-      &Self::take_substeps<false, false, false>, &Self::take_substeps<false, false, true>,
-      &Self::take_substeps<false, true, false>,  &Self::take_substeps<false, true, true>,
-      &Self::take_substeps<true, false, false>,  &Self::take_substeps<true, false, true>,
-      &Self::take_substeps<true, true, false>,   &Self::take_substeps<true, true, true>};
-  return kAll.at((coulomb ? 4U : 0U) + (hand ? 2U : 0U) + (lag ? 1U : 0U));
+SimulatedDevice::Substeps SimulatedDevice::substeps_with(const Effects& effects) {
+  constexpr auto kAll = []<std::size_t... kIs>(std::index_sequence<kIs...>) {
+    return std::array<Substeps, sizeof...(kIs)>{&SimulatedDevice::take_substeps<Effects::numbered(kIs)>...};
+  }
+  (std::make_index_sequence<Effects::kHowMany>{});
+  return kAll.at(effects.number());
 }
 
-template <bool kCoulomb, bool kHand, bool kLag>
+/// `mean`: the half-step momentum, from which it becomes the mean velocity; `velocity`: v₀, from which it becomes v₁.
+/// By reference, because copies of vectors are what a substep costs.
+template <SimulatedDevice::Rub kRub>
+void SimulatedDevice::slide(Vec3& mean, Vec3& velocity, const Side& side, const Vec3& push, const Vec3& position,
+                            double h) const noexcept {
+  if constexpr (kRub == Rub::kJoints) {
+    const auto slide = joints_->step(position, velocity, {mean, side.resistance, side.mass, push}, h);
+    mean = slide.mean;
+    velocity = slide.end;
+    return;
+  }
+  if constexpr (kRub == Rub::kHandle) {
+    const double momentum = mean.norm();
+    const double lost = h / 2 * *config_.coulomb_friction;
+    mean *= momentum > lost ? (1 - lost / momentum) / side.resistance : 0.0;
+  } else {
+    mean /= side.resistance;
+  }
+  velocity = 2 * mean - velocity;
+  if constexpr (kRub == Rub::kHandle) {
+    if (velocity.dot(mean) <= 0 && push.norm() <= *config_.coulomb_friction) velocity.setZero();
+  }
+}
+
+template <SimulatedDevice::Effects kEffects>
 void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
   const double begin = seconds(lived_);
-  double mass = config_.mass;
-  if constexpr (kHand) mass += hand_->mass();
-  double resistance = mass;
-  if (config_.viscous_friction) resistance += h / 2 * *config_.viscous_friction;
-  if constexpr (kHand) resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
+  double viscous = 0;
+  if (config_.viscous_friction) viscous = h / 2 * *config_.viscous_friction;
+  Side handle{config_.mass, 0};  // all of the mass, or its side of the structural mode
+  if constexpr (kEffects.mode) handle.mass = config_.structural_mode->handle_mass;
+  if constexpr (kEffects.hand) handle.mass += hand_->mass();
+  handle.resistance = handle.mass;
+  if constexpr (!kEffects.mode) handle.resistance += viscous;
+  if constexpr (kEffects.hand) handle.resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
+  Side motor;
+  double coupling = 0;
+  if constexpr (kEffects.mode) {
+    coupling = h / 2 * (config_.structural_mode->damping + h / 2 * config_.structural_mode->stiffness);
+    handle.resistance += coupling;
+    motor.mass = config_.mass - config_.structural_mode->handle_mass;
+    // With the handle's velocity eliminated.
+    motor.resistance = motor.mass + viscous + coupling - coupling * coupling / handle.resistance;
+  }
   Lag lag;
-  if constexpr (kLag) {
+  if constexpr (kEffects.lag) {
     lag.h_over_tau = h * 2 * std::numbers::pi * *config_.amplifier_bandwidth;
     lag.reached = -std::expm1(-lag.h_over_tau);
   }
   for (Duration::rep i = 0; i < count; ++i) {
     const Vec3 v0 = truth_.velocity;
-    if constexpr (kLag) {
+    if constexpr (kEffects.lag) {
       truth_.device_force = force_over(lag);
     } else {
       truth_.device_force = command_;
     }
     Vec3 push = truth_.device_force;
+    if constexpr (kEffects.mode) push = config_.structural_mode->stiffness * truth_.deflection;
     Vec3 drive;
-    if constexpr (kHand) {
+    if constexpr (kEffects.hand) {
       drive = hand_->drive(begin + h * (static_cast<double>(i) + 0.5), truth_.position);
       push += drive;
     }
 
-    Vec3 mean = mass * v0 + h / 2 * push;
-    if constexpr (kCoulomb) {
-      const double momentum = mean.norm();
-      const double lost = h / 2 * *config_.coulomb_friction;
-      mean *= momentum > lost ? (1 - lost / momentum) / resistance : 0.0;
+    Vec3 mean = handle.mass * v0 + h / 2 * push;
+    if constexpr (kEffects.mode) {
+      const Vec3 motor_push = truth_.device_force - config_.structural_mode->stiffness * truth_.deflection;
+      Vec3 motor_mean = motor.mass * motor_velocity_ + h / 2 * motor_push + coupling / handle.resistance * mean;
+      slide<kEffects.rub>(motor_mean, motor_velocity_, motor, motor_push + config_.structural_mode->damping * v0,
+                          truth_.position + truth_.deflection, h);
+      mean = (mean + coupling * motor_mean) / handle.resistance;
+      truth_.velocity = 2 * mean - v0;
+      truth_.deflection += h * (motor_mean - mean);
     } else {
-      mean /= resistance;
+      slide<kEffects.rub>(mean, truth_.velocity, handle, push, truth_.position, h);
     }
-
-    truth_.velocity = 2 * mean - v0;
-    if constexpr (kCoulomb) {
-      if (truth_.velocity.dot(mean) <= 0 && push.norm() <= *config_.coulomb_friction) truth_.velocity.setZero();
-    }
-    if constexpr (kHand) {
+    if constexpr (kEffects.hand) {
       const Vec3 pull = drive - (hand_->damping() + h / 2 * hand_->stiffness()) * mean;
       drive_work_ += h * pull.dot(mean);
       truth_.hand_force = pull - hand_->mass() / h * (truth_.velocity - v0);
@@ -193,8 +283,29 @@ Vec3 SimulatedDevice::force_over(const Lag& lag) noexcept {
 void SimulatedDevice::settle_energies() noexcept {
   const double half_v2 = truth_.velocity.squaredNorm() / 2;
   truth_.kinetic_energy = config_.mass * half_v2;
+  if (config_.structural_mode) settle_mode();
   if (!hand_) return;
   truth_.hand_work = drive_work_ - hand_->mass() * (half_v2 - config_.start_velocity.squaredNorm() / 2);
+}
+
+void SimulatedDevice::settle_mode() noexcept {
+  const auto& mode = *config_.structural_mode;
+  const double more = motor_velocity_.squaredNorm() - truth_.velocity.squaredNorm();
+  truth_.kinetic_energy += (config_.mass - mode.handle_mass) * more / 2;
+  truth_.spring_energy = mode.stiffness * truth_.deflection.squaredNorm() / 2;
+}
+
+Friction least_friction(const SimulatedDevice::Config& config) {
+  Friction least{.coulomb = config.coulomb_friction.value_or(0), .viscous = config.viscous_friction.value_or(0)};
+  if (!config.joint_friction) return least;
+  const Friction joints = JointFriction(*config.joint_friction).least();
+  return {.coulomb = joints.coulomb, .viscous = least.viscous + joints.viscous};
+}
+
+Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& position) {
+  if (!config.joint_friction) return least_friction(config);
+  const Friction joints = JointFriction(*config.joint_friction).least_at(position);
+  return {.coulomb = joints.coulomb, .viscous = config.viscous_friction.value_or(0) + joints.viscous};
 }
 
 }  // namespace tendon

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 
+#include "core/friction.h"
 #include "core/motion.h"
 #include "devices/device.h"
+#include "devices/simulated/forces_under_way.h"
+#include "devices/simulated/joint_friction.h"
 #include "devices/simulated/operator_hand.h"
 
 namespace tendon {
@@ -15,14 +20,31 @@ namespace tendon {
 ///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      sgn(v) = v/|v|;  any |sgn| ≤ 1 at v = 0
 ///
 /// Forces in N on the handle: F_device is what the device exerts on the hand, F_hand what the hand
-/// exerts on the device. Friction is isotropic. Each effect is one that the configuration lists or that
-/// does not exist: what is left out costs an empty optional, and in a substep nothing: each combination of
-/// effects has a loop of its own.
+/// exerts on the device. Friction is isotropic, or that of the joints of a mechanism (JointFriction). Each effect is
+/// one that the configuration lists or that does not exist: what is left out costs an empty optional, and in a substep
+/// nothing: each combination of effects has a loop of its own.
+///
+/// **A structural mode** parts the mass: motors, friction and encoder are at one end of a spring K and damper C, handle
+/// and hand at the other. With the motor side at y = x + e and of mass m − m_h,
+///
+///     (m − m_h) dẏ/dt = F_device − b ẏ − f_c sgn(ẏ) − K e − C ė,      m_h dv/dt = F_hand + K e + C ė
+///
+/// Nobody holding it, it rings at ω² = K (1/(m − m_h) + 1/m_h), ζ = C ω/(2 K); with the motor side held still at
+/// ω² = K/m_h. Resonances of the mechanism narrow the impedances that a device can show (Gil et al., IROS 2010;
+/// Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002). Here: what the hand feels is never stiffer than K, and the
+/// most damping that can be rendered falls from about 2 m/T to 2 (m − m_h)/T, further as the mode comes near the rate.
+/// The stiffest sampled spring does not get softer by it, because encoder and motors are on one side.
 ///
 /// **Time.** The device lives from `read` to `read`: the first one sets the instant 0, each later one
 /// moves the world on to its `now` with the force that `apply` left there. Encoder and force change at
 /// the same instant, that of the last `read`. Time that goes backwards moves nothing. Of a gap longer
 /// than kMaxGap only that much is lived through: to the simulated world, the rest did not happen.
+///
+/// **Transport delay.** With `sample_delay` d_s, `read(now)` gives the sample taken at now − d_s, which says so (`at`),
+/// and the world, `truth()` too, is lived up to that instant: all of the above is meant with now − d_s for now. With
+/// `force_delay` d_f the force that `apply` returns reaches the motors that much later; until the first has come there
+/// is none. Both are exact to the nanosecond, whatever the period. A sample shows the first effect of a force d_s + d_f
+/// after it was applied. The device's watchdog counts the forces that reach it.
 ///
 /// **Integration.** Substeps of equal length h ≤ max_substep; each is one implicit midpoint rule with
 /// set-valued friction (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
@@ -38,11 +60,17 @@ namespace tendon {
 /// v₁ = 0. So it sticks exactly, with no velocity threshold, in any direction. Why this rule: it is
 /// stable for any hand, and since m (v₁ − v₀)·v̄ is exactly the change of kinetic energy it neither
 /// makes energy nor hides any. A damped integrator would make every limiter look better than it is:
-/// semi-implicit Euler at 50 µs holds springs stable that are 5 % too stiff for the real device.
-/// Consequently, as long as the force held is the force returned (no amplifier lag, no watchdog ran
-/// out), with the E of EnergyLedger fed with the true position and friction, up to rounding,
+/// semi-implicit Euler at 50 µs holds springs stable that are 5 % too stiff for the real device. With a structural mode
+/// its spring force is that of the mean deflection, and both velocities come of one linear equation; the mode rings at
+/// (2/h) atan(ω h/2), 0.03 % low at 200 Hz. Consequently, as long as the force held is the force returned (no
+/// transport delay, no amplifier lag, no watchdog ran out), with the E of EnergyLedger fed with the true position of
+/// what the encoder sees and with `least_friction`, up to rounding,
 ///
-///     work of the hand + kinetic energy at the start ≥ E + kinetic energy now
+///     work of the hand + stored energy at the start ≥ E + stored energy now
+///
+/// where the kinetic energy of the device is stored, and that of the spring between its masses. Under transport delay
+/// it holds with the forces that have reached the motors, and not with those returned: a delayed spring does give out
+/// energy.
 class SimulatedDevice final : public Device {
  public:
   struct Config {
@@ -54,6 +82,15 @@ class SimulatedDevice final : public Device {
     /// Effects: listed (> 0) or not there.
     std::optional<double> viscous_friction;  ///< b, N·s/m
     std::optional<double> coulomb_friction;  ///< f_c, N
+    /// In the joints instead: not together with `coulomb_friction`. Keeps the energy balance.
+    std::optional<JointFriction::Config> joint_friction;
+    /// The mass that the hand holds, on a spring: see above. Keeps the energy balance.
+    struct StructuralMode {
+      double handle_mass = 0;  ///< m_h, kg, of `mass`; > 0 and below it
+      double stiffness = 0;    ///< K, N/m, > 0
+      double damping = 0;      ///< C, N·s/m, ≥ 0
+    };
+    std::optional<StructuralMode> structural_mode;
     /// m, one encoder count per axis. The sample is the centre of the count, so the truth is never
     /// more than half a count away; the origin is a centre.
     std::optional<double> encoder_step;
@@ -67,6 +104,10 @@ class SimulatedDevice final : public Device {
     };
     std::optional<ForceSensor> force_sensor;
     std::optional<Duration> watchdog;  ///< without an `apply` for so long the force is zero until the next one
+    /// d_s and d_f, each up to kMostDelay: what USB and a device's own loop take is 1 to 2 ms. They break the energy
+    /// balance.
+    std::optional<Duration> sample_delay;
+    std::optional<Duration> force_delay;
 
     std::optional<OperatorHand::Config> hand;
     std::optional<Duration> button_after;  ///< so long after the first `read` the hand presses button 0, and holds it
@@ -79,18 +120,23 @@ class SimulatedDevice final : public Device {
 
   /// What really happens, for tests: nothing in production may look at it.
   struct Truth {
-    Vec3 position = Vec3::Zero();      ///< m
-    Vec3 velocity = Vec3::Zero();      ///< m/s
+    Vec3 position = Vec3::Zero();      ///< m, of the handle
+    Vec3 velocity = Vec3::Zero();      ///< m/s, of the handle
+    Vec3 deflection = Vec3::Zero();    ///< m, e: the encoder is at position + deflection; 0 without a structural mode
     Vec3 device_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
     Vec3 hand_force = Vec3::Zero();    ///< N, mean over the last substep, on the handle
     double hand_work = 0;              ///< J, ∫ F_hand·dx since the start
     double kinetic_energy = 0;         ///< J, of the device alone (the hand's mass is the hand's)
+    double spring_energy = 0;          ///< J, of the structural mode
     bool watchdog_fired = false;       ///< it took the force away during the last interval
   };
 
   /// 10 s is far beyond any pause that a loop survives, and bounds what one `read` may cost (200 000
   /// substeps, some 10 ms).
   static constexpr Duration kMaxGap = std::chrono::seconds(10);
+
+  /// Fifty times what a bus takes; a slower device is no haptic one. It bounds how many forces are under way.
+  static constexpr Duration kMostDelay = std::chrono::milliseconds(100);
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
   explicit SimulatedDevice(Config config);
@@ -112,28 +158,66 @@ class SimulatedDevice final : public Device {
     double reached = 1;     ///< 1 − e^(−h/τ)
     double h_over_tau = 0;  ///< h/τ
   };
+  /// What Coulomb friction there is.
+  enum class Rub : std::uint8_t { kNone, kHandle, kJoints };
+  struct Effects {
+    Rub rub = Rub::kNone;
+    bool hand = false;
+    bool lag = false;
+    bool mode = false;
+
+    static constexpr std::size_t kHowMany = 24;
+    static constexpr Effects numbered(std::size_t i) {
+      return {static_cast<Rub>(i / 8), (i & 4) != 0, (i & 2) != 0, (i & 1) != 0};
+    }
+    constexpr std::size_t number() const {
+      return 8 * static_cast<std::size_t>(rub) + (hand ? 4U : 0U) + (lag ? 2U : 0U) + (mode ? 1U : 0U);
+    }
+  };
+  /// A mass in a substep, kg, and what resists its velocity: the mass, and h/2 of all that is in proportion to it.
+  struct Side {
+    double mass = 0;
+    double resistance = 0;
+  };
+
   Vec3 sensed_force() const noexcept;
+  Vec3 send(const Vec3& force) noexcept;
   void advance(Duration gap) noexcept;
+  void live(Duration gap) noexcept;
+  Duration live_to_last_arrival(Duration gap) noexcept;
   Duration live_with_watchdog(Duration gap) noexcept;
   void integrate(Duration span) noexcept;
   using Substeps = void (SimulatedDevice::*)(Duration::rep count, double h) noexcept;
-  static Substeps substeps_with(bool coulomb, bool hand, bool lag);
-  template <bool kCoulomb, bool kHand, bool kLag>
+  static Substeps substeps_with(const Effects& effects);
+  template <Effects kEffects>
   void take_substeps(Duration::rep count, double h) noexcept;
+  template <Rub kRub>
+  [[gnu::always_inline]] inline void slide(Vec3& mean, Vec3& velocity, const Side& side, const Vec3& push,
+                                           const Vec3& position, double h) const noexcept;
   Vec3 force_over(const Lag& lag) noexcept;
   void settle_energies() noexcept;
+  void settle_mode() noexcept;
 
   Config config_;
   std::optional<OperatorHand> hand_;
+  std::optional<JointFriction> joints_;
   Substeps take_substeps_;
   DeviceInfo info_;
   std::optional<LocalTime> last_read_;
-  Duration lived_{};                        ///< since the first read
-  Vec3 command_ = Vec3::Zero();             ///< N, held
+  Duration lived_{};             ///< since the first read
+  Vec3 command_ = Vec3::Zero();  ///< N, held
+  std::optional<ForcesUnderWay> under_way_;
+  Vec3 motor_velocity_ = Vec3::Zero();      ///< m/s, ẏ of a structural mode
   std::optional<Vec3> amplifier_force_;     ///< N, lags behind `command_`
   std::optional<Duration> until_watchdog_;  ///< empty: it has run out, or there is none
   double drive_work_ = 0;                   ///< J, of the hand's spring and damper
   Truth truth_;
 };
+
+/// The friction that a device with this configuration has at the least, anywhere and in any direction: what a limiter
+/// may at most count on.
+Friction least_friction(const SimulatedDevice::Config& config);
+/// … at `position` (m) in any direction.
+Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& position);
 
 }  // namespace tendon

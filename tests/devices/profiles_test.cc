@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 namespace tendon {
@@ -43,6 +44,39 @@ TEST(DeviceProfiles, PrintEveryNumberWithHowItIsKnown) {
   EXPECT_NE(table.find("Coulomb friction            0.26 N         recalled"), std::string::npos) << table;
   EXPECT_NE(table.find("viscous friction            0.01 N s/m     assumed   unknown"), std::string::npos) << table;
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 10);
+}
+
+TEST(OperatorProfiles, AreRangesOfWhichTheHandIsTheMiddle) {
+  std::string names;
+  for (const OperatorProfile& profile : operator_profiles()) {
+    EXPECT_EQ(find_operator_profile(profile.name), &profile);
+    names += std::string(profile.name) + ' ';
+    for (const KnownRange& range : {profile.stiffness, profile.damping, profile.mass}) {
+      EXPECT_GT(range.least, 0) << profile.name;
+      EXPECT_LT(range.least, range.most) << profile.name;
+      EXPECT_FALSE(range.note.empty());
+    }
+    const auto hand = profile.hand(ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.01, .frequency = 1}));
+    EXPECT_EQ(hand.stiffness, (profile.stiffness.least + profile.stiffness.most) / 2);
+    EXPECT_EQ(hand.damping, profile.damping.middle());
+    EXPECT_EQ(hand.mass, profile.mass.middle());
+    EXPECT_NEAR(hand.motion.at(0.25).position.norm(), 0.01, 1e-12);
+    // A hand is underdamped at most a little, and no oscillator: damping ratios of 0.05 to 3 across its range.
+    const double zeta = hand.damping / (2 * std::sqrt(hand.stiffness * hand.mass));
+    EXPECT_GT(zeta, 0.05) << profile.name;
+    EXPECT_LT(zeta, 3) << profile.name;
+  }
+  EXPECT_EQ(names, "fingertip stylus arm ");
+  EXPECT_EQ(find_operator_profile("foot"), nullptr);
+}
+
+TEST(OperatorProfiles, PrintEveryNumberWithHowItIsKnown) {
+  const std::string table = provenance_table(*find_operator_profile("fingertip"));
+  EXPECT_NE(table.find("fingertip (an operator)\n"), std::string::npos) << table;
+  EXPECT_NE(table.find("stiffness                   255-1255 N/m   recalled  Hajian and Howe"), std::string::npos)
+      << table;
+  EXPECT_NE(table.find("mass                        0.005-0.006 kg recalled"), std::string::npos) << table;
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 4);
 }
 
 }  // namespace

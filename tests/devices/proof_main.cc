@@ -60,9 +60,16 @@ int main(int argc, char** argv) {
   };
   with("viscous friction", [](SimulatedDevice::Config& config) { config.viscous_friction = 0.3; });
   with("Coulomb friction", [](SimulatedDevice::Config& config) { config.coulomb_friction = 0.1; });
+  with("joint friction", [](SimulatedDevice::Config& config) {
+    config.joint_friction = {.mechanism = Mechanism::Falcon{}, .coulomb = {0.01, 0.01, 0.01}};
+  });
+  with("structural mode",
+       [](SimulatedDevice::Config& config) { config.structural_mode = {.handle_mass = 0.05, .stiffness = 5000}; });
   with("encoder", [](SimulatedDevice::Config& config) { config.encoder_step = 30e-6; });
   with("saturation", [](SimulatedDevice::Config& config) { config.max_force = 8; });
   with("amplifier", [](SimulatedDevice::Config& config) { config.amplifier_bandwidth = 200; });
   with("force sensor", [](SimulatedDevice::Config& config) { config.force_sensor.emplace(); });
   with("watchdog", [](SimulatedDevice::Config& config) { config.watchdog = std::chrono::milliseconds(5); });
+  with("sample delay", [](SimulatedDevice::Config& config) { config.sample_delay = std::chrono::milliseconds(1); });
+  with("force delay", [](SimulatedDevice::Config& config) { config.force_delay = std::chrono::milliseconds(1); });
 }

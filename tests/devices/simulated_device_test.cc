@@ -416,6 +416,7 @@ TEST(SimulatedDevice, TakesTheSamePathToTheLastBitWithEffectsThatNeverBite) {
   listed.max_force = 1e9;
   listed.watchdog = 1h;
   listed.force_sensor.emplace();
+  listed.button_after = 1h;
   Bench a(plain);
   Bench z(listed);
   Dice dice(5);
@@ -478,10 +479,19 @@ TEST(SimulatedDevice, AHandThatPushesAlongTheAxisIsMeasuredWithThatSign) {
   EXPECT_NEAR(device.read(LocalTime(50us))->hand_force->x(), 1, 1e-3);
 }
 
-TEST(SimulatedDevice, RepeatsItselfToTheLastBit) {
+class AllEffects : public testing::TestWithParam<bool> {};
+
+TEST_P(AllEffects, RepeatThemselvesToTheLastBit) {
   auto config = bare();
   config.viscous_friction = 0.01;
-  config.coulomb_friction = 0.04;
+  if (GetParam()) {
+    config.joint_friction = {.mechanism = Mechanism::Falcon{}, .coulomb = Vec3(0.002, 0.003, 0.004)};
+  } else {
+    config.coulomb_friction = 0.04;
+  }
+  config.structural_mode = {.handle_mass = 0.03, .stiffness = 3000, .damping = 0.1};
+  config.sample_delay = 1ms;
+  config.force_delay = 700us;
   config.encoder_step = 30e-6;
   config.max_force = 8.5;
   config.amplifier_bandwidth = 400;
@@ -495,8 +505,11 @@ TEST(SimulatedDevice, RepeatsItselfToTheLastBit) {
     const Duration interval(static_cast<Duration::rep>(dice.uniform(0.1e6, 8e6)));
     ASSERT_EQ(a.push(force, interval), z.push(force, interval));
     ASSERT_EQ(a.truth().position, z.truth().position);
+    ASSERT_TRUE(a.truth().position.allFinite());
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(WithFrictionOfTheHandleOrOfTheJoints, AllEffects, testing::Bool());
 
 // ---- configuration ---------------------------------------------------------------------------------------------
 
@@ -541,6 +554,11 @@ TEST(SimulatedDevice, RefusesImpossibleValuesNamingFieldValueAndWhatWasExpected)
       {[](Config& c) { c.mass = kInf; }, "mass = inf: expected a number above 0 kg"},
       {[](Config& c) { c.viscous_friction = -1; }, "viscous_friction = -1: expected"},
       {[](Config& c) { c.coulomb_friction = 0; }, "coulomb_friction = 0: expected a number above 0 (left out when"},
+      {[](Config& c) {
+         c.coulomb_friction = 0.4;
+         c.joint_friction = {.mechanism = Mechanism::Falcon{}, .coulomb = Vec3(1, 1, 1)};
+       },
+       "coulomb_friction = 0.4: expected none besides the friction in the joints"},
       {[](Config& c) { c.encoder_step = kNan; }, "encoder_step = nan: expected"},
       {[](Config& c) { c.force_sensor.emplace().resolution = 0; }, "force_sensor.resolution = 0"},
       {[](Config& c) { c.max_force = -8.5; }, "max_force = -8.5: expected"},

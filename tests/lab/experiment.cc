@@ -141,14 +141,13 @@ double count(double x, double step) { return step > 0 ? std::round(x / step) * s
 class Hand {
  public:
   explicit Hand(const PrescribedMotion& motion) : motion_(&motion), friction_(motion.friction) {}
-  explicit Hand(const FreeHand& config)
-      : friction_{.coulomb = config.coulomb_friction.value_or(0), .viscous = config.viscous_friction.value_or(0)} {
-    device_.emplace(config);
-  }
+  explicit Hand(const FreeHand& config) : friction_(least_friction(config)) { device_.emplace(config); }
 
   const Friction& friction() const { return friction_; }
   const Vec3& position() const { return position_; }
   const Vec3& velocity() const { return velocity_; }
+  /// Where the motors push: with a structural mode that is not where the handle is.
+  Vec3 motor_position() const { return device_ ? Vec3(position_ + device_->truth().deflection) : position_; }
 
   Motion read(LocalTime now) {
     Motion seen;
@@ -197,9 +196,9 @@ std::vector<Moment> run(const Experiment& experiment) {
   for (LocalTime now{}; now.time_since_epoch() < experiment.length; now += experiment.period) {
     const Motion seen = hand.read(now);
     if (!record.empty()) {
-      ledger.observe<3>(applied, hand.position() - before, experiment.period);
+      ledger.observe<3>(applied, hand.motor_position() - before, experiment.period);
     }
-    before = hand.position();
+    before = hand.motor_position();
     if (record.empty()) heart.observe(remote.at_rest(seen));
     remote.observe(seen);
     if (const auto force = remote.arrived(now)) heart.observe(*force);

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <vector>
+
+#include "core/motion.h"
+
+namespace tendon {
+
+/// Commands between the loop that gives them and the motors that follow them: each arrives so much later, in order.
+///
+/// Room for one each 100 µs; of more at once the newest take each other's place. The room is taken in the constructor.
+///
+/// Thread-safe: no. Realtime-safe: all but the constructor.
+class ForcesUnderWay {
+ public:
+  struct Command {
+    Duration arrives{};
+    Vec3 force = Vec3::Zero();  ///< N
+  };
+
+  /// `delay` ≥ 0, of each command.
+  explicit ForcesUnderWay(Duration delay) : delay_(delay), ring_(static_cast<std::size_t>(delay / kClosest) + 2) {}
+
+  void send(Duration now, const Vec3& force) noexcept {
+    const Duration arrives = now + delay_;
+    const bool again = count_ > 0 && newest().arrives == arrives;
+    if (!again && count_ < ring_.size()) ++count_;
+    newest() = {arrives, force};
+  }
+
+  /// The one that arrives next; null when none is under way.
+  const Command* next() const noexcept { return count_ > 0 ? &ring_[first_] : nullptr; }
+
+  void pop() noexcept {
+    first_ = (first_ + 1) % ring_.size();
+    --count_;
+  }
+
+ private:
+  static constexpr Duration kClosest = std::chrono::microseconds(100);
+
+  Command& newest() noexcept { return ring_[(first_ + count_ - 1) % ring_.size()]; }
+
+  Duration delay_;
+  std::vector<Command> ring_;
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+};
+
+}  // namespace tendon

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/simulated/joint_friction.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "core/expect.h"
+
+namespace tendon {
+namespace {
+
+/// Of each joint: it turns this way (−1, 1) or stands (0).
+using Turns = std::array<int, 3>;
+
+struct Grip {
+  Turns turns;
+  Vec3 impulse;  ///< of friction on each joint
+  double wrong =
+      std::numeric_limits<double>::infinity();  ///< how far its law is missed, as a velocity; ≤ 0: not at all
+};
+
+/// Friction of joints of which each turns or stands as said: velocity = free − coupling · impulse.
+Grip gripping(const Turns& turns, const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known) {
+  Mat3 equations = Mat3::Identity();
+  Vec3 right;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const int turn = turns[static_cast<std::size_t>(i)];
+    if (turn == 0) equations.row(i) = coupling.row(i);  // the velocity is zero
+    right[i] = turn == 0 ? free[i] : turn * most[i];
+  }
+  Grip grip{turns, equations.inverse() * right};
+  const Vec3 velocity = free - coupling * grip.impulse;
+  grip.wrong = 0;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto joint = static_cast<std::size_t>(i);
+    if (turns[joint] == 0) {
+      grip.wrong = std::max(grip.wrong, (std::abs(grip.impulse[i]) - most[i]) * coupling(i, i));
+    } else if (known[joint] == 0) {
+      grip.wrong = std::max(grip.wrong, -turns[joint] * velocity[i]);
+    }
+  }
+  return grip;
+}
+
+/// The one impulse with |impulseᵢ| ≤ mostᵢ, and = mostᵢ against the velocity where there is one. Of which joints the
+/// turning is `known` (not 0), there it is. It is one of 27 cases; of several that rounding leaves, the least wrong.
+Grip grip_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
+  Grip best;
+  const auto holds = [&](Turns turns) {
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+      if (known[i] != 0) turns[i] = known[i];
+    }
+    const Grip grip = gripping(turns, coupling, free, most, known);
+    if (grip.wrong < best.wrong) best = grip;
+    return grip.wrong <= 0;
+  };
+  const auto sign = [](double x) { return (x > 0 ? 1 : 0) - (x < 0 ? 1 : 0); };
+  if (holds({sign(free[0]), sign(free[1]), sign(free[2])})) return best;  // so it is while the handle slides
+  if (holds({})) return best;
+  for (int code = 0; code < 27; ++code) {
+    const auto digit = [code](int place) { return code / place % 3 - 1; };
+    if (holds({digit(1), digit(3), digit(9)})) break;
+  }
+  return best;
+}
+
+/// The nearest velocity to `v` in which the joints that stand do.
+Vec3 standing(const Turns& turns, const Mat3& jacobian, const Vec3& v) {
+  if (turns == Turns{}) return Vec3::Zero();
+  const Mat3 coupling = jacobian * jacobian.transpose();
+  const Vec3 turning = jacobian * v;
+  Mat3 equations = Mat3::Identity();
+  Vec3 right = Vec3::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (turns[static_cast<std::size_t>(i)] != 0) continue;
+    equations.row(i) = coupling.row(i);
+    right[i] = turning[i];
+  }
+  return v - jacobian.transpose() * (equations.inverse() * right);
+}
+
+}  // namespace
+
+JointFriction::JointFriction(const Config& config)
+    : mechanism_(config.mechanism), centre_(config.centre), coulomb_(config.coulomb), viscous_(config.viscous) {
+  expect_finite(centre_, "joint_friction.centre");
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const std::string joint = '[' + std::to_string(i) + ']';
+    expect_not_negative(coulomb_[i], "joint_friction.coulomb" + joint);
+    expect_not_negative(viscous_[i], "joint_friction.viscous" + joint);
+  }
+  expect(coulomb_.sum() + viscous_.sum() > 0, "joint_friction.coulomb", 0,
+         "friction in one of the joints at least (left out when there is none)");
+}
+
+Friction JointFriction::least() const noexcept {
+  const Vec3& levers = mechanism_.levers();
+  const bool everywhere = viscous_.minCoeff() > 0;
+  return {.coulomb = coulomb_.cwiseQuotient(levers).minCoeff(),
+          .viscous = everywhere ? 1 / levers.cwiseAbs2().cwiseQuotient(viscous_).sum() : 0};
+}
+
+Friction JointFriction::least_at(const Vec3& position) const noexcept {
+  const Mat3 jacobian = mechanism_.jacobian(position - centre_);
+  const Vec3 levers = jacobian.inverse().colwise().norm().transpose();
+  const Mat3 viscous = jacobian.transpose() * viscous_.asDiagonal() * jacobian;
+  const Eigen::SelfAdjointEigenSolver<Mat3> solved(viscous, Eigen::EigenvaluesOnly);
+  return {.coulomb = coulomb_.cwiseQuotient(levers).minCoeff(), .viscous = std::max(0.0, solved.eigenvalues()[0])};
+}
+
+Vec3 JointFriction::torques(const Mechanism::Kind& mechanism, double coulomb) {
+  const Vec3 levers = Mechanism(mechanism).levers();
+  Vec3 torques = coulomb * levers;
+  for (Eigen::Index i = 0; i < 3; ++i) {  // not less for the rounding: whoever counts on `coulomb` is right to
+    while (torques[i] / levers[i] < coulomb) torques[i] = std::nextafter(torques[i], HUGE_VAL);
+  }
+  return torques;
+}
+
+JointFriction::Slide JointFriction::step(const Vec3& position, const Vec3& v0, const Impetus& impetus,
+                                         double h) const noexcept {
+  const Mat3 jacobian = mechanism_.jacobian(position - centre_);
+  const Mat3 viscous = jacobian.transpose() * viscous_.asDiagonal() * jacobian;  // N·s/m
+  const Mat3 mobility = (impetus.resistance * Mat3::Identity() + h / 2 * viscous).inverse();
+  const Mat3 spread = jacobian * mobility;
+
+  const Grip grip = grip_of(spread * jacobian.transpose(), spread * impetus.momentum, h / 2 * coulomb_);
+  Slide slide;
+  slide.mean = grip.turns == Turns{} ? Vec3(Vec3::Zero())
+                                     : Vec3(mobility * (impetus.momentum - jacobian.transpose() * grip.impulse));
+  slide.end = 2 * slide.mean - v0;
+
+  Turns known = grip.turns;
+  const Vec3 turning = jacobian * slide.end;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (turning[static_cast<Eigen::Index>(i)] * known[i] <= 0) known[i] = 0;
+  }
+  const auto some = [](const Turns& turns) { return std::find(turns.begin(), turns.end(), 0) != turns.end(); };
+  if (!some(known)) return slide;
+  const double drag = (impetus.resistance - impetus.mass) * 2 / h;
+  const Vec3 push = impetus.push - drag * slide.mean - viscous * slide.mean;
+  const Grip rest = grip_of(jacobian * jacobian.transpose(), jacobian * push, coulomb_, known);
+  if (some(rest.turns)) slide.end = standing(rest.turns, jacobian, slide.end);
+  return slide;
+}
+
+}  // namespace tendon

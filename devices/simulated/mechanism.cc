@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices/simulated/mechanism.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/expect.h"
+#include "devices/falcon/kinematics.h"
+
+namespace tendon {
+namespace {
+
+/// Of the ball that falcon::kCentre promises, and what a leg by itself moves the grip in it at most: 0.091685 m/rad of
+/// three million places (0.0672 at the centre, 0.0314 at the least), rounded up.
+constexpr double kFalconReach = 0.05;    // m
+constexpr double kFalconLever = 0.0917;  // m/rad
+
+/// Of the way from the middle of an arm's workspace to the nearest place at which its Jacobian is not finite. Friction
+/// grows beyond all bounds there, and no device is used so far out.
+constexpr double kShareOfArmsReach = 0.8;
+
+double reach_of(const Mechanism::Arm& arm) {
+  const double from_shoulder = std::hypot(arm.upper_arm, arm.forearm);
+  const double stretched = arm.upper_arm + arm.forearm - from_shoulder;
+  const double folded = from_shoulder - std::abs(arm.upper_arm - arm.forearm);
+  return kShareOfArmsReach * std::min({stretched, folded, arm.upper_arm});
+}
+
+/// The closed form, with γ = q₃ − q₂ in (−90°, 90°).
+Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
+  const double r = std::hypot(x.x(), x.z() + arm.upper_arm);
+  const double up = x.y() - arm.forearm;
+  const double sin_gamma =
+      (r * r + up * up - arm.upper_arm * arm.upper_arm - arm.forearm * arm.forearm) / (2 * arm.upper_arm * arm.forearm);
+  const double gamma = std::asin(sin_gamma);
+  const double cos_gamma = std::cos(gamma);
+  const double q2 = std::atan2(up, r) - std::atan2(-arm.forearm * cos_gamma, arm.upper_arm + arm.forearm * sin_gamma);
+  const double q3 = q2 + gamma;
+
+  const Vec3 out(x.x() / r, 0, (x.z() + arm.upper_arm) / r);  // from the turntable's axis to the handle
+  const Vec3 aside(out.z(), 0, -out.x());
+  Mat3 jacobian;
+  jacobian.row(0) = aside / r;
+  jacobian.row(1) = (std::cos(q3) * Vec3::UnitY() - std::sin(q3) * out) / (arm.upper_arm * cos_gamma);
+  jacobian.row(2) = (std::cos(q2) * out + std::sin(q2) * Vec3::UnitY()) / (arm.forearm * cos_gamma);
+  return jacobian;
+}
+
+}  // namespace
+
+Mechanism::Mechanism(const Kind& kind) : kind_(kind), reach_(kFalconReach), levers_(Vec3::Constant(kFalconLever)) {
+  const auto* arm = std::get_if<Arm>(&kind);
+  if (arm == nullptr) return;
+  // Shorter or longer is no haptic device, and far from what doubles can square.
+  const auto sound = [](double length) { return length >= 0.01 && length <= 10; };
+  expect(sound(arm->upper_arm), "upper_arm", arm->upper_arm, "0.01 to 10 m");
+  expect(sound(arm->forearm), "forearm", arm->forearm, "0.01 to 10 m");
+  reach_ = reach_of(*arm);
+  // q₁ moves the handle by r, which is l_u in the middle; q₂ and q₃ by the lengths of what they turn, everywhere.
+  levers_ = Vec3(arm->upper_arm + reach_, arm->upper_arm, arm->forearm);
+}
+
+Mat3 Mechanism::jacobian(const Vec3& position) const noexcept {
+  const double distance = position.norm();
+  const Vec3 within = distance > reach_ ? Vec3(position * (reach_ / distance)) : position;
+  if (const auto* arm = std::get_if<Arm>(&kind_)) return jacobian_of(*arm, within);
+  const std::optional<falcon::Pose> pose = falcon::pose_at(falcon::kCentre + within);
+  return pose ? pose->jacobian : Mat3(Mat3::Zero());  // never empty within kFalconReach
+}
+
+}  // namespace tendon
