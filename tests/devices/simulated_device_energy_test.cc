@@ -57,7 +57,7 @@ struct World {
                                          .motion = ScriptedMotion(script)};
     }
     pushes_along = dice.chance(0.3);
-    if (dice.chance(0.3)) put_in_joints(dice);
+    if (dice.chance(0.1)) put_in_joints(dice);  // ten times as dear as the others
     if (dice.chance(0.3)) {
       config.structural_mode = {.handle_mass = config.mass * dice.uniform(0.05, 0.95),
                                 .stiffness = std::pow(10.0, dice.uniform(2, 5)),

@@ -500,7 +500,7 @@ TEST_P(AllEffects, RepeatThemselvesToTheLastBit) {
   Bench a(config);
   Bench z(config);
   Dice dice(13);
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 400; ++i) {
     const Vec3 force = dice.vector(12);
     const Duration interval(static_cast<Duration::rep>(dice.uniform(0.1e6, 8e6)));
     ASSERT_EQ(a.push(force, interval), z.push(force, interval));
