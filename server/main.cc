@@ -2,11 +2,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <csignal>
 #include <ctime>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -25,6 +27,7 @@
 #include "server/randomness.h"
 #include "server/scene.h"
 #include "server/server.h"
+#include "server/service.h"
 
 namespace {
 
@@ -40,18 +43,23 @@ sigset_t signals_to_end() {
   return set;
 }
 
-// Waits for a signal to end, or for `duration_s` seconds when it is above zero. Returns why it ended.
-std::string wait_for_the_end(const sigset_t& signals, double duration_s) {
-  if (duration_s <= 0) {
-    int signal = 0;
-    sigwait(&signals, &signal);
-    return std::string("signal ") + std::to_string(signal);
+// Waits for a signal to end, or for `duration_s` seconds when it is above zero, and tells a service manager meanwhile
+// that the haptic loops turn. Returns why it ended.
+std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server& server) {
+  constexpr Duration kLongestWait = std::chrono::hours(1);
+  const Duration period = service::watch_period().value_or(kLongestWait);
+  std::optional<Duration> left;
+  if (duration_s > 0) left = from_seconds(duration_s);
+  for (;;) {
+    if (server.turning()) service::alive();
+    const Duration wait = left ? std::min(period, *left) : period;
+    const auto whole = std::chrono::floor<std::chrono::seconds>(wait);
+    const timespec timeout{.tv_sec = whole.count(), .tv_nsec = (wait - whole).count()};
+    const int signal = sigtimedwait(&signals, nullptr, &timeout);
+    if (signal > 0) return "signal " + std::to_string(signal);
+    if (errno == EINTR) continue;  // stopped and continued
+    if (left && (*left -= wait) <= Duration::zero()) return "its duration is over";
   }
-  const Duration duration = from_seconds(duration_s);
-  const auto whole = std::chrono::floor<std::chrono::seconds>(duration);
-  const timespec timeout{.tv_sec = whole.count(), .tv_nsec = (duration - whole).count()};
-  const int signal = sigtimedwait(&signals, nullptr, &timeout);
-  return signal > 0 ? "signal " + std::to_string(signal) : "its duration is over";
 }
 
 /// Of all devices together.
@@ -167,7 +175,9 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   if (json) {
     std::cout << "{\"event\":\"listening\",\"address\":\"" << to_string(server.address()) << "\"}" << std::endl;
   }
-  const std::string why = wait_for_the_end(signals, duration_s);
+  service::ready();
+  const std::string why = wait_for_the_end(signals, duration_s, server);
+  service::stopping();
   const Server::Summary summary = server.stop();
   const HapticLoop::Stats haptic = total(summary.devices);
   log::info("stopped: " + why + "; " + std::to_string(haptic.steps) + " steps, " + std::to_string(haptic.overruns) +

@@ -248,6 +248,15 @@ Server::Summary Server::stop() {
   return summary;
 }
 
+bool Server::turning() {
+  bool all = true;
+  for (auto& lane : lanes_) {
+    const std::uint64_t steps = lane->haptic.stats().steps;
+    all = std::exchange(lane->steps_seen, steps) != steps && all;
+  }
+  return all;
+}
+
 void Server::run_haptic(Lane& lane) {
   const bool first = &lane == lanes_.front().get();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {

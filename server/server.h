@@ -59,6 +59,9 @@ class Server {
   /// Zero force first; then goodbye to the guests; then the end of the recording.
   Summary stop();
 
+  /// Whether every haptic loop has taken a step since the last call.
+  bool turning();
+
   Address address() const { return link_.local_address(); }
 
  private:
@@ -71,6 +74,7 @@ class Server {
     Mailboxes mail;
     HapticLoop haptic;
     std::thread thread;
+    std::uint64_t steps_seen = 0;  ///< by turning()
 
     // What run_log has told the operator already.
     HapticLoop::Stats told;

@@ -69,6 +69,7 @@ const std::vector<Door>& front_doors() {
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc"}},
       {"protobuf", {"google/protobuf/", "*.pb.h"}, {"protocol/codec.cc", "server/recording_codec.cc"}},
+      {"libsystemd", {"systemd/"}, {"server/service.cc"}},
       {"Spectra", {"Spectra/"}, {"clients/softbody/spectrum.cc"}},
       {"spdlog", {"spdlog/"}, {"server/log.cc"}},
       {"toml++", {"toml++/"}, {"server/scene.cc", "clients/softbody/scene.cc"}},

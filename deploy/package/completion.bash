@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+# bash completion for Tendon's programs: the verbs and options that --help lists, and files.
+_tendon() {
+  local program=$1 current=${COMP_WORDS[COMP_CWORD]} help verb=
+  # The first word that is no option is the verb of a program that has verbs.
+  if ((COMP_CWORD > 1)) && [[ ${COMP_WORDS[1]} != -* ]]; then
+    verb=${COMP_WORDS[1]}
+  fi
+  help=$("$program" ${verb:+"$verb"} --help 2>/dev/null </dev/null) || help=$("$program" --help 2>/dev/null </dev/null)
+  if [[ $current == -* ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$(grep -oE -- '--[a-z][a-z0-9-]*' <<<"$help" | sort -u)" -- "$current")
+  elif ((COMP_CWORD == 1)); then
+    mapfile -t COMPREPLY < <(compgen -W "$(awk '/^Subcommands:/ { verbs = 1; next } /^[^ ]/ { verbs = 0 } verbs && /^  [a-z]/ { print $1 }' <<<"$help")" -- "$current")
+  fi
+}
+complete -o default -F _tendon \
+  tendond tendon-inject tendon-softbody tendon-lab tendon-identify tendon-replay tendon-conformance

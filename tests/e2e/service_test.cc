@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tendond as a service manager sees it: the datagrams of sd_notify(3) on a socket of ours.
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "tests/e2e/process.h"
+#include "tests/e2e/stage.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon::e2e {
+namespace {
+
+class Manager {
+ public:
+  explicit Manager(const std::filesystem::path& path) : socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof(address.sun_path) - 1);
+    if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+      throw std::runtime_error("cannot bind " + path.string());
+    }
+    const timeval patience{.tv_sec = kPatience.count(), .tv_usec = 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    setenv("NOTIFY_SOCKET", path.c_str(), 1);
+  }
+  ~Manager() {
+    close(socket_);
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+  }
+  Manager(const Manager&) = delete;
+  Manager& operator=(const Manager&) = delete;
+
+  /// What it hears next; empty after kPatience.
+  std::string next() const {
+    std::array<char, 256> bytes{};
+    const ssize_t size = recv(socket_, bytes.data(), bytes.size(), 0);
+    return size > 0 ? std::string(bytes.data(), static_cast<std::size_t>(size)) : "";
+  }
+
+ private:
+  int socket_;
+};
+
+TEST(Service, IsSaidToBeReadyAliveAndStopping) {
+  const testing::ScratchFolder folder;
+  const Manager manager(folder.path() / "notify");
+  setenv("WATCHDOG_USEC", "100000", 1);
+  Server server(folder.path(), demo_scene());
+  EXPECT_EQ(manager.next(), "READY=1");
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(manager.next(), "WATCHDOG=1");
+  server.stop();
+  std::string last = manager.next();
+  while (last == "WATCHDOG=1") last = manager.next();
+  EXPECT_EQ(last, "STOPPING=1");
+}
+
+TEST(Service, WithoutAWatchdogNothingIsSaidBetweenTheBeginningAndTheEnd) {
+  const testing::ScratchFolder folder;
+  const Manager manager(folder.path() / "notify");
+  Server server(folder.path(), demo_scene());
+  EXPECT_EQ(manager.next(), "READY=1");
+  server.stop();
+  EXPECT_EQ(manager.next(), "STOPPING=1");
+}
+
+}  // namespace
+}  // namespace tendon::e2e
