@@ -240,7 +240,10 @@ void WoodenHapticsDevice::write(const Currents& wanted) noexcept {
                               : woodenhaptics::encode(wanted))) {
     return;
   }
-  if (calibrate) calibrated_ = now_;
+  if (calibrate) {
+    calibrated_ = now_;
+    asking_replies_ = 0;  // only what is heard from now on asks for it again
+  }
   const bool late = under_way_ > 0 && now_ - asked_ >= kAnswerTime;
   if (late) unanswered_.add();
   if (late || under_way_ == 0) {

@@ -348,6 +348,17 @@ TEST(WoodenHapticsDevice, CountersThatAreNotSetAsTheyWereToldAreNoCalibration) {
   EXPECT_TRUE(bench.reaches(State::kHomed, 1s));
 }
 
+// Found by tests/fuzz: whoever does not answer has not asked again.
+TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
+  Bench bench;
+  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms));
+  bench.arm.press_calibrate();
+  for (int i = 0; i < 100 && bench.arm.calibrations() == 0; ++i) bench.step();
+  bench.arm.set_fault(Fault::kSilent);
+  bench.run(90ms);
+  EXPECT_EQ(bench.arm.calibrations(), 1);
+}
+
 // Nobody knows what became of its counters meanwhile.
 TEST(WoodenHapticsDevice, ABoardThatWasCalibratedBeforeIsNotBelievedToBe) {
   for (const bool own_supply : {false, true}) {
