@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/doctor.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -120,11 +122,30 @@ Finding isolation(const fs::path& root) {
   if (isolated.empty()) {
     return {
         "isolated_cpus", "none",
-        "where other programs load this machine: `isolcpus=N nohz_full=N rcu_nocbs=N` to the kernel, and the server "
-        "started by `taskset -c N`"};
+        "where other programs load this machine: `isolcpus=N nohz_full=N rcu_nocbs=N` to the kernel, and `cpu = N` in "
+        "the scene's [loop]"};
   }
   const bool some = !without_tick.empty() && without_tick != "(null)";
   return {"isolated_cpus", isolated + (some ? ", without tick " + without_tick : ""), ""};
+}
+
+/// How long the deepest sleep takes to wake from, which a server may forbid for as long as it runs.
+Finding sleep(const fs::path& root) {
+  constexpr std::int64_t kNoticed = 20;  // µs: what a thread on an ordinary kernel wakes late anyway
+  std::optional<std::int64_t> deepest;
+  std::error_code none;
+  for (const auto& state : fs::directory_iterator(root / "sys/devices/system/cpu/cpu0/cpuidle", none)) {
+    const auto latency = number_of(text_of(state.path() / "latency"));
+    if (latency) deepest = std::max(deepest.value_or(0), *latency);
+  }
+  if (!deepest) return {"cpu_sleep", "unknown", ""};
+  const std::string found = "up to " + std::to_string(*deepest) + " µs to wake";
+  if (*deepest <= kNoticed) return {"cpu_sleep", found, ""};
+  if (access((root / "dev/cpu_dma_latency").c_str(), W_OK) == 0) {
+    return {"cpu_sleep", found + " (the server forbids it while it runs)", ""};
+  }
+  return {"cpu_sleep", found,
+          "a udev rule that lets the server forbid it: KERNEL==\"cpu_dma_latency\", GROUP=\"plugdev\", MODE=\"0660\""};
 }
 
 Finding slack(const fs::path& root) {
@@ -180,8 +201,8 @@ Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, s
 }
 
 std::vector<Diagnosis::Finding> look_around(const fs::path& root) {
-  return {kernel(root),       tick(root),        machine(root),   governor(root),   priority_limit(root),
-          memory_limit(root), autosuspend(root), isolation(root), throttling(root), slack(root)};
+  return {kernel(root),      tick(root),      machine(root), governor(root),   priority_limit(root), memory_limit(root),
+          autosuspend(root), isolation(root), sleep(root),   throttling(root), slack(root)};
 }
 
 Diagnosis diagnose(const WakeUpClock& clock) {

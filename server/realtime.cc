@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/realtime.h"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <system_error>
 
@@ -45,6 +48,35 @@ std::vector<std::string> enter_realtime(int priority) {
   }
   touch_stack();
   return refused;
+}
+
+std::optional<std::string> stay_on(std::uint32_t cpu) {
+  cpu_set_t only;
+  CPU_ZERO(&only);
+  int error = EINVAL;
+  if (cpu < CPU_SETSIZE) {
+    CPU_SET(cpu, &only);
+    error = pthread_setaffinity_np(pthread_self(), sizeof only, &only);
+  }
+  if (error == 0) return std::nullopt;
+  return "the haptic thread does not stay on processor " + std::to_string(cpu) +
+         " (sched_setaffinity: " + std::system_category().message(error) +
+         "); name one of `nproc --all`, from 0, that the unit's AllowedCPUs= and CPUAffinity= leave";
+}
+
+WakefulProcessors::WakefulProcessors(const std::filesystem::path& file)
+    : file_(open(file.c_str(), O_WRONLY | O_CLOEXEC)) {
+  if (file_ < 0 && errno == ENOENT) return;
+  const std::int32_t none = 0;  // µs
+  held_ = file_ >= 0 && write(file_, &none, sizeof none) == static_cast<ssize_t>(sizeof none);
+  if (held_) return;
+  refused_ = "processors may sleep deep (" + file.string() + ": " + std::system_category().message(errno) +
+             "); waking may take a step 0.1 ms and more. Grant it with a udev rule: KERNEL==\"cpu_dma_latency\", "
+             "GROUP=\"plugdev\", MODE=\"0660\"";
+}
+
+WakefulProcessors::~WakefulProcessors() {
+  if (file_ >= 0) close(file_);
 }
 
 }  // namespace tendon

@@ -223,6 +223,7 @@ Server::~Server() {
 }
 
 void Server::start() {
+  if (const auto& refused = wakeful_.emplace().refused()) log::warn(*refused);
   log_thread_ = std::thread([this] { run_log(); });
   network_thread_ = std::thread([this] { run_network(); });
   for (auto& lane : lanes_) lane->thread = std::thread([this, &lane = *lane] { run_haptic(lane); });
@@ -236,6 +237,7 @@ Server::Summary Server::stop() {
   network_thread_.join();
   stop_log_.store(true, std::memory_order_release);
   log_thread_.join();
+  wakeful_.reset();
 
   Summary summary;
   for (const auto& lane : lanes_) {

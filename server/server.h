@@ -17,6 +17,7 @@
 #include "server/haptic_loop.h"
 #include "server/mailboxes.h"
 #include "server/network_loop.h"
+#include "server/realtime.h"
 #include "server/recorder.h"
 #include "server/scene.h"
 #include "server/udp_link.h"
@@ -115,6 +116,7 @@ class Server {
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};
+  std::optional<WakefulProcessors> wakeful_;  ///< while the threads run
   std::thread network_thread_;
   std::thread log_thread_;
 };

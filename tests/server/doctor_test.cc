@@ -51,6 +51,8 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   machine.say("sys/module/usbcore/parameters/autosuspend", "2");
   machine.say("proc/self/limits", kLimits);
   machine.say("sys/devices/system/cpu/isolated", "");
+  machine.say("sys/devices/system/cpu/cpu0/cpuidle/state0/latency", "2");
+  machine.say("sys/devices/system/cpu/cpu0/cpuidle/state1/latency", "133");
   machine.say("proc/self/timerslack_ns", "50000");
   machine.say("proc/sys/kernel/sched_rt_runtime_us", "100000");
   machine.say("proc/sys/kernel/sched_rt_period_us", "1000000");
@@ -63,6 +65,7 @@ TEST(Doctor, HasAdviceForEverythingThatAnOrdinaryMachineLacks) {
   EXPECT_EQ(findings.at("rtprio_limit").found, "0");
   EXPECT_EQ(findings.at("memlock_limit").found, "8388608 bytes");
   EXPECT_EQ(findings.at("isolated_cpus").found, "none");
+  EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake");
   EXPECT_EQ(findings.at("rt_throttling").found, "100000 of each 1000000 µs for real-time threads");
   EXPECT_EQ(findings.at("machine").found, "virtual");
   for (const auto& [key, finding] : findings) {
@@ -80,12 +83,15 @@ TEST(Doctor, HasNoneForAMachineThatIsReady) {
   machine.say("proc/self/limits", "Max locked memory  unlimited unlimited bytes\nMax realtime priority 70 70");
   machine.say("sys/devices/system/cpu/isolated", "3");
   machine.say("sys/devices/system/cpu/nohz_full", "3");
+  machine.say("sys/devices/system/cpu/cpu0/cpuidle/state1/latency", "133");
+  machine.say("dev/cpu_dma_latency", "");
   machine.say("proc/sys/kernel/sched_rt_runtime_us", "950000");
   machine.say("proc/sys/kernel/sched_rt_period_us", "1000000");
   machine.say("proc/cpuinfo", "flags : fpu lahf_lm");
   const auto findings = machine.look();
   EXPECT_EQ(findings.at("kernel").found, "6.1.0-22-rt-amd64, PREEMPT_RT");
   EXPECT_EQ(findings.at("isolated_cpus").found, "3, without tick 3");
+  EXPECT_EQ(findings.at("cpu_sleep").found, "up to 133 µs to wake (the server forbids it while it runs)");
   for (const auto& [key, finding] : findings) EXPECT_EQ(finding.advice, "") << key;
 }
 
