@@ -293,7 +293,8 @@ int main(int argc, char** argv) {
   };
   add_firmware(app);
   app.add_flag("--json", json, "One JSON object per line on stdout: listening, stopped");
-  app.add_flag("--profiles", profiles, "Print the device profiles, and how each of their numbers is known");
+  app.add_flag("--profiles", profiles,
+               "Print the profiles of devices and operators, and how each of their numbers is known");
   app.add_flag("--scene-help", scene_help, "Print every key that a scene may have");
   std::string key_name;
   std::string key_file;
@@ -321,6 +322,7 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (profiles) {
       for (const DeviceProfile& profile : device_profiles()) std::cout << provenance_table(profile) << '\n';
+      for (const OperatorProfile& profile : operator_profiles()) std::cout << provenance_table(profile) << '\n';
       return 0;
     }
     if (scene_help) {

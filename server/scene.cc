@@ -44,11 +44,23 @@ constexpr Unit kNoUnit = {"", "", 1};
 
 /// Longest suffix first.
 constexpr std::array kUnits = {
-    Unit{"_n_s_per_m", "N·s/m", 1}, Unit{"_m_per_s2", "m/s²", 1}, Unit{"_m_per_s", "m/s", 1},
-    Unit{"_n_per_m", "N/m", 1},     Unit{"_n_per_s", "N/s", 1},   Unit{"_hz", "Hz", 1},
-    Unit{"_kg", "kg", 1},           Unit{"_ma", "mA", 1e3},       Unit{"_mj", "mJ", 1e3},
-    Unit{"_mm", "mm", 1e3},         Unit{"_ms", "ms", 1e3},       Unit{"_um", "µm", 1e6},
-    Unit{"_us", "µs", 1e6},         Unit{"_m", "m", 1},           Unit{"_n", "N", 1},
+    Unit{"_n_s_per_m", "N·s/m", 1},
+    Unit{"_m_per_s2", "m/s²", 1},
+    Unit{"_m_per_s", "m/s", 1},
+    Unit{"_n_per_m", "N/m", 1},
+    Unit{"_n_per_s", "N/s", 1},
+    Unit{"_n_m_s", "N·m·s/rad", 1},
+    Unit{"_n_m", "N·m", 1},
+    Unit{"_hz", "Hz", 1},
+    Unit{"_kg", "kg", 1},
+    Unit{"_ma", "mA", 1e3},
+    Unit{"_mj", "mJ", 1e3},
+    Unit{"_mm", "mm", 1e3},
+    Unit{"_ms", "ms", 1e3},
+    Unit{"_um", "µm", 1e6},
+    Unit{"_us", "µs", 1e6},
+    Unit{"_m", "m", 1},
+    Unit{"_n", "N", 1},
 };
 
 const Unit& unit_of(std::string_view key) {
@@ -125,7 +137,9 @@ struct Number {
     if (least <= -limits::kMaxValue) {
       text = unit.symbol.empty() ? "a number" : "a number of " + std::string(unit.symbol);
     } else if (most < limits::kMaxValue) {
-      text = with_symbol("a number from " + digits(least) + " to " + digits(most), unit);
+      text =
+          without_least ? "a number above " + digits(least) + " and up to " : "a number from " + digits(least) + " to ";
+      text += with_symbol(digits(most), unit);
     } else if (without_least) {
       text = with_symbol("a number above " + digits(least), unit);
     } else {
@@ -223,8 +237,17 @@ struct Count {
   }
 
   template <class Whole>
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<Whole>& to) const {
+    return take(node, unit, to.emplace());
+  }
+
+  template <class Whole>
   static std::string shown(const Unit&, Whole value) {
     return std::to_string(value);
+  }
+  template <class Whole>
+  static std::string shown(const Unit&, const std::optional<Whole>& value) {
+    return value ? std::to_string(*value) : "none";
   }
 };
 
@@ -482,6 +505,8 @@ struct Draft {
 
   Scene scene;
   const DeviceProfile* profile = nullptr;
+  const OperatorProfile* operator_profile = nullptr;
+  std::optional<Vec3> joint_coulomb;
   OperatorHand::Config hand{0, 0, 0, ScriptedMotion(ScriptedMotion::Sine{})};  // not listed: not there, so 0
   bool has_hand = false;
   ScriptedMotion::Script motion = ScriptedMotion::Sine{};
@@ -510,11 +535,18 @@ struct Absent {
 constexpr Absent kRequired = {.required = true};
 
 enum class DeviceKind : std::uint8_t { kSimulated, kFalcon, kReplay, kSpaceMouse, kWoodenHaptics };
+enum class MechanismKind : std::uint8_t { kFalcon, kArm };
 enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
 
 Names<const DeviceProfile*> profile_names() {
   Names<const DeviceProfile*> names;
   for (const DeviceProfile& profile : device_profiles()) names.all.emplace_back(profile.name, &profile);
+  return names;
+}
+
+Names<const OperatorProfile*> operator_names() {
+  Names<const OperatorProfile*> names;
+  for (const OperatorProfile& profile : operator_profiles()) names.all.emplace_back(profile.name, &profile);
   return names;
 }
 
@@ -537,7 +569,27 @@ Names<Law> law_names() {
 }
 
 template <class Table>
-void declare_effects(Table& effects, const DeviceProfile* profile, SimulatedDevice::Config& device) {
+void declare_joint_friction(Table& friction, Draft& draft, JointFriction::Config& config) {
+  const Names<MechanismKind> kinds{{{"falcon", MechanismKind::kFalcon}, {"arm", MechanismKind::kArm}}};
+  friction.kind(kinds, [&](Table& keys, MechanismKind kind) {
+    if (kind == MechanismKind::kArm) {
+      auto& arm = config.mechanism.emplace<Mechanism::Arm>();
+      keys.key("upper_arm_mm", arm.upper_arm, Number{.least = 10, .most = 1e4}, "of a Phantom's: shoulder to elbow",
+               kRequired);
+      keys.key("forearm_mm", arm.forearm, Number{.least = 10, .most = 1e4}, "elbow to handle", kRequired);
+    }
+    keys.key("coulomb_n_m", draft.joint_coulomb, Vector{}, "Coulomb friction of each joint, in place of the handle's",
+             Absent{.text = "so much that coulomb_friction_n is the least at any place and in any direction"});
+    keys.key("viscous_n_m_s", config.viscous, Vector{}, "viscous friction of each joint, besides the handle's");
+    keys.key("centre_mm", config.centre, Vector{}, "where the middle of the mechanism's workspace lies");
+  });
+}
+
+template <class Table>
+void declare_effects(Table& effects, Draft& draft) {
+  const DeviceProfile* const profile = draft.profile;
+  SimulatedDevice::Config& device = draft.scene.device;
+  constexpr OrFalse kDelay{Number{.least = 0, .most = 100, .without_least = true}};
   constexpr OrFalse kEffect{kAboveZero};
   constexpr Absent kProfiles{.text = "the profile's; without a profile there is no such effect"};
   effects.key("mass_kg", device.mass, kAboveZero, "apparent mass at the handle",
@@ -552,6 +604,18 @@ void declare_effects(Table& effects, const DeviceProfile* profile, SimulatedDevi
               "measures the force of the hand: what a device of admittance type has", kProfiles);
   effects.key("watchdog_ms", device.watchdog, kEffect,
               "the device drops the force when it gets no command for this long", kProfiles);
+  effects.key("sample_delay_ms", device.sample_delay, kDelay, "positions come so late, and say when they were taken");
+  effects.key("force_delay_ms", device.force_delay, kDelay, "so late do forces reach the motors");
+  effects.part("joint_friction", device.joint_friction, [&draft](Table& friction, JointFriction::Config& config) {
+    declare_joint_friction(friction, draft, config);
+  });
+  effects.part(
+      "structural_mode", device.structural_mode, [](Table& keys, SimulatedDevice::Config::StructuralMode& mode) {
+        keys.key("handle_mass_kg", mode.handle_mass, kAboveZero, "of mass_kg, what is on the hand's side of the spring",
+                 kRequired);
+        keys.key("stiffness_n_per_m", mode.stiffness, kAboveZero, "of the spring between motors and handle", kRequired);
+        keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "beside it");
+      });
 }
 
 template <class Table>
@@ -694,11 +758,17 @@ void declare_device(Table& device, Draft& draft) {
     if (draft.profile != nullptr) config = draft.profile->device();
     keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
              Absent{.text = "where the hand starts, or the origin"});
-    keys.table("effects", [&](Table& effects) { declare_effects(effects, draft.profile, config); });
+    keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
     draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
-      hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip", kRequired);
-      hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip");
-      hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle");
+      hand.key("profile", draft.operator_profile, operator_names(),
+               "what holds the handle: the middle of what is known of such; keys below override one number each");
+      const OperatorProfile* const profile = draft.operator_profile;
+      if (profile != nullptr) draft.hand = profile->hand(std::move(draft.hand.motion));
+      constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
+      hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip",
+               Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
+      hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip", kProfiles);
+      hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
       hand.key("button_after_ms", draft.scene.device.button_after, kZeroOrMore,
                "after this time it presses button 0, and holds it", Absent{.text = "never"});
       hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
@@ -882,6 +952,8 @@ constexpr std::uint32_t kFalconButtons = 4;
 constexpr double kUnfelt = 10;
 /// Readings may fail for so long before it is a fault: what libfranka allows.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
+/// What fits into the kernel's set.
+constexpr Count kProcessor{1023};
 /// The wire tells timeouts in whole ms.
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
@@ -899,6 +971,8 @@ void declare_scene(Table& scene, Draft& draft) {
     loop.key("max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
              "a position that no hand comes to at this speed is a fault: an encoder that wraps or loses count",
              Absent{.text = "every position is believed"});
+    loop.key("cpu", draft.scene.cpu, kProcessor, "the processor on which the haptic thread stays: an isolated one",
+             Absent{.text = "wherever the kernel puts it"});
   });
 
   scene.part("safety", draft.scene.safety,
@@ -1263,6 +1337,8 @@ class Settlement {
     settle_falcon(directory);
     settle_woodenhaptics();
     settle_network(directory);
+    settle_structural_mode();
+    settle_joint_friction();
     settle_control();
     settle_replay(directory);
     settle_channels();
@@ -1376,6 +1452,35 @@ class Settlement {
     }
   }
 
+  void settle_structural_mode() const {
+    const SimulatedDevice::Config& device = draft_.scene.device;
+    if (!device.structural_mode || device.structural_mode->handle_mass < device.mass) return;
+    blame("device.effects.structural_mode.handle_mass_kg", {},
+          "expected less than mass_kg, of which it is a part and which is " + digits(device.mass) + " kg, found " +
+              digits(device.structural_mode->handle_mass));
+  }
+
+  /// Friction is in the joints or at the handle. What is known of a device is that at the handle.
+  void settle_joint_friction() {
+    SimulatedDevice::Config& device = draft_.scene.device;
+    if (!device.joint_friction) return;
+    const std::string table = "device.effects.joint_friction";
+    const std::string_view handles = "device.effects.coulomb_friction_n";
+    if (draft_.joint_coulomb) {
+      if (const auto node = file_.at_path(handles); node && node.is_number()) {
+        blame(handles, {},
+              "expected false beside coulomb_n_m of [" + table + "], found " + found_in(*node.node()) +
+                  ": this friction is in the joints or at the handle");
+      }
+      device.joint_friction->coulomb = *draft_.joint_coulomb;
+    } else if (device.coulomb_friction) {
+      device.joint_friction->coulomb =
+          JointFriction::torques(device.joint_friction->mechanism, *device.coulomb_friction);
+    }
+    device.coulomb_friction.reset();
+    build(table, [&device] { JointFriction{*device.joint_friction}; });
+  }
+
   void settle_channels() {
     Scene& scene = draft_.scene;
     scene.loop.control.channels.clear();
@@ -1455,12 +1560,12 @@ class Settlement {
     // (a)).
     const bool per_axis = control.limiter.law == Law::kAolPerAxis || control.limiter.law == Law::kAolBox;
     const DeviceProfile* profile = draft_.profile;
+    const Friction truth = least_friction(device);
     control.limiter.friction.coulomb =
         friction_bound("coulomb_friction_n", draft_.coulomb_bound, profile ? &profile->coulomb_bound : nullptr,
-                       device.coulomb_friction.value_or(0), per_axis ? 1 / std::numbers::sqrt3 : 1);
-    control.limiter.friction.viscous =
-        friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound, profile ? &profile->viscous_bound : nullptr,
-                       device.viscous_friction.value_or(0), 1);
+                       truth.coulomb, per_axis ? 1 / std::numbers::sqrt3 : 1);
+    control.limiter.friction.viscous = friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound,
+                                                      profile ? &profile->viscous_bound : nullptr, truth.viscous, 1);
     settle_parts(control.limiter);
     settle_places(control);
   }
@@ -1474,16 +1579,19 @@ class Settlement {
       blame(table + ".places_mm", {}, "expected as many places as friction bounds of each kind");
     }
     const SimulatedDevice::Config& device = draft_.scene.device;
-    const auto check = [&](const char* key, const std::vector<double>& bounds, double most) {
-      const auto high = std::find_if(bounds.begin(), bounds.end(), [most](double bound) { return bound > most; });
-      if (high == bounds.end()) return;
-      blame(table + "." + key, {},
-            "expected at most " + with_symbol(digits(most), unit_of(key)) +
-                ", the true friction of the simulated device, found " + digits(*high));
+    const auto check = [&](const char* key, const std::vector<double>& bounds, double Friction::*kind) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const double most = least_friction_at(device, draft_.places[i]).*kind;
+        if (bounds[i] <= most) continue;
+        blame(table + "." + key, {},
+              "expected at most " + with_symbol(digits(most), unit_of(key)) +
+                  ", the true friction of the simulated device" + (device.joint_friction ? " there" : "") + ", found " +
+                  digits(bounds[i]));
+      }
     };
     if (!draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {  // whose true friction nobody knows here
-      check("coulomb_friction_n", draft_.place_coulomb, device.coulomb_friction.value_or(0));
-      check("viscous_friction_n_s_per_m", draft_.place_viscous, device.viscous_friction.value_or(0));
+      check("coulomb_friction_n", draft_.place_coulomb, &Friction::coulomb);
+      check("viscous_friction_n_s_per_m", draft_.place_viscous, &Friction::viscous);
     }
     auto& map = control.friction_map.emplace();
     map.reach = draft_.reach;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -68,6 +69,7 @@ struct Scene {
       device;  ///< of a real device: what is known of it, and what stands in where costs are measured
   std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
   HapticLoop::Config loop;
+  std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere
   std::vector<Channel> channels = {Channel{}};
   Network network;
   bool has_network = false;                        ///< the file says something about it

@@ -264,6 +264,9 @@ void Server::run_haptic(Lane& lane) {
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
     if (first) log::warn(refused);  // to all of them alike
   }
+  if (lane.scene.cpu) {
+    if (const auto refused = stay_on(*lane.scene.cpu)) log::warn(prefix(lane) + *refused);
+  }
   LocalTime due = clock::now();
   while (!stop_haptic_.load(std::memory_order_acquire)) {
     due = lane.haptic.step(clock::now());

@@ -265,6 +265,16 @@ TEST(Scene, LoopsRunFrom250HzTo10KHzAndBearSilenceForTheSameTime) {
   }
 }
 
+TEST(Scene, TheHapticThreadStaysOnAProcessorWhenOneIsNamed) {
+  EXPECT_FALSE(minimal_and("").cpu);
+  EXPECT_EQ(minimal_and("[loop]\ncpu = 0\n").cpu, 0U);
+  EXPECT_EQ(minimal_and("[loop]\ncpu = 3\n").cpu, 3U);
+  EXPECT_EQ(error_of_minimal_and("[loop]\ncpu = -1\n"),
+            "s.toml:5: loop.cpu: expected a whole number from 0 to 1023, found -1");
+  EXPECT_EQ(error_of_minimal_and("[loop]\ncpu = 1.5\n"),
+            "s.toml:5: loop.cpu: expected a whole number from 0 to 1023, found 1.5");
+}
+
 TEST(Scene, OfTheSafetyLayerThereIsWhatItLists) {
   EXPECT_FALSE(minimal_and("").safety);
   const Scene bare = minimal_and("[safety]\n");
@@ -318,6 +328,92 @@ dead_man.button = 0
   EXPECT_EQ(all.link_watchdog->timeout, 20ms);
   EXPECT_EQ(all.link_watchdog->ramp, Watchdog::Config{}.ramp);
   EXPECT_EQ(all.dead_man->button, 0U);
+}
+
+TEST(Scene, ReadsDelaysAStructuralModeAndFrictionOfTheJoints) {
+  const SimulatedDevice::Config device = minimal_and(R"([device.effects]
+sample_delay_ms = 1.5
+force_delay_ms = 0.25
+coulomb_friction_n = false
+[device.effects.structural_mode]
+handle_mass_kg = 0.05
+stiffness_n_per_m = 3500
+damping_n_s_per_m = 0.4
+[device.effects.joint_friction]
+kind = "arm"
+upper_arm_mm = 215
+forearm_mm = 170
+coulomb_n_m = [0.1, 0.2, 0.3]
+viscous_n_m_s = [0.001, 0.002, 0.003]
+centre_mm = [0, 10, 0]
+)")
+                                             .device;
+  EXPECT_EQ(device.sample_delay, 1500us);
+  EXPECT_EQ(device.force_delay, 250us);
+  EXPECT_EQ(device.structural_mode->handle_mass, 0.05);
+  EXPECT_EQ(device.structural_mode->stiffness, 3500);
+  EXPECT_EQ(device.structural_mode->damping, 0.4);
+  ASSERT_TRUE(device.joint_friction);
+  const auto& arm = std::get<Mechanism::Arm>(device.joint_friction->mechanism);
+  EXPECT_EQ(arm.upper_arm, 0.215);
+  EXPECT_EQ(arm.forearm, 0.17);
+  EXPECT_EQ(device.joint_friction->coulomb, Vec3(0.1, 0.2, 0.3));
+  EXPECT_EQ(device.joint_friction->viscous, Vec3(0.001, 0.002, 0.003));
+  EXPECT_EQ(device.joint_friction->centre, Vec3(0, 0.01, 0));
+  EXPECT_FALSE(device.coulomb_friction);
+  EXPECT_FALSE(minimal_and("").device.structural_mode);
+  EXPECT_FALSE(minimal_and("").device.joint_friction);
+  EXPECT_FALSE(minimal_and("").device.sample_delay);
+}
+
+TEST(Scene, AProfilesFrictionGoesIntoTheJointsWithoutBecomingLessThanTheLimiterCountsOn) {
+  const DeviceProfile& falcon = *find_device_profile("falcon");
+  const Scene scene = minimal_and("[device.effects.joint_friction]\nkind = \"falcon\"\n");
+  EXPECT_FALSE(scene.device.coulomb_friction) << "it is in the joints";
+  EXPECT_GE(least_friction(scene.device).coulomb, falcon.coulomb_friction.value);
+  EXPECT_NEAR(least_friction(scene.device).coulomb, falcon.coulomb_friction.value, 1e-12);
+  EXPECT_EQ(least_friction(scene.device).viscous, falcon.viscous_friction.value);
+  EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, falcon.coulomb_bound.value);
+  // What an operator has identified may be as much as there is, and no more.
+  const std::string joints = "[device.effects.joint_friction]\nkind = \"falcon\"\n";
+  EXPECT_EQ(minimal_and(joints + "[limiter]\ncoulomb_friction_n = 0.4\n").loop.control.limiter.friction.coulomb, 0.4);
+  EXPECT_NE(error_of_minimal_and(joints + "[limiter]\ncoulomb_friction_n = 0.41\n")
+                .find("s.toml:7: limiter.coulomb_friction_n: expected at most 0.4"),
+            std::string::npos);
+}
+
+TEST(Scene, BoundsByPlaceMayBeAsMuchAsTheJointsHaveThere) {
+  const std::string scene = R"([device.effects]
+viscous_friction_n_s_per_m = 1
+[device.effects.joint_friction]
+kind = "arm"
+upper_arm_mm = 140
+forearm_mm = 140
+[limiter]
+adaptive_friction = {places_mm = [[0, 0, 0]], viscous_friction_n_s_per_m = [0.5], coulomb_friction_n = [)";
+  // The torque that is 0.4 N at the turntable's longest lever, 0.14 m and the reach, is more where that is 0.14 m; the
+  // least at the centre is that of the other two, whose levers are the same everywhere.
+  EXPECT_TRUE(minimal_and(scene + "0.4]}\n").loop.control.friction_map);
+  const std::string error = error_of_minimal_and(scene + "0.45]}\n");
+  EXPECT_TRUE(error.starts_with("s.toml:11: limiter.adaptive_friction.coulomb_friction_n: expected at most 0.4"))
+      << error;
+  EXPECT_NE(error.find(" N, the true friction of the simulated device there, found 0.45"), std::string::npos) << error;
+}
+
+TEST(Scene, AHandMayBeThatOfAnOperatorsProfile) {
+  const std::string motion = "[device.hand.motion]\nkind = \"sine\"\namplitude_mm = 5\nfrequency_hz = 1\n";
+  for (const OperatorProfile& profile : operator_profiles()) {
+    const std::string hand = "[device.hand]\nprofile = \"" + std::string(profile.name) + "\"\n";
+    const Scene scene = minimal_and(hand + motion);
+    ASSERT_TRUE(scene.device.hand);
+    EXPECT_EQ(scene.device.hand->stiffness, profile.stiffness.middle());
+    EXPECT_EQ(scene.device.hand->damping, profile.damping.middle());
+    EXPECT_EQ(scene.device.hand->mass, profile.mass.middle());
+    EXPECT_NEAR(target(scene, 0.25).position.norm(), 0.005, 1e-12);
+    const Scene firmer = minimal_and(hand + "stiffness_n_per_m = 900\n" + motion);
+    EXPECT_EQ(firmer.device.hand->stiffness, 900);
+    EXPECT_EQ(firmer.device.hand->mass, profile.mass.middle());
+  }
 }
 
 TEST(Scene, AnEffectThatIsFalseDoesNotExist) {
@@ -742,7 +838,7 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
                                                              ": unknown key; known here: period_us, longest_hold_us, "
-                                                             "max_speed_m_per_s"},
+                                                             "max_speed_m_per_s, cpu"},
   });
 }
 
@@ -915,6 +1011,49 @@ TEST(SceneError, WithoutAProfileForceAndFrictionMustBeSaid) {
   EXPECT_EQ(error_of(std::string(kWithoutProfile) + "max_force_n = 5\n[limiter]\ncoulomb_friction_n = 0\n"),
             "s.toml:6: limiter.viscous_friction_n_s_per_m: missing, expected a number of 0 N·s/m or more, because "
             "there is no profile");
+}
+
+TEST(SceneError, OfTheEffectsOfADeviceNamesTheLineAndWhatWasExpected) {
+  const std::string joints = "[device.effects.joint_friction]\n";
+  expect_errors({
+      {"[device.effects]\nsample_delay_ms = 0\n",
+       "s.toml:5: device.effects.sample_delay_ms: expected a number above 0 and up to 100 ms, or false for none, found "
+       "0"},
+      {"[device.effects]\nforce_delay_ms = 101\n",
+       "s.toml:5: device.effects.force_delay_ms: expected a number above 0 and up to 100 ms, or false for none, found "
+       "101"},
+      {"[device.effects]\nsample_delay_us = 5\n",
+       "s.toml:5: device.effects.sample_delay_us: unknown key; sample_delay is given in ms: sample_delay_ms"},
+      {joints + "coulomb_n_m = [1, 1, 1]\n",
+       "s.toml:4: device.effects.joint_friction.kind: missing, expected one of \"falcon\", \"arm\""},
+      {joints + "kind = \"delta\"\n",
+       "s.toml:5: device.effects.joint_friction.kind: expected one of \"falcon\", \"arm\", found \"delta\""},
+      {joints + "kind = \"arm\"\nforearm_mm = 140\n",
+       "s.toml:4: device.effects.joint_friction.upper_arm_mm: missing, expected a number from 10 to 10000 mm"},
+      {joints + "kind = \"falcon\"\nupper_arm_mm = 140\n",
+       "s.toml:6: device.effects.joint_friction.upper_arm_mm: unknown key; known here: kind, coulomb_n_m, "
+       "viscous_n_m_s, "
+       "centre_mm"},
+      {joints + "kind = \"falcon\"\ncoulomb_n_m = 0.1\n",
+       "s.toml:6: device.effects.joint_friction.coulomb_n_m: expected [x, y, z] in N·m, found 0.1"},
+      {joints + "kind = \"falcon\"\ncoulomb_n_m = [0.1, -0.1, 0.1]\n",
+       "s.toml:4: device.effects.joint_friction: joint_friction.coulomb[1] = -0.1: expected a finite number of 0 or "
+       "more"},
+      {"[device.effects]\ncoulomb_friction_n = 0.3\n" + joints + "kind = \"falcon\"\ncoulomb_n_m = [1, 1, 1]\n",
+       "s.toml:5: device.effects.coulomb_friction_n: expected false beside coulomb_n_m of "
+       "[device.effects.joint_friction], found 0.3: this friction is in the joints or at the handle"},
+      {"[device.effects.structural_mode]\nhandle_mass_kg = 0.1\n",
+       "s.toml:4: device.effects.structural_mode.stiffness_n_per_m: missing, expected a number above 0 N/m"},
+      {"[device.effects.structural_mode]\nhandle_mass_kg = 0.2\nstiffness_n_per_m = 1000\n",
+       "s.toml:5: device.effects.structural_mode.handle_mass_kg: expected less than mass_kg, of which it is a part and "
+       "which is 0.2 kg, found 0.2"},
+      {"[device.hand]\nprofile = \"foot\"\n",
+       "s.toml:5: device.hand.profile: expected one of \"fingertip\", \"stylus\", \"arm\", found \"foot\""},
+  });
+  EXPECT_EQ(
+      error_of(std::string(kWithoutProfile) + joints + "kind = \"falcon\"\n[force]\nmax_force_n = 1\n"),
+      "s.toml:5: device.effects.joint_friction: joint_friction.coulomb = 0: expected friction in one of the joints "
+      "at least (left out when there is none)");
 }
 
 TEST(SceneError, RefusesTimesThatContradictEachOther) {
@@ -1100,6 +1239,14 @@ TEST(ShippedScenes, SafeListsEveryPartOfTheSafetyLayer) {
               safety->link_watchdog && safety->dead_man);
 }
 
+TEST(ShippedScenes, MechanismHasWhatARealOneAdds) {
+  const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "mechanism.toml");
+  EXPECT_TRUE(scene.device.joint_friction && scene.device.structural_mode);
+  EXPECT_EQ(scene.device.sample_delay, 1ms);
+  EXPECT_EQ(scene.device.force_delay, 500us);
+  EXPECT_EQ(scene.device.hand->mass, find_operator_profile("stylus")->mass.middle());
+}
+
 TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {
   EXPECT_EQ(read_scene(std::filesystem::path(TENDON_SCENES) / "minimal.toml").device.name, "falcon");
 }
@@ -1120,11 +1267,30 @@ TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {
           "      from one haptic step to the next.\n"
           "      a number from 100 to 4000 µs. Default: 1000.\n"))
       << text;
-  for (const std::string_view key :
-       {"[device]", "profile", "start_position_mm", "[device.effects]", "watchdog_ms", "[device.hand]",
-        "[device.hand.motion]", "kind = \"sine\"", "kind = \"ramp-hold\"", "kind = \"minimum-jerk\"",
-        "kind = \"recorded\"", "position_column", "[limiter]", "[force]", "max_valid_for_ms", "[network]",
-        "observer_timeout_ms", "[recording]"}) {
+  for (const std::string_view key : {"[device]",
+                                     "profile",
+                                     "start_position_mm",
+                                     "[device.effects]",
+                                     "watchdog_ms",
+                                     "[device.hand]",
+                                     "[device.effects.joint_friction]",
+                                     "upper_arm_mm",
+                                     "coulomb_n_m",
+                                     "[device.effects.structural_mode]",
+                                     "sample_delay_ms",
+                                     "one of \"fingertip\", \"stylus\", \"arm\"",
+                                     "[device.hand.motion]",
+                                     "kind = \"sine\"",
+                                     "kind = \"ramp-hold\"",
+                                     "kind = \"minimum-jerk\"",
+                                     "kind = \"recorded\"",
+                                     "position_column",
+                                     "[limiter]",
+                                     "[force]",
+                                     "max_valid_for_ms",
+                                     "[network]",
+                                     "observer_timeout_ms",
+                                     "[recording]"}) {
     EXPECT_TRUE(has(key)) << key;
   }
 }
