@@ -207,22 +207,17 @@ struct Outcome {
 Outcome run(Connection& connection, bool with_limiter = true) {
   constexpr int kPeriods = 6000;
   constexpr double kWall = 500;  // N/m, from 8 mm on
-  SimulatedDevice device({.name = "leader",
-                          .mass = 0.075,
-                          .start_position = std::nullopt,
-                          .viscous_friction = kFriction.viscous,
-                          .coulomb_friction = kFriction.coulomb,
-                          .encoder_step = std::nullopt,
-                          .max_force = std::nullopt,
-                          .amplifier_bandwidth = std::nullopt,
-                          .force_sensor = std::nullopt,
-                          .watchdog = std::nullopt,
-                          .hand = OperatorHand::Config{.stiffness = 300,
-                                                       .damping = 2,
-                                                       .mass = 0.05,
-                                                       .motion = ScriptedMotion(
-                                                           ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 0.5})},
-                          .button_after = std::nullopt});
+  SimulatedDevice::Config leader;
+  leader.name = "leader";
+  leader.mass = 0.075;
+  leader.viscous_friction = kFriction.viscous;
+  leader.coulomb_friction = kFriction.coulomb;
+  leader.hand =
+      OperatorHand::Config{.stiffness = 300,
+                           .damping = 2,
+                           .mass = 0.05,
+                           .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.02, .frequency = 0.5})};
+  SimulatedDevice device(leader);
   Aol<1, 3> law({{kFriction}, kPeriod});
   Outcome outcome;
   Sight hand{Vec3::Zero(), Vec3::Zero()};
