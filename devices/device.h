@@ -56,6 +56,8 @@ class Device {
   virtual void arm() noexcept {}
   /// How often that has been granted. Each time, whatever was at fault before is over.
   virtual std::uint32_t times_armed() const noexcept { return 0; }
+  /// How often it has ended the force by itself, because something was wrong (SafeDevice).
+  virtual std::uint32_t faults() const noexcept { return 0; }
 
   /// Samples the position. Empty when the device did not answer.
   virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;

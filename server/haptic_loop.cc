@@ -105,6 +105,8 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
 
   const auto fault = controller_.fault();
   if (fault != HapticController::Fault::kNone && fault_.load(std::memory_order_relaxed) != fault) mail_.flight.freeze();
+  const std::uint32_t device_faults = device_.faults();
+  if (device_faults != std::exchange(device_faults_, device_faults)) mail_.flight.freeze();
   fault_.store(fault, std::memory_order_relaxed);
   steps_.store(record.tick, std::memory_order_relaxed);
   force_.store(record.applied.norm(), std::memory_order_relaxed);

@@ -65,6 +65,7 @@ class HapticLoop {
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
   bool rearmed_ = false;  ///< since the last record
+  std::uint32_t device_faults_ = 0;
 
   std::atomic<std::uint64_t> steps_{0};
   std::atomic<std::uint64_t> overruns_{0};

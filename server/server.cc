@@ -358,8 +358,12 @@ void Server::report_trouble(Lane& lane) {
               " µs");
   }
   if (now.device != lane.told.device) log::info(prefix(lane) + describe(now.device, lane.scene));
-  if (lane.mail.flight.frozen()) {  // each fault freezes it once, and saving thaws it
-    log::error(prefix(lane) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");
+  // Each fault freezes it once, and saving thaws it: the controller's, and the safety layer's, which report_safety
+  // names.
+  if (lane.mail.flight.frozen()) {
+    if (now.fault != HapticController::Fault::kNone) {
+      log::error(prefix(lane) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");
+    }
     save_flight(lane);
   }
   lane.told = now;

@@ -106,6 +106,7 @@ class SafeDevice final : public Device {
   State state() const noexcept override { return device_.state(); }
   void arm() noexcept override;
   std::uint32_t times_armed() const noexcept override { return times_armed_; }
+  std::uint32_t faults() const noexcept override { return faults_; }
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
 

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/haptic_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "devices/safety/safe_device.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A handle at rest, that can be unplugged.
+class Handle final : public Device {
+ public:
+  bool plugged = true;
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  State state() const noexcept override { return plugged ? State::kHomed : State::kAbsent; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    if (!plugged) return std::nullopt;
+    return PositionSample{.at = now, .position = Vec3::Zero()};
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return plugged ? force : Vec3(Vec3::Zero()); }
+
+ private:
+  DeviceInfo info_{.name = "handle", .max_force = 8};
+};
+
+TEST(HapticLoop, AFaultOfTheSafetyLayerFreezesTheFlightRecorderAtTheStepThatTookTheForceAway) {
+  Handle handle;
+  SafeDevice::Config safety;
+  safety.arming.by = SafeDevice::Arming::By::kStart;
+  SafeDevice safe(safety, handle);
+  HapticLoop::Config config;
+  config.control.limiter.law = Law::kNone;
+  config.control.limiter.longest_hold = milliseconds(2);
+  config.control.max_force = 8;
+  config.control.max_slew = 1e6;
+  const auto mail = std::make_unique<Mailboxes>();
+  HapticLoop loop(config, safe, *mail);
+  LocalTime now(milliseconds(1));
+  const auto step = [&] { now = loop.step(now); };
+
+  for (int i = 0; i < 100; ++i) step();
+  ASSERT_EQ(safe.status().state, SafetyState::kArmed);
+  RemoteForce force;
+  force.sequence = 1;
+  force.received = force.answers = now;
+  force.force = Vec3(-2, 0, 0);
+  force.valid_for = milliseconds(500);
+  mail->forces[0].put(force);
+  for (int i = 0; i < 200; ++i) step();  // ramped in
+  EXPECT_FALSE(mail->flight.frozen());
+  handle.plugged = false;
+  for (int i = 0; i < 5; ++i) step();
+  EXPECT_EQ(loop.stats().fault, HapticController::Fault::kNone) << "5 steps are none of the controller's";
+
+  ASSERT_TRUE(mail->flight.frozen());
+  ASSERT_EQ(mail->flight.size(), 301U);
+  EXPECT_EQ(mail->flight[299].applied, Vec3(-2, 0, 0));
+  EXPECT_EQ(mail->flight[300].applied, Vec3(0, 0, 0));
+
+  // Written down once, it records again.
+  mail->flight.thaw();
+  for (int i = 0; i < 5; ++i) step();
+  EXPECT_FALSE(mail->flight.frozen());
+}
+
+}  // namespace
+}  // namespace tendon
