@@ -42,13 +42,17 @@ std::string end_of(const std::string& text) {
 }  // namespace
 
 Process::Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
-                 const std::filesystem::path& folder)
+                 const std::filesystem::path& folder, std::vector<std::string> more_environment)
     : name_(program.filename().string()) {
   std::vector<std::string> words = arguments;
   words.insert(words.begin(), program.string());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  std::vector<char*> environment;
+  for (std::string& variable : more_environment) environment.push_back(variable.data());  // the first of a name counts
+  for (char** variable = environ; *variable != nullptr; ++variable) environment.push_back(*variable);
+  environment.push_back(nullptr);
 
   const Pipe out = make_pipe();
   const Pipe err = make_pipe();
@@ -58,7 +62,7 @@ Process::Process(const std::filesystem::path& program, const std::vector<std::st
   posix_spawn_file_actions_adddup2(&actions, out.write, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, err.write, STDERR_FILENO);
   posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
+  const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   ::close(out.write);
   ::close(err.write);

@@ -29,9 +29,10 @@ inline constexpr std::chrono::seconds kPatience{30};
 /// Thread-safe: no.
 class Process {
  public:
-  /// Starts `program` in `folder`, with no standard input. Throws std::system_error when it cannot be started.
+  /// Starts `program` in `folder`, with no standard input and, beside our own environment, `more_environment`
+  /// ("NAME=value"). Throws std::system_error when it cannot be started.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
-          const std::filesystem::path& folder);
+          const std::filesystem::path& folder, std::vector<std::string> more_environment = {});
   /// SIGKILL, when it still runs.
   ~Process();
   Process(const Process&) = delete;

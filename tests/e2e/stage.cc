@@ -63,11 +63,11 @@ std::string text_in(std::string_view json, const std::string& key) {
 }
 
 Service::Service(const std::string& name, std::vector<std::string> arguments, const std::filesystem::path& folder,
-                 const std::string& event, const std::string& key)
+                 const std::string& event, const std::string& key, std::vector<std::string> more_environment)
     : process_(program(name),
                std::move(arguments) +
                    std::vector<std::string>{"--listen", "127.0.0.1:0", "--json", "--duration-s", kLongestRun},
-               folder),
+               folder, std::move(more_environment)),
       address_(text_in(process_.wait_for_line("\"event\":\"" + event + '"'), key)) {}
 
 std::string Service::stop(int signal) {
@@ -79,8 +79,10 @@ std::string Service::stop(int signal) {
   return said.substr(said.rfind('\n') + 1);
 }
 
-Server::Server(const std::filesystem::path& folder, const std::filesystem::path& scene, std::vector<std::string> more)
-    : Service("tendond", std::vector{scene.string()} + std::move(more), folder, "listening", "address") {}
+Server::Server(const std::filesystem::path& folder, const std::filesystem::path& scene, std::vector<std::string> more,
+               std::vector<std::string> more_environment)
+    : Service("tendond", std::vector{scene.string()} + std::move(more), folder, "listening", "address",
+              std::move(more_environment)) {}
 
 Client::Client(const std::string& name, const std::string& server, const std::filesystem::path& folder,
                std::vector<std::string> more)

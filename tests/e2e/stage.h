@@ -57,7 +57,7 @@ class Service {
  public:
   /// Starts `name` in `folder`; `event` is the JSON event that tells the address under `key`.
   Service(const std::string& name, std::vector<std::string> arguments, const std::filesystem::path& folder,
-          const std::string& event, const std::string& key);
+          const std::string& event, const std::string& key, std::vector<std::string> more_environment = {});
 
   const std::string& address() const noexcept { return address_; }
   Process& process() noexcept { return process_; }
@@ -73,7 +73,8 @@ class Service {
 /// tendond with `scene`.
 class Server : public Service {
  public:
-  Server(const std::filesystem::path& folder, const std::filesystem::path& scene, std::vector<std::string> more = {});
+  Server(const std::filesystem::path& folder, const std::filesystem::path& scene, std::vector<std::string> more = {},
+         std::vector<std::string> more_environment = {});
 };
 
 /// A client of ours: "virtual_wall", "echo_motion". As Service, it ends by itself.

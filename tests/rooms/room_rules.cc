@@ -67,7 +67,7 @@ const std::vector<Door>& front_doors() {
       {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/crypto.cc", "devices/falcon/firmware.cc"}},
-      {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc"}},
+      {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
       {"protobuf", {"google/protobuf/", "*.pb.h"}, {"protocol/codec.cc", "server/recording_codec.cc"}},
       {"libsystemd", {"systemd/"}, {"server/service.cc"}},
       {"Spectra", {"Spectra/"}, {"clients/softbody/spectrum.cc"}},

@@ -73,16 +73,20 @@ class Plug {
     while (falcon_.next_in() <= now) {
       const auto packet = falcon_.take_in(now);
       send(end_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+      ++said_;
     }
     return true;
   }
 
   /// The last transfer to the OUT endpoint, behind its number.
   const std::vector<std::uint8_t>& last() const { return last_; }
+  /// What IN transfers have brought so far.
+  std::uint64_t said() const { return said_; }
 
  private:
   FakeFalcon& falcon_;
   int end_;
+  std::uint64_t said_ = 0;
   std::vector<std::uint8_t> last_;
 };
 

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The whole server on a Falcon: tendond as it is, through the real libusb, with a remote wall in a process of its own.
+// What the motors do is looked at where the wire ends. falcon-server prints how well it is felt, and how late.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "devices/falcon/packet.h"
+#include "tests/e2e/falcon_stage.h"
+
+namespace tendon::e2e {
+namespace {
+
+constexpr std::uint8_t kOut = 0x02;  // the endpoint
+
+/// Runs `claim` on a stage of its own. The scene's watchdogs are for machines that do not stand still: on one that did,
+/// a claim that came to nothing is tried again, twice.
+template <class Claim>
+void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
+  for (int left = 2;; --left) {
+    FalconStage stage(config);
+    try {
+      claim(stage);
+      return;
+    } catch (const std::runtime_error& vain) {
+      if (left == 0 || !stage.machine_stood_still()) throw;
+      std::cout << "the machine stood still, once more: " << vain.what() << '\n';
+    }
+  }
+}
+
+/// A fault is the machine's, when it stood still.
+void expect_no_fault(FalconStage& stage, const std::string& end) {
+  const auto faults = count_in(end.substr(end.find("\"safety\"")), "faults");
+  if (faults + count_in(end, "fault") == 0) return;
+  throw std::runtime_error("a fault: " + end + "\n" + stage.server().process().err());
+}
+
+std::vector<std::uint8_t> last_packet() {
+  std::vector<std::uint8_t> packet = {kOut};
+  std::ranges::copy(falcon::encode(falcon::kLastCommand), std::back_inserter(packet));
+  return packet;
+}
+
+bool no_torque(const std::vector<std::uint8_t>& packet) {
+  return packet.size() == 17 && std::all_of(packet.begin() + 2, packet.begin() + 14, [](auto c) { return c == 'A'; });
+}
+
+TEST(FalconServer, FromThePlugToAWallThatIsFeltAndPassive) {
+  constexpr FakeFalcon::Options kJustPluggedIn = {.has_firmware = false, .firmware_bytes = 4096};
+  on_a_stage({.falcon = kJustPluggedIn, .record = true}, [](FalconStage& stage) {
+    stage.server().process().wait_for_line("the device has to be homed");
+    EXPECT_EQ(stage.falcon().seen().pushes_begun, 0U);
+    stage.home();
+    stage.wait_until([](const FakeFalcon& falcon) { return falcon.lamps() == falcon::kGreen; }, "green lamps");
+    stage.wait_for_commands(100);
+    EXPECT_EQ(stage.falcon().seen().pushes_begun, 0U);
+    stage.arm_and_press();
+    for (int i = 0; i < 3; ++i) {
+      stage.go_to(0.001);
+      stage.go_to(0.004);
+    }
+    const std::string end = stage.server().stop();
+    expect_no_fault(stage, end);
+    EXPECT_NE(end.find(R"("state":"armed")"), std::string::npos) << end;
+    EXPECT_EQ(count_in(end, "welcomed"), 1U);
+    EXPECT_EQ(count_in(end, "hellos_plain"), 0U);
+    EXPECT_EQ(number_in(end, "force_n"), 0);
+    EXPECT_GT(stage.felt().rounds, stage.felt().nothing);
+
+    const Recording recording = read_recording(stage.recording());
+    EXPECT_EQ(recording.steps.size(), count_in(end, "steps"));
+    expect_passive(recording, stage.scene());
+    std::size_t pushed = 0;
+    for (const StepRecord& step : recording.steps) {
+      if (step.reasons.has(Reason::kUnseen)) continue;
+      if (step.applied.x() < -0.5) ++pushed;
+      EXPECT_LT(step.applied.x(), 0.05) << "at tick " << step.tick << ": out of the wall only";
+    }
+    EXPECT_GT(pushed, 0U);
+  });
+}
+
+TEST(FalconServer, KilledInMidForceItLeavesNoTorque) {
+  std::vector<double> ms;
+  for (int i = 0; i < 3; ++i) {
+    on_a_stage({}, [&ms](FalconStage& stage) {
+      stage.arm_and_press();
+      const FalconStage::Killed killed = stage.kill_server();
+      EXPECT_FALSE(killed.pushes);
+      EXPECT_EQ(killed.last, last_packet());
+      EXPECT_EQ(killed.by_guardian, 1U);
+      ms.push_back(killed.pushed_for_ms);
+    });
+  }
+  std::ranges::sort(ms);
+  std::cout << "SIGKILL of tendond to no torque at the Falcon: median " << ms[1] << " ms, n = 3\n";
+}
+
+TEST(FalconServer, EndedBySigtermInMidForceItsLastWordIsNoTorque) {
+  on_a_stage({}, [](FalconStage& stage) {
+    stage.arm_and_press();
+    const std::string end = stage.server().stop(SIGTERM);
+    EXPECT_EQ(number_in(end, "force_n"), 0) << end;
+    const FarFalcon::Seen seen = stage.wait_for_release();
+    EXPECT_TRUE(no_torque(seen.last));
+    EXPECT_FALSE(stage.falcon().with([](const FakeFalcon& falcon) { return falcon.pushes(); }));
+  });
+}
+
+TEST(FalconServer, UnpluggedInMidForceItPushesAgainOnlyAfterHomingAndArming) {
+  on_a_stage({}, [](FalconStage& stage) {
+    Process& server = stage.server().process();
+    stage.arm_and_press();
+    stage.falcon().unplug();
+    server.wait_for_line("the device is not plugged in");
+    const std::string flight = server.wait_for_line("the steps before the fault are in ");
+    EXPECT_NE(server.err().find("no force any more: the device was unplugged"), std::string::npos) << server.err();
+    const auto pushes_begun = stage.falcon().seen().pushes_begun;
+    stage.falcon().plug();  // its firmware is gone, and its origin; the hand is in the wall, the button is held
+    server.wait_for_line("the device has to be homed");
+    stage.wait_for_commands(100);
+    EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was homed";
+    stage.home();
+    stage.wait_until([](const FakeFalcon& falcon) { return falcon.lamps() == falcon::kGreen; }, "green lamps");
+    stage.wait_for_commands(300);
+    EXPECT_EQ(stage.falcon().seen().pushes_begun, pushes_begun) << "before it was armed";
+    stage.arm_and_press();
+    const std::string end = stage.server().stop();
+    EXPECT_NE(end.find(R"("state":"armed")"), std::string::npos) << end;
+
+    const Recording recording = read_recording(stage.folder() / flight.substr(flight.rfind(' ') + 1));
+    ASSERT_GT(recording.steps.size(), 1U);
+    EXPECT_EQ(recording.steps.back().applied, Vec3(0, 0, 0));
+  });
+}
+
+}  // namespace
+}  // namespace tendon::e2e
