@@ -225,6 +225,25 @@ void draw_device(Dice& dice, DrawnWorld& world, double force_scale) {
   world.device = std::move(device);
 }
 
+/// Some devices rub in their joints, some have a structural mode: both keep the balance of energy at the motors, where
+/// port and limiter are. (Transport delay does not: what is felt is then not what was returned.) Drawn apart, so that
+/// nothing else of a world depends on it.
+void draw_mechanism(Dice dice, DrawnWorld& world) {
+  auto* device = std::get_if<SimulatedDevice::Config>(&world.device);
+  if (device == nullptr) return;
+  if (device->coulomb_friction && dice.chance(0.3)) {
+    auto& joints = device->joint_friction.emplace();
+    if (dice.chance(0.5)) joints.mechanism = Mechanism::Arm{dice.within(0.08, 0.3), dice.within(0.08, 0.3)};
+    joints.coulomb = JointFriction::torques(joints.mechanism, *device->coulomb_friction);
+    device->coulomb_friction.reset();
+  }
+  if (dice.chance(0.3)) {
+    device->structural_mode = {.handle_mass = device->mass * dice.within(0.1, 0.9),
+                               .stiffness = dice.decades(2.5, 5),
+                               .damping = dice.decades(-2, 0.5)};
+  }
+}
+
 DrawnClient draw_client(Dice& dice, DrawnClient::Kind kind, std::size_t number) {
   DrawnClient client;
   client.kind = kind;
@@ -358,6 +377,7 @@ DrawnWorld draw_world(std::uint64_t seed, double force_scale) {
   fair.down.delay = injector::ConstantDelay{world.one_way_down};
   world.changes.push_back({world.clears, fair});
   draw_suite(Dice(~seed), world);
+  draw_mechanism(Dice(seed ^ 0x9e3779b97f4a7c15), world);
   return world;
 }
 
@@ -370,6 +390,10 @@ std::string describe(const DrawnWorld& world) {
     if (device->encoder_step) text += ", counts of " + number(*device->encoder_step * 1e6) + " µm";
     if (device->amplifier_bandwidth) text += ", an amplifier of " + number(*device->amplifier_bandwidth) + " Hz";
     if (device->watchdog) text += ", a watchdog of " + ms(*device->watchdog);
+    if (device->joint_friction) text += ", friction in its joints";
+    if (device->structural_mode) {
+      text += ", a structural mode of " + number(device->structural_mode->stiffness) + " N/m";
+    }
   } else {
     text += "an adversary";
   }
