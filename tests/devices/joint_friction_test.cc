@@ -102,6 +102,30 @@ TEST(JointFriction, BrakesAHandleThatTurnsOneJointAsTheClosedFormSays) {
   }
 }
 
+TEST(JointFriction, TurnsRoundWithoutAPauseUnderAForceThatItCannotHold) {
+  // Braked by force and friction until it stops, then pulled back by force less friction, all along the way of one
+  // joint. What is left of the 50 µs in which it turns may have the wrong sign of friction; a pause of that length
+  // would cost 2.5 mm/s.
+  const Vec3 torques(0.02, 0.02, 0.02);
+  for (const Mechanism::Kind& kind : all_kinds()) {
+    for (Eigen::Index joint = 0; joint < 3; ++joint) {
+      for (const double v0 : {0.05, 0.0503, 0.0511, 0.0517, 0.0526}) {
+        auto config = rubbing(kind, torques);
+        const Vec3 way = way_of(kind, Vec3::Zero(), joint);
+        const double friction = torques[joint] / way.norm();
+        config.start_velocity = v0 * way.normalized();
+        Bench bench(config);
+        // Along the way in so far as that does not turn the others: their friction holds the rest.
+        bench.push(-5 * way.normalized(), 2ms);
+        const double back = 2e-3 - config.mass * v0 / (5 + friction);
+        EXPECT_NEAR(bench.truth().velocity.dot(way.normalized()), -(5 - friction) / config.mass * back,
+                    2 * friction / config.mass * 50e-6 + 1e-4)
+            << joint << ", " << v0;
+      }
+    }
+  }
+}
+
 TEST(JointFriction, ViscousInTheJointsLetsASpeedFallAsTheExponential) {
   // In the middle of a Phantom's workspace J is diagonal but for the order of the axes: 1/l on each.
   const Vec3 viscous(0.002, 0.004, 0.008);
