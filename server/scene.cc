@@ -1209,7 +1209,8 @@ class Reader {
   /// An effect that is there when its table is.
   template <class T, class Declare>
   void part(std::string_view name, std::optional<T>& target, const Declare& declare) {
-    optional_table(name, [&](Reader& keys) { declare(keys, target.emplace()); });
+    // T{}: within the class around a nested T, clang does not see yet that it needs no arguments.
+    optional_table(name, [&](Reader& keys) { declare(keys, target.emplace(T{})); });
   }
 
   /// A table written with [[name]], for each of a few of a kind; without one `target` stays as it is.
