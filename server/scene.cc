@@ -16,6 +16,7 @@
 #include <memory>
 #include <numbers>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -1209,8 +1210,14 @@ class Reader {
   /// An effect that is there when its table is.
   template <class T, class Declare>
   void part(std::string_view name, std::optional<T>& target, const Declare& declare) {
-    // T{}: within the class around a nested T, clang does not see yet that it needs no arguments.
-    optional_table(name, [&](Reader& keys) { declare(keys, target.emplace(T{})); });
+    optional_table(name, [&](Reader& keys) {
+      // To clang a T whose class around it had no end yet, when it first met the optional, needs an argument.
+      if constexpr (std::is_default_constructible_v<T>) {
+        declare(keys, target.emplace());
+      } else {
+        declare(keys, target.emplace(T{}));
+      }
+    });
   }
 
   /// A table written with [[name]], for each of a few of a kind; without one `target` stays as it is.
