@@ -154,7 +154,9 @@ void FarFalcon::serve(Session& session, LocalTime at) {
   if (session.cable >= 0) {
     const bool heard = session.plug->turn(at);
     if (!session.plug->last().empty()) seen_.last = session.plug->last();
-    if (std::exchange(session.said, session.plug->said()) != session.plug->said()) tcflow(session.slave, TCOON);
+    if (std::exchange(session.said, session.plug->said()) != session.plug->said()) {
+      tcflow(session.slave, TCOON);  // NOLINT(concurrency-mt-unsafe): nobody else writes to it
+    }
     if (!heard) {
       // From now on the end of the master says that nobody has the node.
       close_if_open(session.cable);
