@@ -9,10 +9,10 @@ install(TARGETS tendond tendon-softbody tendon-lab tendon-identify tendon-replay
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
-install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT programs)
-install(FILES deploy/systemd/tendond.service DESTINATION lib/systemd/system COMPONENT programs)
-# Where the service looks: /etc, whatever the prefix of a package.
-install(FILES deploy/scenes/demo.toml DESTINATION /etc/tendon RENAME scene.toml COMPONENT programs)
+# What belongs to the whole machine is for packages only: `cmake --install` into a home folder leaves /etc alone.
+install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
+install(FILES deploy/systemd/tendond.service DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
+install(FILES deploy/scenes/demo.toml DESTINATION /etc/tendon RENAME scene.toml COMPONENT machine EXCLUDE_FROM_ALL)
 
 # One file completes all programs; bash-completion looks for one by the name of each.
 set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
@@ -74,8 +74,9 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_PACKAGE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL programs injector conformance development)
+set(CPACK_COMPONENTS_ALL programs machine injector conformance development)
 set(CPACK_COMPONENT_PROGRAMS_GROUP run)
+set(CPACK_COMPONENT_MACHINE_GROUP run)
 set(CPACK_COMPONENT_INJECTOR_GROUP run)
 set(CPACK_COMPONENT_CONFORMANCE_GROUP run)
 set(CPACK_COMPONENT_DEVELOPMENT_GROUP dev)

@@ -14,26 +14,16 @@
 #include "server/byte_sink.h"
 #include "server/recorder.h"
 #include "server/scene.h"
+#include "tests/replay/tapping.h"
 #include "tests/server/scratch_folder.h"
 #include "tests/simulation/world.h"
 
 namespace tendon::replay {
 namespace {
 
-using testing::ScratchFolder;
+using tendon::testing::ScratchFolder;
 
-const std::string kScene = R"([device]
-kind = "simulated"
-profile = "falcon"
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-[device.hand.motion]
-kind = "sine"
-amplitude_mm = 15
-frequency_hz = 2
-[limiter]
+const std::string kScene = testing::kTapping + R"([limiter]
 kind = "aol+"
 [limiter.energy_cap]
 )";

@@ -16,25 +16,15 @@
 #include "devices/simulated/simulated_device.h"
 #include "server/haptic_loop.h"
 #include "server/scene.h"
+#include "tests/replay/tapping.h"
 #include "tests/simulation/world.h"
 
 namespace tendon::replay {
 namespace {
 
-const std::string kTapping = R"([device]
-kind = "simulated"
-profile = "falcon"
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-[device.hand.motion]
-kind = "sine"
-amplitude_mm = 15
-frequency_hz = 2
-)";
-
-Scene scene_with(const std::vector<std::string>& settings) { return parse_scene(kTapping, "scene", ".", settings); }
+Scene scene_with(const std::vector<std::string>& settings) {
+  return parse_scene(testing::kTapping, "scene", ".", settings);
+}
 
 /// What a server recorded while a remote wall of 2000 N/m answered over a bad network.
 std::vector<StepRecord> recorded(const Scene& scene) {

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+namespace tendon::replay::testing {
+
+/// A scene whose hand taps through x = 0 twice a second. What it says of a limiter comes after it.
+inline const std::string kTapping = R"([device]
+kind = "simulated"
+profile = "falcon"
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+[device.hand.motion]
+kind = "sine"
+amplitude_mm = 15
+frequency_hz = 2
+)";
+
+}  // namespace tendon::replay::testing
