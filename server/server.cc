@@ -99,7 +99,8 @@ std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, s
 
 std::unique_ptr<Guardian> guardian_of(const std::vector<Scene>& scenes) {
   const bool any = std::any_of(scenes.begin(), scenes.end(), [](const Scene& scene) { return scene.moves_a_hand(); });
-  return any ? std::make_unique<Guardian>() : nullptr;
+  // The haptic thread says what is refused.
+  return any ? std::make_unique<Guardian>([] { enter_realtime(kHapticPriority); }) : nullptr;
 }
 
 usb::PipeConfig pipe_for(const Scene& scene, const std::string& port) {

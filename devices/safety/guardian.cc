@@ -3,8 +3,10 @@
 
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
+#include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,6 +15,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <future>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -84,9 +87,35 @@ bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges) noe
   return true;
 }
 
+void end_forces(const std::array<Charge, Guardian::kDevices>& charges) noexcept {
+  for (const Charge& charge : charges) {
+    if (charge.fd >= 0) charge.zero->send(charge.fd);
+  }
+}
+
+/// Blocks all signals of the calling thread and of what it starts; for good, or as long as it lives.
+class NoSignals {
+ public:
+  NoSignals() noexcept {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~NoSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  NoSignals(const NoSignals&) = delete;
+  NoSignals& operator=(const NoSignals&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+/// What the kernel sends to the guardian when its parent, a thread of the server, is dead.
+constexpr int kParentDied = SIGUSR1;
+
+// All signals are blocked.
 [[noreturn]] void stand_guard(int socket) noexcept {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) std::signal(signal, SIG_IGN);
   setsid();
+  prctl(PR_SET_PDEATHSIG, kParentDied);
   prctl(PR_SET_NAME, "tendon-guardian", 0UL, 0UL, 0UL);
   // Whoever reads what the server says is to see its end; and nothing of the server's is to be kept open.
   if (const int null = open("/dev/null", O_RDWR | O_CLOEXEC); null >= 0) {
@@ -95,12 +124,21 @@ bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges) noe
   if (socket > 3) close_range(3, static_cast<unsigned>(socket) - 1, 0);
   close_range(static_cast<unsigned>(socket) + 1, ~0U, 0);
 
+  sigset_t death;
+  sigemptyset(&death);
+  sigaddset(&death, kParentDied);
+  pollfd order{.fd = socket, .events = POLLIN, .revents = 0};
+  pollfd parent{.fd = signalfd(-1, &death, SFD_CLOEXEC), .events = POLLIN, .revents = 0};
   std::array<Charge, Guardian::kDevices> charges;
-  while (take_order(socket, charges)) {
+  for (bool server_lives = true; server_lives;) {
+    std::array<pollfd, 2> told = {order, parent};
+    poll(told.data(), told.size(), -1);
+    if (told[0].revents != 0) server_lives = take_order(socket, charges);
+    // The parent alone: other threads may be about to die, one of them in the middle of a last command. So once more at
+    // the end, when there are none.
+    if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) end_forces(charges);
   }
-  for (const Charge& charge : charges) {
-    if (charge.fd >= 0) charge.zero->send(charge.fd);
-  }
+  end_forces(charges);
   _exit(0);
 }
 
@@ -134,29 +172,41 @@ bool ZeroPacket::send(int fd) const noexcept {
   return false;
 }
 
-Guardian::Guardian() {
+Guardian::Guardian(const std::function<void()>& on_start) {
   std::array<int, 2> ends{};
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
     throw std::system_error(errno, std::generic_category(), "no socket for the guardian");
   }
-  pid_ = fork();
-  if (pid_ == 0) {
-    close(ends[0]);
-    stand_guard(ends[1]);
+  std::promise<pid_t> forked;
+  const auto watch = [&on_start, &forked, ends] {
+    if (on_start) on_start();
+    const pid_t guardian = fork();
+    if (guardian == 0) {
+      close(ends[0]);
+      stand_guard(ends[1]);
+    }
+    const int error = errno;
+    close(ends[1]);
+    forked.set_value(guardian > 0 ? guardian : -error);  // the last look at what the constructor owns
+    while (guardian > 0 && waitpid(guardian, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  };
+  {
+    const NoSignals blocked;
+    parent_ = std::thread(watch);
   }
-  const int error = errno;
-  close(ends[1]);
+  pid_ = forked.get_future().get();
   if (pid_ < 0) {
+    parent_.join();
     close(ends[0]);
-    throw std::system_error(error, std::generic_category(), "no process for the guardian");
+    throw std::system_error(-pid_, std::generic_category(), "no process for the guardian");
   }
   socket_ = ends[0];
 }
 
 Guardian::~Guardian() {
   close(socket_);
-  while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
-  }
+  parent_.join();
 }
 
 bool Guardian::guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept {

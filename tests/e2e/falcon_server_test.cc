@@ -96,7 +96,7 @@ TEST(FalconServer, KilledInMidForceItLeavesNoTorque) {
       const FalconStage::Killed killed = stage.kill_server();
       EXPECT_FALSE(killed.pushes);
       EXPECT_EQ(killed.last, last_packet());
-      EXPECT_EQ(killed.by_guardian, 1U);
+      EXPECT_GE(killed.by_guardian, 2U) << "when its parent was dead, and when all were";
       ms.push_back(killed.pushed_for_ms);
     });
   }

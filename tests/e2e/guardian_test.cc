@@ -9,6 +9,7 @@
 #include <linux/ioctl.h>
 #include <linux/usbdevice_fs.h>
 #include <poll.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -182,6 +183,44 @@ TEST(Guardian, OutlivesWhatEndsTheDriversProcessGroup) {
   kill(-pid, SIGKILL);
   EXPECT_EQ(device.last(), kZero);
   ended_by(pid);
+}
+
+// A process under load gives its memory back for tens of milliseconds before it closes its files. Here it is stretched
+// for as long as we like: somebody else has the same files open.
+TEST(Guardian, WritesZeroAsSoonAsItsParentIsDeadAndAgainWhenTheDriversFilesAreClosed) {
+  Heard device;
+  std::array<int, 2> lingering{};
+  ASSERT_EQ(pipe(lingering.data()), 0);
+  const pid_t pid = driver([&] {
+    Guardian guardian;
+    guardian.guard(0, device.end_of_the_driver(), written(kZero));
+    const pid_t keeper = fork();
+    if (keeper == 0) {
+      for (;;) pause();
+    }
+    if (write(lingering[1], &keeper, sizeof keeper) != sizeof keeper) _exit(1);
+    stream(device.end_of_the_driver());
+  });
+  device.unplug();
+  pid_t keeper = 0;
+  ASSERT_EQ(read(lingering[0], &keeper, sizeof keeper), static_cast<ssize_t>(sizeof keeper));
+  for (const int end : lingering) close(end);
+  for (int i = 0; i < 10; ++i) ASSERT_EQ(device.next(), kForce);
+  kill(pid, SIGKILL);
+  EXPECT_EQ(ended_by(pid), SIGKILL);
+  std::string heard = kForce;
+  pollfd packet{.fd = device.end_of_the_device(), .events = POLLIN, .revents = 0};
+  while (heard == kForce && poll(&packet, 1, 30'000) == 1) heard = device.next();
+  EXPECT_EQ(heard, kZero) << "while the files are open";
+  kill(keeper, SIGKILL);
+  EXPECT_EQ(device.next(), kZero) << "when they are not";
+  EXPECT_EQ(device.next(), "");
+}
+
+TEST(Guardian, HasThePriorityThatItsParentHasAskedFor) {
+  constexpr int kNice = 7;
+  Guardian guardian([] { setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice); });
+  EXPECT_EQ(getpriority(PRIO_PROCESS, static_cast<id_t>(guardian.pid())), kNice);
 }
 
 TEST(Guardian, GuardsEachDeviceAndThoseThatAreGoneNot) {
