@@ -42,6 +42,7 @@ class Process {
   std::string wait_for_line(std::string_view text, std::chrono::nanoseconds patience = kPatience);
 
   void signal(int number);
+  pid_t pid() const noexcept { return pid_; }
 
   /// Waits for the end. Returns the exit code, or −N when signal N has ended it.
   int wait(std::chrono::nanoseconds patience = kPatience);

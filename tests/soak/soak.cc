@@ -1,0 +1,421 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/soak/soak.h"
+
+#include <sys/mount.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <fstream>
+#include <iomanip>
+#include <memory>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "protocol/link.h"
+#include "server/clock.h"
+#include "tests/e2e/process.h"
+#include "tests/e2e/stage.h"
+#include "tests/lab/json.h"
+#include "tests/soak/guests.h"
+#include "tests/soak/vital_signs.h"
+
+namespace tendon::soak {
+
+namespace {
+
+constexpr std::string_view kScene = R"([device]
+kind = "simulated"
+profile = "falcon"
+
+[device.effects]
+watchdog_ms = 5
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "sine"
+amplitude_mm = 15
+frequency_hz = 0.5
+
+[network]
+max_observers = 32
+controller_timeout_ms = 300   # an engine that was killed makes room for the next one
+
+[limiter]
+kind = "aol+"
+)";
+
+std::vector<std::string> operator+(std::vector<std::string> words, const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+constexpr int kVisitors = 8;
+// What may grow and still be flat. The proxy keeps a socket for each of the last engines, of which not the same number
+// falls into each second.
+constexpr VitalSigns kServerGrowth{.resident = std::size_t{1} << 20};
+constexpr VitalSigns kProxyGrowth{.resident = std::size_t{1} << 20, .files = 8};
+
+/// A program whose words go to a file: see `log`. Its end is noticed, and is its own doing only after `stop`.
+class Program {
+ public:
+  Program(const std::string& name, const std::vector<std::string>& arguments, const std::filesystem::path& folder,
+          std::vector<std::string> environment = {})
+      : name_(name), log_(folder / (name + ".log")) {
+    std::vector<std::string> words = {"-c", R"(exec "$@" >>"$0" 2>&1)", log_.string(), e2e::program(name).string()};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    process_ = std::make_unique<e2e::Process>("/bin/sh", words, folder, std::move(environment));
+  }
+
+  pid_t pid() const noexcept { return process_->pid(); }
+  const std::filesystem::path& log() const noexcept { return log_; }
+  void kill() {
+    process_->signal(SIGKILL);
+    process_->wait();
+  }
+  /// By SIGTERM; its exit code.
+  int stop() {
+    process_->signal(SIGTERM);
+    return process_->wait();
+  }
+
+  /// The first line in the log that holds `text`, as soon as there is one.
+  std::string line(const std::string& text) const {
+    for (const LocalTime end = clock::now() + e2e::kPatience; clock::now() < end;
+         std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
+      if (const auto line = said(text)) return *line;
+    }
+    throw std::runtime_error(name_ + " did not say " + text + "; see " + log_.string());
+  }
+  /// As line(), now.
+  std::optional<std::string> said(const std::string& text) const {
+    std::ifstream file(log_);
+    for (std::string line; std::getline(file, line);) {
+      if (line.find(text) != std::string::npos) return line;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::string name_;
+  std::filesystem::path log_;
+  std::unique_ptr<e2e::Process> process_;
+};
+
+/// A disk that is soon full; none where nobody may mount one.
+class SmallDisk {
+ public:
+  explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
+    std::filesystem::create_directories(path_);
+    mounted_ = mount("tendon-soak", path_.c_str(), "tmpfs", 0, "size=1m") == 0;
+  }
+  ~SmallDisk() {
+    if (mounted_) umount2(path_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  bool mounted() const noexcept { return mounted_; }
+  const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  bool mounted_ = false;
+};
+
+/// Processes that only burn time.
+class Hogs {
+ public:
+  ~Hogs() { stop(); }
+  void start() {
+    while (pids_.size() < std::max(1U, std::thread::hardware_concurrency())) {
+      const pid_t pid = fork();
+      if (pid == 0) {
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+        for (std::atomic<unsigned> work = 0;; ++work) {
+        }
+      }
+      if (pid < 0) return;
+      pids_.push_back(pid);
+    }
+  }
+  void stop() {
+    for (const pid_t pid : pids_) {
+      kill(pid, SIGKILL);
+      waitpid(pid, nullptr, 0);
+    }
+    pids_.clear();
+  }
+  bool running() const noexcept { return !pids_.empty(); }
+
+ private:
+  std::vector<pid_t> pids_;
+};
+
+/// Cuts a log to nothing under the one who writes it; how long it was.
+std::uint64_t rotate(const std::filesystem::path& log) {
+  const std::uint64_t size = std::filesystem::file_size(log);
+  std::filesystem::copy_file(log, log.string() + ".1", std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::resize_file(log, 0);
+  return size;
+}
+
+/// One whole run: what is alive in it, and what becomes of it.
+class Run {
+ public:
+  explicit Run(const Config& config)
+      : config_(config),
+        random_(config.seed),
+        disk_(config.folder / "small-disk"),
+        scene_(e2e::write(config.folder / "soak.toml", kScene)),
+        clock_file_(e2e::write(config.folder / "clock-step", "0")),
+        server_("tendond", tendond("/dev/null"), config.folder, wrong_clock()),
+        proxy_("tendon-inject",
+               own_end() + std::vector<std::string>{"--listen", "127.0.0.1:0", "--to", address(server_), "--profile",
+                                                    "wifi-good", "--seed", std::to_string(config.seed), "--json"},
+               config.folder) {
+    if (disk_.mounted()) {
+      std::filesystem::create_directories(config.folder / "second");
+      second_ = std::make_unique<Program>("tendond", tendond(disk_.path() / "run.mcap"), config.folder / "second",
+                                          wrong_clock());
+    }
+    through_ = e2e::text_in(proxy_.line("\"event\":\"start\""), "listen");
+  }
+
+  Report run(const std::function<void(double)>& progress) {
+    const LocalTime start = clock::now();
+    const LocalTime end = start + config_.duration;
+    const Address server = parse_address(address(server_));
+    // They are done a little before the end: the last look is at a server that has rest.
+    Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
+    Watching watcher(server);
+    LocalTime next_look = start;
+    LocalTime next_rough = start;
+    while (clock::now() < end && alive()) {
+      const LocalTime now = clock::now();
+      flap(now);
+      if (now >= next_look) {
+        look();
+        progress(seconds(now - start) / seconds(config_.duration));
+        next_look += std::max<Duration>(std::chrono::seconds(1), config_.duration / 3600);
+      }
+      if (now >= next_rough) {
+        treat_roughly();
+        next_rough += kRough;
+      }
+      clock::sleep_until(now + std::chrono::milliseconds(10));
+    }
+    hogs_.stop();
+    visitors.stop();
+    watcher.stop();
+    report_.duration_s = seconds(clock::now() - start);
+    report_.sessions = visitors.sessions();
+    report_.vain = visitors.vain();
+    report_.states_watched = watcher.states();
+    report_.longest_silence_ms = seconds(watcher.longest_silence()) * 1e3;
+    if (report_.vain > 0) broken(std::to_string(report_.vain) + " visitors saw no state within 10 s");
+    if (const auto why = watcher.broken()) broken("a state: " + *why);
+    finish();
+    return report_;
+  }
+
+ private:
+  static constexpr Duration kRough = std::chrono::seconds(7);
+
+  /// For programs that outlive us: they end by themselves.
+  std::vector<std::string> own_end() const {
+    return {"--duration-s", std::to_string(static_cast<int>(seconds(config_.duration)) + 300)};
+  }
+  std::vector<std::string> tendond(const std::filesystem::path& recording) const {
+    return own_end() +
+           std::vector<std::string>{scene_, "--json", "--listen", "127.0.0.1:0", "--record", recording.string()};
+  }
+  std::vector<std::string> wrong_clock() const {
+    return {std::string("LD_PRELOAD=") + TENDON_STEPPED_CLOCK, "TENDON_CLOCK_STEP=" + clock_file_};
+  }
+  static std::string address(const Program& tendond) {
+    return e2e::text_in(tendond.line("\"event\":\"listening\""), "address");
+  }
+  double uniform(double from, double to) {
+    return from + (to - from) * (static_cast<double>(random_() >> 11U) * 0x1p-53);
+  }
+  void broken(const std::string& why) { report_.broken.push_back(why); }
+
+  bool alive() {
+    const bool all =
+        vital_signs(server_.pid()) && vital_signs(proxy_.pid()) && (!second_ || vital_signs(second_->pid()));
+    if (!all) broken("a program ended before its time");
+    return all;
+  }
+
+  /// The engine comes or is killed.
+  void flap(LocalTime now) {
+    if (now < next_flap_) return;
+    if (engine_) {
+      engine_->kill();
+      engine_.reset();
+      ++report_.engines_killed;
+      next_flap_ = now + from_seconds(uniform(0.05, 0.5));
+      return;
+    }
+    engine_ = std::make_unique<Program>(
+        "virtual_wall", own_end() + std::vector<std::string>{"--server", through_, "--stiffness-n-per-m", "800"},
+        config_.folder);
+    next_flap_ = now + from_seconds(uniform(0.2, 3));
+  }
+
+  void look() {
+    const auto add = [](const Program& program, std::vector<VitalSigns>& looks) {
+      if (const auto signs = vital_signs(program.pid())) looks.push_back(*signs);
+    };
+    add(server_, server_looks_);
+    add(proxy_, proxy_looks_);
+    if (second_) add(*second_, second_looks_);
+  }
+
+  void treat_roughly() {
+    constexpr double kDay_s = 86400;
+    std::ofstream(clock_file_) << static_cast<std::int64_t>(uniform(-kDay_s, kDay_s) * 1e9) << '\n';
+    ++report_.clock_steps;
+    if (second_ && !report_.disk_was_full) report_.disk_was_full = second_->said("No space left on device").has_value();
+    report_.log_bytes += rotate(server_.log());
+    rotate(proxy_.log());
+    ++report_.log_rotations;
+    if (uniform(0, 1) < 1.0 / 3) {
+      hogs_.start();
+    } else {
+      hogs_.stop();
+    }
+  }
+
+  void finish() {
+    engine_.reset();
+    for (const auto& why :
+         {not_flat("tendond", server_looks_, kServerGrowth), not_flat("tendon-inject", proxy_looks_, kProxyGrowth),
+          not_flat("the second tendond", second_looks_, kServerGrowth)}) {
+      if (why) broken(*why);
+    }
+    if (!server_looks_.empty()) {
+      report_.server_mb_first = static_cast<double>(server_looks_[server_looks_.size() / 5].resident) / 1e6;
+      report_.server_mb_last = static_cast<double>(server_looks_.back().resident) / 1e6;
+      report_.server_files = server_looks_.back().files;
+      report_.server_threads = server_looks_.back().threads;
+    }
+    // 1: on a machine with so many hogs it could not keep the time of its releases, and says so.
+    if (const int code = proxy_.stop(); code != 0 && code != 1)
+      broken("tendon-inject: exit code " + std::to_string(code));
+    if (second_) {
+      report_.disk_was_full = report_.disk_was_full || second_->said("No space left on device").has_value();
+      if (!report_.disk_was_full) broken("the small disk did not become full: nothing was shown by it");
+      stop(*second_, "the second tendond");
+    }
+    stop(server_, "tendond");
+    const std::string end = server_.line("\"event\":\"stopped\"");
+    report_.log_bytes += std::filesystem::file_size(server_.log());
+    report_.steps = e2e::count_in(end, "steps");
+    report_.overruns = e2e::count_in(end, "overruns");
+    report_.longest_interval_ms = e2e::number_in(end, "longest_interval_us") / 1e3;
+    report_.forces = e2e::count_in(end, "forces");
+    if (e2e::count_in(end, "fault") != 0) broken("a latched fault: " + end);
+    if (e2e::text_in(end, "name") != "soak") broken("the end of another server: " + end);
+  }
+
+  void stop(Program& program, const std::string& name) {
+    if (const int code = program.stop(); code != 0) broken(name + ": exit code " + std::to_string(code));
+  }
+
+  Config config_;
+  std::mt19937_64 random_;
+  SmallDisk disk_;
+  std::string scene_;
+  std::string clock_file_;
+  Program server_;
+  Program proxy_;
+  std::unique_ptr<Program> second_;
+  std::unique_ptr<Program> engine_;
+  std::string through_;
+  Hogs hogs_;
+  LocalTime next_flap_{};
+  std::vector<VitalSigns> server_looks_;
+  std::vector<VitalSigns> proxy_looks_;
+  std::vector<VitalSigns> second_looks_;
+  Report report_;
+};
+
+}  // namespace
+
+Report run(const Config& config, const std::function<void(double)>& progress) {
+  std::filesystem::create_directories(config.folder);
+  if (!std::filesystem::is_empty(config.folder)) {
+    throw std::runtime_error(config.folder.string() + " is not empty: expected a folder that holds nothing to be lost");
+  }
+  return Run(config).run(progress);
+}
+
+std::string to_json(const Config& config, const Report& report) {
+  std::string broken;
+  for (const std::string& why : report.broken) broken += (broken.empty() ? "" : "; ") + why;
+  return lab::JsonLine()
+      .add("event", "soak")
+      .add("passed", report.broken.empty())
+      .add("broken", broken)
+      .add("seed", config.seed)
+      .add("duration_s", report.duration_s)
+      .add("steps", report.steps)
+      .add("overruns", report.overruns)
+      .add("longest_interval_ms", report.longest_interval_ms)
+      .add("engines_killed", report.engines_killed)
+      .add("forces", report.forces)
+      .add("reconnects", report.sessions)
+      .add("reconnects_in_vain", report.vain)
+      .add("states_watched", report.states_watched)
+      .add("longest_silence_ms", report.longest_silence_ms)
+      .add("clock_steps", report.clock_steps)
+      .add("log_rotations", report.log_rotations)
+      .add("log_bytes", report.log_bytes)
+      .add("disk_was_full", report.disk_was_full)
+      .add("server_mb_first", report.server_mb_first)
+      .add("server_mb_last", report.server_mb_last)
+      .add("server_files", report.server_files)
+      .add("server_threads", report.server_threads)
+      .str();
+}
+
+std::string to_text(const Report& report) {
+  std::ostringstream text;
+  const auto row = [&text](const auto& value, const char* meaning) {
+    text << std::setw(12) << value << "  " << meaning << '\n';
+  };
+  text << std::fixed << std::setprecision(1);
+  row(report.duration_s, "s");
+  row(report.steps, "haptic steps");
+  row(report.overruns, "… that took more than two periods");
+  row(report.longest_interval_ms, "ms, the longest of them");
+  row(report.engines_killed, "engines killed by SIGKILL");
+  row(report.forces, "forces that came from them");
+  row(report.sessions, "visitors that came, saw and left");
+  row(report.vain, "… that saw nothing within 10 s");
+  row(report.states_watched, "states held against the promises");
+  row(report.longest_silence_ms, "ms, the longest time between two of them");
+  row(report.clock_steps, "times that the wall clock was set");
+  row(report.log_rotations, "times that the logs were cut");
+  row(report.log_bytes, "bytes of the server's log in all");
+  row(report.disk_was_full ? "yes" : "no", "the second server's disk was full");
+  row(report.server_mb_first, "MB of the server's memory after a fifth of the time");
+  row(report.server_mb_last, "MB … at the end");
+  row(report.server_files, "open files");
+  row(report.server_threads, "threads");
+  for (const std::string& why : report.broken) text << "BROKEN: " << why << '\n';
+  return text.str();
+}
+
+}  // namespace tendon::soak

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iomanip>
+#include <iostream>
+
+#include "tests/soak/soak.h"
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "tendon-soak: a server in real time that is treated roughly: engines that are killed, guests that come and go, "
+      "clocks\n"
+      "that are set, a disk that is full, processors that others use. Are its memory, files and threads flat, and its\n"
+      "promises kept? See tests/soak/README.md.\n\n"
+      "Example:  tendon-soak --duration-s 60 --reconnects 10000 --folder /tmp/soak\n");
+  tendon::soak::Config config{.folder = "soak"};
+  double duration_s = 3600;
+  bool json = false;
+  app.add_option("--duration-s", duration_s, "How long, of real time")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--reconnects", config.reconnects, "Sessions of guests that come, see a state and go")
+      ->capture_default_str();
+  app.add_option("--seed", config.seed, "Of the times of what happens")->capture_default_str();
+  app.add_option("--folder", config.folder, "For logs and scene; made, or empty")->capture_default_str();
+  app.add_flag("--json", json, "One JSON object on stdout");
+  app.footer("\nExit: 0 all was as it should be; 1 it was not; 2 wrong usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& problem) {
+    return app.exit(problem) == 0 ? 0 : 2;
+  }
+  try {
+    config.duration = tendon::from_seconds(duration_s);
+    config.folder = std::filesystem::absolute(config.folder);
+    const bool terminal = isatty(STDERR_FILENO) == 1;
+    const auto report = run(config, [terminal](double share) {
+      if (terminal) std::cerr << "\r" << std::fixed << std::setprecision(1) << share * 100 << " % " << std::flush;
+    });
+    if (terminal) std::cerr << '\r';
+    std::cout << (json ? to_json(config, report) + '\n' : to_text(report)) << std::flush;
+    return report.broken.empty() ? 0 : 1;
+  } catch (const std::exception& problem) {
+    std::cerr << problem.what() << '\n';
+    return 1;
+  }
+}
