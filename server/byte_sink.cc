@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -26,9 +27,12 @@ FileSink::FileSink(std::filesystem::path path) : path_(std::move(path)) {
   // O_APPEND: after a piece has been cut off, the next one starts where the file ends.
   descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (descriptor_ < 0) throw std::runtime_error("cannot write recording " + path_.string() + ": " + reason(errno));
+  // A pipe or /dev/null has nothing to lose, and others may write to it.
+  struct stat status {};
+  if (::fstat(descriptor_, &status) == 0 && !S_ISREG(status.st_mode)) return;
   // Emptied only once it is ours: the recording of another server that still runs is not.
   const bool busy = ::flock(descriptor_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-  if (!busy && (::ftruncate(descriptor_, 0) == 0 || errno == EINVAL)) return;  // EINVAL: not a regular file
+  if (!busy && ::ftruncate(descriptor_, 0) == 0) return;
   const std::string why = busy ? "another recording is being written to it" : reason(errno);
   ::close(descriptor_);
   throw std::runtime_error("cannot write recording " + path_.string() + ": " + why);

@@ -36,6 +36,14 @@ TEST(FileSink, LeavesTheFileOfAnotherRecordingThatStillRunsAlone) {
   EXPECT_EQ(std::filesystem::file_size(path), 6U);
 }
 
+TEST(FileSink, SharesWhatHasNothingToLose) {
+  FileSink one("/dev/null");
+  FileSink other("/dev/null");
+  const std::array<std::byte, 3> bytes{};
+  EXPECT_TRUE(one.append(bytes));
+  EXPECT_TRUE(other.append(bytes));
+}
+
 TEST(FileSink, NamesPathAndReasonWhenItCannotOpen) {
   try {
     FileSink sink("/nowhere/at/all/run.mcap");

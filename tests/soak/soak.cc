@@ -117,7 +117,7 @@ class SmallDisk {
  public:
   explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
     std::filesystem::create_directories(path_);
-    mounted_ = mount("tendon-soak", path_.c_str(), "tmpfs", 0, "size=1m") == 0;
+    mounted_ = mount("tendon-soak", path_.c_str(), "tmpfs", 0, "size=256k") == 0;
   }
   ~SmallDisk() {
     if (mounted_) umount2(path_.c_str(), MNT_DETACH);
@@ -206,7 +206,7 @@ class Run {
       if (now >= next_look) {
         look();
         progress(seconds(now - start) / seconds(config_.duration));
-        next_look += std::max<Duration>(std::chrono::seconds(1), config_.duration / 3600);
+        next_look += kLook;
       }
       if (now >= next_rough) {
         treat_roughly();
@@ -230,6 +230,7 @@ class Run {
 
  private:
   static constexpr Duration kRough = std::chrono::seconds(7);
+  static constexpr Duration kLook = std::chrono::seconds(1);
 
   /// For programs that outlive us: they end by themselves.
   std::vector<std::string> own_end() const {
@@ -305,7 +306,8 @@ class Run {
       if (why) broken(*why);
     }
     if (!server_looks_.empty()) {
-      report_.server_mb_first = static_cast<double>(server_looks_[server_looks_.size() / 5].resident) / 1e6;
+      const std::size_t warm = server_looks_.size() / 5;
+      report_.server_mb_first = static_cast<double>(server_looks_[warm].resident) / 1e6;
       report_.server_mb_last = static_cast<double>(server_looks_.back().resident) / 1e6;
       report_.server_files = server_looks_.back().files;
       report_.server_threads = server_looks_.back().threads;

@@ -18,7 +18,7 @@ namespace tendon::soak {
 ///     engine       virtual_wall through tendon-inject, killed by SIGKILL after 0.2 to 3 s and started again
 ///     visitors     observers that come, see a state, say Bye and come again from elsewhere, `reconnects` in all
 ///     watcher      an observer that stays and holds every state against the promises (Watching)
-///     second       a tendond that records to a disk of 1 MB, which is soon full (where a tmpfs may be mounted)
+///     second       a tendond that records to a disk of 256 kB, which is soon full (where a tmpfs may be mounted)
 ///     wall clock   is set forward or back by up to a day, of both servers (stepped_clock.cc), every 7 s
 ///     hogs         a process that only burns time on each processor, for a third of the time
 ///     log          of the servers, cut to nothing while they write, as logrotate's copytruncate does

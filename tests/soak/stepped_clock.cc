@@ -15,7 +15,7 @@
 extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
   const auto result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
   if (result != 0 || clock != CLOCK_REALTIME) return result;
-  const char* path = std::getenv("TENDON_CLOCK_STEP");
+  const char* path = std::getenv("TENDON_CLOCK_STEP");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   const int file = path == nullptr ? -1 : open(path, O_RDONLY | O_CLOEXEC);
   if (file < 0) return result;
   std::array<char, 32> text{};
