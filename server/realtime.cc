@@ -27,6 +27,8 @@ void touch_stack() {
 
 }  // namespace
 
+void name_thread(const std::string& name) { prctl(PR_SET_NAME, name.c_str(), 0UL, 0UL, 0UL); }
+
 void enter_punctual() { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
 
 std::vector<std::string> enter_realtime(int priority) {

@@ -45,6 +45,10 @@ class WakefulProcessors {
   std::optional<std::string> refused_;
 };
 
+/// Names the calling thread for people who look on: top -H, perf, gdb. At most 15 characters are kept. Which there are,
+/// and what each does: server/THREADS.md.
+void name_thread(const std::string& name);
+
 /// A network or log thread: no timer slack only.
 void enter_punctual();
 

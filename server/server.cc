@@ -100,12 +100,19 @@ std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, s
 std::unique_ptr<Guardian> guardian_of(const std::vector<Scene>& scenes) {
   const bool any = std::any_of(scenes.begin(), scenes.end(), [](const Scene& scene) { return scene.moves_a_hand(); });
   // The haptic thread says what is refused.
-  return any ? std::make_unique<Guardian>([] { enter_realtime(kHapticPriority); }) : nullptr;
+  const auto on_start = [] {
+    name_thread("guardian-parent");
+    enter_realtime(kHapticPriority);
+  };
+  return any ? std::make_unique<Guardian>(on_start) : nullptr;
 }
 
 usb::PipeConfig pipe_for(const Scene& scene, const std::string& port) {
   usb::PipeConfig pipe{.port = port};
-  pipe.on_start = [] { enter_realtime(kUsbPriority); };  // the haptic thread says what is refused
+  pipe.on_start = [device = scene.loop.device] {
+    name_thread("usb-" + std::to_string(device));
+    enter_realtime(kUsbPriority);  // the haptic thread says what is refused
+  };
   pipe.tell = [name = scene.name](const std::string& why) { log::warn(name + ": " + why); };
   return pipe;
 }
@@ -261,6 +268,7 @@ bool Server::turning() {
 }
 
 void Server::run_haptic(Lane& lane) {
+  name_thread("haptic-" + std::to_string(lane.scene.loop.device));
   const bool first = &lane == lanes_.front().get();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
     if (first) log::warn(refused);  // to all of them alike
@@ -278,6 +286,7 @@ void Server::run_haptic(Lane& lane) {
 }
 
 void Server::run_network() {
+  name_thread("network");
   enter_punctual();
   LocalTime due = clock::now();
   while (!stop_network_.load(std::memory_order_acquire)) {
@@ -290,6 +299,7 @@ void Server::run_network() {
 }
 
 void Server::run_log() {
+  name_thread("log");
   bool last = false;
   while (!last) {
     // What was pushed before this flag was set is drained below: nothing is left behind.

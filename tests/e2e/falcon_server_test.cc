@@ -8,12 +8,14 @@
 #include <csignal>
 #include <filesystem>
 #include <iostream>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "devices/falcon/packet.h"
 #include "tests/e2e/falcon_stage.h"
+#include "tests/e2e/threads.h"
 
 namespace tendon::e2e {
 namespace {
@@ -107,6 +109,10 @@ TEST(FalconServer, KilledInMidForceItLeavesNoTorque) {
 TEST(FalconServer, EndedBySigtermInMidForceItsLastWordIsNoTorque) {
   on_a_stage({}, [](FalconStage& stage) {
     stage.arm_and_press();
+    const std::set<std::string> page = threads_of_the_page();
+    const std::set<std::string> threads = threads_of(stage.server().process().pid());
+    for (const std::string& thread : threads) EXPECT_TRUE(page.contains(general_name(thread))) << thread;
+    for (const char* thread : {"usb-0", "guardian-parent"}) EXPECT_EQ(threads.count(thread), 1U) << thread;
     const std::string end = stage.server().stop(SIGTERM);
     EXPECT_EQ(number_in(end, "force_n"), 0) << end;
     const FarFalcon::Seen seen = stage.wait_for_release();
