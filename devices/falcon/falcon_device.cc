@@ -121,7 +121,7 @@ void FalconDevice::receive() noexcept {
       while (const auto reply = parser_.next()) believe(*reply);
     }
   }
-  left_out_bytes_.count.store(parser_.left_out(), std::memory_order_relaxed);
+  left_out_bytes_.set(parser_.left_out());
 }
 
 bool FalconDevice::plausible(const Reply& reply) const noexcept {

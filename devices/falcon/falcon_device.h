@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/counter.h"
 #include "devices/device.h"
 #include "devices/falcon/firmware.h"
 #include "devices/falcon/kinematics.h"
@@ -76,15 +77,6 @@ class FalconDevice final : public Device {
   void advance() noexcept;
   void give_up() noexcept;
   bool streaming() const noexcept;
-
-  struct Counter {
-    std::atomic<std::uint64_t> count{0};
-    /// One writer: a load and a store are enough.
-    void add(std::uint64_t more = 1) noexcept {
-      count.store(count.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
-    }
-    std::uint64_t value() const noexcept { return count.load(std::memory_order_relaxed); }
-  };
 
   DeviceInfo info_;
   std::vector<std::uint8_t> firmware_;

@@ -42,13 +42,10 @@ void SpaceMouseDevice::let_go() noexcept {
 }
 
 void SpaceMouseDevice::receive(LocalTime now) noexcept {
-  const auto add = [](std::atomic<std::uint64_t>& counter) {
-    counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-  };
   std::array<std::uint8_t, usb::kPacketSize> packet;
   while (const std::size_t size = pipe_->read(packet)) {
     const auto report = spacemouse::parse(std::span(packet).first(size));
-    add(report ? reports_ : unknown_);
+    (report ? reports_ : unknown_).add();
     if (!report) continue;
     if (const auto* motion = std::get_if<spacemouse::Motion>(&*report); motion != nullptr && motion->translation) {
       velocity_ = velocity_for(config_, *motion->translation);
@@ -79,7 +76,7 @@ std::optional<PositionSample> SpaceMouseDevice::read(LocalTime now) noexcept {
 Vec3 SpaceMouseDevice::apply(const Vec3& /*force*/) noexcept { return Vec3::Zero(); }
 
 SpaceMouseDevice::Stats SpaceMouseDevice::stats() const noexcept {
-  Stats stats{.reports = reports_.load(std::memory_order_relaxed), .unknown = unknown_.load(std::memory_order_relaxed)};
+  Stats stats{.reports = reports_.value(), .unknown = unknown_.value()};
   const std::int16_t percent = battery_percent_.load(std::memory_order_relaxed);
   if (percent >= 0) stats.battery_percent = static_cast<std::uint8_t>(percent);
   return stats;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/counter.h"
 #include "devices/device.h"
 #include "devices/spacemouse/report.h"
 #include "devices/usb/pipe.h"
@@ -77,8 +78,8 @@ class SpaceMouseDevice final : public Device {
   std::uint32_t buttons_ = 0;
 
   // One writer.
-  std::atomic<std::uint64_t> reports_{0};
-  std::atomic<std::uint64_t> unknown_{0};
+  Counter reports_;
+  Counter unknown_;
   std::atomic<std::int16_t> battery_percent_{-1};
 };
 

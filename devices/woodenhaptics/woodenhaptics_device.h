@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/counter.h"
 #include "devices/device.h"
 #include "devices/usb/pipe.h"
 #include "devices/woodenhaptics/kinematics.h"
@@ -91,13 +92,6 @@ class WoodenHapticsDevice final : public Device {
   void give_up() noexcept;
   bool may_write() const noexcept;
   void write(const woodenhaptics::Currents& wanted) noexcept;
-
-  struct Counter {
-    std::atomic<std::uint64_t> count{0};
-    /// One writer: a load and a store are enough.
-    void add() noexcept { count.store(value() + 1, std::memory_order_relaxed); }
-    std::uint64_t value() const noexcept { return count.load(std::memory_order_relaxed); }
-  };
 
   woodenhaptics::Model model_;
   double most_ma_;
