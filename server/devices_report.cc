@@ -52,14 +52,14 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
-std::vector<DeviceReport> report_devices(std::span<const usb::PluggedIn> plugged,
-                                         const std::optional<std::string>& firmware_problem) {
-  std::vector<DeviceReport> reports;
+std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
+                                          const std::optional<std::string>& firmware_problem) {
+  std::vector<PluggedDevice> reports;
   for (const usb::PluggedIn& one : plugged) {
     const auto known = driver_for(one.id);
     if (!known) continue;
     const bool falcon = one.id == FalconDevice::kId;
-    DeviceReport report{.name = known->name, .kind = known->kind, .plugged = one, .lacks = {}};
+    PluggedDevice report{.name = known->name, .kind = known->kind, .plugged = one, .lacks = {}};
     if (!one.has_node) {
       report.lacks.push_back({"there is no " + one.node + " here, although the kernel has the device",
                               "give it to this container: docker run -v /dev/bus/usb:/dev/bus/usb "
@@ -83,12 +83,12 @@ std::vector<DeviceReport> report_devices(std::span<const usb::PluggedIn> plugged
   return reports;
 }
 
-std::string in_words(std::span<const DeviceReport> devices) {
+std::string in_words(std::span<const PluggedDevice> devices) {
   if (devices.empty()) {
     return "no device that Tendon has a driver for is plugged in; a Falcon needs its own power supply besides USB\n";
   }
   std::ostringstream text;
-  for (const DeviceReport& device : devices) {
+  for (const PluggedDevice& device : devices) {
     text << device.name << "  " << id_of(device.plugged) << "  port " << device.plugged.port << "  "
          << device.plugged.node << "\n  scene: [device] kind = \"" << device.kind << "\"\n";
     for (const auto& [what, mend] : device.lacks) text << "  missing: " << what << "\n    " << mend << '\n';
@@ -97,9 +97,9 @@ std::string in_words(std::span<const DeviceReport> devices) {
   return text.str();
 }
 
-std::string in_json(std::span<const DeviceReport> devices) {
+std::string in_json(std::span<const PluggedDevice> devices) {
   std::ostringstream text;
-  for (const DeviceReport& device : devices) {
+  for (const PluggedDevice& device : devices) {
     text << "{\"name\":" << quoted(device.name) << ",\"kind\":" << quoted(device.kind)
          << ",\"id\":" << quoted(id_of(device.plugged)) << ",\"port\":" << quoted(device.plugged.port)
          << ",\"node\":" << quoted(device.plugged.node)

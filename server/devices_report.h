@@ -11,7 +11,7 @@
 namespace tendon {
 
 /// Of what is plugged in, a device that Tendon has a driver for, and what keeps it from being used: `tendond devices`.
-struct DeviceReport {
+struct PluggedDevice {
   struct Lack {
     std::string what;
     std::string mend;  ///< what the user can do about it
@@ -24,11 +24,11 @@ struct DeviceReport {
 
 /// `firmware_problem`: why the file that was given for a Falcon's firmware is none; empty when it is; none when no file
 /// was given.
-std::vector<DeviceReport> report_devices(std::span<const usb::PluggedIn> plugged,
-                                         const std::optional<std::string>& firmware_problem);
+std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
+                                          const std::optional<std::string>& firmware_problem);
 
 /// For people; and one JSON object for each device, a line each.
-std::string in_words(std::span<const DeviceReport> devices);
-std::string in_json(std::span<const DeviceReport> devices);
+std::string in_words(std::span<const PluggedDevice> devices);
+std::string in_json(std::span<const PluggedDevice> devices);
 
 }  // namespace tendon
