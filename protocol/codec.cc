@@ -124,6 +124,7 @@ bool read_enum(int from, Enum last, Enum& to) noexcept {
 bool read(pb::Mode from, Mode& to) noexcept { return read_enum(from, Mode::kFault, to); }
 bool read(pb::Role from, Role& to) noexcept { return read_enum(from, Role::kController, to); }
 bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kReplaced, to); }
+bool read(pb::Safety from, Safety& to) noexcept { return read_enum(from, Safety::kUnguarded, to); }
 bool read(pb::ChannelRule from, ChannelRule& to) noexcept { return read_enum(from, ChannelRule::kPriority, to); }
 
 bool read_device(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxDevices; }
@@ -172,6 +173,8 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   to.reasons = from.reasons();
   to.force_sequence = from.force_sequence();
   const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
+  to.force_wanted.reset();
+  if (from.has_force_wanted_n() && !read(from.force_wanted_n(), to.force_wanted.emplace())) return false;
   return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
          read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
          bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
@@ -193,6 +196,11 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   to.set_mode(static_cast<pb::Mode>(from.mode));
   to.set_device(from.device);
   to.set_channel(from.channel);
+  if (from.force_wanted) {
+    write(*from.force_wanted, *to.mutable_force_wanted_n());
+  } else {
+    to.clear_force_wanted_n();
+  }
 }
 
 bool all_bounded(const auto& numbers) noexcept { return (numbers.array().abs() <= limits::kMaxValue).all(); }
@@ -537,6 +545,69 @@ void write(const LinkReport& from, pb::LinkReport& to) {
   to.set_words(clip(from.words, limits::kMaxDetail));
 }
 
+/// Zeros at its end are left out.
+void write(const LatenessHistogram& from, google::protobuf::RepeatedField<std::uint64_t>& to) {
+  to.Clear();
+  const auto last = std::find_if(from.rbegin(), from.rend(), [](std::uint64_t count) { return count > 0; });
+  to.Add(from.begin(), last.base());
+}
+
+/// False when there are too many entries, or they count more than `steps`.
+bool read(const google::protobuf::RepeatedField<std::uint64_t>& from, std::uint64_t steps, LatenessHistogram& to) {
+  if (from.size() > static_cast<int>(to.size())) return false;
+  std::uint64_t uncounted = steps;
+  for (const std::uint64_t count : from) {
+    if (count > uncounted) return false;
+    uncounted -= count;
+  }
+  std::fill(std::copy(from.begin(), from.end(), to.begin()), to.end(), std::uint64_t{0});
+  return true;
+}
+
+bool read(const pb::DeviceReport& from, DeviceReport& to) {
+  to.number = from.number();
+  to.steps = from.steps();
+  to.missed = from.missed();
+  to.overruns = from.overruns();
+  to.unseen = from.unseen();
+  return to.number > 0 && read(from.until_ns(), to.until) && read(from.span_ns(), to.span) &&
+         read_device(from.device(), to.device) && to.overruns <= to.steps && to.unseen <= to.steps &&
+         read(from.lateness_us_log2(), to.steps, to.lateness) && read(from.safety(), to.safety) &&
+         read(from.fault(), limits::kMaxDetail, to.fault) && read(from.degraded(), limits::kMaxDetail, to.degraded);
+}
+
+void write(const DeviceReport& from, pb::DeviceReport& to) {
+  to.set_number(from.number);
+  to.set_until_ns(from.until.time_since_epoch().count());
+  to.set_span_ns(unsigned_ns(from.span));
+  to.set_device(from.device);
+  to.set_steps(from.steps);
+  to.set_missed(from.missed);
+  to.set_overruns(from.overruns);
+  to.set_unseen(from.unseen);
+  write(from.lateness, *to.mutable_lateness_us_log2());
+  to.set_safety(static_cast<pb::Safety>(from.safety));
+  to.set_fault(clip(from.fault, limits::kMaxDetail));
+  to.set_degraded(clip(from.degraded, limits::kMaxDetail));
+}
+
+bool read(const pb::PeerReport& from, PeerReport& to) {
+  to.state_one_in = from.state_one_in();
+  to.forces_refused = from.forces_refused();
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
+         read(from.name(), limits::kMaxName, to.name) && to.state_one_in >= 1 && to.state_one_in <= limits::kMaxOneIn &&
+         from.has_link() && read(from.link(), to.link);
+}
+
+void write(const PeerReport& from, pb::PeerReport& to) {
+  to.set_device(from.device);
+  to.set_channel(from.channel);
+  to.set_name(clip(from.name, limits::kMaxName));
+  to.set_state_one_in(from.state_one_in);
+  to.set_forces_refused(from.forces_refused);
+  write(from.link, *to.mutable_link());
+}
+
 bool read(const pb::Bye& from, Bye& to) {
   return read(from.code(), to.code) && read(from.reason(), limits::kMaxDetail, to.reason);
 }
@@ -732,13 +803,15 @@ std::optional<Header> decode_header(std::span<const std::byte> datagram) noexcep
 /// merge, so a datagram with several frames is written piece after piece, and each piece keeps its
 /// objects for the next time.
 struct DataWriter::Pieces {
-  pb::Datagram head, state, force, control, ack, bye, report;
+  pb::Datagram head, state, force, control, ack, bye, report, device_report, peer_report;
   pb::Frame& state_frame = *state.add_frames();
   pb::Frame& force_frame = *force.add_frames();
   pb::Frame& control_frame = *control.add_frames();
   pb::Frame& ack_frame = *ack.add_frames();
   pb::Frame& bye_frame = *bye.add_frames();
   pb::Frame& report_frame = *report.add_frames();
+  pb::Frame& device_report_frame = *device_report.add_frames();
+  pb::Frame& peer_report_frame = *peer_report.add_frames();
 };
 
 DataWriter::DataWriter() : pieces_(std::make_unique<Pieces>()) {}
@@ -801,6 +874,14 @@ bool DataWriter::add(const LinkReport& report) {
   write(report, *pieces_->report_frame.mutable_report());
   return append(pieces_->report);
 }
+bool DataWriter::add(const DeviceReport& report) {
+  write(report, *pieces_->device_report_frame.mutable_device_report());
+  return append(pieces_->device_report);
+}
+bool DataWriter::add(const PeerReport& report) {
+  write(report, *pieces_->peer_report_frame.mutable_peer_report());
+  return append(pieces_->peer_report);
+}
 
 /// Parsed objects live in an arena whose first block is ours: no heap for a state or a force, and one
 /// `Reset` frees what a hostile datagram made of its 1200 bytes.
@@ -850,6 +931,12 @@ const DataContent* DataReader::read(std::span<const std::byte> body) {
         break;
       case pb::Frame::kReport:
         take<LinkReport>(frame.report(), content);
+        break;
+      case pb::Frame::kDeviceReport:
+        take<DeviceReport>(frame.device_report(), content);
+        break;
+      case pb::Frame::kPeerReport:
+        take<PeerReport>(frame.peer_report(), content);
         break;
       case pb::Frame::BODY_NOT_SET:
         break;  // a frame of a newer peer

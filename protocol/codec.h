@@ -90,7 +90,7 @@ struct Bye {
 /// (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
 
-using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport>;
+using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport>;
 
 /// Writes one Data datagram after the other, in the clear. Keeps its protobuf objects: after the first of
 /// its kind, a state or a force costs no heap call (a request, or a long text, does).
@@ -117,6 +117,8 @@ class DataWriter {
   bool add(const ControlAck& ack);
   bool add(const Bye& bye);
   bool add(const LinkReport& report);
+  bool add(const DeviceReport& report);
+  bool add(const PeerReport& report);
 
   std::size_t size() const noexcept { return size_; }
 

@@ -58,6 +58,12 @@ inline constexpr int kMaxFeatures = 16;
 /// One sentence: the reason of a refusal, an answer or a Bye.
 inline constexpr std::size_t kMaxDetail = 128;
 
+/// Buckets of the histogram of a loop's lateness, by powers of two of a microsecond: the last but one ends at 4.2 s,
+/// beyond every safe stop.
+inline constexpr std::size_t kLatenessBuckets = 24;
+/// The rarest that a state is sent to a guest, one in so many: fifty times beyond what RateAdaptation does.
+inline constexpr std::uint32_t kMaxOneIn = 1000;
+
 /// Haptic steps per second: ten times beyond the fastest loop known to us (100 kHz, on FPGAs).
 inline constexpr std::uint32_t kMaxLoopHz = 1'000'000;
 

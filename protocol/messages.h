@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,6 +16,8 @@
 #include "core/mode.h"
 #include "core/motion.h"
 #include "core/remote_force.h"
+#include "core/time.h"
+#include "protocol/limits.h"
 
 // What peers say to each other, as plain values. tendon.proto holds the same nouns as bytes, WIRE.md
 // the bytes around them; codec.h turns one into the other and is the only place that knows protobuf.
@@ -58,6 +64,9 @@ struct DeviceState {
   Mode mode = Mode::kIdle;
   std::uint32_t device = 0;
   std::uint32_t channel = 0;  ///< of the force that `force_sequence`, `force_age` and `mode` are about
+  /// N, what the engines ask for at this step, after hold or local model and before any limit. Only to an observer that
+  /// named kFeatureDiagnostics; empty: not told.
+  std::optional<Vec3> force_wanted{};
 };
 
 /// Client → server, unreliable, newest wins for each device and channel: the force that the physics engine wants.
@@ -104,6 +113,58 @@ struct LinkReport {
   std::uint64_t reordered = 0;
   std::uint64_t duplicated = 0;
   std::string words;  ///< why forces were late, for people; empty when none was. At most 128 bytes
+};
+
+/// Where a device stands between the plug and the force. Part of the wire: never renumber.
+enum class Safety : std::uint8_t {
+  kAbsent = 1,     ///< not plugged in
+  kOpening = 2,    ///< being opened
+  kFirmware = 3,   ///< has, or is being given, no firmware yet
+  kUnhomed = 4,    ///< does not know where it is yet
+  kHomed = 5,      ///< ready, and waiting to be armed
+  kArmed = 6,      ///< gives forces
+  kFault = 7,      ///< was armed, and something happened: no force until it is armed again
+  kUnguarded = 8,  ///< ready; its scene lists no safety layer, so that there is nothing to arm
+};
+
+/// How late a loop woke, in steps: [0] at most 1 µs after they were due, [i] later than 2^(i−1) µs and at most 2^i µs,
+/// the last all that were later still.
+using LatenessHistogram = std::array<std::uint64_t, limits::kLatenessBuckets>;
+
+/// The bucket that counts a step `late` after it was due.
+constexpr std::size_t lateness_bucket(Duration late) noexcept {
+  const std::int64_t us = late.count() <= 0 ? 0 : (late.count() - 1) / 1000;  // whole ones below it: 2 µs is not later
+  const auto bucket = static_cast<std::size_t>(std::bit_width(static_cast<std::uint64_t>(us)));
+  return std::min(bucket, limits::kLatenessBuckets - 1);
+}
+
+/// Server → client, unreliable, newest wins for each device: how its loop does. Once a second, to an observer of it
+/// that named kFeatureDiagnostics. Numbers of things are of the time that it tells of.
+struct DeviceReport {
+  std::uint64_t number = 0;  ///< 1, 2, 3 … of the device
+  PeerTime until{};          ///< end of the time it tells of, server clock
+  Duration span{};           ///< … and its length
+  std::uint32_t device = 0;
+  std::uint64_t steps = 0;     ///< haptic steps
+  std::uint64_t missed = 0;    ///< periods without a step, because the one before came so late
+  std::uint64_t overruns = 0;  ///< steps so long after the one before that it is a reason (Reason::kOverrun)
+  std::uint64_t unseen = 0;    ///< steps in which the device gave no position
+  /// Together at most `steps`, and fewer only where the server lost count of some.
+  LatenessHistogram lateness{};
+  Safety safety = Safety::kAbsent;
+  std::string fault{};     ///< why it gives no force until it is armed or rearmed; empty: no fault. At most 128 bytes
+  std::string degraded{};  ///< what the server does less of at present; empty: nothing. At most 128 bytes
+};
+
+/// Server → client, unreliable, newest wins for each device and channel: how the engine does whose forces a channel
+/// takes. Once a second, to an observer of the device that named kFeatureDiagnostics.
+struct PeerReport {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+  std::string name{};              ///< of the engine; at most 64 bytes
+  std::uint32_t state_one_in = 1;  ///< of the states that it wants, it is sent one in so many: its way is full
+  bool forces_refused = false;     ///< its forces are not taken: its way loses too much
+  LinkReport link{};               ///< `number`: 1, 2, 3 … of the channel; the forces are the channel's
 };
 
 /// Client → server, reliable: how many states of a device per second this client wants. The server sends
@@ -183,6 +244,10 @@ struct DeviceDescription {
 inline constexpr std::string_view kFeatureLocalModel = "local-model";
 /// A feature: the client claims devices and channels by name, and can be told that it has lost a lease.
 inline constexpr std::string_view kFeatureChannels = "channels";
+
+/// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,
+/// PeerReport). A controller that names it is not granted it.
+inline constexpr std::string_view kFeatureDiagnostics = "diagnostics";
 
 /// What a client wants of a server: a device, and of a controller a channel of it, by their names.
 struct Claim {

@@ -16,8 +16,9 @@
 namespace tendon {
 namespace {
 
-/// Of each stream, a device's states or a channel's forces, the newest value. Takes memory at a stream's first value
-/// only; their number is bounded by the codec: kMaxDevices, and kMaxDevices · kMaxChannels.
+/// Of each stream, a device's states and reports or a channel's, the newest value. Takes memory at a stream's first
+/// value only (and for a report's text); their number is bounded by the codec: kMaxDevices, and kMaxDevices ·
+/// kMaxChannels.
 template <class Value>
 class Newest {
  public:
@@ -57,9 +58,8 @@ class Newest {
   };
 
   static bool same(const DeviceState& a, const DeviceState& b) noexcept { return a.device == b.device; }
-  static bool same(const ForceCommand& a, const ForceCommand& b) noexcept {
-    return a.device == b.device && a.channel == b.channel;
-  }
+  static bool same(const DeviceReport& a, const DeviceReport& b) noexcept { return a.device == b.device; }
+  static bool same(const auto& a, const auto& b) noexcept { return a.device == b.device && a.channel == b.channel; }
   typename std::vector<Stream>::const_iterator next_waiting() const noexcept {
     return std::find_if(streams_.begin(), streams_.end(), [](const Stream& s) { return s.waiting; });
   }
@@ -102,6 +102,8 @@ struct Session::State {
   Newest<DeviceState> states_to_send;
   Newest<ForceCommand> forces_to_send;
   std::optional<LinkReport> report_to_send;
+  Newest<DeviceReport> device_reports_to_send;
+  Newest<PeerReport> peer_reports_to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -122,6 +124,8 @@ struct Session::State {
   Newest<DeviceState> states_arrived;
   Newest<ForceCommand> forces_arrived;
   std::optional<LinkReport> report_arrived;
+  Newest<DeviceReport> device_reports_arrived;
+  Newest<PeerReport> peer_reports_arrived;
   std::optional<Closed> closed;
 
   Suite suite() const noexcept { return sealer ? Suite::kNoise : Suite::kPlain; }
@@ -134,14 +138,20 @@ struct Session::State {
   void take(const DeviceState& state) { stats.stale += states_arrived.put_if_newer(state, state.tick) ? 0 : 1; }
   void take(const ForceCommand& force) { stats.stale += forces_arrived.put_if_newer(force, force.sequence) ? 0 : 1; }
   void take(const LinkReport& report);
+  void take(const DeviceReport& report) {
+    stats.stale += device_reports_arrived.put_if_newer(report, report.number) ? 0 : 1;
+  }
+  void take(const PeerReport& report) {
+    stats.stale += peer_reports_arrived.put_if_newer(report, report.link.number) ? 0 : 1;
+  }
   void take(const Control& control) { stats.invalid += answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
   bool something_to_say(LocalTime now) const noexcept {
-    return !states_to_send.empty() || !forces_to_send.empty() || report_to_send || answering.next_due() ||
-           asked.next_due(now) || silent_too_long(now);
+    return !states_to_send.empty() || !forces_to_send.empty() || report_to_send || !device_reports_to_send.empty() ||
+           !peer_reports_to_send.empty() || answering.next_due() || asked.next_due(now) || silent_too_long(now);
   }
   bool too_old(LocalTime now) const noexcept {
     return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams);
@@ -289,6 +299,10 @@ void Session::send(const ForceCommand& command) { state_->forces_to_send.put(com
 
 void Session::send(const LinkReport& report) { state_->report_to_send = report; }
 
+void Session::send(const DeviceReport& report) { state_->device_reports_to_send.put(report); }
+
+void Session::send(const PeerReport& report) { state_->peer_reports_to_send.put(report); }
+
 std::optional<std::uint32_t> Session::request(const Request& request) { return state_->asked.add(request); }
 
 void Session::answer(std::uint32_t id, Code code, std::string detail, Duration wait) {
@@ -357,6 +371,8 @@ void Session::State::fill(LocalTime now) {
     asked.sent(due->id, now, timeout);
   }
   if (report_to_send && writer.add(*report_to_send)) report_to_send.reset();
+  while (device_reports_to_send.first() && writer.add(*device_reports_to_send.first())) device_reports_to_send.take();
+  while (peer_reports_to_send.first() && writer.add(*peer_reports_to_send.first())) peer_reports_to_send.take();
 }
 
 std::size_t Session::next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer) {
@@ -386,6 +402,8 @@ std::optional<Session::Event> Session::next_event() {
   }
   if (!my.forces_arrived.empty()) return ForceArrived{.command = my.forces_arrived.take()};
   if (my.report_arrived) return ReportArrived{.report = *std::exchange(my.report_arrived, std::nullopt)};
+  if (!my.device_reports_arrived.empty()) return DeviceReportArrived{.report = my.device_reports_arrived.take()};
+  if (!my.peer_reports_arrived.empty()) return PeerReportArrived{.report = my.peer_reports_arrived.take()};
   if (!my.states_arrived.empty()) return StateArrived{.state = my.states_arrived.take()};
   if (my.closed) return *std::exchange(my.closed, std::nullopt);
   return {};

@@ -43,7 +43,7 @@ struct LinkStats {
 /// One open conversation between a client and a server, seen from either end: bytes and instants in,
 /// bytes and events out (sans-I/O, pull). It has no socket, clock, thread or randomness of its own.
 ///
-/// * State, force and report are unreliable and newest-wins, states and forces of each device and channel by
+/// * State, force and the reports are unreliable and newest-wins, those of each device and channel by
 ///   themselves: `send` replaces what has not left yet, and a received one older than the newest is dropped and
 ///   counted.
 /// * Requests are reliable and in order: resent until answered. Between requests, states and forces no
@@ -51,9 +51,9 @@ struct LinkStats {
 /// * Every datagram carries tx_time and an Echo, so each gives a round trip and an ack vector.
 /// * Silence is filled with keep-alives and, when too long, ends the conversation.
 ///
-/// Nothing queues without a bound: there is room for one state of each device, one force of each channel, one report
-/// and limits::kRequestWindow requests each way; an event that was not taken out is replaced by a newer one of its
-/// kind.
+/// Nothing queues without a bound: there is room for one state and one report of each device, one force and one report
+/// of each channel, one report of the link and limits::kRequestWindow requests each way; an event that was not taken
+/// out is replaced by a newer one of its kind.
 ///
 /// SESSION.md describes the behaviour over time, WIRE.md the bytes.
 ///
@@ -101,6 +101,12 @@ class Session {
   struct ReportArrived {
     LinkReport report;
   };
+  struct DeviceReportArrived {
+    DeviceReport report;
+  };
+  struct PeerReportArrived {
+    PeerReport report;
+  };
   struct RequestArrived {
     std::uint32_t id;
     Request request;
@@ -116,7 +122,8 @@ class Session {
     Code code;  ///< as the peer said Bye: kOk, kShutdown …; kTimedOut: it fell silent; kExpired: too old
     std::string reason;
   };
-  using Event = std::variant<StateArrived, ForceArrived, ReportArrived, RequestArrived, RequestAnswered, Closed>;
+  using Event = std::variant<StateArrived, ForceArrived, ReportArrived, DeviceReportArrived, PeerReportArrived,
+                             RequestArrived, RequestAnswered, Closed>;
 
   // In.
   /// Takes any bytes. What is not a good datagram of this conversation is counted and dropped. True when
@@ -126,6 +133,8 @@ class Session {
   void send(const DeviceState& state);
   void send(const ForceCommand& command);
   void send(const LinkReport& report);
+  void send(const DeviceReport& report);
+  void send(const PeerReport& report);
   /// Queues a reliable request and returns its id; empty when limits::kRequestWindow are open, that is
   /// sent and their RequestAnswered not yet taken out.
   std::optional<std::uint32_t> request(const Request& request);

@@ -86,6 +86,7 @@ void print(Line& line, const DeviceState& state) {
   line << "state" << state.tick << state.sampled.time_since_epoch() << state.position << state.velocity
        << state.force_applied << state.energy << state.permitted_force << state.reasons << state.force_sequence
        << state.force_age << state.mode;
+  if (state.force_wanted) line << "wanted" << *state.force_wanted;
 }
 
 void print(Line& line, const LocalModel& model) {
@@ -143,6 +144,20 @@ void print(Line& line, const LinkReport& report) {
   line << report.clock_offset << report.clock_drift_ppm << report.clock_error << report.received << report.lost
        << report.reordered << report.duplicated;
   line.put_text(report.words);
+}
+
+void print(Line& line, const DeviceReport& report) {
+  line << "device" << report.number << report.until.time_since_epoch() << report.span << report.device << report.steps
+       << report.missed << report.overruns << report.unseen;
+  for (const std::uint64_t count : report.lateness) line << count;
+  line << report.safety;
+  line.put_text(report.fault).put_text(report.degraded);
+}
+
+void print(Line& line, const PeerReport& report) {
+  line << "peer" << report.device << report.channel;
+  line.put_text(report.name) << report.state_one_in << std::uint32_t{report.forces_refused};
+  print(line, report.link);
 }
 
 void print(Line& line, const Welcome& welcome) {

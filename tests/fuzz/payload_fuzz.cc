@@ -32,6 +32,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       fuzz::require(in_bounds(force->command) && force->command.valid_for > Duration::zero());
     } else if (const auto* state = std::get_if<Session::StateArrived>(&*event)) {
       fuzz::require(state->state.position.allFinite() && state->state.velocity.allFinite());
+      fuzz::require(!state->state.force_wanted || state->state.force_wanted->allFinite());
+    } else if (const auto* device = std::get_if<Session::DeviceReportArrived>(&*event)) {
+      std::uint64_t uncounted = device->report.steps;
+      for (const std::uint64_t count : device->report.lateness) {
+        fuzz::require(count <= uncounted);
+        uncounted -= count;
+      }
+      fuzz::require(device->report.number > 0 && device->report.fault.size() <= limits::kMaxDetail);
+    } else if (const auto* peer_report = std::get_if<Session::PeerReportArrived>(&*event)) {
+      fuzz::require(peer_report->report.state_one_in > 0 && peer_report->report.link.number > 0);
+      fuzz::require(peer_report->report.name.size() <= limits::kMaxName);
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
       session.answer(request->id, Code::kOk, {});
     }

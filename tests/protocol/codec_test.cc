@@ -68,12 +68,14 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   in.mode = static_cast<Mode>(*rc::gen::inRange(1, 7));
   in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
   in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
+  if (*rc::gen::arbitrary<bool>()) in.force_wanted = any_vector();
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
   RC_ASSERT(content != nullptr);
   RC_ASSERT(content->frames.size() == 1U);
   const auto& out = std::get<DeviceState>(content->frames[0]);
+  RC_ASSERT(out.force_wanted == in.force_wanted);
   RC_ASSERT(out.tick == in.tick);
   RC_ASSERT((out.sampled == in.sampled));
   RC_ASSERT(out.position == in.position);
@@ -154,14 +156,13 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
 
 Duration any_length() { return Duration{*rc::gen::inRange<std::int64_t>(0, limits::kMaxTime.count())}; }
 
-RC_GTEST_PROP(Codec, AReportComesOutAsItWentIn, ()) {
+std::string any_text(std::size_t limit) { return std::string(*rc::gen::inRange<std::size_t>(0, limit + 1), 'w'); }
+
+LinkReport any_report() {
   const auto any_delays = []() -> std::optional<Delays> {
     if (*rc::gen::arbitrary<bool>()) return {};
     const Duration median = any_time();
     return Delays{median, any_time()};
-  };
-  const auto same = [](const std::optional<Delays>& a, const std::optional<Delays>& b) {
-    return a.has_value() == b.has_value() && (!a || (a->median == b->median && a->p99 == b->p99));
   };
   LinkReport in;
   in.number = *rc::gen::inRange<std::uint64_t>(1, ~std::uint64_t{0});
@@ -183,13 +184,14 @@ RC_GTEST_PROP(Codec, AReportComesOutAsItWentIn, ()) {
   in.lost = *rc::gen::arbitrary<std::uint64_t>();
   in.reordered = *rc::gen::arbitrary<std::uint64_t>();
   in.duplicated = *rc::gen::arbitrary<std::uint64_t>();
-  in.words = std::string(*rc::gen::inRange<std::size_t>(0, limits::kMaxDetail + 1), 'w');
+  in.words = any_text(limits::kMaxDetail);
+  return in;
+}
 
-  DataReader reader;
-  const DataContent* content = read(reader, data(1, {}, in));
-  RC_ASSERT(content != nullptr);
-  RC_ASSERT(content->frames.size() == 1U);
-  const auto& out = std::get<LinkReport>(content->frames[0]);
+void assert_same(const LinkReport& out, const LinkReport& in) {
+  const auto same = [](const std::optional<Delays>& a, const std::optional<Delays>& b) {
+    return a.has_value() == b.has_value() && (!a || (a->median == b->median && a->p99 == b->p99));
+  };
   RC_ASSERT(out.number == in.number);
   RC_ASSERT((out.until == in.until));
   RC_ASSERT((out.span == in.span && out.worst_late == in.worst_late && out.longest_gap == in.longest_gap));
@@ -207,6 +209,72 @@ RC_GTEST_PROP(Codec, AReportComesOutAsItWentIn, ()) {
   RC_ASSERT(out.reordered == in.reordered);
   RC_ASSERT(out.duplicated == in.duplicated);
   RC_ASSERT(out.words == in.words);
+}
+
+/// As it is after a way there; `in` is the only frame.
+template <class Message>
+Message there(const Message& in) {
+  DataReader reader;
+  const DataContent* content = read(reader, data(1, {}, in));
+  RC_ASSERT(content != nullptr);
+  RC_ASSERT(content->frames.size() == 1U);
+  return std::get<Message>(content->frames[0]);
+}
+
+RC_GTEST_PROP(Codec, AReportComesOutAsItWentIn, ()) {
+  const LinkReport in = any_report();
+  assert_same(there(in), in);
+}
+
+RC_GTEST_PROP(Codec, AReportOnADeviceComesOutAsItWentIn, ()) {
+  DeviceReport in;
+  in.number = *rc::gen::inRange<std::uint64_t>(1, ~std::uint64_t{0});
+  in.until = PeerTime{any_time()};
+  in.span = any_length();
+  in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  in.missed = *rc::gen::arbitrary<std::uint64_t>();
+  const auto buckets = *rc::gen::inRange<std::size_t>(0, limits::kLatenessBuckets + 1);
+  for (std::size_t i = 0; i < buckets; ++i) {
+    in.lateness[i] = *rc::gen::inRange<std::uint64_t>(0, std::uint64_t{1} << 59);  // 24 of them stay below 2^64
+    in.steps += in.lateness[i];
+  }
+  in.steps += *rc::gen::inRange<std::uint64_t>(0, 1000);
+  in.overruns = *rc::gen::inRange<std::uint64_t>(0, in.steps + 1);
+  in.unseen = *rc::gen::inRange<std::uint64_t>(0, in.steps + 1);
+  in.safety = static_cast<Safety>(*rc::gen::inRange(1, 9));
+  in.fault = any_text(limits::kMaxDetail);
+  in.degraded = any_text(limits::kMaxDetail);
+
+  const DeviceReport out = there(in);
+  RC_ASSERT(out.number == in.number);
+  RC_ASSERT((out.until == in.until && out.span == in.span));
+  RC_ASSERT(out.device == in.device);
+  RC_ASSERT(out.steps == in.steps);
+  RC_ASSERT(out.missed == in.missed);
+  RC_ASSERT(out.overruns == in.overruns);
+  RC_ASSERT(out.unseen == in.unseen);
+  RC_ASSERT(out.lateness == in.lateness);
+  RC_ASSERT((out.safety == in.safety));
+  RC_ASSERT(out.fault == in.fault);
+  RC_ASSERT(out.degraded == in.degraded);
+}
+
+RC_GTEST_PROP(Codec, AReportOnAnEngineComesOutAsItWentIn, ()) {
+  PeerReport in;
+  in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
+  in.name = any_text(limits::kMaxName);
+  in.state_one_in = *rc::gen::inRange(1U, limits::kMaxOneIn + 1);
+  in.forces_refused = *rc::gen::arbitrary<bool>();
+  in.link = any_report();
+
+  const PeerReport out = there(in);
+  RC_ASSERT(out.device == in.device);
+  RC_ASSERT(out.channel == in.channel);
+  RC_ASSERT(out.name == in.name);
+  RC_ASSERT(out.state_one_in == in.state_one_in);
+  RC_ASSERT(out.forces_refused == in.forces_refused);
+  assert_same(out.link, in.link);
 }
 
 TEST(Codec, SeveralFramesAndAnEchoShareOneDatagram) {
@@ -244,6 +312,80 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastDatagram) {
   EXPECT_FALSE(std::get<ForceCommand>(content->frames[0]).model.has_value());
 }
 
+TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {
+  DataWriter writer;
+  DataReader reader;
+  std::array<std::byte, kMaxDatagram> buffer;
+  writer.begin(buffer, {.connection_id = 1}, LocalTime{}, {});
+  writer.add(examples::state_with_wanted());
+  writer.add(examples::device_report());
+  writer.add(examples::peer_report());
+  writer.begin(buffer, {.connection_id = 1, .packet_number = 1}, LocalTime{}, {});
+  writer.add(examples::state());
+  writer.add(DeviceReport{.number = 8});
+  PeerReport quiet;
+  quiet.link.number = 1;
+  writer.add(quiet);
+  const auto* content = reader.read(std::span(buffer).first(writer.size()).subspan(kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 3U);
+  EXPECT_FALSE(std::get<DeviceState>(content->frames[0]).force_wanted.has_value());
+  const auto& device = std::get<DeviceReport>(content->frames[1]);
+  EXPECT_EQ(device.lateness, LatenessHistogram{});
+  EXPECT_EQ(device.fault + device.degraded, "");
+  const auto& peer = std::get<PeerReport>(content->frames[2]);
+  EXPECT_FALSE(peer.forces_refused);
+  EXPECT_FALSE(peer.link.round_trip.has_value());
+  EXPECT_EQ(peer.name + peer.link.words, "");
+}
+
+TEST(Codec, TheLargestReportsFitIntoASealedDatagramOfTheirOwn) {
+  constexpr std::uint64_t kMost = ~std::uint64_t{0};
+  LinkReport link;
+  link.number = link.forces = link.late_server = link.late_network = link.late_engine = kMost;
+  link.until = PeerTime{limits::kMaxTime};
+  link.span = link.worst_late = link.longest_gap = limits::kMaxTime;
+  link.round_trip = link.to_server = link.to_client = Delays{-limits::kMaxTime, -limits::kMaxTime};
+  link.clock_offset = -limits::kMaxTime;
+  link.clock_drift_ppm = 0.1;
+  link.clock_error = limits::kMaxTime;
+  link.received = link.lost = link.reordered = link.duplicated = kMost;
+  link.words.assign(limits::kMaxDetail, 'w');
+  const PeerReport peer{.device = limits::kMaxDevices - 1,
+                        .channel = limits::kMaxChannels - 1,
+                        .name = std::string(limits::kMaxName, 'n'),
+                        .state_one_in = limits::kMaxOneIn,
+                        .forces_refused = true,
+                        .link = link};
+  DeviceReport device{.number = kMost,
+                      .until = PeerTime{limits::kMaxTime},
+                      .span = limits::kMaxTime,
+                      .device = limits::kMaxDevices - 1,
+                      .steps = kMost,
+                      .missed = kMost,
+                      .overruns = kMost,
+                      .unseen = kMost};
+  device.lateness.fill(kMost / limits::kLatenessBuckets);
+  device.safety = Safety::kUnguarded;
+  device.fault.assign(limits::kMaxDetail, 'f');
+  device.degraded.assign(limits::kMaxDetail, 'd');
+
+  const OutgoingEcho echo{.sent = PeerTime{limits::kMaxTime},
+                          .received = LocalTime{limits::kMaxTime},
+                          .packet_number = limits::kMaxPacketNumber,
+                          .received_mask = 1};
+  DataWriter writer;
+  std::array<std::byte, kMaxDatagram - 16> buffer;
+  for (const bool of_device : {true, false}) {
+    writer.begin(buffer, {.connection_id = 1}, LocalTime{limits::kMaxTime}, echo);
+    EXPECT_TRUE(of_device ? writer.add(device) : writer.add(peer));
+    DataReader reader;
+    const auto* content = reader.read(std::span(buffer).first(writer.size()).subspan(kHeaderSize));
+    ASSERT_NE(content, nullptr);
+    EXPECT_EQ(content->frames.size(), 1U);
+  }
+}
+
 TEST(Codec, AFrameThatDoesNotFitLeavesTheDatagramAsItWas) {
   DataWriter writer;
   DataReader reader;
@@ -276,6 +418,7 @@ TEST(Codec, AStateOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"negative age", [](DeviceState& s) { s.force_age = Duration{-1}; }},
       {"mode 0", [](DeviceState& s) { s.mode = Mode{0}; }},
       {"mode 7", [](DeviceState& s) { s.mode = Mode{7}; }},
+      {"NaN wanted", [](DeviceState& s) { s.force_wanted = Vec3(0, 0, kNan); }},
   };
   for (const BadState& bad : cases) {
     DeviceState state = examples::state();
@@ -370,6 +513,109 @@ TEST(Codec, AReportOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   EXPECT_EQ(read(reader, data(1, {}, wordy))->frames.size(), 1U);
   const RawProtobuf report = RawProtobuf().varint(1, 1).text(20, wordy.words);
   EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(6, report)))->invalid, 1U);
+}
+
+/// `report` is left out and counted, and the state beside it is read.
+void expect_left_out(const auto& report, const std::string& what) {
+  DataReader reader;
+  const auto* content = read(reader, data(1, {}, report, examples::state()));
+  ASSERT_NE(content, nullptr) << what;
+  EXPECT_EQ(content->invalid, 1U) << what;
+  ASSERT_EQ(content->frames.size(), 1U) << what;
+  EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << what;
+}
+
+/// How many of frames with `report` in field `field` are read: 0 or 1.
+std::size_t read_raw(unsigned field, const RawProtobuf& report) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(RawProtobuf().message(field, report)));
+  if (content == nullptr) return 99;
+  EXPECT_EQ(content->frames.size() + content->invalid, 1U);
+  return content->frames.size();
+}
+
+struct BadDeviceReport {
+  const char* what;
+  void (*spoil)(DeviceReport&);
+};
+
+TEST(Codec, AReportOnADeviceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadDeviceReport cases[] = {
+      {"number 0", [](DeviceReport& r) { r.number = 0; }},
+      {"from beyond all clocks", [](DeviceReport& r) { r.until = PeerTime{limits::kMaxTime + Duration{1}}; }},
+      {"a span below zero", [](DeviceReport& r) { r.span = Duration{-1}; }},
+      {"an endless span", [](DeviceReport& r) { r.span = limits::kMaxTime + Duration{1}; }},
+      {"device 16", [](DeviceReport& r) { r.device = limits::kMaxDevices; }},
+      {"more late steps than steps", [](DeviceReport& r) { r.steps = 986; }},
+      {"counts that overflow", [](DeviceReport& r) { r.lateness[1] = r.lateness[2] = std::uint64_t{1} << 63; }},
+      {"more overruns than steps", [](DeviceReport& r) { r.overruns = r.steps + 1; }},
+      {"more unseen than steps", [](DeviceReport& r) { r.unseen = r.steps + 1; }},
+      {"safety 0", [](DeviceReport& r) { r.safety = Safety{0}; }},
+      {"safety 9", [](DeviceReport& r) { r.safety = Safety{9}; }},
+  };
+  for (const BadDeviceReport& bad : cases) {
+    DeviceReport report = examples::device_report();
+    bad.spoil(report);
+    expect_left_out(report, bad.what);
+  }
+  const auto good = [] { return RawProtobuf().varint(1, 1).varint(10, 6); };
+  const std::string wordy(limits::kMaxDetail + 1, 'w');  // ours are cut; a stranger's are refused
+  EXPECT_EQ(there(DeviceReport{.number = 1, .fault = wordy, .degraded = wordy}).degraded.size(), limits::kMaxDetail);
+  EXPECT_EQ(read_raw(7, good()), 1U);
+  EXPECT_EQ(read_raw(7, good().text(11, wordy)), 0U);
+  EXPECT_EQ(read_raw(7, good().text(12, wordy)), 0U);
+  EXPECT_EQ(read_raw(7, RawProtobuf().varint(1, 1)), 0U) << "no safety";
+  const std::string zeros(limits::kLatenessBuckets, '\0');  // each byte is an entry
+  EXPECT_EQ(read_raw(7, good().text(9, zeros)), 1U);
+  EXPECT_EQ(read_raw(7, good().text(9, zeros + '\0')), 0U) << "25 buckets";
+}
+
+TEST(Codec, ZerosAtTheEndOfAHistogramDoNotTravel) {
+  DeviceReport report = examples::device_report();
+  const std::size_t before = data(1, {}, report).size();
+  std::swap(report.lateness[13], report.lateness[12]);
+  EXPECT_EQ(data(1, {}, report).size(), before - 1);
+  report.lateness = {};
+  EXPECT_EQ(data(1, {}, report).size(), before - 2 - 15);  // key and length, 14 entries, one of two bytes
+}
+
+TEST(Codec, ABucketEndsWithItsPowerOfTwo) {
+  using std::chrono::microseconds;
+  EXPECT_EQ(lateness_bucket(-std::chrono::seconds(1)), 0U);
+  EXPECT_EQ(lateness_bucket(Duration{0}), 0U);
+  EXPECT_EQ(lateness_bucket(microseconds(1)), 0U);
+  EXPECT_EQ(lateness_bucket(microseconds(1) + Duration{1}), 1U);
+  for (std::size_t i = 1; i + 1 < limits::kLatenessBuckets; ++i) {
+    const Duration end = microseconds(std::int64_t{1} << i);
+    EXPECT_EQ(lateness_bucket(end), i);
+    EXPECT_EQ(lateness_bucket(end + Duration{1}), i + 1);
+  }
+  EXPECT_EQ(lateness_bucket(Duration::max()), limits::kLatenessBuckets - 1);
+}
+
+struct BadPeerReport {
+  const char* what;
+  void (*spoil)(PeerReport&);
+};
+
+TEST(Codec, AReportOnAnEngineOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadPeerReport cases[] = {
+      {"device 16", [](PeerReport& r) { r.device = limits::kMaxDevices; }},
+      {"channel 8", [](PeerReport& r) { r.channel = limits::kMaxChannels; }},
+      {"one state in none", [](PeerReport& r) { r.state_one_in = 0; }},
+      {"one state in 1001", [](PeerReport& r) { r.state_one_in = limits::kMaxOneIn + 1; }},
+      {"a link out of bounds", [](PeerReport& r) { r.link.number = 0; }},
+      {"NaN drift", [](PeerReport& r) { r.link.clock_drift_ppm = kNan; }},
+  };
+  for (const BadPeerReport& bad : cases) {
+    PeerReport report = examples::peer_report();
+    bad.spoil(report);
+    expect_left_out(report, bad.what);
+  }
+  const auto good = [] { return RawProtobuf().varint(4, 1).message(6, RawProtobuf().varint(1, 1)); };
+  EXPECT_EQ(read_raw(8, good()), 1U);
+  EXPECT_EQ(read_raw(8, good().text(3, std::string(limits::kMaxName + 1, 'n'))), 0U);
+  EXPECT_EQ(read_raw(8, RawProtobuf().varint(4, 1)), 0U) << "no link";
 }
 
 TEST(Codec, ADeadbandThatIsNoNumberIsLeftOutAndOneThatMakesNoSenseIsForTheServerToRefuse) {

@@ -95,6 +95,38 @@ inline LinkReport report() {
           .words = "forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)"};
 }
 
+// To an observer that named the feature "diagnostics".
+
+/// Four times as much is wanted as is given.
+inline DeviceState state_with_wanted() {
+  DeviceState diagnosed = state();
+  diagnosed.force_wanted = Vec3(-8, 0, 0.5);
+  return diagnosed;
+}
+
+/// It was armed and has tripped; three of its steps were not counted.
+inline DeviceReport device_report() {
+  DeviceReport report{.number = 7,
+                      .until = PeerTime{Duration{1'000'000'000}},
+                      .span = Duration{1'000'000'000},
+                      .device = 1,
+                      .steps = 990,
+                      .missed = 10,
+                      .overruns = 2,
+                      .unseen = 1};
+  report.lateness[0] = 3;
+  report.lateness[6] = 981;  // up to 64 µs
+  report.lateness[13] = 3;   // up to 8.2 ms
+  report.safety = Safety::kFault;
+  report.fault = "the handle was faster than a hand";
+  report.degraded = "the log thread does not follow";
+  return report;
+}
+
+inline PeerReport peer_report() {
+  return {.device = 1, .channel = 1, .name = "wall", .state_one_in = 4, .forces_refused = true, .link = report()};
+}
+
 inline Hello hello() {
   return {.version_min = 1, .version_max = 1, .role = Role::kController, .name = "wall", .features = {"local-model"}};
 }
@@ -245,6 +277,9 @@ inline std::vector<Named> datagrams() {
       {"report", data(57, {}, report())},
       {"state-deadband", data(58, {}, state_deadband())},
       {"force-with-all", data(59, {}, force_with_all())},
+      {"state-wanted", data(60, {}, state_with_wanted())},
+      {"device-report", data(61, {}, device_report())},
+      {"peer-report", data(62, {}, peer_report())},
   };
 }
 

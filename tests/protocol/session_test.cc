@@ -188,6 +188,62 @@ TEST_F(TwoEnds, AReportIsNewestWinsAsWellAndGoesBesideAState) {
   EXPECT_EQ(a_.stats().stale, 1U);
 }
 
+TEST_F(TwoEnds, ReportsOnDevicesAndEnginesAreNewestWinsEachForItself) {
+  const auto of_device = [](std::uint32_t device, std::uint64_t number) {
+    DeviceReport report = examples::device_report();
+    report.device = device;
+    report.number = number;
+    return report;
+  };
+  const auto of_channel = [](std::uint32_t channel, std::uint64_t number) {
+    PeerReport report = examples::peer_report();
+    report.channel = channel;
+    report.link.number = number;
+    return report;
+  };
+  z_.send(of_device(0, 1));
+  z_.send(of_device(1, 1));
+  z_.send(of_device(0, 2));
+  z_.send(of_channel(0, 1));
+  z_.send(of_channel(1, 5));
+  deliver(a_, now_, pull(z_, now_));
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_a.size(), 4U);
+  EXPECT_EQ(std::get<Session::DeviceReportArrived>(at_a[0]).report.number, 2U);
+  EXPECT_EQ(std::get<Session::DeviceReportArrived>(at_a[1]).report.device, 1U);
+  EXPECT_EQ(std::get<Session::PeerReportArrived>(at_a[2]).report.channel, 0U);
+  EXPECT_EQ(std::get<Session::PeerReportArrived>(at_a[3]).report.link.number, 5U);
+  EXPECT_EQ(a_.stats().stale, 0U);
+
+  z_.send(of_device(0, 2));
+  z_.send(of_channel(1, 4));
+  z_.send(of_channel(0, 4));  // of its channel the newest
+  deliver(a_, now_, pull(z_, now_));
+  const auto then = events(a_);
+  ASSERT_EQ(then.size(), 1U);
+  EXPECT_EQ(std::get<Session::PeerReportArrived>(then[0]).report.channel, 0U);
+  EXPECT_EQ(a_.stats().stale, 2U);
+}
+
+TEST_F(TwoEnds, ReportsOfAllDevicesAndChannelsLeaveInAsManyDatagramsAsTheyNeed) {
+  for (std::uint32_t device = 0; device < limits::kMaxDevices; ++device) {
+    DeviceReport report = examples::device_report();
+    report.device = device;
+    z_.send(report);
+    for (std::uint32_t channel = 0; channel < limits::kMaxChannels; ++channel) {
+      PeerReport peer = examples::peer_report();
+      peer.device = device;
+      peer.channel = channel;
+      z_.send(peer);
+    }
+  }
+  const auto datagrams = pull(z_, now_);
+  EXPECT_GT(datagrams.size(), 1U);
+  deliver(a_, now_, datagrams);
+  EXPECT_EQ(events(a_).size(), limits::kMaxDevices * (1 + limits::kMaxChannels));
+  EXPECT_TRUE(pull(z_, now_).empty());
+}
+
 // ---- round trip ----
 
 TEST_F(TwoEnds, TheRoundTripDoesNotCountTheTimeThatThePeerTook) {

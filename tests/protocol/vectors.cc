@@ -157,6 +157,9 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"report on a client's forces", false, 261, 0, at(261, examples::report())},
       {"deadband of states", true, 264, 0, at(264, examples::state_deadband())},
       {"force with all that it can say", true, 265, 0, at(265, examples::force_with_all())},
+      {"state with the force that is wanted", false, 266, 0, at(266, examples::state_with_wanted())},
+      {"reports on a device and on an engine", false, 267, 0,
+       at(267, examples::device_report(), examples::peer_report())},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

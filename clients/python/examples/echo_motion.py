@@ -12,7 +12,8 @@ options = cli.parser("echo_motion", __doc__, rate_hz=10).parse_args()
 def show(hand: DeviceState, link: LinkStats) -> None:
     x, f, ms = hand.position, hand.force_applied, link.smoothed_round_trip_ns / 1e6
     if options.json:
-        print(json.dumps({"tick": hand.tick, "position_m": x, "force_n": f, "round_trip_ms": ms}), flush=True)
+        line = {"tick": hand.tick, "position_m": x, "force_n": f, "force_wanted_n": hand.force_wanted, "round_trip_ms": ms}
+        print(json.dumps(line), flush=True)
     else:
         position, force = ("{:+.4f} {:+.4f} {:+.4f}".format(*x), "{:+.2f} {:+.2f} {:+.2f}".format(*f))
         print(f"tick {hand.tick}   position {position} m   force {force} N   round trip {ms:.1f} ms", flush=True)

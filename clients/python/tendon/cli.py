@@ -15,7 +15,7 @@ from .client import Client, Physics
 from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
 from .guest import RefusedForGood, log, parse_address
 from .keys import read_key
-from .messages import Delays, DeviceState, LinkReport, LinkStats, Role
+from .messages import Delays, DeviceReport, DeviceState, LinkReport, LinkStats, PeerReport, Role
 
 Watch = Callable[[DeviceState, LinkStats], None]
 """An onlooker: device state and the state of the link in, nothing out."""
@@ -90,8 +90,9 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
         1   it could not connect, or the server refused it for good
 
     stderr gets one sentence for each change of the connection, and the server's when forces were late; stdout nothing but the
-    callback's own output and, with --json, what the server says of our forces once a second, {"report":{"number":1, …}}, and the
-    summary: {"summary":{"duration_s":…, …}}. What the callback raises passes through, after a Bye.
+    callback's own output and, with --json, once a second what the server says of our forces, {"report":{"number":1, …}}, or to an
+    observer of the device's loop and its engines, {"device":{"number":1, …}} and {"peer":{"name":"wall", …}}, and the summary:
+    {"summary":{"duration_s":…, …}}. What the callback raises passes through, after a Bye.
     """
     if (physics is None) == (watch is None):
         raise TypeError("run: expected physics or watch")
@@ -104,14 +105,18 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
             role=Role.CONTROLLER if physics else Role.OBSERVER,
             key=options.key,
             rate_hz=options.rate_hz,
+            diagnostics=options.json and watch is not None,
         )
         with Client(options.server, config) as client:
             try:
                 reported: LinkReport | None = None
+                told: dict[int | None, DeviceReport | PeerReport] = {}  # by channel; None: of the device
                 for hand in client.states(options.duration_s or None):
                     if options.json and client.report is not reported:
                         reported = client.report
                         _print_report(reported)
+                    if options.json:
+                        _print_diagnoses(client.device_report, client.peer_reports, told)
                     if physics is not None:
                         client.send(hand, physics(hand))
                     elif watch is not None:
@@ -127,13 +132,43 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
 
 
 def _print_report(report: LinkReport | None) -> None:
-    if report is None:  # of a new session
-        return
+    if report is not None:  # None: of a new session
+        print(json.dumps({"report": _in_words(report)}, separators=(",", ":")), flush=True)
 
+
+def _print_diagnoses(
+    device: DeviceReport | None, peers: dict[int, PeerReport], told: dict[int | None, DeviceReport | PeerReport]
+) -> None:
+    """Those that are not in `told` yet."""
+    if device is not None and told.get(None) is not device:
+        told[None] = device
+        words: dict[str, object] = {
+            "number": device.number,
+            "span_ms": device.span_ns / 1e6,
+            "steps": device.steps,
+            "missed": device.missed,
+            "overruns": device.overruns,
+            "unseen": device.unseen,
+            "lateness_us_log2": device.lateness,
+            "safety": device.safety.name.lower(),
+            "fault": device.fault,
+            "degraded": device.degraded,
+        }
+        print(json.dumps({"device": words}, separators=(",", ":")), flush=True)
+    for channel, peer in peers.items():
+        if told.get(channel) is peer:
+            continue
+        told[channel] = peer
+        words = {"channel": channel, "name": peer.name, "state_one_in": peer.state_one_in}
+        words |= {"forces_refused": peer.forces_refused, "link": _in_words(peer.link)}
+        print(json.dumps({"peer": words}, separators=(",", ":")), flush=True)
+
+
+def _in_words(report: LinkReport) -> dict[str, object]:
     def delays(of: Delays | None) -> dict[str, float] | None:
         return None if of is None else {"median": of.median_ns / 1e6, "p99": of.p99_ns / 1e6}
 
-    told = {
+    return {
         "number": report.number,
         "forces": report.forces,
         "late_server": report.late_server,
@@ -150,7 +185,6 @@ def _print_report(report: LinkReport | None) -> None:
         "reordered": report.reordered,
         "duplicated": report.duplicated,
     }
-    print(json.dumps({"report": told}, separators=(",", ":")), flush=True)
 
 
 def _print_summary(stats: Stats, duration_s: float, as_json: bool) -> None:

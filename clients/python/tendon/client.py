@@ -11,7 +11,7 @@ from typing import Union
 
 from .force_client import Config, Stats
 from .guest import Guest
-from .messages import NEVER, DeviceState, LinkReport, Touch, Welcome
+from .messages import NEVER, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float]]]
 """The physics engine, seen from here: device state in, force (and stiffness) out."""
@@ -84,6 +84,16 @@ class Client:
     def report(self) -> LinkReport | None:
         """The server's newest word on how our forces fare, once a second while they come; None before the first."""
         return self._guest.report
+
+    @property
+    def device_report(self) -> DeviceReport | None:
+        """With Config.diagnostics, how the device's loop does, once a second; None before the first."""
+        return self._guest.device_report
+
+    @property
+    def peer_reports(self) -> dict[int, PeerReport]:
+        """With Config.diagnostics, how the engine of each channel does, or did last."""
+        return self._guest.peer_reports
 
     def close(self) -> None:
         """Says Bye, so that the server need not wait for a timeout."""

@@ -31,6 +31,7 @@ from .messages import (
     Delays,
     Describe,
     DeviceDescription,
+    DeviceReport,
     DeviceState,
     ForceCommand,
     ForceTable,
@@ -43,10 +44,12 @@ from .messages import (
     LocalModel,
     Mat3,
     Mode,
+    PeerReport,
     Rearm,
     Refused,
     Request,
     Role,
+    Safety,
     SetStateDeadband,
     SetStateRate,
     TakeLease,
@@ -175,6 +178,7 @@ _Number = TypeVar("_Number", bound=IntEnum)
 _MODES: dict[int, Mode] = {int(mode): mode for mode in Mode}
 _CODES: dict[int, Code] = {int(code): code for code in Code}
 _ROLES: dict[int, Role] = {int(role): role for role in Role}
+_SAFETY: dict[int, Safety] = {int(safety): safety for safety in Safety}
 _RULES: dict[int, ChannelRule] = {int(rule): rule for rule in ChannelRule}
 
 
@@ -265,6 +269,7 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         mode=_enum(_MODES, message.mode),
         device=_device(message.device),
         channel=_channel(message.channel),
+        force_wanted=_vector(message.force_wanted_n) if message.HasField("force_wanted_n") else None,
     )
 
 
@@ -509,6 +514,67 @@ def _write_report(report: LinkReport) -> pb.LinkReport:
     )
 
 
+def _read_device_report(message: pb.DeviceReport) -> DeviceReport:
+    steps, lateness = message.steps, tuple(message.lateness_us_log2)
+    _whole(len(lateness), 0, limits.LATENESS_BUCKETS)
+    _whole(sum(lateness), 0, steps)
+    return DeviceReport(
+        number=_whole(message.number, 1, 2**64),
+        until_ns=_time(message.until_ns),
+        span_ns=_length(message.span_ns),
+        device=_device(message.device),
+        steps=steps,
+        missed=message.missed,
+        overruns=_whole(message.overruns, 0, steps),
+        unseen=_whole(message.unseen, 0, steps),
+        lateness=lateness,
+        safety=_enum(_SAFETY, message.safety),
+        fault=_text(message.fault, limits.MAX_DETAIL),
+        degraded=_text(message.degraded, limits.MAX_DETAIL),
+    )
+
+
+def _write_device_report(report: DeviceReport) -> pb.DeviceReport:
+    return pb.DeviceReport(
+        number=report.number,
+        until_ns=report.until_ns,
+        span_ns=report.span_ns,
+        device=report.device,
+        steps=report.steps,
+        missed=report.missed,
+        overruns=report.overruns,
+        unseen=report.unseen,
+        lateness_us_log2=report.lateness,
+        safety=cast(pb.Safety, report.safety),
+        fault=_clip(report.fault, limits.MAX_DETAIL),
+        degraded=_clip(report.degraded, limits.MAX_DETAIL),
+    )
+
+
+def _read_peer_report(message: pb.PeerReport) -> PeerReport:
+    if not message.HasField("link"):
+        raise _OutOfBounds
+    return PeerReport(
+        device=_device(message.device),
+        channel=_channel(message.channel),
+        name=_text(message.name, limits.MAX_NAME),
+        state_one_in=_whole(message.state_one_in, 1, limits.MAX_ONE_IN),
+        forces_refused=message.forces_refused,
+        link=_read_report(message.link),
+    )
+
+
+def _write_peer_report(report: PeerReport) -> pb.PeerReport:
+    return pb.PeerReport(
+        device=report.device,
+        channel=report.channel,
+        name=_clip(report.name, limits.MAX_NAME),
+        state_one_in=report.state_one_in,
+        forces_refused=report.forces_refused,
+        link=_write_report(report.link),
+    )
+
+
 def _write_vector(vector: Vec3) -> pb.Vec3:
     return pb.Vec3(x=vector[0], y=vector[1], z=vector[2])
 
@@ -564,6 +630,7 @@ def _write_frame(frame: Frame) -> pb.Frame:
             mode=cast(pb.Mode, frame.mode),
             device=frame.device,
             channel=frame.channel,
+            force_wanted_n=None if frame.force_wanted is None else _write_vector(frame.force_wanted),
         )
         return pb.Frame(state=state)
     if isinstance(frame, Control):
@@ -579,6 +646,10 @@ def _write_frame(frame: Frame) -> pb.Frame:
         return pb.Frame(control_ack=ack)
     if isinstance(frame, LinkReport):
         return pb.Frame(report=_write_report(frame))
+    if isinstance(frame, DeviceReport):
+        return pb.Frame(device_report=_write_device_report(frame))
+    if isinstance(frame, PeerReport):
+        return pb.Frame(peer_report=_write_peer_report(frame))
     bye = pb.Bye(code=cast(pb.Code, frame.code), reason=_clip(frame.reason, limits.MAX_DETAIL))
     return pb.Frame(bye=bye)
 
@@ -648,6 +719,10 @@ def _read_frame(message: pb.Frame) -> Frame | None:
         return _read_bye(message.bye)
     if body == "report":
         return _read_report(message.report)
+    if body == "device_report":
+        return _read_device_report(message.device_report)
+    if body == "peer_report":
+        return _read_peer_report(message.peer_report)
     return None  # a frame of a newer peer
 
 

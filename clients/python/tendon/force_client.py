@@ -15,12 +15,14 @@ from . import codec, limits
 from .deadband import Deadband, ForceDeadband, foretell, objection
 from .handshake import ClientHandshake
 from .messages import (
+    FEATURE_DIAGNOSTICS,
     FEATURE_LOCAL_MODEL,
     NEVER,
     ZERO,
     Code,
     Contact,
     ControlAck,
+    DeviceReport,
     DeviceState,
     ForceCommand,
     ForceTable,
@@ -30,6 +32,7 @@ from .messages import (
     LinkStats,
     LocalModel,
     Mat3,
+    PeerReport,
     Rearm,
     Refused,
     Role,
@@ -81,6 +84,9 @@ class Config:
     """States that we can foretell are not sent to us. With rate_hz = r, states are then handed out at multiples of 1/r as they
     are foretold for that instant, their tick and time of sampling included; never a tick twice, never an older one, and nothing
     is foretold for longer than max_silence_us. With rate_hz = 0, only those that come. None: every state is asked for."""
+    diagnostics: bool = False
+    """Of an observer: ask for what the engines want (`DeviceState.force_wanted`), and once a second for how the device's loop and
+    its engines do. A server that knows nothing of this leaves it out."""
     patience_s: float = 2.0
     """Hellos of one attempt go unanswered for so long before it is given up."""
     retry_min_s: float = 0.1
@@ -101,6 +107,7 @@ class Config:
         require(0 <= self.valid_for_s <= 10, "valid_for_s: expected 0 to 10")
         wrong = objection(self.state_deadband) if self.state_deadband else ""
         require(not wrong, f"state_deadband: {wrong}")
+        require(not self.diagnostics or self.role is Role.OBSERVER, "diagnostics: for observers only")
         require(self.patience_s > 0, "patience_s: must be above zero")
         require(self.retry_min_s > 0, "retry_min_s: must be above zero")
         require(self.retry_max_s >= self.retry_min_s, "retry_max_s: must not be below retry_min_s")
@@ -147,6 +154,10 @@ class ForceClient:
         """What the server said of itself and its device when the newest session opened."""
         self.report: LinkReport | None = None
         """The server's newest word on how our forces fare, once a second while they come. Of the present session."""
+        self.device_report: DeviceReport | None = None
+        """With Config.diagnostics, the newest word on how the device's loop does. Of the present session."""
+        self.peer_reports: dict[int, PeerReport] = {}
+        """… and by channel on the engine that it has, or had last."""
         self.config = config
         self._random = random
         self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
@@ -311,7 +322,8 @@ class ForceClient:
     # ---- Inside ----
 
     def _greet(self, now: int) -> None:
-        hello = Hello(self.config.role, self.config.name, (FEATURE_LOCAL_MODEL,))
+        features = (FEATURE_LOCAL_MODEL, FEATURE_DIAGNOSTICS) if self.config.diagnostics else (FEATURE_LOCAL_MODEL,)
+        hello = Hello(self.config.role, self.config.name, features)
         key = self.config.key
         ephemeral = b"" if key is None else self._random(KEY_SIZE)
         self._handshake = ClientHandshake(hello, self._random(16), now, key=key, ephemeral=ephemeral)
@@ -336,7 +348,8 @@ class ForceClient:
         self._deadband_request = self._session.request(asked) if asked else None
         self._foretell = False
         self._seen_tick = 0
-        self.report = None
+        self.report = self.device_report = None
+        self.peer_reports = {}
         # What another session was sent, this one was not.
         self._deadband = Deadband(self.config.deadband) if self.config.deadband else None
         self._sequence = 0
@@ -365,6 +378,10 @@ class ForceClient:
                 self._back_off = _ns(self.config.retry_min_s)
             elif isinstance(event, LinkReport):
                 self.report = event
+            elif isinstance(event, DeviceReport):
+                self.device_report = event
+            elif isinstance(event, PeerReport):
+                self.peer_reports[event.channel] = event
             elif isinstance(event, ControlAck):
                 if event.id == self._deadband_request:
                     self._foretell = event.code is Code.OK and self._period > 0 and self._silence_ns() > 0

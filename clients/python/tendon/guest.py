@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
-from .messages import Code, DeviceState, LinkReport, Touch, Welcome
+from .messages import Code, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
 
 log = logging.getLogger("tendon")
 
@@ -67,6 +67,16 @@ class Guest:
     def report(self) -> LinkReport | None:
         """The server's newest word on how our forces fare, once a second while they come; None before the first."""
         return self.core.report
+
+    @property
+    def device_report(self) -> DeviceReport | None:
+        """With Config.diagnostics, how the device's loop does, once a second; None before the first."""
+        return self.core.device_report
+
+    @property
+    def peer_reports(self) -> dict[int, PeerReport]:
+        """With Config.diagnostics, how the engine of each channel does, or did last."""
+        return self.core.peer_reports
 
     def turn(self, now: int) -> None:
         """Takes what has come in, does what is due, sends what is to be sent."""

@@ -33,6 +33,10 @@ MAX_FEATURES = 16
 MAX_DETAIL = 128
 """Bytes of UTF-8 in the sentence of a refusal, an answer or a Bye."""
 MAX_LOOP_HZ = 1_000_000
+LATENESS_BUCKETS = 24
+"""Of the histogram of a loop's lateness."""
+MAX_ONE_IN = 1000
+"""The rarest that a state is sent to an engine, one in so many."""
 MAX_TIMEOUT_MS = 3_600_000
 BYES = 3
 """How often a Bye is said."""

@@ -27,6 +27,9 @@ FEATURE_CHANNELS = "channels"
 FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
 
+FEATURE_DIAGNOSTICS = "diagnostics"
+"""An observer is told what the engines ask for, and how loops and engines do (DeviceReport, PeerReport)."""
+
 
 class Role(IntEnum):
     OBSERVER = 1  # sees device states
@@ -93,6 +96,7 @@ class DeviceState:
     mode: Mode
     device: int = 0
     channel: int = 0  # of the force that force_sequence, force_age_ns and mode are about
+    force_wanted: Vec3 | None = None  # N, asked for by the engines, before any limit; None: not told (FEATURE_DIAGNOSTICS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,7 +303,52 @@ class LinkReport:
     words: str  # why forces were late, for people; empty when none was
 
 
-Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport]
+class Safety(IntEnum):
+    """Where a device stands between the plug and the force."""
+
+    ABSENT = 1  # not plugged in
+    OPENING = 2  # being opened
+    FIRMWARE = 3  # has, or is being given, no firmware yet
+    UNHOMED = 4  # does not know where it is yet
+    HOMED = 5  # ready, and waiting to be armed
+    ARMED = 6  # gives forces
+    FAULT = 7  # was armed, and something happened: no force until it is armed again
+    UNGUARDED = 8  # ready; its scene lists no safety layer, so that there is nothing to arm
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceReport:
+    """Server → client, newest wins for each device: how its loop does. Numbers of things are of the time that it tells of."""
+
+    number: int  # 1, 2, 3 … of the device
+    until_ns: int  # end of the time it tells of, server clock
+    span_ns: int  # … and its length
+    device: int
+    steps: int  # haptic steps
+    missed: int  # periods without a step, because the one before came so late
+    overruns: int  # steps so long after the one before that it is a reason
+    unseen: int  # steps in which the device gave no position
+    # Steps by how late the loop woke: [0] at most 1 µs, [i] later than 2^(i−1) µs and at most 2^i µs, [23] all later ones.
+    # Zeros at the end are left out; together at most `steps`.
+    lateness: tuple[int, ...]
+    safety: Safety
+    fault: str  # why it gives no force until it is armed or rearmed, for people; empty: no fault
+    degraded: str  # what the server does less of at present, for people; empty: nothing
+
+
+@dataclass(frozen=True, slots=True)
+class PeerReport:
+    """Server → client, newest wins for each device and channel: how the engine does whose forces the channel takes."""
+
+    device: int
+    channel: int
+    name: str  # of the engine
+    state_one_in: int  # of the states that it wants, it is sent one in so many: its way is full
+    forces_refused: bool  # its forces are not taken: its way loses too much
+    link: LinkReport  # number: 1, 2, 3 … of the channel; the forces are the channel's
+
+
+Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,12 +15,14 @@ from .messages import (
     Code,
     Control,
     ControlAck,
+    DeviceReport,
     DeviceState,
     ForceCommand,
     Frame,
     Instant,
     LinkReport,
     LinkStats,
+    PeerReport,
     Request,
 )
 from .replay_window import ReplayWindow
@@ -43,8 +45,13 @@ class Closed:
     reason: str
 
 
-Event = Union[DeviceState, ForceCommand, LinkReport, Control, ControlAck, Closed]
+Event = Union[DeviceState, ForceCommand, LinkReport, DeviceReport, PeerReport, Control, ControlAck, Closed]
 """A Control is a request that has arrived and wants an answer, a ControlAck the answer to one of ours."""
+
+
+def _stream(report: DeviceReport | PeerReport) -> tuple[int, int]:
+    """Device and channel; −1 of the device itself."""
+    return (report.device, report.channel if isinstance(report, PeerReport) else -1)
 
 
 class Session:
@@ -53,7 +60,7 @@ class Session:
     Use: `receive` what arrives and `tick` when `next_turn()` is due; then pull `next_event` and
     `next_datagram` until they are empty. `now` never goes back.
 
-    Nothing queues without a bound: there is room for one state, one force, one report and
+    Nothing queues without a bound: there is room for one state, one force, one report (on each device and channel) and
     limits.REQUEST_WINDOW requests each way; what was not taken out is replaced by a newer one of its kind.
     """
 
@@ -73,6 +80,7 @@ class Session:
         self._state_to_send: DeviceState | None = None
         self._force_to_send: ForceCommand | None = None
         self._report_to_send: LinkReport | None = None
+        self._diagnoses_to_send: dict[tuple[int, int], DeviceReport | PeerReport] = {}
         self._asked = OutgoingRequests()
         self._bye: Bye | None = None
         self._byes_left = 0
@@ -85,6 +93,7 @@ class Session:
         self._newest_tick: dict[int, int] = {}  # by device
         self._newest_sequence: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_report = 0
+        self._newest_diagnosis: dict[tuple[int, int], int] = {}  # by _stream
         self._newest_echoed = -1  # newest packet of ours that the peer has told of
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
@@ -92,6 +101,7 @@ class Session:
         self._state_arrived: DeviceState | None = None
         self._force_arrived: ForceCommand | None = None
         self._report_arrived: LinkReport | None = None
+        self._diagnoses_arrived: dict[tuple[int, int], DeviceReport | PeerReport] = {}
         self._closed: Closed | None = None
 
     # ---- In ----
@@ -134,12 +144,14 @@ class Session:
             return
         self._accept(now, number, content)
 
-    def send(self, frame: DeviceState | ForceCommand | LinkReport) -> None:
+    def send(self, frame: DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport) -> None:
         """Replaces what has not left yet."""
         if isinstance(frame, ForceCommand):
             self._force_to_send = frame
         elif isinstance(frame, LinkReport):
             self._report_to_send = frame
+        elif isinstance(frame, (DeviceReport, PeerReport)):
+            self._diagnoses_to_send[_stream(frame)] = frame
         else:
             self._state_to_send = frame
 
@@ -189,6 +201,8 @@ class Session:
             event, self._force_arrived = self._force_arrived, None
         if event is None:
             event, self._report_arrived = self._report_arrived, None
+        if event is None and self._diagnoses_arrived:
+            event = self._diagnoses_arrived.pop(min(self._diagnoses_arrived))
         if event is None:
             event, self._state_arrived = self._state_arrived, None
         if event is None:
@@ -245,6 +259,14 @@ class Session:
                 return
             self._newest_report = frame.number
             self._report_arrived = frame
+        elif isinstance(frame, (DeviceReport, PeerReport)):
+            stream = _stream(frame)
+            number = frame.link.number if isinstance(frame, PeerReport) else frame.number
+            if number <= self._newest_diagnosis.get(stream, 0):
+                self.stats.stale += 1
+                return
+            self._newest_diagnosis[stream] = number
+            self._diagnoses_arrived[stream] = frame
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):
@@ -285,6 +307,7 @@ class Session:
             self._force_to_send is not None
             or self._state_to_send is not None
             or self._report_to_send is not None
+            or bool(self._diagnoses_to_send)
             or self._last_sent is None
             or now - self._last_sent >= KEEP_ALIVE_NS
             or self._asked.next_due() <= now
@@ -324,6 +347,8 @@ class Session:
             self._asked.sent(control.id, now, timeout)
         if self._report_to_send is not None and add(self._report_to_send):
             self._report_to_send = None
+        while self._diagnoses_to_send and add(self._diagnoses_to_send[min(self._diagnoses_to_send)]):
+            del self._diagnoses_to_send[min(self._diagnoses_to_send)]
         return bytes(body)
 
     def _seal(self, now: int, body: bytes) -> bytes:

@@ -29,6 +29,15 @@ MODE_UNSPECIFIED: Mode
 ROLE_CONTROLLER: Role
 ROLE_OBSERVER: Role
 ROLE_UNSPECIFIED: Role
+SAFETY_ABSENT: Safety
+SAFETY_ARMED: Safety
+SAFETY_FAULT: Safety
+SAFETY_FIRMWARE: Safety
+SAFETY_HOMED: Safety
+SAFETY_OPENING: Safety
+SAFETY_UNGUARDED: Safety
+SAFETY_UNHOMED: Safety
+SAFETY_UNSPECIFIED: Safety
 
 class Answer(_message.Message):
     __slots__ = ["refused", "welcome"]
@@ -166,14 +175,43 @@ class DeviceDescription(_message.Message):
     workspace_min_m: Vec3
     def __init__(self, device: _Optional[int] = ..., name: _Optional[str] = ..., model: _Optional[str] = ..., position_dof: _Optional[int] = ..., force_dof: _Optional[int] = ..., workspace_min_m: _Optional[_Union[Vec3, _Mapping]] = ..., workspace_max_m: _Optional[_Union[Vec3, _Mapping]] = ..., max_force_n: _Optional[float] = ..., continuous_force_n: _Optional[float] = ..., max_stiffness_npm: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., channels: _Optional[_Iterable[_Union[ChannelDescription, _Mapping]]] = ...) -> None: ...
 
+class DeviceReport(_message.Message):
+    __slots__ = ["degraded", "device", "fault", "lateness_us_log2", "missed", "number", "overruns", "safety", "span_ns", "steps", "unseen", "until_ns"]
+    DEGRADED_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    FAULT_FIELD_NUMBER: _ClassVar[int]
+    LATENESS_US_LOG2_FIELD_NUMBER: _ClassVar[int]
+    MISSED_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    OVERRUNS_FIELD_NUMBER: _ClassVar[int]
+    SAFETY_FIELD_NUMBER: _ClassVar[int]
+    SPAN_NS_FIELD_NUMBER: _ClassVar[int]
+    STEPS_FIELD_NUMBER: _ClassVar[int]
+    UNSEEN_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_NS_FIELD_NUMBER: _ClassVar[int]
+    degraded: str
+    device: int
+    fault: str
+    lateness_us_log2: _containers.RepeatedScalarFieldContainer[int]
+    missed: int
+    number: int
+    overruns: int
+    safety: Safety
+    span_ns: int
+    steps: int
+    unseen: int
+    until_ns: int
+    def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., device: _Optional[int] = ..., steps: _Optional[int] = ..., missed: _Optional[int] = ..., overruns: _Optional[int] = ..., unseen: _Optional[int] = ..., lateness_us_log2: _Optional[_Iterable[int]] = ..., safety: _Optional[_Union[Safety, str]] = ..., fault: _Optional[str] = ..., degraded: _Optional[str] = ...) -> None: ...
+
 class DeviceState(_message.Message):
-    __slots__ = ["channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    __slots__ = ["channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     ENERGY_J_FIELD_NUMBER: _ClassVar[int]
     FORCE_AGE_NS_FIELD_NUMBER: _ClassVar[int]
     FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
     FORCE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    FORCE_WANTED_N_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
     PERMITTED_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     POSITION_M_FIELD_NUMBER: _ClassVar[int]
@@ -187,6 +225,7 @@ class DeviceState(_message.Message):
     force_age_ns: int
     force_applied_n: Vec3
     force_sequence: int
+    force_wanted_n: Vec3
     mode: Mode
     permitted_force_n: float
     position_m: Vec3
@@ -194,7 +233,7 @@ class DeviceState(_message.Message):
     sampled_ns: int
     tick: int
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
 
 class Echo(_message.Message):
     __slots__ = ["peer_packet_number", "peer_tx_time_ns", "received_mask", "rx_time_ns"]
@@ -241,20 +280,24 @@ class ForceTable(_message.Message):
     def __init__(self, first_depth_m: _Optional[float] = ..., step_m: _Optional[float] = ..., force_n: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Frame(_message.Message):
-    __slots__ = ["bye", "control", "control_ack", "force", "report", "state"]
+    __slots__ = ["bye", "control", "control_ack", "device_report", "force", "peer_report", "report", "state"]
     BYE_FIELD_NUMBER: _ClassVar[int]
     CONTROL_ACK_FIELD_NUMBER: _ClassVar[int]
     CONTROL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_REPORT_FIELD_NUMBER: _ClassVar[int]
     FORCE_FIELD_NUMBER: _ClassVar[int]
+    PEER_REPORT_FIELD_NUMBER: _ClassVar[int]
     REPORT_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     bye: Bye
     control: Control
     control_ack: ControlAck
+    device_report: DeviceReport
     force: ForceCommand
+    peer_report: PeerReport
     report: LinkReport
     state: DeviceState
-    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
+    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ...) -> None: ...
 
 class GiveLease(_message.Message):
     __slots__ = ["channel", "device"]
@@ -356,6 +399,22 @@ class LocalModel(_message.Message):
     valid_radius_m: float
     def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ..., valid_radius_m: _Optional[float] = ..., contact: _Optional[_Union[Contact, _Mapping]] = ...) -> None: ...
 
+class PeerReport(_message.Message):
+    __slots__ = ["channel", "device", "forces_refused", "link", "name", "state_one_in"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    FORCES_REFUSED_FIELD_NUMBER: _ClassVar[int]
+    LINK_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    STATE_ONE_IN_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    forces_refused: bool
+    link: LinkReport
+    name: str
+    state_one_in: int
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
+
 class Rearm(_message.Message):
     __slots__ = ["device"]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
@@ -438,6 +497,9 @@ class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class ChannelRule(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class Safety(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class Code(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

@@ -5,7 +5,8 @@ import { create, fromBinary, toBinary, type DescMessage, type MessageShape } fro
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
-  Claim, Contact, Delays, DeviceDescription, DeviceState, ForceCommand, Grant, Hello, LinkReport, LocalModel, Refused, Request, Stiffness, Vec3, Welcome,
+  Claim, Contact, Delays, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, Hello, LinkReport, LocalModel,
+  PeerReport, Refused, Request, Stiffness, Vec3, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -45,7 +46,9 @@ export type Frame =
   | { readonly kind: "control"; readonly value: Control }
   | { readonly kind: "controlAck"; readonly value: ControlAck }
   | { readonly kind: "bye"; readonly value: Bye }
-  | { readonly kind: "report"; readonly value: LinkReport };
+  | { readonly kind: "report"; readonly value: LinkReport }
+  | { readonly kind: "deviceReport"; readonly value: DeviceReport }
+  | { readonly kind: "peerReport"; readonly value: PeerReport };
 
 /** What a Data datagram holds. */
 export interface DataContent {
@@ -217,6 +220,14 @@ function readBody(body: Body): Frame | undefined {
       const value = readReport(body.value);
       return value && { kind: "report", value };
     }
+    case "deviceReport": {
+      const value = readDeviceReport(body.value);
+      return value && { kind: "deviceReport", value };
+    }
+    case "peerReport": {
+      const value = readPeerReport(body.value);
+      return value && { kind: "peerReport", value };
+    }
   }
 }
 
@@ -240,6 +251,10 @@ function writeBody(frame: Frame): Body {
     }
     case "report":
       return { case: "report", value: writeReport(frame.value) };
+    case "deviceReport":
+      return { case: "deviceReport", value: writeDeviceReport(frame.value) };
+    case "peerReport":
+      return { case: "peerReport", value: writePeerReport(frame.value) };
   }
 }
 
@@ -268,8 +283,9 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
     mode: from.mode,
     device: from.device,
     channel: from.channel,
+    ...(from.forceWantedN && { forceWanted: readVec3(from.forceWantedN) }),
   };
-  const good = isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
+  const good = (!state.forceWanted || isVec3(state.forceWanted)) && isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
     isVec3(state.forceApplied) && isBounded(state.energy) &&
     (state.permittedForce === Infinity || isMagnitude(state.permittedForce)) && isLength(state.forceAgeNs) &&
     isEnum(state.mode, pb.ModeSchema) && isDevice(state.device) && isChannel(state.channel);
@@ -291,6 +307,7 @@ const writeState = (from: DeviceState): pb.DeviceState =>
     mode: from.mode,
     device: from.device,
     channel: from.channel,
+    ...(from.forceWanted && { forceWantedN: writeVec3(from.forceWanted) }),
   });
 
 /** 1 entry, 3 or 9, all of them within bounds. */
@@ -400,6 +417,33 @@ function writeReport({ roundTrip, toServer, toClient, words, ...rest }: LinkRepo
     ...(toClient && { toClient: create(pb.DelaysSchema, toClient) }),
     words: clip(words, limits.kMaxDetail),
   });
+}
+
+function readDeviceReport(from: pb.DeviceReport): DeviceReport | undefined {
+  const { $typeName: _name, $unknown: _unknown, latenessUsLog2: lateness, ...rest } = from;
+  const { number, untilNs, spanNs, device, steps, overruns, unseen, safety, fault, degraded } = rest;
+  const good = number > 0n && isTime(untilNs) && isLength(spanNs) && isDevice(device) && overruns <= steps && unseen <= steps &&
+    lateness.length <= limits.kLatenessBuckets && lateness.reduce((sum, count) => sum + count, 0n) <= steps &&
+    isEnum(safety, pb.SafetySchema) && isText(fault, limits.kMaxDetail) && isText(degraded, limits.kMaxDetail);
+  return good ? { ...rest, lateness } : undefined;
+}
+
+function writeDeviceReport({ lateness, fault, degraded, ...rest }: DeviceReport): pb.DeviceReport {
+  return create(pb.DeviceReportSchema, {
+    ...rest, latenessUsLog2: [...lateness], fault: clip(fault, limits.kMaxDetail), degraded: clip(degraded, limits.kMaxDetail),
+  });
+}
+
+function readPeerReport(from: pb.PeerReport): PeerReport | undefined {
+  const { device, channel, name, stateOneIn, forcesRefused } = from;
+  const link = from.link && readReport(from.link);
+  const good = isDevice(device) && isChannel(channel) && isText(name, limits.kMaxName) && stateOneIn >= 1 &&
+    stateOneIn <= limits.kMaxOneIn;
+  return good && link ? { device, channel, name, stateOneIn, forcesRefused, link } : undefined;
+}
+
+function writePeerReport({ link, name, ...rest }: PeerReport): pb.PeerReport {
+  return create(pb.PeerReportSchema, { ...rest, name: clip(name, limits.kMaxName), link: writeReport(link) });
 }
 
 /** Its values are within bounds. */

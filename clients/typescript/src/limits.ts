@@ -34,6 +34,10 @@ export const kMaxFeature = 32;
 /** Bytes of UTF-8 in one sentence: the reason of a refusal, an answer or a Bye. */
 export const kMaxDetail = 128;
 export const kMaxLoopHz = 1_000_000;
+/** Of the histogram of a loop's lateness. */
+export const kLatenessBuckets = 24;
+/** The rarest that a state is sent to an engine, one in so many. */
+export const kMaxOneIn = 1000;
 export const kMaxTimeoutMs = 3_600_000;
 /** How often a Bye is said. */
 export const kByes = 3;

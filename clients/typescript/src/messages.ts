@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
 // frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
-import { ChannelRule, Code, Mode, Role } from "./gen/tendon_pb.js";
+import { ChannelRule, Code, Mode, Role, Safety } from "./gen/tendon_pb.js";
 import type { Nanoseconds } from "./time.js";
 
-export { ChannelRule, Code, Mode, Role };
+export { ChannelRule, Code, Mode, Role, Safety };
 
 /** The version of the wire that this client speaks. */
 export const kProtocolVersion = 1;
@@ -50,6 +50,8 @@ export interface DeviceState {
   readonly device: number;
   /** Of the force that forceSequence, forceAgeNs and mode are about. */
   readonly channel: number;
+  /** N, asked for by the engines, before any limit; absent: not told, see DeviceReport. */
+  readonly forceWanted?: Vec3 | undefined;
 }
 
 /**
@@ -199,6 +201,51 @@ export interface LinkReport {
   readonly duplicated: bigint;
   /** Why forces were late, for people; empty when none was. */
   readonly words: string;
+}
+
+/**
+ * How a device's loop does. Only to an observer that named the feature "diagnostics". Numbers of things are of the time that
+ * it tells of.
+ */
+export interface DeviceReport {
+  /** 1, 2, 3 … of the device. */
+  readonly number: bigint;
+  /** End of the time it tells of, on the server's clock, and its length. */
+  readonly untilNs: Nanoseconds;
+  readonly spanNs: Nanoseconds;
+  readonly device: number;
+  /** Haptic steps. */
+  readonly steps: bigint;
+  /** Periods without a step, because the one before came so late. */
+  readonly missed: bigint;
+  /** Steps so long after the one before that it is a reason. */
+  readonly overruns: bigint;
+  /** Steps in which the device gave no position. */
+  readonly unseen: bigint;
+  /**
+   * Steps by how late the loop woke: [0] at most 1 µs, [i] later than 2^(i−1) µs and at most 2^i µs, [23] all later ones. Zeros
+   * at the end are left out; together at most `steps`.
+   */
+  readonly lateness: readonly bigint[];
+  readonly safety: Safety;
+  /** Why it gives no force until it is armed or rearmed, for people; empty: no fault. */
+  readonly fault: string;
+  /** What the server does less of at present, for people; empty: nothing. */
+  readonly degraded: string;
+}
+
+/** How the engine does whose forces a channel takes. Only to an observer that named the feature "diagnostics". */
+export interface PeerReport {
+  readonly device: number;
+  readonly channel: number;
+  /** Of the engine. */
+  readonly name: string;
+  /** Of the states that it wants, it is sent one in so many: its way is full. */
+  readonly stateOneIn: number;
+  /** Its forces are not taken: its way loses too much. */
+  readonly forcesRefused: boolean;
+  /** Its number counts those of the channel, and the forces are the channel's. */
+  readonly link: LinkReport;
 }
 
 /** What a client wants: a device by name, and as a controller a channel by name; empty = number 0. */

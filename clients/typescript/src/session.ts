@@ -314,6 +314,9 @@ export class Session {
           ++this.stats.stale;
         }
         return;
+      case "deviceReport":
+      case "peerReport":
+        return; // for observers that ask for it, which this client does not
       case "control":
         this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
         return;

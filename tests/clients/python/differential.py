@@ -17,17 +17,19 @@ from pathlib import Path
 from conftest import ROOT
 from wire_md import PAGE, golden_datagrams
 
-from tendon import codec
+from tendon import codec, limits
 from tendon import tendon_pb2 as pb
 from tendon.codec import DatagramType, Suite
 from tendon.messages import (
     Bye,
     Control,
     ControlAck,
+    DeviceReport,
     DeviceState,
     ForceCommand,
     Frame,
     LinkReport,
+    PeerReport,
     Rearm,
     Refused,
     SetStateDeadband,
@@ -68,6 +70,7 @@ def _frame(frame: Frame) -> list[object]:
             *(*_vector(frame.position), *_vector(frame.velocity), *_vector(frame.force_applied)),
             *(_double(frame.energy), _double(frame.permitted_force)),
             *(frame.reasons, frame.force_sequence, frame.force_age_ns, int(frame.mode)),
+            *([] if frame.force_wanted is None else ["wanted", *_vector(frame.force_wanted)]),
         ]
     if isinstance(frame, ForceCommand):
         words: list[object] = ["force", frame.sequence, frame.based_on_tick, *_vector(frame.force)]
@@ -101,6 +104,18 @@ def _frame(frame: Frame) -> list[object]:
         return ["ack", frame.id, int(frame.code), _text(frame.detail)]
     if isinstance(frame, LinkReport):
         return _report(frame)
+    if isinstance(frame, DeviceReport):
+        return [
+            *("device", frame.number, frame.until_ns, frame.span_ns, frame.device, frame.steps),
+            *(frame.missed, frame.overruns, frame.unseen),
+            *(*frame.lateness, *[0] * (limits.LATENESS_BUCKETS - len(frame.lateness))),
+            *(int(frame.safety), _text(frame.fault), _text(frame.degraded)),
+        ]
+    if isinstance(frame, PeerReport):
+        return [
+            *("peer", frame.device, frame.channel, _text(frame.name), frame.state_one_in, int(frame.forces_refused)),
+            *_report(frame.link),
+        ]
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]
 
@@ -196,6 +211,8 @@ class Dice(random.Random):
                     inside.x, inside.y, inside.z = self.choice([(length, 0, 0), (0.6 * length, 0, 0.8 * length)])
             else:
                 setattr(message, field.name, self.value(field))
+        if isinstance(message, pb.DeviceReport) and self.random() < 0.7:  # by chance they are hardly ever enough
+            message.steps = min(max(sum(message.lateness_us_log2), message.overruns, message.unseen), 2**64 - 1)
 
     def value(self, field: object) -> float | int | str | bool:
         kind = field.type  # type: ignore[attr-defined]

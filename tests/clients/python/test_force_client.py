@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from math import inf, nan
 
 import pytest
 from stand_in import StandIn
-from test_wire_md import REPORT
+from test_wire_md import DEVICE_REPORT, PEER_REPORT, REPORT
 from world import MS, PERFECT, SECOND, Weather, World
 
 from tendon import (
@@ -342,6 +343,36 @@ def test_a_force_of_a_wrong_shape_is_an_error_in_the_callers_program(touch):
     stage.touch = lambda hand: touch
     with pytest.raises(ValueError, match="expected a (force|stiffness)"):
         stage.run(1 * SECOND)
+
+
+def test_an_observer_that_asks_for_diagnostics_has_the_newest_reports_and_they_go_with_the_session():
+    stage = Stage(Config(role=Role.OBSERVER, diagnostics=True))
+    stage.touch = None
+    stage.run(100 * MS)
+    assert "diagnostics" in stage.server.hellos[0].features
+    assert stage.client.device_report is None
+    stage.server.session.send(DEVICE_REPORT)
+    stage.server.session.send(PEER_REPORT)
+    stage.server.session.send(replace(PEER_REPORT, channel=0, name="guidance"))
+    stage.run(100 * MS)
+    assert stage.client.device_report == DEVICE_REPORT
+    assert {channel: peer.name for channel, peer in stage.client.peer_reports.items()} == {0: "guidance", 1: "wall"}
+    stage.server.session.send(replace(DEVICE_REPORT, number=6))  # older than 7
+    stage.server.session.send(replace(PEER_REPORT, link=replace(REPORT, number=4)))
+    stage.run(100 * MS)
+    assert stage.client.device_report == DEVICE_REPORT
+    assert stage.client.peer_reports[1].link.number == 4
+    assert stage.client.stats.link.stale == 1
+    stage.server.session.close(Code.SHUTDOWN, "")
+    stage.run(1 * SECOND)
+    assert stage.client.phase is Phase.OPEN
+    assert stage.client.device_report is None
+    assert stage.client.peer_reports == {}
+
+
+def test_a_controller_does_not_ask_for_diagnostics():
+    with pytest.raises(ValueError, match="diagnostics: for observers only"):
+        Config(diagnostics=True)
 
 
 def test_an_observer_sees_states_and_cannot_send():

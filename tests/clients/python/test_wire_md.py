@@ -16,6 +16,7 @@ from tendon.messages import (
     Control,
     ControlAck,
     Delays,
+    DeviceReport,
     DeviceState,
     ForceCommand,
     ForceTable,
@@ -23,8 +24,10 @@ from tendon.messages import (
     LinkReport,
     LocalModel,
     Mode,
+    PeerReport,
     Refused,
     Role,
+    Safety,
     SetStateDeadband,
     SetStateRate,
     Welcome,
@@ -88,6 +91,22 @@ REPORT = LinkReport(
     duplicated=0,
     words="forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)",
 )
+STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5))
+DEVICE_REPORT = DeviceReport(
+    number=7,
+    until_ns=1_000_000_000,
+    span_ns=1_000_000_000,
+    device=1,
+    steps=990,
+    missed=10,
+    overruns=2,
+    unseen=1,
+    lateness=(3, 0, 0, 0, 0, 0, 981, 0, 0, 0, 0, 0, 0, 3),
+    safety=Safety.FAULT,
+    fault="the handle was faster than a hand",
+    degraded="the log thread does not follow",
+)
+PEER_REPORT = PeerReport(device=1, channel=1, name="wall", state_one_in=4, forces_refused=True, link=REPORT)
 FRAMES = {
     "keep-alive": (0, None, []),
     "state": (42, ECHO, [STATE]),
@@ -97,6 +116,9 @@ FRAMES = {
     "control-ack": (45, None, [ControlAck(7, Code.OK, "500 Hz")]),
     "bye": (46, None, [Bye(Code.SHUTDOWN, "SIGTERM")]),
     "report": (57, None, [REPORT]),
+    "state-wanted": (60, None, [STATE_WANTED]),
+    "device-report": (61, None, [DEVICE_REPORT]),
+    "peer-report": (62, None, [PEER_REPORT]),
     "state-deadband": (58, None, [Control(9, SetStateDeadband(0.1, 0.001, 20_000))]),
 }
 
@@ -202,6 +224,7 @@ def out_of_bounds():
     yield "force age", state(force_age_ns=2**60 + 1)
     yield "mode 0", state(mode=0)
     yield "mode 7", state(mode=7)
+    yield "wanted NaN", state(force_wanted=(0.0, nan, 0.0))
     yield "sequence 0", force(sequence=0)
     yield "force NaN", force(force=(nan, 0.0, 0.0))
     yield "valid for nothing", force(valid_for_us=0)
@@ -216,6 +239,21 @@ def out_of_bounds():
     yield "table without a step", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 0.0, (1.0, 2.0))))
     yield "table NaN", with_all(contact=Contact((1.0, 0.0, 0.0), 0.0, ForceTable(0.0, 1.0, (1.0, nan))))
     yield "error", force(error=-0.1)
+    yield "device report 0", replace(DEVICE_REPORT, number=0)
+    yield "its time", replace(DEVICE_REPORT, until_ns=2**60 + 1)
+    yield "its span", replace(DEVICE_REPORT, span_ns=2**60 + 1)
+    yield "device 16", replace(DEVICE_REPORT, device=16)
+    yield "more late steps than steps", replace(DEVICE_REPORT, steps=986)
+    yield "more overruns than steps", replace(DEVICE_REPORT, overruns=991)
+    yield "more unseen than steps", replace(DEVICE_REPORT, unseen=991)
+    yield "25 buckets", replace(DEVICE_REPORT, lateness=25 * (1,))
+    yield "safety 0", replace(DEVICE_REPORT, safety=0)
+    yield "safety 9", replace(DEVICE_REPORT, safety=9)
+    yield "peer of device 16", replace(PEER_REPORT, device=16)
+    yield "channel 8", replace(PEER_REPORT, channel=8)
+    yield "one in none", replace(PEER_REPORT, state_one_in=0)
+    yield "one in 1001", replace(PEER_REPORT, state_one_in=1001)
+    yield "peer report 0", replace(PEER_REPORT, link=replace(REPORT, number=0))
     yield "request 0", Control(0, SetStateRate(1))
     yield "answer to 0", ControlAck(0, Code.OK)
     yield "code 0", ControlAck(1, 0)

@@ -15,7 +15,7 @@ import {
   concat, DatagramType, decodeAnswer, decodeHeader, decodeHello, decodeRetry, encodeAnswer, encodeHello, encodeRetry,
   kHeaderSize,
 } from "../../../clients/typescript/src/datagram.js";
-import { Code, Mode, reasonNames, Role } from "../../../clients/typescript/src/messages.js";
+import { Code, Mode, reasonNames, Role, Safety, type DeviceReport, type PeerReport } from "../../../clients/typescript/src/messages.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { toHex } from "./support/bytes.js";
 import { kRoot } from "./support/paths.js";
@@ -142,6 +142,57 @@ describe("WIRE.md", () => {
     assert.deepEqual([report.clockOffsetNs, report.clockDriftPpm, report.clockErrorNs], [-5_000_000n, 16, 250_000n]);
     assert.deepEqual([report.received, report.lost, report.reordered, report.duplicated], [3000n, 12n, 1n, 0n]);
     assert.match(report.words, /^forces were late 3 times, .* usually 41 ms\)$/);
+  });
+
+  it("state-wanted says what the page says", () => {
+    const [frame] = contentOf("state-wanted").frames;
+    assert.ok(frame?.kind === "state");
+    assert.deepEqual(frame.value.forceWanted, { x: -8, y: 0, z: 0.5 });
+  });
+
+  const kDeviceReport: DeviceReport = {
+    number: 7n, untilNs: 1_000_000_000n, spanNs: 1_000_000_000n, device: 1, steps: 990n, missed: 10n, overruns: 2n, unseen: 1n,
+    lateness: [3, 0, 0, 0, 0, 0, 981, 0, 0, 0, 0, 0, 0, 3].map(BigInt), safety: Safety.FAULT,
+    fault: "the handle was faster than a hand", degraded: "the log thread does not follow",
+  };
+
+  function peerReport(): PeerReport {
+    const [frame] = contentOf("peer-report").frames;
+    assert.ok(frame?.kind === "peerReport");
+    return frame.value;
+  }
+
+  it("device-report says what the page says", () => {
+    assert.deepEqual(contentOf("device-report").frames, [{ kind: "deviceReport", value: kDeviceReport }]);
+  });
+
+  it("peer-report says what the page says", () => {
+    const { link, ...rest } = peerReport();
+    assert.deepEqual(rest, { device: 1, channel: 1, name: "wall", stateOneIn: 4, forcesRefused: true });
+    const [report] = contentOf("report").frames;
+    assert.ok(report?.kind === "report");
+    assert.deepEqual(link, report.value);
+  });
+
+  it("a report out of bounds is left out and counted", () => {
+    const link = peerReport().link;
+    const devices: Partial<DeviceReport>[] = [
+      { number: 0n }, { untilNs: 2n ** 60n + 1n }, { spanNs: 2n ** 60n + 1n }, { device: 16 }, { steps: 986n }, { overruns: 991n },
+      { unseen: 991n }, { lateness: new Array<bigint>(25).fill(1n) }, { safety: 0 as Safety }, { safety: 9 as Safety },
+    ];
+    const peers: Partial<PeerReport>[] = [
+      { device: 16 }, { channel: 8 }, { stateOneIn: 0 }, { stateOneIn: 1001 }, { link: { ...link, number: 0n } },
+    ];
+    const frames = [
+      ...devices.map((change) => encodeFrame({ kind: "deviceReport", value: { ...kDeviceReport, ...change } })),
+      ...peers.map((change) => encodeFrame({ kind: "peerReport", value: { ...peerReport(), ...change } })),
+    ];
+    for (const [i, frame] of frames.entries()) {
+      const good = encodeFrame({ kind: "deviceReport", value: kDeviceReport });
+      const content = decodeData(concat(encodeHead(1n, undefined), frame, good));
+      assert.equal(content?.invalid, 1, `frame ${i}`);
+      assert.equal(content?.frames.length, 1, `frame ${i}`);
+    }
   });
 
   it("state-deadband says what the page says", () => {

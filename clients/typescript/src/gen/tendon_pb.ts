@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByL/AQoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBItECCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDSLyAQoMRm9yY2VDb21tYW5kEhAKCHNlcXVlbmNlGAEgASgEEhUKDWJhc2VkX29uX3RpY2sYAiABKAQSIAoHZm9yY2VfbhgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKBW1vZGVsGAQgASgLMhUudGVuZG9uLnYxLkxvY2FsTW9kZWwSFAoMdmFsaWRfZm9yX3VzGAUgASgNEg4KBmRldmljZRgGIAEoDRIPCgdjaGFubmVsGAcgASgNEhgKEHRvcG9sb2d5X2NoYW5nZWQYCCABKAgSFAoHZXJyb3JfbhgJIAEoAUgAiAEBQgoKCF9lcnJvcl9uIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi2QIKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGgoIRGVzY3JpYmUSDgoGZGV2aWNlGAEgASgNIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIoYBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSLRAwoKTGlua1JlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZmb3JjZXMYBCABKAQSEwoLbGF0ZV9zZXJ2ZXIYBSABKAQSFAoMbGF0ZV9uZXR3b3JrGAYgASgEEhMKC2xhdGVfZW5naW5lGAcgASgEEhUKDXdvcnN0X2xhdGVfbnMYCCABKAQSFgoObG9uZ2VzdF9nYXBfbnMYCSABKAQSJQoKcm91bmRfdHJpcBgKIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fc2VydmVyGAsgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19jbGllbnQYDCABKAsyES50ZW5kb24udjEuRGVsYXlzEhcKD2Nsb2NrX29mZnNldF9ucxgNIAEoEhIXCg9jbG9ja19kcmlmdF9wcG0YDiABKAESFgoOY2xvY2tfZXJyb3JfbnMYDyABKAQSEAoIcmVjZWl2ZWQYECABKAQSDAoEbG9zdBgRIAEoBBIRCglyZW9yZGVyZWQYEiABKAQSEgoKZHVwbGljYXRlZBgTIAEoBBINCgV3b3JkcxgUIAEoCSIrCgZEZWxheXMSEQoJbWVkaWFuX25zGAEgASgSEg4KBnA5OV9ucxgCIAEoEiKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIvoCCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzIvIBCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQFCCgoIX2Vycm9yX24imwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASLZAgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASKgoKbGVhc2VfbG9zdBgHIAEoCzIULnRlbmRvbi52MS5MZWFzZUxvc3RIAEIECgJvcCIqCgxTZXRTdGF0ZVJhdGUSCgoCaHoYASABKA0SDgoGZGV2aWNlGAIgASgNIkwKEFNldFN0YXRlRGVhZGJhbmQSDQoFc2hhcmUYASABKAESEQoJZmxvb3JfbXBzGAIgASgBEhYKDm1heF9zaWxlbmNlX3VzGAMgASgNIhcKBVJlYXJtEg4KBmRldmljZRgBIAEoDSIaCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0iLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkihgEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uImoKEkNoYW5uZWxEZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiQKBHJ1bGUYAiABKA4yFi50ZW5kb24udjEuQ2hhbm5lbFJ1bGUSEAoIbGVhc2VfbXMYAyABKA0SDgoGaG9sZGVyGAQgASgJIjQKA0J5ZRIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGcmVhc29uGAIgASgJItEDCgpMaW5rUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmZvcmNlcxgEIAEoBBITCgtsYXRlX3NlcnZlchgFIAEoBBIUCgxsYXRlX25ldHdvcmsYBiABKAQSEwoLbGF0ZV9lbmdpbmUYByABKAQSFQoNd29yc3RfbGF0ZV9ucxgIIAEoBBIWCg5sb25nZXN0X2dhcF9ucxgJIAEoBBIlCgpyb3VuZF90cmlwGAogASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19zZXJ2ZXIYCyABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX2NsaWVudBgMIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSFwoPY2xvY2tfb2Zmc2V0X25zGA0gASgSEhcKD2Nsb2NrX2RyaWZ0X3BwbRgOIAEoARIWCg5jbG9ja19lcnJvcl9ucxgPIAEoBBIQCghyZWNlaXZlZBgQIAEoBBIMCgRsb3N0GBEgASgEEhEKCXJlb3JkZXJlZBgSIAEoBBISCgpkdXBsaWNhdGVkGBMgASgEEg0KBXdvcmRzGBQgASgJIisKBkRlbGF5cxIRCgltZWRpYW5fbnMYASABKBISDgoGcDk5X25zGAIgASgSIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAiq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -143,6 +143,24 @@ export type Frame = Message<"tendon.v1.Frame"> & {
      */
     value: LinkReport;
     case: "report";
+  } | {
+    /**
+     * Only to an observer that named the feature "diagnostics":
+     *
+     * server → client, unreliable, of each device the newest number wins
+     *
+     * @generated from field: tendon.v1.DeviceReport device_report = 7;
+     */
+    value: DeviceReport;
+    case: "deviceReport";
+  } | {
+    /**
+     * server → client, unreliable, of each device and channel the newest number wins
+     *
+     * @generated from field: tendon.v1.PeerReport peer_report = 8;
+     */
+    value: PeerReport;
+    case: "peerReport";
   } | { case: undefined; value?: undefined };
 };
 
@@ -270,6 +288,14 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
    * @generated from field: uint32 channel = 13;
    */
   channel: number;
+
+  /**
+   * What the engines ask for at this step, held, faded or led on by their local models, before any limit. Absent: not
+   * told; only to an observer that named the feature "diagnostics"
+   *
+   * @generated from field: tendon.v1.Vec3 force_wanted_n = 14;
+   */
+  forceWantedN?: Vec3 | undefined;
 };
 
 /**
@@ -1096,6 +1122,160 @@ export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
   messageDesc(file_tendon, 22);
 
 /**
+ * How a device's loop does. Numbers of things are of the time that the report tells of.
+ *
+ * @generated from message tendon.v1.DeviceReport
+ */
+export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
+  /**
+   * 1, 2, 3 … of the device; 0 is refused
+   *
+   * @generated from field: uint64 number = 1;
+   */
+  number: bigint;
+
+  /**
+   * end of the time it tells of
+   *
+   * @generated from field: sfixed64 until_ns = 2;
+   */
+  untilNs: bigint;
+
+  /**
+   * … and its length
+   *
+   * @generated from field: uint64 span_ns = 3;
+   */
+  spanNs: bigint;
+
+  /**
+   * ≤ 15
+   *
+   * @generated from field: uint32 device = 4;
+   */
+  device: number;
+
+  /**
+   * haptic steps
+   *
+   * @generated from field: uint64 steps = 5;
+   */
+  steps: bigint;
+
+  /**
+   * periods without a step, because the one before came so late
+   *
+   * @generated from field: uint64 missed = 6;
+   */
+  missed: bigint;
+
+  /**
+   * steps so long after the one before that it is a reason (REASON overrun)
+   *
+   * @generated from field: uint64 overruns = 7;
+   */
+  overruns: bigint;
+
+  /**
+   * steps in which the device gave no position
+   *
+   * @generated from field: uint64 unseen = 8;
+   */
+  unseen: bigint;
+
+  /**
+   * How late the loop woke: entry 0 counts steps at most 1 µs after they were due, entry i later than 2^(i−1) µs and at
+   * most 2^i µs, entry 23 all that were later than 2^22 µs. Zeros at the end are left out; together at most `steps`,
+   * and fewer only where the server lost count of some.
+   *
+   * @generated from field: repeated uint64 lateness_us_log2 = 9 [packed = true];
+   */
+  latenessUsLog2: bigint[];
+
+  /**
+   * @generated from field: tendon.v1.Safety safety = 10;
+   */
+  safety: Safety;
+
+  /**
+   * why it gives no force until it is armed or rearmed, for people; empty: no fault. At most 128 bytes
+   *
+   * @generated from field: string fault = 11;
+   */
+  fault: string;
+
+  /**
+   * what the server does less of at present, for people; empty: nothing. At most 128 bytes
+   *
+   * @generated from field: string degraded = 12;
+   */
+  degraded: string;
+};
+
+/**
+ * Describes the message tendon.v1.DeviceReport.
+ * Use `create(DeviceReportSchema)` to create a new message.
+ */
+export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
+  messageDesc(file_tendon, 23);
+
+/**
+ * How the engine does whose forces a channel takes.
+ *
+ * @generated from message tendon.v1.PeerReport
+ */
+export type PeerReport = Message<"tendon.v1.PeerReport"> & {
+  /**
+   * ≤ 15
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * ≤ 7
+   *
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * of the engine; at most 64 bytes
+   *
+   * @generated from field: string name = 3;
+   */
+  name: string;
+
+  /**
+   * of the states that it wants, it is sent one in so many: its way is full; 1 … 1000
+   *
+   * @generated from field: uint32 state_one_in = 4;
+   */
+  stateOneIn: number;
+
+  /**
+   * its forces are not taken: its way loses too much
+   *
+   * @generated from field: bool forces_refused = 5;
+   */
+  forcesRefused: boolean;
+
+  /**
+   * number: 1, 2, 3 … of the channel; the forces are the channel's; absent is refused
+   *
+   * @generated from field: tendon.v1.LinkReport link = 6;
+   */
+  link?: LinkReport | undefined;
+};
+
+/**
+ * Describes the message tendon.v1.PeerReport.
+ * Use `create(PeerReportSchema)` to create a new message.
+ */
+export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
+  messageDesc(file_tendon, 24);
+
+/**
  * @generated from message tendon.v1.Hello
  */
 export type Hello = Message<"tendon.v1.Hello"> & {
@@ -1143,7 +1323,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 25);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -1176,7 +1356,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 26);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -1205,7 +1385,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 27);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -1285,7 +1465,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -1316,7 +1496,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 29);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -1352,7 +1532,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 30);
 
 /**
  * @generated from enum tendon.v1.Mode
@@ -1450,6 +1630,82 @@ export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
   enumDesc(file_tendon, 1);
 
 /**
+ * Where a device stands between the plug and the force.
+ *
+ * @generated from enum tendon.v1.Safety
+ */
+export enum Safety {
+  /**
+   * refused
+   *
+   * @generated from enum value: SAFETY_UNSPECIFIED = 0;
+   */
+  UNSPECIFIED = 0,
+
+  /**
+   * not plugged in
+   *
+   * @generated from enum value: SAFETY_ABSENT = 1;
+   */
+  ABSENT = 1,
+
+  /**
+   * being opened
+   *
+   * @generated from enum value: SAFETY_OPENING = 2;
+   */
+  OPENING = 2,
+
+  /**
+   * has, or is being given, no firmware yet
+   *
+   * @generated from enum value: SAFETY_FIRMWARE = 3;
+   */
+  FIRMWARE = 3,
+
+  /**
+   * does not know where it is yet
+   *
+   * @generated from enum value: SAFETY_UNHOMED = 4;
+   */
+  UNHOMED = 4,
+
+  /**
+   * ready, and waiting to be armed
+   *
+   * @generated from enum value: SAFETY_HOMED = 5;
+   */
+  HOMED = 5,
+
+  /**
+   * gives forces
+   *
+   * @generated from enum value: SAFETY_ARMED = 6;
+   */
+  ARMED = 6,
+
+  /**
+   * was armed, and something happened: no force until it is armed again
+   *
+   * @generated from enum value: SAFETY_FAULT = 7;
+   */
+  FAULT = 7,
+
+  /**
+   * ready; its scene lists no safety layer, so that there is nothing to arm
+   *
+   * @generated from enum value: SAFETY_UNGUARDED = 8;
+   */
+  UNGUARDED = 8,
+}
+
+/**
+ * Describes the enum tendon.v1.Safety.
+ */
+export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
+  enumDesc(file_tendon, 2);
+
+/**
  * @generated from enum tendon.v1.Code
  */
 export enum Code {
@@ -1526,7 +1782,7 @@ export enum Code {
  * Describes the enum tendon.v1.Code.
  */
 export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
-  enumDesc(file_tendon, 2);
+  enumDesc(file_tendon, 3);
 
 /**
  * @generated from enum tendon.v1.Role
@@ -1558,5 +1814,5 @@ export enum Role {
  * Describes the enum tendon.v1.Role.
  */
 export const RoleSchema: GenEnum<Role> = /*@__PURE__*/
-  enumDesc(file_tendon, 3);
+  enumDesc(file_tendon, 4);
 
