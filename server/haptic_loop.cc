@@ -25,6 +25,7 @@ DeviceState to_state(std::uint32_t device, const StepRecord& record) noexcept {
   state.force_sequence = record.force_sequence;
   state.force_age = record.force_age;
   state.mode = record.mode;
+  state.force_wanted = record.wanted;
   return state;
 }
 

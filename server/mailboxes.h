@@ -12,6 +12,7 @@
 #include "core/spsc_ring.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
+#include "server/health.h"
 #include "server/records.h"
 
 namespace tendon {
@@ -35,6 +36,7 @@ struct HapticOrder {
 ///     haptic  ──state──▶ network     newest wins
 ///     haptic  ──steps──▶ log         all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
+///     log     ──health─▶ network     newest wins: what it counts is since the start
 ///     network ─datagrams▶ log        all of them, those of other devices too; what does not fit is counted
 ///
 /// Takes its memory when it is made, before the loops run: some 14 MB with the default capacities.
@@ -56,6 +58,7 @@ struct Mailboxes {
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
   FlightRecorder<StepRecord> flight;
+  Latest<Health> health;
   SpscRing<DatagramRecord> datagrams;
   std::atomic<std::uint64_t> datagrams_lost{0};
 };

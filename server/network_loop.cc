@@ -16,16 +16,22 @@ namespace {
 
 constexpr std::size_t kMaxNotices = 64;
 
-/// How often a controller is told how its forces fare: often enough to look at, and nothing beside 1000 states.
+/// How often a controller is told how its forces fare, and an observer how loops and engines do: often enough to look
+/// at, and nothing beside 1000 states.
 constexpr Duration kReportPeriod = std::chrono::seconds(1);
 
 /// What this server can do beyond the version's minimum.
-constexpr std::array<std::string_view, 2> kFeatures = {kFeatureLocalModel, kFeatureChannels};
+constexpr std::array<std::string_view, 3> kFeatures = {kFeatureLocalModel, kFeatureChannels, kFeatureDiagnostics};
 
-std::vector<std::string> in_common(const std::vector<std::string>& offered) {
+bool contains(const std::vector<std::string>& features, std::string_view feature) {
+  return std::find(features.begin(), features.end(), feature) != features.end();
+}
+
+std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
   std::vector<std::string> both;
   for (const std::string_view feature : kFeatures) {
-    if (std::find(offered.begin(), offered.end(), feature) != offered.end()) both.emplace_back(feature);
+    const bool not_for_it = feature == kFeatureDiagnostics && role != Role::kObserver;
+    if (contains(offered, feature) && !not_for_it) both.emplace_back(feature);
   }
   return both;
 }
@@ -90,8 +96,11 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes
   check_names(config.devices, limits::kMaxDevices, "device");
   if (mail.size() != config.devices.size()) throw std::invalid_argument("expected mailboxes for each device");
   for (std::size_t i = 0; i < mail.size(); ++i) {
-    Device& device = devices_.emplace_back(Device{
-        .about = config.devices[i], .mail = mail[i], .sampled = std::vector<Sampled>(kRemembered), .channels = {}});
+    Device& device = devices_.emplace_back(Device{.about = config.devices[i],
+                                                  .mail = mail[i],
+                                                  .sampled = std::vector<Sampled>(kRemembered),
+                                                  .channels = {},
+                                                  .told = {}});
     check_names(device.about.channels, limits::kMaxChannels, "channel");
     device.about.device = static_cast<std::uint32_t>(i);
     device.channels.resize(device.about.channels.size());
@@ -290,7 +299,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   session.life = config_.session_life;
   Welcome welcome;
   welcome.version = guest.version;
-  welcome.features = in_common(guest.hello.features);
+  welcome.features = in_common(guest.hello.features, role);
   welcome.role = role;
   const DeviceDescription& first = devices_[seats.front().device].about;
   welcome.device_name = first.model;
@@ -318,7 +327,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 guest.key,
                 guest.hello.name,
                 role,
-                std::find(welcome.features.begin(), welcome.features.end(), kFeatureChannels) != welcome.features.end(),
+                contains(welcome.features, kFeatureChannels),
+                contains(welcome.features, kFeatureDiagnostics),
                 seats,
                 std::move(views),
                 {bytes.begin(), bytes.end()},
@@ -474,14 +484,15 @@ void NetworkLoop::measure(LocalTime now, Guest& guest) {
   adapt(now, guest);
 }
 
-/// To the operator, channel by channel; to each holder, of all its channels together.
+/// To the operator, channel by channel; to each holder, of all its channels together; to observers that ask, of each
+/// device and each channel.
 void NetworkLoop::report(LocalTime now) {
   if (now - reported_ < kReportPeriod) return;
   std::map<std::uint32_t, Lateness::Report> told;  // by connection id
   for (Device& device : devices_) {
     for (std::size_t i = 0; i < device.channels.size(); ++i) {
       Channel& channel = device.channels[i];
-      const Lateness::Report report = channel.lateness.report(now);
+      const Lateness::Report& report = channel.newest = channel.lateness.report(now);
       stats_.late_ours += report.late_ours;
       stats_.late_network += report.late_network;
       stats_.late_engine += report.late_engine;
@@ -493,17 +504,64 @@ void NetworkLoop::report(LocalTime now) {
     }
   }
   for (Guest& guest : guests_) {
-    if (guest.meter) tell(now, guest, told[guest.session.connection_id()]);
+    if (!guest.meter) continue;
+    const LinkMeter::Report link = guest.meter->report(now);
+    tell_of_engine(now, guest, link);
+    const Lateness::Report& forces = told[guest.session.connection_id()];
+    if (forces.forces == 0 && forces.late() == 0) continue;
+    LinkReport report = link_report(now, guest, link, forces);
+    report.number = ++guest.reports;
+    guest.session.send(report);
   }
+  tell_of_devices();
   reported_ = now;
 }
 
-void NetworkLoop::tell(LocalTime now, Guest& guest, const Lateness::Report& forces) {
-  const LinkMeter::Report link = guest.meter->report(now);
-  if (forces.forces == 0 && forces.late() == 0) return;
+template <class Report>
+void NetworkLoop::tell_observers(std::uint32_t device, const Report& report) {
+  for (Guest& guest : guests_) {
+    const bool watches =
+        std::any_of(guest.views.begin(), guest.views.end(), [&](const View& view) { return view.device == device; });
+    if (guest.diagnoses && watches) guest.session.send(report);
+  }
+}
+
+/// Where the log thread has said nothing since, there is nothing to tell.
+void NetworkLoop::tell_of_devices() {
+  for (std::uint32_t number = 0; number < devices_.size(); ++number) {
+    Device& device = devices_[number];
+    const Health* const health = device.mail->health.take();
+    if (health == nullptr) continue;
+    if (device.told) {
+      DeviceReport report = tendon::report(*device.told, *health);
+      report.number = ++device.reports;
+      report.device = number;
+      tell_observers(number, report);
+    }
+    device.told = *health;
+  }
+}
+
+void NetworkLoop::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter::Report& link) {
+  for (const Seat& seat : engine.seats) {
+    Channel& channel = devices_[seat.device].channels[seat.channel];
+    if (seat.role != Role::kController || channel.holder != engine.session.connection_id()) continue;
+    PeerReport report;
+    report.device = seat.device;
+    report.channel = seat.channel;
+    report.name = engine.name;
+    report.state_one_in = engine.adaptation ? engine.adaptation->one_in() : 1;
+    report.forces_refused = engine.adaptation && engine.adaptation->hopeless();
+    report.link = link_report(now, engine, link, channel.newest);
+    report.link.number = ++channel.reports;
+    tell_observers(seat.device, report);
+  }
+}
+
+LinkReport NetworkLoop::link_report(LocalTime now, const Guest& guest, const LinkMeter::Report& link,
+                                    const Lateness::Report& forces) const {
   const LinkStats& counted = guest.session.stats();
   LinkReport report;
-  report.number = ++guest.reports;
   report.until = PeerTime(now.time_since_epoch());
   report.span = now - std::max(reported_, guest.arrived);
   report.forces = forces.forces;
@@ -525,7 +583,7 @@ void NetworkLoop::tell(LocalTime now, Guest& guest, const Lateness::Report& forc
   report.reordered = counted.reordered;
   report.duplicated = counted.duplicated;
   report.words = forces.text;
-  guest.session.send(report);
+  return report;
 }
 
 /// A client may answer a step that it has foretold, also one that we were too late to see: those between the last state
@@ -549,6 +607,13 @@ void NetworkLoop::publish(LocalTime now) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     remember(now, devices_[number], *state);
+    // What an engine asks for is bounded, what a device's loop makes of it need not be: no frame is lost for that.
+    DeviceState diagnosed = *state;
+    if (diagnosed.force_wanted && !(diagnosed.force_wanted->array().abs() <= limits::kMaxValue).all()) {
+      diagnosed.force_wanted.reset();
+    }
+    DeviceState plain = *state;
+    plain.force_wanted.reset();
     for (Guest& guest : guests_) {
       const auto view =
           std::find_if(guest.views.begin(), guest.views.end(), [&](const View& seen) { return seen.device == number; });
@@ -560,7 +625,7 @@ void NetworkLoop::publish(LocalTime now) {
         continue;
       }
       view->last_state = state->tick;
-      guest.session.send(*state);
+      guest.session.send(guest.diagnoses ? diagnosed : plain);
     }
   }
   for (Guest& guest : guests_) send_all(now, guest);

@@ -27,6 +27,8 @@ namespace tendon {
 /// One thread calls `turn` when a datagram has come, when the haptic loop has made a step, or when the
 /// time that the last turn returned has come; it does nothing else but wait and read the clock.
 ///
+/// Observers that ask for it (kFeatureDiagnostics) are told once a second how the devices' loops and the engines do.
+///
 /// One controller for each channel, who may have to share it with others in turn (a lease, SESSION.md), and up to
 /// `max_observers` observers. The link is drained in every turn, so nothing
 /// waits behind what is old; forces are newest-wins, every request is answered.
@@ -150,6 +152,7 @@ class NetworkLoop {
     std::string name;
     Role role;
     bool can_lose;            ///< it can be told that it has lost a lease
+    bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
     std::vector<Seat> seats;  ///< `role` is what its Welcome says
     std::vector<View> views;
     std::vector<std::byte> answer;  ///< for when it was lost
@@ -173,6 +176,8 @@ class NetworkLoop {
     std::uint64_t handovers = 0;
     std::uint64_t late = 0;
     Lateness lateness;
+    Lateness::Report newest;    ///< of it
+    std::uint64_t reports = 0;  ///< of its engine, to observers
   };
   /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.
   struct Sampled {
@@ -187,6 +192,8 @@ class NetworkLoop {
     std::vector<Sampled> sampled;
     std::uint64_t newest_tick = 0;
     std::vector<Channel> channels;
+    std::optional<Health> told;  ///< to observers, last; empty before there was any
+    std::uint64_t reports = 0;   ///< told so far
   };
 
   bool drain(LocalTime now);
@@ -217,7 +224,12 @@ class NetworkLoop {
   void adapt(LocalTime now, Guest& guest);
   void remember(LocalTime now, Device& device, const DeviceState& state);
   void report(LocalTime now);
-  void tell(LocalTime now, Guest& guest, const Lateness::Report& forces);
+  LinkReport link_report(LocalTime now, const Guest& guest, const LinkMeter::Report& link,
+                         const Lateness::Report& forces) const;
+  void tell_of_devices();
+  void tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter::Report& link);
+  template <class Report>
+  void tell_observers(std::uint32_t device, const Report& report);
   void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
            std::size_t size);

@@ -63,6 +63,13 @@ const char* describe(HapticController::Fault fault) {
   return "unknown";
 }
 
+Safety on_the_wire(SafetyState state) noexcept {
+  static_assert(static_cast<int>(SafetyState::kAbsent) + 1 == static_cast<int>(Safety::kAbsent));
+  static_assert(static_cast<int>(SafetyState::kHomed) + 1 == static_cast<int>(Safety::kHomed));
+  static_assert(static_cast<int>(SafetyState::kFault) + 1 == static_cast<int>(Safety::kFault));
+  return static_cast<Safety>(static_cast<int>(state) + 1);
+}
+
 /// What the operator is told when a real device comes to this state.
 std::string describe(Device::State state, const Scene& scene) {
   switch (state) {
@@ -163,7 +170,8 @@ Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capaciti
       device(make_device(scene, guardian)),
       safe(scene.safety ? std::make_unique<SafeDevice>(*scene.safety, *device) : nullptr),
       mail(capacities),
-      haptic(scene.loop, safe ? *safe : *device, mail) {}
+      haptic(scene.loop, safe ? *safe : *device, mail),
+      meter(scene.loop.period) {}
 
 Server::Lanes Server::lanes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
   Lanes lanes;
@@ -272,6 +280,7 @@ void Server::run_haptic(Lane& lane) {
   const bool first = &lane == lanes_.front().get();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
     if (first) log::warn(refused);  // to all of them alike
+    lane.not_realtime.store(true, std::memory_order_relaxed);
   }
   if (lane.scene.cpu) {
     if (const auto refused = stay_on(*lane.scene.cpu)) log::warn(prefix(lane) + *refused);
@@ -306,6 +315,7 @@ void Server::run_log() {
     last = stop_log_.load(std::memory_order_acquire);
     const LocalTime now = clock::now();
     drain_to_recorder(now);
+    for (auto& lane : lanes_) report_health(now, *lane);
     if (now >= tell_next_ || last) {
       for (auto& lane : lanes_) report_trouble(*lane);
       tell_next_ = now + kTellPeriod;
@@ -320,6 +330,7 @@ void Server::drain_to_recorder(LocalTime now) {
   for (std::size_t device = 0; device < lanes_.size(); ++device) {
     Lane& lane = *lanes_[device];
     while (const StepRecord* step = lane.mail.steps.front()) {
+      lane.meter.observe(*step);
       if (recorder_) recorder_->record(*step, device);
       lane.mail.steps.pop();
     }
@@ -344,6 +355,25 @@ void Server::drain_to_recorder(LocalTime now) {
     told_recording_ended_ = true;
     log::error("recording has ended, the device runs on: " + status.error);
   }
+}
+
+/// To the network thread, for observers that ask.
+void Server::report_health(LocalTime now, Lane& lane) {
+  Health health = lane.meter.counted();
+  health.at = now;
+  const HapticLoop::Stats haptic = lane.haptic.stats();
+  if (haptic.fault != HapticController::Fault::kNone) health.fault = describe(haptic.fault);
+  if (lane.safe) {
+    const SafeDevice::Status safety = lane.safe->status();
+    health.safety = on_the_wire(safety.state);
+    if (safety.state == SafetyState::kFault) health.fault = to_string(safety.last_fault);
+  } else {
+    const bool ready = haptic.device == Device::State::kHomed;
+    health.safety = ready ? Safety::kUnguarded : on_the_wire(static_cast<SafetyState>(haptic.device));
+  }
+  health.not_realtime = lane.not_realtime.load(std::memory_order_relaxed);
+  health.recording_ended = told_recording_ended_;
+  lane.mail.health.put(health);
 }
 
 void Server::report_safety(Lane& lane) {

@@ -15,6 +15,7 @@
 #include "server/byte_sink.h"
 #include "server/doorbell.h"
 #include "server/haptic_loop.h"
+#include "server/health.h"
 #include "server/mailboxes.h"
 #include "server/network_loop.h"
 #include "server/realtime.h"
@@ -31,7 +32,7 @@ namespace tendon {
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
 /// | haptic… | HapticLoop, Device           | the absolute time of its next step      | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
-/// | log     | Recorder                     | 20 ms                                   | allocate, write, log    |
+/// | log     | Recorder, HealthMeters       | 20 ms                                   | allocate, write, log    |
 ///
 /// They share the Mailboxes of each device, and nothing else.
 class Server {
@@ -75,7 +76,9 @@ class Server {
     Mailboxes mail;
     HapticLoop haptic;
     std::thread thread;
-    std::uint64_t steps_seen = 0;  ///< by turning()
+    std::atomic<bool> not_realtime{false};  ///< the kernel refused its haptic thread something
+    std::uint64_t steps_seen = 0;           ///< by turning()
+    HealthMeter meter;                      ///< the log thread's
 
     // What run_log has told the operator already.
     HapticLoop::Stats told;
@@ -95,6 +98,7 @@ class Server {
   void run_network();
   void run_log();
   void drain_to_recorder(LocalTime now);
+  void report_health(LocalTime now, Lane& lane);
   void report_trouble(Lane& lane);
   void report_safety(Lane& lane);
   void save_flight(Lane& lane);

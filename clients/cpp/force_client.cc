@@ -66,6 +66,7 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now)
     : ForceClient(link, server, config, Role::kController, now) {
   require(physics != nullptr, "physics: a controller needs a callback");
+  require(!config.diagnostics, "diagnostics: for observers only");
   physics_ = std::move(physics);
 }
 
@@ -119,6 +120,7 @@ void ForceClient::greet(LocalTime now) {
   config.hello.role = role_;
   config.hello.name = config_.name;
   config.hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels)};
+  if (config_.diagnostics) config.hello.features.emplace_back(kFeatureDiagnostics);
   if (claims()) config.hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
   const Key random = secrets_.next();
   std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
@@ -163,6 +165,8 @@ void ForceClient::settle(LocalTime now) {
   foretell_ = false;
   seen_tick_ = 0;
   report_.reset();
+  device_report_.reset();
+  peer_reports_.clear();
   if (config_.state_hz > 0) session_->request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
   sequence_ = 0;
   if (config_.deadband) deadband_.emplace(*config_.deadband);  // what another session was sent, this one was not
@@ -225,6 +229,18 @@ void ForceClient::tick(LocalTime now) {
   }
 }
 
+/// Of our device there are at most kMaxChannels, and a server tells of no other.
+void ForceClient::take_report(const PeerReport& report) {
+  if (report.device != place_.device) return;
+  const auto known = std::find_if(peer_reports_.begin(), peer_reports_.end(),
+                                  [&](const PeerReport& one) { return one.channel == report.channel; });
+  if (known == peer_reports_.end()) {
+    peer_reports_.push_back(report);
+  } else {
+    *known = report;
+  }
+}
+
 void ForceClient::take_events(LocalTime now) {
   while (session_) {
     const std::optional<Session::Event> event = session_->next_event();
@@ -237,6 +253,10 @@ void ForceClient::take_events(LocalTime now) {
       back_off_ = config_.retry_min;
     } else if (const auto* report = std::get_if<Session::ReportArrived>(&*event)) {
       report_ = report->report;
+    } else if (const auto* of_device = std::get_if<Session::DeviceReportArrived>(&*event)) {
+      if (of_device->report.device == place_.device) device_report_ = of_device->report;
+    } else if (const auto* of_peer = std::get_if<Session::PeerReportArrived>(&*event)) {
+      take_report(of_peer->report);
     } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&*event)) {
       take_answer(now, *answered);
     } else if (const auto* asked = std::get_if<Session::RequestArrived>(&*event)) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "protocol/crypto.h"
 #include "protocol/deadband.h"
@@ -100,6 +101,9 @@ class ForceClient {
     /// max_silence: where states are lost the callback waits for the next one. With rate_hz = 0 it is called for each
     /// state that comes. Empty: every state is asked for. A server that knows nothing of this sends every state.
     std::optional<SetStateDeadband> state_deadband{};
+    /// Of an observer: ask for what the engines want (DeviceState::force_wanted), and once a second for how the
+    /// device's loop and its engines do. A server that knows nothing of this leaves it out.
+    bool diagnostics = false;
     /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
     std::optional<Key> key{};
     Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
@@ -147,7 +151,7 @@ class ForceClient {
   /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves
   /// with the first turn. Throws std::invalid_argument naming the field when `config` is impossible.
   ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now);
-  /// An observer: sees states; never sends a force.
+  /// An observer: sees states, and reports when it asks for them; never sends a force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
   /// Does all there is to do at `now` and returns when it wants to be called again at the latest; a
@@ -180,6 +184,12 @@ class ForceClient {
   /// losses. Of the present session; empty before the first.
   const std::optional<LinkReport>& report() const noexcept { return report_; }
 
+  /// With Config::diagnostics: the newest word on our device's loop, and on the engine of each of its channels that has
+  /// one, in the order of their first reports. Of the present session; empty before the first. An engine that has gone
+  /// leaves its last one.
+  const std::optional<DeviceReport>& device_report() const noexcept { return device_report_; }
+  const std::vector<PeerReport>& peer_reports() const noexcept { return peer_reports_; }
+
  private:
   ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now);
 
@@ -188,6 +198,7 @@ class ForceClient {
   void end(LocalTime now, Phase phase, Code code, std::string reason);
   bool drain(LocalTime now);
   bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
+  void take_report(const PeerReport& report);
   void take_events(LocalTime now);
   void take_answer(LocalTime now, const Session::RequestAnswered& answered);
   void take_request(LocalTime now, const Session::RequestArrived& arrived);
@@ -233,6 +244,8 @@ class ForceClient {
   std::uint64_t sequence_ = 0;       ///< of the newest force
   std::uint64_t answered_tick_ = 0;  ///< the tick it answers
   std::optional<LinkReport> report_;
+  std::optional<DeviceReport> device_report_;
+  std::vector<PeerReport> peer_reports_;
   Stats stats_;
 };
 

@@ -203,6 +203,7 @@ INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
                                                      {Fault::kReportsAllTheTime, "link-report"},
                                                      {Fault::kReportsOfOneNumber, "link-report"},
                                                      {Fault::kReportsBeyondBounds, "link-report"},
+                                                     {Fault::kDiagnosesUnasked, "diagnostics-unasked"},
                                                  })),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(Client, BrokenToy,

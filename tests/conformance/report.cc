@@ -162,6 +162,8 @@ constexpr std::array kChecks = {
           "max(share · |v|, floor), whose mode is another, or that comes max_silence_us later."},
     Check{"link-report", kServer, kSession, "Report",
           "From a controller's first force on, the server tells it once a second how its forces fare (LinkReport)"},
+    Check{"diagnostics-unasked", kServer, kSession, "Report",
+          "An observer that named the feature diagnostics, and nobody else, is told"},
     // The end.
     Check{"bye-silence", kBoth, kSession, kStates, "nothing is sent, believed or counted any more"},
     Check{"bye-thrice", kBoth, kSession, kStates, "Bye is said three times, what was not sent is dropped"},

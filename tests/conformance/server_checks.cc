@@ -1009,6 +1009,9 @@ void ServerJudge::check_states(const Conversation& talk) {
   talk.for_each_frame(0, [&](const pb::Frame& frame) {
     report_.judge("states", !frame.has_force() && !frame.has_control(), frame.ShortDebugString(),
                   "only frames that a server sends");
+    const bool diagnosed = frame.has_device_report() || frame.has_peer_report() || frame.state().has_force_wanted_n();
+    report_.judge("diagnostics-unasked", !diagnosed, frame.ShortDebugString(),
+                  "nothing of it: nobody named the feature");
     if (!frame.has_state()) return;
     const pb::DeviceState& state = frame.state();
     ++count;

@@ -90,6 +90,7 @@ enum class Fault : std::uint8_t {
   kReportsAllTheTime,
   kReportsOfOneNumber,
   kReportsBeyondBounds,
+  kDiagnosesUnasked,
   kKnowsNoChannels,  ///< no fault: an older server
   // A client's.
   kShortHello,

@@ -135,9 +135,26 @@ def test_echo_motion_prints_json_lines_and_a_summary(tmp_path):
         tmp_path, "echo_motion", "--server", server.address, "--json", "--duration-s", "1"
     ) as echo:
         line = json.loads(echo.wait_for_line('"tick"'))
-        assert {"tick", "position_m", "force_n", "round_trip_ms"} == set(line)
+        assert {"tick", "position_m", "force_n", "force_wanted_n", "round_trip_ms"} == set(line)
         assert echo.wait() == 0
         assert summary_of(echo)["summary"]["states"] > 0
+
+
+def test_an_observer_with_json_is_told_of_the_loop_and_of_the_engine(tmp_path):
+    with Server(tmp_path) as server, example(tmp_path, "virtual_wall", "--server", server.address), example(
+        tmp_path, "echo_motion", "--server", server.address, "--json", "--duration-s", "60"
+    ) as echo:
+        while True:  # the first report may be of a time before the engine came
+            device = json.loads(echo.wait_for_line('{"device":'))["device"]
+            assert sum(device["lateness_us_log2"]) == device["steps"] > 0
+            assert device["safety"] == "unguarded"
+            peer = json.loads(echo.wait_for_line('{"peer":'))["peer"]
+            assert peer["name"] == "virtual_wall" and not peer["forces_refused"]
+            wanted = json.loads(echo.wait_for_line('"tick"'))["force_wanted_n"]
+            assert len(wanted) == 3
+            if peer["link"]["forces"] > 0 and peer["link"]["round_trip_ms"] is not None:
+                break
+        assert echo.stop() == 0
 
 
 def test_without_a_server_an_example_says_so_and_leaves_with_1(tmp_path):
