@@ -61,10 +61,12 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 }
 
 constexpr int kVisitors = 8;
-// What may grow and still be flat. The proxy keeps a socket for each of the last engines, of which not the same number
-// falls into each second.
-constexpr VitalSigns kServerGrowth{.resident = std::size_t{1} << 20};
-constexpr VitalSigns kProxyGrowth{.resident = std::size_t{1} << 20, .files = 8};
+// What may grow and still be flat.
+constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
+/// The proxy keeps a socket for each of the last engines, of which not the same number falls into each second.
+constexpr VitalSigns kProxyGrowth{.resident = kGrowth.resident, .files = 8};
+/// The index of a recording, which its end is to hold: four chunks in a second, of some 200 bytes each.
+constexpr std::size_t kIndexBytesPerSecond = 1024;
 
 /// A program whose words go to a file: see `log`. Its end is noticed, and is its own doing only after `stop`.
 class Program {
@@ -169,6 +171,17 @@ std::uint64_t rotate(const std::filesystem::path& log) {
   return size;
 }
 
+/// A program that is to be flat.
+struct Watched {
+  Watched(std::string the_name, std::unique_ptr<Program> the_program, const VitalSigns& the_growth)
+      : name(std::move(the_name)), program(std::move(the_program)), growth(the_growth) {}
+
+  std::string name;
+  std::unique_ptr<Program> program;
+  VitalSigns growth;
+  std::vector<VitalSigns> looks{};
+};
+
 /// One whole run: what is alive in it, and what becomes of it.
 class Run {
  public:
@@ -177,24 +190,26 @@ class Run {
         random_(config.seed),
         disk_(config.folder / "small-disk"),
         scene_(e2e::write(config.folder / "soak.toml", kScene)),
-        clock_file_(e2e::write(config.folder / "clock-step", "0")),
-        server_("tendond", tendond("/dev/null"), config.folder, wrong_clock()),
-        proxy_("tendon-inject",
-               own_end() + std::vector<std::string>{"--listen", "127.0.0.1:0", "--to", address(server_), "--profile",
-                                                    "wifi-good", "--seed", std::to_string(config.seed), "--json"},
-               config.folder) {
+        clock_file_(e2e::write(config.folder / "clock-step", "0")) {
+    server_ = tendond("tendond", {}, kGrowth);
+    const std::vector<std::string> proxy = {"--listen",  "127.0.0.1:0", "--to",   address(*server_),
+                                            "--profile", "wifi-good",   "--seed", std::to_string(config.seed),
+                                            "--json"};
+    proxy_ = watch("tendon-inject", std::make_unique<Program>("tendon-inject", own_end() + proxy, config.folder),
+                   kProxyGrowth);
+    VitalSigns index = kGrowth;
+    index.resident += kIndexBytesPerSecond * static_cast<std::size_t>(seconds(config.duration));
+    tendond("recording", {"--record", "/dev/null"}, index);
     if (disk_.mounted()) {
-      std::filesystem::create_directories(config.folder / "second");
-      second_ = std::make_unique<Program>("tendond", tendond(disk_.path() / "run.mcap"), config.folder / "second",
-                                          wrong_clock());
+      full_ = tendond("full-disk", {"--record", (disk_.path() / "run.mcap").string()}, kGrowth);
     }
-    through_ = e2e::text_in(proxy_.line("\"event\":\"start\""), "listen");
+    through_ = e2e::text_in(proxy_->line("\"event\":\"start\""), "listen");
   }
 
   Report run(const std::function<void(double)>& progress) {
     const LocalTime start = clock::now();
     const LocalTime end = start + config_.duration;
-    const Address server = parse_address(address(server_));
+    const Address server = parse_address(address(*server_));
     // They are done a little before the end: the last look is at a server that has rest.
     Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
     Watching watcher(server);
@@ -236,12 +251,17 @@ class Run {
   std::vector<std::string> own_end() const {
     return {"--duration-s", std::to_string(static_cast<int>(seconds(config_.duration)) + 300)};
   }
-  std::vector<std::string> tendond(const std::filesystem::path& recording) const {
-    return own_end() +
-           std::vector<std::string>{scene_, "--json", "--listen", "127.0.0.1:0", "--record", recording.string()};
+  Program* watch(const std::string& name, std::unique_ptr<Program> program, const VitalSigns& growth) {
+    return watched_.emplace_back(name, std::move(program), growth).program.get();
   }
-  std::vector<std::string> wrong_clock() const {
-    return {std::string("LD_PRELOAD=") + TENDON_STEPPED_CLOCK, "TENDON_CLOCK_STEP=" + clock_file_};
+  /// A server, in a folder of its own, with a wall clock that is wrong.
+  Program* tendond(const std::string& name, const std::vector<std::string>& more, const VitalSigns& growth) {
+    const std::filesystem::path folder = config_.folder / name;
+    std::filesystem::create_directories(folder);
+    const std::vector<std::string> wrong_clock = {std::string("LD_PRELOAD=") + TENDON_STEPPED_CLOCK,
+                                                  "TENDON_CLOCK_STEP=" + clock_file_};
+    const std::vector<std::string> words = {scene_, "--json", "--listen", "127.0.0.1:0"};
+    return watch(name, std::make_unique<Program>("tendond", own_end() + words + more, folder, wrong_clock), growth);
   }
   static std::string address(const Program& tendond) {
     return e2e::text_in(tendond.line("\"event\":\"listening\""), "address");
@@ -252,10 +272,13 @@ class Run {
   void broken(const std::string& why) { report_.broken.push_back(why); }
 
   bool alive() {
-    const bool all =
-        vital_signs(server_.pid()) && vital_signs(proxy_.pid()) && (!second_ || vital_signs(second_->pid()));
-    if (!all) broken("a program ended before its time");
-    return all;
+    for (const Watched& watched : watched_) {
+      if (!vital_signs(watched.program->pid())) {
+        broken(watched.name + " ended before its time");
+        return false;
+      }
+    }
+    return true;
   }
 
   /// The engine comes or is killed.
@@ -275,21 +298,17 @@ class Run {
   }
 
   void look() {
-    const auto add = [](const Program& program, std::vector<VitalSigns>& looks) {
-      if (const auto signs = vital_signs(program.pid())) looks.push_back(*signs);
-    };
-    add(server_, server_looks_);
-    add(proxy_, proxy_looks_);
-    if (second_) add(*second_, second_looks_);
+    for (Watched& watched : watched_) {
+      if (const auto signs = vital_signs(watched.program->pid())) watched.looks.push_back(*signs);
+    }
   }
 
   void treat_roughly() {
     constexpr double kDay_s = 86400;
     std::ofstream(clock_file_) << static_cast<std::int64_t>(uniform(-kDay_s, kDay_s) * 1e9) << '\n';
     ++report_.clock_steps;
-    if (second_ && !report_.disk_was_full) report_.disk_was_full = second_->said("No space left on device").has_value();
-    report_.log_bytes += rotate(server_.log());
-    rotate(proxy_.log());
+    report_.log_bytes += rotate(server_->log());
+    rotate(proxy_->log());
     ++report_.log_rotations;
     if (uniform(0, 1) < 1.0 / 3) {
       hogs_.start();
@@ -300,39 +319,32 @@ class Run {
 
   void finish() {
     engine_.reset();
-    for (const auto& why :
-         {not_flat("tendond", server_looks_, kServerGrowth), not_flat("tendon-inject", proxy_looks_, kProxyGrowth),
-          not_flat("the second tendond", second_looks_, kServerGrowth)}) {
-      if (why) broken(*why);
+    for (Watched& watched : watched_) {
+      if (const auto why = not_flat(watched.name, watched.looks, watched.growth)) broken(*why);
+      if (!watched.looks.empty()) {
+        const VitalSigns& warm = watched.looks[watched.looks.size() / 5];
+        report_.programs.push_back({.name = watched.name,
+                                    .mb_first = static_cast<double>(warm.resident) / 1e6,
+                                    .mb_last = static_cast<double>(watched.looks.back().resident) / 1e6,
+                                    .files = watched.looks.back().files,
+                                    .threads = watched.looks.back().threads});
+      }
+      const int code = watched.program->stop();
+      // 1: on a machine with so many hogs the proxy could not keep the time of its releases, and says so.
+      if (code != 0 && !(code == 1 && watched.program.get() == proxy_)) {
+        broken(watched.name + ": exit code " + std::to_string(code));
+      }
     }
-    if (!server_looks_.empty()) {
-      const std::size_t warm = server_looks_.size() / 5;
-      report_.server_mb_first = static_cast<double>(server_looks_[warm].resident) / 1e6;
-      report_.server_mb_last = static_cast<double>(server_looks_.back().resident) / 1e6;
-      report_.server_files = server_looks_.back().files;
-      report_.server_threads = server_looks_.back().threads;
-    }
-    // 1: on a machine with so many hogs it could not keep the time of its releases, and says so.
-    if (const int code = proxy_.stop(); code != 0 && code != 1)
-      broken("tendon-inject: exit code " + std::to_string(code));
-    if (second_) {
-      report_.disk_was_full = report_.disk_was_full || second_->said("No space left on device").has_value();
-      if (!report_.disk_was_full) broken("the small disk did not become full: nothing was shown by it");
-      stop(*second_, "the second tendond");
-    }
-    stop(server_, "tendond");
-    const std::string end = server_.line("\"event\":\"stopped\"");
-    report_.log_bytes += std::filesystem::file_size(server_.log());
+    if (full_ != nullptr) report_.disk_was_full = full_->said("No space left on device").has_value();
+    if (full_ != nullptr && !report_.disk_was_full)
+      broken("the small disk did not become full: nothing was shown by it");
+    const std::string end = server_->line("\"event\":\"stopped\"");
+    report_.log_bytes += std::filesystem::file_size(server_->log());
     report_.steps = e2e::count_in(end, "steps");
     report_.overruns = e2e::count_in(end, "overruns");
     report_.longest_interval_ms = e2e::number_in(end, "longest_interval_us") / 1e3;
     report_.forces = e2e::count_in(end, "forces");
     if (e2e::count_in(end, "fault") != 0) broken("a latched fault: " + end);
-    if (e2e::text_in(end, "name") != "soak") broken("the end of another server: " + end);
-  }
-
-  void stop(Program& program, const std::string& name) {
-    if (const int code = program.stop(); code != 0) broken(name + ": exit code " + std::to_string(code));
   }
 
   Config config_;
@@ -340,16 +352,14 @@ class Run {
   SmallDisk disk_;
   std::string scene_;
   std::string clock_file_;
-  Program server_;
-  Program proxy_;
-  std::unique_ptr<Program> second_;
+  std::vector<Watched> watched_;
+  Program* server_ = nullptr;  ///< of `watched_`, as the next ones
+  Program* proxy_ = nullptr;
+  Program* full_ = nullptr;  ///< null where no disk could be mounted
   std::unique_ptr<Program> engine_;
   std::string through_;
   Hogs hogs_;
   LocalTime next_flap_{};
-  std::vector<VitalSigns> server_looks_;
-  std::vector<VitalSigns> proxy_looks_;
-  std::vector<VitalSigns> second_looks_;
   Report report_;
 };
 
@@ -366,8 +376,8 @@ Report run(const Config& config, const std::function<void(double)>& progress) {
 std::string to_json(const Config& config, const Report& report) {
   std::string broken;
   for (const std::string& why : report.broken) broken += (broken.empty() ? "" : "; ") + why;
-  return lab::JsonLine()
-      .add("event", "soak")
+  lab::JsonLine line;
+  line.add("event", "soak")
       .add("passed", report.broken.empty())
       .add("broken", broken)
       .add("seed", config.seed)
@@ -384,12 +394,14 @@ std::string to_json(const Config& config, const Report& report) {
       .add("clock_steps", report.clock_steps)
       .add("log_rotations", report.log_rotations)
       .add("log_bytes", report.log_bytes)
-      .add("disk_was_full", report.disk_was_full)
-      .add("server_mb_first", report.server_mb_first)
-      .add("server_mb_last", report.server_mb_last)
-      .add("server_files", report.server_files)
-      .add("server_threads", report.server_threads)
-      .str();
+      .add("disk_was_full", report.disk_was_full);
+  for (const ProgramReport& program : report.programs) {
+    line.add(program.name + "_mb_first", program.mb_first)
+        .add(program.name + "_mb_last", program.mb_last)
+        .add(program.name + "_files", program.files)
+        .add(program.name + "_threads", program.threads);
+  }
+  return line.str();
 }
 
 std::string to_text(const Report& report) {
@@ -411,11 +423,11 @@ std::string to_text(const Report& report) {
   row(report.clock_steps, "times that the wall clock was set");
   row(report.log_rotations, "times that the logs were cut");
   row(report.log_bytes, "bytes of the server's log in all");
-  row(report.disk_was_full ? "yes" : "no", "the second server's disk was full");
-  row(report.server_mb_first, "MB of the server's memory after a fifth of the time");
-  row(report.server_mb_last, "MB … at the end");
-  row(report.server_files, "open files");
-  row(report.server_threads, "threads");
+  row(report.disk_was_full ? "yes" : "no", "the disk was full");
+  for (const ProgramReport& program : report.programs) {
+    text << std::setw(12) << program.mb_last << "  MB of memory of " << program.name << ", after a fifth of the time "
+         << program.mb_first << "; " << program.files << " open files, " << program.threads << " threads\n";
+  }
   for (const std::string& why : report.broken) text << "BROKEN: " << why << '\n';
   return text.str();
 }

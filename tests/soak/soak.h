@@ -14,22 +14,32 @@ namespace tendon::soak {
 
 /// A server that is treated roughly, in real time:
 ///
-///     server       tendond as it is, on a simulated Falcon at 1 kHz, recording to /dev/null all the while
+///     server       tendond as it is, on a simulated Falcon at 1 kHz
 ///     engine       virtual_wall through tendon-inject, killed by SIGKILL after 0.2 to 3 s and started again
 ///     visitors     observers that come, see a state, say Bye and come again from elsewhere, `reconnects` in all
 ///     watcher      an observer that stays and holds every state against the promises (Watching)
-///     second       a tendond that records to a disk of 256 kB, which is soon full (where a tmpfs may be mounted)
-///     wall clock   is set forward or back by up to a day, of both servers (stepped_clock.cc), every 7 s
-///     hogs         a process that only burns time on each processor, for a third of the time
-///     log          of the servers, cut to nothing while they write, as logrotate's copytruncate does
+///     recording    a second tendond, alone, that records to /dev/null; its memory may grow by the index of the
+///     recording full disk    a third one that records to a disk of 256 kB, which is soon full (where a tmpfs may be
+///     mounted) wall clock   is set forward or back by up to a day, of all servers (stepped_clock.cc), every 7 s hogs
+///     a process that only burns time on each processor, for a third of the time log          of the server, cut to
+///     nothing while they write, as logrotate's copytruncate does
 ///
-/// What is to be flat is (VitalSigns), of both servers and of the proxy; nobody ends before it is told to; the haptic
+/// What is to be flat is (VitalSigns), of the servers and of the proxy; nobody ends before it is told to; the haptic
 /// loop latches no fault; a visitor always sees a state.
 struct Config {
   std::filesystem::path folder;  ///< of what it writes; made, or empty
   Duration duration = std::chrono::hours(1);
   std::uint64_t reconnects = 1'000'000;
   std::uint64_t seed = 1;
+};
+
+/// What became of a program that is to be flat.
+struct ProgramReport {
+  std::string name;
+  double mb_first = 0;  ///< resident memory after a fifth of the time …
+  double mb_last = 0;   ///< … and at the end
+  std::size_t files = 0;
+  std::size_t threads = 0;
 };
 
 struct Report {
@@ -48,10 +58,7 @@ struct Report {
   std::uint64_t log_rotations = 0;
   std::uint64_t log_bytes = 0;  ///< written in all
   bool disk_was_full = false;
-  double server_mb_first = 0;  ///< resident memory after a fifth of the time …
-  double server_mb_last = 0;   ///< … and at the end
-  std::size_t server_files = 0;
-  std::size_t server_threads = 0;
+  std::vector<ProgramReport> programs;
 };
 
 /// `progress` is called now and then with the share of the time that is over, in [0, 1]. Throws std::runtime_error when
