@@ -63,8 +63,9 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 constexpr int kVisitors = 8;
 // What may grow and still be flat.
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
-/// The proxy keeps a socket for each of the last engines, of which not the same number falls into each second.
-constexpr VitalSigns kProxyGrowth{.resident = kGrowth.resident, .files = 8};
+/// The proxy keeps a socket and statistics for each of the last engines, of which not the same number falls into each
+/// second.
+constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
 /// The index of a recording, which its end is to hold: four chunks in a second, of some 200 bytes each.
 constexpr std::size_t kIndexBytesPerSecond = 1024;
 
