@@ -229,11 +229,10 @@ void ForceClient::tick(LocalTime now) {
   }
 }
 
-/// Of our device there are at most kMaxChannels, and a server tells of no other.
 void ForceClient::take_report(const PeerReport& report) {
-  if (report.device != place_.device) return;
-  const auto known = std::find_if(peer_reports_.begin(), peer_reports_.end(),
-                                  [&](const PeerReport& one) { return one.channel == report.channel; });
+  const auto known = std::find_if(peer_reports_.begin(), peer_reports_.end(), [&](const PeerReport& one) {
+    return one.device == report.device && one.channel == report.channel;
+  });
   if (known == peer_reports_.end()) {
     peer_reports_.push_back(report);
   } else {
@@ -254,7 +253,7 @@ void ForceClient::take_events(LocalTime now) {
     } else if (const auto* report = std::get_if<Session::ReportArrived>(&*event)) {
       report_ = report->report;
     } else if (const auto* of_device = std::get_if<Session::DeviceReportArrived>(&*event)) {
-      if (of_device->report.device == place_.device) device_report_ = of_device->report;
+      device_report_ = of_device->report;
     } else if (const auto* of_peer = std::get_if<Session::PeerReportArrived>(&*event)) {
       take_report(of_peer->report);
     } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&*event)) {
