@@ -616,6 +616,22 @@ TEST_F(SealedServer, AnObserverIsToldOfAnEngineThatSendsNoForceToo) {
   EXPECT_TRUE(link.round_trip.has_value());
 }
 
+TEST_F(SealedServer, WhatAnObserverWasToldGoesWithItsSession) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  measured_ = true;
+  run(milliseconds(2500), {&a, &b});
+  EXPECT_TRUE(b.client->device_report().has_value());
+  EXPECT_FALSE(b.client->peer_reports().empty());
+  loop_->close(now_);
+  measured_ = false;
+  run(milliseconds(500), {&b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(b.client->stats().sessions, 2U);
+  EXPECT_FALSE(b.client->device_report().has_value());
+  EXPECT_TRUE(b.client->peer_reports().empty());
+}
+
 TEST_F(SealedServer, WhoDoesNotAskIsToldNothingOfIt) {
   Client a = controller(wall_, "192.0.2.1:4000");
   DeviceState seen;
@@ -715,10 +731,15 @@ TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
 TEST_F(TwoDevices, AnObserverIsToldOfTheDeviceThatItWatchesAndOfEachOfItsChannelsWithAnEngine) {
   Client left = controller_of(wall_, "192.0.2.1:4000", "left", "main");
   Client right = controller_of(other_, "192.0.2.2:4000", "right", "tissue", true);
+  Client waits = controller_of(wall_, "192.0.2.5:4000", "right", "tissue");  // holds nothing: nobody is told of it
   Client watches_left = diagnosing(screen_, "192.0.2.3:4000", "left");
   Client watches_right = diagnosing(screen_, "192.0.2.4:4000", "right");
   measured_ = true;
-  run(milliseconds(2500), {&left, &right, &watches_left, &watches_right});
+  run(milliseconds(500), {&left, &right});
+  run(milliseconds(2500), {&left, &right, &waits, &watches_left, &watches_right});
+  EXPECT_TRUE(right.client->holds());
+  EXPECT_EQ(phase(waits), Phase::kOpen);
+  EXPECT_FALSE(waits.client->holds());
   ASSERT_TRUE(watches_left.client->device_report() && watches_right.client->device_report());
   EXPECT_EQ(watches_left.client->device_report()->device, 0U);
   EXPECT_EQ(watches_right.client->device_report()->device, 1U);
