@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
+#include <vector>
 
 namespace tendon {
 namespace {
@@ -92,6 +94,47 @@ TEST(VelocityEstimator, IgnoresWhatIsNotANumberAndWhatIsNotNewer) {
   EXPECT_EQ(estimator.observe(LocalTime(milliseconds(2)), Vec3(std::nan(""), 0, 0)), v);
   EXPECT_EQ(estimator.observe(LocalTime(milliseconds(1)), Vec3(5, 0, 0)), v);
   EXPECT_NEAR(estimator.observe(LocalTime(milliseconds(2)), Vec3(3e-3, 0, 0)).x(), 2, 1e-12);
+}
+
+// The definition, sample by sample, as the header has it.
+double end_fit(const std::vector<Motion>& newest_first, int axis, double resolution) {
+  const Motion& now = newest_first.front();
+  double velocity = 0;
+  for (std::size_t n = 1; n < newest_first.size() && n <= VelocityEstimator::kWindow; ++n) {
+    const auto slope = [&](std::size_t i, double offset) {
+      return (now.position[axis] - newest_first[i].position[axis] + offset) / seconds(now.at - newest_first[i].at);
+    };
+    const double v = slope(n, 0);
+    for (std::size_t i = 1; i < n; ++i) {
+      if (v < slope(i, -resolution) || v > slope(i, resolution)) return velocity;
+    }
+    velocity = v;
+  }
+  return velocity;
+}
+
+TEST(VelocityEstimator, IsTheLongestEndFitToTheLastBit) {
+  std::mt19937_64 random(1);
+  for (const double count : {0.0, 30e-6, 1e-3}) {
+    VelocityEstimator estimator(count);
+    std::vector<Motion> newest_first;
+    Motion hand{.at = LocalTime{}, .position = Vec3::Zero(), .velocity = Vec3::Zero()};
+    for (int step = 0; step < 3000; ++step) {
+      hand.at += Duration(500'000 + random() % 1'000'000);
+      for (int axis = 0; axis < 3; ++axis) {
+        const double fast = step % 1000 < 500 ? 1e-3 : 1e-5;
+        hand.velocity[axis] += fast * (static_cast<double>(random() % 2001) - 1000);
+        hand.velocity[axis] *= 0.99;
+        hand.position[axis] += 1e-3 * hand.velocity[axis];
+      }
+      Motion seen = hand;
+      if (count > 0) seen.position = count * (hand.position / count).array().round().matrix();
+      newest_first.insert(newest_first.begin(), seen);
+      if (newest_first.size() > 20) newest_first.pop_back();
+      const Vec3 velocity = estimator.observe(seen.at, seen.position);
+      for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(velocity[axis], end_fit(newest_first, axis, count)) << step;
+    }
+  }
 }
 
 TEST(VelocityEstimator, RefusesANegativeResolution) {
