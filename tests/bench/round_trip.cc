@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tendon-bench-roundtrip: from a state handed over to the force that answers it, decoded in its box, over the loopback
-// and back through a client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes
-// between the same two processes and the same kinds of sockets that waits in the same way. The two take turns in
-// blocks, so that what else the machine does falls on both. For suite 1 there is a second floor: the ping-pong that
-// seals and opens each datagram with libsodium, and does nothing else.
+// From a state handed over to the force that answers it, decoded in its box, over the loopback and back through a
+// client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes between the same
+// two processes and the same kinds of sockets that waits in the same way. The two take turns in blocks, so that what
+// else the machine does falls on both. For suite 1 there is a second floor: the ping-pong that seals and opens each
+// datagram with libsodium, and does nothing else.
 #include <netinet/in.h>
 #include <poll.h>
-#include <sched.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -23,7 +20,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <iostream>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -39,27 +35,23 @@
 #include "server/clock.h"
 #include "server/network_loop.h"
 #include "server/udp_link.h"
+#include "tests/bench/bench.h"
+#include "tests/bench/measure.h"
 
-namespace tendon {
+namespace tendon::bench {
 namespace {
 
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-constexpr int kDone = 0;
-constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
 /// Nothing on a loopback takes so long: something is broken.
 constexpr Duration kGiveUp = std::chrono::seconds(10);
-constexpr Duration kHapticPeriod = milliseconds(1);
-/// At the beginning of each block, not counted: caches, and the processor's clock.
-constexpr int kWarmUp = 50;
 
 struct Options {
   int blocks = 40;
   int exchanges = 500;  ///< of each kind in a block
-  int fifo = 0;         ///< SCHED_FIFO priority of both processes; 0: as it is
-  bool json = false;
+  int warm_up = 50;     ///< at the beginning of each, not counted: caches, and the processor's clock
+  int priority = 0;     ///< of both processes
 };
 
 enum class Wait : std::uint8_t { kBusy, kBlocking };
@@ -156,16 +148,6 @@ void connect(int fd, const Address& to) {
   }
 }
 
-void enter_fifo(int priority) {
-  ::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
-  if (priority == 0) return;
-  sched_param param{};
-  param.sched_priority = priority;
-  if (::sched_setscheduler(0, SCHED_FIFO, &param) != 0) {
-    throw std::system_error(errno, std::generic_category(), "SCHED_FIFO " + std::to_string(priority));
-  }
-}
-
 /// The other process: a wall at x = 0, or the echo.
 void serve(Orders& orders, const Address& server, int echo, Wait wait, const std::optional<Key>& key) {
   UdpTransport transport(server);
@@ -196,28 +178,19 @@ void serve(Orders& orders, const Address& server, int echo, Wait wait, const std
   }
 }
 
-struct Figures {
-  Duration p50{};
-  Duration p99{};
-};
-Figures figures(std::vector<Duration> times) {
-  std::sort(times.begin(), times.end());
-  return {times[times.size() / 2], times[times.size() * 99 / 100]};
-}
-
 struct Result {
-  std::size_t n = 0;
-  Figures bare;
-  Figures sealed;  ///< suite 1: as `bare`, with libsodium at both ends
-  Figures tendon;
-  Figures until_step;  ///< from then to the next haptic step
+  std::vector<double> bare;    ///< µs, each
+  std::vector<double> sealed;  ///< suite 1: as `bare`, with libsodium at both ends
+  std::vector<double> tendon;
   std::size_t state_bytes = 0;
   std::size_t force_bytes = 0;
 };
 
-class Bench {
+double us(Duration d) { return 1e6 * seconds(d); }
+
+class RoundTrip {
  public:
-  Bench(const Options& options, Wait wait, bool sealed)
+  RoundTrip(const Options& options, Wait wait, bool sealed)
       : options_(options), wait_(wait), sealed_(sealed), key_(Ratchet(3).next()) {
     NetworkLoop::Config config;
     config.devices = {{.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}}};
@@ -232,44 +205,41 @@ class Bench {
     if (child_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
     if (child_ == 0) {
       try {
-        enter_fifo(options.fifo);
+        const AtPriority high(options.priority);
         serve(*orders_, server, bare_client_.fd(), wait, sealed ? std::optional(key_) : std::nullopt);
-        ::_exit(kDone);
+        ::_exit(0);
       } catch (const std::exception& error) {
-        std::fprintf(stderr, "tendon-bench-roundtrip: %s\n", error.what());
-        ::_exit(kFailed);
+        std::fprintf(stderr, "tendon-lab bench: the client: %s\n", error.what());
+        ::_exit(1);
       }
     }
   }
-  ~Bench() {
+  ~RoundTrip() {
     orders_->job = Orders::kQuit;
     ::waitpid(child_, nullptr, 0);
     ::munmap(orders_, sizeof(Orders));
   }
-  Bench(const Bench&) = delete;
-  Bench& operator=(const Bench&) = delete;
+  RoundTrip(const RoundTrip&) = delete;
+  RoundTrip& operator=(const RoundTrip&) = delete;
 
   Result run() {
     order(Orders::kTendon);
     exchange();  // the handshake
-    for (int i = 0; i < kWarmUp; ++i) exchange();
-    std::vector<Duration> bare;
-    std::vector<Duration> sealed;
-    std::vector<Duration> tendon;
+    for (int i = 0; i < options_.warm_up; ++i) exchange();
+    Result result;
     for (int block = 0; block < options_.blocks; ++block) {
       orders_->echo_bytes = static_cast<int>(force_bytes_);
-      ping_pong(Orders::kEcho, bare);
-      if (sealed_) ping_pong(Orders::kSealedEcho, sealed);
+      ping_pong(Orders::kEcho, result.bare);
+      if (sealed_) ping_pong(Orders::kSealedEcho, result.sealed);
       order(Orders::kTendon);
-      for (int i = -kWarmUp; i < options_.exchanges; ++i) {
+      for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
         const Duration took = exchange();
-        if (i >= 0) tendon.push_back(took);
+        if (i >= 0) result.tendon.push_back(us(took));
       }
     }
-    std::vector<Duration> until_step;
-    for (const Duration took : tendon) until_step.push_back(kHapticPeriod - took % kHapticPeriod);
-    return {tendon.size(), figures(bare), sealed_ ? figures(sealed) : Figures{}, figures(tendon), figures(until_step),
-            state_bytes_,  force_bytes_};
+    result.state_bytes = state_bytes_;
+    result.force_bytes = force_bytes_;
+    return result;
   }
 
  private:
@@ -277,15 +247,15 @@ class Bench {
     if (clock::now() - began > kGiveUp) throw std::runtime_error("the other process does not answer");
   }
 
-  void ping_pong(Orders::Job job, std::vector<Duration>& times) {
+  void ping_pong(Orders::Job job, std::vector<double>& times) {
     const Address peer = bare_client_.local_address();
     BareSocket socket(bare_server_.fd(), &peer, wait_, job == Orders::kSealedEcho);
     order(job);
-    for (int i = -kWarmUp; i < options_.exchanges; ++i) {
+    for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
       const LocalTime began = clock::now();
       socket.send(state_bytes_);
       while (!socket.receive()) check(began);
-      if (i >= 0) times.push_back(clock::now() - began);
+      if (i >= 0) times.push_back(us(clock::now() - began));
     }
   }
 
@@ -358,73 +328,43 @@ class Bench {
   std::size_t force_bytes_ = 0;
 };
 
-double us(Duration d) { return 1e6 * seconds(d); }
-
-void print(const Options& options, Wait wait, bool sealed, const Result& r) {
-  const char* const style = wait == Wait::kBusy ? "busy-polling" : "blocking";
-  const double p50 = us(r.tendon.p50) / us(r.bare.p50);
-  const double p99 = us(r.tendon.p99) / us(r.bare.p99);
-  const double to_sealed = sealed ? us(r.tendon.p50) / us(r.sealed.p50) : p50;
-  if (options.json) {
-    double load = 0;
-    ::getloadavg(&load, 1);
-    std::printf(
-        "{\"wait\":\"%s\",\"suite\":%d,\"n\":%zu,\"state_bytes\":%zu,\"force_bytes\":%zu,\"bare_p50_us\":%.2f,"
-        "\"bare_p99_us\":%.2f,\"bare_sealed_p50_us\":%.2f,\"tendon_p50_us\":%.2f,\"tendon_p99_us\":%.2f,"
-        "\"p50_ratio\":%.3f,\"p99_ratio\":%.3f,\"p50_ratio_sealed\":%.3f,\"until_step_p50_us\":%.1f,\"fifo\":%d,"
-        "\"load\":%.2f}\n",
-        style, sealed ? 1 : 0, r.n, r.state_bytes, r.force_bytes, us(r.bare.p50), us(r.bare.p99), us(r.sealed.p50),
-        us(r.tendon.p50), us(r.tendon.p99), p50, p99, to_sealed, us(r.until_step.p50), options.fifo, load);
-  } else {
-    std::printf("%-13s %5d %7zu  %4zu/%-4zu %8.1f %8.1f %8.1f %8.1f %8.1f %7.2f %7.2f %8.2f %10.0f\n", style,
-                sealed ? 1 : 0, r.n, r.state_bytes, r.force_bytes, us(r.bare.p50), us(r.bare.p99),
-                us(sealed ? r.sealed.p50 : r.bare.p50), us(r.tendon.p50), us(r.tendon.p99), p50, p99, to_sealed,
-                us(r.until_step.p50));
-  }
-  std::fflush(stdout);
-}
-
-int main_of(int argc, char** argv) {
-  CLI::App app("From a state to the force that answers it, over the loopback, beside a bare ping-pong of datagrams",
-               "tendon-bench-roundtrip");
-  Options options;
-  app.add_option("--blocks", options.blocks, "in which both take turns")->check(CLI::Range(1, 100'000));
-  app.add_option("--exchanges", options.exchanges, "of each kind in a block")->check(CLI::Range(10, 1'000'000));
-  app.add_option("--fifo", options.fifo, "real-time priority of both processes, on a machine with other work")
-      ->check(CLI::Range(0, 99));
-  app.add_flag("--json", options.json, "one JSON object a line instead of the table");
-  app.get_formatter()->column_width(32);
-  app.footer(
-      "\nExample:\n  tendon-bench-roundtrip --fifo 50\n\nExit: 0 done; 1 it could not be measured; 2 wrong usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongUsage;
-  }
-  try {
-    if (!options.json) {
-      std::printf(
-          "                              bytes  bare ping-pong   sealed     state to force   ratio to bare    to      "
-          "to the step\n"
-          "wait          suite       n  there/back p50 µs   p99 µs   p50 µs   p50 µs   p99 µs     p50     p99   sealed "
-          "    p50 µs\n");
-      std::fflush(stdout);
-    }
-    for (const Wait wait : {Wait::kBusy, Wait::kBlocking}) {
-      for (const bool sealed : {false, true}) {
-        Bench bench(options, wait, sealed);  // forks before it has a priority of its own
-        enter_fifo(options.fifo);
-        print(options, wait, sealed, bench.run());
-      }
-    }
-    return kDone;
-  } catch (const std::exception& error) {
-    std::cerr << "tendon-bench-roundtrip: " << error.what() << '\n';
-    return kFailed;
-  }
-}
-
 }  // namespace
-}  // namespace tendon
 
-int main(int argc, char** argv) { return tendon::main_of(argc, argv); }
+void measure_round_trip(Run& run) {
+  Options options;
+  if (run.options.quick) options = {.blocks = 1, .exchanges = 20, .warm_up = 1};
+  options.priority = run.options.priority;
+  for (const Wait wait : {Wait::kBusy, Wait::kBlocking}) {
+    for (const bool sealed : {false, true}) {
+      RoundTrip round_trip(options, wait, sealed);  // forks before it has a priority of its own
+      const AtPriority high(options.priority);
+      const Result r = round_trip.run();
+      const double ratio = quantile(r.tendon, 0.5) / quantile(r.bare, 0.5);
+      const double target = wait == Wait::kBusy ? 1.3 : 1.15;
+      Row row{.section = {},
+              .what = std::string("state → force, ") + (wait == Wait::kBusy ? "busy-polling" : "blocking") +
+                      (sealed ? ", sealed" : ""),
+              .unit = "µs",
+              .n = r.tendon.size(),
+              .p50 = quantile(r.tendon, 0.5),
+              .p99 = quantile(r.tendon, 0.99),
+              .floor = "a bare ping-pong of " + std::to_string(r.state_bytes) + "/" + std::to_string(r.force_bytes) +
+                       " bytes",
+              .floor_p50 = quantile(r.bare, 0.5),
+              .floor_p99 = quantile(r.bare, 0.99),
+              .ratio = ratio,
+              .target = Row::Target{wait == Wait::kBusy ? "≤ 1.3 × the floor" : "≤ 1.15 × the floor", ratio <= target},
+              .note = {}};
+      if (sealed) {
+        char note[120];
+        const double bare = quantile(r.sealed, 0.5);
+        std::snprintf(note, sizeof note, "a ping-pong that libsodium seals and opens: %.1f; to that %.2f", bare,
+                      row.p50 / bare);
+        row.note = note;
+      }
+      run.add(row);
+    }
+  }
+}
+
+}  // namespace tendon::bench

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "tests/bench/bench.h"
 #include "tests/injector/named_profiles.h"
 #include "tests/lab/accuracy.h"
 #include "tests/lab/boundary.h"
@@ -325,6 +326,33 @@ void add_accuracy(CLI::App& app, AccuracyArguments& arguments) {
   });
 }
 
+void add_bench(CLI::App& app, bench::BenchOptions& options) {
+  std::string names;
+  for (const bench::Section& section : bench::sections())
+    names += (names.empty() ? "" : "|") + std::string(section.name);
+  CLI::App* const verb = app.add_subcommand("bench", "What things cost, each beside the machine's own floor");
+  verb->add_option("--only", options.only, names + "; any number of times")->type_name("NAME")->allow_extra_args(false);
+  verb->add_option(
+          "--fifo", options.priority,
+          "real-time priority of what is measured, on a machine with other work; it takes both cores from that")
+      ->type_name("PRIORITY")
+      ->check(CLI::Range(1, 60));
+  verb->add_option("--seed", options.seed, "of worlds, keys and networks")->capture_default_str();
+  verb->add_option("--write", options.write, "write the table as a page in Markdown, too")->type_name("FILE.md");
+  verb->add_flag("--quick", options.quick, "only that it runs: seconds, and the figures mean nothing");
+  verb->add_flag("--json", options.json, "one JSON object for each line of the table, and one for its circumstances");
+  verb->footer(
+      "\nExample: all of it, some minutes, with its page\n"
+      "  tendon-lab bench --fifo 50 --write tests/bench/RESULTS.md\n"
+      "one part\n  tendon-lab bench --only steps --json\n"
+      "\nTimes are those of this machine, now. Exit: 0 measured, whatever the figures; 1 it could not be; 2 wrong "
+      "usage.");
+  verb->callback([&options] {
+    options.progress = isatty(STDERR_FILENO) != 0;
+    bench::bench(options, std::cout);
+  });
+}
+
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
   app.require_subcommand(1);
@@ -341,6 +369,7 @@ int main(int argc, char** argv) {
   CostOptions cost_options;
   NetemOptions netem_options;
   AccuracyArguments accuracy_arguments;
+  bench::BenchOptions bench_options;
   add_report(app, report_arguments);
   add_paper(app, paper_options);
   add_filter(app, filter_arguments, exit);
@@ -349,6 +378,7 @@ int main(int argc, char** argv) {
   add_cost(app, cost_options);
   add_netem(app, netem_options);
   add_accuracy(app, accuracy_arguments);
+  add_bench(app, bench_options);
 
   try {
     app.parse(argc, argv);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tendon-bench-observers: how late the haptic thread wakes with a controller alone, and with observers besides, who
-// cost a datagram each in every step. The two take turns in blocks within one run of one server, whose threads are
-// those of tendond: haptic (real-time priority where it is granted), network, and a log that takes records out. The
-// observers are in one process, and cost processor time themselves: it is told apart.
+// How late the haptic thread wakes with a controller alone, and with 32 observers besides, who cost a datagram each in
+// every step; and beside them a thread that only sleeps. All take turns in blocks within one run of one server, whose
+// threads are those of tendond: haptic (real-time priority where it is granted), network, and a log that takes records
+// out. The observers are in one process, and cost processor time themselves: it is told apart.
 #include <poll.h>
 #include <pthread.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -18,7 +18,6 @@
 #include <chrono>
 #include <cstdio>
 #include <ctime>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -36,25 +35,21 @@
 #include "server/network_loop.h"
 #include "server/realtime.h"
 #include "server/udp_link.h"
-#include "tests/lab/json.h"
+#include "tests/bench/bench.h"
+#include "tests/bench/measure.h"
 
-namespace tendon {
+namespace tendon::bench {
 namespace {
 
 using std::chrono::milliseconds;
 
-constexpr int kDone = 0;
-constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
-constexpr int kPriority = 70;  // as tendond
 /// At the beginning of each block: guests have come or gone.
 constexpr Duration kSettle = milliseconds(200);
 
 struct Options {
   std::size_t observers = 32;
-  int blocks = 10;  ///< of each kind
-  int block_ms = 2000;
-  bool json = false;
+  int blocks = 8;  ///< of each kind
+  int block_ms = 1000;
 };
 
 /// All guests, in one process of their own: a wall, and observers who come when told to. It wakes once in a millisecond
@@ -73,10 +68,10 @@ class Guests {
     if (child_ > 0) return;
     try {
       serve(server, observers);
-      ::_exit(kDone);
+      ::_exit(0);
     } catch (const std::exception& error) {
-      std::fprintf(stderr, "tendon-bench-observers: %s\n", error.what());
-      ::_exit(kFailed);
+      std::fprintf(stderr, "tendon-lab bench: guests: %s\n", error.what());
+      ::_exit(1);
     }
   }
   ~Guests() {
@@ -153,18 +148,11 @@ class Guests {
 
 /// Of one kind of block, all of them together.
 struct Figures {
-  std::vector<Duration> late;  ///< of each haptic step
+  std::vector<double> late;  ///< µs, of each wake-up
   std::uint64_t overruns = 0;
   std::uint64_t datagrams = 0;  ///< that the server has sent
   Duration network_thread{};    ///< processor time
   Duration guests{};            ///< likewise, of their process
-
-  double late_us(std::size_t percent) {
-    if (late.empty()) return 0;
-    const auto nth = late.begin() + static_cast<std::ptrdiff_t>((late.size() - 1) * percent / 100);
-    std::nth_element(late.begin(), nth, late.end());
-    return 1e6 * seconds(*nth);
-  }
 };
 
 SimulatedDevice::Config device_config() {
@@ -177,9 +165,9 @@ SimulatedDevice::Config device_config() {
   return device;
 }
 
-class Bench {
+class WakeUps {
  public:
-  explicit Bench(const Options& options)
+  explicit WakeUps(const Options& options)
       : options_(options),
         device_(device_config()),
         guests_(link_.local_address(), options.observers),
@@ -208,6 +196,7 @@ class Bench {
       pthread_getcpuclockid(network.native_handle(), &network_clock);
       clock_getcpuclockid(guests_.pid(), &guests_clock);
       for (int block = 0; block < 2 * options_.blocks; ++block) {
+        only_sleep();
         const bool with = block % 2 == 1;
         guests_.let_observers_in(with);
         watch(kSettle, nullptr);
@@ -229,7 +218,7 @@ class Bench {
     end(haptic, network);
   }
 
-  Figures alone, observed;
+  Figures asleep, alone, observed;
   bool realtime = true;
   std::uint64_t welcomed() const { return network_.stats().welcomed; }
 
@@ -244,9 +233,14 @@ class Bench {
   }
 
   void run_haptic() {
-    realtime = enter_realtime(kPriority).empty();
+    realtime = enter_realtime(kHapticPriority).empty();
     LocalTime due = clock::now();
     while (!stop_) {
+      if (resting_) {
+        clock::sleep_until(clock::now() + milliseconds(1));
+        due = clock::now();
+        continue;
+      }
       due = haptic_.step(clock::now());
       stepped_.ring();
       clock::sleep_until(due);
@@ -263,6 +257,25 @@ class Bench {
       due = network_.turn(clock::now());
     }
     network_.close(clock::now());
+  }
+
+  /// A thread like the haptic one that does nothing else, while that one rests.
+  void only_sleep() {
+    resting_ = true;
+    clock::sleep_until(clock::now() + milliseconds(5));
+    std::thread sleeper([this] {
+      enter_realtime(kHapticPriority);
+      const LocalTime end = clock::now() + milliseconds(options_.block_ms);
+      for (LocalTime due = clock::now() + milliseconds(1); due < end;) {
+        clock::sleep_until(due);
+        const LocalTime now = clock::now();
+        asleep.late.push_back(1e6 * seconds(now - due));
+        due += milliseconds(1);
+        if (due <= now) due = now + milliseconds(1);
+      }
+    });
+    sleeper.join();
+    resting_ = false;
   }
 
   void end(std::thread& haptic, std::thread& network) {
@@ -282,7 +295,7 @@ class Bench {
   void watch(Duration lasts, Figures* into) {
     for (const LocalTime end = clock::now() + lasts; clock::now() < end;) {
       while (const StepRecord* step = mail_.steps.front()) {
-        if (into != nullptr) into->late.push_back(step->hand.at - step->scheduled);
+        if (into != nullptr) into->late.push_back(1e6 * seconds(step->hand.at - step->scheduled));
         mail_.steps.pop();
       }
       while (const DatagramRecord* record = mail_.datagrams.front()) {
@@ -302,71 +315,49 @@ class Bench {
   HapticLoop haptic_;
   NetworkLoop network_;
   std::atomic<bool> stop_{false};
+  std::atomic<bool> resting_{false};  ///< the haptic thread takes no steps
   std::uint64_t datagrams_ = 0;
 };
 
-void print(const char* who, std::size_t observers, Figures& figures, const Options& options) {
-  const double seconds_of_all = 1e-3 * options.block_ms * options.blocks;
-  const auto steps = static_cast<double>(figures.late.size());
-  const double per_s = static_cast<double>(figures.datagrams) / seconds_of_all;
-  const double network = 1e6 * seconds(figures.network_thread) / steps;
-  const double guests = 1e6 * seconds(figures.guests) / steps;
-  if (options.json) {
-    std::cout << lab::JsonLine()
-                     .add("observers", observers)
-                     .add("steps", figures.late.size())
-                     .add("late_p50_us", figures.late_us(50))
-                     .add("late_p99_us", figures.late_us(99))
-                     .add("overruns", figures.overruns)
-                     .add("datagrams_per_s", per_s)
-                     .add("network_thread_us_per_step", network)
-                     .add("guests_us_per_step", guests)
-                     .str()
-              << '\n';
-  } else {
-    std::printf(
-        "%-20s %7zu steps, late by p50 %6.1f µs, p99 %7.1f µs; %llu overruns; %.0f datagrams/s; processor time for "
-        "each "
-        "step: network thread %.1f µs, guests %.1f µs\n",
-        who, figures.late.size(), figures.late_us(50), figures.late_us(99),
-        static_cast<unsigned long long>(figures.overruns), per_s, network, guests);
-  }
-}
-
-int main_of(int argc, char** argv) {
-  CLI::App app("How late the haptic thread wakes with observers and without, in turns", "tendon-bench-observers");
-  Options options;
-  app.add_option("--observers", options.observers, "besides the controller")->check(CLI::Range(1, 1000));
-  app.add_option("--blocks", options.blocks, "of each kind")->check(CLI::Range(1, 10'000));
-  app.add_option("--block-ms", options.block_ms, "length of one")->check(CLI::Range(10, 1'000'000));
-  app.add_flag("--json", options.json, "one JSON object a line instead of text");
-  app.footer(
-      "\nExample:\n  tendon-bench-observers --observers 32\n\nExit: 0 done; 1 it could not be measured; 2 wrong "
-      "usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongUsage;
-  }
-  try {
-    Bench bench(options);
-    bench.run();
-    if (!bench.realtime) std::fprintf(stderr, "without real-time priority: expect late steps under load\n");
-    print("controller alone", 0, bench.alone, options);
-    print(("with " + std::to_string(options.observers) + " observers").c_str(), options.observers, bench.observed,
-          options);
-    const std::uint64_t expected = 1 + options.observers * static_cast<std::uint64_t>(options.blocks);
-    if (bench.welcomed() >= expected && !bench.alone.late.empty() && !bench.observed.late.empty()) return kDone;
-    std::fprintf(stderr, "tendon-bench-observers: %llu sessions were opened, %llu expected\n",
-                 static_cast<unsigned long long>(bench.welcomed()), static_cast<unsigned long long>(expected));
-    return kFailed;
-  } catch (const std::exception& error) {
-    std::cerr << "tendon-bench-observers: " << error.what() << '\n';
-    return kFailed;
-  }
-}
-
 }  // namespace
-}  // namespace tendon
 
-int main(int argc, char** argv) { return tendon::main_of(argc, argv); }
+void measure_wake_ups(Run& run) {
+  Options options;
+  if (run.options.quick) options = {.observers = 3, .blocks = 1, .block_ms = 50};
+  WakeUps wake_ups(options);
+  wake_ups.run();
+  ::munlockall();  // of enter_realtime
+  const std::uint64_t expected = 1 + options.observers * static_cast<std::uint64_t>(options.blocks);
+  if (wake_ups.welcomed() < expected || wake_ups.alone.late.empty() || wake_ups.observed.late.empty()) {
+    throw std::runtime_error(std::to_string(wake_ups.welcomed()) + " sessions were opened, " +
+                             std::to_string(expected) + " expected");
+  }
+  const auto line = [&](const std::string& what, const Figures& figures) {
+    const double span = 1e-3 * options.block_ms * options.blocks;
+    const auto steps = static_cast<double>(figures.late.size());
+    Row row{.section = {},
+            .what = what,
+            .unit = "µs",
+            .n = figures.late.size(),
+            .p50 = quantile(figures.late, 0.5),
+            .p99 = quantile(figures.late, 0.99),
+            .floor = "a thread that only sleeps",
+            .floor_p50 = quantile(wake_ups.asleep.late, 0.5),
+            .floor_p99 = quantile(wake_ups.asleep.late, 0.99),
+            .note = {}};
+    row.ratio = row.p50 / *row.floor_p50;
+    char note[220];
+    std::snprintf(note, sizeof note,
+                  "%llu overruns; %.0f datagrams/s out; processor time for each step: network thread %.1f µs, guests "
+                  "%.1f µs%s",
+                  static_cast<unsigned long long>(figures.overruns), static_cast<double>(figures.datagrams) / span,
+                  1e6 * seconds(figures.network_thread) / steps, 1e6 * seconds(figures.guests) / steps,
+                  wake_ups.realtime ? "" : "; without real-time priority");
+    row.note = note;
+    run.add(row);
+  };
+  line("haptic thread, a controller alone", wake_ups.alone);
+  line("haptic thread, and " + std::to_string(options.observers) + " observers", wake_ups.observed);
+}
+
+}  // namespace tendon::bench

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How fast and how punctual the proxy is, against what the machine can do, in the same run: throughput against a bare
-// forwarder on the same core, release errors against a thread that only sleeps. README.md has results.
+// How fast and how punctual tendon-inject is: throughput against a bare forwarder on the same core, release errors
+// against its own thread when it is woken with nothing to send.
 #include <poll.h>
 #include <sched.h>
 #include <sys/socket.h>
@@ -10,27 +10,30 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
+#include "tests/bench/bench.h"
+#include "tests/bench/measure.h"
 #include "tests/injector/driver.h"
 #include "tests/injector/profile.h"
 #include "tests/injector/real_time.h"
 
-namespace tendon::injector {
+namespace tendon::bench {
 namespace {
+
+using namespace injector;
 
 using namespace std::chrono_literals;
 
 constexpr std::size_t kBytes = 200;
+/// A machine that does not forward one datagram in so long is not to be measured.
+constexpr Duration kPatience = 10s;
 
 void pin_to(unsigned core) {
   cpu_set_t cores;
@@ -134,13 +137,14 @@ Load saturate(UdpBatch& server, const Address& forwarder, std::uint64_t window, 
       if (n > 0) last_arrival = monotonic_now();
     }
   };
-  while (monotonic_now() < start + length) {
+  while (monotonic_now() < start + length || (got == 0 && monotonic_now() < start + kPatience)) {
     const auto room = static_cast<std::size_t>(std::min<std::uint64_t>(window - (sent - got), kUdpBatch));
     if (room >= kUdpBatch / 2) {
       sent += room - client.send(std::span(batch).first(room)).count();
     } else {
       pollfd readable{server.fd(), POLLIN, 0};
-      if (::poll(&readable, 1, 200) == 0) break;  // the window is lost: so is the rest of this round
+      // When the window is lost, so is the rest of this round.
+      if (::poll(&readable, 1, 200) == 0 && got > 0) break;
     }
     receive();
   }
@@ -154,71 +158,50 @@ Load saturate(UdpBatch& server, const Address& forwarder, std::uint64_t window, 
   return {per_second, sent, sent - got};
 }
 
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values.empty() ? 0 : values[values.size() / 2];
-}
-
 double us(Duration d) { return static_cast<double>(d.count()) / 1e3; }
 
-void compare_throughput(const std::string& profile, std::uint64_t window, int rounds, Duration length) {
+void compare_throughput(Run& run, const std::string& name, const std::string& profile, std::uint64_t window, int rounds,
+                        Duration length) {
   UdpBatch server = UdpBatch::listening(loopback());
-  std::vector<double> bare;
+  std::vector<double> bare;  // ns for each datagram
   std::vector<double> proxied;
   std::vector<double> ratios;
   std::uint64_t sent = 0;
   std::uint64_t lost = 0;
-  std::uint64_t bare_lost = 0;
   for (int round = 0; round < rounds; ++round) {
     {
       const BareForwarder forwarder(server.local_address());
-      const Load load = saturate(server, forwarder.address(), window, length);
-      bare.push_back(load.per_second);
-      bare_lost += load.lost;
+      bare.push_back(1e9 / saturate(server, forwarder.address(), window, length).per_second);
     }
     {
       const RunningProxy proxy(server.local_address(), profile, Duration::zero());
       const Load load = saturate(server, proxy.address(), window, length);
-      proxied.push_back(load.per_second);
+      proxied.push_back(1e9 / load.per_second);
       sent += load.sent;
       lost += load.lost;
     }
     ratios.push_back(proxied.back() / bare.back());
   }
-  std::printf(
-      "throughput, %zu bytes, \"%s\", window %llu, %d rounds of %.1f s each: bare %.0f/s (lost %llu), proxy %.0f/s, "
-      "median ratio %.2f (%.2f … %.2f), lost %llu of %llu\n",
-      kBytes, profile.c_str(), static_cast<unsigned long long>(window), rounds, seconds(length), median(bare),
-      static_cast<unsigned long long>(bare_lost), median(proxied), median(ratios), *std::ranges::min_element(ratios),
-      *std::ranges::max_element(ratios), static_cast<unsigned long long>(lost), static_cast<unsigned long long>(sent));
+  Row row{.section = {},
+          .what = "a datagram of 200 bytes forwarded, " + name,
+          .unit = "ns",
+          .n = sent,
+          .p50 = quantile(proxied, 0.5),
+          .p99 = quantile(proxied, 0.99),
+          .floor = "recvmmsg, sendmmsg and nothing else",
+          .floor_p50 = quantile(bare, 0.5),
+          .floor_p99 = quantile(bare, 0.99),
+          .ratio = quantile(ratios, 0.5),
+          .note = {}};
+  char note[160];
+  std::snprintf(note, sizeof note, "%.0f/s beside %.0f/s; lost %llu", 1e9 / row.p50, 1e9 / *row.floor_p50,
+                static_cast<unsigned long long>(lost));
+  row.note = note;
+  run.add(row);
 }
 
-/// How late clock_nanosleep(2) wakes a thread that sleeps as long as datagrams take, on the core of the proxy.
-DurationHistogram sleep_floor(Duration length, const std::atomic<bool>& stop) {
-  pin_to(kForwarderCore);
-  DurationHistogram late;
-  LocalTime due = monotonic_now();
-  while (!stop) {
-    due = std::max(due + length, monotonic_now() + 100us);
-    const auto since = due.time_since_epoch();
-    const auto whole = std::chrono::floor<std::chrono::seconds>(since);
-    const timespec time{.tv_sec = whole.count(), .tv_nsec = (since - whole).count()};
-    while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
-    }
-    late.observe(monotonic_now() - due);
-  }
-  return late;
-}
-
-void print(const char* name, const DurationHistogram& late, const DurationHistogram& floor) {
-  const auto ratio = [&](double q) { return us(late.quantile(q)) / std::max(us(floor.quantile(q)), 1e-3); };
-  std::printf("  %-28s p50 %7.1f us (%.2f of the floor)  p99 %8.1f us (%.2f)  max %9.1f us  n = %llu\n", name,
-              us(late.quantile(0.5)), ratio(0.5), us(late.quantile(0.99)), ratio(0.99), us(late.max()),
-              static_cast<unsigned long long>(late.count()));
-}
-
-/// 1 kHz each way through 20 ± 5 ms, an echo at the other end, and meanwhile, in turns of a second, the floor.
-void compare_punctuality(Duration spin, int rounds, Duration length) {
+/// 1 kHz each way through 20 ± 5 ms, an echo at the other end; and meanwhile, in turns of a second, the floor.
+void compare_punctuality(Run& run, Duration spin, int rounds, Duration length) {
   UdpBatch server = UdpBatch::listening(loopback());
   RunningProxy proxy(server.local_address(), "delay=uniform(15ms,25ms)", spin);
   pin_to(kLoadCore);
@@ -242,38 +225,58 @@ void compare_punctuality(Duration spin, int rounds, Duration length) {
   }
   proxy.stop();
   const Status status = proxy.status();
-  std::atomic<bool> stop = false;
-  DurationHistogram slept;
-  std::thread sleeper([&] { slept = sleep_floor(500us, stop); });
-  const timespec while_floor{
-      static_cast<time_t>(std::chrono::ceil<std::chrono::seconds>(length * rounds).count() / 4 + 1), 0};
-  ::nanosleep(&while_floor, nullptr);
-  stop = true;
-  sleeper.join();
-  std::printf("punctuality, 1 kHz each way, %zu bytes, 20 ± 5 ms, spin %.0f us\n", kBytes, us(spin));
-  print("floor: the proxy's probes", status.timer_floor, status.timer_floor);
-  print("floor: clock_nanosleep after", slept, status.timer_floor);
-  print("up", status.of(Direction::kUp).release_error, status.timer_floor);
-  print("down", status.of(Direction::kDown).release_error, status.timer_floor);
+  const auto line = [&](const char* way, const DurationHistogram& late) {
+    char name[120];
+    std::snprintf(name, sizeof name, "released too late, 1 kHz through 20 ± 5 ms, %s, spin %.0f µs", way, us(spin));
+    Row row{.section = {},
+            .what = name,
+            .unit = "µs",
+            .n = late.count(),
+            .p50 = us(late.quantile(0.5)),
+            .p99 = us(late.quantile(0.99)),
+            .floor = "the proxy's own thread, woken with nothing to send",
+            .floor_p50 = us(status.timer_floor.quantile(0.5)),
+            .floor_p99 = us(status.timer_floor.quantile(0.99)),
+            .note = {}};
+    if (*row.floor_p50 > 0) row.ratio = row.p50 / *row.floor_p50;
+    run.add(row);
+  };
+  line("up", status.of(Direction::kUp).release_error);
+  line("down", status.of(Direction::kDown).release_error);
 }
 
-int main(int argc, char** argv) {
-  const bool smoke = argc == 2 && std::string_view(argv[1]) == "--smoke";
-  if (argc > 1 && !smoke) {
-    std::fprintf(stderr,
-                 "usage: proxy_bench [--smoke]\nExample: proxy_bench --smoke    (a second, to see that it runs)\n");
-    return std::string_view(argv[1]) == "--help" ? 0 : 2;
+/// The threads that are started meanwhile have its priority and its core, too; this one gets back its own.
+class Apart {
+ public:
+  template <class Work>
+  explicit Apart(int priority, Work work) {
+    std::exception_ptr error;
+    std::thread thread([&] {
+      try {
+        const AtPriority high(priority);
+        work();
+      } catch (...) {
+        error = std::current_exception();
+      }
+    });
+    thread.join();
+    if (error) std::rethrow_exception(error);
   }
-  const int rounds = smoke ? 1 : 7;
-  const Duration length = smoke ? 100ms : 1s;
-  compare_throughput("", 512, rounds, length);
-  compare_throughput("delay=uniform(1ms,3ms) loss=0% duplicate=0%", 2048, rounds, length);
-  compare_punctuality(Duration::zero(), smoke ? 1 : 20, length);
-  compare_punctuality(50us, smoke ? 1 : 10, length);
-  return 0;
-}
+};
 
 }  // namespace
-}  // namespace tendon::injector
 
-int main(int argc, char** argv) { return tendon::injector::main(argc, argv); }
+void measure_proxy(Run& run) {
+  const bool quick = run.options.quick;
+  const int rounds = quick ? 1 : 5;
+  const Duration length = quick ? 50ms : 1s;
+  const Apart apart(run.options.priority, [&] {
+    compare_throughput(run, "no delay", "", 512, rounds, length);
+    compare_punctuality(run, 50us, quick ? 2 : 8, length);
+    if (quick) return;
+    compare_throughput(run, "1 to 3 ms", "delay=uniform(1ms,3ms) loss=0% duplicate=0%", 2048, rounds, length);
+    compare_punctuality(run, Duration::zero(), 8, length);
+  });
+}
+
+}  // namespace tendon::bench
