@@ -45,9 +45,9 @@ const std::vector<Room>& rooms() {
 
 const Names kRoomFolders = {"clients", "core", "deploy", "devices", "protocol", "server", "tests"};
 
-const Names kAtTheRoot = {".ci",          ".clang-format",  ".clang-tidy",       ".gitignore",
-                          "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md",
-                          "LICENSE",      "README.md"};
+const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",     ".clang-tidy",     ".gitignore",
+                          "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE",
+                          "README.md"};
 
 /// No type, but what a processor does with the numbers of all rooms.
 constexpr std::string_view kForAllRooms = "core/arithmetic.h";
@@ -62,12 +62,15 @@ struct Door {
 const std::vector<Door>& front_doors() {
   static const std::vector<Door> kDoors = {
       {"Asio", {"asio.hpp", "asio/"}, {"server/udp_link.cc", "clients/cpp/udp_transport.cc"}},
+      // HTTP and WebSockets of a process of its own, which is not the haptic one.
+      {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/dashboard/web_server.cc"}},
       {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/sparse.cc"}},
       {"CLI11", {"CLI/"}, {"server/main.cc", "clients/cpp/options.cc", "*_main.cc"}},
       {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
+      {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf", {"google/protobuf/", "*.pb.h"}, {"protocol/codec.cc", "server/recording_codec.cc"}},
       {"libsystemd", {"systemd/"}, {"server/service.cc"}},
       {"Spectra", {"Spectra/"}, {"clients/softbody/spectrum.cc"}},

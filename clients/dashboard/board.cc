@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/board.h"
+
+#include <utility>
+
+namespace tendon::dash {
+namespace {
+
+/// An engine is told of once a second as its device is. One report may be lost on the way.
+constexpr std::uint64_t kForgetAfter = 3;
+
+/// What the page shows of a device does not depend on numbers that go up all the time.
+bool same(const DeviceDescription& a, const DeviceDescription& b) {
+  if (a.name != b.name || a.model != b.model || a.loop_hz != b.loop_hz || a.max_force != b.max_force ||
+      a.channels.size() != b.channels.size()) {
+    return false;
+  }
+  for (std::size_t i = 0; i < a.channels.size(); ++i) {
+    if (a.channels[i].name != b.channels[i].name || a.channels[i].holder != b.channels[i].holder) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void Board::tell(Contact contact, std::string words) {
+  if (contact_ == contact && words_ == words) return;
+  contact_ = contact;
+  words_ = std::move(words);
+  ++version_;
+}
+
+void Board::welcomed(const Welcome& welcome) {
+  welcome_ = welcome;
+  ++sessions_;
+  ++version_;
+}
+
+void Board::described(const DeviceDescription& about) {
+  Device& device = devices_[about.device];
+  if (device.about && same(*device.about, about)) return;
+  device.about = about;
+  ++version_;
+}
+
+void Board::counted(std::uint32_t devices) {
+  if (std::erase_if(devices_, [&](const auto& device) { return device.first >= devices; }) > 0) ++version_;
+}
+
+void Board::observe(const DeviceState& state) {
+  Device& device = devices_[state.device];
+  device.newest = state;
+  ++device.states;
+  for (std::size_t bit = 0; bit < kReasons; ++bit) device.limited[bit] += (state.reasons >> bit) & 1U;
+  if (device.waiting.size() >= kMaxWaiting) {
+    const auto half = device.waiting.size() / 2;  // one move for many states
+    device.waiting.erase(device.waiting.begin(), device.waiting.begin() + static_cast<std::ptrdiff_t>(half));
+    device.dropped += half;
+  }
+  device.waiting.push_back(state);
+}
+
+void Board::observe(const DeviceReport& report) {
+  Device& device = devices_[report.device];
+  device.report = report;
+  for (std::size_t i = 0; i < report.lateness.size(); ++i) device.lateness[i] += report.lateness[i];
+  device.steps += report.steps;
+  device.missed += report.missed;
+  device.overruns += report.overruns;
+  device.unseen += report.unseen;
+  for (auto& [channel, engine] : device.engines) ++engine.silent_for;
+  std::erase_if(device.engines, [](const auto& engine) { return engine.second.silent_for > kForgetAfter; });
+}
+
+void Board::observe(const PeerReport& report) {
+  auto& engines = devices_[report.device].engines;
+  if (const auto known = engines.find(report.channel);
+      known != engines.end() && known->second.newest.name != report.name) {
+    engines.erase(known);  // another one sits there now: its sums begin at zero
+  }
+  Engine& engine = engines[report.channel];
+  engine.newest = report;
+  engine.forces += report.link.forces;
+  engine.late_server += report.link.late_server;
+  engine.late_network += report.link.late_network;
+  engine.late_engine += report.link.late_engine;
+  engine.silent_for = 0;
+}
+
+std::vector<DeviceState> Board::take_states(std::uint32_t number) {
+  const auto device = devices_.find(number);
+  if (device == devices_.end()) return {};
+  return std::exchange(device->second.waiting, {});
+}
+
+}  // namespace tendon::dash

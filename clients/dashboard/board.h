@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/messages.h"
+#include "protocol/session.h"
+
+namespace tendon::dash {
+
+/// How the way to the server is.
+enum class Contact : std::uint8_t {
+  kGreeting,    ///< an attempt is under way
+  kOpen,        ///< states come in
+  kUnanswered,  ///< nobody answers; trying on
+  kRefused,     ///< the server said no; trying on
+  kLost,        ///< a session has ended; trying on
+};
+
+/// All that is known of a server at this instant, as values: what the Observer writes down, the page is told and
+/// /metrics exports. Counters only grow, as long as this object lives, whatever the server does.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Board {
+ public:
+  /// States of a device that wait for the page; of more the oldest are dropped and counted. Half a second at 1 kHz: the
+  /// page is told sixty times a second.
+  static constexpr std::size_t kMaxWaiting = 500;
+  static constexpr std::size_t kReasons = 32;
+
+  /// The engine at one channel of a device, as the server's newest word of it was.
+  struct Engine {
+    PeerReport newest;
+    // Sums over all reports.
+    std::uint64_t forces = 0;
+    std::uint64_t late_server = 0;
+    std::uint64_t late_network = 0;
+    std::uint64_t late_engine = 0;
+    /// Reports of the device that came since: an engine that has left is told of no more.
+    std::uint64_t silent_for = 0;
+  };
+
+  struct Device {
+    std::optional<DeviceDescription> about;
+    std::optional<DeviceState> newest;
+    std::vector<DeviceState> waiting;  ///< that the page has not been told, in order
+    std::uint64_t dropped = 0;         ///< of those, because nobody took them
+    std::uint64_t states = 0;
+    std::array<std::uint64_t, kReasons> limited{};  ///< states with each bit of core/reason.h
+    std::optional<DeviceReport> report;
+    // Sums over all reports.
+    LatenessHistogram lateness{};
+    std::uint64_t steps = 0;
+    std::uint64_t missed = 0;
+    std::uint64_t overruns = 0;
+    std::uint64_t unseen = 0;
+    std::map<std::uint32_t, Engine> engines;  ///< by channel
+  };
+
+  void tell(Contact contact, std::string words);
+  void welcomed(const Welcome& welcome);
+  void described(const DeviceDescription& about);
+  /// There are so many devices: those beyond were another server's.
+  void counted(std::uint32_t devices);
+  void observe(const DeviceState& state);
+  void observe(const DeviceReport& report);
+  void observe(const PeerReport& report);
+  void observe(const LinkStats& link) { link_ = link; }
+
+  Contact contact() const noexcept { return contact_; }
+  const std::string& words() const noexcept { return words_; }  ///< about the contact, for people
+  const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
+  const LinkStats& link() const noexcept { return link_; }
+  std::uint64_t sessions() const noexcept { return sessions_; }
+  const std::map<std::uint32_t, Device>& devices() const noexcept { return devices_; }  ///< by number
+
+  /// Grows when the contact, the devices or what they are has changed.
+  std::uint64_t version() const noexcept { return version_; }
+  /// Takes out the states of a device that wait; empty for a device that is not there.
+  std::vector<DeviceState> take_states(std::uint32_t device);
+
+ private:
+  Contact contact_ = Contact::kGreeting;
+  std::string words_ = "looking for the server";
+  std::optional<Welcome> welcome_;
+  LinkStats link_;
+  std::uint64_t sessions_ = 0;
+  std::uint64_t version_ = 1;
+  std::map<std::uint32_t, Device> devices_;
+};
+
+}  // namespace tendon::dash

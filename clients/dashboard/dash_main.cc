@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-dash: a web page that shows what a Tendon server does, live and recorded. It only looks on.
+#include <sys/random.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/key_file.h"
+#include "clients/dashboard/board.h"
+#include "clients/dashboard/feed.h"
+#include "clients/dashboard/json.h"
+#include "clients/dashboard/metrics.h"
+#include "clients/dashboard/observer.h"
+#include "clients/dashboard/page_files.h"
+#include "clients/dashboard/recordings.h"
+#include "clients/dashboard/routes.h"
+#include "clients/dashboard/web_server.h"
+
+namespace tendon::dash {
+namespace {
+
+LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
+
+Seed seed_from_system() {
+  Seed seed;
+  if (getrandom(seed.bytes.data(), seed.bytes.size(), 0) != static_cast<ssize_t>(seed.bytes.size())) {
+    throw std::runtime_error("the system gives no random numbers");
+  }
+  return seed;
+}
+
+struct Options {
+  WebServer::Config web;
+  Routes::Config routes;
+  std::string key_file;
+  std::string recordings;
+  double duration_s = 0;
+  bool json = false;
+};
+
+/// Reads the command line into `options`; an exit code when there is no more to do.
+std::optional<int> parse(int argc, char** argv, Options& options) {
+  CLI::App app(
+      "A web page that shows what a Tendon server does, live and recorded; /metrics for Prometheus, and /bridge for "
+      "engines in "
+      "browsers.",
+      "tendon-dash");
+  app.footer(
+      "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
+      "then open http://127.0.0.1:8080 in a browser.");
+  app.set_help_flag("-h,--help", "Print this and leave");
+  std::string server = to_string(options.web.server);
+  std::string listen = to_string(options.web.listen);
+  const auto address = CLI::Validator(
+      [](const std::string& text) -> std::string {
+        try {
+          parse_address(text);
+          return {};
+        } catch (const std::invalid_argument& error) {
+          return error.what();
+        }
+      },
+      "");
+  app.add_option("--server", server, "Where tendond listens")
+      ->type_name("HOST:PORT")
+      ->capture_default_str()
+      ->check(address);
+  app.add_option(
+         "--key", options.key_file,
+         "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
+      ->type_name("FILE");
+  app.add_option("--listen", listen,
+                 "Where the page is; port 0 lets the system choose. Beyond this machine only with --host")
+      ->type_name("HOST:PORT")
+      ->capture_default_str()
+      ->check(address);
+  app.add_option("--host", options.routes.hosts,
+                 "A name under which browsers on other machines find this one. Whoever can reach it sees everything")
+      ->type_name("NAME");
+  app.add_option("--origin", options.routes.origins, "Pages from there may use /bridge: https://lab.example")
+      ->type_name("URL");
+  app.add_option("--recordings", options.recordings, "Folder whose recordings (*.mcap) the page may open")
+      ->type_name("FOLDER");
+  app.add_option("--duration-s", options.duration_s, "Leave after this time; 0 = at Ctrl-C")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e9));
+  app.add_flag("--json", options.json, "One JSON object per line on stdout: listening, stopped");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;  // prints the help, or what is wrong
+  }
+  options.web.server = parse_address(server);
+  options.web.listen = parse_address(listen);
+  if (!is_loopback(options.web.listen) && options.routes.hosts.empty()) {
+    std::cerr << "--listen " << listen
+              << ": beyond this machine only with --host NAME, the name that browsers there use\n";
+    return 2;
+  }
+  return std::nullopt;
+}
+
+int run(const Options& options) {
+  std::optional<Key> key;
+  if (!options.key_file.empty()) key = read_client_key(options.key_file).key;
+  std::optional<Recordings> recordings;
+  if (!options.recordings.empty()) recordings.emplace(options.recordings);
+
+  const LocalTime start = read_clock();
+  Board board;
+  WebCounts counts;
+  BridgeCounts bridge;
+  Feed feed(board, {.server = to_string(options.web.server), .arms = false, .recordings = recordings.has_value()},
+            counts, start);
+  const Routes routes(options.routes, {.page = page_files(),
+                                       .recordings = recordings ? &*recordings : nullptr,
+                                       .metrics = [&] { return metrics_text(board, counts, bridge); }});
+  WebServer web(options.web, routes, feed, counts, bridge, read_clock);
+  Observer observer(web.link(), options.web.server, {.key = key, .seed = seed_from_system()}, board, start);
+
+  const std::string at = to_string(web.address());
+  if (options.json) {
+    JsonWriter json;
+    json.begin_object().key("event").value("listening").key("address").value(at);
+    json.key("server").value(to_string(options.web.server)).end_object();
+    std::puts(json.text().c_str());
+    std::fflush(stdout);
+  } else {
+    std::cerr << "tendon-dash: open http://" << at << "/\n";
+  }
+
+  std::string said;
+  const auto turn = [&](LocalTime now) {
+    observer.set_watched(feed.pages() > 0);
+    const LocalTime next = observer.turn(now);
+    if (board.contact() != Contact::kGreeting && board.words() != said) {
+      std::cerr << "tendon-dash: " << (said = board.words()) << '\n';
+    }
+    return next;
+  };
+  web.run(from_seconds(options.duration_s), turn, [](LocalTime) {});
+  observer.stop(read_clock());
+  if (options.json) {
+    JsonWriter json;
+    json.begin_object().key("event").value("stopped").key("requests").value(counts.requests);
+    json.key("refused").value(counts.refused).key("states_skipped").value(counts.states_skipped);
+    json.key("sessions").value(board.sessions()).end_object();
+    std::puts(json.text().c_str());
+  }
+  return board.sessions() > 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace tendon::dash
+
+int main(int argc, char** argv) {
+  tendon::dash::Options options;
+  if (const auto exit_code = tendon::dash::parse(argc, argv, options)) return *exit_code;
+  try {
+    return tendon::dash::run(options);
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-dash: " << error.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/feed.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+#include <vector>
+
+#include "clients/dashboard/json.h"
+#include "protocol/limits.h"
+
+namespace tendon::dash {
+namespace {
+
+constexpr Duration kReportsEvery = std::chrono::seconds(1);
+
+/// The N of "watch N".
+std::optional<std::uint32_t> number_after(std::string_view line, std::string_view word) {
+  if (!line.starts_with(word)) return std::nullopt;
+  line.remove_prefix(word.size());
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), number);
+  if (error != std::errc{} || end != line.data() + line.size() || number >= limits::kMaxDevices) return std::nullopt;
+  return number;
+}
+
+}  // namespace
+
+Feed::PageId Feed::join(LocalTime now) {
+  const std::uint32_t first = board_.devices().empty() ? 0 : board_.devices().begin()->first;
+  pages_.emplace(++last_, Page{.device = first, .post = {}, .lines = RateLimit(kMaxLinesHz, now)});
+  counts_.pages = pages_.size();
+  return last_;
+}
+
+void Feed::leave(PageId page) {
+  pages_.erase(page);
+  counts_.pages = pages_.size();
+}
+
+bool Feed::hear(LocalTime now, PageId id, std::string_view line) {
+  const auto found = pages_.find(id);
+  if (found == pages_.end()) return false;
+  Page& page = found->second;
+  if (!page.lines.take(now)) return false;
+  if (const auto device = number_after(line, "watch ")) {
+    page.device = *device;
+    page.post.forget_states();
+    page.reports_due = true;
+    return true;
+  }
+  if (const auto device = number_after(line, "arm ")) {
+    if (!abilities_.arms) {
+      tell(id, false, "tendon-dash was not started with --arm");
+    } else if (arm_asked_) {
+      tell(id, false, "somebody else is at it");
+    } else {
+      arm_asked_ = ArmAsked{id, *device};
+    }
+    return true;
+  }
+  return false;
+}
+
+void Feed::tick(LocalTime now) {
+  const bool reports = now >= next_reports_;
+  if (reports) next_reports_ = std::max(next_reports_ + kReportsEvery, now);
+  std::map<std::uint32_t, std::string> reports_of;
+  std::optional<std::string> server;
+  for (auto& [id, page] : pages_) {
+    if (page.version != board_.version()) {
+      if (!server) server = server_json(board_, abilities_);
+      page.post.put(PagePost::Kind::kServer, *server);
+      page.version = board_.version();
+    }
+    if (std::exchange(page.reports_due, false) || reports) {
+      auto& text = reports_of[page.device];
+      if (text.empty()) text = reports_json(page.device, board_);
+      page.post.put(PagePost::Kind::kReports, text);
+    }
+  }
+  std::vector<std::uint32_t> devices;
+  for (const auto& [number, device] : board_.devices()) devices.push_back(number);
+  for (const std::uint32_t number : devices) {
+    const std::vector<DeviceState> states = board_.take_states(number);
+    if (states.empty()) continue;
+    std::string text;
+    for (auto& [id, page] : pages_) {
+      if (page.device != number) continue;
+      if (text.empty()) text = states_json(number, states);
+      page.post.put_states(text, states.size());
+      counts_.states_skipped += page.post.take_skipped();
+    }
+  }
+}
+
+std::optional<std::string> Feed::next(PageId page) {
+  const auto found = pages_.find(page);
+  return found == pages_.end() ? std::nullopt : found->second.post.next();
+}
+
+void Feed::tell(PageId page, bool done, std::string_view words) {
+  const auto found = pages_.find(page);
+  if (found == pages_.end()) return;
+  JsonWriter json;
+  json.begin_object().key("type").value("answer").key("done").value(done).key("words").value(words).end_object();
+  found->second.post.put(PagePost::Kind::kAnswer, json.take());
+}
+
+}  // namespace tendon::dash

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "clients/dashboard/board.h"
+#include "clients/dashboard/metrics.h"
+#include "clients/dashboard/page_json.h"
+#include "clients/dashboard/page_post.h"
+#include "clients/dashboard/rate_limit.h"
+
+namespace tendon::dash {
+
+/// Tells every page that looks on what is new on the Board, without a socket: what a page says goes in, what it is to
+/// be told comes out.
+///
+/// A page looks at one device, at first at the server's first one, and says what it wants in one line of text:
+///
+///     watch N          tell me of device N from now on
+///     arm N            clear the fault of device N, or arm it (see Abilities::arms)
+///
+/// It is told with every tick what has come of its device, and once a second how the loop and the engines do. Each text
+/// is made once for all pages that look at the same device.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Feed {
+ public:
+  using PageId = std::uint64_t;
+  /// Between two ticks: what a screen shows.
+  static constexpr Duration kTick = std::chrono::microseconds(16'667);
+  /// Lines that a page may say in a second: a person clicks less often.
+  static constexpr double kMaxLinesHz = 20;
+
+  struct ArmAsked {
+    PageId page;
+    std::uint32_t device;
+  };
+
+  /// `board` and `counts` must outlive the feed.
+  Feed(Board& board, Abilities abilities, WebCounts& counts, LocalTime now)
+      : board_(board), abilities_(std::move(abilities)), counts_(counts), next_reports_(now) {}
+
+  PageId join(LocalTime now);
+  void leave(PageId page);
+  std::size_t pages() const noexcept { return pages_.size(); }
+
+  /// What a page says. False: it speaks another language, or too fast; it is best sent away.
+  bool hear(LocalTime now, PageId page, std::string_view line);
+  /// Takes what is new on the board.
+  void tick(LocalTime now);
+  /// The next text for a page; empty when none waits.
+  std::optional<std::string> next(PageId page);
+
+  /// A page that wants to arm a device; empty when none does.
+  std::optional<ArmAsked> take_arm() { return std::exchange(arm_asked_, std::nullopt); }
+  /// … and what came of it, in words.
+  void tell(PageId page, bool done, std::string_view words);
+
+ private:
+  struct Page {
+    std::uint32_t device = 0;
+    std::uint64_t version = 0;  ///< of the board, that it was told of
+    bool reports_due = true;
+    PagePost post;
+    RateLimit lines;
+  };
+
+  Board& board_;
+  Abilities abilities_;
+  WebCounts& counts_;
+  LocalTime next_reports_;
+  PageId last_ = 0;
+  std::map<PageId, Page> pages_;
+  std::optional<ArmAsked> arm_asked_;
+};
+
+}  // namespace tendon::dash

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/metrics.h"
+
+#include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
+
+#include <array>
+#include <limits>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "clients/dashboard/page_json.h"
+
+namespace tendon::dash {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+using Labels = std::vector<ClientMetric::Label>;
+
+/// Families in the order in which they were begun.
+class Exposition {
+ public:
+  /// Later samples are of this family.
+  void begin(const char* name, MetricType type, const char* help) {
+    families_.emplace_back();
+    families_.back().name = name;
+    families_.back().help = help;
+    families_.back().type = type;
+  }
+  void add(Labels labels, double value) {
+    ClientMetric metric;
+    metric.label = std::move(labels);
+    metric.gauge.value = value;
+    metric.counter.value = value;
+    families_.back().metric.push_back(std::move(metric));
+  }
+  void add(Labels labels, std::uint64_t value) { add(std::move(labels), static_cast<double>(value)); }
+  void add(Labels labels, ClientMetric::Histogram histogram) {
+    ClientMetric metric;
+    metric.label = std::move(labels);
+    metric.histogram = std::move(histogram);
+    families_.back().metric.push_back(std::move(metric));
+  }
+  std::string text() {
+    std::erase_if(families_, [](const MetricFamily& family) { return family.metric.empty(); });
+    std::ostringstream out;
+    prometheus::TextSerializer().Serialize(out, families_);
+    return out.str();
+  }
+
+ private:
+  std::vector<MetricFamily> families_;
+};
+
+constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
+constexpr std::array kModes = {Mode::kIdle,     Mode::kActive,   Mode::kHolding,
+                               Mode::kDecaying, Mode::kSafeStop, Mode::kFault};
+constexpr std::array kSafeties = {Safety::kAbsent, Safety::kOpening, Safety::kFirmware, Safety::kUnhomed,
+                                  Safety::kHomed,  Safety::kArmed,   Safety::kFault,    Safety::kUnguarded};
+
+/// Of `board`'s devices, those for which `what` is there; `add` gets each with its label.
+template <class Add>
+void each(const Board& board, Add add) {
+  for (const auto& [number, device] : board.devices()) {
+    const std::string name = device.about && !device.about->name.empty() ? device.about->name : std::to_string(number);
+    add(ClientMetric::Label{"device", name}, device);
+  }
+}
+
+ClientMetric::Histogram lateness(const Board::Device& device) {
+  ClientMetric::Histogram histogram;
+  double upper = 1e-6;
+  for (std::size_t i = 0; i + 1 < device.lateness.size(); ++i, upper *= 2) {
+    histogram.sample_count += device.lateness[i];
+    histogram.bucket.push_back({histogram.sample_count, upper});
+  }
+  histogram.sample_count += device.lateness.back();
+  histogram.bucket.push_back({histogram.sample_count, std::numeric_limits<double>::infinity()});
+  histogram.sample_sum = std::numeric_limits<double>::quiet_NaN();  // the wire counts buckets only
+  return histogram;
+}
+
+void add_devices(Exposition& out, const Board& board) {
+  using Label = ClientMetric::Label;
+  using Device = Board::Device;
+  const auto newest = [&](auto value) {
+    each(board, [&](const Label& label, const Device& device) {
+      if (device.newest) value(label, *device.newest);
+    });
+  };
+  out.begin("tendon_device_position_meters", MetricType::Gauge, "Position of the handle, device base frame.");
+  newest([&](const Label& label, const DeviceState& state) {
+    for (int i = 0; i < 3; ++i) out.add({label, {"axis", kAxes[static_cast<std::size_t>(i)]}}, state.position[i]);
+  });
+  out.begin("tendon_device_force_wanted_newtons", MetricType::Gauge, "Norm of the force that the engines ask for.");
+  newest([&](const Label& label, const DeviceState& state) {
+    if (state.force_wanted) out.add({label}, state.force_wanted->norm());
+  });
+  out.begin("tendon_device_force_permitted_newtons", MetricType::Gauge,
+            "The limiter's bound on the norm of the force.");
+  newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.permitted_force); });
+  out.begin("tendon_device_force_applied_newtons", MetricType::Gauge, "Norm of the force that the device gives out.");
+  newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.force_applied.norm()); });
+  out.begin("tendon_device_energy_joules", MetricType::Gauge, "Energy ledger: what the device may still give out.");
+  newest([&](const Label& label, const DeviceState& state) { out.add({label}, state.energy); });
+  out.begin("tendon_device_force_age_seconds", MetricType::Gauge, "Age of the rendered force since it arrived.");
+  newest([&](const Label& label, const DeviceState& state) { out.add({label}, seconds(state.force_age)); });
+  out.begin("tendon_device_mode", MetricType::Gauge, "1 for what the force is made of now, 0 for the others.");
+  newest([&](const Label& label, const DeviceState& state) {
+    for (const Mode mode : kModes) out.add({label, {"mode", std::string(name(mode))}}, state.mode == mode ? 1.0 : 0.0);
+  });
+  out.begin("tendon_device_states_total", MetricType::Counter, "States that came.");
+  each(board, [&](const Label& label, const Device& device) { out.add({label}, device.states); });
+  out.begin("tendon_device_states_limited_total", MetricType::Counter,
+            "Of these, those whose force was not the one asked for, by each reason.");
+  each(board, [&](const Label& label, const Device& device) {
+    for (std::size_t bit = 0; bit < Board::kReasons; ++bit) {
+      const std::string reason = reason_name(bit);
+      if (!reason.starts_with("bit_") || device.limited[bit] > 0)
+        out.add({label, {"reason", reason}}, device.limited[bit]);
+    }
+  });
+
+  const auto reported = [&](auto value) {
+    each(board, [&](const Label& label, const Device& device) {
+      if (device.report) value(label, device, *device.report);
+    });
+  };
+  using Report = DeviceReport;
+  out.begin("tendon_device_safety_state", MetricType::Gauge, "1 for where the device stands, 0 for the others.");
+  reported([&](const Label& label, const Device&, const Report& report) {
+    for (const Safety safety : kSafeties)
+      out.add({label, {"state", std::string(name(safety))}}, report.safety == safety ? 1.0 : 0.0);
+  });
+  out.begin("tendon_device_fault", MetricType::Gauge, "1 while a fault holds the force at zero.");
+  reported([&](const Label& label, const Device&, const Report& r) { out.add({label}, r.fault.empty() ? 0.0 : 1.0); });
+  out.begin("tendon_device_degraded", MetricType::Gauge, "1 while the server does less for the device than it should.");
+  reported(
+      [&](const Label& label, const Device&, const Report& r) { out.add({label}, r.degraded.empty() ? 0.0 : 1.0); });
+  out.begin("tendon_device_steps_total", MetricType::Counter, "Haptic steps.");
+  reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.steps); });
+  out.begin("tendon_device_steps_missed_total", MetricType::Counter, "Periods without a step.");
+  reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.missed); });
+  out.begin("tendon_device_steps_overrun_total", MetricType::Counter, "Steps that came so late that it is a reason.");
+  reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.overruns); });
+  out.begin("tendon_device_steps_unseen_total", MetricType::Counter, "Steps in which the device gave no position.");
+  reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, device.unseen); });
+  out.begin("tendon_device_wakeup_lateness_seconds", MetricType::Histogram,
+            "How late the haptic loop woke. The sum is not known (NaN): the wire counts buckets.");
+  reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, lateness(device)); });
+}
+
+void add_engines(Exposition& out, const Board& board) {
+  const auto engines = [&](auto value) {
+    each(board, [&](const ClientMetric::Label& label, const Board::Device& device) {
+      for (const auto& [number, engine] : device.engines) {
+        const bool named = device.about && number < device.about->channels.size();
+        const std::string channel = named ? device.about->channels[number].name : std::to_string(number);
+        value(Labels{label, {"channel", channel}, {"engine", engine.newest.name}}, engine);
+      }
+    });
+  };
+  const auto with = [](Labels labels, const char* name, const char* value) {
+    labels.push_back({name, value});
+    return labels;
+  };
+  const auto delays = [&](const Labels& labels, const char* way, const std::optional<Delays>& measured) {
+    if (!measured) return;
+    out.add(with(with(labels, "way", way), "quantile", "0.5"), seconds(measured->median));
+    out.add(with(with(labels, "way", way), "quantile", "0.99"), seconds(measured->p99));
+  };
+  using Engine = Board::Engine;
+  out.begin("tendon_engine_delay_seconds", MetricType::Gauge,
+            "Delay of an engine's datagrams in the last second: round_trip, to_server, to_engine.");
+  engines([&](const Labels& labels, const Engine& engine) {
+    delays(labels, "round_trip", engine.newest.link.round_trip);
+    delays(labels, "to_server", engine.newest.link.to_server);
+    delays(labels, "to_engine", engine.newest.link.to_client);
+  });
+  out.begin("tendon_engine_forces_total", MetricType::Counter, "Forces that came from the engine.");
+  engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.forces); });
+  out.begin("tendon_engine_forces_late_total", MetricType::Counter, "Forces that came too late, by whose fault.");
+  engines([&](const Labels& labels, const Engine& engine) {
+    out.add(with(labels, "cause", "server"), engine.late_server);
+    out.add(with(labels, "cause", "network"), engine.late_network);
+    out.add(with(labels, "cause", "engine"), engine.late_engine);
+  });
+  out.begin("tendon_engine_datagrams_received", MetricType::Gauge, "Datagrams of the engine's present session.");
+  engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.link.received); });
+  out.begin("tendon_engine_datagrams_lost", MetricType::Gauge, "… and those of it that never came.");
+  engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.link.lost); });
+  out.begin("tendon_engine_forces_refused", MetricType::Gauge,
+            "1 while its forces are not taken: its way loses too much.");
+  engines(
+      [&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.forces_refused ? 1.0 : 0.0); });
+}
+
+}  // namespace
+
+std::string metrics_text(const Board& board, const WebCounts& web, const BridgeCounts& bridge) {
+  Exposition out;
+  out.begin("tendon_up", MetricType::Gauge, "1 while tendond answers.");
+  out.add({}, board.contact() == Contact::kOpen ? 1.0 : 0.0);
+  out.begin("tendon_server_info", MetricType::Gauge, "1, with the name and version of the server.");
+  if (board.welcome()) out.add({{"server", board.welcome()->server}}, 1.0);
+  out.begin("tendon_sessions_total", MetricType::Counter, "Sessions of this dashboard with the server.");
+  out.add({}, board.sessions());
+  add_devices(out, board);
+  add_engines(out, board);
+  out.begin("tendon_dash_pages", MetricType::Gauge, "Pages that look on.");
+  out.add({}, web.pages);
+  out.begin("tendon_dash_requests_total", MetricType::Counter, "HTTP requests.");
+  out.add({}, web.requests);
+  out.begin("tendon_dash_requests_refused_total", MetricType::Counter, "HTTP requests refused.");
+  out.add({}, web.refused);
+  out.begin("tendon_dash_states_skipped_total", MetricType::Counter, "States not told to a page that did not keep up.");
+  out.add({}, web.states_skipped);
+  out.begin("tendon_bridge_pages", MetricType::Gauge, "WebSockets on the bridge.");
+  out.add({}, bridge.pages);
+  out.begin("tendon_bridge_datagrams_total", MetricType::Counter, "Datagrams that crossed the bridge.");
+  out.add({{"way", "to_server"}}, bridge.to_server);
+  out.add({{"way", "to_page"}}, bridge.to_page);
+  out.begin("tendon_bridge_dropped_total", MetricType::Counter, "Datagrams that did not, by cause.");
+  out.add({{"cause", "malformed"}}, bridge.malformed);
+  out.add({{"cause", "plain"}}, bridge.plain);
+  out.add({{"cause", "too_fast"}}, bridge.too_fast);
+  out.add({{"cause", "too_slow"}}, bridge.too_slow);
+  out.begin("tendon_bridge_refused_total", MetricType::Counter,
+            "WebSockets that were not let onto the bridge, by cause.");
+  out.add({{"cause", "origin"}}, bridge.refused_origin);
+  out.add({{"cause", "full"}}, bridge.refused_full);
+  return out.text();
+}
+
+}  // namespace tendon::dash

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "clients/dashboard/board.h"
+#include "protocol/crypto.h"
+#include "protocol/handshake.h"
+#include "protocol/link.h"
+#include "protocol/session.h"
+
+namespace tendon::dash {
+
+/// Watches every device of a Tendon server in one session, and writes what it hears on a Board: an observer, without
+/// socket, clock or thread. It never sends a force.
+///
+///     Observer observer(link, server, config, board, now);
+///     for (;;) wait for a datagram, at most until observer.turn(now);
+///
+/// A guest sees the devices that it has claimed by name, and learns their names by asking (Describe) for device 0, 1, 2
+/// … until there is none. So a server with several is greeted twice: the first session asks, the second one claims them
+/// all.
+///
+/// * **Reconnection.** However an attempt or a session ends, the next attempt waits retry_min, then twice as long each
+/// time,
+///   at most retry_max, for ever: a server that comes back is found.
+/// * **Holders.** Each device is described anew once in `describe_every`, because engines come and go.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Observer {
+ public:
+  struct Config {
+    std::string name = "tendon-dash";  ///< for the server's log; at most limits::kMaxName bytes
+    std::optional<Key> key{};          ///< as ForceClient::Config::key; an observer's will do
+    Seed seed{};                       ///< 32 bytes from the system at each start
+    Duration patience = std::chrono::seconds(2);
+    Duration retry_min = std::chrono::milliseconds(100);
+    Duration retry_max = std::chrono::seconds(2);
+    Duration describe_every = std::chrono::seconds(1);
+    /// Datagrams taken from the link in one turn: a quarter of a second of states at 1 kHz.
+    int max_datagrams = 256;
+  };
+  /// States per second and device while somebody looks: all. While nobody does, enough for /metrics.
+  static constexpr std::uint32_t kIdleStateHz = 20;
+
+  /// `link` and `board` must outlive this object. The first Hello leaves with the first turn.
+  Observer(Link& link, const Address& server, const Config& config, Board& board, LocalTime now);
+
+  /// Does all there is to do at `now` and returns when it wants to be called again at the latest; a datagram is a
+  /// reason to call it earlier.
+  LocalTime turn(LocalTime now);
+
+  /// Whether somebody looks at the states, which then come at the loop's own rate.
+  void set_watched(bool watched) noexcept { watched_ = watched; }
+
+  /// Says Bye. Any further turn does nothing.
+  void stop(LocalTime now);
+
+ private:
+  struct Asked {
+    std::uint32_t device = 0;
+    bool describe = false;  ///< otherwise a SetStateRate
+  };
+
+  void greet(LocalTime now);
+  void settle(LocalTime now);
+  void end(LocalTime now, Contact contact, std::string words);
+  bool drain(LocalTime now);
+  void take_events(LocalTime now);
+  void take_answer(LocalTime now, const Session::RequestAnswered& answered);
+  void ask(LocalTime now);
+  void flush(LocalTime now);
+
+  Link& link_;
+  Address server_;
+  Config config_;
+  Board& board_;
+  Ratchet secrets_;
+  std::optional<ClientHandshake> handshake_;
+  std::optional<Session> session_;
+  std::map<std::uint32_t, std::string> names_;  ///< of the devices, as far as they are known
+  bool claims_ = false;                         ///< this attempt, or session, has claimed them by name
+  bool counted_ = false;                        ///< we know how many there are
+  std::map<std::uint32_t, Asked> asked_;        ///< open requests, by id
+  std::uint32_t next_describe_ = 0;             ///< the device to ask about next
+  LocalTime describe_at_{};
+  bool watched_ = true;
+  std::map<std::uint32_t, std::uint32_t> rates_;  ///< states per second that each device was asked for
+  LocalTime give_up_{};
+  LocalTime retry_{};
+  Duration back_off_;
+  bool stopped_ = false;
+};
+
+}  // namespace tendon::dash

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+import uPlot from "uplot";
+import { h, say, theme } from "./dom.js";
+import { thin, type Column, type Track } from "./track.js";
+import { digits } from "./words.js";
+
+export interface Line {
+  readonly column: Column;
+  readonly name: string;
+  /** CSS variable of its colour; told apart by dashes and width as well. */
+  readonly colour: string;
+  readonly dash?: readonly number[];
+  readonly width?: number;
+  /** Fills down to zero. */
+  readonly fill?: string;
+}
+
+export interface ChartSpec {
+  readonly id: string;
+  readonly title: string;
+  readonly unit: string;
+  /** From SI to `unit`. */
+  readonly scale: number;
+  readonly lines: readonly Line[];
+  /** The axis begins at zero. */
+  readonly positive?: boolean;
+  /** … and shows at least this much. */
+  readonly least: number;
+  /** Lines that the axis need not show whole: what is far beyond the others would flatten them. */
+  readonly mayLeave?: Column;
+}
+
+/** What a hand on a chart asks for. */
+export interface ChartEvents {
+  zoom(from: number, to: number): void;
+  reset(): void;
+  hover(time: number | undefined): void;
+}
+
+/** Of a plot: lower where there is little room. */
+const heightFor = (width: number): number => (width < 500 ? 168 : 196);
+
+/** One plot over time: lines with a unit, a legend that tells their values at the cursor. */
+export class Chart {
+  readonly element: HTMLElement;
+  readonly #plot: uPlot;
+  readonly #box: HTMLElement;
+  readonly #values: HTMLElement[];
+  #width = 0;
+
+  constructor(readonly spec: ChartSpec, events: ChartEvents) {
+    this.#values = spec.lines.map(() => h("span", { class: "value" }));
+    const legend = h("div", { class: "legend" }, ...spec.lines.map((line, i) => h("span", { class: "key" }, swatch(line), line.name, " ", this.#values[i]!)));
+    this.#box = h("div", { class: "plot" });
+    this.element = h("figure", { class: "chart", "data-chart": spec.id },
+      h("figcaption", {}, h("span", { class: "title" }, spec.title, h("span", { class: "unit", text: spec.unit })), legend), this.#box);
+
+    const font = "11px system-ui, sans-serif";
+    const grid = { stroke: () => theme("grid"), width: 1 };
+    const options: uPlot.Options = {
+      width: 300,
+      height: heightFor(300),
+      padding: [8, 20, 0, 0],
+      legend: { show: false },
+      cursor: { y: false, drag: { x: true, y: false, setScale: false }, points: { show: false }, sync: { key: "tendon" } },
+      scales: { x: { time: false }, y: { range: (_, low, high) => this.#range(low, high) } },
+      axes: [
+        { stroke: () => theme("quiet"), font, grid, ticks: grid, size: 30, space: 70, values: (_, at) => at.map((t) => `${Number(t.toFixed(6))} s`) },
+        { stroke: () => theme("quiet"), font, grid, ticks: { show: false }, size: 48, space: 28, values: (_, at) => at.map((v) => String(Number(v.toPrecision(6))).replace("-", "−")) },
+      ],
+      series: [{}, ...spec.lines.map((line): uPlot.Series => ({
+        label: line.name,
+        stroke: () => theme(line.colour),
+        width: line.width ?? 1.5,
+        ...(line.dash ? { dash: [...line.dash] } : {}),
+        ...(line.fill ? { fill: () => theme(line.fill!) } : {}),
+        points: { show: false },
+        spanGaps: false,
+      }))],
+      hooks: {
+        setSelect: [(plot) => {
+          const { left, width } = plot.select;
+          if (width < 4) return;
+          events.zoom(plot.posToVal(left, "x"), plot.posToVal(left + width, "x"));
+          plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+        }],
+        setCursor: [(plot) => {
+          const left = plot.cursor.left ?? -1;
+          if (plot.cursor.event) events.hover(left < 0 ? undefined : plot.posToVal(left, "x"));
+        }],
+      },
+    };
+    this.#plot = new uPlot(options, [[], ...spec.lines.map(() => [])], this.#box);
+    this.#plot.over.addEventListener("dblclick", () => events.reset());
+  }
+
+  /** Shows [from, to]; the legend tells what was at `cursor`. */
+  draw(track: Track, from: number, to: number, cursor: number): void {
+    const width = this.#box.clientWidth;
+    if (width === 0) return;
+    if (width !== this.#width) {
+      this.#width = width;
+      this.#plot.setSize({ width, height: heightFor(width) });
+    }
+    const data = thin(track, this.spec.lines.map((line) => line.column), from, to, Math.max(width - 60, 50), this.spec.scale);
+    this.#plot.batch(() => {
+      this.#plot.setData(data as uPlot.AlignedData, false);
+      this.#plot.setScale("x", { min: from, max: to });
+    });
+    const at = track.at(cursor);
+    const i = at < track.end ? at : track.end - 1;
+    this.spec.lines.forEach((line, k) => {
+      const value = i >= track.begin ? track.column(line.column)[i]! * this.spec.scale : NaN;
+      say(this.#values[k]!, digits(value));
+    });
+  }
+
+  /** The theme has changed. */
+  repaint(): void {
+    this.#plot.redraw(false, true);
+  }
+
+  destroy(): void {
+    this.#plot.destroy();
+  }
+
+  #range(low: number | null, high: number | null): [number, number] {
+    const { positive, least, mayLeave } = this.spec;
+    let [from, to] = [low ?? 0, high ?? 0];
+    if (mayLeave) {
+      // Without the line that may leave.
+      [from, to] = [Infinity, -Infinity];
+      this.spec.lines.forEach((line, k) => {
+        if (line.column === mayLeave) return;
+        for (const v of this.#plot.data[k + 1] ?? []) {
+          if (v == null) continue;
+          if (v < from) from = v;
+          if (v > to) to = v;
+        }
+      });
+      if (from > to) [from, to] = [0, 0];
+      to *= 1.25;
+    }
+    if (positive) from = 0;
+    const middle = (from + to) / 2;
+    if (to - from < least) [from, to] = positive ? [0, Math.max(to, least)] : [middle - least / 2, middle + least / 2];
+    const room = (to - from) * 0.06;
+    return [positive ? 0 : from - room, to + room];
+  }
+}
+
+function swatch(line: Line): HTMLElement {
+  const box = h("span", { class: "swatch" });
+  const style = !line.dash ? "solid" : (line.dash[0] ?? 0) > 3 ? "dashed" : "dotted";
+  box.style.borderTop = `${line.fill ? 2 : Math.max(2, line.width ?? 2)}px ${style} var(--${line.colour})`;
+  return box;
+}

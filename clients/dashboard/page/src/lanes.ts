@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+import { h, say, theme } from "./dom.js";
+import { shares, type Track } from "./track.js";
+import { kReasons, percent, type ReasonWords } from "./words.js";
+
+const kLimiting = kReasons.reduce((bits, reason) => (reason.limits ? bits | (1 << reason.bit) : bits), 0);
+const kHeight = 8;
+
+interface Lane {
+  readonly row: HTMLElement;
+  readonly share: HTMLElement;
+  readonly canvas: HTMLCanvasElement;
+}
+
+/** Why the force was not what was asked for: in words, and a lane for each reason that says when. */
+export class Lanes {
+  readonly element: HTMLElement;
+  readonly #sentence = h("p", { class: "why" });
+  readonly #list = h("div", { class: "lanes" });
+  readonly #lanes = new Map<number, Lane>();
+  #seen: ReasonWords[] = [];
+
+  constructor() {
+    this.element = h("section", { class: "panel reasons" }, h("h3", { text: "Why the force is not what was asked for" }), this.#sentence, this.#list);
+  }
+
+  draw(track: Track, from: number, to: number): void {
+    const { share, any, n } = shares(track, from, to, kLimiting);
+    say(this.#sentence, n === 0 ? "No states in this time." : sentence(share, any, to - from));
+    // A lane that has been there stays: rows that come and go cannot be read.
+    const now = kReasons.filter((reason) => share.has(reason.bit) || this.#seen.includes(reason));
+    if (now.length !== this.#seen.length) {
+      this.#seen = now;
+      this.#list.replaceChildren(...now.map((reason) => this.#lane(reason).row));
+    }
+    for (const reason of now) {
+      const lane = this.#lane(reason);
+      say(lane.share, percent(share.get(reason.bit) ?? 0));
+      this.#paint(lane.canvas, track, reason.bit, from, to);
+    }
+  }
+
+  /** Another device, another recording. */
+  clear(): void {
+    this.#seen = [];
+    this.#list.replaceChildren();
+  }
+
+  #lane(reason: ReasonWords): Lane {
+    const known = this.#lanes.get(reason.bit);
+    if (known) return known;
+    const share = h("span", { class: "share" });
+    const canvas = h("canvas", { height: kHeight });
+    const row = h("div", { class: "lane", "data-reason": reason.bit },
+      h("div", { class: "label" }, h("b", { text: reason.name }), h("span", { class: "meaning", text: reason.meaning }), share), canvas);
+    const lane = { row, share, canvas };
+    this.#lanes.set(reason.bit, lane);
+    return lane;
+  }
+
+  #paint(canvas: HTMLCanvasElement, track: Track, bit: number, from: number, to: number): void {
+    const ratio = window.devicePixelRatio;
+    const width = canvas.clientWidth;
+    if (width === 0) return;
+    canvas.width = width * ratio;
+    canvas.height = kHeight * ratio;
+    const paint = canvas.getContext("2d")!;
+    paint.scale(ratio, ratio);
+    paint.fillStyle = theme("lane");
+    paint.fillRect(0, 0, width, kHeight);
+    paint.fillStyle = theme(bit === 8 || bit === 6 ? "bad" : "wanted");
+    for (let px = 0, i = track.at(from); px < width; ++px) {
+      const end = track.at(from + ((px + 1) / width) * (to - from));
+      let set = false;
+      for (; i < end; ++i) set ||= ((track.reasons[i]! >>> bit) & 1) === 1;
+      if (set) paint.fillRect(px, 0, 1, kHeight);
+    }
+  }
+}
+
+function sentence(share: Map<number, number>, any: number, span: number): string {
+  const time = span >= 1 ? `${Number(span.toPrecision(3))} s` : `${Number((1e3 * span).toPrecision(3))} ms`;
+  if (any === 0) return `In these ${time} the hand felt what the engines asked for.`;
+  const most = kReasons.filter((r) => r.limits && share.has(r.bit)).sort((a, b) => share.get(b.bit)! - share.get(a.bit)!)[0]!;
+  return `For ${percent(any)} of these ${time} it was less or other than asked for; most of all: ${most.meaning}.`;
+}

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+import { h, mark, say } from "./dom.js";
+import { Scrubber } from "./scrubber.js";
+import { Stream, type AnswerMessage, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
+import { Track } from "./track.js";
+import { View, type Facts } from "./view.js";
+import { count, digits, kSafety } from "./words.js";
+
+/** Steps that are kept: two minutes at 1 kHz. */
+const kKept = 120_000;
+const kWindows = [0.5, 2, 5, 20, 60] as const;
+/** Pictures per second: a hand is not faster, and a phone's battery is grateful. */
+const kFrameMs = 33;
+
+/** What a server does now. */
+export class Live {
+  readonly element: HTMLElement;
+  readonly #track = new Track(kKept);
+  readonly #stream: Stream;
+  readonly #view: View;
+  readonly #scrubber: Scrubber;
+  readonly #pause: HTMLButtonElement;
+  readonly #device: HTMLSelectElement;
+  readonly #window: HTMLSelectElement;
+  readonly #about = h("span", { class: "quiet about" });
+  readonly #arm: HTMLButtonElement;
+  readonly #answer = h("span", { class: "answer", role: "status" });
+  #server: ServerMessage | undefined;
+  #reports: ReportsMessage | undefined;
+  #watched = 0;
+  #zero: number | undefined;
+  #open = false;
+  /** Of the window while it stands still; undefined: it follows. */
+  #still: { from: number; to: number } | undefined;
+  #hover: number | undefined;
+  #drawn = 0;
+  #dirty = true;
+  #stopped = false;
+
+  constructor(readonly told: (server: ServerMessage | undefined, words: string) => void) {
+    this.#pause = h("button", { type: "button", id: "pause", "aria-pressed": "false", click: () => this.#setStill(this.#still ? undefined : this.#following()) }, "Pause");
+    this.#device = h("select", { id: "device", "aria-label": "Device", change: () => this.#watch(Number(this.#device.value)) });
+    this.#window = h("select", { id: "window", "aria-label": "Time shown", change: () => this.#still && this.#setStill(this.#around()) },
+      ...kWindows.map((s) => h("option", { value: s, selected: s === 5 }, `${s} s`)));
+    this.#arm = h("button", { type: "button", id: "arm", class: "arm", hidden: true, click: () => this.#stream.say(`arm ${this.#watched}`) }, "Arm");
+    const zoom = (factor: number): void => {
+      const { from, to } = this.#still ?? this.#following();
+      const [middle, half] = [(from + to) / 2, ((to - from) / 2) * factor];
+      if (half < 0.001) return;
+      this.#setStill({ from: middle - half, to: Math.min(middle + half, Math.max(this.#track.last, middle)) });
+    };
+    this.#view = new View({
+      zoom: (from, to) => this.#setStill({ from, to }),
+      reset: () => this.#setStill(undefined),
+      hover: (time) => {
+        this.#hover = time;
+        this.#dirty = true;
+      },
+    });
+    this.#scrubber = new Scrubber((from, to) => this.#setStill({ from, to }));
+    this.#scrubber.element.hidden = true;
+    this.element = h("main", { class: "live" },
+      h("div", { class: "bar" },
+        h("label", { class: "field" }, "Device ", this.#device), this.#about, h("span", { class: "space" }),
+        this.#answer, this.#arm,
+        h("label", { class: "field" }, "Show ", this.#window),
+        h("span", { class: "group" },
+          h("button", { type: "button", id: "zoom-in", "aria-label": "Zoom in", title: "Zoom in", click: () => zoom(0.5) }, "+"),
+          h("button", { type: "button", id: "zoom-out", "aria-label": "Zoom out", title: "Zoom out", click: () => zoom(2) }, "−")),
+        this.#pause),
+      this.#scrubber.element, this.#view.element);
+    this.#stream = new Stream((message) => this.#take(message), (open) => this.#changed(open));
+    this.#loop();
+  }
+
+  repaint(): void {
+    this.#scrubber.repaint();
+    this.#view.repaint();
+    this.#dirty = true;
+  }
+
+  #take(message: Message): void {
+    this.#dirty = true;
+    if (message.type === "states") this.#takeStates(message);
+    else if (message.type === "reports") this.#reports = message.device === this.#watched ? message : this.#reports;
+    else if (message.type === "answer") this.#takeAnswer(message);
+    else this.#takeServer(message);
+  }
+
+  #takeStates(message: StatesMessage): void {
+    if (message.device !== this.#watched) return;
+    const number = (value: number | null | undefined): number => value ?? NaN;
+    for (let i = 0; i < message.tick.length; ++i) {
+      const sampled = message.sampled_us[i]! / 1e6;
+      // The server has been started again: its clock may have begun anew.
+      if (this.#zero === undefined || sampled - this.#zero < this.#track.last) {
+        this.#zero = sampled;
+        this.#track.clear();
+        this.#setStill(undefined);
+      }
+      this.#track.push({
+        t: sampled - this.#zero,
+        x: number(message.position_m[0][i]), y: number(message.position_m[1][i]), z: number(message.position_m[2][i]),
+        wx: number(message.wanted_n[0][i]), wy: number(message.wanted_n[1][i]), wz: number(message.wanted_n[2][i]),
+        ax: number(message.applied_n[0][i]), ay: number(message.applied_n[1][i]), az: number(message.applied_n[2][i]),
+        permitted: number(message.permitted_n[i]), energy: number(message.energy_j[i]),
+        reasons: message.reasons[i]!, mode: message.mode[i]!, age: message.force_age_ms[i]! / 1e3, late: NaN,
+      });
+    }
+  }
+
+  #takeServer(server: ServerMessage): void {
+    const before = this.#server?.devices.map((d) => d.name).join("\n");
+    this.#server = server;
+    if (server.devices.map((d) => d.name).join("\n") !== before) {
+      this.#device.replaceChildren(...server.devices.map((d) => h("option", { value: d.number, selected: d.number === this.#watched }, d.name || `device ${d.number}`)));
+      const first = server.devices[0];
+      if (first && !server.devices.some((d) => d.number === this.#watched)) this.#watch(first.number);
+    }
+    this.#tell();
+  }
+
+  #takeAnswer(answer: AnswerMessage): void {
+    say(this.#answer, answer.words);
+    mark(this.#answer, "data-level", answer.done ? "good" : "bad");
+    setTimeout(() => say(this.#answer, ""), 8000);
+  }
+
+  #changed(open: boolean): void {
+    this.#open = open;
+    this.#dirty = true;
+    this.#tell();
+  }
+
+  #tell(): void {
+    this.told(this.#open ? this.#server : undefined, this.#open ? (this.#server?.words ?? "asking tendon-dash") : "tendon-dash does not answer; trying on");
+  }
+
+  #watch(device: number): void {
+    this.#watched = device;
+    this.#zero = undefined;
+    this.#reports = undefined;
+    this.#track.clear();
+    this.#view.clear();
+    this.#setStill(undefined);
+    this.#stream.say(`watch ${device}`, true);
+  }
+
+  #following(): { from: number; to: number } {
+    const length = Number(this.#window.value);
+    return { from: this.#track.last - length, to: this.#track.last };
+  }
+
+  #around(): { from: number; to: number } {
+    const length = Number(this.#window.value);
+    const to = Math.min(this.#still!.to, this.#track.last);
+    return { from: to - length, to };
+  }
+
+  #setStill(still: { from: number; to: number } | undefined): void {
+    this.#still = still;
+    mark(this.#pause, "aria-pressed", String(still !== undefined));
+    say(this.#pause, still ? "Go on" : "Pause");
+    this.#scrubber.element.hidden = still === undefined;
+    this.#scrubber.repaint();
+    this.#dirty = true;
+  }
+
+  stop(): void {
+    this.#stopped = true;
+  }
+
+  #loop(): void {
+    const frame = (now: number): void => {
+      if (this.#stopped) return;
+      requestAnimationFrame(frame);
+      if (!this.#dirty || now - this.#drawn < kFrameMs || !this.element.isConnected) return;
+      this.#drawn = now;
+      this.#dirty = false;
+      this.#draw();
+    };
+    requestAnimationFrame(frame);
+  }
+
+  #draw(): void {
+    const { from, to } = this.#still ?? this.#following();
+    const info = this.#server?.devices.find((d) => d.number === this.#watched);
+    say(this.#about, info ? `${info.model}, ${count(info.loop_hz)} steps per second, at most ${digits(info.max_force_n)} N` : "");
+    const safety = this.#reports?.loop?.safety;
+    this.#arm.hidden = !(this.#server?.arms && safety !== "unguarded");
+    const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
+    this.#view.draw(this.#track, from, to, cursor, this.#facts());
+    if (this.#still) this.#scrubber.draw([this.#track], from, to);
+    mark(this.element, "data-states", String(this.#track.end));
+  }
+
+  #facts(): Facts {
+    const loop = this.#reports?.loop ?? undefined;
+    const engines = this.#reports?.engines ?? [];
+    const slowest = engines.filter((e) => e.round_trip_ms).sort((a, b) => b.round_trip_ms!.median - a.round_trip_ms!.median)[0];
+    const lossiest = [...engines].sort((a, b) => lossOf(b) - lossOf(a))[0];
+    const words = loop ? kSafety[loop.safety] : undefined;
+    const connected = this.#open && this.#server?.contact === "open";
+    const holders = this.#server?.devices.find((d) => d.number === this.#watched)?.channels.filter((c) => c.holder !== "") ?? [];
+    return {
+      state: !connected
+        ? { level: "off", name: "Not connected", meaning: this.#open ? (this.#server?.words ?? "") : "tendon-dash does not answer" }
+        : loop?.fault
+          ? { level: "bad", name: "Fault", meaning: loop.fault }
+          : (words ?? { level: "off", name: "Not told", meaning: "the server has not said how the device is" }),
+      engines,
+      noEngines: holders.length > 0 ? `${holders.map((c) => `${c.holder} on channel ${c.name}`).join(", ")}.` : "No engine sends forces.",
+      delay: slowest
+        ? { name: "Delay", value: `${digits(slowest.round_trip_ms!.median)} ms`, note: `${slowest.name} and back; 99\u00a0%: ${digits(slowest.round_trip_ms!.p99)} ms` }
+        : { name: "Delay", value: "–", note: "no engine sends forces" },
+      loss: lossiest
+        ? { name: "Loss", value: `${digits(100 * lossOf(lossiest), 2)} %`, note: `of the datagrams of ${lossiest.name}` }
+        : { name: "Loss", value: "–", note: "no engine sends forces" },
+      lateness: {
+        buckets: loop?.lateness_us_log2_total ?? [],
+        what: "Since this dashboard was started",
+        more: loop
+          ? `In the last second ${count(loop.steps)} steps, ${count(loop.missed)} missed, ${count(loop.overruns)} too late for the control law, ${count(loop.unseen)} without a position. ${count(loop.missed_total)} missed of ${count(loop.steps_total)} since.`
+          : "",
+      },
+      degraded: loop?.degraded ?? "",
+    };
+  }
+}
+
+const lossOf = (engine: { lost: number; received: number }): number => engine.lost / Math.max(engine.lost + engine.received, 1);

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+import "uplot/dist/uPlot.min.css";
+import "./style.css";
+import { h, mark, s, say } from "./dom.js";
+import { Live } from "./live.js";
+import { Runs } from "./runs.js";
+import type { ServerMessage } from "./stream.js";
+
+const contact = h("span", { class: "contact", role: "status", "data-level": "off" });
+const place = h("div", { class: "place" });
+const tabs = { live: h("a", { href: "#/live" }, "Live"), recordings: h("a", { href: "#/recordings" }, "Recordings") };
+
+/** As the system says, or as chosen here; the choice is kept in this browser. */
+const kThemes = ["auto", "light", "dark"] as const;
+const themeButton = h("button", { type: "button", id: "theme", class: "quiet" });
+function setTheme(name: string): void {
+  if (name === "auto") document.documentElement.removeAttribute("data-theme");
+  else document.documentElement.setAttribute("data-theme", name);
+  say(themeButton, name === "auto" ? "◐" : name === "light" ? "○" : "●");
+  mark(themeButton, "title", `Colours: ${name === "auto" ? "as the system's" : name}`);
+  mark(themeButton, "aria-label", `Colours: ${name}`);
+  live.repaint();
+  runs.repaint();
+}
+themeButton.addEventListener("click", () => {
+  const next = kThemes[(kThemes.indexOf((localStorage.getItem("theme") ?? "auto") as (typeof kThemes)[number]) + 1) % kThemes.length]!;
+  localStorage.setItem("theme", next);
+  setTheme(next);
+});
+
+function told(server: ServerMessage | undefined, words: string): void {
+  const level = !server ? "bad" : server.contact === "open" ? "good" : server.contact === "greeting" ? "off" : "bad";
+  mark(contact, "data-level", level);
+  say(contact, words);
+  tabs.recordings.hidden = server ? !server.recordings : false;
+}
+
+const live = new Live(told);
+const runs = new Runs();
+
+const mark_ = s("svg", { viewBox: "0 0 32 32", class: "logo", "aria-hidden": "true" },
+  s("rect", { width: 32, height: 32, rx: 7 }), s("path", { d: "M4 20h5c3 0 3-10 6-10s3 14 6 14 3-8 7-8" }));
+document.body.append(
+  h("header", {}, h("a", { href: "#/live", class: "brand" }, mark_ as unknown as HTMLElement, "Tendon"), contact, h("nav", {}, tabs.live, tabs.recordings), themeButton),
+  place);
+
+function route(): void {
+  const [, where = "live", ...names] = location.hash.split("/");
+  const recordings = where === "recordings";
+  tabs.live.classList.toggle("here", !recordings);
+  tabs.recordings.classList.toggle("here", recordings);
+  place.replaceChildren(recordings ? runs.element : live.element);
+  if (recordings) void runs.show(names.map(decodeURIComponent));
+}
+window.addEventListener("hashchange", route);
+window.addEventListener("resize", () => (live.repaint(), runs.repaint()));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (live.repaint(), runs.repaint()));
+setTheme(localStorage.getItem("theme") ?? "auto");
+route();

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+import { fromBinary, type Message } from "@bufbuild/protobuf";
+import { FileDescriptorSetSchema, type DescriptorProto, type FileDescriptorSet } from "@bufbuild/protobuf/wkt";
+import { BinaryReader } from "@bufbuild/protobuf/wire";
+import { McapIndexedReader, McapStreamReader, type McapTypes } from "@mcap/core";
+import { Track, type Sample } from "./track.js";
+
+/** Steps that are read at once: ten minutes at 1 kHz. A longer recording is opened in parts. */
+const kMaxSteps = 600_000;
+/** A file up to this size is fetched whole: one request instead of hundreds. */
+const kWhole = 48 * 1024 * 1024;
+const kStepTopic = /(?:^|\/)haptic\/step$/;
+
+export interface DeviceTrack {
+  /** Of the device, as its topic says; empty: the first one of the recording. */
+  readonly name: string;
+  readonly track: Track;
+}
+
+export interface Recording {
+  readonly name: string;
+  readonly devices: readonly DeviceTrack[];
+  readonly scene: { readonly text: string; readonly version: string; readonly commit: string } | undefined;
+  /** ns since 1970 of the first step. */
+  readonly began: bigint;
+  /** What the person should know: that it is cut short, that only a part is shown. */
+  readonly remarks: readonly string[];
+}
+
+/** Reads the steps of a recording; `progress` hears how many so far. Throws a sentence when it is none. */
+export async function readRecording(url: string, name: string, progress: (steps: number) => void): Promise<Recording> {
+  const file = await openFile(url);
+  const collected = new Collector(name);
+  try {
+    const reader = await McapIndexedReader.Initialize({ readable: file });
+    const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || t === "/scene");
+    for (const channel of reader.channelsById.values()) collected.channel(channel, reader.schemasById.get(channel.schemaId));
+    for await (const message of reader.readMessages({ topics })) {
+      if (!collected.message(message)) break;
+      if (collected.steps % 5000 === 0) {
+        progress(collected.steps);
+        await new Promise((resolve) => setTimeout(resolve));
+      }
+    }
+    return collected.recording();
+  } catch (error) {
+    if (collected.steps > 0) return collected.recording("It could be read up to here: " + String(error));
+  }
+  // Without an index: the server was killed, or still records.
+  const reader = new McapStreamReader();
+  const size = await file.size();
+  try {
+    for (let at = 0n; at < size; ) {
+      const bytes = await file.read(at, size - at < 1_048_576n ? size - at : 1_048_576n);
+      at += BigInt(bytes.byteLength);
+      reader.append(bytes);
+      for (let record = reader.nextRecord(); record; record = reader.nextRecord()) {
+        if (record.type === "Schema") collected.schema(record);
+        else if (record.type === "Channel") collected.channel(record, collected.schemas.get(record.schemaId));
+        else if (record.type === "Message" && !collected.message(record)) return collected.recording();
+      }
+      progress(collected.steps);
+    }
+  } catch (error) {
+    if (collected.steps === 0) throw new Error(`${name} is no recording: ${String(error)}`);
+  }
+  if (collected.steps === 0) throw new Error(`There is no haptic step in ${name}.`);
+  return collected.recording("It has no end: the server was killed, or it still records. This is all up to the last whole piece.");
+}
+
+/** What has been read so far. */
+class Collector {
+  steps = 0;
+  readonly schemas = new Map<number, McapTypes.TypedMcapRecords["Schema"]>();
+  readonly #tracks = new Map<number, { name: string; track: Track; decode: (data: Uint8Array) => Sample }>();
+  #sceneChannel: number | undefined;
+  #sceneFields: Map<string, number> | undefined;
+  #scene: Recording["scene"];
+  #began: bigint | undefined;
+  #full = false;
+
+  constructor(readonly name: string) {}
+
+  schema(schema: McapTypes.TypedMcapRecords["Schema"]): void {
+    this.schemas.set(schema.id, schema);
+  }
+
+  channel(channel: McapTypes.TypedMcapRecords["Channel"], schema: McapTypes.TypedMcapRecords["Schema"] | undefined): void {
+    if (!schema || channel.messageEncoding !== "protobuf" || schema.encoding !== "protobuf") return;
+    const types = fromBinary(FileDescriptorSetSchema, schema.data);
+    if (channel.topic === "/scene") {
+      this.#sceneChannel = channel.id;
+      this.#sceneFields = fieldsOf(types, schema.name);
+    } else if (kStepTopic.test(channel.topic) && !this.#tracks.has(channel.id)) {
+      const device = channel.topic.replace(kStepTopic, "").replace(/^\//, "");
+      this.#tracks.set(channel.id, { name: device, track: new Track(), decode: stepDecoder(fieldsOf(types, schema.name)) });
+    }
+  }
+
+  /** False: that is as much as is read at once. */
+  message(message: McapTypes.TypedMcapRecords["Message"]): boolean {
+    if (message.channelId === this.#sceneChannel) {
+      this.#scene = decodeScene(message.data, this.#sceneFields!);
+      return true;
+    }
+    const device = this.#tracks.get(message.channelId);
+    if (!device) return true;
+    if (this.steps >= kMaxSteps) {
+      this.#full = true;
+      return false;
+    }
+    this.#began ??= message.logTime;
+    const sample = device.decode(message.data);
+    sample.t = Number(message.logTime - this.#began) / 1e9;
+    device.track.push(sample);
+    ++this.steps;
+    return true;
+  }
+
+  recording(remark = ""): Recording {
+    const remarks = remark ? [remark] : [];
+    if (this.#full) remarks.push(`It is longer: these are its first ${kMaxSteps.toLocaleString("en-US")} steps.`);
+    const devices = [...this.#tracks.values()].filter((d) => d.track.length > 0).map(({ name, track }) => ({ name, track }));
+    if (devices.length === 0) throw new Error(`There is no haptic step in ${this.name}.`);
+    return { name: this.name, devices, scene: this.#scene, began: this.#began ?? 0n, remarks };
+  }
+}
+
+/** Numbers of the fields of a message type, by name: recordings outlive programs, so the file says what is in it. */
+function fieldsOf(types: FileDescriptorSet & Message, fullName: string): Map<string, number> {
+  let found: DescriptorProto | undefined;
+  for (const file of types.file) {
+    for (const type of file.messageType) if (`${file.package}.${type.name}` === fullName) found = type;
+  }
+  if (!found) throw new Error(`the file does not describe ${fullName}`);
+  return new Map(found.field.map((field) => [field.name, field.number]));
+}
+
+const kVectors = { position_m: ["x", "y", "z"], force_wanted_n: ["wx", "wy", "wz"], force_applied_n: ["ax", "ay", "az"] } as const;
+
+function stepDecoder(fields: Map<string, number>): (data: Uint8Array) => Sample {
+  const readers: ((reader: BinaryReader, s: Sample) => void)[] = [];
+  const read = (name: string, how: (reader: BinaryReader, s: Sample) => void): void => {
+    const number = fields.get(name);
+    if (number !== undefined) readers[number] = how;
+  };
+  for (const [name, [x, y, z]] of Object.entries(kVectors)) {
+    read(name, (reader, s) => {
+      const end = reader.uint32() + reader.pos;
+      while (reader.pos < end) {
+        const [number, type] = reader.tag();
+        if (number === 1) s[x] = reader.double();
+        else if (number === 2) s[y] = reader.double();
+        else if (number === 3) s[z] = reader.double();
+        else reader.skip(type, number);
+      }
+    });
+  }
+  read("permitted_n", (reader, s) => (s.permitted = reader.double()));
+  read("energy_j", (reader, s) => (s.energy = reader.double()));
+  read("reason_bits", (reader, s) => (s.reasons = reader.uint32()));
+  read("mode", (reader, s) => (s.mode = reader.int32()));
+  read("late_ns", (reader, s) => (s.late = Number(reader.sint64()) / 1e9));
+  read("loop_age_ns", (reader, s) => (s.age = Number(reader.sint64()) / 1e9));
+  return (data) => {
+    const s: Sample = { t: 0, x: 0, y: 0, z: 0, wx: 0, wy: 0, wz: 0, ax: 0, ay: 0, az: 0, permitted: 0, energy: 0, reasons: 0, mode: 0, age: 0, late: 0 };
+    const reader = new BinaryReader(data);
+    while (reader.pos < reader.len) {
+      const [number, type] = reader.tag();
+      const how = readers[number];
+      if (how) how(reader, s);
+      else reader.skip(type, number);
+    }
+    return s;
+  };
+}
+
+function decodeScene(data: Uint8Array, fields: Map<string, number>): NonNullable<Recording["scene"]> {
+  const scene = { text: "", version: "", commit: "" };
+  const reader = new BinaryReader(data);
+  while (reader.pos < reader.len) {
+    const [number, type] = reader.tag();
+    if (number === fields.get("text")) scene.text = reader.string();
+    else if (number === fields.get("version")) scene.version = reader.string();
+    else if (number === fields.get("commit")) scene.commit = reader.string();
+    else reader.skip(type, number);
+  }
+  return scene;
+}
+
+interface Readable {
+  size(): Promise<bigint>;
+  read(offset: bigint, size: bigint): Promise<Uint8Array>;
+}
+
+/** A file of the server: whole where it is small, else in the ranges that are asked for. */
+async function openFile(url: string): Promise<Readable> {
+  const head = await fetch(url, { method: "HEAD" });
+  if (!head.ok) throw new Error(head.status === 404 ? "There is no such recording." : `The server says ${head.status}.`);
+  const size = Number(head.headers.get("Content-Length"));
+  if (size <= kWhole) {
+    // Not a byte more than it had just now, should it grow.
+    const all = size === 0 ? new Uint8Array() : await fetchRange(url, 0, size);
+    return { size: async () => BigInt(all.length), read: async (offset, length) => all.subarray(Number(offset), Number(offset + length)) };
+  }
+  return { size: async () => BigInt(size), read: (offset, length) => fetchRange(url, Number(offset), Number(length)) };
+}
+
+async function fetchRange(url: string, offset: number, length: number): Promise<Uint8Array> {
+  const answer = await fetch(url, { headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
+  if (answer.status !== 206) throw new Error(`The server says ${answer.status}.`);
+  return new Uint8Array(await answer.arrayBuffer());
+}

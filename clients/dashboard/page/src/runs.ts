@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+import { h, say } from "./dom.js";
+import { readRecording, type DeviceTrack, type Recording } from "./recording.js";
+import { Scrubber } from "./scrubber.js";
+import { quantiles, type Track } from "./track.js";
+import { View, type Facts } from "./view.js";
+import { bytes, count, duration } from "./words.js";
+
+interface Entry {
+  readonly name: string;
+  readonly size_bytes: number;
+  readonly modified_unix_s: number;
+}
+
+const kNarrow = 2;
+
+/** The recordings of a folder: a list, one of them, or two side by side, in the view of a live device. */
+export class Runs {
+  readonly element = h("main", { class: "recordings" });
+  #open: Run[] = [];
+  #scrubber: Scrubber | undefined;
+  #asked = 0;
+  #from = 0;
+  #to = 0;
+  #cursor: number | undefined;
+  #due = false;
+
+  repaint(): void {
+    this.#scrubber?.repaint();
+    for (const run of this.#open) run.view.repaint();
+    this.#draw();
+  }
+
+  /** No name: the list. One or two: these. */
+  async show(names: readonly string[]): Promise<void> {
+    const asked = ++this.#asked;
+    for (const run of this.#open) run.view.destroy();
+    this.#open = [];
+    this.#scrubber = undefined;
+    const wanted = names.filter((name) => name !== "").slice(0, kNarrow);
+    const said = h("p", { class: "progress", role: "status", text: wanted.length > 0 ? "Reading …" : "Looking …" });
+    this.element.replaceChildren(said);
+    try {
+      if (wanted.length === 0) {
+        const entries = (await (await fetch("api/recordings")).json()) as Entry[];
+        if (asked === this.#asked) this.element.replaceChildren(list(entries));
+        return;
+      }
+      const read: Recording[] = [];
+      for (const name of wanted) {
+        read.push(await readRecording(`recordings/${encodeURIComponent(name)}`, name, (n) => say(said, `Reading ${name}: ${count(n)} steps …`)));
+        if (asked !== this.#asked) return;
+      }
+      this.#present(read);
+    } catch (error) {
+      if (asked !== this.#asked) return;
+      this.element.replaceChildren(h("p", { class: "error", role: "alert", text: error instanceof Error ? error.message : String(error) }), h("a", { href: "#/recordings" }, "All recordings"));
+    }
+  }
+
+  #present(read: readonly Recording[]): void {
+    const moved = (from: number, to: number): void => {
+      [this.#from, this.#to] = [from, to];
+      this.#later();
+    };
+    const events = {
+      zoom: moved,
+      reset: () => moved(0, this.#end),
+      hover: (time: number | undefined) => {
+        this.#cursor = time;
+        this.#later();
+      },
+    };
+    this.#open = read.map((recording) => new Run(recording, new View(events), () => this.#later()));
+    this.#scrubber = new Scrubber(moved);
+    const zoom = (factor: number): void => {
+      const [middle, half] = [(this.#from + this.#to) / 2, ((this.#to - this.#from) / 2) * factor];
+      if (half >= 0.001) moved(Math.max(middle - half, 0), Math.min(middle + half, this.#end));
+    };
+    const names = read.map((r) => r.name);
+    const bar = h("div", { class: "bar" }, h("a", { href: "#/recordings" }, "‹ All recordings"), h("span", { class: "space" }),
+      names.length === 2 && h("a", { href: `#/recordings/${names.map(encodeURIComponent).reverse().join("/")}` }, "Swap sides"),
+      h("span", { class: "group" },
+        h("button", { type: "button", id: "zoom-in", "aria-label": "Zoom in", title: "Zoom in", click: () => zoom(0.5) }, "+"),
+        h("button", { type: "button", id: "zoom-out", "aria-label": "Zoom out", title: "Zoom out", click: () => zoom(2) }, "−")),
+      h("button", { type: "button", id: "whole", click: () => moved(0, this.#end) }, "All of it"));
+    this.element.replaceChildren(bar, this.#scrubber.element, h("div", { class: read.length === 2 ? "runs two" : "runs" }, ...this.#open.map((run) => run.element)));
+    this.#cursor = undefined;
+    moved(0, Math.min(this.#end, 10));
+  }
+
+  get #end(): number {
+    return Math.max(...this.#open.map((run) => run.track.last), 0.01);
+  }
+
+  #later(): void {
+    if (this.#due) return;
+    this.#due = true;
+    requestAnimationFrame(() => {
+      this.#due = false;
+      this.#draw();
+    });
+  }
+
+  #draw(): void {
+    if (!this.#scrubber || this.#open.length === 0) return;
+    this.#scrubber.draw(this.#open.map((run) => run.track), this.#from, this.#to);
+    const cursor = this.#cursor ?? this.#to;
+    for (const run of this.#open) run.draw(this.#from, this.#to, cursor);
+  }
+}
+
+/** One recording in its view. */
+class Run {
+  readonly element: HTMLElement;
+  #device: DeviceTrack;
+  #facts: { key: string; facts: Facts } | undefined;
+
+  constructor(
+    readonly recording: Recording,
+    readonly view: View,
+    changed: () => void,
+  ) {
+    this.#device = recording.devices[0]!;
+    const device = h("select", { "aria-label": "Device", hidden: recording.devices.length < 2, change: () => {
+      this.#device = recording.devices[device.selectedIndex]!;
+      this.view.clear();
+      changed();
+    } }, ...recording.devices.map((d) => h("option", {}, d.name || "first device")));
+    const when = new Date(Number(recording.began / 1_000_000n));
+    const facts = [recording.began > 10n ** 17n ? when.toLocaleString() : "simulated", duration(this.track.last), `${count(this.track.length)} steps`, recording.scene?.version].filter(Boolean).join(" · ");
+    this.element = h("section", { class: "run", "data-run": recording.name },
+      h("div", { class: "head" }, h("h2", { text: recording.name }), h("span", { class: "quiet", text: facts }), device),
+      ...recording.remarks.map((text) => h("div", { class: "alert", text })),
+      view.element,
+      recording.scene && h("details", {}, h("summary", { text: "Scene" }), h("pre", { text: recording.scene.text })));
+  }
+
+  get track(): Track {
+    return this.#device.track;
+  }
+
+  draw(from: number, to: number, cursor: number): void {
+    const key = `${this.#device.name} ${from} ${to}`;
+    if (this.#facts?.key !== key) this.#facts = { key, facts: this.#compute(from, to) };
+    this.view.draw(this.track, from, to, cursor, this.#facts.facts);
+  }
+
+  #compute(from: number, to: number): Facts {
+    const track = this.track;
+    const [first, last] = [track.at(from), track.at(to)];
+    const buckets = new Array<number>(24).fill(0);
+    const late = track.column("late");
+    let faults = 0;
+    for (let i = first; i < last; ++i) {
+      const us = late[i]! * 1e6;
+      ++buckets[us <= 1 ? 0 : Math.min(Math.ceil(Math.log2(us) - 1e-9), 23)]!;
+      if (track.mode[i] === 6) ++faults;
+    }
+    const [age, oldest] = quantiles(track, "age", from, to, [0.5, 0.99]);
+    const missed = countMissed(track, first, last);
+    return {
+      state: faults > 0
+        ? { level: "bad", name: "Fault", meaning: `in ${count(faults)} of these ${count(last - first)} steps` }
+        : { level: "off", name: "Recorded", meaning: `${count(last - first)} steps are shown` },
+      engines: [],
+      noEngines: "A recording holds no reports of engines: see the age of the force.",
+      delay: age! > 0
+        ? { name: "Age of the force", value: duration(age!), note: `since the motion that it answers; 99\u00a0%: ${duration(oldest!)}` }
+        : { name: "Age of the force", value: "–", note: "no force was in use" },
+      loss: { name: "Missing steps", value: count(missed), note: `of ${count(last - first + missed)} in this time` },
+      lateness: { buckets: last > first ? buckets : [], what: "In this time", more: "" },
+      degraded: "",
+    };
+  }
+}
+
+function countMissed(track: Track, first: number, last: number): number {
+  if (last - first < 2) return 0;
+  const step = (track.t[last - 1]! - track.t[first]!) / (last - 1 - first);
+  let missed = 0;
+  for (let i = first + 1; i < last; ++i) {
+    const gap = track.t[i]! - track.t[i - 1]!;
+    if (gap > 1.6 * step) missed += Math.round(gap / step) - 1;
+  }
+  return missed;
+}
+
+function list(entries: readonly Entry[]): HTMLElement {
+  if (entries.length === 0) {
+    return h("div", { class: "list" }, h("p", { class: "empty", text: "There is no recording in the folder of tendon-dash yet. tendond --record run.mcap makes one." }));
+  }
+  const chosen = new Set<string>();
+  const compare = h("button", { type: "button", id: "compare", class: "primary", disabled: true, click: () => {
+    location.hash = `#/recordings/${[...chosen].map(encodeURIComponent).join("/")}`;
+  } }, "Compare two");
+  const rows = entries.map((entry) => {
+    const box = h("input", { type: "checkbox", "aria-label": `Compare ${entry.name}`, change: () => {
+      if (box.checked) chosen.add(entry.name);
+      else chosen.delete(entry.name);
+      compare.disabled = chosen.size !== 2;
+      compare.textContent = chosen.size === 1 ? "Choose one more to compare" : "Compare two";
+    } });
+    return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: `#/recordings/${encodeURIComponent(entry.name)}` }, entry.name)),
+      h("td", { text: bytes(entry.size_bytes) }), h("td", { class: "date", text: new Date(entry.modified_unix_s * 1e3).toLocaleString() }));
+  });
+  return h("div", {}, h("div", { class: "bar" }, h("span", { class: "quiet", text: `${count(entries.length)} ${entries.length === 1 ? "recording" : "recordings. Open one, or choose two to see them side by side"}.` }), h("span", { class: "space" }), compare),
+    h("div", { class: "list" }, h("table", {},
+      h("thead", {}, h("tr", {}, h("th", {}), h("th", { text: "Name" }), h("th", { text: "Size" }), h("th", { class: "date", text: "Last written" }))), h("tbody", {}, ...rows))));
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+
+export interface ChannelInfo {
+  readonly name: string;
+  readonly rule: string;
+  readonly lease_ms: number;
+  readonly holder: string;
+}
+export interface DeviceInfo {
+  readonly number: number;
+  readonly name: string;
+  readonly model: string;
+  readonly loop_hz: number;
+  readonly max_force_n: number;
+  readonly channels: readonly ChannelInfo[];
+}
+export interface ServerMessage {
+  readonly type: "server";
+  readonly address: string;
+  readonly contact: "greeting" | "open" | "unanswered" | "refused" | "lost";
+  readonly words: string;
+  readonly version: string;
+  readonly arms: boolean;
+  readonly recordings: boolean;
+  readonly devices: readonly DeviceInfo[];
+}
+type Triple = readonly [readonly (number | null)[], readonly (number | null)[], readonly (number | null)[]];
+export interface StatesMessage {
+  readonly type: "states";
+  readonly device: number;
+  readonly tick: readonly number[];
+  readonly sampled_us: readonly number[];
+  readonly position_m: Triple;
+  readonly wanted_n: Triple;
+  readonly applied_n: Triple;
+  readonly permitted_n: readonly (number | null)[];
+  readonly energy_j: readonly (number | null)[];
+  readonly reasons: readonly number[];
+  readonly mode: readonly number[];
+  readonly force_age_ms: readonly number[];
+}
+export interface Delays {
+  readonly median: number;
+  readonly p99: number;
+}
+export interface LoopReport {
+  readonly span_s: number;
+  readonly steps: number;
+  readonly missed: number;
+  readonly overruns: number;
+  readonly unseen: number;
+  readonly safety: string;
+  readonly fault: string;
+  readonly degraded: string;
+  readonly lateness_us_log2: readonly number[];
+  readonly lateness_us_log2_total: readonly number[];
+  readonly steps_total: number;
+  readonly missed_total: number;
+}
+export interface EngineReport {
+  readonly channel: string;
+  readonly name: string;
+  readonly span_s: number;
+  readonly forces: number;
+  readonly late_server: number;
+  readonly late_network: number;
+  readonly late_engine: number;
+  readonly worst_late_ms: number;
+  readonly longest_gap_ms: number;
+  readonly round_trip_ms: Delays | null;
+  readonly to_server_ms: Delays | null;
+  readonly to_client_ms: Delays | null;
+  readonly clock_error_ms: number;
+  readonly received: number;
+  readonly lost: number;
+  readonly state_one_in: number;
+  readonly forces_refused: boolean;
+  readonly words: string;
+}
+export interface ReportsMessage {
+  readonly type: "reports";
+  readonly device: number;
+  readonly link: { readonly round_trip_ms: number; readonly received: number; readonly lost: number };
+  readonly loop: LoopReport | null;
+  readonly engines: readonly EngineReport[];
+}
+export interface AnswerMessage {
+  readonly type: "answer";
+  readonly done: boolean;
+  readonly words: string;
+}
+export type Message = ServerMessage | StatesMessage | ReportsMessage | AnswerMessage;
+
+/** The way to tendon-dash, which is found again when it was gone. */
+export class Stream {
+  #socket: WebSocket | undefined;
+  #wait = 250;
+  #first = "";
+
+  constructor(
+    readonly receive: (message: Message) => void,
+    readonly changed: (open: boolean) => void,
+  ) {
+    this.#open();
+  }
+
+  /** Says a line now, and `first` again whenever the way is opened anew. */
+  say(line: string, first = false): void {
+    if (first) this.#first = line;
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(line);
+  }
+
+  #open(): void {
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+    this.#socket = socket;
+    socket.onopen = () => {
+      this.#wait = 250;
+      if (this.#first) socket.send(this.#first);
+      this.changed(true);
+    };
+    socket.onmessage = ({ data }) => this.receive(JSON.parse(data as string) as Message);
+    socket.onclose = () => {
+      this.changed(false);
+      setTimeout(() => this.#open(), this.#wait);
+      this.#wait = Math.min(2 * this.#wait, 4000);
+    };
+  }
+}

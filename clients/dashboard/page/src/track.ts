@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+
+/** One haptic step, as the page knows it. What is not known is NaN. */
+export interface Sample {
+  /** s */ t: number;
+  /** m */ x: number;
+  y: number;
+  z: number;
+  /** N */ wx: number;
+  wy: number;
+  wz: number;
+  /** N */ ax: number;
+  ay: number;
+  az: number;
+  /** N */ permitted: number;
+  /** J */ energy: number;
+  reasons: number;
+  mode: number;
+  /** s */ age: number;
+  /** s, that the step came late; only in recordings */ late: number;
+}
+
+const kColumns = ["x", "y", "z", "wx", "wy", "wz", "ax", "ay", "az", "permitted", "energy", "age", "late", "wanted", "applied"] as const;
+/** A column of numbers; `wanted` and `applied` are the norms. */
+export type Column = (typeof kColumns)[number];
+
+/** Steps in the order of their times, in columns; of a live device the newest `limit` of them. */
+export class Track {
+  t = new Float64Array(4096);
+  reasons = new Uint32Array(4096);
+  mode = new Uint8Array(4096);
+  readonly #columns: Record<Column, Float32Array>;
+  /** Index of the first one that is kept, and of the end. */
+  begin = 0;
+  end = 0;
+
+  constructor(readonly limit = Infinity) {
+    this.#columns = Object.fromEntries(kColumns.map((name) => [name, new Float32Array(4096)])) as Record<Column, Float32Array>;
+  }
+
+  get length(): number {
+    return this.end - this.begin;
+  }
+  get first(): number {
+    return this.length > 0 ? this.t[this.begin]! : 0;
+  }
+  get last(): number {
+    return this.length > 0 ? this.t[this.end - 1]! : 0;
+  }
+  column(name: Column): Float32Array {
+    return this.#columns[name];
+  }
+
+  push(s: Sample): void {
+    if (this.end === this.t.length) this.#makeRoom();
+    const i = this.end++;
+    const c = this.#columns;
+    this.t[i] = s.t;
+    c.x[i] = s.x;
+    c.y[i] = s.y;
+    c.z[i] = s.z;
+    c.wx[i] = s.wx;
+    c.wy[i] = s.wy;
+    c.wz[i] = s.wz;
+    c.ax[i] = s.ax;
+    c.ay[i] = s.ay;
+    c.az[i] = s.az;
+    c.permitted[i] = s.permitted;
+    c.energy[i] = s.energy;
+    c.age[i] = s.age;
+    c.late[i] = s.late;
+    c.wanted[i] = Math.hypot(s.wx, s.wy, s.wz);
+    c.applied[i] = Math.hypot(s.ax, s.ay, s.az);
+    this.reasons[i] = s.reasons;
+    this.mode[i] = s.mode;
+    if (this.length > this.limit) ++this.begin;
+  }
+
+  clear(): void {
+    this.begin = this.end = 0;
+  }
+
+  /** Index of the first step at or after `time`. */
+  at(time: number): number {
+    let [low, high] = [this.begin, this.end];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.t[middle]! < time) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  #makeRoom(): void {
+    const columns = [this.t, this.reasons, this.mode, ...Object.values(this.#columns)];
+    if (this.begin > this.t.length / 2) {
+      for (const column of columns) column.copyWithin(0, this.begin, this.end);
+      [this.begin, this.end] = [0, this.length];
+      return;
+    }
+    const grown = <T extends Float64Array | Float32Array | Uint32Array | Uint8Array>(column: T): T => {
+      const larger = new (column.constructor as new (length: number) => T)(2 * column.length);
+      larger.set(column);
+      return larger;
+    };
+    this.t = grown(this.t);
+    this.reasons = grown(this.reasons);
+    this.mode = grown(this.mode);
+    for (const name of kColumns) this.#columns[name] = grown(this.#columns[name]);
+  }
+}
+
+/** What a plot of `columns` pixels can show of steps: of more than that the least and the most of each pixel; gaps are null. */
+export function thin(
+  track: Track, names: readonly Column[], from: number, to: number, columns: number, scale: number,
+): [number[], ...(number | null)[][]] {
+  const first = Math.max(track.begin, track.at(from) - 1);
+  const last = Math.min(track.end, track.at(to) + 1);
+  const times: number[] = [];
+  const values: (number | null)[][] = names.map(() => []);
+  const sources = names.map((name) => track.column(name));
+  const gap = Math.max(20 * usualStep(track), 0.06);
+  const put = (column: number, value: number): void => {
+    values[column]!.push(Number.isFinite(value) ? value * scale : null);
+  };
+  if (last - first <= 2 * columns) {
+    for (let i = first; i < last; ++i) {
+      if (i > first && track.t[i]! - track.t[i - 1]! > gap) {
+        times.push((track.t[i]! + track.t[i - 1]!) / 2);
+        for (const column of values) column.push(null);
+      }
+      times.push(track.t[i]!);
+      sources.forEach((source, k) => put(k, source[i]!));
+    }
+    return [times, ...values];
+  }
+  // On a grid that stands still while time goes by, or the picture would shimmer.
+  const width = Math.max((to - from) / columns, 1e-9);
+  const lows = sources.map(() => 0);
+  const highs = sources.map(() => 0);
+  const start = track.at(from);
+  if (start >= last) return [times, ...values];
+  for (let i = start, cell = Math.floor(track.t[start]! / width); i < last; ++cell) {
+    const end = track.at((cell + 1) * width);
+    const stop = Math.min(Math.max(end, i), last);
+    const some = stop > i;
+    // A pixel without a step is no gap yet.
+    if (!some && i > track.begin && track.t[i]! - track.t[i - 1]! <= gap) continue;
+    times.push(cell * width, (cell + 0.5) * width);
+    sources.forEach((source, k) => {
+      if (!some) return void values[k]!.push(null, null);
+      lows[k] = i;
+      highs[k] = i;
+      for (let j = i + 1; j < stop; ++j) {
+        if (source[j]! < source[lows[k]!]!) lows[k] = j;
+        if (source[j]! > source[highs[k]!]!) highs[k] = j;
+      }
+      put(k, source[Math.min(lows[k]!, highs[k]!)]!);
+      put(k, source[Math.max(lows[k]!, highs[k]!)]!);
+    });
+    i = stop;
+  }
+  return [times, ...values];
+}
+
+/** s, from one step to the next. */
+export function usualStep(track: Track): number {
+  const n = Math.min(track.length, 200);
+  return n < 2 ? 0.001 : (track.t[track.begin + n - 1]! - track.t[track.begin]!) / (n - 1);
+}
+
+/** Of the steps in [from, to): the share with each reason bit, and with any that limits the force. */
+export function shares(track: Track, from: number, to: number, limiting: number): { share: Map<number, number>; any: number; n: number } {
+  const [first, last] = [track.at(from), track.at(to)];
+  const counts = new Uint32Array(32);
+  let any = 0;
+  for (let i = first; i < last; ++i) {
+    const bits = track.reasons[i]!;
+    if (bits === 0) continue;
+    if ((bits & limiting) !== 0) ++any;
+    for (let b = 0; b < 16; ++b) counts[b]! += (bits >>> b) & 1;
+  }
+  const n = last - first;
+  const share = new Map<number, number>();
+  counts.forEach((c, bit) => c > 0 && share.set(bit, c / n));
+  return { share, any: n > 0 ? any / n : 0, n };
+}
+
+/** The numbers of one column in [from, to) at the shares `quantiles` of them; NaN where there is none. */
+export function quantiles(track: Track, name: Column, from: number, to: number, wanted: readonly number[]): number[] {
+  const values = track.column(name).slice(track.at(from), track.at(to)).filter((v) => Number.isFinite(v)).sort();
+  return wanted.map((q) => (values.length === 0 ? NaN : values[Math.min(values.length - 1, Math.floor(q * values.length))]!));
+}

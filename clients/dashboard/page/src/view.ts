@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+import { Chart, type ChartEvents, type ChartSpec } from "./chart.js";
+import { h, mark, say } from "./dom.js";
+import { Histogram } from "./histogram.js";
+import { Lanes } from "./lanes.js";
+import type { EngineReport } from "./stream.js";
+import type { Track } from "./track.js";
+import { digits, kModes, type Level } from "./words.js";
+
+export const kCharts: readonly ChartSpec[] = [
+  {
+    id: "force", title: "Force", unit: "N", scale: 1, positive: true, least: 0.5, mayLeave: "permitted",
+    lines: [
+      { column: "permitted", name: "permitted", colour: "permitted", width: 1, fill: "permitted-fill" },
+      { column: "wanted", name: "wanted", colour: "wanted", dash: [6, 4] },
+      { column: "applied", name: "applied", colour: "applied", width: 2 },
+    ],
+  },
+  {
+    id: "position", title: "Position", unit: "mm", scale: 1e3, least: 2,
+    lines: [
+      { column: "x", name: "x", colour: "x", width: 2 },
+      { column: "y", name: "y", colour: "y", dash: [6, 4] },
+      { column: "z", name: "z", colour: "z", dash: [2, 3] },
+    ],
+  },
+  {
+    id: "energy", title: "Energy that may still be given out", unit: "mJ", scale: 1e3, positive: true, least: 1,
+    lines: [{ column: "energy", name: "energy", colour: "energy", width: 2, fill: "energy-fill" }],
+  },
+];
+
+/** What a view shows beside the track: of a live server what it reports, of a recording what can be computed from it. */
+export interface Facts {
+  readonly state: { readonly level: Level; readonly name: string; readonly meaning: string };
+  readonly engines: readonly EngineReport[];
+  /** … in place of cards, where there is none. */
+  readonly noEngines: string;
+  readonly delay: { readonly name: string; readonly value: string; readonly note: string };
+  readonly loss: { readonly name: string; readonly value: string; readonly note: string };
+  readonly lateness: { readonly buckets: readonly number[]; readonly what: string; readonly more: string };
+  /** What the server does less of; empty: nothing. */
+  readonly degraded: string;
+}
+
+const tile = (id: string, text: string): { element: HTMLElement; name: HTMLElement; value: HTMLElement; note: HTMLElement } => {
+  const name = h("div", { class: "name", text });
+  const value = h("div", { class: "value" });
+  const note = h("div", { class: "note" });
+  return { element: h("div", { class: "tile", "data-tile": id }, name, value, note), name, value, note };
+};
+
+/** The same instruments for a live device and for a recording. */
+export class View {
+  readonly element: HTMLElement;
+  readonly #charts: Chart[];
+  readonly #lanes = new Lanes();
+  readonly #histogram = new Histogram();
+  readonly #engines = h("div", { class: "engines" });
+  readonly #tiles = {
+    state: tile("state", "Device"), mode: tile("mode", "Force is"), force: tile("force", "Applied force"),
+    energy: tile("energy", "Energy"), delay: tile("delay", "Delay"), loss: tile("loss", "Loss"),
+  };
+  readonly #alert = h("div", { class: "alert", role: "status", hidden: true });
+  #cards = "";
+
+  constructor(events: ChartEvents) {
+    this.#charts = kCharts.map((spec) => new Chart(spec, events));
+    const engines = h("section", { class: "panel" }, h("h3", { text: "Engines" }), this.#engines);
+    this.element = h("div", { class: "view" },
+      h("div", { class: "tiles" }, ...Object.values(this.#tiles).map((t) => t.element)), this.#alert,
+      h("div", { class: "columns" },
+        h("div", { class: "charts" }, ...this.#charts.map((chart) => chart.element)),
+        h("div", { class: "side" }, this.#lanes.element, engines, this.#histogram.element)));
+  }
+
+  draw(track: Track, from: number, to: number, cursor: number, facts: Facts): void {
+    for (const chart of this.#charts) chart.draw(track, from, to, cursor);
+    this.#lanes.draw(track, from, to);
+    this.#histogram.draw(facts.lateness.buckets, facts.lateness.what, facts.lateness.more);
+    this.#drawTiles(track, cursor, facts);
+    this.#drawEngines(facts);
+  }
+
+  clear(): void {
+    this.#lanes.clear();
+  }
+
+  repaint(): void {
+    for (const chart of this.#charts) chart.repaint();
+  }
+
+  destroy(): void {
+    for (const chart of this.#charts) chart.destroy();
+  }
+
+  #drawTiles(track: Track, cursor: number, facts: Facts): void {
+    const { state, mode, force, energy, delay, loss } = this.#tiles;
+    const show = (t: typeof state, level: Level, value: string, note: string): void => {
+      mark(t.element, "data-level", level);
+      say(t.value, value);
+      say(t.note, note);
+    };
+    show(state, facts.state.level, facts.state.name, facts.state.meaning);
+    const at = track.at(cursor);
+    const i = at < track.end ? at : track.end - 1;
+    const known = i >= track.begin;
+    const value = (column: "applied" | "wanted" | "permitted" | "energy" | "age"): number => (known ? track.column(column)[i]! : NaN);
+    const words = known ? kModes[track.mode[i]!] : undefined;
+    show(mode, words?.level ?? "off", words?.name ?? "–", words?.meaning ?? "no state has come");
+    const bound = Number.isFinite(value("permitted")) ? `${digits(value("permitted"))} permitted` : "no bound";
+    show(force, "off", `${digits(value("applied"))} N`, Number.isFinite(value("wanted")) ? `of ${digits(value("wanted"))} wanted, ${bound}` : bound);
+    show(energy, value("energy") < 0 ? "bad" : "off", `${digits(1e3 * value("energy"))} mJ`, "may still be given out");
+    say(delay.name, facts.delay.name);
+    say(loss.name, facts.loss.name);
+    show(delay, "off", facts.delay.value, facts.delay.note);
+    show(loss, "off", facts.loss.value, facts.loss.note);
+    say(this.#alert, facts.degraded ? `Degraded: ${facts.degraded}` : "");
+    this.#alert.hidden = facts.degraded === "";
+  }
+
+  #drawEngines(facts: Facts): void {
+    const drawn = JSON.stringify(facts.engines) + facts.noEngines;
+    if (drawn === this.#cards) return;
+    this.#cards = drawn;
+    this.#engines.replaceChildren(...(facts.engines.length > 0 ? facts.engines.map(card) : [h("p", { class: "quiet", text: facts.noEngines })]));
+  }
+}
+
+function card(engine: EngineReport): HTMLElement {
+  const late = engine.late_server + engine.late_network + engine.late_engine;
+  const lost = engine.lost / Math.max(engine.lost + engine.received, 1);
+  const ms = (delays: { median: number; p99: number } | null): string => (delays ? `${digits(delays.median)} ms` : "–");
+  const p99 = (delays: { median: number; p99: number } | null): string => (delays ? `99\u00a0%: ${digits(delays.p99)} ms` : "");
+  const level: Level = engine.forces_refused ? "bad" : late > 0 || engine.forces === 0 ? "notice" : "good";
+  const row = (name: string, value: string, note: string): HTMLElement =>
+    h("tr", {}, h("th", { scope: "row", text: name }), h("td", { text: value }), h("td", { class: "note", text: note }));
+  const rate = engine.span_s > 0 ? engine.forces / engine.span_s : 0;
+  const why = [
+    [engine.late_server, "server"], [engine.late_network, "network"], [engine.late_engine, "engine"],
+  ].filter(([n]) => (n as number) > 0).map(([n, cause]) => `${n} by the ${cause}`).join(", ");
+  return h("div", { class: "engine", "data-level": level },
+    h("div", { class: "name" }, h("b", { text: engine.name }), h("span", { class: "quiet", text: ` on channel ${engine.channel}` })),
+    h("table", {},
+      row("round trip", ms(engine.round_trip_ms), p99(engine.round_trip_ms)),
+      row("to the server", ms(engine.to_server_ms), p99(engine.to_server_ms)),
+      row("to the engine", ms(engine.to_client_ms), p99(engine.to_client_ms)),
+      row("lost", `${digits(100 * lost, 2)} %`, `${engine.lost} of ${engine.lost + engine.received}`),
+      row("forces", `${digits(rate)} /s`, late > 0 ? `${late} late: ${why}` : "none late")),
+    engine.state_one_in > 1 && h("p", { class: "note", text: `Its way is full: it is sent one state in ${engine.state_one_in}.` }),
+    engine.forces_refused && h("p", { class: "note", text: "Its forces are not taken: its way loses too much." }),
+    engine.words !== "" && h("p", { class: "note", text: `${engine.words[0]!.toUpperCase()}${engine.words.slice(1)}.` }));
+}

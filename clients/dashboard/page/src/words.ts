@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+
+/** Green, amber and red, said by a shape and a word as well as by a colour. */
+export type Level = "good" | "notice" | "bad" | "off";
+
+export interface ReasonWords {
+  readonly bit: number;
+  readonly name: string;
+  readonly meaning: string;
+  /** It makes the force smaller or later than asked for; the others tell only that something happened. */
+  readonly limits: boolean;
+}
+
+/** The bits of core/reason.h. */
+export const kReasons: readonly ReasonWords[] = [
+  { bit: 8, name: "Fault", meaning: "a latched fault holds the force at zero", limits: true },
+  { bit: 6, name: "Safe stop", meaning: "no fresh force for too long: zero until one comes", limits: true },
+  { bit: 5, name: "Fading", meaning: "no fresh force has come, and the last one fades", limits: true },
+  { bit: 4, name: "Held", meaning: "the newest force has outlived its validity and is held", limits: true },
+  { bit: 0, name: "Energy limit", meaning: "more would give out energy that the device never got", limits: true },
+  { bit: 1, name: "Force limit", meaning: "the largest force of the device or the scene", limits: true },
+  { bit: 2, name: "Growth limit", meaning: "the force may not grow that fast", limits: true },
+  { bit: 3, name: "Ramp-in", meaning: "forces have just begun again", limits: true },
+  { bit: 7, name: "Not a number", meaning: "NaN or infinity was asked for or measured", limits: true },
+  { bit: 9, name: "Device clamp", meaning: "the device gave out less than it was told to", limits: true },
+  { bit: 12, name: "Unseen", meaning: "the device gave no position, so it gives no force", limits: true },
+  { bit: 10, name: "Overrun", meaning: "a step came later than the control law reckons with", limits: false },
+  { bit: 11, name: "Watchdog", meaning: "… so late that the device's own watchdog let go", limits: false },
+];
+
+interface StateWords {
+  readonly name: string;
+  readonly meaning: string;
+  readonly level: Level;
+}
+
+/** The numbers of Mode, on the wire and in recordings. */
+export const kModes: Readonly<Record<number, StateWords>> = {
+  1: { name: "Idle", meaning: "no engine has sent a force yet", level: "off" },
+  2: { name: "Active", meaning: "a fresh force is rendered", level: "good" },
+  3: { name: "Holding", meaning: "the force is older than it may be, and is held a little longer", level: "notice" },
+  4: { name: "Fading", meaning: "no fresh force has come, and the last one fades", level: "notice" },
+  5: { name: "Safe stop", meaning: "no force until a fresh one comes", level: "bad" },
+  6: { name: "Fault", meaning: "latched: no force until the device is armed again", level: "bad" },
+};
+
+export const kSafety: Readonly<Record<string, StateWords>> = {
+  absent: { name: "Not plugged in", meaning: "the server looks for the device", level: "bad" },
+  opening: { name: "Being opened", meaning: "the device answers soon", level: "notice" },
+  firmware: { name: "Without firmware", meaning: "the device is being given its firmware", level: "notice" },
+  unhomed: { name: "Not homed", meaning: "move the handle as the device asks, so that it knows where it is", level: "notice" },
+  homed: { name: "Ready, not armed", meaning: "gives no force until it is armed", level: "notice" },
+  armed: { name: "Armed", meaning: "gives forces", level: "good" },
+  fault: { name: "Fault", meaning: "gives no force until it is armed again", level: "bad" },
+  unguarded: { name: "Gives forces", meaning: "its scene lists no safety layer: there is nothing to arm", level: "good" },
+};
+
+/** "0.42", "12.3", "1234": three digits that count, whatever the size. */
+export function digits(value: number, most = 3): string {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size === 0) return "0";
+  const before = Math.max(0, Math.floor(Math.log10(size)) + 1);
+  return value.toFixed(Math.min(Math.max(most - before, 0), size < 0.001 ? 6 : 3)).replace("-", "−");
+}
+
+/** A count with thin spaces: "12 345". */
+export const count = (value: number): string => Math.round(value).toLocaleString("en-US").replaceAll(",", "\u202f");
+
+export const percent = (share: number): string =>
+  !Number.isFinite(share) ? "–" : share > 0 && share < 0.001 ? "< 0.1 %" : `${digits(100 * share, share < 0.1 ? 2 : 3)} %`;
+
+/** "64 µs", "1.02 ms", "2.1 s". */
+export function duration(seconds: number): string {
+  if (!Number.isFinite(seconds)) return "–";
+  const [value, unit] = seconds < 1e-3 ? [seconds * 1e6, "µs"] : seconds < 1 ? [seconds * 1e3, "ms"] : [seconds, "s"];
+  return `${Number(value.toPrecision(3))}\u00a0${unit}`;
+}
+
+export function bytes(size: number): string {
+  return size < 1e6 ? `${digits(size / 1e3)} kB` : size < 1e9 ? `${digits(size / 1e6)} MB` : `${digits(size / 1e9)} GB`;
+}

@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+import { defineConfig } from "vite";
+
+// What leaves here is put into a program and served under a strict Content-Security-Policy: no inline script, no data: file.
+export default defineConfig({
+  build: { target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false }, outDir: "dist" },
+});

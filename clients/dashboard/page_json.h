@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/dashboard/board.h"
+#include "clients/dashboard/recordings.h"
+
+// What the page is told, one JSON object per WebSocket message. Units are in the names, as on the wire; an absent
+// number is null. README.md of this folder lists the fields.
+
+namespace tendon::dash {
+
+/// What tendon-dash itself was told at its start, which the page has to know.
+struct Abilities {
+  std::string server;       ///< HOST:PORT of tendond
+  bool arms = false;        ///< the button is allowed
+  bool recordings = false;  ///< there is a folder
+};
+
+/// {"type":"server",…}: the contact, the devices and what they are. Told when it changes.
+std::string server_json(const Board& board, const Abilities& abilities);
+
+/// {"type":"states",…}: states of one device in columns, in order, every one that came. Ticks that are missing were
+/// lost on the way, or the page did not keep up.
+std::string states_json(std::uint32_t device, std::span<const DeviceState> states);
+
+/// {"type":"reports",…}: how a device's loop and its engines do. Told once a second.
+std::string reports_json(std::uint32_t device, const Board& board);
+
+/// [{"name":…,"size_bytes":…,"modified_unix_s":…}, …]
+std::string recordings_json(std::span<const Recordings::Entry> entries);
+
+/// "active", "holding" …: as the page and /metrics name it.
+std::string_view name(Mode mode) noexcept;
+/// "armed", "fault" …
+std::string_view name(Safety safety) noexcept;
+std::string_view name(Contact contact) noexcept;
+/// "energy", "max_force" … of bit `bit` of core/reason.h; "bit_20" of one that has no name yet.
+std::string reason_name(std::size_t bit);
+
+}  // namespace tendon::dash

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace tendon::dash {
+
+/// What waits to be sent to one page, for the time that it is busy: newest wins. A page that does not read costs this
+/// and no more, however long it sleeps: one text of each kind, and a handful of batches of states.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class PagePost {
+ public:
+  enum class Kind : std::uint8_t {
+    kServer,   ///< the newest of these three replaces the one before
+    kReports,  //
+    kAnswer,   //
+  };
+  /// An eighth of a second: what a page makes up for without that a hand on the screen looks late.
+  static constexpr std::size_t kMaxBatches = 8;
+
+  void put(Kind kind, std::string text) { newest_[static_cast<std::size_t>(kind)] = std::move(text); }
+
+  /// A batch of `states` states. The oldest batch makes room, and its states are counted.
+  void put_states(std::string text, std::size_t states) {
+    batches_.push_back({std::move(text), states});
+    if (batches_.size() <= kMaxBatches) return;
+    skipped_ += batches_.front().states;
+    batches_.pop_front();
+  }
+
+  /// States dropped since this was asked last.
+  std::uint64_t take_skipped() noexcept { return std::exchange(skipped_, 0); }
+
+  /// The next text to send; empty when nothing waits.
+  std::optional<std::string> next() {
+    for (auto& text : newest_) {
+      if (text) return std::exchange(text, std::nullopt);
+    }
+    if (batches_.empty()) return std::nullopt;
+    std::string text = std::move(batches_.front().text);
+    batches_.pop_front();
+    return text;
+  }
+
+  /// The page looks at another device: what waits of the one before is of no use.
+  void forget_states() {
+    batches_.clear();
+    newest_[static_cast<std::size_t>(Kind::kReports)].reset();
+    skipped_ = 0;
+  }
+
+ private:
+  struct Batch {
+    std::string text;
+    std::size_t states;
+  };
+  std::array<std::optional<std::string>, 3> newest_;
+  std::deque<Batch> batches_;
+  std::uint64_t skipped_ = 0;
+};
+
+}  // namespace tendon::dash

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/routes.h"
+
+#include <algorithm>
+#include <charconv>
+#include <type_traits>
+
+#include "clients/dashboard/page_json.h"
+
+namespace tendon::dash {
+namespace {
+
+/// Scripts, styles and connections of our own and nothing else, in no frame. A data: image is the page's icon.
+constexpr std::string_view kContentSecurity =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Prometheus' text format.
+constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
+
+std::string_view status_words(unsigned status) {
+  switch (status) {
+    case 200:
+      return "OK";
+    case 206:
+      return "Partial Content";
+    case 400:
+      return "Bad Request";
+    case 403:
+      return "Forbidden";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 413:
+      return "Content Too Large";
+    case 416:
+      return "Range Not Satisfiable";
+    case 421:
+      return "Misdirected Request";
+    case 426:
+      return "Upgrade Required";
+    case 431:
+      return "Request Header Fields Too Large";
+    case 503:
+      return "Service Unavailable";
+    default:
+      return "Status";
+  }
+}
+
+bool equal_but_for_case(std::string_view a, std::string_view b) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  return std::ranges::equal(a, b, {}, lower, lower);
+}
+
+/// "localhost" of "localhost:8080", "[::1]" of "[::1]:8080"; empty when what follows is no port.
+std::string_view host_name(std::string_view host) {
+  const auto end = host.starts_with('[') ? host.find(']') + 1 : std::min(host.find(':'), host.size());
+  if (host.starts_with('[') && end == 0) return {};
+  const std::string_view port = host.substr(end);
+  const bool digits = port.size() > 1 && port.size() <= 6 &&
+                      std::ranges::all_of(port.substr(1), [](char c) { return c >= '0' && c <= '9'; });
+  return port.empty() || (port[0] == ':' && digits) ? host.substr(0, end) : std::string_view();
+}
+
+/// 127.0.0.0/8 in four decimal numbers: a browser writes it so, whatever was typed.
+bool is_ipv4_loopback(std::string_view name) {
+  int parts = 0;
+  for (std::string_view rest = name; !rest.empty() || parts == 0; ++parts) {
+    const auto dot = rest.find('.');
+    const std::string_view part = rest.substr(0, dot);
+    unsigned value = 256;
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+    if (error != std::errc{} || end != part.data() + part.size() || value > 255) return false;
+    if (parts == 0 && value != 127) return false;
+    rest = dot == std::string_view::npos ? std::string_view() : rest.substr(dot + 1);
+    if (dot != std::string_view::npos && rest.empty()) return false;
+  }
+  return parts == 4;
+}
+
+bool is_loopback_name(std::string_view name) {
+  constexpr std::string_view kLocal = "localhost";
+  constexpr std::string_view kBelow = ".localhost";
+  return equal_but_for_case(name, kLocal) || name == "[::1]" || is_ipv4_loopback(name) ||
+         (name.size() > kBelow.size() && equal_but_for_case(name.substr(name.size() - kBelow.size()), kBelow));
+}
+
+/// "localhost:8000" of "http://localhost:8000"; empty for an origin of any other kind, such as "null".
+std::string_view origin_host(std::string_view origin) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!origin.starts_with(scheme)) continue;
+    const std::string_view host = origin.substr(scheme.size());
+    return host.find_first_of("/?#@\\ ") == std::string_view::npos ? host : std::string_view();
+  }
+  return {};
+}
+
+void set(Reply& reply, std::string_view name, std::string_view value) { reply.headers.emplace_back(name, value); }
+
+/// Headers that every answer has.
+Reply begin(unsigned status, std::string_view type) {
+  Reply reply;
+  reply.status = status;
+  set(reply, "Content-Type", type);
+  set(reply, "Content-Security-Policy", kContentSecurity);
+  set(reply, "Cross-Origin-Opener-Policy", "same-origin");
+  set(reply, "Cross-Origin-Resource-Policy", "same-origin");
+  set(reply, "Referrer-Policy", "no-referrer");
+  set(reply, "X-Content-Type-Options", "nosniff");
+  return reply;
+}
+
+}  // namespace
+
+std::uint64_t Reply::size() const {
+  return std::visit(
+      [](const auto& content) -> std::uint64_t {
+        if constexpr (std::is_same_v<std::decay_t<decltype(content)>, Slice>) {
+          return content.range.count;
+        } else {
+          return content.size();
+        }
+      },
+      body);
+}
+
+std::string Reply::head(bool keep_alive) const {
+  std::string text = "HTTP/1.1 " + std::to_string(status) + " " + std::string(status_words(status)) + "\r\n";
+  for (const auto& [name, value] : headers) text += name + ": " + value + "\r\n";
+  text += "Content-Length: " + std::to_string(size()) + "\r\n";
+  text += keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
+  return text;
+}
+
+std::optional<std::string> percent_decoded(std::string_view text) {
+  std::string bytes;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    char c = text[i];
+    if (c == '%') {
+      unsigned value = 0;
+      const std::string_view hex = text.substr(i + 1, 2);
+      const auto [end, error] = std::from_chars(hex.data(), hex.data() + hex.size(), value, 16);
+      if (hex.size() != 2 || error != std::errc{} || end != hex.data() + 2) return std::nullopt;
+      c = static_cast<char>(static_cast<unsigned char>(value));
+      i += 2;
+    }
+    if (c == '\0') return std::nullopt;
+    bytes += c;
+  }
+  return bytes;
+}
+
+Reply Routes::plain(unsigned status, std::string words) {
+  Reply reply = begin(status, "text/plain; charset=utf-8");
+  set(reply, "Cache-Control", "no-store");
+  if (status == 405) set(reply, "Allow", "GET, HEAD");
+  reply.body = std::move(words) + "\n";
+  return reply;
+}
+
+bool Routes::is_our_host(std::string_view host) const {
+  const std::string_view name = host_name(host);
+  if (name.empty()) return false;
+  return is_loopback_name(name) || std::ranges::any_of(config_.hosts, [&](const std::string& ours) {
+           return equal_but_for_case(ours, host) || equal_but_for_case(ours, name);
+         });
+}
+
+bool Routes::may_bridge(std::string_view origin) const {
+  return std::ranges::find(config_.origins, origin) != config_.origins.end() ||
+         is_loopback_name(host_name(origin_host(origin)));
+}
+
+Answer Routes::answer(const Request& request) const {
+  if (request.method != "GET" && request.method != "HEAD") return plain(405, "only GET and HEAD");
+  if (!request.host || !is_our_host(*request.host)) {
+    return plain(421, "this is not what this machine is called; see --host of tendon-dash");
+  }
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  if (path == "/live" || path == "/bridge") {
+    const bool live = path == "/live";
+    const bool foreign = request.origin && !(live ? equal_but_for_case(origin_host(*request.origin), *request.host)
+                                                  : may_bridge(*request.origin));
+    if (foreign) return plain(403, "not for pages from elsewhere; see --origin of tendon-dash for the bridge");
+    if (!request.upgrade) return plain(426, "tendon-dash speaks WebSocket here");
+    if (live) return LiveSocket{};
+    return BridgeSocket{request.local && !request.proxied};
+  }
+  if (path == "/metrics") {
+    Reply reply = begin(200, kMetricsType);
+    set(reply, "Cache-Control", "no-store");
+    reply.body = sources_.metrics();
+    return reply;
+  }
+  if (path == "/api/recordings") {
+    Reply reply = begin(200, "application/json");
+    set(reply, "Cache-Control", "no-store");
+    const auto entries =
+        sources_.recordings != nullptr ? sources_.recordings->list() : std::vector<Recordings::Entry>();
+    reply.body = recordings_json(entries);
+    return reply;
+  }
+  constexpr std::string_view kRecordings = "/recordings/";
+  if (path.starts_with(kRecordings)) return recording(request, path.substr(kRecordings.size()));
+  return file(request, path == "/" ? "/index.html" : path);
+}
+
+Reply Routes::file(const Request& request, std::string_view path) const {
+  const auto found = std::ranges::find(sources_.page, path, &PageFile::path);
+  if (found == sources_.page.end()) return plain(404, "there is nothing here");
+  Reply reply = begin(200, found->type);
+  // The names of the parts change with what is in them.
+  set(reply, "Cache-Control", path.starts_with("/assets/") ? "public, max-age=31536000, immutable" : "no-cache");
+  set(reply, "Vary", "Accept-Encoding");
+  const bool gzip = request.accept_encoding.find("gzip") != std::string_view::npos && !found->gzip.empty();
+  if (gzip) set(reply, "Content-Encoding", "gzip");
+  reply.body = gzip ? found->gzip : found->bytes;
+  return reply;
+}
+
+Reply Routes::recording(const Request& request, std::string_view name) const {
+  const auto decoded = percent_decoded(name);
+  auto opened = decoded && sources_.recordings != nullptr ? sources_.recordings->open(*decoded) : std::nullopt;
+  if (!opened) return plain(404, "there is no such recording");
+  const std::uint64_t size = opened->size();
+  const auto range = request.range ? parse_range(*request.range, size) : WholeFile{};
+  if (std::holds_alternative<Unsatisfiable>(range)) {
+    Reply reply = plain(416, "the file is not that long");
+    set(reply, "Content-Range", "bytes */" + std::to_string(size));
+    return reply;
+  }
+  const auto* part = std::get_if<ByteRange>(&range);
+  Reply reply = begin(part != nullptr ? 206 : 200, "application/octet-stream");
+  set(reply, "Cache-Control", "no-store");
+  set(reply, "Accept-Ranges", "bytes");
+  const ByteRange slice = part != nullptr ? *part : ByteRange{0, size};
+  if (part != nullptr) {
+    set(reply, "Content-Range",
+        "bytes " + std::to_string(slice.first) + "-" + std::to_string(slice.first + slice.count - 1) + "/" +
+            std::to_string(size));
+  }
+  reply.body = Reply::Slice{std::move(*opened), slice};
+  return reply;
+}
+
+}  // namespace tendon::dash

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "clients/dashboard/page_files.h"
+#include "clients/dashboard/recordings.h"
+
+namespace tendon::dash {
+
+/// What of an HTTP request matters here. The texts belong to whoever has read it.
+struct Request {
+  std::string_view method;
+  std::string_view target;                 ///< path and query, as it came
+  std::optional<std::string_view> host{};  ///< header Host
+  std::optional<std::string_view> origin{};
+  std::optional<std::string_view> range{};
+  std::string_view accept_encoding{};
+  bool upgrade = false;  ///< asks for a WebSocket
+  bool local = false;    ///< from an address of this machine …
+  bool proxied = false;  ///< … but passed on for another: Forwarded, X-Forwarded-For, X-Real-IP or Via
+};
+
+/// An answer: everything but Date and Connection.
+struct Reply {
+  struct Slice {
+    OpenFile file;
+    ByteRange range;
+  };
+  unsigned status = 200;
+  std::vector<std::pair<std::string, std::string>> headers{};
+  std::variant<std::string, std::string_view, Slice> body{};
+
+  std::uint64_t size() const;
+  /// Status line and headers, with the empty line; `keep_alive`: the connection stays.
+  std::string head(bool keep_alive) const;
+};
+
+/// The connection becomes a WebSocket.
+struct LiveSocket {};
+struct BridgeSocket {
+  bool local = false;  ///< datagrams in the clear may pass
+};
+
+using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
+
+/// Says what a request gets, without a socket: all there is to be known about who may have what.
+///
+///     GET /                    the page, GET /assets/… its parts
+///     GET /live                WebSocket: what the server does now
+///     GET /bridge              WebSocket: datagrams
+///     GET /metrics             for Prometheus
+///     GET /api/recordings      which there are
+///     GET /recordings/NAME     the bytes of one; Range is understood
+///
+/// A page that happens to be open in a browser on this machine could ask for all of it. So
+/// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts; a name of somebody else's
+/// that has
+///   been made to point here (DNS rebinding) is refused, 421.
+/// * **Origin** of a WebSocket must be that very host for /live, and a page of this machine or one of Config::origins
+/// for
+///   /bridge, 403. A program that is no browser sends none. Nothing else may be read by other origins: no CORS header
+///   is ever sent.
+/// * Only GET and HEAD exist, 405. What is no path of the above is 404: nothing is looked up in a file system but the
+/// plain name
+///   of a recording.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Routes {
+ public:
+  struct Config {
+    std::vector<std::string> hosts{};    ///< other names of this machine, with ":PORT" or without
+    std::vector<std::string> origins{};  ///< pages from there may use the bridge: "https://lab.example"
+  };
+  /// What they are made from. All must outlive the routes; `recordings` may be null.
+  struct Sources {
+    std::span<const PageFile> page;
+    const Recordings* recordings = nullptr;
+    std::function<std::string()> metrics;
+  };
+
+  Routes(Config config, Sources sources) : config_(std::move(config)), sources_(std::move(sources)) {}
+
+  Answer answer(const Request& request) const;
+
+  /// An answer in plain words, for whatever is no answer to a request.
+  static Reply plain(unsigned status, std::string words);
+
+ private:
+  bool is_our_host(std::string_view host) const;
+  bool may_bridge(std::string_view origin) const;
+  Reply file(const Request& request, std::string_view path) const;
+  Reply recording(const Request& request, std::string_view name) const;
+
+  Config config_;
+  Sources sources_;
+};
+
+/// The bytes that a percent-encoded text stands for; empty when it is none, or holds a zero byte.
+std::optional<std::string> percent_decoded(std::string_view text);
+
+}  // namespace tendon::dash

@@ -1,0 +1,490 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/web_server.h"
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <csignal>
+#include <list>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace tendon::dash {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using asio::ip::udp;
+using boost::system::error_code;
+using Bytes = std::span<const std::byte>;
+
+/// Datagrams of the server are taken in lots: a haptic loop's thousand wake-ups a second would be ours too, on the
+/// processors that it runs on. A round trip of our own looks longer by as much; nobody computes with it.
+constexpr Duration kGather = std::chrono::milliseconds(3);
+/// Datagrams taken from a socket of the bridge before others have their turn.
+constexpr int kMaxDrained = 64;
+/// Times that one receive skips an empty datagram or an error report (ICMP "port unreachable").
+constexpr int kMaxSkips = 64;
+/// Of a file, in one write.
+constexpr std::size_t kPiece = 64 * 1024;
+/// Longest message of a page that looks on: "watch 15".
+constexpr std::size_t kMaxLine = 64;
+
+asio::ip::address ip_of(const Address& address) {
+  const asio::ip::address_v6 v6(address.ip);
+  if (v6.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, v6);
+  return v6;
+}
+
+template <class Endpoint>
+Address address_of(const Endpoint& endpoint) {
+  const asio::ip::address ip = endpoint.address();
+  const auto v6 = ip.is_v4() ? asio::ip::make_address_v6(asio::ip::v4_mapped, ip.to_v4()) : ip.to_v6();
+  return {v6.to_bytes(), endpoint.port()};
+}
+
+/// Waits are of a clock of Asio's own.
+auto waiting_time(Duration d) {
+  return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
+}
+
+Bytes bytes_of(const beast::flat_buffer& buffer) {
+  return {static_cast<const std::byte*>(buffer.data().data()), buffer.data().size()};
+}
+
+/// A UDP socket that talks to the server and to nobody else.
+class ServerSocket : public Link {
+ public:
+  ServerSocket(asio::io_context& context, const Address& server) : server_(server), socket_(context) {
+    error_code error;
+    socket_.connect(udp::endpoint(ip_of(server), server.port), error);
+    if (!error) socket_.non_blocking(true, error);
+    if (error) throw std::runtime_error("cannot reach " + to_string(server) + ": " + error.message());
+  }
+
+  void send(const Address& to, Bytes datagram) override {
+    error_code lost;
+    if (to == server_) socket_.send(asio::buffer(datagram.data(), datagram.size()), 0, lost);
+  }
+  void send(Bytes datagram) { send(server_, datagram); }
+
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    from = server_;
+    for (int i = 0; i < kMaxSkips; ++i) {
+      error_code error;
+      // MSG_TRUNC: the size is that of the datagram, even when the buffer is smaller.
+      const std::size_t size = socket_.receive(asio::buffer(buffer.data(), buffer.size()), MSG_TRUNC, error);
+      if (!error && size > 0) return size;
+      if (error == asio::error::would_block) return 0;
+    }
+    return 0;
+  }
+
+  template <class Handler>
+  void when_readable(Handler handler) {
+    socket_.async_wait(udp::socket::wait_read, std::move(handler));
+  }
+
+ private:
+  Address server_;
+  udp::socket socket_;
+};
+
+class Connection;
+
+/// What all connections share.
+struct Shared {
+  const WebServer::Config& config;
+  const Routes& routes;
+  Feed& feed;
+  WebCounts& counts;
+  BridgeCounts& bridge;
+  WebServer::Clock clock;
+  asio::io_context context{1};
+  std::list<std::unique_ptr<Connection>> connections;
+};
+
+/// One connection of a browser, from its first request until it is closed: requests, or a WebSocket.
+///
+/// It is deleted when it is closed and none of its operations is under way (`pending_`): handlers may then use `this`
+/// as they like.
+class Connection {
+ public:
+  Connection(Shared& shared, tcp::socket socket)
+      : shared_(shared), stream_(std::move(socket)), request_buffer_(shared.config.max_request) {
+    error_code gone;
+    const tcp::endpoint peer = stream_.socket().remote_endpoint(gone);
+    local_ = !gone && is_loopback(address_of(peer));
+    // A batch of states must not wait for the acknowledgement of the one before.
+    stream_.socket().set_option(tcp::no_delay(true), gone);
+  }
+  ~Connection() {
+    if (page_) shared_.feed.leave(*page_);
+    if (gate_) --shared_.bridge.pages;
+  }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  void start() { read_request(); }
+  bool done() const noexcept { return closed_ && pending_ == 0; }
+
+  void close() {
+    if (std::exchange(closed_, true)) return;
+    error_code gone;
+    tcp::socket& socket = web_socket_ ? web_socket_->next_layer().socket() : stream_.socket();
+    socket.shutdown(tcp::socket::shutdown_both, gone);
+    socket.close(gone);
+    server_.reset();
+  }
+
+  /// Sends what waits for the page, where nothing is being sent.
+  void pump() {
+    if (closed_ || !web_socket_ || !open_ || std::exchange(writing_, true)) return;
+    if (page_) {
+      if (auto text = shared_.feed.next(*page_)) {
+        text_ = std::move(*text);
+        web_socket_->text(true);
+        return write_message(asio::buffer(text_));
+      }
+    } else if (auto datagram = gate_->next()) {
+      datagram_ = std::move(*datagram);
+      web_socket_->binary(true);
+      return write_message(asio::buffer(datagram_.data(), datagram_.size()));
+    }
+    writing_ = false;
+  }
+
+ private:
+  template <class Handler>
+  auto with(Handler handler) {
+    ++pending_;
+    return [this, handler = std::move(handler)](auto... results) mutable {
+      --pending_;
+      if (!closed_) handler(results...);
+      if (!done()) return;
+      auto& all = shared_.connections;
+      all.erase(std::ranges::find(all, this, [](const auto& one) { return one.get(); }));
+    };
+  }
+
+  // ---- Requests
+
+  void read_request() {
+    parser_.emplace();
+    parser_->header_limit(static_cast<std::uint32_t>(shared_.config.max_request));
+    parser_->body_limit(0);
+    stream_.expires_after(waiting_time(shared_.config.patience));
+    http::async_read(stream_, request_buffer_, *parser_,
+                     with([this](error_code error, std::size_t) { take_request(error); }));
+  }
+
+  void take_request(error_code error) {
+    if (error == http::error::end_of_stream || error == beast::error::timeout ||
+        error == asio::error::connection_reset) {
+      return close();
+    }
+    ++shared_.counts.requests;
+    keep_alive_ = false;
+    with_body_ = true;
+    if (error == http::error::header_limit || error == http::error::buffer_overflow) {
+      return write_reply(Routes::plain(431, "the request is too long"));
+    }
+    if (error == http::error::body_limit) return write_reply(Routes::plain(413, "a request has no content here"));
+    if (error) return write_reply(Routes::plain(400, "that is no HTTP request"));
+    const auto& message = parser_->get();
+    const auto header = [&](http::field field) -> std::optional<std::string_view> {
+      const auto found = message.find(field);
+      if (found == message.end()) return std::nullopt;
+      return std::string_view(found->value().data(), found->value().size());
+    };
+    if (message.count(http::field::host) > 1 || message.count(http::field::origin) > 1) {
+      return write_reply(Routes::plain(400, "one Host and one Origin"));
+    }
+    Request request;
+    request.method = {message.method_string().data(), message.method_string().size()};
+    request.target = {message.target().data(), message.target().size()};
+    request.host = header(http::field::host);
+    request.origin = header(http::field::origin);
+    request.range = header(http::field::range);
+    request.accept_encoding = header(http::field::accept_encoding).value_or("");
+    request.upgrade = websocket::is_upgrade(message);
+    request.local = local_;
+    request.proxied = header(http::field::forwarded) || header(http::field::via) ||
+                      message.count("X-Forwarded-For") > 0 || message.count("X-Real-IP") > 0;
+    keep_alive_ = message.keep_alive();
+    with_body_ = request.method != "HEAD";
+    Answer answer = shared_.routes.answer(request);
+    if (auto* reply = std::get_if<Reply>(&answer)) {
+      if (reply->status == 403 && request.target.starts_with("/bridge")) ++shared_.bridge.refused_origin;
+      write_reply(std::move(*reply));
+    } else if (std::holds_alternative<LiveSocket>(answer)) {
+      if (shared_.feed.pages() >= shared_.config.max_pages) {
+        return write_reply(Routes::plain(503, "too many pages look on already"));
+      }
+      page_ = shared_.feed.join(shared_.clock());
+      accept(true);
+    } else {
+      if (shared_.bridge.pages >= shared_.config.max_bridges) {
+        ++shared_.bridge.refused_full;
+        return write_reply(Routes::plain(503, "too many pages are on the bridge already"));
+      }
+      ++shared_.bridge.pages;
+      ++shared_.bridge.opened;
+      gate_.emplace(shared_.config.bridge, std::get<BridgeSocket>(answer).local, shared_.bridge, shared_.clock());
+      accept(false);
+    }
+  }
+
+  void write_reply(Reply reply) {
+    if (reply.status >= 400 && reply.status != 404 && reply.status != 416) ++shared_.counts.refused;
+    reply_ = std::move(reply);
+    text_ = reply_.head(keep_alive_);
+    sent_ = 0;
+    if (with_body_) {
+      if (const auto* text = std::get_if<std::string>(&reply_.body)) text_ += *text;
+      if (const auto* text = std::get_if<std::string_view>(&reply_.body)) text_ += *text;
+    }
+    write_piece();
+  }
+
+  void write_piece() {
+    stream_.expires_after(waiting_time(shared_.config.patience));
+    asio::async_write(stream_, asio::buffer(text_), with([this](error_code error, std::size_t) {
+                        const auto* file = std::get_if<Reply::Slice>(&reply_.body);
+                        if (error) return close();
+                        if (file != nullptr && with_body_ && sent_ < file->range.count) {
+                          const std::uint64_t left = file->range.count - sent_;
+                          text_ = file->file.read(file->range.first + sent_, std::min<std::uint64_t>(left, kPiece));
+                          if (text_.empty())
+                            return close();  // it has become shorter: the browser sees that some is missing
+                          sent_ += text_.size();
+                          return write_piece();
+                        }
+                        reply_.body = std::string();  // closes the file
+                        if (keep_alive_) return read_request();
+                        close();
+                      }));
+  }
+
+  // ---- WebSockets
+
+  void accept(bool live) {
+    stream_.expires_never();
+    web_socket_.emplace(std::move(stream_));
+    websocket::stream_base::timeout timeout{};
+    timeout.handshake_timeout = waiting_time(shared_.config.patience);
+    timeout.idle_timeout = waiting_time(shared_.config.patience);
+    timeout.keep_alive_pings = live;
+    web_socket_->set_option(timeout);
+    web_socket_->read_message_max(live ? kMaxLine : kMaxDatagram);
+    if (!live) {
+      try {
+        server_ = std::make_unique<ServerSocket>(shared_.context, shared_.config.server);
+      } catch (const std::runtime_error&) {
+        return close();
+      }
+    }
+    web_socket_->async_accept(parser_->get(), with([this](error_code error) {
+                                if (error) return close();
+                                open_ = true;
+                                read_message();
+                                if (gate_) read_server();
+                                pump();
+                              }));
+  }
+
+  void read_message() {
+    message_.clear();
+    web_socket_->async_read(message_, with([this](error_code error, std::size_t) {
+                              if (error) return close();
+                              const LocalTime now = shared_.clock();
+                              const Bytes bytes = bytes_of(message_);
+                              if (gate_) {
+                                if (gate_->passes(now, bytes, web_socket_->got_binary())) server_->send(bytes);
+                              } else {
+                                const std::string_view line(static_cast<const char*>(message_.data().data()),
+                                                            message_.data().size());
+                                if (web_socket_->got_binary() || !shared_.feed.hear(now, *page_, line)) return close();
+                                pump();
+                              }
+                              read_message();
+                            }));
+  }
+
+  void write_message(asio::const_buffer bytes) {
+    web_socket_->async_write(bytes, with([this](error_code error, std::size_t) {
+                               writing_ = false;
+                               if (error) return close();
+                               pump();
+                             }));
+  }
+
+  void read_server() {
+    server_->when_readable(with([this](error_code error) {
+      if (error) return close();
+      std::array<std::byte, kMaxDatagram> buffer;
+      Address from;
+      for (int i = 0; i < kMaxDrained; ++i) {
+        const std::size_t size = server_->receive(from, buffer);
+        if (size == 0) break;
+        if (size <= buffer.size()) gate_->offer(Bytes(buffer).first(size));
+      }
+      pump();
+      read_server();
+    }));
+  }
+
+  Shared& shared_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer request_buffer_;
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  bool local_ = false;
+  bool keep_alive_ = false;
+  bool with_body_ = true;
+  Reply reply_;
+  std::string text_;        ///< being sent
+  std::uint64_t sent_ = 0;  ///< of a file
+
+  std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
+  beast::flat_buffer message_;
+  std::optional<Feed::PageId> page_;
+  std::optional<BridgeGate> gate_;
+  std::unique_ptr<ServerSocket> server_;
+  std::vector<std::byte> datagram_;  ///< being sent
+  bool open_ = false;
+  bool writing_ = false;
+
+  int pending_ = 0;
+  bool closed_ = false;
+};
+
+}  // namespace
+
+struct WebServer::State {
+  State(const Config& own, const Routes& routes, Feed& feed, WebCounts& counts, BridgeCounts& bridge, Clock clock)
+      : config(own),
+        shared{.config = config,
+               .routes = routes,
+               .feed = feed,
+               .counts = counts,
+               .bridge = bridge,
+               .clock = clock,
+               .connections = {}},
+        link(shared.context, config.server) {
+    const tcp::endpoint at(ip_of(config.listen), config.listen.port);
+    error_code error;
+    acceptor.open(at.protocol(), error);
+    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor.bind(at, error);
+    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+    if (error) throw std::runtime_error("cannot listen on " + to_string(config.listen) + ": " + error.message());
+  }
+
+  void accept() {
+    acceptor.async_accept([this](error_code error, tcp::socket socket) {
+      if (!error && shared.connections.size() < config.max_connections) {
+        shared.connections.push_back(std::make_unique<Connection>(shared, std::move(socket)));
+        shared.connections.back()->start();
+      } else if (error) {  // out of descriptors: they come back as others leave
+        accept_again.expires_after(waiting_time(std::chrono::milliseconds(100)));
+        return accept_again.async_wait([this](error_code) { accept(); });
+      } else {
+        ++shared.counts.refused;
+      }
+      accept();
+    });
+  }
+
+  void wait_for_server() {
+    if (std::exchange(waiting, true)) return;
+    link.when_readable([this](error_code) {
+      waiting = false;
+      schedule_turn(kGather);
+    });
+  }
+
+  void schedule_turn(Duration in) {
+    turn_timer.expires_after(waiting_time(in));
+    turn_timer.async_wait([this](error_code cancelled) {
+      if (cancelled) return;
+      const LocalTime now = shared.clock();
+      const LocalTime next = turn(now);
+      // The wait that is under way, if one is, ends here.
+      schedule_turn(std::min(next - now, Duration(std::chrono::seconds(1))));
+      wait_for_server();
+    });
+  }
+
+  void schedule_tick() {
+    tick_timer.expires_after(waiting_time(Feed::kTick));
+    tick_timer.async_wait([this](error_code) {
+      const LocalTime now = shared.clock();
+      tick(now);
+      shared.feed.tick(now);
+      for (const auto& connection : shared.connections) connection->pump();
+      schedule_tick();
+    });
+  }
+
+  Config config;
+  Shared shared;
+  ServerSocket link;
+  tcp::acceptor acceptor{shared.context};
+  asio::steady_timer turn_timer{shared.context};
+  asio::steady_timer tick_timer{shared.context};
+  asio::steady_timer accept_again{shared.context};
+  bool waiting = false;  ///< for the server
+  std::function<LocalTime(LocalTime)> turn;
+  std::function<void(LocalTime)> tick;
+};
+
+WebServer::WebServer(const Config& config, const Routes& routes, Feed& feed, WebCounts& counts, BridgeCounts& bridge,
+                     Clock clock)
+    : state_(std::make_unique<State>(config, routes, feed, counts, bridge, clock)) {}
+
+WebServer::~WebServer() = default;
+
+Address WebServer::address() const { return address_of(state_->acceptor.local_endpoint()); }
+
+Link& WebServer::link() { return state_->link; }
+
+void WebServer::run(Duration duration, const std::function<LocalTime(LocalTime)>& turn,
+                    const std::function<void(LocalTime)>& tick) {
+  asio::io_context& context = state_->shared.context;
+  state_->turn = turn;
+  state_->tick = tick;
+  asio::signal_set signals(context, SIGINT, SIGTERM);
+  signals.async_wait([&](error_code, int) { context.stop(); });
+  asio::steady_timer end(context);
+  if (duration > Duration::zero()) {
+    end.expires_after(waiting_time(duration));
+    end.async_wait([&](error_code) { context.stop(); });
+  }
+  state_->accept();
+  state_->schedule_turn(Duration::zero());
+  state_->schedule_tick();
+  context.run();
+  for (const auto& connection : state_->shared.connections) connection->close();
+}
+
+}  // namespace tendon::dash

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+#include "clients/dashboard/bridge_gate.h"
+#include "clients/dashboard/feed.h"
+#include "clients/dashboard/metrics.h"
+#include "clients/dashboard/routes.h"
+#include "protocol/link.h"
+
+namespace tendon::dash {
+
+/// The sockets of tendon-dash and its one thread: HTTP and WebSockets for pages, one UDP socket to the server for the
+/// Observer, and one for each page on the bridge. It decides nothing: what is answered is Routes' business, what is
+/// told Feed's, what crosses the bridge BridgeGate's. The only file behind it knows Boost.Beast and Boost.Asio.
+///
+/// * A connection that has sent no whole request within `patience`, or reads no answer for so long, is closed. A
+/// WebSocket that is
+///   silent for so long is asked (ping) whether it is there; one of the bridge is not, its page says something every 50
+///   ms.
+/// * Nothing queues without a bound: of what a page does not read the newest is kept (PagePost), the bridge drops
+/// (BridgeGate).
+///
+/// Thread-safe: no. Realtime-safe: no.
+class WebServer {
+ public:
+  struct Config {
+    Address listen = parse_address("127.0.0.1:8080");   ///< port 0 lets the system choose
+    Address server = parse_address("127.0.0.1:47100");  ///< tendond
+    std::size_t max_connections = 128;                  ///< of all kinds; more are closed at once
+    std::size_t max_pages = 16;                         ///< that look on: each costs 150 kB/s of JSON
+    std::size_t max_bridges = 32;                       ///< as many as a server takes observers
+    std::size_t max_request = 16 * 1024;                ///< bytes of a request's headers
+    Duration patience = std::chrono::seconds(30);
+    BridgeGate::Config bridge{};
+  };
+  using Clock = LocalTime (*)();
+
+  /// Listens from here on. `routes`, `feed` and the counts must outlive the server. Throws std::runtime_error when the
+  /// system refuses: "cannot listen on 127.0.0.1:8080: Address already in use".
+  WebServer(const Config& config, const Routes& routes, Feed& feed, WebCounts& counts, BridgeCounts& bridge,
+            Clock clock);
+  ~WebServer();
+
+  /// Where it listens.
+  Address address() const;
+  /// The way to the server, for the Observer. What is sent there leaves at once.
+  Link& link();
+
+  /// Runs until SIGINT or SIGTERM, or until `duration` is over when that is above zero. `turn(now)` is called when a
+  /// datagram has come over link(), and at the latest when it asked for; `tick(now)` once in Feed::kTick, before the
+  /// pages are told.
+  void run(Duration duration, const std::function<LocalTime(LocalTime)>& turn,
+           const std::function<void(LocalTime)>& tick);
+
+ private:
+  struct State;  // keeps Beast out of this header
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tendon::dash

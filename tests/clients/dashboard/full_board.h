@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "clients/dashboard/board.h"
+#include "core/reason.h"
+
+namespace tendon::dash {
+
+/// A board of which nothing is missing.
+inline Board full_board() {
+  Board board;
+  Welcome welcome;
+  welcome.server = "tendond";
+  board.welcomed(welcome);
+  board.tell(Contact::kOpen, "connected");
+  board.described({.device = 0,
+                   .name = "left",
+                   .model = "falcon",
+                   .loop_hz = 1000,
+                   .channels = {{.name = "main", .holder = "wall"}}});
+  DeviceState state;
+  state.position = Vec3(0, -0.5, 0);
+  state.force_wanted = Vec3(3, 4, 0);
+  state.force_applied = Vec3(0, 0, 2);
+  state.permitted_force = 2.5;
+  state.energy = 0.125;
+  state.mode = Mode::kHolding;
+  state.reasons = Reasons(Reason::kEnergy).bits();
+  board.observe(state);
+  DeviceReport report;
+  report.steps = 1000;
+  report.missed = 3;
+  report.lateness[3] = 990;
+  report.lateness[23] = 7;
+  report.safety = Safety::kArmed;
+  report.degraded = "recording has fallen behind";
+  board.observe(report);
+  PeerReport peer;
+  peer.name = "wall";
+  peer.link.forces = 97;
+  peer.link.late_network = 4;
+  peer.link.round_trip = Delays{std::chrono::milliseconds(40), std::chrono::milliseconds(125)};
+  peer.link.to_server = peer.link.round_trip;
+  peer.link.to_client = peer.link.round_trip;
+  peer.link.received = 3000;
+  peer.link.lost = 12;
+  board.observe(peer);
+  return board;
+}
+
+}  // namespace tendon::dash

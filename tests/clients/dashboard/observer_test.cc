@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/observer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/network_loop.h"
+
+// The observer against the server's own network half, on virtual time, over a perfect network.
+
+namespace tendon::dash {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+struct Datagram {
+  Address from;
+  Address to;
+  std::vector<std::byte> bytes;
+};
+
+class End : public Link {
+ public:
+  End(std::deque<Datagram>& wire, const std::string& address) : self(parse_address(address)), wire_(wire) {}
+  void send(const Address& to, std::span<const std::byte> datagram) override {
+    wire_.push_back({self, to, {datagram.begin(), datagram.end()}});
+  }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    if (inbox.empty()) return 0;
+    const Datagram datagram = std::move(inbox.front());
+    inbox.pop_front();
+    from = datagram.from;
+    std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
+    return datagram.bytes.size();
+  }
+  Address self;
+  std::deque<Datagram> inbox;
+
+ private:
+  std::deque<Datagram>& wire_;
+};
+
+class ObserverTest : public testing::Test {
+ protected:
+  void serve(const std::vector<std::string>& names, std::uint32_t first_id = 1) {
+    NetworkLoop::Config config;
+    config.secret.fill(static_cast<std::byte>(first_id));
+    config.first_connection_id = first_id;
+    std::vector<Mailboxes*> mail;
+    mail_.clear();
+    for (const std::string& name : names) {
+      config.devices.push_back(
+          {.name = name, .model = "model of " + name, .max_force = 8, .loop_hz = 1000, .channels = {{.name = "main"}}});
+      config.devices.back().device = static_cast<std::uint32_t>(config.devices.size() - 1);
+      mail_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}));
+      mail.push_back(mail_.back().get());
+    }
+    server_.inbox.clear();
+    loop_ = std::make_unique<NetworkLoop>(config, server_, mail);
+  }
+  /// 1 ms at a time; each device makes a step in each.
+  void run(Duration length) {
+    for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
+      ++tick_;
+      for (std::size_t i = 0; i < mail_.size(); ++i) {
+        DeviceState state;
+        state.tick = tick_;
+        state.sampled = PeerTime(now_.time_since_epoch());
+        state.device = static_cast<std::uint32_t>(i);
+        state.force_wanted = Vec3(1, 2, 3);
+        mail_[i]->state.put(state);
+      }
+      if (loop_) loop_->turn(now_);
+      observer_.turn(now_);
+      for (; !wire_.empty(); wire_.pop_front()) {
+        Datagram& datagram = wire_.front();
+        (datagram.to == server_.self ? server_ : own_).inbox.push_back(std::move(datagram));
+      }
+    }
+  }
+  std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const auto& [number, device] : board_.devices()) names.push_back(device.about ? device.about->name : "?");
+    return names;
+  }
+  using Names = std::vector<std::string>;
+
+  LocalTime now_{seconds(1000)};
+  std::deque<Datagram> wire_;
+  End server_{wire_, "127.0.0.1:47100"};
+  End own_{wire_, "127.0.0.1:5000"};
+  std::vector<std::unique_ptr<Mailboxes>> mail_;
+  std::unique_ptr<NetworkLoop> loop_;
+  std::uint64_t tick_ = 0;
+  Board board_;
+  Observer observer_{own_, server_.self, {.seed = 1}, board_, now_};
+};
+
+TEST_F(ObserverTest, WatchesTheOnlyDeviceOfAServer) {
+  serve({"left"});
+  run(seconds(2));
+  EXPECT_EQ(board_.contact(), Contact::kOpen);
+  EXPECT_EQ(names(), Names{"left"});
+  EXPECT_EQ(board_.sessions(), 1U) << "one session is enough";
+  EXPECT_GT(board_.devices().at(0).states, 1900U);
+  EXPECT_EQ(board_.link().lost, 0U);
+}
+
+TEST_F(ObserverTest, ComesBackForAllTheDevicesOfAServerWithSeveral) {
+  serve({"left", "right", "foot"});
+  run(seconds(2));
+  EXPECT_EQ(names(), (Names{"left", "right", "foot"}));
+  EXPECT_EQ(board_.sessions(), 2U);
+  for (std::uint32_t device : {0U, 1U, 2U}) EXPECT_GT(board_.devices().at(device).states, 1800U) << device;
+  EXPECT_EQ(loop_->stats().timed_out, 0U) << "the first session was ended by a Bye";
+}
+
+TEST_F(ObserverTest, IsToldWhatTheEnginesWant) {
+  serve({"left", "right"});
+  run(seconds(1));
+  for (std::uint32_t device : {0U, 1U}) {
+    ASSERT_TRUE(board_.devices().at(device).newest->force_wanted) << device;
+    EXPECT_EQ(*board_.devices().at(device).newest->force_wanted, Vec3(1, 2, 3));
+  }
+}
+
+TEST_F(ObserverTest, AsksForFewStatesWhileNobodyLooks) {
+  serve({"left", "right"});
+  observer_.set_watched(false);
+  run(seconds(1));
+  const auto states = [&](std::uint32_t device) { return board_.devices().at(device).states; };
+  const auto [left, right] = std::pair(states(0), states(1));
+  run(seconds(10));
+  EXPECT_NEAR(static_cast<double>(states(0) - left), 10.0 * Observer::kIdleStateHz, 5);
+  EXPECT_NEAR(static_cast<double>(states(1) - right), 10.0 * Observer::kIdleStateHz, 5);
+  observer_.set_watched(true);
+  const auto before = states(1);
+  run(seconds(1));
+  EXPECT_GT(states(1) - before, 900U);
+}
+
+TEST_F(ObserverTest, FindsAServerThatComesLate) {
+  run(seconds(5));
+  EXPECT_EQ(board_.contact(), Contact::kUnanswered);
+  EXPECT_EQ(board_.words(), "no answer from 127.0.0.1:47100: is tendond running there?");
+  serve({"left"});
+  run(seconds(5));
+  EXPECT_EQ(board_.contact(), Contact::kOpen);
+}
+
+TEST_F(ObserverTest, FindsAServerAgainThatHasOtherDevicesNow) {
+  serve({"left", "right", "foot"});
+  run(seconds(1));
+  loop_.reset();
+  mail_.clear();
+  run(seconds(5));
+  EXPECT_EQ(board_.contact(), Contact::kUnanswered);
+  serve({"only"}, 77);
+  run(seconds(8));
+  EXPECT_EQ(board_.contact(), Contact::kOpen);
+  EXPECT_EQ(names(), Names{"only"});
+  const auto states = board_.devices().at(0).states;
+  run(seconds(1));
+  EXPECT_GT(board_.devices().at(0).states, states + 900);
+}
+
+TEST_F(ObserverTest, SaysWhyItIsRefused) {
+  serve({"left"});
+  loop_.reset();
+  NetworkLoop::Config config;
+  config.max_observers = 0;
+  config.devices = {{.name = "left", .model = "model", .loop_hz = 1000, .channels = {{.name = "main"}}}};
+  loop_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_[0].get()});
+  run(seconds(1));
+  EXPECT_EQ(board_.contact(), Contact::kRefused);
+  EXPECT_EQ(board_.words(), "127.0.0.1:47100 refuses: there are 0 observers already");
+}
+
+TEST_F(ObserverTest, SaysByeWhenItStops) {
+  serve({"left"});
+  run(seconds(1));
+  observer_.stop(now_);
+  run(seconds(1));
+  EXPECT_EQ(loop_->stats().timed_out, 0U);
+  EXPECT_EQ(observer_.turn(now_), LocalTime::max());
+  const auto states = board_.devices().at(0).states;
+  run(seconds(1));
+  EXPECT_EQ(board_.devices().at(0).states, states);
+}
+
+}  // namespace
+}  // namespace tendon::dash

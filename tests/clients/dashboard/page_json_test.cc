@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/page_json.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/reason.h"
+
+namespace tendon::dash {
+namespace {
+
+using nlohmann::json;
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+TEST(PageJson, TellsStatesInColumns) {
+  DeviceState first;
+  first.tick = 7;
+  first.sampled = PeerTime(microseconds(1'000'123));
+  first.position = Vec3(0.001, -0.5, 0);
+  first.force_wanted = Vec3(1, 2, 3);
+  first.force_applied = Vec3(0.25, 0, -1);
+  first.permitted_force = std::numeric_limits<double>::infinity();
+  first.energy = -0.125;
+  first.reasons = 5;
+  first.force_age = milliseconds(12);
+  first.mode = Mode::kActive;
+  DeviceState second;
+  second.tick = 8;
+  const json text = json::parse(states_json(3, std::vector{first, second}));
+  EXPECT_EQ(text["type"], "states");
+  EXPECT_EQ(text["device"], 3);
+  EXPECT_EQ(text["tick"], (json{7, 8}));
+  EXPECT_EQ(text["sampled_us"][0], 1'000'123.0);
+  EXPECT_FLOAT_EQ(text["position_m"][0][0].get<float>(), 0.001F);
+  EXPECT_EQ(text["position_m"][1][0], -0.5);
+  EXPECT_EQ(text["wanted_n"][2][0], 3.0);
+  EXPECT_TRUE(text["wanted_n"][2][1].is_null()) << "not told";
+  EXPECT_EQ(text["applied_n"][2][0], -1.0);
+  EXPECT_TRUE(text["permitted_n"][0].is_null()) << "no bound";
+  EXPECT_EQ(text["permitted_n"][1], 0.0);
+  EXPECT_EQ(text["energy_j"][0], -0.125);
+  EXPECT_EQ(text["reasons"], (json{5, 0}));
+  EXPECT_EQ(text["mode"], (json{2, 1}));
+  EXPECT_EQ(text["force_age_ms"][0], 12.0);
+  for (const auto& [name, column] : text.items()) {
+    if (column.is_array()) {
+      EXPECT_EQ(column[0].is_array() ? column[0].size() : column.size(), 2U) << name;
+    }
+  }
+}
+
+TEST(PageJson, TellsTheServerAndItsDevices) {
+  Board board;
+  Welcome welcome;
+  welcome.server = "tendond \"1\"";
+  board.welcomed(welcome);
+  board.tell(Contact::kOpen, "connected");
+  board.described(
+      {.device = 1,
+       .name = "right",
+       .model = "falcon",
+       .workspace = DeviceDescription::Box{Vec3(-1, -2, -3), Vec3(1, 2, 3)},
+       .max_force = 8,
+       .loop_hz = 1000,
+       .channels = {{.name = "main", .rule = ChannelRule::kPriority, .lease = milliseconds(500), .holder = "wall"}}});
+  const json text = json::parse(server_json(board, {.server = "127.0.0.1:47100", .arms = true, .recordings = false}));
+  EXPECT_EQ(text["contact"], "open");
+  EXPECT_EQ(text["version"], "tendond \"1\"");
+  EXPECT_EQ(text["arms"], true);
+  EXPECT_EQ(text["recordings"], false);
+  const json device = text["devices"][0];
+  EXPECT_EQ(device["number"], 1);
+  EXPECT_EQ(device["workspace_m"][0][2], -3.0);
+  EXPECT_EQ(device["channels"][0],
+            (json{{"name", "main"}, {"rule", "priority"}, {"lease_ms", 500.0}, {"holder", "wall"}}));
+}
+
+TEST(PageJson, TellsHowTheLoopAndTheEnginesDo) {
+  Board board;
+  board.described({.device = 0, .name = "left", .channels = {{.name = "main"}, {.name = "tissue"}}});
+  json text = json::parse(reports_json(0, board));
+  EXPECT_TRUE(text["loop"].is_null());
+  EXPECT_TRUE(text["engines"].empty());
+  DeviceReport report;
+  report.safety = Safety::kFault;
+  report.fault = "too fast";
+  report.degraded = "";
+  report.lateness[4] = 9;
+  board.observe(report);
+  board.observe(report);
+  PeerReport peer;
+  peer.channel = 1;
+  peer.name = "liver";
+  peer.link.round_trip = Delays{milliseconds(40), milliseconds(130)};
+  peer.link.lost = 12;
+  board.observe(peer);
+  text = json::parse(reports_json(0, board));
+  EXPECT_EQ(text["loop"]["safety"], "fault");
+  EXPECT_EQ(text["loop"]["fault"], "too fast");
+  EXPECT_EQ(text["loop"]["lateness_us_log2"][4], 9);
+  EXPECT_EQ(text["loop"]["lateness_us_log2_total"][4], 18);
+  EXPECT_EQ(text["loop"]["lateness_us_log2"].size(), limits::kLatenessBuckets);
+  ASSERT_EQ(text["engines"].size(), 1U);
+  EXPECT_EQ(text["engines"][0]["channel"], "tissue");
+  EXPECT_EQ(text["engines"][0]["round_trip_ms"], (json{{"median", 40.0}, {"p99", 130.0}}));
+  EXPECT_TRUE(text["engines"][0]["to_server_ms"].is_null());
+  EXPECT_EQ(text["engines"][0]["lost"], 12);
+  EXPECT_TRUE(json::parse(reports_json(9, board))["loop"].is_null()) << "no such device";
+}
+
+TEST(PageJson, NamesEveryReasonAsTheCoreDoes) {
+  for (std::size_t bit = 0; bit < 32; ++bit) {
+    std::string name = to_string(Reasons::from_bits(1U << bit));
+    std::ranges::replace_if(
+        name, [](char c) { return c == ' ' || c == '-'; }, '_');
+    EXPECT_EQ(reason_name(bit), name.empty() ? "bit_" + std::to_string(bit) : name);
+  }
+}
+
+TEST(PageJson, ListsRecordings) {
+  const std::vector<Recordings::Entry> entries = {{"a \"b\".mcap", 5'000'000'000, 1.5}};
+  EXPECT_EQ(json::parse(recordings_json(entries)),
+            (json::array({{{"name", "a \"b\".mcap"}, {"size_bytes", 5'000'000'000}, {"modified_unix_s", 1.5}}})));
+}
+
+}  // namespace
+}  // namespace tendon::dash

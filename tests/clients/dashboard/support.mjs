@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Programs of ours, as a user starts them, and patience.
+import { spawn } from "node:child_process";
+import { createSocket } from "node:dgram";
+import { mkdtempSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
+import { connect } from "node:net";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { createInterface } from "node:readline";
+import { fileURLToPath } from "node:url";
+
+export const kRoot = join(dirname(fileURLToPath(import.meta.url)), "../../..");
+const kPatienceMs = 60_000;
+
+/** A package that npm has brought into one of the clients' folders. */
+export const packageOf = (folder, name) => createRequire(join(kRoot, folder, "package.json"))(name);
+
+/** A folder of the test's own. */
+export function scratch(test) {
+  const folder = mkdtempSync(join(tmpdir(), "tendon-dash-"));
+  test.after(() => rmSync(folder, { recursive: true }));
+  return folder;
+}
+
+/** A running program; its lines on either stream. Gone at the end of the test. */
+export class Program {
+  lines = [];
+  constructor(test, name, args, folder) {
+    this.process = spawn(join(process.env.TENDON_PROGRAMS, name), args, { stdio: ["ignore", "pipe", "pipe"], cwd: folder });
+    this.ended = new Promise((resolve) => this.process.once("close", resolve));
+    for (const stream of [this.process.stdout, this.process.stderr]) createInterface(stream).on("line", (line) => this.lines.push(line));
+    test.after(async () => {
+      this.process.kill("SIGKILL");
+      await this.ended;
+    });
+  }
+  async line(text) {
+    await until(`${text} in ${this.process.spawnfile}`, () => this.lines.some((line) => line.includes(text)) || this.process.exitCode !== null, () => this.lines.join("\n"));
+    const found = this.lines.find((line) => line.includes(text));
+    if (!found) throw new Error(`it ended without: ${text}\n${this.lines.join("\n")}`);
+    return found;
+  }
+  async stop() {
+    this.process.kill("SIGTERM");
+    return this.ended;
+  }
+}
+
+/** Waits for what another process brings about. */
+export async function until(what, done, more = () => "") {
+  const deadline = performance.now() + kPatienceMs;
+  for (;;) {
+    const result = await done();
+    if (result) return result;
+    if (performance.now() > deadline) throw new Error(`never came to be: ${what}\n${more()}`);
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+}
+
+/** tendond with scenes of deploy/scenes; its address. */
+export async function startServer(test, folder, scenes, ...more) {
+  const paths = scenes.map((scene) => join(kRoot, "deploy/scenes", `${scene}.toml`));
+  const program = new Program(test, "tendond", [...paths, ...(more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"]), "--json", ...more], folder);
+  return { program, address: JSON.parse(await program.line('"listening"')).address };
+}
+
+/** tendon-dash; where its page is. */
+export async function startDash(test, server, ...more) {
+  const program = new Program(test, "tendon-dash", ["--server", server, "--listen", "127.0.0.1:0", "--json", ...more]);
+  const address = JSON.parse(await program.line('"listening"')).address;
+  return { program, address, url: `http://${address}` };
+}
+
+/** A UDP socket where a server would be; what comes to it that is Data, which the dashboard's own observer never comes to say. */
+export async function fakeServer(test) {
+  const socket = createSocket("udp4");
+  const arrived = [];
+  socket.on("message", (datagram, from) => (datagram[1] & 0xf) === 3 && arrived.push({ datagram, from }));
+  await new Promise((resolve) => socket.bind(0, "127.0.0.1", resolve));
+  test.after(() => socket.close());
+  return { socket, arrived, address: `127.0.0.1:${socket.address().port}` };
+}
+
+/** Bytes of a connection of one's own: what comes back until it is closed. */
+export async function raw(address, bytes) {
+  const [host, port] = address.split(":");
+  const socket = connect(Number(port), host);
+  let answer = "";
+  socket.setEncoding("latin1").on("data", (text) => (answer += text));
+  socket.on("error", () => {});
+  socket.write(bytes);
+  await new Promise((resolve) => socket.once("close", resolve));
+  return answer;
+}
+
+/** The value of a sample of /metrics; undefined when it is not there. */
+export async function metric(url, sample) {
+  const text = await (await fetch(`${url}/metrics`)).text();
+  const line = text.split("\n").find((one) => one.startsWith(`${sample} `));
+  return line === undefined ? undefined : Number(line.slice(sample.length + 1));
+}
