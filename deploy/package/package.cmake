@@ -9,6 +9,11 @@ install(TARGETS tendond tendon-softbody tendon-lab tendon-identify tendon-replay
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
+if(TARGET tendon-dash)
+  list(APPEND programs tendon-dash)
+  install(TARGETS tendon-dash COMPONENT programs)
+  install(DIRECTORY deploy/monitoring DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon COMPONENT programs)
+endif()
 # What belongs to the whole machine is for packages only: `cmake --install` into a home folder leaves /etc alone.
 install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/systemd/tendond.service DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
