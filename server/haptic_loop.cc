@@ -109,14 +109,10 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   const std::uint32_t device_faults = device_.faults();
   if (device_faults != std::exchange(device_faults_, device_faults)) mail_.flight.freeze();
   fault_.store(fault, std::memory_order_relaxed);
-  steps_.store(record.tick, std::memory_order_relaxed);
+  steps_.set(record.tick);
   force_.store(record.applied.norm(), std::memory_order_relaxed);
-  // One writer: a load and a store are enough.
-  const auto count = [](std::atomic<std::uint64_t>& counter) {
-    counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-  };
-  if (record.reasons.has(Reason::kOverrun)) count(overruns_);
-  if (record.reasons.has(Reason::kUnseen)) count(unseen_);
+  if (record.reasons.has(Reason::kOverrun)) overruns_.add();
+  if (record.reasons.has(Reason::kUnseen)) unseen_.add();
   if (record.held.count() > longest_interval_ns_.load(std::memory_order_relaxed)) {
     longest_interval_ns_.store(record.held.count(), std::memory_order_relaxed);
   }
@@ -128,9 +124,12 @@ void HapticLoop::stop() noexcept {
 }
 
 HapticLoop::Stats HapticLoop::stats() const noexcept {
-  return {steps_.load(std::memory_order_relaxed),  overruns_.load(std::memory_order_relaxed),
-          unseen_.load(std::memory_order_relaxed), Duration(longest_interval_ns_.load(std::memory_order_relaxed)),
-          fault_.load(std::memory_order_relaxed),  device_.state(),
+  return {steps_.value(),
+          overruns_.value(),
+          unseen_.value(),
+          Duration(longest_interval_ns_.load(std::memory_order_relaxed)),
+          fault_.load(std::memory_order_relaxed),
+          device_.state(),
           force_.load(std::memory_order_relaxed)};
 }
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "core/counter.h"
 #include "core/estimation/velocity_estimator.h"
 #include "core/haptic_controller.h"
 #include "devices/device.h"
@@ -67,9 +68,9 @@ class HapticLoop {
   bool rearmed_ = false;  ///< since the last record
   std::uint32_t device_faults_ = 0;
 
-  std::atomic<std::uint64_t> steps_{0};
-  std::atomic<std::uint64_t> overruns_{0};
-  std::atomic<std::uint64_t> unseen_{0};
+  Counter steps_;
+  Counter overruns_;
+  Counter unseen_;
   std::atomic<std::int64_t> longest_interval_ns_{0};
   std::atomic<double> force_{0};
   std::atomic<HapticController::Fault> fault_{HapticController::Fault::kNone};
