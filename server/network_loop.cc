@@ -590,9 +590,11 @@ LinkReport NetworkLoop::link_report(LocalTime now, const Guest& guest, const Lin
 /// and this one were evenly spaced, as far as we know.
 void NetworkLoop::remember(LocalTime now, Device& device, const DeviceState& state) {
   const LocalTime at(state.sampled.time_since_epoch());
-  const Sampled last = device.sampled[device.newest_tick % kRemembered];
-  const std::uint64_t since = state.tick - std::exchange(device.newest_tick, state.tick);
-  if (last.tick > 0 && since < kRemembered) {
+  const std::uint64_t newest = std::exchange(device.newest_tick, state.tick);
+  const std::uint64_t since = state.tick - newest;
+  // What nobody needs is not looked at: of many devices it is no longer in the cache.
+  if (newest > 0 && since > 1 && since < kRemembered) {
+    const Sampled last = device.sampled[newest % kRemembered];
     const Duration apart = (at - last.at) / static_cast<Duration::rep>(since);
     for (std::uint64_t i = 1; i < since; ++i) {
       const std::uint64_t tick = last.tick + i;
