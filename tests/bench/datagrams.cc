@@ -75,7 +75,8 @@ void codec(Run& run, std::size_t blocks, const std::string& name, const Message&
   Buffer copy{};
   const std::size_t messages = write(writer, buffer, message, wanted);
   const std::size_t size = writer.size();
-  const std::string what = messages == 1 ? name : std::to_string(messages) + " " + name + "s in one";
+  const std::string what =
+      messages == 1 ? "a " + name + " datagram" : std::to_string(messages) + " " + name + "s in one datagram";
   const auto copying = [&](std::size_t) {
     keep(buffer);
     std::memcpy(copy.data(), buffer.data(), size);
@@ -89,7 +90,7 @@ void codec(Run& run, std::size_t blocks, const std::string& name, const Message&
                        keep(buffer);
                      },
                      copying),
-                 "encode a " + what + " datagram", floor));
+                 "encode " + what, floor));
   const auto datagram = std::span<const std::byte>(buffer).first(size);
   run.add(row_of(in_turns(
                      blocks, kCalls,

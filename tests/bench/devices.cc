@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How many devices one core can step in a millisecond, and whether each costs the same however many there are.
 #include <sys/mman.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How many simulated worlds of 10 s a core can look at in a second (tests/simulation).
+#include <cstdio>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "core/haptic_controller.h"
