@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How late the haptic thread wakes with a controller alone, and with 32 observers besides, who cost a datagram each in
-// every step; and beside them a thread that only sleeps. All take turns in blocks within one run of one server, whose
-// threads are those of tendond: haptic (real-time priority where it is granted), network, and a log that takes records
-// out. The observers are in one process, and cost processor time themselves: it is told apart.
+// How late the haptic thread wakes with a controller alone; with a recording besides; with 32 observers, who cost a
+// datagram each in every step; with tendon-dash and a page that listens to it; and beside them a thread that only
+// sleeps. All take turns in blocks within one run of one server, whose threads are those of tendond: haptic (real-time
+// priority where it is granted), network, and a log that takes records out. The observers are in one process, and cost
+// processor time themselves: it is told apart.
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
 #include <sys/mman.h>
@@ -16,9 +19,13 @@
 #include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -29,14 +36,17 @@
 #include "clients/cpp/udp_transport.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
+#include "server/byte_sink.h"
 #include "server/clock.h"
 #include "server/doorbell.h"
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
 #include "server/realtime.h"
+#include "server/recorder.h"
 #include "server/udp_link.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/measure.h"
+#include "tests/e2e/process.h"
 
 namespace tendon::bench {
 namespace {
@@ -146,6 +156,100 @@ class Guests {
   pid_t child_ = 0;
 };
 
+/// What a page does, but for drawing: a WebSocket at tendon-dash's /live (RFC 6455, section 4.1), all of which is read.
+class Page {
+ public:
+  explicit Page(const std::string& address) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const Address dash = parse_address(address);
+    sockaddr_in there{};
+    there.sin_family = AF_INET;
+    there.sin_port = htons(dash.port);
+    there.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const std::string hello = "GET /live HTTP/1.1\r\nHost: " + address + "\r\nOrigin: http://" + address +
+                              "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                              "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+    if (::connect(socket_, reinterpret_cast<const sockaddr*>(&there), sizeof there) != 0 ||
+        ::send(socket_, hello.data(), hello.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(hello.size())) {
+      const int error = errno;
+      ::close(socket_);
+      throw std::system_error(error, std::generic_category(), "tendon-dash at " + address);
+    }
+  }
+  ~Page() { ::close(socket_); }
+  Page(const Page&) = delete;
+  Page& operator=(const Page&) = delete;
+
+  /// Bytes that have come since the last call.
+  std::size_t read() {
+    std::array<char, 65536> bytes{};
+    std::size_t all = 0;
+    for (ssize_t size = 1; size > 0; all += static_cast<std::size_t>(std::max<ssize_t>(size, 0))) {
+      size = ::recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    }
+    return all;
+  }
+
+ private:
+  int socket_;
+};
+
+/// tendon-dash, in a process of its own, with a page.
+class Dashboard {
+ public:
+  Dashboard(const std::filesystem::path& program, const Address& server)
+      : process_(program, {"--server", to_string(server), "--listen", "127.0.0.1:0", "--json"}, "/"),
+        page_(address_in(process_.wait_for_line("\"listening\""))) {}
+  /// It says Bye, so that the next block is without it.
+  ~Dashboard() {
+    process_.signal(SIGTERM);
+    process_.wait();
+  }
+  Dashboard(const Dashboard&) = delete;
+  Dashboard& operator=(const Dashboard&) = delete;
+  std::size_t read() { return page_.read(); }
+
+ private:
+  static std::string address_in(const std::string& line) {
+    const std::string key = "127.0.0.1:";
+    const std::size_t begin = line.find(key);
+    return line.substr(begin, line.find_first_not_of("0123456789", begin + key.size()) - begin);
+  }
+
+  e2e::Process process_;
+  Page page_;
+};
+
+/// A recording into a file that is gone with it.
+class Recording {
+ public:
+  Recording() : path_(make()), sink_(path_), recorder_({}, sink_) {}
+  ~Recording() { std::filesystem::remove(path_); }
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+  Recorder& recorder() { return recorder_; }
+
+ private:
+  static std::filesystem::path make() {
+    std::string path = (std::filesystem::temp_directory_path() / "tendon-bench-XXXXXX").string();
+    const int file = ::mkstemp(path.data());
+    if (file < 0) throw std::system_error(errno, std::generic_category(), path);
+    ::close(file);
+    return path;
+  }
+
+  std::filesystem::path path_;
+  FileSink sink_;
+  Recorder recorder_;
+};
+
+/// Beside this program; empty where it was not built.
+std::optional<std::filesystem::path> dashboard_program() {
+  const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tendon-dash";
+  return std::filesystem::exists(program) ? std::optional(program) : std::nullopt;
+}
+
+enum class Kind { kAlone, kRecorder, kObservers, kDashboard };
+
 /// Of one kind of block, all of them together.
 struct Figures {
   std::vector<double> late;  ///< µs, of each wake-up
@@ -153,6 +257,7 @@ struct Figures {
   std::uint64_t datagrams = 0;  ///< that the server has sent
   Duration network_thread{};    ///< processor time
   Duration guests{};            ///< likewise, of their process
+  std::uint64_t page_bytes = 0;
 };
 
 SimulatedDevice::Config device_config() {
@@ -175,7 +280,7 @@ class WakeUps {
         network_(
             [&] {
               NetworkLoop::Config config;
-              config.max_observers = options.observers;
+              config.max_observers = options.observers + 1;
               DeviceDescription about;
               about.name = "device";
               about.model = device_.info().name;
@@ -195,17 +300,25 @@ class WakeUps {
       clockid_t guests_clock{};
       pthread_getcpuclockid(network.native_handle(), &network_clock);
       clock_getcpuclockid(guests_.pid(), &guests_clock);
-      for (int block = 0; block < 2 * options_.blocks; ++block) {
+      const int kinds = dash_ ? 4 : 3;
+      for (int block = 0; block < kinds * options_.blocks; ++block) {
         only_sleep();
-        const bool with = block % 2 == 1;
-        guests_.let_observers_in(with);
-        watch(kSettle, nullptr);
-        Figures& figures = with ? observed : alone;
+        const auto kind = static_cast<Kind>(block % kinds);
+        guests_.let_observers_in(kind == Kind::kObservers);
+        std::optional<Recording> recording;
+        if (kind == Kind::kRecorder) recording.emplace();
+        std::optional<Dashboard> dashboard;
+        if (kind == Kind::kDashboard) dashboard.emplace(*dash_, link_.local_address());
+        const auto look = [&](Duration lasts, Figures* into) {
+          watch(lasts, recording ? &recording->recorder() : nullptr, dashboard ? &*dashboard : nullptr, into);
+        };
+        look(kSettle, nullptr);
+        Figures& figures = of[static_cast<std::size_t>(kind)];
         const std::uint64_t overruns = haptic_.stats().overruns;
         const std::uint64_t sent = datagrams_;
         const Duration network_before = read(network_clock);
         const Duration guests_before = read(guests_clock);
-        watch(milliseconds(options_.block_ms), &figures);
+        look(milliseconds(options_.block_ms), &figures);
         figures.overruns += haptic_.stats().overruns - overruns;
         figures.datagrams += datagrams_ - sent;
         figures.network_thread += read(network_clock) - network_before;
@@ -218,7 +331,8 @@ class WakeUps {
     end(haptic, network);
   }
 
-  Figures asleep, alone, observed;
+  Figures asleep;
+  std::array<Figures, 4> of;  ///< Kind
   bool realtime = true;
   std::uint64_t welcomed() const { return network_.stats().welcomed; }
 
@@ -292,21 +406,27 @@ class WakeUps {
   }
 
   /// The log thread: takes records out, and keeps how late the steps were.
-  void watch(Duration lasts, Figures* into) {
+  void watch(Duration lasts, Recorder* recorder, Dashboard* dashboard, Figures* into) {
     for (const LocalTime end = clock::now() + lasts; clock::now() < end;) {
       while (const StepRecord* step = mail_.steps.front()) {
         if (into != nullptr) into->late.push_back(1e6 * seconds(step->hand.at - step->scheduled));
+        if (recorder != nullptr) recorder->record(*step, 0);
         mail_.steps.pop();
       }
       while (const DatagramRecord* record = mail_.datagrams.front()) {
         datagrams_ += record->direction == DatagramRecord::Direction::kOut ? 1 : 0;
+        if (recorder != nullptr) recorder->record(*record);
         mail_.datagrams.pop();
       }
+      const std::size_t page_bytes = dashboard != nullptr ? dashboard->read() : 0;
+      if (into != nullptr) into->page_bytes += page_bytes;
+      if (recorder != nullptr) recorder->tick(clock::now());
       clock::sleep_until(clock::now() + milliseconds(20));
     }
   }
 
   Options options_;
+  std::optional<std::filesystem::path> dash_ = dashboard_program();
   SimulatedDevice device_;
   Mailboxes mail_;
   UdpLink link_{parse_address("127.0.0.1:0")};
@@ -328,7 +448,7 @@ void measure_wake_ups(Run& run) {
   wake_ups.run();
   ::munlockall();  // of enter_realtime
   const std::uint64_t expected = 1 + options.observers * static_cast<std::uint64_t>(options.blocks);
-  if (wake_ups.welcomed() < expected || wake_ups.alone.late.empty() || wake_ups.observed.late.empty()) {
+  if (wake_ups.welcomed() < expected || wake_ups.of[0].late.empty() || wake_ups.of[2].late.empty()) {
     throw std::runtime_error(std::to_string(wake_ups.welcomed()) + " sessions were opened, " +
                              std::to_string(expected) + " expected");
   }
@@ -356,8 +476,14 @@ void measure_wake_ups(Run& run) {
     row.note = note;
     run.add(row);
   };
-  line("haptic thread, a controller alone", wake_ups.alone);
-  line("haptic thread, and " + std::to_string(options.observers) + " observers", wake_ups.observed);
+  const auto of = [&](Kind kind) -> const Figures& { return wake_ups.of[static_cast<std::size_t>(kind)]; };
+  line("haptic thread, a controller alone", of(Kind::kAlone));
+  line("… and a recording", of(Kind::kRecorder));
+  line("… and " + std::to_string(options.observers) + " observers", of(Kind::kObservers));
+  const Figures& dashboard = of(Kind::kDashboard);
+  if (dashboard.late.empty()) return;  // tendon-dash is not built
+  if (dashboard.page_bytes == 0) throw std::runtime_error("tendon-dash told its page nothing");
+  line("… and tendon-dash with a page", dashboard);
 }
 
 }  // namespace tendon::bench
