@@ -118,8 +118,7 @@ int run(const Options& options) {
   Board board;
   WebCounts counts;
   BridgeCounts bridge;
-  Feed feed(board, {.server = to_string(options.web.server), .arms = false, .recordings = recordings.has_value()},
-            counts, start);
+  Feed feed(board, {.server = to_string(options.web.server), .recordings = recordings.has_value()}, counts, start);
   const Routes routes(options.routes, {.page = page_files(),
                                        .recordings = recordings ? &*recordings : nullptr,
                                        .metrics = [&] { return metrics_text(board, counts, bridge); }});

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "clients/dashboard/json.h"
 #include "protocol/limits.h"
 
 namespace tendon::dash {
@@ -49,16 +48,6 @@ bool Feed::hear(LocalTime now, PageId id, std::string_view line) {
     page.reports_due = true;
     return true;
   }
-  if (const auto device = number_after(line, "arm ")) {
-    if (!abilities_.arms) {
-      tell(id, false, "tendon-dash was not started with --arm");
-    } else if (arm_asked_) {
-      tell(id, false, "somebody else is at it");
-    } else {
-      arm_asked_ = ArmAsked{id, *device};
-    }
-    return true;
-  }
   return false;
 }
 
@@ -97,14 +86,6 @@ void Feed::tick(LocalTime now) {
 std::optional<std::string> Feed::next(PageId page) {
   const auto found = pages_.find(page);
   return found == pages_.end() ? std::nullopt : found->second.post.next();
-}
-
-void Feed::tell(PageId page, bool done, std::string_view words) {
-  const auto found = pages_.find(page);
-  if (found == pages_.end()) return;
-  JsonWriter json;
-  json.begin_object().key("type").value("answer").key("done").value(done).key("words").value(words).end_object();
-  found->second.post.put(PagePost::Kind::kAnswer, json.take());
 }
 
 }  // namespace tendon::dash

@@ -18,10 +18,8 @@ namespace tendon::dash {
 /// Tells every page that looks on what is new on the Board, without a socket: what a page says goes in, what it is to
 /// be told comes out.
 ///
-/// A page looks at one device, at first at the server's first one, and says what it wants in one line of text:
-///
-///     watch N          tell me of device N from now on
-///     arm N            clear the fault of device N, or arm it (see Abilities::arms)
+/// A page looks at one device, at first at the server's first one. "watch N" says that it looks at device N from now
+/// on.
 ///
 /// It is told with every tick what has come of its device, and once a second how the loop and the engines do. Each text
 /// is made once for all pages that look at the same device.
@@ -34,11 +32,6 @@ class Feed {
   static constexpr Duration kTick = std::chrono::microseconds(16'667);
   /// Lines that a page may say in a second: a person clicks less often.
   static constexpr double kMaxLinesHz = 20;
-
-  struct ArmAsked {
-    PageId page;
-    std::uint32_t device;
-  };
 
   /// `board` and `counts` must outlive the feed.
   Feed(Board& board, Abilities abilities, WebCounts& counts, LocalTime now)
@@ -55,11 +48,6 @@ class Feed {
   /// The next text for a page; empty when none waits.
   std::optional<std::string> next(PageId page);
 
-  /// A page that wants to arm a device; empty when none does.
-  std::optional<ArmAsked> take_arm() { return std::exchange(arm_asked_, std::nullopt); }
-  /// … and what came of it, in words.
-  void tell(PageId page, bool done, std::string_view words);
-
  private:
   struct Page {
     std::uint32_t device = 0;
@@ -75,7 +63,6 @@ class Feed {
   LocalTime next_reports_;
   PageId last_ = 0;
   std::map<PageId, Page> pages_;
-  std::optional<ArmAsked> arm_asked_;
 };
 
 }  // namespace tendon::dash

@@ -166,7 +166,7 @@ std::string server_json(const Board& board, const Abilities& abilities) {
   json.begin_object().key("type").value("server").key("address").value(abilities.server);
   json.key("contact").value(name(board.contact())).key("words").value(board.words());
   json.key("version").value(board.welcome() ? board.welcome()->server : "");
-  json.key("arms").value(abilities.arms).key("recordings").value(abilities.recordings);
+  json.key("recordings").value(abilities.recordings);
   json.key("devices").begin_array();
   for (const auto& [number, device] : board.devices()) {
     if (device.about) write(json, *device.about);

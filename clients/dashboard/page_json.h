@@ -18,7 +18,6 @@ namespace tendon::dash {
 /// What tendon-dash itself was told at its start, which the page has to know.
 struct Abilities {
   std::string server;       ///< HOST:PORT of tendond
-  bool arms = false;        ///< the button is allowed
   bool recordings = false;  ///< there is a folder
 };
 

@@ -18,9 +18,8 @@ namespace tendon::dash {
 class PagePost {
  public:
   enum class Kind : std::uint8_t {
-    kServer,   ///< the newest of these three replaces the one before
+    kServer,   ///< the newest of these two replaces the one before
     kReports,  //
-    kAnswer,   //
   };
   /// An eighth of a second: what a page makes up for without that a hand on the screen looks late.
   static constexpr std::size_t kMaxBatches = 8;
@@ -61,7 +60,7 @@ class PagePost {
     std::string text;
     std::size_t states;
   };
-  std::array<std::optional<std::string>, 3> newest_;
+  std::array<std::optional<std::string>, 2> newest_;
   std::deque<Batch> batches_;
   std::uint64_t skipped_ = 0;
 };

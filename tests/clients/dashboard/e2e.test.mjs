@@ -12,6 +12,9 @@ const { WebSocket } = packageOf("clients/typescript", "ws");
 
 async function open(test, url, options = {}) {
   const socket = new WebSocket(url, options);
+  // From the beginning: the first words may come with the very answer that opens it.
+  socket.said = [];
+  socket.on("message", (data, binary) => binary || socket.said.push(JSON.parse(data)));
   test.after(() => socket.terminate());
   socket.on("error", () => {});
   await Promise.race([once(socket, "open"), once(socket, "close")]);
@@ -45,9 +48,8 @@ it("shows a server, its device and its engine, live and as metrics", async (test
   new Program(test, "virtual_wall", ["--server", server.address, "--rate-hz", "200"]);
   const { url, address } = await startDash(test, server.address, "--recordings", folder);
 
-  const said = [];
   const page = await open(test, `ws://${address}/live`, { origin: url });
-  page.on("message", (data) => said.push(JSON.parse(data)));
+  const { said } = page;
   const find = (what, fits) => until(what, () => said.find(fits), () => said.slice(-2).map((s) => JSON.stringify(s).slice(0, 400)).join("\n"));
   const about = await find("the device is described", (m) => m.type === "server" && m.contact === "open" && m.devices.length === 1);
   assert.deepEqual([about.devices[0].name, about.devices[0].model, about.devices[0].loop_hz, about.address], ["demo", "falcon", 1000, server.address]);
@@ -84,8 +86,7 @@ it("watches all devices of a server, and tells a page of the one that it chose",
   const server = await startServer(test, folder, ["left", "right"], "--record", "/dev/null");
   const { address } = await startDash(test, server.address);
   const page = await open(test, `ws://${address}/live`);
-  const said = [];
-  page.on("message", (data) => said.push(JSON.parse(data)));
+  const { said } = page;
   await until("both are described", () => said.some((m) => m.type === "server" && m.devices.length === 2));
   await until("states of the first one come", () => said.some((m) => m.type === "states" && m.device === 0));
   page.send("watch 1");

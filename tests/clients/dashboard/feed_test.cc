@@ -44,7 +44,7 @@ class FeedTest : public testing::Test {
   LocalTime now_{std::chrono::seconds(5)};
   Board board_;
   WebCounts counts_;
-  Feed feed_{board_, {.server = "127.0.0.1:47100", .arms = true}, counts_, now_};
+  Feed feed_{board_, {.server = "127.0.0.1:47100"}, counts_, now_};
   std::uint64_t tick_ = 0;
 };
 
@@ -112,7 +112,7 @@ TEST_F(FeedTest, KeepsTheNewestForAPageThatDoesNotRead) {
 
 TEST_F(FeedTest, SendsAwayWhoSpeaksAnotherLanguage) {
   for (const char* line : {"", "watch", "watch ", "watch -1", "watch 16", "watch 1 ", "watch 1e1", "watch 99999999999",
-                           "hello", "arm", "arm x", "{\"type\":\"watch\"}"}) {
+                           "hello", "arm 0", "{\"type\":\"watch\"}"}) {
     const auto page = feed_.join(now_);
     EXPECT_FALSE(feed_.hear(now_, page, line)) << line;
     feed_.leave(page);
@@ -128,29 +128,6 @@ TEST_F(FeedTest, SendsAwayWhoSpeaksTooFast) {
   EXPECT_FALSE(feed_.hear(now_, page, "watch 1"));
   now_ += std::chrono::seconds(1);
   EXPECT_TRUE(feed_.hear(now_, page, "watch 1"));
-}
-
-TEST_F(FeedTest, AsksForOneDeviceToBeArmedAtATime) {
-  const auto one = feed_.join(now_);
-  const auto two = feed_.join(now_);
-  EXPECT_TRUE(feed_.hear(now_, one, "arm 1"));
-  EXPECT_TRUE(feed_.hear(now_, two, "arm 0"));
-  const auto asked = feed_.take_arm();
-  ASSERT_TRUE(asked);
-  EXPECT_EQ(asked->page, one);
-  EXPECT_EQ(asked->device, 1U);
-  EXPECT_FALSE(feed_.take_arm());
-  feed_.tell(one, true, "armed");
-  EXPECT_EQ(all(one).back(), (json{{"type", "answer"}, {"done", true}, {"words", "armed"}}));
-  EXPECT_EQ(all(two).back()["done"], false);
-}
-
-TEST_F(FeedTest, ArmsNothingUnlessItWasAllowedTo) {
-  Feed feed(board_, {.server = "", .arms = false}, counts_, now_);
-  const auto page = feed.join(now_);
-  EXPECT_TRUE(feed.hear(now_, page, "arm 0"));
-  EXPECT_FALSE(feed.take_arm());
-  EXPECT_EQ(json::parse(*feed.next(page))["words"], "tendon-dash was not started with --arm");
 }
 
 }  // namespace

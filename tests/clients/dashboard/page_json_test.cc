@@ -68,10 +68,9 @@ TEST(PageJson, TellsTheServerAndItsDevices) {
        .max_force = 8,
        .loop_hz = 1000,
        .channels = {{.name = "main", .rule = ChannelRule::kPriority, .lease = milliseconds(500), .holder = "wall"}}});
-  const json text = json::parse(server_json(board, {.server = "127.0.0.1:47100", .arms = true, .recordings = false}));
+  const json text = json::parse(server_json(board, {.server = "127.0.0.1:47100", .recordings = false}));
   EXPECT_EQ(text["contact"], "open");
   EXPECT_EQ(text["version"], "tendond \"1\"");
-  EXPECT_EQ(text["arms"], true);
   EXPECT_EQ(text["recordings"], false);
   const json device = text["devices"][0];
   EXPECT_EQ(device["number"], 1);

@@ -43,10 +43,11 @@ const heightFor = (width: number): number => (width < 500 ? 168 : 196);
 /** One plot over time: lines with a unit, a legend that tells their values at the cursor. */
 export class Chart {
   readonly element: HTMLElement;
-  readonly #plot: uPlot;
+  #plot: uPlot;
   readonly #box: HTMLElement;
   readonly #values: HTMLElement[];
   #width = 0;
+  #shared: [number, number] | undefined;
 
   constructor(readonly spec: ChartSpec, events: ChartEvents) {
     this.#values = spec.lines.map(() => h("span", { class: "value" }));
@@ -63,7 +64,7 @@ export class Chart {
       padding: [8, 20, 0, 0],
       legend: { show: false },
       cursor: { y: false, drag: { x: true, y: false, setScale: false }, points: { show: false }, sync: { key: "tendon" } },
-      scales: { x: { time: false }, y: { range: (_, low, high) => this.#range(low, high) } },
+      scales: { x: { time: false }, y: { range: () => this.#range() } },
       axes: [
         { stroke: () => theme("quiet"), font, grid, ticks: grid, size: 30, space: 70, values: (_, at) => at.map((t) => `${Number(t.toFixed(6))} s`) },
         { stroke: () => theme("quiet"), font, grid, ticks: { show: false }, size: 48, space: 28, values: (_, at) => at.map((v) => String(Number(v.toPrecision(6))).replace("-", "−")) },
@@ -115,6 +116,27 @@ export class Chart {
     });
   }
 
+  /** The least and the most that is drawn, but for the line that may leave. */
+  extent(): [number, number] {
+    let [from, to] = [Infinity, -Infinity];
+    this.spec.lines.forEach((line, k) => {
+      if (line.column === this.spec.mayLeave) return;
+      for (const v of this.#plot?.data[k + 1] ?? []) {
+        if (v == null) continue;
+        if (v < from) from = v;
+        if (v > to) to = v;
+      }
+    });
+    return from > to ? [0, 0] : [from, to];
+  }
+
+  /** Draws with the axis of another chart: two runs side by side are compared by eye. */
+  share([from, to]: readonly [number, number]): void {
+    this.#shared = [from, to];
+    this.#plot.setScale("y", { min: from, max: to });
+    this.#shared = undefined;
+  }
+
   /** The theme has changed. */
   repaint(): void {
     this.#plot.redraw(false, true);
@@ -124,28 +146,15 @@ export class Chart {
     this.#plot.destroy();
   }
 
-  #range(low: number | null, high: number | null): [number, number] {
+  #range(): [number, number] {
     const { positive, least, mayLeave } = this.spec;
-    let [from, to] = [low ?? 0, high ?? 0];
-    if (mayLeave) {
-      // Without the line that may leave.
-      [from, to] = [Infinity, -Infinity];
-      this.spec.lines.forEach((line, k) => {
-        if (line.column === mayLeave) return;
-        for (const v of this.#plot.data[k + 1] ?? []) {
-          if (v == null) continue;
-          if (v < from) from = v;
-          if (v > to) to = v;
-        }
-      });
-      if (from > to) [from, to] = [0, 0];
-      to *= 1.25;
-    }
-    if (positive) from = 0;
+    let [from, to] = this.#shared ?? this.extent();
+    if (mayLeave) to *= 1.25;
+    if (positive) from = Math.min(0, from);
     const middle = (from + to) / 2;
-    if (to - from < least) [from, to] = positive ? [0, Math.max(to, least)] : [middle - least / 2, middle + least / 2];
+    if (to - from < least) [from, to] = positive && from === 0 ? [0, Math.max(to, least)] : [middle - least / 2, middle + least / 2];
     const room = (to - from) * 0.06;
-    return [positive ? 0 : from - room, to + room];
+    return [positive && from === 0 ? 0 : from - room, to + room];
   }
 }
 

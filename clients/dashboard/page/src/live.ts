@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 import { h, mark, say } from "./dom.js";
 import { Scrubber } from "./scrubber.js";
-import { Stream, type AnswerMessage, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
+import { Stream, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
 import { Track } from "./track.js";
 import { View, type Facts } from "./view.js";
-import { count, digits, kSafety } from "./words.js";
+import { count, digits, duration, kSafety } from "./words.js";
 
 /** Steps that are kept: two minutes at 1 kHz. */
 const kKept = 120_000;
@@ -23,8 +23,6 @@ export class Live {
   readonly #device: HTMLSelectElement;
   readonly #window: HTMLSelectElement;
   readonly #about = h("span", { class: "quiet about" });
-  readonly #arm: HTMLButtonElement;
-  readonly #answer = h("span", { class: "answer", role: "status" });
   #server: ServerMessage | undefined;
   #reports: ReportsMessage | undefined;
   #watched = 0;
@@ -42,7 +40,6 @@ export class Live {
     this.#device = h("select", { id: "device", "aria-label": "Device", change: () => this.#watch(Number(this.#device.value)) });
     this.#window = h("select", { id: "window", "aria-label": "Time shown", change: () => this.#still && this.#setStill(this.#around()) },
       ...kWindows.map((s) => h("option", { value: s, selected: s === 5 }, `${s} s`)));
-    this.#arm = h("button", { type: "button", id: "arm", class: "arm", hidden: true, click: () => this.#stream.say(`arm ${this.#watched}`) }, "Arm");
     const zoom = (factor: number): void => {
       const { from, to } = this.#still ?? this.#following();
       const [middle, half] = [(from + to) / 2, ((to - from) / 2) * factor];
@@ -62,7 +59,6 @@ export class Live {
     this.element = h("main", { class: "live" },
       h("div", { class: "bar" },
         h("label", { class: "field" }, "Device ", this.#device), this.#about, h("span", { class: "space" }),
-        this.#answer, this.#arm,
         h("label", { class: "field" }, "Show ", this.#window),
         h("span", { class: "group" },
           h("button", { type: "button", id: "zoom-in", "aria-label": "Zoom in", title: "Zoom in", click: () => zoom(0.5) }, "+"),
@@ -83,7 +79,6 @@ export class Live {
     this.#dirty = true;
     if (message.type === "states") this.#takeStates(message);
     else if (message.type === "reports") this.#reports = message.device === this.#watched ? message : this.#reports;
-    else if (message.type === "answer") this.#takeAnswer(message);
     else this.#takeServer(message);
   }
 
@@ -118,12 +113,6 @@ export class Live {
       if (first && !server.devices.some((d) => d.number === this.#watched)) this.#watch(first.number);
     }
     this.#tell();
-  }
-
-  #takeAnswer(answer: AnswerMessage): void {
-    say(this.#answer, answer.words);
-    mark(this.#answer, "data-level", answer.done ? "good" : "bad");
-    setTimeout(() => say(this.#answer, ""), 8000);
   }
 
   #changed(open: boolean): void {
@@ -186,8 +175,6 @@ export class Live {
     const { from, to } = this.#still ?? this.#following();
     const info = this.#server?.devices.find((d) => d.number === this.#watched);
     say(this.#about, info ? `${info.model}, ${count(info.loop_hz)} steps per second, at most ${digits(info.max_force_n)} N` : "");
-    const safety = this.#reports?.loop?.safety;
-    this.#arm.hidden = !(this.#server?.arms && safety !== "unguarded");
     const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
     this.#view.draw(this.#track, from, to, cursor, this.#facts());
     if (this.#still) this.#scrubber.draw([this.#track], from, to);
@@ -211,7 +198,7 @@ export class Live {
       engines,
       noEngines: holders.length > 0 ? `${holders.map((c) => `${c.holder} on channel ${c.name}`).join(", ")}.` : "No engine sends forces.",
       delay: slowest
-        ? { name: "Delay", value: `${digits(slowest.round_trip_ms!.median)} ms`, note: `${slowest.name} and back; 99\u00a0%: ${digits(slowest.round_trip_ms!.p99)} ms` }
+        ? { name: "Delay", value: duration(slowest.round_trip_ms!.median / 1e3), note: `${slowest.name} and back; 99\u00a0%: ${duration(slowest.round_trip_ms!.p99 / 1e3)}` }
         : { name: "Delay", value: "–", note: "no engine sends forces" },
       loss: lossiest
         ? { name: "Loss", value: `${digits(100 * lossOf(lossiest), 2)} %`, note: `of the datagrams of ${lossiest.name}` }
@@ -223,6 +210,7 @@ export class Live {
           ? `In the last second ${count(loop.steps)} steps, ${count(loop.missed)} missed, ${count(loop.overruns)} too late for the control law, ${count(loop.unseen)} without a position. ${count(loop.missed_total)} missed of ${count(loop.steps_total)} since.`
           : "",
       },
+      gives: !loop || (loop.fault === "" && (loop.safety === "armed" || loop.safety === "unguarded")),
       degraded: loop?.degraded ?? "",
     };
   }

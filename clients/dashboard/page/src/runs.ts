@@ -12,7 +12,8 @@ interface Entry {
   readonly modified_unix_s: number;
 }
 
-const kNarrow = 2;
+/** Side by side. */
+const kMostRuns = 2;
 
 /** The recordings of a folder: a list, one of them, or two side by side, in the view of a live device. */
 export class Runs {
@@ -37,7 +38,7 @@ export class Runs {
     for (const run of this.#open) run.view.destroy();
     this.#open = [];
     this.#scrubber = undefined;
-    const wanted = names.filter((name) => name !== "").slice(0, kNarrow);
+    const wanted = names.filter((name) => name !== "").slice(0, kMostRuns);
     const said = h("p", { class: "progress", role: "status", text: wanted.length > 0 ? "Reading …" : "Looking …" });
     this.element.replaceChildren(said);
     try {
@@ -107,6 +108,10 @@ export class Runs {
     this.#scrubber.draw(this.#open.map((run) => run.track), this.#from, this.#to);
     const cursor = this.#cursor ?? this.#to;
     for (const run of this.#open) run.draw(this.#from, this.#to, cursor);
+    if (this.#open.length < 2) return;
+    const all = this.#open.map((run) => run.view.extents());
+    const widest = all[0]!.map((_, i): [number, number] => [Math.min(...all.map((one) => one[i]![0])), Math.max(...all.map((one) => one[i]![1]))]);
+    for (const run of this.#open) run.view.share(widest);
   }
 }
 
@@ -170,6 +175,7 @@ class Run {
         : { name: "Age of the force", value: "–", note: "no force was in use" },
       loss: { name: "Missing steps", value: count(missed), note: `of ${count(last - first + missed)} in this time` },
       lateness: { buckets: last > first ? buckets : [], what: "In this time", more: "" },
+      gives: true,
       degraded: "",
     };
   }

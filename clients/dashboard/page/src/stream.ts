@@ -20,7 +20,6 @@ export interface ServerMessage {
   readonly contact: "greeting" | "open" | "unanswered" | "refused" | "lost";
   readonly words: string;
   readonly version: string;
-  readonly arms: boolean;
   readonly recordings: boolean;
   readonly devices: readonly DeviceInfo[];
 }
@@ -84,12 +83,7 @@ export interface ReportsMessage {
   readonly loop: LoopReport | null;
   readonly engines: readonly EngineReport[];
 }
-export interface AnswerMessage {
-  readonly type: "answer";
-  readonly done: boolean;
-  readonly words: string;
-}
-export type Message = ServerMessage | StatesMessage | ReportsMessage | AnswerMessage;
+export type Message = ServerMessage | StatesMessage | ReportsMessage;
 
 /** The way to tendon-dash, which is found again when it was gone. */
 export class Stream {

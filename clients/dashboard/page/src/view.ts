@@ -5,7 +5,7 @@ import { Histogram } from "./histogram.js";
 import { Lanes } from "./lanes.js";
 import type { EngineReport } from "./stream.js";
 import type { Track } from "./track.js";
-import { digits, kModes, type Level } from "./words.js";
+import { digits, duration, kModes, type Level } from "./words.js";
 
 export const kCharts: readonly ChartSpec[] = [
   {
@@ -39,6 +39,8 @@ export interface Facts {
   readonly delay: { readonly name: string; readonly value: string; readonly note: string };
   readonly loss: { readonly name: string; readonly value: string; readonly note: string };
   readonly lateness: { readonly buckets: readonly number[]; readonly what: string; readonly more: string };
+  /** The device gives out what it is told to. */
+  readonly gives: boolean;
   /** What the server does less of; empty: nothing. */
   readonly degraded: string;
 }
@@ -82,6 +84,14 @@ export class View {
     this.#drawEngines(facts);
   }
 
+  extents(): [number, number][] {
+    return this.#charts.map((chart) => chart.extent());
+  }
+
+  share(extents: readonly (readonly [number, number])[]): void {
+    this.#charts.forEach((chart, i) => chart.share(extents[i]!));
+  }
+
   clear(): void {
     this.#lanes.clear();
   }
@@ -107,7 +117,8 @@ export class View {
     const known = i >= track.begin;
     const value = (column: "applied" | "wanted" | "permitted" | "energy" | "age"): number => (known ? track.column(column)[i]! : NaN);
     const words = known ? kModes[track.mode[i]!] : undefined;
-    show(mode, words?.level ?? "off", words?.name ?? "–", words?.meaning ?? "no state has come");
+    if (words?.level === "good" && !facts.gives) show(mode, "off", words.name, "a fresh force has come, but the device gives none out");
+    else show(mode, words?.level ?? "off", words?.name ?? "–", words?.meaning ?? "no state has come");
     const bound = Number.isFinite(value("permitted")) ? `${digits(value("permitted"))} permitted` : "no bound";
     show(force, "off", `${digits(value("applied"))} N`, Number.isFinite(value("wanted")) ? `of ${digits(value("wanted"))} wanted, ${bound}` : bound);
     show(energy, value("energy") < 0 ? "bad" : "off", `${digits(1e3 * value("energy"))} mJ`, "may still be given out");
@@ -130,8 +141,8 @@ export class View {
 function card(engine: EngineReport): HTMLElement {
   const late = engine.late_server + engine.late_network + engine.late_engine;
   const lost = engine.lost / Math.max(engine.lost + engine.received, 1);
-  const ms = (delays: { median: number; p99: number } | null): string => (delays ? `${digits(delays.median)} ms` : "–");
-  const p99 = (delays: { median: number; p99: number } | null): string => (delays ? `99\u00a0%: ${digits(delays.p99)} ms` : "");
+  const ms = (delays: { median: number; p99: number } | null): string => (delays ? duration(delays.median / 1e3) : "–");
+  const p99 = (delays: { median: number; p99: number } | null): string => (delays ? `99\u00a0%: ${duration(delays.p99 / 1e3)}` : "");
   const level: Level = engine.forces_refused ? "bad" : late > 0 || engine.forces === 0 ? "notice" : "good";
   const row = (name: string, value: string, note: string): HTMLElement =>
     h("tr", {}, h("th", { scope: "row", text: name }), h("td", { text: value }), h("td", { class: "note", text: note }));
@@ -146,7 +157,7 @@ function card(engine: EngineReport): HTMLElement {
       row("to the server", ms(engine.to_server_ms), p99(engine.to_server_ms)),
       row("to the engine", ms(engine.to_client_ms), p99(engine.to_client_ms)),
       row("lost", `${digits(100 * lost, 2)} %`, `${engine.lost} of ${engine.lost + engine.received}`),
-      row("forces", `${digits(rate)} /s`, late > 0 ? `${late} late: ${why}` : "none late")),
+      row("forces", `${Math.round(rate)} /s`, late > 0 ? `${late} late: ${why}` : "none late")),
     engine.state_one_in > 1 && h("p", { class: "note", text: `Its way is full: it is sent one state in ${engine.state_one_in}.` }),
     engine.forces_refused && h("p", { class: "note", text: "Its forces are not taken: its way loses too much." }),
     engine.words !== "" && h("p", { class: "note", text: `${engine.words[0]!.toUpperCase()}${engine.words.slice(1)}.` }));
