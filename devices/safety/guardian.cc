@@ -60,8 +60,9 @@ struct Charge {
   std::optional<ZeroPacket> zero;
 };
 
-/// The next order. False at the end: nobody can give any more.
-bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges) noexcept {
+/// The next order, which `flags` may say not to wait for. False when there is none: at the end nobody can give any
+/// more.
+bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges, int flags = 0) noexcept {
   alignas(Order) std::array<std::byte, sizeof(Order)> bytes{};
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
   alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(int))> control{};
@@ -72,7 +73,7 @@ bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges) noe
   message.msg_controllen = control.size();
   ssize_t size = 0;
   do {
-    size = recvmsg(socket, &message, MSG_CMSG_CLOEXEC);
+    size = recvmsg(socket, &message, MSG_CMSG_CLOEXEC | flags);
   } while (size < 0 && errno == EINTR);
   if (size != static_cast<ssize_t>(bytes.size())) return false;
 
@@ -111,6 +112,8 @@ class NoSignals {
 
 /// What the kernel sends to the guardian when its parent, a thread of the server, is dead.
 constexpr int kParentDied = SIGUSR1;
+/// What the guardian says once it will hear of that.
+constexpr char kStandsGuard = 'g';
 
 // All signals are blocked.
 [[noreturn]] void stand_guard(int socket) noexcept {
@@ -130,13 +133,19 @@ constexpr int kParentDied = SIGUSR1;
   pollfd order{.fd = socket, .events = POLLIN, .revents = 0};
   pollfd parent{.fd = signalfd(-1, &death, SFD_CLOEXEC), .events = POLLIN, .revents = 0};
   std::array<Charge, Guardian::kDevices> charges;
-  for (bool server_lives = true; server_lives;) {
+  bool server_lives = send(socket, &kStandsGuard, 1, MSG_NOSIGNAL) == 1;
+  while (server_lives) {
     std::array<pollfd, 2> told = {order, parent};
     poll(told.data(), told.size(), -1);
-    if (told[0].revents != 0) server_lives = take_order(socket, charges);
-    // The parent alone: other threads may be about to die, one of them in the middle of a last command. So once more at
-    // the end, when there are none.
-    if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) end_forces(charges);
+    if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
+      while (take_order(socket, charges, MSG_DONTWAIT)) {
+      }
+      // The parent alone: other threads may be about to die, one of them in the middle of a last command. So once more
+      // at the end, when there are none.
+      end_forces(charges);
+    } else if (told[0].revents != 0) {
+      server_lives = take_order(socket, charges);
+    }
   }
   end_forces(charges);
   _exit(0);
@@ -196,10 +205,12 @@ Guardian::Guardian(const std::function<void()>& on_start) {
     parent_ = std::thread(watch);
   }
   pid_ = forked.get_future().get();
-  if (pid_ < 0) {
-    parent_.join();
+  char said = 0;
+  const bool stands = pid_ > 0 && read(ends[0], &said, 1) == 1;
+  if (!stands) {
     close(ends[0]);
-    throw std::system_error(-pid_, std::generic_category(), "no process for the guardian");
+    parent_.join();
+    throw std::system_error(pid_ < 0 ? -pid_ : ECHILD, std::generic_category(), "no process for the guardian");
   }
   socket_ = ends[0];
 }
