@@ -539,12 +539,15 @@ class Host {
       return sum;
     };
     bool counted = false;
+    std::uint64_t taken_before = 0;
+    const auto count = [&](bool counts) {
+      if (counts && !counted) taken_before = forces();
+      if (!counts && counted) result_.forces_taken = forces() - taken_before;
+      counted = counts;
+    };
     while (!stop_.load(std::memory_order_acquire)) {
       const LocalTime before = clock::now();
-      if (const bool counts = measuring_.load(std::memory_order_acquire); counts != counted) {
-        counted = counts;
-        result_.forces_taken = forces() - result_.forces_taken;
-      }
+      count(measuring_.load(std::memory_order_acquire));
       const Duration left =
           std::clamp<Duration>(*std::min_element(due.begin(), due.end()) - before, Duration::zero(), milliseconds(100));
       const timespec time{0, static_cast<long>(left.count())};
@@ -556,6 +559,7 @@ class Host {
         if (stepped || fds[s].revents != 0 || due[s] <= now) due[s] = networks_[s]->turn(now);
       }
     }
+    count(false);  // the fleet may have been stopped before this thread saw that the measurement had ended
     for (const auto& network : networks_) network->close(clock::now());
   }
 
