@@ -129,7 +129,7 @@ class SealedServer : public testing::Test {
         state.device = 1;
         second_->state.put(state);
       }
-      loop_->turn(now_);
+      if (tick_ % steps_a_turn_ == 0) loop_->turn(now_);
       for (Client* client : clients) client->client->turn(now_);
       for (const std::size_t count = wire_.size(); count_ < count; ++count_) {
         Datagram datagram = wire_[count_];
@@ -173,8 +173,9 @@ class SealedServer : public testing::Test {
   std::unique_ptr<Mailboxes> second_;  ///< of a second device
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
-  std::optional<Vec3> wanted_;  ///< as the device's loop says
-  bool measured_ = false;       ///< the log thread tells how the loops do
+  std::uint64_t steps_a_turn_ = 1;  ///< more: the network thread is late, and sees only the newest of them
+  std::optional<Vec3> wanted_;      ///< as the device's loop says
+  bool measured_ = false;           ///< the log thread tells how the loops do
   Health health_;
   std::uint64_t seed_ = 10;
 };
@@ -831,6 +832,40 @@ TEST_F(SealedServer, LeavesOutStatesThatAClientCanForetellWhenItAsksForIt) {
     a.client->stop(now_);
     run(milliseconds(10), {&a});
   }
+}
+
+TEST_F(SealedServer, TakesForcesThatAnswerAForetoldStepWhichItWasTooLateToSee) {
+  Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+  ForceClient::Config config = config_of(wall_, ++seed_);
+  config.rate_hz = 1000;
+  config.state_deadband = SetStateDeadband{.share = 0.1, .floor = 1e-3, .max_silence = milliseconds(20)};
+  const LocalTime first_step = now_;
+  a.client = std::make_unique<ForceClient>(
+      *a.end, server_.self, config, [](const DeviceState&) { return Touch(Vec3(1, 0, 0)); }, now_);
+  run(seconds(1), {&a});
+  const std::uint64_t unanswerable = loop_->stats().unanswerable;
+  const std::uint64_t forces = loop_->stats().forces;
+  steps_a_turn_ = 5;
+  std::deque<std::pair<LocalTime, Datagram>> to_server;  // 10 ms under way: the step after the answered one is known
+  std::uint64_t unseen = 0;
+  for (int i = 0; i < 500; ++i) {
+    run(milliseconds(1), {&a}, [&](const Datagram& datagram) {
+      if (datagram.from != a.end->self) return true;
+      to_server.emplace_back(now_ + milliseconds(10), datagram);
+      return false;
+    });
+    for (; !to_server.empty() && to_server.front().first <= now_; to_server.pop_front()) {
+      deliver(a.end->self, to_server.front().second.bytes);
+    }
+    const RemoteForce* const force = mail_->forces[0].take();
+    if (force == nullptr) continue;
+    // A step a millisecond: when it was sampled is known exactly.
+    EXPECT_EQ(force->answers - first_step, milliseconds(force->answers_tick - 1));
+    if (force->answers_tick % steps_a_turn_ != 0) ++unseen;
+  }
+  EXPECT_EQ(loop_->stats().unanswerable, unanswerable);
+  EXPECT_GT(loop_->stats().forces - forces, 450U);
+  EXPECT_GT(unseen, 90U);  // of those that were the newest in their turn
 }
 
 TEST_F(SealedServer, ASessionThatHasReachedItsAgeIsBegunAgainByItsClient) {
