@@ -411,17 +411,16 @@ void Server::report_trouble(Lane& lane) {
 }
 
 void Server::save_flight(Lane& lane) {
-  std::filesystem::path path = lanes_.front()->scene.recording.value_or("tendon.mcap");
-  path.replace_extension((lanes_.size() == 1 ? "" : "." + lane.scene.name) + ".fault-" +
-                         std::to_string(++lane.flights) + ".mcap");
   try {
+    const std::filesystem::path path =
+        flight_path(lanes_.front()->scene.recording, lanes_.size() == 1 ? "" : lane.scene.name, ++lane.flights);
     FileSink sink(path);
     write_flight(lane.mail.flight, {.scene = scene_record(lane), .started = started_}, sink);
     log::error("the steps before the fault are in " + path.string());
   } catch (const std::exception& problem) {
     log::error(std::string("the steps before the fault are lost: ") + problem.what());
-    lane.mail.flight.thaw();
   }
+  lane.mail.flight.thaw();
 }
 
 }  // namespace tendon

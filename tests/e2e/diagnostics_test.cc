@@ -101,7 +101,7 @@ TEST(Diagnostics, AnObserverSeesWhatIsWantedHowTheLoopDoesAndWhatTheEnginesNetwo
   server.stop();
 }
 
-TEST(Diagnostics, AnObserverSeesADeviceArmedAndItsFault) {
+TEST(Diagnostics, AnObserverSeesADeviceArmedAndItsFaultAndTheStepsBeforeItAreKept) {
   const ScratchFolder folder;
   // A hand that rests for seconds, long enough to be armed, and then moves faster than is allowed.
   const std::string scene = R"([device]
@@ -119,7 +119,8 @@ back_and_forth = true
 [safety.speed_trip]
 max_m_per_s = 0.05
 )";
-  Server server(folder.path(), write(folder.path() / "scene.toml", scene));
+  // Where the recording is no file, there is no "beside it".
+  Server server(folder.path(), write(folder.path() / "scene.toml", scene), {"--record", "/dev/null"});
   Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
   Guest engine(server.address(), [](const DeviceState&) { return Touch(Vec3::Zero()); });
   const auto reported = [&](Safety safety) {
@@ -135,6 +136,9 @@ max_m_per_s = 0.05
   EXPECT_EQ(watcher.client().device_report()->fault, "");
   ASSERT_TRUE(turn_until({&watcher, &engine}, [&] { return reported(Safety::kFault); }));
   EXPECT_EQ(watcher.client().device_report()->fault, "the handle was faster than a hand that holds it");
+  const std::string told = server.process().wait_for_line("the steps before the fault are ");
+  EXPECT_NE(told.find(" are in tendon.fault-1.mcap"), std::string::npos) << told;
+  EXPECT_FALSE(read_recording(folder.path() / "tendon.fault-1.mcap").steps.empty());
   server.stop();
 }
 
