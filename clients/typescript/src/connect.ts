@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
-import type { LinkReport, Welcome } from "./messages.js";
+import type { DeviceReport, LinkReport, PeerReport, Welcome } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
 /** Where datagrams to one server leave. */
@@ -25,6 +25,10 @@ export interface Guest {
   readonly welcome: Welcome | undefined;
   /** The server's newest word on how our forces fare, once a second while they come. */
   readonly report: LinkReport | undefined;
+  /** With `diagnostics`, the newest word on how the device's loop does, once a second … */
+  readonly deviceReport: DeviceReport | undefined;
+  /** … and by channel on the engine that it has, or had last. */
+  readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
   /** Says Bye and ends. */
@@ -95,6 +99,12 @@ class RealTimeGuest implements Guest {
   }
   get report(): LinkReport | undefined {
     return this.#client.report;
+  }
+  get deviceReport(): DeviceReport | undefined {
+    return this.#client.deviceReport;
+  }
+  get peerReports(): ReadonlyMap<number, PeerReport> {
+    return this.#client.peerReports;
   }
   stats(): ClientStats {
     return this.#client.stats();

@@ -5,8 +5,8 @@ import { Deadband, foretell, forceDeadbandObjection, stateDeadbandObjection, typ
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, type Contact, kFeatureLocalModel, kProtocolVersion, Role, type DeviceState, type LinkReport, type StateDeadband, type Stiffness,
-  type Vec3, type Welcome,
+  Code, type Contact, kFeatureDiagnostics, kFeatureLocalModel, kProtocolVersion, Role, type DeviceReport, type DeviceState, type LinkReport,
+  type PeerReport, type StateDeadband, type Stiffness, type Vec3, type Welcome,
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
@@ -61,6 +61,11 @@ export interface ClientConfig {
    * every state is asked for.
    */
   readonly stateDeadband?: StateDeadband | undefined;
+  /**
+   * Of an observer: to be told what the engines ask for (DeviceState.forceWanted), and once a second how the device's loop and
+   * its engines do. A server that knows nothing of this leaves it out.
+   */
+  readonly diagnostics?: boolean;
   /** The Hellos of one attempt go unanswered for so long before it is given up. */
   readonly patienceMs?: number;
   /** First wait before the next attempt. */
@@ -108,7 +113,7 @@ const kMinValidForMs = 20;
 const kMaxObservedPeriodMs = 100;
 
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
-  name: "guest", rateHz: 0, stateHz: 0, validForMs: 0, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000,
+  name: "guest", rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000,
   random: randomBytes,
 };
 
@@ -182,6 +187,8 @@ export class ForceClient {
   #foretells = false;
   #deadband: Deadband | undefined;
   #report: LinkReport | undefined;
+  #deviceReport: DeviceReport | undefined;
+  #peerReports: ReadonlyMap<number, PeerReport> = new Map();
   #nextCall: Nanoseconds;
   /** Of the newest force. */
   #sequence = 0n;
@@ -204,6 +211,7 @@ export class ForceClient {
   ) {
     this.#config = checked(config);
     this.#physics = "physics" in callback ? callback.physics : undefined;
+    if (this.#physics && this.#config.diagnostics) throw new RangeError("diagnostics: for observers only");
     this.#watch = "watch" in callback ? callback.watch : undefined;
     this.#role = this.#physics ? Role.CONTROLLER : Role.OBSERVER;
     this.#send = send;
@@ -269,13 +277,22 @@ export class ForceClient {
     return this.#report;
   }
 
+  /** With `diagnostics`, the newest word on how the device's loop does, once a second. Of the present session. */
+  get deviceReport(): DeviceReport | undefined {
+    return this.#deviceReport;
+  }
+  /** … and by channel on the engine that it has, or had last. It does not change any more. */
+  get peerReports(): ReadonlyMap<number, PeerReport> {
+    return this.#peerReports;
+  }
+
   #greet(now: Nanoseconds): void {
     const hello = {
       versionMin: kProtocolVersion,
       versionMax: kProtocolVersion,
       role: this.#role,
       name: this.#config.name,
-      features: [kFeatureLocalModel],
+      features: this.#config.diagnostics ? [kFeatureLocalModel, kFeatureDiagnostics] : [kFeatureLocalModel],
     };
     this.#handshake = new ClientHandshake(hello, this.#config.key, this.#config.random, now);
     this.#giveUp = now + fromMilliseconds(this.#config.patienceMs);
@@ -300,7 +317,8 @@ export class ForceClient {
     this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
     this.#foretells = false;
     this.#seenTick = 0n;
-    this.#report = undefined;
+    this.#report = this.#deviceReport = undefined;
+    this.#peerReports = new Map();
     this.#deadband = deadband && new Deadband(deadband); // what another session was sent, this one was not
     this.#sequence = 0n;
     this.#stats.phase = "open";
@@ -340,6 +358,10 @@ export class ForceClient {
         this.#backOff = fromMilliseconds(this.#config.retryMinMs);
       } else if (event.kind === "report") {
         this.#report = event.report;
+      } else if (event.kind === "deviceReport") {
+        this.#deviceReport = event.value;
+      } else if (event.kind === "peerReport") {
+        this.#peerReports = new Map(this.#peerReports).set(event.value.channel, event.value);
       } else if (event.kind === "answered" && event.id === this.#deadbandRequest) {
         this.#foretells = event.code === Code.OK && this.#period > 0n && this.#silence() > 0n;
       } else if (event.kind === "closed") {

@@ -14,6 +14,9 @@ export const kFeatureLocalModel = "local-model";
 /** A feature: the client understands that a lease can be lost. */
 export const kFeatureChannels = "channels";
 
+/** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
+export const kFeatureDiagnostics = "diagnostics";
+
 /** Any object with x, y and z will do: the vector of your engine too. */
 export interface Vec3 {
   readonly x: number;

@@ -2,7 +2,9 @@
 import { decodeData, encodeFrame, encodeHead, type DataContent, type Echo, type Frame } from "./codec.js";
 import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
 import { kByes, kMaxDatagram, kMaxPacketNumber } from "./limits.js";
-import { Code, type DeviceState, type ForceCommand, type LinkReport, type Request } from "./messages.js";
+import {
+  Code, type DeviceReport, type DeviceState, type ForceCommand, type LinkReport, type PeerReport, type Request,
+} from "./messages.js";
 import { ReplayWindow } from "./replay_window.js";
 import { IncomingRequests, OutgoingRequests } from "./requests.js";
 import { RoundTrip } from "./round_trip.js";
@@ -43,11 +45,33 @@ export interface LinkStats {
   roundTripVariationMs: number;
 }
 
+/** What an observer is told that asks for diagnostics. */
+export type Diagnosis =
+  | { readonly kind: "deviceReport"; readonly value: DeviceReport }
+  | { readonly kind: "peerReport"; readonly value: PeerReport };
+
+/** Newest wins for each device, and for each of its channels. */
+function streamOf({ kind, value }: Diagnosis): string {
+  return kind === "deviceReport" ? `${value.device}` : `${value.device}/${value.channel}`;
+}
+function numberOf({ kind, value }: Diagnosis): bigint {
+  return kind === "deviceReport" ? value.number : value.link.number;
+}
+/** Takes out the one that was put in first. */
+function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
+  for (const [key, value] of from) {
+    from.delete(key);
+    return value;
+  }
+  return undefined;
+}
+
 /** What can be told to the owner of a session. */
 export type SessionEvent =
   | { readonly kind: "state"; readonly state: DeviceState }
   | { readonly kind: "force"; readonly command: ForceCommand }
   | { readonly kind: "report"; readonly report: LinkReport }
+  | Diagnosis
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | { readonly kind: "answered"; readonly id: number; readonly code: Code; readonly detail: string }
   /** As the peer said Bye; Code.TIMED_OUT: it fell silent; Code.EXPIRED: too old. The last event. */
@@ -70,7 +94,7 @@ export interface SessionConfig {
  * One open conversation between a client and a server, seen from either end: bytes and times in, bytes and events out
  * (sans-I/O, pull). protocol/SESSION.md describes the behaviour.
  *
- * State, force and report: newest wins. Requests: reliable and in order. Every datagram carries an echo, so each gives a round
+ * State, force and reports: newest wins. Requests: reliable and in order. Every datagram carries an echo, so each gives a round
  * trip and an ack vector. Nothing queues without a bound.
  *
  * Use: `receive` what arrives and `tick` when `nextTick()` is due; then pull `nextEvent` and `nextDatagram` until they
@@ -92,6 +116,7 @@ export class Session {
   #stateToSend: DeviceState | undefined;
   #forceToSend: ForceCommand | undefined;
   #reportToSend: LinkReport | undefined;
+  readonly #diagnosesToSend = new Map<string, Diagnosis>();
   readonly #asked = new OutgoingRequests();
   #bye: Frame | undefined;
   #byesLeft = 0;
@@ -104,6 +129,7 @@ export class Session {
   readonly #newestTick = new Map<number, bigint>();
   readonly #newestSequence = new Map<string, bigint>();
   #newestReport = 0n;
+  readonly #newestDiagnosis = new Map<string, bigint>();
   /** Newest packet of ours that the peer has told of. */
   #newestEchoed = -1n;
   readonly #answering = new IncomingRequests();
@@ -113,6 +139,7 @@ export class Session {
   #stateArrived: DeviceState | undefined;
   #forceArrived: ForceCommand | undefined;
   #reportArrived: LinkReport | undefined;
+  readonly #diagnosesArrived = new Map<string, Diagnosis>();
   #closed: SessionEvent | undefined;
 
   /** `opened` is the instant of the handshake's end. The first datagram is due at once. */
@@ -174,6 +201,9 @@ export class Session {
   sendReport(report: LinkReport): void {
     this.#reportToSend = report;
   }
+  sendDiagnosis(diagnosis: Diagnosis): void {
+    this.#diagnosesToSend.set(streamOf(diagnosis), diagnosis);
+  }
   /** Queues a reliable request and returns its id; undefined when 16 are open. */
   request(request: Request): number | undefined {
     return this.#asked.add(request);
@@ -228,6 +258,8 @@ export class Session {
     const report = this.#reportArrived;
     this.#reportArrived = undefined;
     if (report) return { kind: "report", report };
+    const diagnosis = takeFirst(this.#diagnosesArrived);
+    if (diagnosis) return diagnosis;
     const state = this.#stateArrived;
     this.#stateArrived = undefined;
     if (state) return { kind: "state", state };
@@ -315,8 +347,16 @@ export class Session {
         }
         return;
       case "deviceReport":
-      case "peerReport":
-        return; // for observers that ask for it, which this client does not
+      case "peerReport": {
+        const stream = streamOf(frame);
+        if (numberOf(frame) > (this.#newestDiagnosis.get(stream) ?? 0n)) {
+          this.#newestDiagnosis.set(stream, numberOf(frame));
+          this.#diagnosesArrived.set(stream, frame);
+        } else {
+          ++this.stats.stale;
+        }
+        return;
+      }
       case "control":
         this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
         return;
@@ -333,7 +373,7 @@ export class Session {
   #somethingToSay(now: Nanoseconds): boolean {
     const silentTooLong = this.#lastSent === undefined || now - this.#lastSent >= this.#config.keepAlive;
     return silentTooLong || this.#stateToSend !== undefined || this.#forceToSend !== undefined ||
-      this.#reportToSend !== undefined ||
+      this.#reportToSend !== undefined || this.#diagnosesToSend.size > 0 ||
       this.#answering.nextDue() !== undefined || this.#asked.nextDue(now) !== undefined;
   }
 
@@ -364,6 +404,10 @@ export class Session {
         this.#asked.sent(due.id, now, timeout);
       }
       if (this.#reportToSend && add({ kind: "report", value: this.#reportToSend })) this.#reportToSend = undefined;
+      for (const [stream, diagnosis] of this.#diagnosesToSend) {
+        if (!add(diagnosis)) break;
+        this.#diagnosesToSend.delete(stream);
+      }
     }
     const datagram = seal.close(now, connectionId, this.#nextPacket, body);
     ++this.#nextPacket;
