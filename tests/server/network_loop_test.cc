@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "clients/cpp/force_client.h"
+#include "tests/support/wire.h"
 
 // The server's network half against real clients and forgers, on virtual time, over a perfect network.
 
@@ -22,40 +23,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-using Bytes = std::vector<std::byte>;
-struct Datagram {
-  Address from;
-  Address to;
-  Bytes bytes;
-};
-
-/// Everything that is under way; a test may look at it, change it and put things in.
-using Wire = std::deque<Datagram>;
-
-class End : public Link {
- public:
-  End(Wire& wire, const Address& address) : self(address), wire_(wire) {}
-  void send(const Address& to, std::span<const std::byte> datagram) override {
-    wire_.push_back({self, to, {datagram.begin(), datagram.end()}});
-    sent += datagram.size();
-  }
-  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
-    if (inbox.empty()) return 0;
-    const Datagram datagram = std::move(inbox.front());
-    inbox.pop_front();
-    from = datagram.from;
-    std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
-    return datagram.bytes.size();
-  }
-
-  Address self;
-  std::deque<Datagram> inbox;
-  std::size_t sent = 0;
-
- private:
-  Wire& wire_;
-};
 
 ClientKey key_of(const std::string& name, Role role, std::uint64_t seed) {
   return {.name = name, .role = role, .key = Ratchet(seed).next()};

@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <deque>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "server/network_loop.h"
+#include "tests/support/wire.h"
 
 // The observer against the server's own network half, on virtual time, over a perfect network.
 
@@ -19,33 +19,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-struct Datagram {
-  Address from;
-  Address to;
-  std::vector<std::byte> bytes;
-};
-
-class End : public Link {
- public:
-  End(std::deque<Datagram>& wire, const std::string& address) : self(parse_address(address)), wire_(wire) {}
-  void send(const Address& to, std::span<const std::byte> datagram) override {
-    wire_.push_back({self, to, {datagram.begin(), datagram.end()}});
-  }
-  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
-    if (inbox.empty()) return 0;
-    const Datagram datagram = std::move(inbox.front());
-    inbox.pop_front();
-    from = datagram.from;
-    std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
-    return datagram.bytes.size();
-  }
-  Address self;
-  std::deque<Datagram> inbox;
-
- private:
-  std::deque<Datagram>& wire_;
-};
 
 class ObserverTest : public testing::Test {
  protected:
@@ -93,9 +66,9 @@ class ObserverTest : public testing::Test {
   using Names = std::vector<std::string>;
 
   LocalTime now_{seconds(1000)};
-  std::deque<Datagram> wire_;
-  End server_{wire_, "127.0.0.1:47100"};
-  End own_{wire_, "127.0.0.1:5000"};
+  Wire wire_;
+  End server_{wire_, parse_address("127.0.0.1:47100")};
+  End own_{wire_, parse_address("127.0.0.1:5000")};
   std::vector<std::unique_ptr<Mailboxes>> mail_;
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <deque>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "protocol/link.h"
+
+namespace tendon {
+
+using Bytes = std::vector<std::byte>;
+struct Datagram {
+  Address from;
+  Address to;
+  Bytes bytes;
+};
+
+/// Everything that is under way, oldest first. It goes nowhere by itself: a test may look at it, change it and put
+/// things in, and delivers it to an inbox.
+using Wire = std::deque<Datagram>;
+
+/// One end of it.
+class End : public Link {
+ public:
+  End(Wire& wire, const Address& address) : self(address), wire_(wire) {}
+  void send(const Address& to, std::span<const std::byte> datagram) override {
+    wire_.push_back({self, to, {datagram.begin(), datagram.end()}});
+    sent += datagram.size();
+  }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    if (inbox.empty()) return 0;
+    const Datagram datagram = std::move(inbox.front());
+    inbox.pop_front();
+    from = datagram.from;
+    std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
+    return datagram.bytes.size();
+  }
+
+  Address self;
+  std::deque<Datagram> inbox;
+  std::size_t sent = 0;  ///< bytes
+
+ private:
+  Wire& wire_;
+};
+
+}  // namespace tendon
