@@ -125,6 +125,7 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
     step.mode = Mode::kFault;
     step.reasons |= Reason::kFault;
   }
+  if (disarmed_) step.force.setZero();
   const Limited saturated = saturate(step.force, config_.max_force);
   // After a pause the force may not have grown for as long as the pause lasted.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
@@ -132,7 +133,7 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
   if (friction_map_) limiter_.adapt(friction_map_->at(hand.position));
   // What bounds a force bends the environment: how it goes on from there is not known any more.
   const bool as_wanted =
-      !admittance_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
+      !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
   const LimitedForce<3> limited =
       limiter_.limit({.force = slewed.force, .stiffness = as_wanted ? wanted.stiffness : Mat3(Mat3::Zero())});
   step.force = limited.force;
@@ -142,6 +143,10 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
   if (!step.reasons.has(Reason::kEnergy)) {
     step.reasons |= saturated.reasons;
     step.reasons |= slewed.reasons;
+  }
+  if (disarmed_) {
+    step.force.setZero();
+    step.reasons |= Reason::kDisarmed;
   }
   return step;
 }
@@ -165,11 +170,13 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied) noexcept 
   step.mode = fault_ == Fault::kNone ? Mode::kHolding : Mode::kFault;
   step.reasons |= Reason::kUnseen;
   if (fault_ != Fault::kNone) step.reasons |= Reason::kFault;
+  if (disarmed_) step.reasons |= Reason::kDisarmed;
   return step;
 }
 
 void HapticController::rearm() noexcept {
   fault_ = Fault::kNone;
+  disarmed_ = false;
   missed_ = 0;
   held_.disengage();
 }

@@ -55,6 +55,9 @@ struct Step {
 ///
 /// Faults are latched: force zero (through the slew limit while the hand can be seen) until `rearm`.
 ///
+/// `disarm` is the operator's: force zero from the next step on, through nothing, until `rearm`. It is no fault, and
+/// clears none.
+///
 /// Thread-safe: no. Realtime-safe: yes.
 class HapticController {
  public:
@@ -111,8 +114,9 @@ class HapticController {
   Step step_unseen(LocalTime now, const Vec3& applied) noexcept;
 
   Fault fault() const noexcept { return fault_; }
-  /// Clears the fault. Forces start again from idle: the next fresh one is ramped in.
+  /// Clears the fault, and ends `disarm`. Forces start again from idle: the next fresh one is ramped in.
   void rearm() noexcept;
+  void disarm() noexcept { disarmed_ = true; }
 
  private:
   bool believable(const Motion& hand) const noexcept;
@@ -129,6 +133,7 @@ class HapticController {
   std::optional<FrictionMap> friction_map_;
   ForceChannels held_;
   Fault fault_ = Fault::kNone;
+  bool disarmed_ = false;
   std::uint32_t missed_ = 0;
   std::optional<Motion> last_;  ///< empty when the position before this step is unknown
   LocalTime last_at_{};         ///< when the force held now was applied

@@ -7,7 +7,7 @@
 namespace tendon {
 
 std::string to_string(Reasons reasons) {
-  static constexpr std::array<std::pair<Reason, const char*>, 13> kNames = {{
+  static constexpr std::array<std::pair<Reason, const char*>, 14> kNames = {{
       {Reason::kEnergy, "energy"},
       {Reason::kMaxForce, "max force"},
       {Reason::kSlew, "slew"},
@@ -21,6 +21,7 @@ std::string to_string(Reasons reasons) {
       {Reason::kOverrun, "overrun"},
       {Reason::kWatchdog, "watchdog"},
       {Reason::kUnseen, "unseen"},
+      {Reason::kDisarmed, "disarmed"},
   }};
   std::string text;
   for (const auto& [reason, name] : kNames) {

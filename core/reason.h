@@ -23,6 +23,7 @@ enum class Reason : std::uint32_t {
   kOverrun = 1U << 10,     ///< not a limit: the step before this one was held longer than the bound assumed
   kWatchdog = 1U << 11,    ///< not a limit: … and so long that the device's own watchdog ended it
   kUnseen = 1U << 12,      ///< the device gave no position this time, so no force is given out
+  kDisarmed = 1U << 13,    ///< the operator has disarmed the device: no force until it is rearmed
 };
 
 /// A set of reasons.

@@ -54,6 +54,9 @@ class Device {
   /// The operator asks for forces, at first or again after a fault. To be refused or granted later, by whoever wants to
   /// know first that nobody is hurt by them (SafeDevice); a device that is ready when it is homed needs no asking.
   virtual void arm() noexcept {}
+  /// The operator wants no forces until he asks for them again. Whoever has a say in it (SafeDevice) gives none from
+  /// the next `apply` on; of any other device the control law asks for none (HapticController::disarm).
+  virtual void disarm() noexcept {}
   /// How often that has been granted. Each time, whatever was at fault before is over.
   virtual std::uint32_t times_armed() const noexcept { return 0; }
   /// How often it has ended the force by itself, because something was wrong (SafeDevice).

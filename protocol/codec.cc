@@ -336,6 +336,7 @@ bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
   return read_device(from.device(), to.device);
 }
 bool read(const pb::Rearm& from, Rearm& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Disarm& from, Disarm& to) noexcept { return read_device(from.device(), to.device); }
 bool read(const pb::Describe& from, Describe& to) noexcept { return read_device(from.device(), to.device); }
 template <class Message, class Lease>
 bool read_lease(const Message& from, Lease& to) noexcept {
@@ -360,6 +361,8 @@ bool read(const pb::Control& from, Control& to) {
       return read_request<SetStateRate>(from.set_state_rate(), to);
     case pb::Control::kRearm:
       return read_request<Rearm>(from.rearm(), to);
+    case pb::Control::kDisarm:
+      return read_request<Disarm>(from.disarm(), to);
     case pb::Control::kDescribe:
       return read_request<Describe>(from.describe(), to);
     case pb::Control::kTakeLease:
@@ -387,6 +390,7 @@ void write_request(const SetStateRate& from, pb::Control& to) {
   to.mutable_set_state_rate()->set_device(from.device);
 }
 void write_request(const Rearm& from, pb::Control& to) { to.mutable_rearm()->set_device(from.device); }
+void write_request(const Disarm& from, pb::Control& to) { to.mutable_disarm()->set_device(from.device); }
 void write_request(const Describe& from, pb::Control& to) { to.mutable_describe()->set_device(from.device); }
 template <class Lease, class Message>
 void write_lease(const Lease& from, Message& to) {

@@ -181,8 +181,14 @@ struct SetStateDeadband {
   Duration max_silence{};  ///< 0: every state is sent, as before this was asked; travels in whole µs
 };
 
-/// Client → server, reliable: clears a latched fault. Only from a controller of the device.
+/// Client → server, reliable: clears a latched fault, and takes a Disarm back. Only from a controller of the device.
 struct Rearm {
+  std::uint32_t device = 0;
+};
+
+/// Client → server, reliable: no force from the next haptic step on, until a Rearm. Only from a controller of the
+/// device.
+struct Disarm {
   std::uint32_t device = 0;
 };
 
@@ -210,7 +216,7 @@ struct LeaseLost {
   std::string to;  ///< name of the one that is; at most 64 bytes
 };
 
-using Request = std::variant<SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband>;
+using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband>;
 
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes

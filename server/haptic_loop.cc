@@ -48,7 +48,13 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
       case HapticOrder::Kind::kRelease:
         controller_.release(now, order->source, order->channel);
         break;
+      case HapticOrder::Kind::kDisarm:
+        disarmed_ = true;
+        controller_.disarm();
+        device_.disarm();
+        break;
       case HapticOrder::Kind::kRearm:
+        disarmed_ = false;
         rearm();
         device_.arm();
         break;
@@ -78,6 +84,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   record.tick = ++tick_;
   record.scheduled = due_;
   record.rearmed = std::exchange(rearmed_, false);
+  record.disarmed = disarmed_;
   watch_device();
   publish(record);
 
@@ -96,6 +103,7 @@ void HapticLoop::watch_device() noexcept {
 
 void HapticLoop::rearm() noexcept {
   controller_.rearm();
+  if (disarmed_) controller_.disarm();  // the device's doing, not the operator's
   rearmed_ = true;
 }
 

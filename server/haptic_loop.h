@@ -65,7 +65,8 @@ class HapticLoop {
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
-  bool rearmed_ = false;  ///< since the last record
+  bool rearmed_ = false;   ///< since the last record
+  bool disarmed_ = false;  ///< by an order, which only an order ends
   std::uint32_t device_faults_ = 0;
 
   Counter steps_;

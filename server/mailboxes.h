@@ -21,7 +21,8 @@ namespace tendon {
 struct HapticOrder {
   enum class Kind : std::uint8_t {
     kRelease,  ///< `source` no longer has `channel`: its force is no longer fresh
-    kRearm,    ///< clear the latched fault
+    kRearm,    ///< clear the latched fault, and take kDisarm back
+    kDisarm,   ///< no force until kRearm
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;

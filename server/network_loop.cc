@@ -697,6 +697,21 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   ++stats_.forces;
 }
 
+/// To arm or to disarm a device is for those who control it, whether they hold its channel now or not.
+void NetworkLoop::order(Guest& guest, std::uint32_t id, std::uint32_t device, HapticOrder::Kind kind) {
+  const std::string verb = kind == HapticOrder::Kind::kDisarm ? "disarm" : "rearm";
+  const bool controls = std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
+    return seat.device == device && seat.role == Role::kController;
+  });
+  if (!controls) {
+    ++stats_.denied;
+    return guest.session.answer(id, Code::kDenied, "only a controller may " + verb);
+  }
+  if (!devices_[device].mail->orders.try_push({kind})) return guest.session.answer(id, Code::kBusy, {});
+  notice(true, verb + "ed by \"" + guest.name + "\"");
+  guest.session.answer(id, Code::kOk, {});
+}
+
 void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request) {
   const auto no_such_device = [&] {
     guest.session.answer(id, Code::kInvalid, "there are " + std::to_string(devices_.size()) + " devices");
@@ -721,20 +736,8 @@ void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Re
                    }
                    guest.session.answer(id, Code::kOk, {});
                  },
-                 [&](const Rearm& rearm) {
-                   const bool controls = std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
-                     return seat.device == rearm.device && seat.role == Role::kController;
-                   });
-                   if (!controls) {
-                     ++stats_.denied;
-                     return guest.session.answer(id, Code::kDenied, "only a controller may rearm");
-                   }
-                   if (!devices_[rearm.device].mail->orders.try_push({HapticOrder::Kind::kRearm})) {
-                     return guest.session.answer(id, Code::kBusy, {});
-                   }
-                   notice(true, "rearmed by \"" + guest.name + "\"");
-                   guest.session.answer(id, Code::kOk, {});
-                 },
+                 [&](const Rearm& rearm) { order(guest, id, rearm.device, HapticOrder::Kind::kRearm); },
+                 [&](const Disarm& disarm) { order(guest, id, disarm.device, HapticOrder::Kind::kDisarm); },
                  [&](const Describe& describe) {
                    if (describe.device >= devices_.size()) return no_such_device();
                    const Device& device = devices_[describe.device];

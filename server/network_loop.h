@@ -210,6 +210,7 @@ class NetworkLoop {
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
+  void order(Guest& guest, std::uint32_t id, std::uint32_t device, HapticOrder::Kind kind);
   void take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted);
   void hold(LocalTime now, Guest& guest, std::uint32_t device, std::uint32_t channel);
   void free(std::uint32_t device, std::uint32_t channel);

@@ -39,6 +39,7 @@ void put(pb::Reason* out, Reasons reasons) {
   out->set_overrun(reasons.has(Reason::kOverrun));
   out->set_watchdog(reasons.has(Reason::kWatchdog));
   out->set_unseen(reasons.has(Reason::kUnseen));
+  out->set_disarmed(reasons.has(Reason::kDisarmed));
 }
 
 template <class Message>
@@ -92,6 +93,7 @@ std::string encode(const StepRecord& step) {
   if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
   if (step.force_error) out.set_force_error_n(*step.force_error);
   out.set_rearmed(step.rearmed);
+  out.set_disarmed(step.disarmed);
   if (!step.stiffness.isZero(0)) {
     for (const auto row : step.stiffness.rowwise()) {
       for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
@@ -157,6 +159,7 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   if (in.has_hand_force_n()) out.hand_force = vec3(in.hand_force_n());
   if (in.has_force_error_n()) out.force_error = in.force_error_n();
   out.rearmed = in.rearmed();
+  out.disarmed = in.disarmed();
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

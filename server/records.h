@@ -17,6 +17,7 @@ struct StepRecord : Step {
   LocalTime scheduled{};        ///< when the step was due
   Vec3 applied = Vec3::Zero();  ///< N, really written by the device (`force` is what it was told)
   bool rearmed = false;         ///< the controller was rearmed since the step before
+  bool disarmed = false;        ///< the operator had disarmed the device
 };
 
 /// One datagram that went in or out.

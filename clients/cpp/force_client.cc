@@ -78,6 +78,8 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
 
 bool ForceClient::rearm() { return session_ && session_->request(Rearm{.device = place_.device}).has_value(); }
 
+bool ForceClient::disarm() { return session_ && session_->request(Disarm{.device = place_.device}).has_value(); }
+
 bool ForceClient::take_lease() {
   if (session_) asked_lease_ = session_->request(TakeLease{.device = place_.device, .channel = place_.channel});
   return session_ && asked_lease_;

@@ -159,9 +159,12 @@ class ForceClient {
   /// to the server.
   LocalTime turn(LocalTime now);
 
-  /// Asks the server to clear a latched fault of its device. Controllers only: an observer is refused. False when
-  /// there is no session to ask in, or too many requests are open.
+  /// Asks the server to clear a latched fault of its device, and to take a disarm back; with a safety layer it is the
+  /// request to arm. Controllers only: an observer is refused. False when there is no session to ask in, or too many
+  /// requests are open.
   bool rearm();
+  /// Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm().
+  bool disarm();
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.
   bool holds() const noexcept { return holds_; }

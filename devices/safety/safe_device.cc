@@ -98,8 +98,23 @@ SafeDevice::SafeDevice(const Config& config, Device& device)
 }
 
 void SafeDevice::arm() noexcept {
+  disarmed_ = false;
   if (arming_.by == Arming::By::kDeadMan || stage_ == Stage::kArmed || !now_) return;
   request_until_ = std::max(request_until_, *now_ + arming_.patience);
+}
+
+void SafeDevice::disarm() noexcept {
+  disarmed_ = true;
+  request_until_ = LocalTime::min();
+  leave_armed();
+  publish();
+}
+
+/// Not by a fault; but one that is on its way to zero stays one.
+void SafeDevice::leave_armed() noexcept {
+  if (stage_ != Stage::kArmed) return;
+  stage_ = stopping_ ? Stage::kFault : Stage::kWaiting;
+  stopping_.reset();
 }
 
 std::optional<PositionSample> SafeDevice::read(LocalTime now) noexcept {
@@ -146,12 +161,9 @@ void SafeDevice::watch_rest(const PositionSample& sample) noexcept {
 void SafeDevice::watch_button(std::uint32_t buttons) noexcept {
   if (!dead_man_) return;
   const bool held = dead_man_->held(buttons);
-  if (!held && stage_ == Stage::kArmed) {
-    stage_ = stopping_ ? Stage::kFault : Stage::kWaiting;
-    stopping_.reset();
-  }
+  if (!held) leave_armed();
   if (arming_.by == Arming::By::kDeadMan) {
-    if (held && !button_held_) request_until_ = LocalTime::max();
+    if (held && !button_held_ && !disarmed_) request_until_ = LocalTime::max();
     if (!held) request_until_ = LocalTime::min();
   }
   button_held_ = held;

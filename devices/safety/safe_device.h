@@ -59,6 +59,11 @@ std::string_view to_string(SafetyFault fault) noexcept;
 /// from being armed. Force is zero from the next `apply` on; with a watchdog's ramp it stays in Armed, on its way to
 /// zero, until it is there. Letting go of the dead man's button is no fault: Armed → Homed, zero at once.
 ///
+/// **Disarming** is the operator's, and no fault: Armed → Homed, zero at once, from whatever state; a request to arm
+/// that was not granted yet is withdrawn. Nothing but `arm` ends it: not the start (`kStart`), and the dead man's
+/// button arms only by being pressed anew after that. A fault stays one, and one that is on its way to zero becomes
+/// one.
+///
 /// What this layer cannot do: act while nobody calls it. When the whole process hangs or dies, forces end by the
 /// device's own watchdog, or by the guardian (guardian.h).
 ///
@@ -71,7 +76,7 @@ class SafeDevice final : public Device {
     enum class By : std::uint8_t {
       kRequest,  ///< only `arm`
       kStart,    ///< the first time by itself, then `arm`
-      kDeadMan,  ///< only by pressing the dead man's button; `arm` does nothing
+      kDeadMan,  ///< only by pressing the dead man's button; `arm` only ends what `disarm` began
     };
     By by = By::kRequest;
     double rest_speed = 0.02;  ///< m/s, > 0
@@ -105,6 +110,7 @@ class SafeDevice final : public Device {
   const DeviceInfo& info() const noexcept override { return info_; }
   State state() const noexcept override { return device_.state(); }
   void arm() noexcept override;
+  void disarm() noexcept override;
   std::uint32_t times_armed() const noexcept override { return times_armed_; }
   std::uint32_t faults() const noexcept override { return faults_; }
   std::optional<PositionSample> read(LocalTime now) noexcept override;
@@ -119,6 +125,7 @@ class SafeDevice final : public Device {
   void watch_rest(const PositionSample& sample) noexcept;
   void watch_button(std::uint32_t buttons) noexcept;
   void watch_silence() noexcept;
+  void leave_armed() noexcept;
   void trip(SafetyFault fault, Duration ramp = Duration::zero()) noexcept;
   void forget_motion() noexcept;
   bool may_be_armed(const Vec3& asked) const noexcept;
@@ -145,6 +152,7 @@ class SafeDevice final : public Device {
   std::optional<RampOut> stopping_;             ///< a fault whose force is on its way to zero
   LocalTime request_until_ = LocalTime::min();  ///< the operator's request to arm is open until then
   bool button_held_ = true;                     ///< one that is stuck has never been pressed
+  bool disarmed_ = false;                       ///< by the operator, who alone may end it
 
   std::optional<LocalTime> now_;  ///< of the last `read`
   Duration passed_{};             ///< between the last two

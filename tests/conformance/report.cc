@@ -127,6 +127,7 @@ constexpr std::array kChecks = {
           "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
     Check{"rearm-by-controller", kServer, kWire, kData,
           "client → server: clears a latched fault; from a controller of the device only"},
+    Check{"disarm-by-controller", kServer, kWire, kData, "client → server: no force until a rearm"},
     Check{"forces", kClient, kWire, kData, "1, 2, 3 … per session, device and channel"},
     Check{"force-bounds", kClient, kWire, kData, "µs from arrival during which it is fresh"},
     Check{"force-answers", kClient, kWire, kData, "tick of the state it was computed from"},

@@ -692,7 +692,15 @@ void ServerJudge::check_observer(Conversation& controller) {
   const auto ack = request(talk, rearm);
   report_.judge("rearm-by-controller", ack && ack->code() == pb::CODE_DENIED, ack ? ack->ShortDebugString() : "nothing",
                 "CODE_DENIED to an observer");
-  check_from_outside(talk, 2);
+  pb::Control disarm;
+  disarm.set_id(2);
+  disarm.mutable_disarm();
+  const auto refused = request(talk, disarm);
+  // A server may be older than this request.
+  const bool not_done = refused && (refused->code() == pb::CODE_DENIED || refused->code() == pb::CODE_UNSUPPORTED);
+  report_.judge("disarm-by-controller", not_done, refused ? refused->ShortDebugString() : "nothing",
+                "CODE_DENIED to an observer");
+  check_from_outside(talk, 3);
   controller.say();
   say_bye(talk);
 }

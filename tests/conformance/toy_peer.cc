@@ -415,6 +415,8 @@ void ToyServer::execute(Member& member, const pb::Control& control) {
     member.every = std::max(1U, 1000 / std::max(1U, std::min(1000U, control.set_state_rate().hz())));
   } else if (control.has_rearm()) {
     if (member.role != pb::ROLE_CONTROLLER && !is(Fault::kObserversRearm)) ack.set_code(pb::CODE_DENIED);
+  } else if (control.has_disarm()) {
+    if (member.role != pb::ROLE_CONTROLLER && !is(Fault::kObserversDisarm)) ack.set_code(pb::CODE_DENIED);
   } else if (control.has_describe()) {
     if (control.describe().device() == 0 || is(Fault::kDescribesAnyNumber)) {
       *ack.mutable_device() = describe();

@@ -69,6 +69,7 @@ enum class Fault : std::uint8_t {
   kRoamsByAnything,
   kObserversPush,
   kObserversRearm,
+  kObserversDisarm,
   kRequestsAsTheyCome,
   kRequestsAgain,
   kForgetsAnswers,

@@ -210,6 +210,65 @@ TEST(HapticController, AFaultIsLeftOnlyByRearmAndForcesAreRampedInAgain) {
   EXPECT_TRUE(step.reasons.has(Reason::kRampIn));
 }
 
+TEST(HapticController, DisarmedItGivesNoForceFromTheNextStepOnThroughNoSlewLimitUntilRearmed) {
+  HapticController::Config c = config();
+  c.limiter.law = Law::kNone;
+  c.max_slew = 100;
+  c.hold.ramp_in = milliseconds(100);
+  Bench bench(c);
+  for (int i = 0; i < 300; ++i) bench.want(-5), bench.move_to(0);
+  ASSERT_EQ(bench.applied.x(), -5);
+  bench.controller.disarm();
+  for (int i = 0; i < 300; ++i) {
+    bench.want(-5);
+    const Step step = i % 3 == 0 ? bench.controller.step_unseen(LocalTime(bench.now += milliseconds(1)), bench.applied)
+                                 : bench.move_to(0);
+    ASSERT_EQ(step.force, Vec3::Zero()) << i;
+    ASSERT_TRUE(step.reasons.has(Reason::kDisarmed));
+    ASSERT_FALSE(step.reasons.has(Reason::kFault));
+    bench.applied = step.force;
+  }
+  EXPECT_EQ(bench.controller.fault(), HapticController::Fault::kNone);
+  bench.controller.rearm();
+  EXPECT_EQ(bench.move_to(0).force, Vec3::Zero()) << "the force of before is not gone on with";
+  bench.want(-5);
+  const Step again = bench.move_to(0);
+  EXPECT_TRUE(again.reasons.has(Reason::kRampIn));
+  EXPECT_FALSE(again.reasons.has(Reason::kDisarmed));
+  for (int i = 0; i < 150; ++i) bench.want(-5), bench.move_to(0);
+  EXPECT_EQ(bench.applied.x(), -5);
+}
+
+TEST(HapticController, ALawThatBrakesByItselfGivesNoForceEitherWhileDisarmed) {
+  HapticController::Config c = config();
+  c.limiter.law = Law::kPassivityController;
+  const auto push = [](Bench& bench, int i) {  // an engine that gives energy away
+    bench.want(5);
+    return bench.move_to(i * 1e-4).force.x();
+  };
+  Bench armed(c);
+  Bench disarmed(c);
+  for (int i = 0; i < 100; ++i) push(armed, i), push(disarmed, i);
+  disarmed.controller.disarm();
+  int braking = 0;
+  for (int i = 100; i < 200; ++i) {
+    armed.want(0);
+    braking += armed.move_to(i * 1e-4).force.x() < 0 ? 1 : 0;
+    ASSERT_EQ(push(disarmed, i), 0);
+  }
+  EXPECT_GT(braking, 0) << "without that this shows nothing";
+}
+
+TEST(HapticController, ToDisarmIsNoFaultAndClearsNone) {
+  Bench bench(config());
+  bench.move_to(std::nan(""));
+  bench.controller.disarm();
+  const Step step = bench.move_to(0);
+  EXPECT_EQ(step.mode, Mode::kFault);
+  EXPECT_TRUE(step.reasons.has(Reason::kFault));
+  EXPECT_TRUE(step.reasons.has(Reason::kDisarmed));
+}
+
 TEST(HapticController, ASilentDeviceGetsZeroForceAndIsAFaultAfterTwentyMisses) {
   Bench bench(config());
   bench.move_to(0);

@@ -119,6 +119,8 @@ void print(Line& line, const Control& control) {
     line << "deadband" << deadband->share << deadband->floor << deadband->max_silence;
   } else if (std::holds_alternative<Rearm>(*control.request)) {
     line << "rearm";
+  } else if (std::holds_alternative<Disarm>(*control.request)) {
+    line << "disarm";
   } else {
     line << "other";
   }

@@ -14,6 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Session session({.connection_id = kConnection}, keys, kOpened);
   std::array<std::byte, kMaxDatagram> buffer;
   session.request(Rearm{});
+  session.request(Disarm{});
   session.next_datagram(kOpened, buffer);
 
   const auto body = std::as_bytes(std::span(data, std::min(size, kMaxDatagram - kHeaderSize - crypto::kTagSize)));

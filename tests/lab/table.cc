@@ -36,6 +36,7 @@ constexpr std::array kReasonNames = {
     ReasonName{Reason::kFault, "fault", "latched fault"},
     ReasonName{Reason::kDeviceClamp, "device_clamp", "the device gave less"},
     ReasonName{Reason::kUnseen, "unseen", "the device gave no position"},
+    ReasonName{Reason::kDisarmed, "disarmed", "the operator disarmed"},
 };
 
 // ---- For people -------------------------------------------------------------------------------------------------

@@ -280,6 +280,7 @@ inline std::vector<Named> datagrams() {
       {"state-wanted", data(60, {}, state_with_wanted())},
       {"device-report", data(61, {}, device_report())},
       {"peer-report", data(62, {}, peer_report())},
+      {"control-disarm", data(63, {}, Control{.id = 13, .request = Disarm{.device = 1}})},
   };
 }
 

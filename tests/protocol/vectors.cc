@@ -160,6 +160,7 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"state with the force that is wanted", false, 266, 0, at(266, examples::state_with_wanted())},
       {"reports on a device and on an engine", false, 267, 0,
        at(267, examples::device_report(), examples::peer_report())},
+      {"disarm a device", true, 268, 0, request(268, 14, Disarm{.device = 1})},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

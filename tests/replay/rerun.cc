@@ -76,6 +76,7 @@ StepRecord Rerun::step(const StepRecord& recorded) {
     controller_.rearm();
     missed_ = 0;
   }
+  if (recorded.disarmed) controller_.disarm();
   StepRecord again = recorded;
   static_cast<Step&>(again) = take(recorded, held_ == Held::kRecorded ? recorded.was_applied : own_);
   // Of the force in use the record knows more than the law.

@@ -140,7 +140,8 @@ std::vector<StepRecord> troubled(const HapticLoop::Config& config) {
       force.valid_for = std::chrono::milliseconds(20);
       mail->forces[0].put(force);
     }
-    if (n == 500 || n == 800 || n == 1000) mail->orders.try_push({HapticOrder::Kind::kRearm});
+    if (n == 100 || n == 350) mail->orders.try_push({HapticOrder::Kind::kDisarm});
+    if (n == 200 || n == 500 || n == 800 || n == 1000) mail->orders.try_push({HapticOrder::Kind::kRearm});
     now = loop.step(now);
     while (const StepRecord* step = mail->steps.front()) {
       steps.push_back(*step);
@@ -170,11 +171,23 @@ TEST(Rerun, FaultsAndRearmsAsTheControllerDid) {
   EXPECT_EQ(first_difference(config.control, steps), "");
 }
 
+TEST(Rerun, DisarmsAsTheLoopDid) {
+  const HapticLoop::Config config = with_fault_detection();
+  std::vector<StepRecord> steps = troubled(config);
+  ASSERT_NE(steps[98].force, Vec3::Zero());
+  ASSERT_EQ(steps[99].force, Vec3::Zero()) << "step 100";
+  ASSERT_EQ(steps[198].force, Vec3::Zero());
+  ASSERT_NE(steps[250].force, Vec3::Zero());
+  ASSERT_TRUE(steps[420].disarmed && steps[440].mode == Mode::kFault);
+  for (StepRecord& step : steps) step.disarmed = false;
+  EXPECT_NE(first_difference(config.control, steps).find("step 100: "), std::string::npos);
+}
+
 TEST(Rerun, NoticesARearmThatIsNotInTheRecord) {
   const HapticLoop::Config config = with_fault_detection();
   std::vector<StepRecord> steps = troubled(config);
   for (StepRecord& step : steps) step.rearmed = false;
-  EXPECT_NE(first_difference(config.control, steps).find("step 500: "), std::string::npos);
+  EXPECT_NE(first_difference(config.control, steps).find("step 200: "), std::string::npos);
 }
 
 TEST(Rerun, NamesTheFirstBitThatDiffers) {

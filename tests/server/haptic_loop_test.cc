@@ -69,5 +69,106 @@ TEST(HapticLoop, AFaultOfTheSafetyLayerFreezesTheFlightRecorderAtTheStepThatTook
   EXPECT_FALSE(mail->flight.frozen());
 }
 
+/// A loop whose engine pushes all the time, around any device.
+struct Pushed {
+  explicit Pushed(Device& device) : loop(config(), device, *mail) {}
+
+  static HapticLoop::Config config() {
+    HapticLoop::Config config;
+    config.control.limiter.law = Law::kNone;
+    config.control.limiter.longest_hold = milliseconds(2);
+    config.control.max_force = 8;
+    config.control.max_slew = 100;
+    return config;
+  }
+  /// Returns the last step's record.
+  StepRecord steps(int count) {
+    StepRecord last;
+    for (int i = 0; i < count; ++i) {
+      RemoteForce force;
+      force.sequence = ++sequence;
+      force.received = force.answers = now;
+      force.force = Vec3(-2, 0, 0);
+      force.valid_for = milliseconds(20);
+      mail->forces[0].put(force);
+      now = loop.step(now);
+      while (const StepRecord* step = mail->steps.front()) {
+        last = *step;
+        mail->steps.pop();
+      }
+    }
+    return last;
+  }
+  void order(HapticOrder::Kind kind) { ASSERT_TRUE(mail->orders.try_push({kind})); }
+
+  std::unique_ptr<Mailboxes> mail = std::make_unique<Mailboxes>();
+  HapticLoop loop;
+  LocalTime now{milliseconds(1)};
+  std::uint64_t sequence = 0;
+};
+
+using Kind = HapticOrder::Kind;
+
+TEST(HapticLoop, ADisarmedDeviceWithASafetyLayerIsHomedInThatVeryStepAndArmedAgainByAnOrderOnly) {
+  Handle handle;
+  SafeDevice::Config safety;
+  safety.arming.by = SafeDevice::Arming::By::kStart;
+  SafeDevice safe(safety, handle);
+  Pushed world(safe);
+  ASSERT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
+  world.order(Kind::kDisarm);
+  const StepRecord next = world.steps(1);
+  EXPECT_EQ(next.applied, Vec3::Zero());
+  EXPECT_TRUE(next.reasons.has(Reason::kDisarmed));
+  EXPECT_TRUE(next.disarmed);
+  EXPECT_EQ(safe.status().state, SafetyState::kHomed);
+  EXPECT_EQ(world.steps(3000).applied, Vec3::Zero());
+  EXPECT_EQ(safe.status().state, SafetyState::kHomed);
+  EXPECT_EQ(safe.status().faults, 0U);
+  EXPECT_EQ(world.loop.stats().fault, HapticController::Fault::kNone);
+  EXPECT_FALSE(world.mail->flight.frozen());
+  world.order(Kind::kRearm);
+  const StepRecord again = world.steps(400);
+  EXPECT_EQ(again.applied, Vec3(-2, 0, 0));
+  EXPECT_FALSE(again.disarmed);
+  EXPECT_EQ(safe.status().state, SafetyState::kArmed);
+}
+
+TEST(HapticLoop, ADisarmedDeviceWithoutASafetyLayerGivesNoForceEither) {
+  Handle handle;
+  Pushed world(handle);
+  ASSERT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
+  world.order(Kind::kDisarm);
+  EXPECT_EQ(world.steps(1).applied, Vec3::Zero());
+  EXPECT_EQ(world.steps(1000).applied, Vec3::Zero());
+  EXPECT_EQ(world.loop.stats().fault, HapticController::Fault::kNone);
+  world.order(Kind::kRearm);
+  EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
+}
+
+TEST(HapticLoop, WhatWasDisarmedBeforeItWasHomedGivesNoForceWhenItIs) {
+  Handle handle;
+  handle.plugged = false;
+  Pushed world(handle);
+  world.steps(100);
+  world.order(Kind::kDisarm);
+  world.steps(100);
+  handle.plugged = true;
+  EXPECT_EQ(world.steps(400).applied, Vec3::Zero());
+  world.order(Kind::kRearm);
+  EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
+}
+
+TEST(HapticLoop, OfTwoOrdersTheLaterOneCounts) {
+  Handle handle;
+  Pushed world(handle);
+  world.order(Kind::kRearm);
+  world.order(Kind::kDisarm);
+  EXPECT_EQ(world.steps(400).applied, Vec3::Zero());
+  world.order(Kind::kDisarm);
+  world.order(Kind::kRearm);
+  EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
+}
+
 }  // namespace
 }  // namespace tendon

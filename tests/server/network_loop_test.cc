@@ -442,6 +442,50 @@ TEST_F(TwoDevices, AGivenLeaseIsFree) {
   EXPECT_TRUE(first.client->holds());
 }
 
+TEST_F(TwoDevices, ArmsAndDisarmsTheDeviceOfAControllerAlsoWhenAnotherHoldsTheLease) {
+  Client holder = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
+  run(milliseconds(300), {&holder});
+  Client second = controller_of(other_, "192.0.2.2:4000", "right", "tissue");
+  run(milliseconds(100), {&holder, &second});
+  ASSERT_FALSE(second.client->holds());
+  const auto orders = [](Mailboxes& mail) {
+    std::vector<HapticOrder::Kind> kinds;
+    for (; mail.orders.front() != nullptr; mail.orders.pop()) kinds.push_back(mail.orders.front()->kind);
+    return kinds;
+  };
+  orders(*second_);
+  loop_->take_notices();
+  ASSERT_TRUE(second.client->disarm());
+  ASSERT_TRUE(second.client->rearm());
+  run(milliseconds(100), {&holder, &second});
+  EXPECT_EQ(orders(*second_), (std::vector{HapticOrder::Kind::kDisarm, HapticOrder::Kind::kRearm}));
+  EXPECT_TRUE(orders(*mail_).empty()) << "the device of another";
+  std::vector<std::string> said;
+  for (const auto& notice : loop_->take_notices()) said.push_back(notice.text);
+  EXPECT_EQ(said, (std::vector<std::string>{"disarmed by \"other\"", "rearmed by \"other\""}));
+  EXPECT_TRUE(holder.client->holds());
+}
+
+TEST_F(TwoDevices, WhoCannotBeDisarmedAtOnceIsToldToAskAgain) {
+  Client a = controller_of(wall_, "192.0.2.1:4000", "right", "guidance");
+  run(milliseconds(300), {&a});
+  while (second_->orders.try_push({HapticOrder::Kind::kRelease})) {
+  }
+  loop_->take_notices();
+  ASSERT_TRUE(a.client->disarm());
+  run(milliseconds(100), {&a});
+  EXPECT_TRUE(loop_->take_notices().empty()) << "what was not done is not told";
+}
+
+TEST_F(SealedServer, AnObserverMayNotDisarm) {
+  Client a = observer(screen_, "192.0.2.1:4000");
+  run(milliseconds(300), {&a});
+  ASSERT_TRUE(a.client->disarm());
+  run(milliseconds(100), {&a});
+  EXPECT_EQ(loop_->stats().denied, 1U);
+  EXPECT_EQ(mail_->orders.front(), nullptr);
+}
+
 TEST_F(TwoDevices, AChannelWithoutALeaseIsNotTakenFromItsHolder) {
   Client first = controller_of(wall_, "192.0.2.1:4000", "right", "guidance");
   run(milliseconds(300), {&first});

@@ -138,5 +138,36 @@ TEST(SafeWorld, WhatIsUnpluggedInMidForceGivesForcesAgainOnlyAfterHomingAndTheEn
   EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
 }
 
+TEST(SafeWorld, WhatItsEngineHasDisarmedInMidForceGivesNoneUntilItRearms) {
+  for (const bool guarded : {true, false}) {
+    SCOPED_TRACE(guarded ? "with a safety layer" : "without");
+    SimulatedDevice device(hand(Vec3(0.015, 0, 0)));
+    SafeDevice::Config config;
+    config.arming.by = SafeDevice::Arming::By::kStart;
+    SafeDevice safe(config, device);
+    World world(world_config(device.info()), guarded ? static_cast<Device&>(safe) : device);
+    const std::size_t engine = world.add_controller(at_100_hz(), wall());
+    std::vector<StepRecord> steps;
+    world.watch_steps([&](const StepRecord& step) { steps.push_back(step); });
+    const auto peak_of = [&](Duration duration) {
+      steps.clear();
+      world.run_for(duration);
+      double peak = 0;
+      for (const StepRecord& step : steps) peak = std::max(peak, step.applied.norm());
+      return peak;
+    };
+    EXPECT_GT(peak_of(seconds(2)), 1);
+    EXPECT_TRUE(world.client(engine).disarm());
+    world.run_for(milliseconds(500));  // the request is on its way
+    EXPECT_EQ(peak_of(seconds(2)), 0);
+    EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
+    if (guarded) {
+      EXPECT_EQ(safe.status().state, SafetyState::kHomed);
+    }
+    EXPECT_TRUE(world.client(engine).rearm());
+    EXPECT_GT(peak_of(seconds(3)), 1);
+  }
+}
+
 }  // namespace
 }  // namespace tendon::simulation

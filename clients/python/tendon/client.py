@@ -71,6 +71,12 @@ class Client:
         self._guest.flush(time.monotonic_ns())
         return asked
 
+    def disarm(self) -> bool:
+        """Asks the server for no force of its device until somebody rearms. False when there is no session to ask in."""
+        asked = self._guest.core.disarm()
+        self._guest.flush(time.monotonic_ns())
+        return asked
+
     @property
     def stats(self) -> Stats:
         return self._guest.stats

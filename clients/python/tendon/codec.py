@@ -33,6 +33,7 @@ from .messages import (
     DeviceDescription,
     DeviceReport,
     DeviceState,
+    Disarm,
     ForceCommand,
     ForceTable,
     Frame,
@@ -365,6 +366,8 @@ def _read_control(message: pb.Control) -> Control:
         request = SetStateRate(message.set_state_rate.hz, _device(message.set_state_rate.device))
     elif op == "rearm":
         request = Rearm(_device(message.rearm.device))
+    elif op == "disarm":
+        request = Disarm(_device(message.disarm.device))
     elif op == "describe":
         request = Describe(_device(message.describe.device))
     elif op == "take_lease":
@@ -585,6 +588,8 @@ def _write_control(frame: Control) -> pb.Control:
         control.set_state_rate.CopyFrom(pb.SetStateRate(hz=request.hz, device=request.device))
     elif isinstance(request, Rearm):
         control.rearm.CopyFrom(pb.Rearm(device=request.device))
+    elif isinstance(request, Disarm):
+        control.disarm.CopyFrom(pb.Disarm(device=request.device))
     elif isinstance(request, Describe):
         control.describe.CopyFrom(pb.Describe(device=request.device))
     elif isinstance(request, TakeLease):

@@ -24,6 +24,7 @@ from .messages import (
     ControlAck,
     DeviceReport,
     DeviceState,
+    Disarm,
     ForceCommand,
     ForceTable,
     Hello,
@@ -250,9 +251,13 @@ class ForceClient:
         self._stats.forces += 1
 
     def rearm(self) -> bool:
-        """Asks the server to clear a latched fault. False when there is no session to ask in, or too many
-        requests are open. Controllers only: the server refuses an observer."""
+        """Asks the server to clear a latched fault, and to take a disarm back. False when there is no session to ask in,
+        or too many requests are open. Controllers only: the server refuses an observer."""
         return self._session is not None and self._session.request(Rearm()) is not None
+
+    def disarm(self) -> bool:
+        """Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm()."""
+        return self._session is not None and self._session.request(Disarm()) is not None
 
     def stop(self, now: int) -> None:
         """Ends for good. `next_datagram` then gives the Byes, so that the server need not wait for a timeout."""

@@ -77,6 +77,7 @@ class Reason(IntFlag):
     OVERRUN = 1024
     WATCHDOG = 2048
     UNSEEN = 4096
+    DISARMED = 8192
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +154,14 @@ class SetStateRate:
 
 @dataclass(frozen=True, slots=True)
 class Rearm:
-    """Client → server, reliable: clears a latched fault. Only from a controller of the device."""
+    """Client → server, reliable: clears a latched fault, and takes a Disarm back. Only from a controller of the device."""
+
+    device: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Disarm:
+    """Client → server, reliable: no force from the next step on, until a Rearm. Only from a controller of the device."""
 
     device: int = 0
 
@@ -203,7 +211,7 @@ class SetStateDeadband:
     max_silence_us: int = 20_000  # 1000 … 20 000; 0 = every state is sent, as before this was asked
 
 
-Request = Union[SetStateRate, Rearm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband]
+Request = Union[SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband]
 
 
 class ChannelRule(IntEnum):

@@ -88,8 +88,9 @@ class Contact(_message.Message):
     def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., gap_m: _Optional[float] = ..., table: _Optional[_Union[ForceTable, _Mapping]] = ...) -> None: ...
 
 class Control(_message.Message):
-    __slots__ = ["describe", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
+    __slots__ = ["describe", "disarm", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
+    DISARM_FIELD_NUMBER: _ClassVar[int]
     GIVE_LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
@@ -98,6 +99,7 @@ class Control(_message.Message):
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
     TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
     describe: Describe
+    disarm: Disarm
     give_lease: GiveLease
     id: int
     lease_lost: LeaseLost
@@ -105,7 +107,7 @@ class Control(_message.Message):
     set_state_deadband: SetStateDeadband
     set_state_rate: SetStateRate
     take_lease: TakeLease
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
     __slots__ = ["code", "detail", "device", "id", "wait_ms"]
@@ -234,6 +236,12 @@ class DeviceState(_message.Message):
     tick: int
     velocity_mps: Vec3
     def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
+
+class Disarm(_message.Message):
+    __slots__ = ["device"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    def __init__(self, device: _Optional[int] = ...) -> None: ...
 
 class Echo(_message.Message):
     __slots__ = ["peer_packet_number", "peer_tx_time_ns", "received_mask", "rx_time_ns"]

@@ -497,6 +497,7 @@ function readRequest(op: pb.Control["op"]): Request | undefined {
     case "setStateRate":
       return { kind: op.case, hz: op.value.hz, device: op.value.device };
     case "rearm":
+    case "disarm":
     case "describe":
       return { kind: op.case, device: op.value.device };
     case "takeLease":
@@ -519,6 +520,8 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
       return { case: request.kind, value: create(pb.SetStateRateSchema, { hz: request.hz, device: request.device }) };
     case "rearm":
       return { case: request.kind, value: create(pb.RearmSchema, { device: request.device }) };
+    case "disarm":
+      return { case: request.kind, value: create(pb.DisarmSchema, { device: request.device }) };
     case "describe":
       return { case: request.kind, value: create(pb.DescribeSchema, { device: request.device }) };
     case "takeLease":

@@ -31,6 +31,7 @@ export interface Guest {
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
+  disarm(): boolean;
   /** Says Bye and ends. */
   stop(): void;
   /** Resolves at the end; rejects with what a callback threw. */
@@ -111,6 +112,11 @@ class RealTimeGuest implements Guest {
   }
   rearm(): boolean {
     const asked = this.#client.rearm();
+    this.#wake();
+    return asked;
+  }
+  disarm(): boolean {
+    const asked = this.#client.disarm();
     this.#wake();
     return asked;
   }

@@ -244,11 +244,15 @@ export class ForceClient {
   }
 
   /**
-   * Asks the server to clear a latched fault of its device. Controllers only: an observer is refused. False when there is
-   * no session to ask in, or too many requests are open.
+   * Asks the server to clear a latched fault of its device, and to take a disarm back. Controllers only: an observer is
+   * refused. False when there is no session to ask in, or too many requests are open.
    */
   rearm(): boolean {
     return this.#session?.request({ kind: "rearm", device: 0 }) !== undefined;
+  }
+  /** Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm(). */
+  disarm(): boolean {
+    return this.#session?.request({ kind: "disarm", device: 0 }) !== undefined;
   }
 
   /** Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing. */

@@ -123,12 +123,12 @@ export interface StateDeadband {
 }
 
 /**
- * Reliable. Client → server: how many states of a device per second it wants; clear a latched fault; what is this device; my
- * forces are to be this channel's, or no longer; which states to leave out. Server → client: they no longer are.
+ * Reliable. Client → server: how many states of a device per second it wants; clear a latched fault; no force until
+ * then; what is this device; my forces are to be this channel's, or no longer; which states to leave out. Server → client: they no longer are.
  */
 export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
-  | { readonly kind: "rearm" | "describe"; readonly device: number }
+  | { readonly kind: "rearm" | "disarm" | "describe"; readonly device: number }
   | { readonly kind: "takeLease" | "giveLease"; readonly device: number; readonly channel: number }
   | { readonly kind: "leaseLost"; readonly device: number; readonly channel: number; readonly to: string }
   | ({ readonly kind: "setStateDeadband" } & StateDeadband);
@@ -305,7 +305,7 @@ export interface Refused {
 
 const kReasons = [
   "energy", "max force", "slew", "ramp-in", "held", "decaying", "safe stop", "not finite", "fault", "device clamp",
-  "overrun", "watchdog", "position unseen",
+  "overrun", "watchdog", "position unseen", "disarmed",
 ] as const;
 
 /** The names of the bits of DeviceState.reasons. */

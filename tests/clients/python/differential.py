@@ -26,6 +26,7 @@ from tendon.messages import (
     ControlAck,
     DeviceReport,
     DeviceState,
+    Disarm,
     ForceCommand,
     Frame,
     LinkReport,
@@ -99,7 +100,7 @@ def _frame(frame: Frame) -> list[object]:
             asked = frame.request
             words = ["control", frame.id, "deadband", _double(asked.share), _double(asked.floor)]
             return [*words, asked.max_silence_us * 1000]
-        return ["control", frame.id, "rearm" if isinstance(frame.request, Rearm) else "other"]
+        return ["control", frame.id, {Rearm: "rearm", Disarm: "disarm"}.get(type(frame.request), "other")]
     if isinstance(frame, ControlAck):
         return ["ack", frame.id, int(frame.code), _text(frame.detail)]
     if isinstance(frame, LinkReport):

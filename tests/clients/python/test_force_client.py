@@ -37,7 +37,7 @@ from tendon.codec import (
     write_answer,
 )
 from tendon.handshake import ClientHandshake
-from tendon.messages import Control, DeviceState, ForceCommand, Hello, LocalModel, Rearm, Refused, SetStateRate
+from tendon.messages import Control, DeviceState, Disarm, ForceCommand, Hello, LocalModel, Rearm, Refused, SetStateRate
 
 KEY = bytes(range(32))
 ZERO = (0.0, 0.0, 0.0)
@@ -391,7 +391,9 @@ def test_a_wanted_state_rate_and_rearm_arrive_as_requests():
     stage.run(500 * MS)
     assert stage.client.rearm()
     stage.run(500 * MS)
-    assert [control.request for control in stage.requests] == [SetStateRate(250), Rearm()]
+    assert stage.client.disarm()
+    stage.run(500 * MS)
+    assert [control.request for control in stage.requests] == [SetStateRate(250), Rearm(), Disarm()]
 
 
 def test_stop_says_bye_and_is_for_good():

@@ -68,7 +68,8 @@ for (const [suite, key] of kSuites) {
         const renewAfter = { datagrams: 50n, time: 600n * kSecond };
         const { seen, world } = controller(seed, kFoul, { key, stateHz: 1000 }, { key, renewAfter });
         world.runMs(3000);
-        for (let i = 0; i < 10; ++i) assert.equal(world.client.rearm(), true);
+        for (let i = 0; i < 9; ++i) assert.equal(world.client.rearm(), true);
+        assert.equal(world.client.disarm(), true);
         world.runMs(3000);
         const context = `seed ${seed}`;
         assert.deepEqual([world.client.phase, world.client.stats().sessions], ["open", 1], context);
@@ -77,7 +78,7 @@ for (const [suite, key] of kSuites) {
         world.server.forces.forEach(({ command }, i, all) =>
           assert.ok(i === 0 || command.sequence > all[i - 1]!.command.sequence, context));
         assert.ok(world.server.forces.length > 500, `${context}: ${world.server.forces.length} forces`);
-        const rearms = new Array(10).fill({ kind: "rearm", device: 0 });
+        const rearms = [...new Array(9).fill({ kind: "rearm", device: 0 }), { kind: "disarm", device: 0 }];
         assert.deepEqual(world.server.requests, [{ kind: "setStateRate", hz: 1000, device: 0 }, ...rearms], context);
         const link = world.client.stats().link!;
         assert.ok(link.lost > 0 && link.lostOutgoing > 0 && link.duplicated > 0 && link.reordered > 0, context);

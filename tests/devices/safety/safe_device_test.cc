@@ -582,6 +582,82 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
   EXPECT_EQ(latched.size(), 7U);
 }
 
+// --- The operator disarms ----------------------------------------------------------------------------------
+
+TEST(SafeDevice, DisarmedInEveryStateItGivesNoForceFromTheNextStepOnAndOnlyTheOperatorEndsThat) {
+  for (const Situation& situation : kSituations) {
+    for (const int times : {1, 3}) {
+      SCOPED_TRACE(std::string(situation.name) + ", disarmed " + std::to_string(times) + " times");
+      Rig rig(everything());
+      rig.puppet.buttons = 1;
+      rig.steps(60);
+      situation.reach(rig);
+      rig.step(kPush);
+      const SafeDevice::Status before = rig.safe.status();
+      const bool fault = before.faults > 0;  // at fault already, or on its way there
+
+      for (int i = 0; i < times; ++i) rig.safe.disarm();
+      const SafetyState expected = fault                                 ? SafetyState::kFault
+                                   : before.state == SafetyState::kArmed ? SafetyState::kHomed
+                                                                         : before.state;
+      EXPECT_EQ(rig.state(), expected) << to_string(rig.state());
+      for (int i = 0; i < 1200; ++i) {
+        ASSERT_EQ(rig.step(kPush), Vec3::Zero());
+        ASSERT_EQ(rig.puppet.told, Vec3::Zero());
+      }
+      // Neither rest nor the button, nor a plug: nobody has asked for it.
+      for (const Device::State stage : {Device::State::kAbsent, Device::State::kHomed}) {
+        rig.puppet.stage = stage;
+        rig.steps(200);
+        rig.puppet.buttons = 0;
+        rig.steps(10);
+        rig.puppet.buttons = 1;
+        rig.steps(200);
+      }
+      EXPECT_EQ(rig.state(), fault ? SafetyState::kFault : SafetyState::kHomed);
+      EXPECT_EQ(rig.safe.times_armed(), before.state == SafetyState::kArmed || fault ? 1U : 0U);
+      EXPECT_EQ(rig.safe.status().faults, before.faults) << "to disarm is no fault";
+      rig.arm();
+      EXPECT_NE(rig.steps(20, kPush), Vec3::Zero());
+    }
+  }
+}
+
+TEST(SafeDevice, WhatIsToBeArmedAtTheStartIsNotWhenDisarmedBefore) {
+  SafeDevice::Config config;
+  config.arming.by = By::kStart;
+  Rig rig(config);
+  rig.step();
+  rig.safe.disarm();
+  rig.steps(3000);
+  EXPECT_EQ(rig.state(), SafetyState::kHomed);
+  rig.safe.arm();
+  rig.step();
+  EXPECT_EQ(rig.state(), SafetyState::kArmed);
+}
+
+TEST(DeadMan, WhatTheOperatorHasDisarmedTheButtonArmsOnlyAfterHeHasSaidSoAndPressedAnew) {
+  Rig rig(by_button());
+  rig.steps(60);
+  const auto press = [&rig] {
+    rig.puppet.buttons = 0;
+    rig.steps(10);
+    rig.puppet.buttons = 4;
+    rig.steps(60);
+  };
+  press();
+  ASSERT_EQ(rig.state(), SafetyState::kArmed);
+  rig.safe.disarm();
+  EXPECT_EQ(rig.step(kPush), Vec3::Zero());
+  press();
+  EXPECT_EQ(rig.state(), SafetyState::kHomed);
+  rig.safe.arm();
+  rig.steps(100);
+  EXPECT_EQ(rig.state(), SafetyState::kHomed) << "a button that is held was pressed for something else";
+  press();
+  EXPECT_EQ(rig.state(), SafetyState::kArmed);
+}
+
 // --- Any sequence ------------------------------------------------------------------------------------------
 
 struct Seen {
@@ -606,6 +682,7 @@ void live(std::uint64_t seed, Seen& seen) {
   Rig rig(config);
   Vec3 velocity = Vec3::Zero();
   double size = 0;
+  bool disarmed = false;
   for (int i = 0; i < 600; ++i) {
     if (dice.chance(0.01))
       velocity = dice.chance(0.6) ? Vec3(Vec3::Zero()) : Vec3(dice.direction() * dice.decades(-3, 0.3));
@@ -614,7 +691,8 @@ void live(std::uint64_t seed, Seen& seen) {
     if (dice.chance(0.004)) rig.puppet.stage = static_cast<Device::State>(dice.bits() % 5);
     if (dice.chance(0.03)) rig.puppet.stage = Device::State::kHomed;
     if (dice.chance(0.01)) rig.puppet.answers = !rig.puppet.answers || dice.chance(0.5);
-    if (dice.chance(0.03)) rig.safe.arm();
+    if (dice.chance(0.03)) rig.safe.arm(), disarmed = false;
+    if (dice.chance(0.003)) rig.safe.disarm(), disarmed = true;
     if (dice.chance(0.005)) rig.now += dice.milliseconds(0, 100);
     if (dice.chance(0.1)) rig.puppet.age = dice.milliseconds(0, 3);
     rig.puppet.position += velocity * 1e-3;
@@ -633,6 +711,7 @@ void live(std::uint64_t seed, Seen& seen) {
     if (applied != Vec3::Zero()) {
       ++seen.nonzero;
       ASSERT_EQ(status.state, SafetyState::kArmed);
+      ASSERT_FALSE(disarmed);
       ASSERT_EQ(rig.puppet.stage, Device::State::kHomed);
       ASSERT_TRUE(asked.allFinite());
       if (config.dead_man) {

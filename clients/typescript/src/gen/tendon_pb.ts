@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIvoCCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzIvIBCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQFCCgoIX2Vycm9yX24imwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASLZAgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASKgoKbGVhc2VfbG9zdBgHIAEoCzIULnRlbmRvbi52MS5MZWFzZUxvc3RIAEIECgJvcCIqCgxTZXRTdGF0ZVJhdGUSCgoCaHoYASABKA0SDgoGZGV2aWNlGAIgASgNIkwKEFNldFN0YXRlRGVhZGJhbmQSDQoFc2hhcmUYASABKAESEQoJZmxvb3JfbXBzGAIgASgBEhYKDm1heF9zaWxlbmNlX3VzGAMgASgNIhcKBVJlYXJtEg4KBmRldmljZRgBIAEoDSIaCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0iLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkihgEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uImoKEkNoYW5uZWxEZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiQKBHJ1bGUYAiABKA4yFi50ZW5kb24udjEuQ2hhbm5lbFJ1bGUSEAoIbGVhc2VfbXMYAyABKA0SDgoGaG9sZGVyGAQgASgJIjQKA0J5ZRIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGcmVhc29uGAIgASgJItEDCgpMaW5rUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmZvcmNlcxgEIAEoBBITCgtsYXRlX3NlcnZlchgFIAEoBBIUCgxsYXRlX25ldHdvcmsYBiABKAQSEwoLbGF0ZV9lbmdpbmUYByABKAQSFQoNd29yc3RfbGF0ZV9ucxgIIAEoBBIWCg5sb25nZXN0X2dhcF9ucxgJIAEoBBIlCgpyb3VuZF90cmlwGAogASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19zZXJ2ZXIYCyABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX2NsaWVudBgMIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSFwoPY2xvY2tfb2Zmc2V0X25zGA0gASgSEhcKD2Nsb2NrX2RyaWZ0X3BwbRgOIAEoARIWCg5jbG9ja19lcnJvcl9ucxgPIAEoBBIQCghyZWNlaXZlZBgQIAEoBBIMCgRsb3N0GBEgASgEEhEKCXJlb3JkZXJlZBgSIAEoBBISCgpkdXBsaWNhdGVkGBMgASgEEg0KBXdvcmRzGBQgASgJIisKBkRlbGF5cxIRCgltZWRpYW5fbnMYASABKBISDgoGcDk5X25zGAIgASgSIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAiq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIvoCCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzIvIBCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQFCCgoIX2Vycm9yX24imwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASL+AgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASIwoGZGlzYXJtGAkgASgLMhEudGVuZG9uLnYxLkRpc2FybUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSIaCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0iLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkihgEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uImoKEkNoYW5uZWxEZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiQKBHJ1bGUYAiABKA4yFi50ZW5kb24udjEuQ2hhbm5lbFJ1bGUSEAoIbGVhc2VfbXMYAyABKA0SDgoGaG9sZGVyGAQgASgJIjQKA0J5ZRIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGcmVhc29uGAIgASgJItEDCgpMaW5rUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmZvcmNlcxgEIAEoBBITCgtsYXRlX3NlcnZlchgFIAEoBBIUCgxsYXRlX25ldHdvcmsYBiABKAQSEwoLbGF0ZV9lbmdpbmUYByABKAQSFQoNd29yc3RfbGF0ZV9ucxgIIAEoBBIWCg5sb25nZXN0X2dhcF9ucxgJIAEoBBIlCgpyb3VuZF90cmlwGAogASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19zZXJ2ZXIYCyABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX2NsaWVudBgMIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSFwoPY2xvY2tfb2Zmc2V0X25zGA0gASgSEhcKD2Nsb2NrX2RyaWZ0X3BwbRgOIAEoARIWCg5jbG9ja19lcnJvcl9ucxgPIAEoBBIQCghyZWNlaXZlZBgQIAEoBBIMCgRsb3N0GBEgASgEEhEKCXJlb3JkZXJlZBgSIAEoBBISCgpkdXBsaWNhdGVkGBMgASgEEg0KBXdvcmRzGBQgASgJIisKBkRlbGF5cxIRCgltZWRpYW5fbnMYASABKBISDgoGcDk5X25zGAIgASgSIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAiq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -551,6 +551,12 @@ export type Control = Message<"tendon.v1.Control"> & {
     case: "setStateDeadband";
   } | {
     /**
+     * @generated from field: tendon.v1.Disarm disarm = 9;
+     */
+    value: Disarm;
+    case: "disarm";
+  } | {
+    /**
      * server → client
      *
      * @generated from field: tendon.v1.LeaseLost lease_lost = 7;
@@ -629,7 +635,8 @@ export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*
   messageDesc(file_tendon, 11);
 
 /**
- * Clears a latched fault. Only from a controller of the device.
+ * Clears a latched fault, and takes a Disarm back. With a safety layer it is the operator's request to arm. Only from a
+ * controller of the device.
  *
  * @generated from message tendon.v1.Rearm
  */
@@ -648,6 +655,28 @@ export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
   messageDesc(file_tendon, 12);
 
 /**
+ * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
+ * nor a new session ends it, nor the dead man's button by itself. Safety goes from armed to homed; a request to arm that
+ * was not granted yet is withdrawn. It is no fault, and clears none. Asking twice is asking once. Only from a controller of
+ * the device, the holder of its channel or not. CODE_OK: the order is given to the device's loop, ahead of its next step.
+ *
+ * @generated from message tendon.v1.Disarm
+ */
+export type Disarm = Message<"tendon.v1.Disarm"> & {
+  /**
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+};
+
+/**
+ * Describes the message tendon.v1.Disarm.
+ * Use `create(DisarmSchema)` to create a new message.
+ */
+export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
+  messageDesc(file_tendon, 13);
+
+/**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
  *
  * @generated from message tendon.v1.Describe
@@ -664,7 +693,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 14);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -689,7 +718,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 15);
 
 /**
  * I do not want to be it any more.
@@ -713,7 +742,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 16);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -744,7 +773,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 17);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -789,7 +818,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 18);
 
 /**
  * What a device is and can do.
@@ -890,7 +919,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 19);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -928,7 +957,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 20);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -952,7 +981,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 21);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1097,7 +1126,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 22);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1119,7 +1148,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 23);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -1217,7 +1246,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 24);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -1273,7 +1302,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 25);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -1323,7 +1352,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 26);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -1356,7 +1385,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 27);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -1385,7 +1414,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -1465,7 +1494,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 29);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -1496,7 +1525,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 30);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -1532,7 +1561,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 31);
 
 /**
  * @generated from enum tendon.v1.Mode
