@@ -71,14 +71,23 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
 }
 
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now)
-    : ForceClient(link, server, config, Role::kObserver, now) {
+    : ForceClient(link, server, config, config.operates ? Role::kController : Role::kObserver, now) {
   require(watch != nullptr, "watch: an observer needs a callback");
+  require(!(config.operates && config.diagnostics), "diagnostics: for observers only");
   watch_ = std::move(watch);
 }
 
-bool ForceClient::rearm() { return session_ && session_->request(Rearm{.device = place_.device}).has_value(); }
+bool ForceClient::give_order(const Request& order) {
+  const auto id = session_ ? session_->request(order) : std::nullopt;
+  if (!id) return false;
+  order_ = id;
+  order_answer_.reset();
+  return true;
+}
 
-bool ForceClient::disarm() { return session_ && session_->request(Disarm{.device = place_.device}).has_value(); }
+bool ForceClient::rearm() { return give_order(Rearm{.device = place_.device}); }
+
+bool ForceClient::disarm() { return give_order(Disarm{.device = place_.device}); }
 
 bool ForceClient::take_lease() {
   if (session_) asked_lease_ = session_->request(TakeLease{.device = place_.device, .channel = place_.channel});
@@ -153,6 +162,8 @@ void ForceClient::settle(LocalTime now) {
   holds_ = place_.role == Role::kController;
   asked_lease_.reset();
   description_.reset();
+  order_.reset();
+  order_answer_.reset();
   stats_.lease_lost_to.clear();
   ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
   Session::Config config;
@@ -272,6 +283,7 @@ void ForceClient::take_events(LocalTime now) {
 
 void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& answered) {
   if (answered.device) description_ = answered.device;
+  if (answered.id == order_) order_answer_ = answered;
   if (answered.id == deadband_request_) {
     foretell_ = answered.code == Code::kOk && period_ > Duration::zero() &&
                 config_.state_deadband->max_silence > Duration::zero();

@@ -104,6 +104,9 @@ class ForceClient {
     /// Of an observer: ask for what the engines want (DeviceState::force_wanted), and once a second for how the
     /// device's loop and its engines do. A server that knows nothing of this leaves it out.
     bool diagnostics = false;
+    /// With a Watch: come as a controller all the same, one that sends no force. It may rearm, disarm and hold a
+    /// channel.
+    bool operates = false;
     /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
     std::optional<Key> key{};
     Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
@@ -151,7 +154,8 @@ class ForceClient {
   /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves
   /// with the first turn. Throws std::invalid_argument naming the field when `config` is impossible.
   ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now);
-  /// An observer: sees states, and reports when it asks for them; never sends a force.
+  /// An observer: sees states, and reports when it asks for them; or an operator (Config::operates). Never sends a
+  /// force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
   /// Does all there is to do at `now` and returns when it wants to be called again at the latest; a
@@ -165,6 +169,9 @@ class ForceClient {
   bool rearm();
   /// Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm().
   bool disarm();
+
+  /// What the server has said to the newest rearm() or disarm() of the present session; empty until then.
+  const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.
   bool holds() const noexcept { return holds_; }
@@ -200,6 +207,7 @@ class ForceClient {
   void settle(LocalTime now);
   void end(LocalTime now, Phase phase, Code code, std::string reason);
   bool drain(LocalTime now);
+  bool give_order(const Request& order);
   bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
   void take_report(const PeerReport& report);
   void take_events(LocalTime now);
@@ -228,6 +236,8 @@ class ForceClient {
   std::optional<Session> session_;
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
+  std::optional<std::uint32_t> order_;  ///< the newest rearm or disarm: number of the request
+  std::optional<Session::RequestAnswered> order_answer_;
   Grant place_;  ///< the numbers of our device and channel
   bool holds_ = false;
   std::optional<std::uint32_t> asked_lease_;  ///< the request that waits for its answer

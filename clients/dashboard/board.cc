@@ -30,6 +30,11 @@ void Board::tell(Contact contact, std::string words) {
   ++version_;
 }
 
+void Board::tell(Press press) {
+  press_ = std::move(press);
+  ++version_;
+}
+
 void Board::welcomed(const Welcome& welcome) {
   welcome_ = welcome;
   ++sessions_;

@@ -22,6 +22,15 @@ enum class Contact : std::uint8_t {
   kLost,        ///< a session has ended; trying on
 };
 
+/// What became of the newest press of a button that arms or disarms.
+struct Press {
+  enum class State : std::uint8_t { kUnderWay, kDone, kFailed };
+  std::uint32_t device = 0;
+  bool arm = false;  ///< otherwise a disarming
+  State state = State::kUnderWay;
+  std::string words;  ///< for people
+};
+
 /// All that is known of a server at this instant, as values: what the Observer writes down, the page is told and
 /// /metrics exports. Counters only grow, as long as this object lives, whatever the server does.
 ///
@@ -63,6 +72,7 @@ class Board {
   };
 
   void tell(Contact contact, std::string words);
+  void tell(Press press);
   void welcomed(const Welcome& welcome);
   void described(const DeviceDescription& about);
   /// There are so many devices: those beyond were another server's.
@@ -74,12 +84,13 @@ class Board {
 
   Contact contact() const noexcept { return contact_; }
   const std::string& words() const noexcept { return words_; }  ///< about the contact, for people
+  const std::optional<Press>& press() const noexcept { return press_; }
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   const LinkStats& link() const noexcept { return link_; }
   std::uint64_t sessions() const noexcept { return sessions_; }
   const std::map<std::uint32_t, Device>& devices() const noexcept { return devices_; }  ///< by number
 
-  /// Grows when the contact, the devices or what they are has changed.
+  /// Grows when the contact, a press, the devices or what they are has changed.
   std::uint64_t version() const noexcept { return version_; }
   /// Takes out the states of a device that wait; empty for a device that is not there.
   std::vector<DeviceState> take_states(std::uint32_t device);
@@ -87,6 +98,7 @@ class Board {
  private:
   Contact contact_ = Contact::kGreeting;
   std::string words_ = "looking for the server";
+  std::optional<Press> press_;
   std::optional<Welcome> welcome_;
   LinkStats link_;
   std::uint64_t sessions_ = 0;

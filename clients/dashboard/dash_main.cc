@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-dash: a web page that shows what a Tendon server does, live and recorded. It only looks on.
+// tendon-dash: a web page that shows what a Tendon server does, live and recorded. It only looks on, unless it may arm.
 #include <sys/random.h>
 
 #include <CLI/CLI.hpp>
@@ -14,11 +14,13 @@
 #include <vector>
 
 #include "clients/cpp/key_file.h"
+#include "clients/cpp/udp_transport.h"
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/feed.h"
 #include "clients/dashboard/json.h"
 #include "clients/dashboard/metrics.h"
 #include "clients/dashboard/observer.h"
+#include "clients/dashboard/operator.h"
 #include "clients/dashboard/page_files.h"
 #include "clients/dashboard/recordings.h"
 #include "clients/dashboard/routes.h"
@@ -41,6 +43,7 @@ struct Options {
   WebServer::Config web;
   Routes::Config routes;
   std::string key_file;
+  std::string arm_channel;
   std::string recordings;
   double duration_s = 0;
   bool json = false;
@@ -77,6 +80,13 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
          "--key", options.key_file,
          "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
       ->type_name("FILE");
+  app.add_option("--arm", options.arm_channel,
+                 "Whoever uses a browser on this machine may arm and disarm: with --key, a controller's, best of its "
+                 "own, and by "
+                 "this channel of the device, which is claimed for that moment and best is the operator's own. No "
+                 "force is sent, "
+                 "and nothing taken from an engine that holds it")
+      ->type_name("CHANNEL");
   app.add_option("--listen", listen,
                  "Where the page is; port 0 lets the system choose. Beyond this machine only with --host")
       ->type_name("HOST:PORT")
@@ -105,12 +115,17 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
               << ": beyond this machine only with --host NAME, the name that browsers there use\n";
     return 2;
   }
+  if (!options.arm_channel.empty() && options.key_file.empty()) {
+    std::cerr << "--arm " << options.arm_channel << ": only with --key FILE, a controller's key\n";
+    return 2;
+  }
   return std::nullopt;
 }
 
 int run(const Options& options) {
-  std::optional<Key> key;
-  if (!options.key_file.empty()) key = read_client_key(options.key_file).key;
+  std::optional<ClientKey> key;
+  if (!options.key_file.empty()) key = read_client_key(options.key_file);
+  const bool arms = !options.arm_channel.empty();
   std::optional<Recordings> recordings;
   if (!options.recordings.empty()) recordings.emplace(options.recordings);
 
@@ -118,12 +133,30 @@ int run(const Options& options) {
   Board board;
   WebCounts counts;
   BridgeCounts bridge;
-  Feed feed(board, {.server = to_string(options.web.server), .recordings = recordings.has_value()}, counts, start);
+  // The Observer's address is another guest's.
+  std::optional<UdpTransport> operator_link;
+  std::optional<Operator> operates;
+  Abilities abilities{.server = to_string(options.web.server), .recordings = recordings.has_value()};
+  std::function<std::string(std::uint32_t, Operator::Order)> press;
+  if (arms) {
+    if (key->role != Role::kController)
+      throw std::runtime_error(options.key_file + ": an observer's key; --arm wants a controller's");
+    operator_link.emplace(options.web.server);
+    abilities.arms = true;
+    operates.emplace(*operator_link, options.web.server,
+                     Operator::Config{.channel = options.arm_channel, .key = key->key, .seed = seed_from_system()},
+                     board);
+    abilities.arming_objection = [&](std::uint32_t device) { return operates->objection(device); };
+    press = [&](std::uint32_t device, Operator::Order order) { return operates->press(read_clock(), device, order); };
+  }
+  Feed feed(board, abilities, counts, start);
   const Routes routes(options.routes, {.page = page_files(),
                                        .recordings = recordings ? &*recordings : nullptr,
-                                       .metrics = [&] { return metrics_text(board, counts, bridge); }});
+                                       .metrics = [&] { return metrics_text(board, counts, bridge); },
+                                       .press = press});
   WebServer web(options.web, routes, feed, counts, bridge, read_clock);
-  Observer observer(web.link(), options.web.server, {.key = key, .seed = seed_from_system()}, board, start);
+  Observer observer(web.link(), options.web.server,
+                    {.key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()}, board, start);
 
   const std::string at = to_string(web.address());
   if (options.json) {
@@ -145,7 +178,10 @@ int run(const Options& options) {
     }
     return next;
   };
-  web.run(from_seconds(options.duration_s), turn, [](LocalTime) {});
+  web.run(from_seconds(options.duration_s), turn, [&](LocalTime now) {
+    if (operates) operates->turn(now);
+  });
+  if (operates) operates->stop(read_clock());
   observer.stop(read_clock());
   if (options.json) {
     JsonWriter json;

@@ -24,7 +24,29 @@ void write(JsonWriter& json, std::string_view name, const std::optional<Delays>&
   json.key("p99").value(milliseconds(delays->p99)).end_object();
 }
 
-void write(JsonWriter& json, const DeviceDescription& about) {
+std::string_view state_name(Press::State state) noexcept {
+  switch (state) {
+    case Press::State::kUnderWay:
+      return "under_way";
+    case Press::State::kDone:
+      return "done";
+    case Press::State::kFailed:
+      return "failed";
+  }
+  return "unknown";
+}
+
+void write(JsonWriter& json, const std::optional<Press>& press) {
+  json.key("press");
+  if (!press) {
+    json.null();
+    return;
+  }
+  json.begin_object().key("device").value(press->device).key("order").value(press->arm ? "arm" : "disarm");
+  json.key("state").value(state_name(press->state)).key("words").value(press->words).end_object();
+}
+
+void write(JsonWriter& json, const DeviceDescription& about, const std::string& arming_objection) {
   json.begin_object().key("number").value(about.device).key("name").value(about.name).key("model").value(about.model);
   json.key("loop_hz").value(about.loop_hz).key("max_force_n").value(about.max_force);
   json.key("workspace_m");
@@ -42,7 +64,7 @@ void write(JsonWriter& json, const DeviceDescription& about) {
     json.key("rule").value(channel.rule == ChannelRule::kSum ? "sum" : "priority");
     json.key("lease_ms").value(milliseconds(channel.lease)).key("holder").value(channel.holder).end_object();
   }
-  json.end_array().end_object();
+  json.end_array().key("arming_objection").value(arming_objection).end_object();
 }
 
 void write(JsonWriter& json, const Board::Device& device) {
@@ -167,9 +189,11 @@ std::string server_json(const Board& board, const Abilities& abilities) {
   json.key("contact").value(name(board.contact())).key("words").value(board.words());
   json.key("version").value(board.welcome() ? board.welcome()->server : "");
   json.key("recordings").value(abilities.recordings);
+  json.key("arms").value(abilities.arms);
+  write(json, board.press());
   json.key("devices").begin_array();
   for (const auto& [number, device] : board.devices()) {
-    if (device.about) write(json, *device.about);
+    if (device.about) write(json, *device.about, abilities.arming_objection(number));
   }
   json.end_array().end_object();
   return json.take();

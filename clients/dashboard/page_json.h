@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,10 +16,20 @@
 
 namespace tendon::dash {
 
+/// What a tendon-dash lacks that may not arm.
+inline constexpr std::string_view kArmingNeeds =
+    "This page only looks on. To arm and disarm from here start tendon-dash with --key FILE, a controller's key, and "
+    "--arm CHANNEL.";
+
 /// What tendon-dash itself was told at its start, which the page has to know.
 struct Abilities {
   std::string server;       ///< HOST:PORT of tendond
   bool recordings = false;  ///< there is a folder
+  bool arms = false;        ///< … and leave to arm and disarm
+  /// Why a device cannot be armed and disarmed from the page now, in a sentence; empty: it can.
+  std::function<std::string(std::uint32_t device)> arming_objection = [](std::uint32_t) {
+    return std::string(kArmingNeeds);
+  };
 };
 
 /// {"type":"server",…}: the contact, the devices and what they are. Told when it changes.

@@ -15,6 +15,9 @@ constexpr std::string_view kContentSecurity =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+constexpr std::string_view kArmPath = "/api/arm";
+constexpr std::string_view kDisarmPath = "/api/disarm";
+
 /// Prometheus' text format.
 constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
@@ -22,6 +25,8 @@ std::string_view status_words(unsigned status) {
   switch (status) {
     case 200:
       return "OK";
+    case 202:
+      return "Accepted";
     case 206:
       return "Partial Content";
     case 400:
@@ -32,6 +37,8 @@ std::string_view status_words(unsigned status) {
       return "Not Found";
     case 405:
       return "Method Not Allowed";
+    case 409:
+      return "Conflict";
     case 413:
       return "Content Too Large";
     case 416:
@@ -152,10 +159,10 @@ std::optional<std::string> percent_decoded(std::string_view text) {
   return bytes;
 }
 
-Reply Routes::plain(unsigned status, std::string words) {
+Reply Routes::plain(unsigned status, std::string words, std::string_view allowed) {
   Reply reply = begin(status, "text/plain; charset=utf-8");
   set(reply, "Cache-Control", "no-store");
-  if (status == 405) set(reply, "Allow", "GET, HEAD");
+  if (status == 405) set(reply, "Allow", allowed);
   reply.body = std::move(words) + "\n";
   return reply;
 }
@@ -173,12 +180,35 @@ bool Routes::may_bridge(std::string_view origin) const {
          is_loopback_name(host_name(origin_host(origin)));
 }
 
+Reply Routes::order(const Request& request, std::string_view path) const {
+  if (request.method != "POST") return plain(405, "only POST", "POST");
+  if (!request.host || !is_our_host(*request.host)) {
+    return plain(421, "this is not what this machine is called; see --host of tendon-dash");
+  }
+  if (!request.local || request.proxied) return plain(403, "Only from the machine that tendon-dash runs on.");
+  if (!request.origin || !equal_but_for_case(origin_host(*request.origin), *request.host)) {
+    return plain(403, "Only for the page of tendon-dash itself.");
+  }
+  if (!sources_.press) return plain(403, std::string(kArmingNeeds));
+  constexpr std::string_view kQuery = "?device=";
+  std::string_view rest = request.target.substr(path.size());
+  std::uint32_t device = 0;
+  const bool named = rest.starts_with(kQuery);
+  if (named) rest.remove_prefix(kQuery.size());
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), device);
+  if (!named || error != std::errc{} || end != rest.data() + rest.size()) return plain(400, "expected ?device=N");
+  const std::string objection =
+      sources_.press(device, path == kArmPath ? Operator::Order::kArm : Operator::Order::kDisarm);
+  return objection.empty() ? plain(202, "begun") : plain(409, objection);
+}
+
 Answer Routes::answer(const Request& request) const {
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  if (path == kArmPath || path == kDisarmPath) return order(request, path);
   if (request.method != "GET" && request.method != "HEAD") return plain(405, "only GET and HEAD");
   if (!request.host || !is_our_host(*request.host)) {
     return plain(421, "this is not what this machine is called; see --host of tendon-dash");
   }
-  const std::string_view path = request.target.substr(0, request.target.find('?'));
   if (path == "/live" || path == "/bridge") {
     const bool live = path == "/live";
     const bool foreign = request.origin && !(live ? equal_but_for_case(origin_host(*request.origin), *request.host)

@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "clients/dashboard/operator.h"
 #include "clients/dashboard/page_files.h"
 #include "clients/dashboard/recordings.h"
 
@@ -60,6 +61,7 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 ///     GET /metrics             for Prometheus
 ///     GET /api/recordings      which there are
 ///     GET /recordings/NAME     the bytes of one; Range is understood
+///     POST /api/arm?device=N, POST /api/disarm?device=N     begins it; what becomes of it /live says
 ///
 /// A page that happens to be open in a browser on this machine could ask for all of it. So
 /// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts; a name of somebody else's
@@ -69,8 +71,11 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 /// for
 ///   /bridge, 403. A program that is no browser sends none. Nothing else may be read by other origins: no CORS header
 ///   is ever sent.
-/// * Only GET and HEAD exist, 405. What is no path of the above is 404: nothing is looked up in a file system but the
-/// plain name
+/// * **Arming** moves a machine, so it is for the page itself in a browser on this machine and for nobody else, 403:
+/// not from another machine or through a proxy, not for another Origin, nor for a program that names none. A form or a
+/// script of another page cannot name ours. 202: begun; 409: not now, and why.
+/// * For all else only GET and HEAD exist, 405. What is no path of the above is 404: nothing is looked up in a file
+/// system but the plain name
 ///   of a recording.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -85,6 +90,8 @@ class Routes {
     std::span<const PageFile> page;
     const Recordings* recordings = nullptr;
     std::function<std::string()> metrics;
+    /// Begins an order; returns why it does not. Empty: nobody may.
+    std::function<std::string(std::uint32_t device, Operator::Order order)> press{};
   };
 
   Routes(Config config, Sources sources) : config_(std::move(config)), sources_(std::move(sources)) {}
@@ -92,11 +99,12 @@ class Routes {
   Answer answer(const Request& request) const;
 
   /// An answer in plain words, for whatever is no answer to a request.
-  static Reply plain(unsigned status, std::string words);
+  static Reply plain(unsigned status, std::string words, std::string_view allowed = "GET, HEAD");
 
  private:
   bool is_our_host(std::string_view host) const;
   bool may_bridge(std::string_view origin) const;
+  Reply order(const Request& request, std::string_view path) const;
   Reply file(const Request& request, std::string_view path) const;
   Reply recording(const Request& request, std::string_view name) const;
 

@@ -309,6 +309,33 @@ TEST(ForceClient, AnObserverSeesTheHandAndTheLinkAndSendsNoForce) {
   EXPECT_EQ(world.a->phase(), Phase::kOpen) << "keep-alives hold the session";
 }
 
+TEST(ForceClient, AnOperatorComesAsAControllerSendsNoForceAndHearsWhatBecameOfItsOrder) {
+  World world(13, kFineWeather);
+  int calls = 0;
+  world.connect({.operates = true}, [&](const DeviceState&, const LinkStats&) { ++calls; });
+  EXPECT_FALSE(world.a->disarm()) << "there is no session to ask in";
+  world.run(kSecond);
+  EXPECT_EQ(world.z->hellos.front().role, Role::kController);
+  EXPECT_TRUE(world.a->holds());
+  EXPECT_GT(calls, 900);
+  EXPECT_FALSE(world.a->order_answer());
+  ASSERT_TRUE(world.a->disarm());
+  world.run(kSecond);
+  ASSERT_TRUE(world.a->order_answer());
+  EXPECT_EQ(world.a->order_answer()->code, Code::kOk);
+  ASSERT_TRUE(world.a->rearm());
+  EXPECT_FALSE(world.a->order_answer()) << "that was the one before";
+  world.run(kSecond);
+  EXPECT_TRUE(world.a->order_answer());
+  ASSERT_EQ(world.z->requests.size(), 2U);
+  EXPECT_TRUE(std::holds_alternative<Disarm>(world.z->requests[0]));
+  EXPECT_TRUE(std::holds_alternative<Rearm>(world.z->requests[1]));
+  EXPECT_TRUE(world.z->forces.empty());
+  World other(13);
+  EXPECT_THROW(other.connect({.diagnostics = true, .operates = true}, [](const DeviceState&, const LinkStats&) {}),
+               std::invalid_argument);
+}
+
 TEST(ForceClient, AsksForTheStateRateOnceInEachSession) {
   World world(14, {.loss = 0.3});
   world.connect({.state_hz = 250}, answer);

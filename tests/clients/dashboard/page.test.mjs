@@ -2,6 +2,8 @@
 //
 // The page on a live server, as a person uses it.
 import assert from "node:assert/strict";
+import { copyFileSync, mkdirSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
 import { it } from "node:test";
 import { painted, picture, says, shown, visit } from "./browser.mjs";
 import { Program, scratch, startDash, startServer, until } from "./support.mjs";
@@ -71,4 +73,107 @@ it("says in words that nobody answers, and finds the server when it comes", asyn
   await startServer(test, folder, ["minimal"], "--record", "/dev/null", "--listen", first.address);
   await says(page, ".contact[data-level=good]", "connected");
   await until("states come", async () => (await shown(page)) > 50);
+});
+
+/** A hand that rests 8 mm deep in a wall, a device that is armed by request, and a channel that is the operator's. */
+const kGuarded = `
+[device]
+kind = "simulated"
+profile = "falcon"
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 8
+mass_kg = 0.05
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [7.9, 0, 0]
+to_mm = [8, 0, 0]
+ramp_ms = 100
+[safety]
+arm = "by request"
+[[channel]]
+name = "wall"
+lease_ms = 500
+[[channel]]
+name = "operator"
+[network]
+keys = "keys"
+`;
+
+/** A server with keys for an engine, an operator and a screen. */
+async function guarded(test) {
+  const folder = scratch(test);
+  mkdirSync(join(folder, "keys"));
+  for (const name of ["engine", "operator", "screen"]) {
+    const made = new Program(test, "tendond", ["keygen", name, ...(name === "screen" ? ["--observer"] : [])], folder);
+    assert.equal(await made.ended, 0, made.lines.join("\n"));
+    copyFileSync(join(folder, `${name}.key`), join(folder, "keys", `${name}.key`));
+  }
+  writeFileSync(join(folder, "guarded.toml"), kGuarded);
+  const server = await startServer(test, folder, [join(folder, "guarded.toml")], "--record", "/dev/null");
+  const key = (name) => ["--key", join(folder, `${name}.key`)];
+  new Program(test, "virtual_wall", ["--server", server.address, "--device", "guarded", "--channel", "wall", "--rate-hz", "200", "--stiffness-n-per-m", "300", ...key("engine")]);
+  return { server, key };
+}
+const applied = async (page) => parseFloat(await page.locator("[data-tile=force] .value").textContent());
+const result = (page, level, text) => says(page, `.arming .result[data-level=${level}]`, text);
+
+it("arms and disarms by two buttons, beside an engine that goes on, and says what became of it", async (test) => {
+  const { server, key } = await guarded(test);
+  const { url, program } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
+  const page = await visit(test, url);
+  await says(page, ".engine", "virtual_wall");
+  await says(page, ".arming", "Ready, not armed: gives no force until it is armed.");
+  await until("no force is given", async () => (await applied(page)) === 0);
+  await page.click("#arm");
+  await result(page, "good", "Armed: it gives forces.");
+  await says(page, "[data-tile=state] .value", "Armed");
+  await until("force is given", async () => (await applied(page)) > 0);
+
+  await page.click("#disarm");
+  await result(page, "good", "Disarmed: no force until it is armed again.");
+  await says(page, ".arming", "Disarmed: gives no force until it is armed again.");
+  await until("no force is given", async () => (await applied(page)) === 0);
+  await says(page, ".reasons", "Disarmed");
+  const before = await shown(page);
+  await until("time passes", async () => (await shown(page)) > before + 500);
+  assert.equal(await applied(page), 0, "though the engine goes on");
+
+  await page.click("#arm");
+  await result(page, "good", "Armed: it gives forces.");
+  await until("force is given again", async () => (await applied(page)) > 0);
+  assert.equal(server.program.lines.filter((line) => /refused|denied/.test(line)).length, 0);
+  assert.ok(program.process.exitCode === null);
+});
+
+it("arms nothing by a channel that an engine holds, and says who holds it", async (test) => {
+  const { server, key } = await guarded(test);
+  const { url } = await startDash(test, server.address, ...key("operator"), "--arm", "wall");
+  const page = await visit(test, url);
+  await says(page, ".arming .needs", '"virtual_wall" holds the channel "wall", and for 500 ms after its last force. Nothing is taken from it.');
+  for (const button of ["#arm", "#disarm"]) assert.equal(await page.locator(button).isDisabled(), true, button);
+  const answer = await fetch(`${url}/api/disarm?device=0`, { method: "POST", headers: { origin: url } });
+  assert.equal(answer.status, 409);
+  assert.match(await answer.text(), /^"virtual_wall" holds the channel/);
+});
+
+it("shows no button without leave to arm, but what that takes, and is closed to whoever is not its page", async (test) => {
+  const { server, key } = await guarded(test);
+  const { url } = await startDash(test, server.address, ...key("screen"));
+  const page = await visit(test, url);
+  await says(page, ".arming .needs", "start tendon-dash with --key FILE, a controller's key, and --arm CHANNEL");
+  for (const button of ["#arm", "#disarm"]) assert.equal(await page.locator(button).isVisible(), false, button);
+  const post = async (where, headers) => (await fetch(`${where}/api/arm?device=0`, { method: "POST", headers })).status;
+  assert.equal(await post(url, { origin: url }), 403);
+  const { url: open } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
+  assert.equal(await post(open, {}), 403);
+  assert.equal(await post(open, { origin: "http://evil.example" }), 403);
+  assert.equal(await post(open, { origin: url }), 403, "a page of another program on this machine");
+  assert.equal(await post(open, { origin: open, "x-forwarded-for": "192.0.2.7" }), 403);
+  assert.equal((await fetch(`${open}/api/arm?device=0`)).status, 405);
+  const observer = new Program(test, "tendon-dash", ["--server", server.address, "--listen", "127.0.0.1:0", ...key("screen"), "--arm", "operator"]);
+  assert.equal(await observer.ended, 1);
+  assert.match(observer.lines.join("\n"), /an observer's key; --arm wants a controller's/);
+  const keyless = new Program(test, "tendon-dash", ["--server", server.address, "--listen", "127.0.0.1:0", "--arm", "operator"]);
+  assert.equal(await keyless.ended, 2);
 });

@@ -79,6 +79,27 @@ TEST(PageJson, TellsTheServerAndItsDevices) {
             (json{{"name", "main"}, {"rule", "priority"}, {"lease_ms", 500.0}, {"holder", "wall"}}));
 }
 
+TEST(PageJson, TellsWhetherADeviceMayBeArmedAndWhatBecameOfThePress) {
+  Board board;
+  board.described({.device = 0, .name = "left", .channels = {{.name = "main"}}});
+  board.described({.device = 1, .name = "right", .channels = {{.name = "main"}}});
+  json text = json::parse(server_json(board, {}));
+  EXPECT_EQ(text["arms"], false);
+  EXPECT_TRUE(text["press"].is_null());
+  EXPECT_EQ(text["devices"][0]["arming_objection"], kArmingNeeds);
+  const auto version = board.version();
+  board.tell(Press{.device = 1, .arm = true, .state = Press::State::kFailed, .words = "Not armed."});
+  EXPECT_GT(board.version(), version) << "or no page is told";
+  const Abilities may{.server = "", .arms = true, .arming_objection = [](std::uint32_t device) {
+                        return device == 1 ? std::string("held") : std::string();
+                      }};
+  text = json::parse(server_json(board, may));
+  EXPECT_EQ(text["arms"], true);
+  EXPECT_EQ(text["devices"][0]["arming_objection"], "");
+  EXPECT_EQ(text["devices"][1]["arming_objection"], "held");
+  EXPECT_EQ(text["press"], (json{{"device", 1}, {"order", "arm"}, {"state", "failed"}, {"words", "Not armed."}}));
+}
+
 TEST(PageJson, TellsHowTheLoopAndTheEnginesDo) {
   Board board;
   board.described({.device = 0, .name = "left", .channels = {{.name = "main"}, {.name = "tissue"}}});

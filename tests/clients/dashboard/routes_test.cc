@@ -7,6 +7,8 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tests/server/scratch_folder.h"
 
@@ -169,6 +171,78 @@ TEST_F(RoutesTest, KnowsNoOtherMethodAndNoOtherPath) {
                              "/metrics/", "*", "", "http://127.0.0.1:8080/", "/api"}) {
     EXPECT_EQ(status(get(target)), 404U) << target;
   }
+}
+
+TEST_F(RoutesTest, AnOrderToArmIsForItsOwnPageOnThisMachineByPostAndForNobodyElse) {
+  std::vector<std::pair<std::uint32_t, Operator::Order>> pressed;
+  std::string objection;
+  const Routes routes({.hosts = {"dash.lab"}, .origins = {"https://lab.example"}},
+                      {.page = kPage,
+                       .recordings = nullptr,
+                       .metrics = [] { return std::string(); },
+                       .press =
+                           [&](std::uint32_t device, Operator::Order order) {
+                             if (objection.empty()) pressed.emplace_back(device, order);
+                             return objection;
+                           }});
+  const auto answer = [&](const Request& request) { return std::get<Reply>(routes.answer(request)); };
+  Request good = get("/api/arm?device=3");
+  good.method = "POST";
+  good.origin = "http://127.0.0.1:8080";
+  EXPECT_EQ(answer(good).status, 202U);
+  Request other = good;
+  other.target = "/api/disarm?device=15";
+  EXPECT_EQ(answer(other).status, 202U);
+  EXPECT_EQ(pressed, (decltype(pressed){{3, Operator::Order::kArm}, {15, Operator::Order::kDisarm}}));
+  pressed.clear();
+
+  const auto refused = [&](unsigned status, const auto& change) {
+    for (const char* target : {"/api/arm?device=3", "/api/disarm?device=3"}) {
+      Request request = good;
+      request.target = target;
+      change(request);
+      EXPECT_EQ(answer(request).status, status)
+          << request.method << " " << target << " " << request.origin.value_or("no origin");
+    }
+  };
+  for (const char* method : {"GET", "HEAD", "PUT", "OPTIONS", "post", ""}) {
+    refused(405, [&](Request& r) { r.method = method; });
+  }
+  Request asked = good;
+  asked.method = "GET";
+  EXPECT_EQ(header(answer(asked), "Allow"), "POST");
+  refused(421, [](Request& r) { r.host = "evil.example", r.origin = "http://evil.example"; });
+  refused(421, [](Request& r) { r.host.reset(); });
+  for (const char* origin : {"http://evil.example", "https://lab.example", "http://127.0.0.1:8081", "http://127.0.0.1",
+                             "http://localhost:8080", "null", "", "http://127.0.0.1:8080/", "127.0.0.1:8080"}) {
+    refused(403, [&](Request& r) { r.origin = origin; });
+  }
+  refused(403, [](Request& r) { r.origin.reset(); });
+  refused(403, [](Request& r) { r.local = false; });
+  refused(403, [](Request& r) { r.proxied = true; });
+  refused(403, [](Request& r) { r.host = "dash.lab", r.origin = "http://dash.lab", r.local = false; });
+  for (const char* query : {"", "?", "?device=", "?device=x", "?device=-1", "?device=1x", "?device=1&device=2",
+                            "?device=99999999999", "?x=1"}) {
+    Request request = good;
+    const std::string target = std::string("/api/arm") + query;
+    request.target = target;
+    EXPECT_EQ(answer(request).status, 400U) << query;
+  }
+  EXPECT_TRUE(pressed.empty());
+
+  objection = "\"wall\" holds it";
+  EXPECT_EQ(answer(good).status, 409U);
+  EXPECT_EQ(text(answer(good)), "\"wall\" holds it\n");
+}
+
+TEST_F(RoutesTest, WithoutLeaveToArmNobodyMayAndIsToldWhatItTakes) {
+  Request request = get("/api/disarm?device=0");
+  request.method = "POST";
+  request.origin = "http://127.0.0.1:8080";
+  const Reply answer = reply(request);
+  EXPECT_EQ(answer.status, 403U);
+  EXPECT_NE(text(answer).find("--key FILE"), std::string::npos);
+  EXPECT_NE(text(answer).find("--arm CHANNEL"), std::string::npos);
 }
 
 TEST_F(RoutesTest, ServesTheBytesOfARecording) {

@@ -59,9 +59,9 @@ export async function until(what, done, more = () => "") {
   }
 }
 
-/** tendond with scenes of deploy/scenes; its address. */
+/** tendond with scenes of deploy/scenes, or of files of the test's own; its address. */
 export async function startServer(test, folder, scenes, ...more) {
-  const paths = scenes.map((scene) => join(kRoot, "deploy/scenes", `${scene}.toml`));
+  const paths = scenes.map((scene) => (scene.endsWith(".toml") ? scene : join(kRoot, "deploy/scenes", `${scene}.toml`)));
   const program = new Program(test, "tendond", [...paths, ...(more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"]), "--json", ...more], folder);
   return { program, address: JSON.parse(await program.line('"listening"')).address };
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+import { Arming } from "./arming.js";
 import { h, mark, say } from "./dom.js";
 import { Scrubber } from "./scrubber.js";
 import { Stream, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
 import { Track } from "./track.js";
 import { View, type Facts } from "./view.js";
-import { count, digits, duration, kSafety } from "./words.js";
+import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety } from "./words.js";
 
 /** Steps that are kept: two minutes at 1 kHz. */
 const kKept = 120_000;
@@ -19,6 +20,7 @@ export class Live {
   readonly #stream: Stream;
   readonly #view: View;
   readonly #scrubber: Scrubber;
+  readonly #arming = new Arming();
   readonly #pause: HTMLButtonElement;
   readonly #device: HTMLSelectElement;
   readonly #window: HTMLSelectElement;
@@ -64,7 +66,7 @@ export class Live {
           h("button", { type: "button", id: "zoom-in", "aria-label": "Zoom in", title: "Zoom in", click: () => zoom(0.5) }, "+"),
           h("button", { type: "button", id: "zoom-out", "aria-label": "Zoom out", title: "Zoom out", click: () => zoom(2) }, "−")),
         this.#pause),
-      this.#scrubber.element, this.#view.element);
+      this.#arming.element, this.#scrubber.element, this.#view.element);
     this.#stream = new Stream((message) => this.#take(message), (open) => this.#changed(open));
     this.#loop();
   }
@@ -176,7 +178,9 @@ export class Live {
     const info = this.#server?.devices.find((d) => d.number === this.#watched);
     say(this.#about, info ? `${info.model}, ${count(info.loop_hz)} steps per second, at most ${digits(info.max_force_n)} N` : "");
     const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
-    this.#view.draw(this.#track, from, to, cursor, this.#facts());
+    const facts = this.#facts();
+    this.#view.draw(this.#track, from, to, cursor, facts);
+    this.#arming.draw(this.#open ? this.#server : undefined, this.#watched, facts.state);
     if (this.#still) this.#scrubber.draw([this.#track], from, to);
     mark(this.element, "data-states", String(this.#track.end));
   }
@@ -187,6 +191,7 @@ export class Live {
     const slowest = engines.filter((e) => e.round_trip_ms).sort((a, b) => b.round_trip_ms!.median - a.round_trip_ms!.median)[0];
     const lossiest = [...engines].sort((a, b) => lossOf(b) - lossOf(a))[0];
     const words = loop ? kSafety[loop.safety] : undefined;
+    const disarmed = this.#track.end > this.#track.begin && (this.#track.reasons[this.#track.end - 1]! & kDisarmedBit) !== 0;
     const connected = this.#open && this.#server?.contact === "open";
     const holders = this.#server?.devices.find((d) => d.number === this.#watched)?.channels.filter((c) => c.holder !== "") ?? [];
     return {
@@ -194,7 +199,9 @@ export class Live {
         ? { level: "off", name: "Not connected", meaning: this.#open ? (this.#server?.words ?? "") : "tendon-dash does not answer" }
         : loop?.fault
           ? { level: "bad", name: "Fault", meaning: loop.fault }
-          : (words ?? { level: "off", name: "Not told", meaning: "the server has not said how the device is" }),
+          : disarmed
+            ? kDisarmed
+            : (words ?? { level: "off", name: "Not told", meaning: "the server has not said how the device is" }),
       engines,
       noEngines: holders.length > 0 ? `${holders.map((c) => `${c.holder} on channel ${c.name}`).join(", ")}.` : "No engine sends forces.",
       delay: slowest
@@ -210,7 +217,7 @@ export class Live {
           ? `In the last second ${count(loop.steps)} steps, ${count(loop.missed)} missed, ${count(loop.overruns)} too late for the control law, ${count(loop.unseen)} without a position. ${count(loop.missed_total)} missed of ${count(loop.steps_total)} since.`
           : "",
       },
-      gives: !loop || (loop.fault === "" && (loop.safety === "armed" || loop.safety === "unguarded")),
+      gives: !disarmed && (!loop || (loop.fault === "" && (loop.safety === "armed" || loop.safety === "unguarded"))),
       degraded: loop?.degraded ?? "",
     };
   }

@@ -13,6 +13,15 @@ export interface DeviceInfo {
   readonly loop_hz: number;
   readonly max_force_n: number;
   readonly channels: readonly ChannelInfo[];
+  /** Why it cannot be armed and disarmed from here now; empty: it can. */
+  readonly arming_objection: string;
+}
+/** What became of the newest press of a button that arms or disarms. */
+export interface PressInfo {
+  readonly device: number;
+  readonly order: "arm" | "disarm";
+  readonly state: "under_way" | "done" | "failed";
+  readonly words: string;
 }
 export interface ServerMessage {
   readonly type: "server";
@@ -21,6 +30,8 @@ export interface ServerMessage {
   readonly words: string;
   readonly version: string;
   readonly recordings: boolean;
+  readonly arms: boolean;
+  readonly press: PressInfo | null;
   readonly devices: readonly DeviceInfo[];
 }
 type Triple = readonly [readonly (number | null)[], readonly (number | null)[], readonly (number | null)[]];

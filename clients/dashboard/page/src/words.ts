@@ -14,6 +14,7 @@ export interface ReasonWords {
 /** The bits of core/reason.h. */
 export const kReasons: readonly ReasonWords[] = [
   { bit: 8, name: "Fault", meaning: "a latched fault holds the force at zero", limits: true },
+  { bit: 13, name: "Disarmed", meaning: "an operator has disarmed the device: zero until it is armed again", limits: true },
   { bit: 6, name: "Safe stop", meaning: "no fresh force for too long: zero until one comes", limits: true },
   { bit: 5, name: "Fading", meaning: "no fresh force has come, and the last one fades", limits: true },
   { bit: 4, name: "Held", meaning: "the newest force has outlived its validity and is held", limits: true },
@@ -54,6 +55,10 @@ export const kSafety: Readonly<Record<string, StateWords>> = {
   fault: { name: "Fault", meaning: "gives no force until it is armed again", level: "bad" },
   unguarded: { name: "Gives forces", meaning: "its scene lists no safety layer: there is nothing to arm", level: "good" },
 };
+
+/** Bit 13 of the reasons: whatever the safety layer was last reported to be, there is no force. */
+export const kDisarmedBit = 1 << 13;
+export const kDisarmed: StateWords = { name: "Disarmed", meaning: "gives no force until it is armed again", level: "notice" };
 
 /** "0.42", "12.3", "1234": three digits that count, whatever the size. */
 export function digits(value: number, most = 3): string {

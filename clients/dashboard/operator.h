@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "clients/cpp/force_client.h"
+#include "clients/dashboard/board.h"
+#include "protocol/crypto.h"
+#include "protocol/link.h"
+
+namespace tendon::dash {
+
+/// Arms and disarms devices for whoever presses the page's buttons, without socket, clock or thread.
+///
+/// Each press is a session of its own, beside the Observer's: a controller with the operator's key that claims one
+/// channel of the device, holds it, sends Rearm or Disarm and never a force, and leaves at the answer. Between two
+/// presses there is no controller. What became of a press is written on the Board in words, and is not what the server
+/// answered but what the device then did: its states have the reason "disarmed" and no force, its report says "armed".
+///
+/// * **An engine is never disturbed.** While another client holds the channel nothing is sent at all (`objection`), and
+///   a lease is never taken from anybody, not even by a key that the scene lets take over. Best is a channel of the
+///   operator's own. The key, too, should be his own: tendond gives a key's place to the newest who comes with it, and
+///   what the Board knows of holders is up to a second old.
+/// * **Disarm goes before.** It ends an arming that is under way; nothing ends a disarming.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Operator {
+ public:
+  enum class Order : std::uint8_t { kArm, kDisarm };
+
+  struct Config {
+    std::string name = "tendon-dash operator";  ///< for the server's log; at most limits::kMaxLabel bytes
+    std::string channel;                        ///< that each device has for this
+    Key key;                                    ///< a controller's
+    Seed seed{};                                ///< 32 bytes from the system at each start
+    /// For the session and the server's answer: a round trip of 1 s at 50 % loss is enough for it.
+    Duration patience = std::chrono::seconds(5);
+    /// For the device, from the answer on: the safety layer may take a second to grant it, the next report on it as
+    /// long to come.
+    Duration granted_within = std::chrono::seconds(4);
+  };
+
+  /// `link` must not be the Observer's: to the server one address is one guest. It and `board` must outlive this
+  /// object.
+  Operator(Link& link, const Address& server, const Config& config, Board& board);
+
+  /// Why a device cannot be armed or disarmed now, in a sentence; empty: it can.
+  std::string objection(std::uint32_t device) const;
+
+  /// A button was pressed. Returns why nothing is done, or nothing when it has begun.
+  std::string press(LocalTime now, std::uint32_t device, Order order);
+
+  /// Does what is due; to be called sixty times a second or so.
+  void turn(LocalTime now);
+
+  /// Leaves.
+  void stop(LocalTime now);
+
+ private:
+  void ask(LocalTime now);
+  void look(LocalTime now);
+  void finish(LocalTime now, bool done, std::string words);
+  std::string held_by(const ChannelDescription& channel) const;
+
+  Link& link_;
+  Address server_;
+  Config config_;
+  Board& board_;
+  Ratchet secrets_;
+  std::uint32_t device_ = 0;
+  Order order_ = Order::kArm;
+  bool under_way_ = false;
+  std::optional<ForceClient> client_;  ///< until the server has answered
+  bool asked_ = false;
+  LocalTime give_up_{};
+  PeerTime answered_{};  ///< the newest sample of the device by then
+};
+
+}  // namespace tendon::dash

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+import { h, mark, say } from "./dom.js";
+import type { PressInfo, ServerMessage } from "./stream.js";
+import type { Level } from "./words.js";
+
+type Order = "arm" | "disarm";
+
+/** So long a success is told: later the device may be something else, which its state says. A failure stays. */
+const kToldMs = 8000;
+
+/**
+ * The device's safety in words, and the two buttons. What a press leads to is told by the server of this page, to every page that looks
+ * on: this one only begins it.
+ */
+export class Arming {
+  readonly element: HTMLElement;
+  readonly #state = h("b", {});
+  readonly #meaning = h("span", { class: "quiet" });
+  readonly #result = h("p", { class: "result", role: "status", hidden: true });
+  readonly #needs = h("p", { class: "quiet needs", hidden: true });
+  readonly #buttons: Readonly<Record<Order, HTMLButtonElement>>;
+  readonly #group: HTMLElement;
+  #device = 0;
+  /** Why our own press was not taken; until the next one, or until the server of this page tells something newer. */
+  #refused: string | undefined;
+  #told: string | undefined;
+  #toldAt = -Infinity;
+
+  constructor() {
+    const button = (order: Order, text: string): HTMLButtonElement =>
+      h("button", { type: "button", id: order, disabled: true, click: () => void this.#press(order) }, text);
+    this.#buttons = { disarm: button("disarm", "Disarm"), arm: button("arm", "Arm") };
+    this.#group = h("span", { class: "orders" }, this.#buttons.disarm, this.#buttons.arm);
+    this.element = h("section", { class: "panel arming", "aria-label": "Arming" },
+      h("div", { class: "head" }, h("span", { class: "words" }, this.#state, " ", this.#meaning), this.#group), this.#needs, this.#result);
+  }
+
+  draw(server: ServerMessage | undefined, device: number, state: { readonly level: Level; readonly name: string; readonly meaning: string }): void {
+    this.#device = device;
+    mark(this.element, "data-level", state.level);
+    say(this.#state, `${state.name}:`);
+    say(this.#meaning, `${state.meaning}.`);
+    const told = server ? JSON.stringify(server.press) : this.#told;
+    if (told !== this.#told) {
+      this.#refused = undefined;
+      // What had been done before this page came is no news.
+      this.#toldAt = this.#told === undefined ? -Infinity : performance.now();
+      this.#told = told;
+    }
+    const old = server?.press?.state === "done" && performance.now() - this.#toldAt > kToldMs;
+    const press = server?.press?.device === device && !old ? server.press : undefined;
+    const objection = server ? (server.devices.find((d) => d.number === device)?.arming_objection ?? "The server has not said which devices it has.") : "tendon-dash does not answer.";
+    const busy = server?.press?.state === "under_way" ? server.press : undefined;
+    this.#group.hidden = server?.arms !== true;
+    this.#buttons.arm.disabled = objection !== "" || busy !== undefined;
+    // It goes before an arming.
+    this.#buttons.disarm.disabled = objection !== "" || busy?.order === "disarm";
+    say(this.#needs, objection);
+    this.#needs.hidden = objection === "";
+    const words = this.#refused ?? press?.words ?? "";
+    say(this.#result, words);
+    this.#result.hidden = words === "";
+    mark(this.#result, "data-level", this.#refused !== undefined ? "bad" : levelOf(press));
+  }
+
+  async #press(order: Order): Promise<void> {
+    this.#refused = undefined;
+    try {
+      const answer = await fetch(`/api/${order}?device=${this.#device}`, { method: "POST" });
+      if (!answer.ok) this.#refused = (await answer.text()).trim();
+    } catch {
+      this.#refused = "Not done, as far as is known: tendon-dash does not answer.";
+    }
+  }
+}
+
+const levelOf = (press: PressInfo | undefined): Level =>
+  press === undefined ? "off" : press.state === "done" ? "good" : press.state === "failed" ? "bad" : "notice";

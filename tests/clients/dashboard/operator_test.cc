@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/dashboard/operator.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/dashboard/observer.h"
+#include "devices/safety/safe_device.h"
+#include "server/haptic_loop.h"
+#include "server/network_loop.h"
+#include "tests/support/wire.h"
+
+// The operator beside the observer and an engine, against the server's own two halves and its safety layer, on virtual
+// time.
+
+namespace tendon::dash {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Order = Operator::Order;
+using State = Press::State;
+
+/// A handle at rest.
+class Handle final : public Device {
+ public:
+  const DeviceInfo& info() const noexcept override { return info_; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    return PositionSample{.at = now, .position = position};
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return force; }
+  Vec3 position = Vec3::Zero();
+
+ private:
+  DeviceInfo info_{.name = "handle", .max_force = 8};
+};
+
+ClientKey key_of(const std::string& name, std::uint64_t seed, Role role = Role::kController) {
+  return {.name = name, .role = role, .key = Ratchet(seed).next()};
+}
+
+class OperatorTest : public testing::Test {
+ protected:
+  OperatorTest() { serve(true); }
+
+  void serve(bool guarded, std::vector<std::string> takeover = {}) {
+    NetworkLoop::Config config;
+    config.secret.fill(std::byte{7});
+    config.keys = {engine_key_, operator_key_};
+    config.takeover = std::move(takeover);
+    config.devices = {{.name = "left",
+                       .model = "handle",
+                       .max_force = 8,
+                       .loop_hz = 1000,
+                       .channels = {{.name = "main", .lease = milliseconds(500), .holder = {}}, {.name = "operator"}}}};
+    HapticLoop::Config haptic;
+    haptic.control.limiter.law = Law::kNone;
+    haptic.control.limiter.longest_hold = milliseconds(2);
+    haptic.control.max_force = 8;
+    haptic.control.max_slew = 1e6;
+    haptic.control.channels = {ChannelRule::kSum, ChannelRule::kSum};
+    safe_ = guarded ? std::make_unique<SafeDevice>(SafeDevice::Config{}, handle_) : nullptr;
+    haptic_ = std::make_unique<HapticLoop>(haptic, safe_ ? static_cast<Device&>(*safe_) : static_cast<Device&>(handle_),
+                                           *mail_);
+    network_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_.get()});
+  }
+
+  ForceClient::Config engine_config(const ClientKey& key, const std::string& channel) const {
+    ForceClient::Config config;
+    config.name = key.name;
+    config.device = "left";
+    config.channel = channel;
+    config.key = key.key;
+    config.seed = 5;
+    return config;
+  }
+  void start_engine(const ClientKey& key, const std::string& channel) {
+    engine_.emplace(
+        engine_end_, server_.self, engine_config(key, channel),
+        [](const DeviceState&) { return Touch(Vec3(-2, 0, 0)); }, now_);
+  }
+  Operator& with(const ClientKey& key, const std::string& channel) {
+    return operator_.emplace(operator_end_, server_.self,
+                             Operator::Config{.channel = channel, .key = key.key, .seed = 3}, board_);
+  }
+
+  void run(Duration length) {
+    for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
+      if (shaking_) handle_.position.x() += 1e-3 * ((++steps_ / 20) % 2 == 0 ? 1 : -1);
+      haptic_->step(now_);
+      while (mail_->steps.front() != nullptr) mail_->steps.pop();
+      ++health_.steps;
+      health_.at = now_;
+      // In the order of the wire's numbers, as the server maps them.
+      health_.safety = safe_ ? (safe_->status().state == SafetyState::kArmed   ? Safety::kArmed
+                                : safe_->status().state == SafetyState::kHomed ? Safety::kHomed
+                                                                               : Safety::kFault)
+                             : Safety::kUnguarded;
+      mail_->health.put(health_);
+      network_->turn(now_);
+      observer_.turn(now_);
+      if (operator_) operator_->turn(now_);
+      if (engine_) engine_->turn(now_);
+      for (; !wire_.empty(); wire_.pop_front()) {
+        for (End* end_of : {&server_, &observer_end_, &operator_end_, &engine_end_}) {
+          if (blind_ && end_of == &observer_end_) continue;
+          if (wire_.front().to == end_of->self) end_of->inbox.push_back(wire_.front());
+        }
+      }
+    }
+  }
+  /// As long as a press is under way.
+  const Press& settle() {
+    for (int i = 0; i < 200 && board_.press()->state == State::kUnderWay; ++i) run(milliseconds(50));
+    return *board_.press();
+  }
+  Vec3 applied() const { return board_.devices().at(0).newest->force_applied; }
+  std::string holder(std::size_t channel) const { return network_->stats().channels.at(channel).holder; }
+
+  ClientKey engine_key_ = key_of("wall", 1);
+  ClientKey operator_key_ = key_of("operator", 2);
+  LocalTime now_{seconds(1000)};
+  Wire wire_;
+  End server_{wire_, parse_address("192.0.2.1:47100")};
+  End observer_end_{wire_, parse_address("192.0.2.2:5000")};
+  End operator_end_{wire_, parse_address("192.0.2.2:5001")};
+  End engine_end_{wire_, parse_address("192.0.2.3:5000")};
+  Handle handle_;
+  std::unique_ptr<SafeDevice> safe_;
+  std::unique_ptr<Mailboxes> mail_ =
+      std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1});
+  std::unique_ptr<HapticLoop> haptic_;
+  std::unique_ptr<NetworkLoop> network_;
+  Health health_;
+  int steps_ = 0;
+  bool shaking_ = false;
+  bool blind_ = false;  ///< what the server tells the observer is lost
+  Board board_;
+  Observer observer_{observer_end_, server_.self, {.key = operator_key_.key, .seed = 1}, board_, now_};
+  std::optional<ForceClient> engine_;
+  std::optional<Operator> operator_;
+};
+
+TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineThatGoesOnAndLeavesNobodyBehind) {
+  Operator& person = with(operator_key_, "operator");
+  start_engine(engine_key_, "main");
+  run(seconds(3));
+  ASSERT_EQ(applied(), Vec3::Zero());
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  EXPECT_EQ(board_.press()->state, State::kUnderWay);
+  EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
+  EXPECT_EQ(board_.press()->words, "Armed: it gives forces.");
+  EXPECT_EQ(safe_->status().state, SafetyState::kArmed);
+  run(seconds(1));
+  EXPECT_EQ(applied(), Vec3(-2, 0, 0));
+  EXPECT_EQ(holder(1), "");
+
+  const std::uint64_t forces = network_->stats().channels.at(1).forces;
+  ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
+  EXPECT_EQ(safe_->status().state, SafetyState::kHomed);
+  EXPECT_EQ(applied(), Vec3::Zero());
+  run(seconds(2));
+  EXPECT_EQ(applied(), Vec3::Zero());
+  EXPECT_EQ(holder(0), "wall");
+  EXPECT_EQ(holder(1), "");
+  EXPECT_EQ(engine_->stats().sessions, 1U) << "the engine was not disturbed";
+  EXPECT_EQ(network_->stats().channels.at(1).forces, forces) << "an operator sends no force";
+  EXPECT_EQ(network_->stats().timed_out, 0U) << "it has said Bye";
+  EXPECT_EQ(board_.sessions(), 1U) << "the observer was not taken for it";
+}
+
+TEST_F(OperatorTest, TakesNothingFromAnEngineThatHoldsTheChannelAndSaysWhoAndForHowLong) {
+  serve(true, {"operator"});  // one that need not wait for a lease
+  Operator& person = with(operator_key_, "main");
+  start_engine(engine_key_, "main");
+  run(seconds(3));
+  const std::uint64_t welcomed = network_->stats().welcomed;
+  const std::string words =
+      "\"wall\" holds the channel \"main\", and for 500 ms after its last force. Nothing is taken from it.";
+  EXPECT_EQ(person.objection(0), words);
+  EXPECT_EQ(person.press(now_, 0, Order::kDisarm), words);
+  EXPECT_FALSE(board_.press());
+  run(seconds(1));
+  EXPECT_EQ(network_->stats().welcomed, welcomed) << "nothing was sent";
+  EXPECT_EQ(holder(0), "wall");
+}
+
+TEST_F(OperatorTest, AnEngineThatHasComeSinceTheBoardWasToldIsNotDisturbedEither) {
+  serve(true, {"operator"});
+  Operator& person = with(operator_key_, "main");
+  run(seconds(3));
+  ASSERT_EQ(person.objection(0), "");
+  start_engine(engine_key_, "main");
+  while (holder(0).empty()) run(milliseconds(1));
+  ASSERT_EQ(person.objection(0), "") << "else this shows nothing";
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  EXPECT_EQ(settle().state, State::kFailed);
+  EXPECT_NE(board_.press()->words.find("Not done: \"wall\" holds the channel \"main\""), std::string::npos)
+      << board_.press()->words;
+  run(seconds(1));
+  EXPECT_EQ(holder(0), "wall");
+  EXPECT_EQ(engine_->stats().sessions, 1U);
+  EXPECT_EQ(safe_->status().state, SafetyState::kHomed);
+}
+
+TEST_F(OperatorTest, SaysThatTheSafetyLayerHasNotGrantedIt) {
+  Operator& person = with(operator_key_, "operator");
+  shaking_ = true;
+  run(seconds(3));
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  EXPECT_EQ(settle().state, State::kFailed);
+  EXPECT_NE(board_.press()->words.find("Not armed. It is homed. The handle has to rest"), std::string::npos)
+      << board_.press()->words;
+}
+
+TEST_F(OperatorTest, DoesNotBelieveAReportFromBeforeItsOrder) {
+  Operator& person = with(operator_key_, "operator");
+  run(seconds(3));
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  ASSERT_EQ(settle().state, State::kDone);
+  shaking_ = true;
+  ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  ASSERT_EQ(settle().state, State::kDone);
+  ASSERT_EQ(board_.devices().at(0).report->safety, Safety::kArmed) << "else this shows nothing";
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  EXPECT_EQ(settle().state, State::kFailed) << board_.press()->words;
+}
+
+TEST_F(OperatorTest, ADeviceWithoutASafetyLayerIsDisarmedAndArmedToo) {
+  serve(false);
+  Operator& person = with(operator_key_, "operator");
+  start_engine(engine_key_, "main");
+  run(seconds(3));
+  ASSERT_EQ(applied(), Vec3(-2, 0, 0));
+  ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  EXPECT_EQ(settle().state, State::kDone);
+  run(seconds(1));
+  EXPECT_EQ(applied(), Vec3::Zero());
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  EXPECT_EQ(settle().state, State::kDone);
+  EXPECT_NE(board_.press()->words.find("no safety layer"), std::string::npos);
+  run(seconds(1));
+  EXPECT_EQ(applied(), Vec3(-2, 0, 0));
+}
+
+TEST_F(OperatorTest, ADisarmingGoesBeforeAnArmingAndNothingBeforeADisarming) {
+  Operator& person = with(operator_key_, "operator");
+  run(seconds(3));
+  ASSERT_EQ(person.press(now_, 0, Order::kArm), "");
+  run(milliseconds(2));
+  EXPECT_EQ(person.press(now_, 0, Order::kArm), "") << "the same again is the same";
+  EXPECT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  EXPECT_FALSE(board_.press()->arm);
+  EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is under way.");
+  EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
+  EXPECT_FALSE(board_.press()->arm);
+  run(seconds(3));
+  EXPECT_EQ(safe_->status().state, SafetyState::kHomed);
+}
+
+TEST_F(OperatorTest, SaysWhatIsMissing) {
+  Operator& person = with(operator_key_, "foot");
+  EXPECT_EQ(person.objection(0), "There is no connection to the server.");
+  run(seconds(2));
+  EXPECT_EQ(person.objection(7), "The server has no such device.");
+  EXPECT_EQ(person.objection(0), "This device has no channel \"foot\", which --arm names, but \"main\", \"operator\".");
+  EXPECT_EQ(person.press(now_, 0, Order::kArm), person.objection(0));
+}
+
+TEST_F(OperatorTest, SaysThatTheServerDoesNotAnswer) {
+  Operator& stranger = with(key_of("stranger", 9), "operator");
+  run(seconds(2));
+  ASSERT_EQ(stranger.press(now_, 0, Order::kDisarm), "");
+  EXPECT_EQ(settle().state, State::kFailed);
+  EXPECT_EQ(board_.press()->words, "Not done: no answer from 192.0.2.1:47100.");
+}
+
+TEST_F(OperatorTest, AnOrderThatTheServerHasTakenIsNotDoneBeforeTheDeviceShowsIt) {
+  Operator& person = with(operator_key_, "operator");
+  run(seconds(2));
+  blind_ = true;
+  ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  EXPECT_EQ(settle().state, State::kFailed);
+  EXPECT_EQ(board_.press()->words,
+            "The server has taken the order, but the device does not show it. Take its power away.");
+}
+
+}  // namespace
+}  // namespace tendon::dash
