@@ -14,8 +14,8 @@ namespace tendon {
 /// 30 mm/s. First-order adaptive windowing takes, per axis, the longest window whose end-to-end line
 /// passes within one count of every sample in it:
 ///
-///     v = (x(k) − x(k−n)) / (t(k) − t(k−n)),
-///     n = max { n ≤ window : |x(k−i) − (x(k) − v·(t(k) − t(k−i)))| ≤ resolution, 0 < i < n }
+///     v = (x(k) − x(k−n)) · r(n),        r(n) = 1 / (t(k) − t(k−n)),
+///     n = max { n ≤ window : |v − (x(k) − x(k−i)) · r(i)| ≤ resolution · r(i), 0 < i < n }
 ///
 /// so it is smooth when slow and prompt when fast, with no cut-off frequency to choose. With
 /// resolution 0 (exact sensing) it is the backward difference for every motion but a straight line.
@@ -43,14 +43,14 @@ class VelocityEstimator {
     LocalTime at;
     Vec3 position;
   };
-  static constexpr std::size_t kSlots = 32;  // a power of two, at least kWindow + 1
-  static_assert(kSlots > kWindow);
-  const Sample& back(std::size_t i) const noexcept { return samples_[(newest_ - i) % kSlots]; }
+  static constexpr std::size_t kSlots = 2 * kWindow;
 
   double resolution_;
+  /// Newest first, from `newest_` on; what is newer still goes before it. When there is no more room, all that a window
+  /// needs moves to the end. (A ring would cost each step a wrap for each sample.)
   std::array<Sample, kSlots> samples_{};
-  std::size_t newest_ = 0;
-  std::size_t count_ = 0;
+  std::size_t newest_ = kSlots;
+  std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1
   Vec3 velocity_ = Vec3::Zero();
 };
 

@@ -9,7 +9,10 @@
 
 namespace tendon::injector {
 
-/// The delays of a distribution as a table in nanoseconds.
+/// The delays of a distribution as a table in nanoseconds. A smooth one's takes some milliseconds to make (a gamma's),
+/// so that those made last are kept, and made once for the same numbers.
+///
+/// Thread-safe: yes.
 QuantileTable delay_table(const Delay& delay);
 
 /// Makes independent uniform draws depend on the one before, and leaves each of them uniform: a Gaussian copula AR(1).

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,25 @@ TEST(DelayTable, UniformReachesBothEndsInclusive) {
 TEST(DelayTable, DelaysBelowZeroAreZeroAndNoneIsAboveTheLongest) {
   EXPECT_EQ(table_of("normal(1ms,4ms)")(0), 0);
   EXPECT_EQ(table_of("pareto(1s,0.1)")(~std::uint64_t{0}), kMaxDelay.count());
+}
+
+// A table is kept and found again by its numbers: those of another kind, or in another order, are another's.
+TEST(DelayTable, IsTheSameWhenAskedForAgainAndAnothersForOtherNumbers) {
+  std::set<std::uint64_t> different;
+  const auto ask_for_all = [&] {
+    for (const char* kind : {"normal", "exponential", "lognormal", "gamma"}) {
+      for (const char* numbers : {"(20ms,30ms)", "(20ms,40ms)", "(10ms,30ms)"}) {
+        different.insert(table_of(kind + std::string(numbers)).hash());
+      }
+    }
+    different.insert(table_of("pareto(20ms,2.5)").hash());
+    different.insert(table_of("pareto(20ms,2.6)").hash());
+  };
+  ask_for_all();
+  EXPECT_EQ(different.size(), 14U);
+  for (int i = 1; i <= 300; ++i) table_of("exponential(1ms," + std::to_string(1 + i) + "ms)");  // more than are kept
+  ask_for_all();
+  EXPECT_EQ(different.size(), 14U);
 }
 
 TEST(DelayTable, AHistogramNeverGivesWhatLiesInAnEmptyBin) {

@@ -100,13 +100,12 @@ TEST(VelocityEstimator, IgnoresWhatIsNotANumberAndWhatIsNotNewer) {
 double end_fit(const std::vector<Motion>& newest_first, int axis, double resolution) {
   const Motion& now = newest_first.front();
   double velocity = 0;
+  const auto rate = [&](std::size_t i) { return 1e9 / static_cast<double>((now.at - newest_first[i].at).count()); };
+  const auto slope = [&](std::size_t i) { return (now.position[axis] - newest_first[i].position[axis]) * rate(i); };
   for (std::size_t n = 1; n < newest_first.size() && n <= VelocityEstimator::kWindow; ++n) {
-    const auto slope = [&](std::size_t i, double offset) {
-      return (now.position[axis] - newest_first[i].position[axis] + offset) / seconds(now.at - newest_first[i].at);
-    };
-    const double v = slope(n, 0);
+    const double v = slope(n);
     for (std::size_t i = 1; i < n; ++i) {
-      if (v < slope(i, -resolution) || v > slope(i, resolution)) return velocity;
+      if (v < slope(i) - resolution * rate(i) || v > slope(i) + resolution * rate(i)) return velocity;
     }
     velocity = v;
   }
