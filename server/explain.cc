@@ -13,7 +13,6 @@
 namespace tendon {
 namespace {
 
-constexpr int kRounds = 80;
 constexpr int kSteps = 200;  ///< of a round
 
 /// Something that a scene lists or does not.
@@ -227,7 +226,7 @@ std::string rounded(double ns, double resolution) {
 
 }  // namespace
 
-Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time) {
+Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time, int rounds) {
   Explanation out;
   std::vector<std::unique_ptr<Trial>> trials;  // the whole scene, the same again, and one for each part that it lists
   trials.push_back(std::make_unique<Trial>(scene));
@@ -244,7 +243,7 @@ Explanation explain(const Scene& scene, const std::function<Duration()>& process
   Trial device(scene);
   Least device_alone;
   std::vector<Least> least(trials.size());
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < trials.size(); ++i) least[i].add(trials[i]->steps(processor_time));
     device_alone.add(device.device(processor_time));
   }

@@ -31,8 +31,8 @@ struct Explanation {
   double resolution_ns = 0;
 };
 
-/// `processor_time` of the calling thread. Takes a quarter of a second.
-Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time);
+/// `processor_time` of the calling thread. The least of each `rounds` counts; 80 take a quarter of a second.
+Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time, int rounds = 80);
 
 /// For people; and a JSON object in one line.
 std::string in_words(const Scene& scene, const Explanation& explanation);

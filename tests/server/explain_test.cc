@@ -16,6 +16,8 @@ using namespace std::chrono_literals;
 
 Scene shipped(const char* name) { return read_scene(std::filesystem::path(TENDON_SCENES) / name); }
 
+constexpr int kRounds = 4;  // a clock that ticks evenly tells in the first what it would in the eightieth
+
 /// Time that passes by 1 µs whenever somebody looks.
 std::function<Duration()> ticking() {
   return [now = Duration{}]() mutable { return now += 1us; };
@@ -39,14 +41,14 @@ std::set<std::string> optional_parts() {
 
 TEST(Explain, NamesEveryPartThatASceneMayLeaveOut) {
   std::set<std::string> named;
-  for (const auto& part : explain(shipped("demo.toml"), ticking()).parts) named.insert(std::string(part.key));
+  for (const auto& part : explain(shipped("demo.toml"), ticking(), kRounds).parts) named.insert(std::string(part.key));
   EXPECT_GT(named.size(), 15U);
   EXPECT_EQ(named, optional_parts());
 }
 
 TEST(Explain, OnlyWhatIsListedHasACost) {
   std::set<std::string> listed;
-  for (const auto& part : explain(shipped("admittance.toml"), ticking()).parts) {
+  for (const auto& part : explain(shipped("admittance.toml"), ticking(), kRounds).parts) {
     if (part.cost_ns) listed.insert(std::string(part.key));
   }
   EXPECT_EQ(listed, (std::set<std::string>{"admittance", "device.effects.coulomb_friction_n",
@@ -66,7 +68,7 @@ TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
     if (looks % 2 == 0 && trial != 3) now += 1us;
     return now;
   };
-  const Explanation explanation = explain(scene, time);
+  const Explanation explanation = explain(scene, time, kRounds);
   EXPECT_NEAR(explanation.step_ns, 5, 1e-9);
   EXPECT_NEAR(explanation.device_ns, 5, 1e-9);
   EXPECT_NEAR(explanation.resolution_ns, 0, 1e-9);
@@ -78,7 +80,7 @@ TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
 
 TEST(Explain, JsonAndWordsSayTheSame) {
   const Scene scene = shipped("admittance.toml");
-  const Explanation explanation = explain(scene, ticking());
+  const Explanation explanation = explain(scene, ticking(), kRounds);
   const auto json = nlohmann::json::parse(in_json(scene, explanation));
   const std::string words = in_words(scene, explanation);
   EXPECT_EQ(json["parts"].size(), explanation.parts.size());
