@@ -20,36 +20,31 @@ constexpr std::size_t kMaxGuideBits = 13;
 
 }  // namespace
 
-QuantileTable::QuantileTable(const std::vector<Piece>& pieces) : built_(std::make_shared<const Built>(build(pieces))) {}
-
-QuantileTable::Built QuantileTable::build(const std::vector<Piece>& pieces) {
-  Built built;
-  built.pieces.reserve(pieces.size());
+QuantileTable::QuantileTable(const std::vector<Piece>& pieces) {
+  pieces_.reserve(pieces.size());
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const Piece& piece = pieces[i];
     const std::uint64_t last = i + 1 < pieces.size() ? pieces[i + 1].from - 1 : ~std::uint64_t{0};
     const int shift = std::min(63, std::countl_zero(last - piece.from));
     const Uint128 length = (Uint128{last - piece.from} + 1) << shift;  // 2⁶³ … 2⁶⁴
     const auto slope = static_cast<std::uint64_t>((Uint128{piece.width} << (64 + kSlopeScale)) / length);
-    built.pieces.push_back({piece.from, piece.width == 1 ? 0 : slope, piece.least * 64 + shift});
+    pieces_.push_back({piece.from, piece.width == 1 ? 0 : slope, piece.least * 64 + shift});
   }
   const auto bits = std::min<std::size_t>(kMaxGuideBits, static_cast<std::size_t>(std::bit_width(pieces.size())));
-  built.guide_shift = 64 - static_cast<int>(bits);
-  built.guide.reserve((std::size_t{1} << bits) + 1);
+  guide_shift_ = 64 - static_cast<int>(bits);
+  guide_.reserve((std::size_t{1} << bits) + 1);
   std::uint32_t piece = 0;
   for (std::uint64_t cell = 0; cell < std::uint64_t{1} << bits; ++cell) {
-    while (piece + 1 < pieces.size() && pieces[piece + 1].from <= cell << built.guide_shift) ++piece;
-    built.guide.push_back(piece);
+    while (piece + 1 < pieces.size() && pieces[piece + 1].from <= cell << guide_shift_) ++piece;
+    guide_.push_back(piece);
   }
-  built.guide.push_back(static_cast<std::uint32_t>(pieces.size() - 1));
-  return built;
+  guide_.push_back(static_cast<std::uint32_t>(pieces.size() - 1));
 }
 
 std::int64_t QuantileTable::operator()(std::uint64_t u) const noexcept {
-  const Built& built = *built_;
-  const std::size_t cell = u >> built.guide_shift;
-  const auto first = built.pieces.begin() + built.guide[cell] + 1;
-  const auto last = built.pieces.begin() + built.guide[cell + 1] + 1;
+  const std::size_t cell = u >> guide_shift_;
+  const auto first = pieces_.begin() + guide_[cell] + 1;
+  const auto last = pieces_.begin() + guide_[cell + 1] + 1;
   const auto next =
       std::upper_bound(first, last, u, [](std::uint64_t value, const Compiled& p) { return value < p.from; });
   const Compiled& piece = *std::prev(next);
@@ -65,7 +60,7 @@ std::uint64_t QuantileTable::hash() const noexcept {
       hash *= 0x100000001b3;
     }
   };
-  for (const Compiled& piece : built_->pieces) {
+  for (const Compiled& piece : pieces_) {
     feed(piece.from);
     feed(piece.slope);
     feed(static_cast<std::uint64_t>(piece.least_and_shift));

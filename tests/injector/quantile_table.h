@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <vector>
 
 namespace tendon::injector {
@@ -15,7 +14,7 @@ namespace tendon::injector {
 ///     least + ⌊width · (u − from)/(next from − from)⌋        so to least … least + width − 1
 ///
 /// which takes one multiplication, and no floating point. What is straight in truth (constant, uniform, histograms,
-/// samples) is exact; smooth distributions are cut by tabulate(). Copies share the pieces.
+/// samples) is exact; smooth distributions are cut by tabulate().
 ///
 /// Thread-safe: yes, once built.
 class QuantileTable {
@@ -33,7 +32,7 @@ class QuantileTable {
   std::int64_t operator()(std::uint64_t u) const noexcept;
 
   /// The same for every draw.
-  bool constant() const noexcept { return built_->pieces.size() == 1 && built_->pieces.front().slope == 0; }
+  bool constant() const noexcept { return pieces_.size() == 1 && pieces_.front().slope == 0; }
 
   /// FNV-1a of the pieces, for the trace: two tables with the same hash decide alike.
   std::uint64_t hash() const noexcept;
@@ -44,16 +43,10 @@ class QuantileTable {
     std::uint64_t slope;           ///< ⌊width · 2⁹⁰/(length · 2^shift)⌋; 0 for width 1
     std::int64_t least_and_shift;  ///< least · 64 + shift: the leading zeros of the length
   };
-  struct Built {
-    std::vector<Compiled> pieces;
-    /// For each value of the leading bits of u: the last piece that begins at or before it. Then few are left to
-    /// search.
-    std::vector<std::uint32_t> guide;
-    int guide_shift = 0;
-  };
-  static Built build(const std::vector<Piece>& pieces);
-
-  std::shared_ptr<const Built> built_;
+  std::vector<Compiled> pieces_;
+  /// For each value of the leading bits of u: the last piece that begins at or before it. Then few are left to search.
+  std::vector<std::uint32_t> guide_;
+  int guide_shift_ = 0;
 };
 
 /// A smooth quantile function as a table: 4096 equal cells, of which the outer 16 on either side are cut anew into 16
