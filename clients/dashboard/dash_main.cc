@@ -80,12 +80,11 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
          "--key", options.key_file,
          "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
       ->type_name("FILE");
-  app.add_option("--arm", options.arm_channel,
-                 "Whoever uses a browser on this machine may arm and disarm: with --key, a controller's, best of its "
-                 "own, and by "
-                 "this channel of the device, which is claimed for that moment and best is the operator's own. No "
-                 "force is sent, "
-                 "and nothing taken from an engine that holds it")
+  app.add_option(
+         "--arm", options.arm_channel,
+         "Whoever uses a browser on this machine may arm and disarm, by this channel of the device, best one of the "
+         "operator's own. Needs --key: a controller's, best one of its own, too. The channel is claimed for that "
+         "moment; no force is sent, and nothing taken from an engine that holds it")
       ->type_name("CHANNEL");
   app.add_option("--listen", listen,
                  "Where the page is; port 0 lets the system choose. Beyond this machine only with --host")
@@ -139,8 +138,9 @@ int run(const Options& options) {
   Abilities abilities{.server = to_string(options.web.server), .recordings = recordings.has_value()};
   std::function<std::string(std::uint32_t, Operator::Order)> press;
   if (arms) {
-    if (key->role != Role::kController)
+    if (key->role != Role::kController) {
       throw std::runtime_error(options.key_file + ": an observer's key; --arm wants a controller's");
+    }
     operator_link.emplace(options.web.server);
     abilities.arms = true;
     operates.emplace(*operator_link, options.web.server,

@@ -5,14 +5,13 @@
 #include <utility>
 
 #include "clients/dashboard/page_json.h"
+#include "core/reason.h"
 
 namespace tendon::dash {
 namespace {
 
 /// States per second: the session lasts a few round trips, and nobody looks at them.
 constexpr std::uint32_t kStateHz = 20;
-/// Of DeviceState::reasons (WIRE.md).
-constexpr std::uint32_t kDisarmed = 8192;
 
 const ChannelDescription* channel_of(const Board::Device& device, const std::string& name) {
   if (!device.about) return nullptr;
@@ -109,8 +108,9 @@ void Operator::ask(LocalTime now) {
     }
     client_->stop(now);
     client_.reset();
-    const auto& newest = board_.devices().at(device_).newest;
-    answered_ = newest ? newest->sampled : PeerTime{};
+    const auto device = board_.devices().find(device_);
+    const bool seen = device != board_.devices().end() && device->second.newest;
+    answered_ = seen ? device->second.newest->sampled : PeerTime{};
     give_up_ = now + config_.granted_within;
     return board_.tell(Press{.device = device_,
                              .arm = arm,
@@ -142,7 +142,7 @@ void Operator::look(LocalTime now) {
       device != nullptr && device->newest && device->newest->sampled > answered_ ? &*device->newest : nullptr;
   const DeviceReport* const report =
       device != nullptr && device->report && device->report->until > answered_ ? &*device->report : nullptr;
-  const bool disarmed = state != nullptr && (state->reasons & kDisarmed) != 0;
+  const bool disarmed = state != nullptr && Reasons::from_bits(state->reasons).has(Reason::kDisarmed);
   if (order_ == Order::kDisarm) {
     if (disarmed && state->force_applied.isZero(0)) {
       finish(now, true, "Disarmed: no force until it is armed again.");

@@ -280,6 +280,18 @@ TEST_F(OperatorTest, SaysThatTheServerDoesNotAnswer) {
   EXPECT_EQ(board_.press()->words, "Not done: no answer from 192.0.2.1:47100.");
 }
 
+// The observer may meanwhile have found another server, with fewer devices.
+TEST_F(OperatorTest, ADeviceThatIsGoneWhenTheAnswerComesShowsNothing) {
+  Operator& person = with(operator_key_, "operator");
+  run(seconds(2));
+  blind_ = true;
+  run(milliseconds(10));
+  ASSERT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  board_.counted(0);
+  EXPECT_EQ(settle().state, State::kFailed);
+  EXPECT_NE(board_.press()->words.find("does not show it"), std::string::npos) << board_.press()->words;
+}
+
 TEST_F(OperatorTest, AnOrderThatTheServerHasTakenIsNotDoneBeforeTheDeviceShowsIt) {
   Operator& person = with(operator_key_, "operator");
   run(seconds(2));
