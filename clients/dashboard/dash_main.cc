@@ -9,8 +9,10 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/cpp/key_file.h"
@@ -37,6 +39,18 @@ Seed seed_from_system() {
     throw std::runtime_error("the system gives no random numbers");
   }
   return seed;
+}
+
+/// 128 bits, for one run.
+std::string new_pass() {
+  const Seed seed = seed_from_system();
+  std::string pass;
+  for (const std::byte byte : std::span(seed.bytes).first(16)) {
+    constexpr std::string_view kDigits = "0123456789abcdef";
+    pass += kDigits[std::to_integer<unsigned>(byte) >> 4];
+    pass += kDigits[std::to_integer<unsigned>(byte) & 15];
+  }
+  return pass;
 }
 
 struct Options {
@@ -82,9 +96,10 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       ->type_name("FILE");
   app.add_option(
          "--arm", options.arm_channel,
-         "Whoever uses a browser on this machine may arm and disarm, by this channel of the device, best one of the "
-         "operator's own. Needs --key: a controller's, best one of its own, too. The channel is claimed for that "
-         "moment; no force is sent, and nothing taken from an engine that holds it")
+         "Whoever opens the address that is then said, in a browser on this machine, may arm and disarm, by this "
+         "channel of the device, best one of the operator's own. Needs --key: a controller's, best one of its own, "
+         "too. The channel is claimed for that moment; no force is sent, and nothing taken from an engine that holds "
+         "it")
       ->type_name("CHANNEL");
   app.add_option("--listen", listen,
                  "Where the page is; port 0 lets the system choose. Beyond this machine only with --host")
@@ -149,24 +164,30 @@ int run(const Options& options) {
     abilities.arming_objection = [&](std::uint32_t device) { return operates->objection(device); };
     press = [&](std::uint32_t device, Operator::Order order) { return operates->press(read_clock(), device, order); };
   }
+  const std::string pass = arms ? new_pass() : std::string();
   Feed feed(board, abilities, counts, start);
   const Routes routes(options.routes, {.page = page_files(),
                                        .recordings = recordings ? &*recordings : nullptr,
                                        .metrics = [&] { return metrics_text(board, counts, bridge); },
-                                       .press = press});
+                                       .press = press,
+                                       .pass = pass});
   WebServer web(options.web, routes, feed, counts, bridge, read_clock);
   Observer observer(web.link(), options.web.server,
                     {.key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()}, board, start);
 
   const std::string at = to_string(web.address());
+  const std::string operator_url = arms ? "http://" + at + "/#/operator/" + pass : std::string();
   if (options.json) {
     JsonWriter json;
     json.begin_object().key("event").value("listening").key("address").value(at);
-    json.key("server").value(to_string(options.web.server)).end_object();
+    json.key("server").value(to_string(options.web.server));
+    if (arms) json.key("operator_url").value(operator_url);
+    json.end_object();
     std::puts(json.text().c_str());
     std::fflush(stdout);
   } else {
     std::cerr << "tendon-dash: open http://" << at << "/\n";
+    if (arms) std::cerr << "tendon-dash: to arm and disarm, open " << operator_url << "\n";
   }
 
   std::string said;

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "clients/dashboard/page_json.h"
+#include "protocol/crypto.h"
 
 namespace tendon::dash {
 namespace {
@@ -190,6 +191,11 @@ Reply Routes::order(const Request& request, std::string_view path) const {
     return plain(403, "Only for the page of tendon-dash itself.");
   }
   if (!sources_.press) return plain(403, std::string(kArmingNeeds));
+  const auto bytes = [](std::string_view text) { return std::as_bytes(std::span(text)); };
+  if (!request.authorization || !crypto::equal(bytes(*request.authorization), bytes("Bearer " + sources_.pass))) {
+    return plain(403,
+                 "Only from the address that tendon-dash says when it starts: the pass is of another run, or missing.");
+  }
   constexpr std::string_view kQuery = "?device=";
   std::string_view rest = request.target.substr(path.size());
   std::uint32_t device = 0;

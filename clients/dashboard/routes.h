@@ -23,6 +23,7 @@ struct Request {
   std::string_view target;                 ///< path and query, as it came
   std::optional<std::string_view> host{};  ///< header Host
   std::optional<std::string_view> origin{};
+  std::optional<std::string_view> authorization{};
   std::optional<std::string_view> range{};
   std::string_view accept_encoding{};
   bool upgrade = false;  ///< asks for a WebSocket
@@ -73,7 +74,8 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 ///   is ever sent.
 /// * **Arming** moves a machine, so it is for the page itself in a browser on this machine and for nobody else, 403:
 /// not from another machine or through a proxy, not for another Origin, nor for a program that names none. A form or a
-/// script of another page cannot name ours. 202: begun; 409: not now, and why.
+/// script of another page cannot name ours. Others may use this machine too: `Authorization: Bearer PASS` must be the
+/// pass that whoever has started the program was told. 202: begun; 409: not now, and why.
 /// * For all else only GET and HEAD exist, 405. What is no path of the above is 404: nothing is looked up in a file
 /// system but the plain name
 ///   of a recording.
@@ -92,6 +94,7 @@ class Routes {
     std::function<std::string()> metrics;
     /// Begins an order; returns why it does not. Empty: nobody may.
     std::function<std::string(std::uint32_t device, Operator::Order order)> press{};
+    std::string pass{};  ///< for `press`; of characters that a header and an address may have
   };
 
   Routes(Config config, Sources sources) : config_(std::move(config)), sources_(std::move(sources)) {}

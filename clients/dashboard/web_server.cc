@@ -217,14 +217,16 @@ class Connection {
       if (found == message.end()) return std::nullopt;
       return std::string_view(found->value().data(), found->value().size());
     };
-    if (message.count(http::field::host) > 1 || message.count(http::field::origin) > 1) {
-      return write_reply(Routes::plain(400, "one Host and one Origin"));
+    if (message.count(http::field::host) > 1 || message.count(http::field::origin) > 1 ||
+        message.count(http::field::authorization) > 1) {
+      return write_reply(Routes::plain(400, "one Host, one Origin and one Authorization"));
     }
     Request request;
     request.method = {message.method_string().data(), message.method_string().size()};
     request.target = {message.target().data(), message.target().size()};
     request.host = header(http::field::host);
     request.origin = header(http::field::origin);
+    request.authorization = header(http::field::authorization);
     request.range = header(http::field::range);
     request.accept_encoding = header(http::field::accept_encoding).value_or("");
     request.upgrade = websocket::is_upgrade(message);

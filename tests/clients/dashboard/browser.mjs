@@ -12,20 +12,20 @@ before(async () => {
 });
 after(() => browser?.close());
 
-/** A page that has looked nowhere but at tendon-dash, and against whose policy nothing was done. */
-export async function visit(test, url, options = {}) {
+/** `at`: where in it. A page that has looked nowhere but at tendon-dash, and against whose policy nothing was done. */
+export async function visit(test, url, { at = url, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, ...options });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
   const wrong = [];
   page.on("pageerror", (error) => wrong.push(String(error)));
-  page.on("console", (message) => message.type() === "error" && !/WebSocket|status of 404/.test(message.text()) && wrong.push(message.text()));
+  page.on("console", (message) => message.type() === "error" && !/WebSocket|status of 40[34]/.test(message.text()) && wrong.push(message.text()));
   page.on("request", (request) => !request.url().startsWith(url) && !request.url().startsWith("data:") && wrong.push(request.url()));
   test.after(async () => {
     await context.close();
     assert.deepEqual(wrong, []);
   });
-  await page.goto(url);
+  await page.goto(at);
   return page;
 }
 

@@ -120,8 +120,9 @@ const result = (page, level, text) => says(page, `.arming .result[data-level=${l
 
 it("arms and disarms by two buttons, beside an engine that goes on, and says what became of it", async (test) => {
   const { server, key } = await guarded(test);
-  const { url, program } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
-  const page = await visit(test, url);
+  const { url, operatorUrl, program } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
+  const page = await visit(test, url, { at: operatorUrl });
+  assert.equal(page.url(), `${url}/#/live`, "nobody reads the pass off the screen, or in the history");
   await says(page, ".engine", "virtual_wall");
   await says(page, ".arming", "Ready, not armed: gives no force until it is armed.");
   await until("no force is given", async () => (await applied(page)) === 0);
@@ -148,11 +149,12 @@ it("arms and disarms by two buttons, beside an engine that goes on, and says wha
 
 it("arms nothing by a channel that an engine holds, and says who holds it", async (test) => {
   const { server, key } = await guarded(test);
-  const { url } = await startDash(test, server.address, ...key("operator"), "--arm", "wall");
-  const page = await visit(test, url);
+  const { url, operatorUrl } = await startDash(test, server.address, ...key("operator"), "--arm", "wall");
+  const page = await visit(test, url, { at: operatorUrl });
   await says(page, ".arming .needs", '"virtual_wall" holds the channel "wall", and for 500 ms after its last force. Nothing is taken from it.');
   for (const button of ["#arm", "#disarm"]) assert.equal(await page.locator(button).isDisabled(), true, button);
-  const answer = await fetch(`${url}/api/disarm?device=0`, { method: "POST", headers: { origin: url } });
+  const authorization = `Bearer ${operatorUrl.split("/").at(-1)}`;
+  const answer = await fetch(`${url}/api/disarm?device=0`, { method: "POST", headers: { origin: url, authorization } });
   assert.equal(answer.status, 409);
   assert.match(await answer.text(), /^"virtual_wall" holds the channel/);
 });
@@ -165,11 +167,19 @@ it("shows no button without leave to arm, but what that takes, and is closed to 
   for (const button of ["#arm", "#disarm"]) assert.equal(await page.locator(button).isVisible(), false, button);
   const post = async (where, headers) => (await fetch(`${where}/api/arm?device=0`, { method: "POST", headers })).status;
   assert.equal(await post(url, { origin: url }), 403);
-  const { url: open } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
-  assert.equal(await post(open, {}), 403);
-  assert.equal(await post(open, { origin: "http://evil.example" }), 403);
-  assert.equal(await post(open, { origin: url }), 403, "a page of another program on this machine");
-  assert.equal(await post(open, { origin: open, "x-forwarded-for": "192.0.2.7" }), 403);
+  const { url: open, operatorUrl } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
+  const authorization = `Bearer ${operatorUrl.split("/").at(-1)}`;
+  assert.equal(await post(open, { authorization }), 403);
+  assert.equal(await post(open, { authorization, origin: "http://evil.example" }), 403);
+  assert.equal(await post(open, { authorization, origin: url }), 403, "a page of another program on this machine");
+  assert.equal(await post(open, { authorization, origin: open, "x-forwarded-for": "192.0.2.7" }), 403);
+  assert.equal(await post(open, { origin: open }), 403, "somebody else who uses this machine");
+  const onlooker = await visit(test, open);
+  await says(onlooker, ".arming .needs", "open the address that tendon-dash said when it was started");
+  for (const button of ["#arm", "#disarm"]) assert.equal(await onlooker.locator(button).isVisible(), false, button);
+  const late = await visit(test, open, { at: `${open}/#/operator/${"0".repeat(32)}` });
+  await late.click("#arm");
+  await says(late, ".arming .result[data-level=bad]", "the pass is of another run, or missing");
   assert.equal((await fetch(`${open}/api/arm?device=0`)).status, 405);
   const observer = new Program(test, "tendon-dash", ["--server", server.address, "--listen", "127.0.0.1:0", ...key("screen"), "--arm", "operator"]);
   assert.equal(await observer.ended, 1);

@@ -184,11 +184,13 @@ TEST_F(RoutesTest, AnOrderToArmIsForItsOwnPageOnThisMachineByPostAndForNobodyEls
                            [&](std::uint32_t device, Operator::Order order) {
                              if (objection.empty()) pressed.emplace_back(device, order);
                              return objection;
-                           }});
+                           },
+                       .pass = "0123abcd"});
   const auto answer = [&](const Request& request) { return std::get<Reply>(routes.answer(request)); };
   Request good = get("/api/arm?device=3");
   good.method = "POST";
   good.origin = "http://127.0.0.1:8080";
+  good.authorization = "Bearer 0123abcd";
   EXPECT_EQ(answer(good).status, 202U);
   Request other = good;
   other.target = "/api/disarm?device=15";
@@ -218,6 +220,11 @@ TEST_F(RoutesTest, AnOrderToArmIsForItsOwnPageOnThisMachineByPostAndForNobodyEls
     refused(403, [&](Request& r) { r.origin = origin; });
   }
   refused(403, [](Request& r) { r.origin.reset(); });
+  for (const char* other_pass :
+       {"", "Bearer", "Bearer ", "0123abcd", "Bearer 0123abcc", "Bearer 0123abcd0", "Basic 0123abcd"}) {
+    refused(403, [&](Request& r) { r.authorization = other_pass; });
+  }
+  refused(403, [](Request& r) { r.authorization.reset(); });
   refused(403, [](Request& r) { r.local = false; });
   refused(403, [](Request& r) { r.proxied = true; });
   refused(403, [](Request& r) { r.host = "dash.lab", r.origin = "http://dash.lab", r.local = false; });

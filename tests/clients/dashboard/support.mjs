@@ -69,8 +69,8 @@ export async function startServer(test, folder, scenes, ...more) {
 /** tendon-dash; where its page is. */
 export async function startDash(test, server, ...more) {
   const program = new Program(test, "tendon-dash", ["--server", server, "--listen", "127.0.0.1:0", "--json", ...more]);
-  const address = JSON.parse(await program.line('"listening"')).address;
-  return { program, address, url: `http://${address}` };
+  const { address, operator_url: operatorUrl } = JSON.parse(await program.line('"listening"'));
+  return { program, address, url: `http://${address}`, operatorUrl };
 }
 
 /** A UDP socket where a server would be; what comes to it that is Data, which the dashboard's own observer never comes to say. */

@@ -5,6 +5,13 @@ import type { Level } from "./words.js";
 
 type Order = "arm" | "disarm";
 
+/** From the address that tendon-dash says when it starts: `#/operator/PASS`. Of this tab only, and of no history. */
+const kPass = "operator-pass";
+export function takePass(pass: string): void {
+  sessionStorage.setItem(kPass, pass);
+  location.replace("#/live");
+}
+
 /** So long a success is told: later the device may be something else, which its state says. A failure stays. */
 const kToldMs = 8000;
 
@@ -51,12 +58,13 @@ export class Arming {
     const press = server?.press?.device === device && !old ? server.press : undefined;
     const objection = server ? (server.devices.find((d) => d.number === device)?.arming_objection ?? "The server has not said which devices it has.") : "tendon-dash does not answer.";
     const busy = server?.press?.state === "under_way" ? server.press : undefined;
-    this.#group.hidden = server?.arms !== true;
+    const withoutPass = server?.arms === true && sessionStorage.getItem(kPass) === null;
+    this.#group.hidden = server?.arms !== true || withoutPass;
     this.#buttons.arm.disabled = objection !== "" || busy !== undefined;
     // It goes before an arming.
     this.#buttons.disarm.disabled = objection !== "" || busy?.order === "disarm";
-    say(this.#needs, objection);
-    this.#needs.hidden = objection === "";
+    say(this.#needs, withoutPass ? "To arm and disarm from here, open the address that tendon-dash said when it was started." : objection);
+    this.#needs.hidden = !withoutPass && objection === "";
     const words = this.#refused ?? press?.words ?? "";
     say(this.#result, words);
     this.#result.hidden = words === "";
@@ -66,7 +74,7 @@ export class Arming {
   async #press(order: Order): Promise<void> {
     this.#refused = undefined;
     try {
-      const answer = await fetch(`/api/${order}?device=${this.#device}`, { method: "POST" });
+      const answer = await fetch(`/api/${order}?device=${this.#device}`, { method: "POST", headers: { authorization: `Bearer ${sessionStorage.getItem(kPass)}` } });
       if (!answer.ok) this.#refused = (await answer.text()).trim();
     } catch {
       this.#refused = "Not done, as far as is known: tendon-dash does not answer.";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
+import { takePass } from "./arming.js";
 import { h, mark, s, say } from "./dom.js";
 import { Live } from "./live.js";
 import { Runs } from "./runs.js";
@@ -46,6 +47,7 @@ document.body.append(
 
 function route(): void {
   const [, where = "live", ...names] = location.hash.split("/");
+  if (where === "operator" && names[0]) return takePass(names[0]);
   const recordings = where === "recordings";
   tabs.live.classList.toggle("here", !recordings);
   tabs.recordings.classList.toggle("here", recordings);
