@@ -3,17 +3,16 @@
 #include <sys/mman.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
-#include "devices/simulated/profiles.h"
-#include "devices/simulated/simulated_device.h"
+#include "core/estimation/velocity_estimator.h"
+#include "core/haptic_controller.h"
 #include "server/clock.h"
 #include "server/haptic_loop.h"
 #include "server/realtime.h"
@@ -48,22 +47,66 @@ class CircleDevice final : public Device {
   Vec3 arm_{0.015 * std::cos(angle_), 0.015 * std::sin(angle_), 0};
 };
 
-struct Lane {
-  explicit Lane(std::size_t number) : device(number), haptic(config_of(device), device, mail) {}
+HapticController::Config control_of(const Device& device) {
+  HapticController::Config config;
+  config.limiter.friction = {0.3, 0.8};
+  config.limiter.longest_hold = 2 * kPeriod;
+  config.limiter.parts = lab::default_parts(device.info().position_resolution);
+  config.max_force = device.info().max_force;
+  config.max_slew = 1000;
+  return config;
+}
 
-  static HapticLoop::Config config_of(const Device& device) {
-    HapticLoop::Config config;
-    config.control.limiter.friction = {0.3, 0.8};
-    config.control.limiter.longest_hold = 2 * kPeriod;
-    config.control.limiter.parts = lab::default_parts(device.info().position_resolution);
-    config.control.max_force = device.info().max_force;
-    config.control.max_slew = 1000;
-    return config;
+/// An engine's answer to what the hand did at `now`.
+RemoteForce answer_to(const Vec3& position, std::uint64_t tick, LocalTime now) {
+  RemoteForce force;
+  force.sequence = tick;
+  force.answers_tick = tick;
+  force.answers = now;
+  force.received = now;
+  force.force = -300 * position;
+  force.valid_for = std::chrono::milliseconds(30);
+  return force;
+}
+
+/// A device's haptic thread, with what it shares with the others.
+struct Lane {
+  explicit Lane(std::size_t number) : device(number), haptic({.control = control_of(device)}, device, mail) {}
+
+  void step(LocalTime now) { haptic.step(now); }
+
+  /// The records taken out, and every tenth step a force, as the network thread puts it into the box.
+  void be_the_others(std::uint64_t step, LocalTime now) {
+    while (mail.steps.front() != nullptr) mail.steps.pop();
+    const DeviceState* state = mail.state.take();
+    if (step % 10 == 0 && state != nullptr) mail.forces.front().put(answer_to(state->position, state->tick, now));
   }
 
   CircleDevice device;
   Mailboxes mail{{.steps = 4, .flight = 64, .datagrams = 1}};
   HapticLoop haptic;
+};
+
+/// The control law by itself: what it answers nobody is told.
+struct BareLane {
+  explicit BareLane(std::size_t number)
+      : device(number), velocity(device.info().position_resolution), controller(control_of(device)) {}
+
+  void step(LocalTime now) {
+    const PositionSample sample = *device.read(now);
+    const Motion hand{now, sample.position, velocity.observe(now, sample.position)};
+    applied = device.apply(controller.step(hand, applied).force);
+    position = sample.position;
+  }
+  void be_the_others(std::uint64_t step, LocalTime now) {
+    if (step % 10 == 0) controller.observe(answer_to(position, step, now), 0);
+  }
+
+  CircleDevice device;
+  VelocityEstimator velocity;
+  HapticController controller;
+  Vec3 applied = Vec3::Zero();
+  Vec3 position = Vec3::Zero();
 };
 
 struct Paced {
@@ -74,23 +117,11 @@ struct Paced {
   double seconds = 0;
 };
 
-/// An engine's answer, as the network thread puts it into the box, every tenth step; and the records taken out.
-void be_the_others(Lane& lane, std::uint64_t step, LocalTime now) {
-  while (lane.mail.steps.front() != nullptr) lane.mail.steps.pop();
-  const DeviceState* state = lane.mail.state.take();
-  if (step % 10 != 0 || state == nullptr) return;
-  RemoteForce force;
-  force.sequence = step;
-  force.answers_tick = state->tick;
-  force.answers = now;
-  force.received = now;
-  force.force = -300 * state->position;
-  force.valid_for = std::chrono::milliseconds(30);
-  lane.mail.forces.front().put(force);
-}
-
 /// At 1 kHz, in one thread, on one core.
-Paced at_1_khz(std::vector<std::unique_ptr<Lane>>& lanes, Duration length) {
+template <class AnyLane>
+Paced at_1_khz(std::size_t count, Duration length) {
+  std::vector<std::unique_ptr<AnyLane>> lanes;
+  for (std::size_t i = 0; i < count; ++i) lanes.push_back(std::make_unique<AnyLane>(i));
   Paced result;
   std::thread haptic([&] {
     enter_realtime(kHapticPriority);
@@ -102,7 +133,7 @@ Paced at_1_khz(std::vector<std::unique_ptr<Lane>>& lanes, Duration length) {
     LocalTime due = began;
     for (std::uint64_t round = 1; round <= rounds; ++round) {
       const LocalTime now = clock::now();
-      for (const auto& lane : lanes) lane->haptic.step(now);
+      for (const auto& lane : lanes) lane->step(now);
       const LocalTime done = clock::now();
       result.late.push_back(1e6 * seconds(now - due));
       result.rounds.push_back(1e6 * seconds(done - now));
@@ -113,7 +144,7 @@ Paced at_1_khz(std::vector<std::unique_ptr<Lane>>& lanes, Duration length) {
         due += behind * kPeriod;
       }
       const Duration spent = clock::processor_time();
-      for (const auto& lane : lanes) be_the_others(*lane, round, now);
+      for (const auto& lane : lanes) lane->be_the_others(round, now);
       others += clock::processor_time() - spent;
       due = std::max(due, clock::now());  // what the others take is not the step's to answer for
       clock::sleep_until(due);
@@ -126,48 +157,58 @@ Paced at_1_khz(std::vector<std::unique_ptr<Lane>>& lanes, Duration length) {
   return result;
 }
 
+Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::optional<double> ten) {
+  std::vector<double> each;
+  for (const double round : paced.rounds) each.push_back(1e3 * round / static_cast<double>(count));
+  const double p50 = quantile(each, 0.5);
+  const double missed = 100 * static_cast<double>(paced.missed) / static_cast<double>(paced.rounds.size());
+  char note[200];
+  std::snprintf(note, sizeof note,
+                "all of them in %.0f µs (p50), %.0f µs (p99) of 1000; late by %.0f µs (p99); %.2f %% of the periods "
+                "missed; %.0f %% of a core",
+                quantile(paced.rounds, 0.5), quantile(paced.rounds, 0.99), quantile(paced.late, 0.99), missed,
+                100 * paced.processor / paced.seconds);
+  Row row;
+  row.what = std::to_string(count) + (count == 1 ? " device, " : " devices, ") + what;
+  row.unit = "ns";
+  row.n = each.size();
+  row.p50 = p50;
+  row.p99 = quantile(each, 0.99);
+  row.note = note;
+  if (count == 10) ten = p50;
+  if (ten) {
+    row.floor = "each of 10";
+    row.floor_p50 = ten;
+    row.ratio = p50 / *ten;
+  }
+  if (count == 1000) {
+    row.target = Row::Target{"1000 at 1 kHz on one core: p99 of a round ≤ 1 ms", quantile(paced.rounds, 0.99) <= 1000};
+  }
+  return row;
+}
+
+/// 1, 10, 100 … of one kind, to where they no longer fit into a millisecond.
+template <class AnyLane>
+void measure_lanes(Run& run, const std::string& what, const std::vector<std::size_t>& counts) {
+  // A device by itself pays for a processor that has slept, and ten share that.
+  std::optional<double> ten;
+  for (const std::size_t count : counts) {
+    const Paced paced = at_1_khz<AnyLane>(count, std::chrono::milliseconds(run.options.quick ? 50 : 3000));
+    const Row row = row_of(paced, count, what, ten);
+    if (count == 10) ten = row.p50;
+    run.add(row);
+    if (quantile(paced.rounds, 0.5) > 1000) break;  // here it breaks
+  }
+}
+
 }  // namespace
 
 void measure_devices(Run& run) {
   const std::vector<std::size_t> counts = run.options.quick
                                               ? std::vector<std::size_t>{1, 10}
                                               : std::vector<std::size_t>{1, 10, 100, 500, 1000, 1500, 2000, 3000, 4000};
-  // A device by itself pays for a processor that has slept, and ten share that.
-  std::optional<double> ten;
-  for (const std::size_t count : counts) {
-    std::vector<std::unique_ptr<Lane>> lanes;
-    for (std::size_t i = 0; i < count; ++i) lanes.push_back(std::make_unique<Lane>(i));
-    const Paced paced = at_1_khz(lanes, std::chrono::milliseconds(run.options.quick ? 50 : 3000));
-    const auto number = static_cast<double>(count);
-    std::vector<double> each;
-    for (const double round : paced.rounds) each.push_back(1e3 * round / number);
-    const double p50 = quantile(each, 0.5);
-    if (count == 10) ten = p50;
-    Row row{.section = {},
-            .what = std::to_string(count) + (count == 1 ? " device" : " devices") + ", HapticLoop::step of each",
-            .unit = "ns",
-            .n = each.size(),
-            .p50 = p50,
-            .p99 = quantile(each, 0.99),
-            .floor = ten ? "each of 10" : "",
-            .floor_p50 = ten,
-            .ratio = ten ? std::optional(p50 / *ten) : std::nullopt,
-            .note = {}};
-    const double missed = 100 * static_cast<double>(paced.missed) / static_cast<double>(paced.rounds.size());
-    char note[200];
-    std::snprintf(note, sizeof note,
-                  "all of them in %.0f µs (p50), %.0f µs (p99) of 1000; late by %.0f µs (p99); %.2f %% of the periods "
-                  "missed; %.0f %% of a core",
-                  quantile(paced.rounds, 0.5), quantile(paced.rounds, 0.99), quantile(paced.late, 0.99), missed,
-                  100 * paced.processor / paced.seconds);
-    row.note = note;
-    if (count == 1000) {
-      row.target =
-          Row::Target{"1000 at 1 kHz on one core: p99 of a round ≤ 1 ms", quantile(paced.rounds, 0.99) <= 1000};
-    }
-    run.add(row);
-    if (quantile(paced.rounds, 0.5) > 1000) break;  // here it breaks
-  }
+  measure_lanes<BareLane>(run, "velocity and HapticController::step of each", counts);
+  measure_lanes<Lane>(run, "HapticLoop::step of each", counts);
 }
 
 }  // namespace tendon::bench
