@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# long.sh [RUNS [TARGET…]]: runs of each fuzz target of the preset `fuzz`, one after the other, at the lowest priority, for
-# hours: 10 000 000 unless told otherwise. What they find is in build/fuzz/long/TARGET/, what they say in TARGET.log there.
+# long.sh [RUNS [TARGET…]]: runs of each fuzz target of the preset `asan`, one after the other, at the lowest priority, for
+# hours: 10 000 000 unless told otherwise. What they find is in build/asan/long/TARGET/, what they say in TARGET.log there.
 # The corpus that has grown, minimised, replaces the committed one when it reaches more: then it belongs into a commit, and
 # the figures into README.md.
 set -euo pipefail
@@ -14,14 +14,14 @@ targets=("$@")
 declare -A longest=([header]=64 [payload]=400 [handshake]=24 [session]=24 [key]=160 [scene]=400 [trace]=600 [recording]=600
   [falcon_reply]=200 [falcon_loader]=60 [falcon_device]=200 [spacemouse_report]=64
   [woodenhaptics_report]=64 [woodenhaptics_device]=200)
-cmake --preset fuzz && cmake --build --preset fuzz
+cmake --preset asan && cmake --build --preset asan --target fuzzers
 # Of a stack trace for each allocation nobody has anything, and entropic scheduling costs more than our targets do.
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=1:thread_local_quarantine_size_kb=16
 for target in "${targets[@]}"; do
-  folder=build/fuzz/long/$target
+  folder=build/asan/long/$target
   mkdir -p "$folder/corpus"
   cp -n tests/fuzz/corpus/"$target"/* "$folder/corpus/"
-  nice -n 19 "build/fuzz/bin/${target}_fuzz" -entropic=0 -runs="$runs" -seed="${SEED:-1}" -max_len="${longest[$target]}" \
+  nice -n 19 "build/asan/bin/${target}_fuzz" -entropic=0 -runs="$runs" -seed="${SEED:-1}" -max_len="${longest[$target]}" \
     -timeout=60 -close_fd_mask=3 -print_final_stats=1 -artifact_prefix="$folder/" "$folder/corpus" 2>"$folder.log"
   grep -a 'number_of_executed_units\|DONE ' "$folder.log"
 done
