@@ -58,7 +58,7 @@ constexpr Duration kSettle = milliseconds(200);
 
 struct Options {
   std::size_t observers = 32;
-  int blocks = 8;  ///< of each kind
+  int blocks = 60;  ///< of each kind: a minute in all
   int block_ms = 1000;
 };
 
