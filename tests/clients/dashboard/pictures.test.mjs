@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Makes the pictures of deploy/screenshots anew; no test, but what a person should look at after a change of the page:
+//
+//     TENDON_PROGRAMS=$PWD/build/release/bin tests/clients/dashboard/run pictures
+import { copyFileSync, mkdirSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { it } from "node:test";
+import { says, shown, visit } from "./browser.mjs";
+import { Program, kRoot, scratch, startDash, startServer, until } from "./support.mjs";
+
+const shoot = (page, name, more = {}) => page.screenshot({ path: join(kRoot, "deploy/screenshots", `${name}.png`), ...more });
+const kDark = { colorScheme: "dark", viewport: { width: 1280, height: 960 } };
+const kLight = { colorScheme: "light", viewport: { width: 1280, height: 960 } };
+const kPhone = { colorScheme: "light", viewport: { width: 390, height: 844 } };
+
+/** A bad network before the server: where a client sends to. */
+async function inject(test, server, profile) {
+  const program = new Program(test, "tendon-inject", ["--listen", "127.0.0.1:0", "--to", server, "--profile", profile, "--seed", "8", "--json"]);
+  return JSON.parse(await program.line('"start"')).listen;
+}
+
+const kScene = (fastest) => `
+[device]
+kind = "simulated"
+profile = "falcon"
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 400
+hold_ms = 900
+[limiter]
+kind = "aol+"
+[limiter.energy_cap]
+[limiter.robust_ledger]
+[limiter.knee]
+[safety]
+arm = "by request"
+[safety.speed_trip]
+max_m_per_s = ${fastest}
+[[channel]]
+name = "main"
+lease_ms = 500
+[[channel]]
+name = "operator"
+[network]
+keys = "keys"
+`;
+
+/** A device with a safety layer, armed from the page, with an engine behind 20 ms. */
+async function armed(test, name, fastest) {
+  const folder = scratch(test);
+  mkdirSync(join(folder, "keys"));
+  for (const who of ["engine", "operator"]) {
+    await new Program(test, "tendond", ["keygen", who], folder).ended;
+    copyFileSync(join(folder, `${who}.key`), join(folder, "keys", `${who}.key`));
+  }
+  writeFileSync(join(folder, `${name}.toml`), kScene(fastest));
+  const server = await startServer(test, folder, [join(folder, `${name}.toml`)], "--record", "run.mcap");
+  const near = await inject(test, server.address, "delay=20ms loss=1%");
+  new Program(test, "virtual_wall", ["--server", near, "--device", name, "--channel", "main", "--key", join(folder, "engine.key")]);
+  const { url, operatorUrl } = await startDash(test, server.address, "--key", join(folder, "operator.key"), "--arm", "operator", "--recordings", folder);
+  const page = await visit(test, url, { ...kLight, at: operatorUrl });
+  await says(page, ".engine", "virtual_wall");
+  await page.click("#arm");
+  return { page, url, operatorUrl };
+}
+
+it("live, paused, on a phone", async (test) => {
+  const { page, url, operatorUrl } = await armed(test, "falcon-right", 3);
+  await says(page, ".arming .result[data-level=good]", "Armed: it gives forces.");
+  await until("ten seconds are shown", async () => (await shown(page)) > 10_000);
+  await shoot(page, "live-light");
+  const dark = await visit(test, url, { ...kDark, at: operatorUrl });
+  const phone = await visit(test, url, { ...kPhone, at: operatorUrl });
+  await until("seconds are shown", async () => (await shown(dark)) > 8000 && (await shown(phone)) > 8000);
+  await dark.click("#pause");
+  await dark.locator(".scrubber").waitFor();
+  await shoot(dark, "paused-dark");
+  await shoot(phone, "phone", { fullPage: true });
+});
+
+it("in a fault", async (test) => {
+  const { page } = await armed(test, "falcon-right", 0.03);
+  await says(page, "[data-tile=state] .value", "Fault");
+  await until("five seconds are shown", async () => (await shown(page)) > 8000);
+  await shoot(page, "fault");
+});
+
+it("a recording, and two side by side", async (test) => {
+  const folder = scratch(test);
+  for (const [name, ...more] of [["far"], ["far-off", "--without-limiter"]]) {
+    const server = await startServer(test, folder, ["demo"], "--record", `${name}.mcap`, "--duration-s", "12", ...more);
+    const near = await inject(test, server.address, "delay=30ms");
+    const wall = new Program(test, "virtual_wall", ["--server", near]);
+    await server.program.ended;
+    await wall.stop();
+  }
+  const server = await startServer(test, folder, ["demo"], "--record", "/dev/null");
+  const { url } = await startDash(test, server.address, "--recordings", folder);
+  const page = await visit(test, url, { ...kLight, at: `${url}/#/recordings/far.mcap` });
+  await says(page, ".contact", "connected");
+  await says(page, ".lateness .words", "within");
+  await page.click("#zoom-in");
+  await shoot(page, "recording");
+  const dark = await visit(test, url, { ...kDark, viewport: { width: 1600, height: 1200 } });
+  await dark.click("nav a:has-text('Recordings')");
+  for (const name of ["far-off", "far"]) await dark.check(`[aria-label='Compare ${name}.mcap']`);
+  await dark.click("#compare");
+  await dark.locator(".runs.two .run .lateness").nth(1).waitFor();
+  await shoot(dark, "side-by-side-dark");
+});
