@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/time.h"
+
 namespace tendon {
 
 /// No datagram is larger than this: below every common path MTU, so it is never fragmented.
@@ -51,6 +53,12 @@ class Link {
   /// A datagram larger than the buffer is cut and its full size returned, so that the caller sees
   /// that it was too large.
   virtual std::size_t receive(Address& from, std::span<std::byte> buffer) = 0;
+
+  /// A time, not before `now`, by which the datagram that receive() has just returned was certainly here. A turn that
+  /// loses its processor after it has been told the time finds datagrams younger than that; taken for as old, their
+  /// round trip and one of its ways would look short by as much, and of round trips the shortest is believed most
+  /// (ClockOffsetEstimator). A link without a clock says `now`.
+  virtual LocalTime received_by(LocalTime now) const { return now; }
 };
 
 }  // namespace tendon

@@ -6,7 +6,7 @@
 namespace tendon {
 
 /// The real clock, CLOCK_MONOTONIC: the only place in the server where time is taken. Each thread reads it
-/// once per turn and passes it on.
+/// once per turn and passes it on; UdpLink reads it for each datagram.
 ///
 /// Thread-safe, realtime-safe.
 namespace clock {

@@ -128,12 +128,13 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   return next;
 }
 
-bool NetworkLoop::drain(LocalTime now) {
+bool NetworkLoop::drain(LocalTime& now) {
   std::array<std::byte, kMaxDatagram> buffer;
   for (std::size_t i = 0; i < config_.max_datagrams; ++i) {
     Address from;
     const std::size_t size = link_.receive(from, buffer);
     if (size == 0) return false;
+    now = link_.received_by(now);
     const auto datagram = std::span(buffer).first(std::min(size, buffer.size()));
     tap(now, DatagramRecord::Direction::kIn, from, datagram, size);
     if (size > buffer.size()) {

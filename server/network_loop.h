@@ -196,7 +196,7 @@ class NetworkLoop {
     std::uint64_t reports = 0;   ///< told so far
   };
 
-  bool drain(LocalTime now);
+  bool drain(LocalTime& now);  ///< `now` goes on with what it takes
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);

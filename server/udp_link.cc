@@ -13,6 +13,8 @@
 #include <ctime>
 #include <stdexcept>
 
+#include "server/clock.h"
+
 namespace tendon {
 namespace {
 
@@ -88,6 +90,8 @@ std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
   }
   return 0;
 }
+
+LocalTime UdpLink::received_by(LocalTime now) const { return std::max(now, clock::now()); }
 
 void UdpLink::wait(Duration timeout, Doorbell* doorbell) {
   // poll() ignores an entry with a negative descriptor.

@@ -39,6 +39,9 @@ class UdpLink : public Link {
   /// As Link says. Empty datagrams are skipped: they say nothing, and 0 means that none is waiting.
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
+  /// The time by clock::now().
+  LocalTime received_by(LocalTime now) const override;
+
   /// Waits until a datagram can be received, or the doorbell rings (it is then answered), or
   /// `timeout` is over, whichever comes first; a signal handler may end it sooner. A timeout of zero
   /// or less does not wait. The resolution is the kernel's: set the thread's timer slack to 1 ns if

@@ -201,14 +201,15 @@ void ForceClient::end(LocalTime now, Phase phase, Code code, std::string reason)
   back_off_ = std::min(2 * back_off_, config_.retry_max);
 }
 
-/// True when there may be more in the link.
-bool ForceClient::drain(LocalTime now) {
+/// True when there may be more in the link. `now` goes on with what it takes.
+bool ForceClient::drain(LocalTime& now) {
   // One byte more than the largest datagram: one that is too large stays too large after the cut.
   std::array<std::byte, kMaxDatagram + 1> buffer;
   for (int i = 0; i < config_.max_datagrams; ++i) {
     Address from;
     const std::size_t size = link_.receive(from, buffer);
     if (size == 0) return false;
+    now = link_.received_by(now);
     if (from != server_) {
       ++stats_.strangers;
       continue;

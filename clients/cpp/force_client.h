@@ -206,7 +206,7 @@ class ForceClient {
   void greet(LocalTime now);
   void settle(LocalTime now);
   void end(LocalTime now, Phase phase, Code code, std::string reason);
-  bool drain(LocalTime now);
+  bool drain(LocalTime& now);
   bool give_order(const Request& order);
   bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
   void take_report(const PeerReport& report);

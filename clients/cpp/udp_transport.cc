@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <asio/io_context.hpp>
 #include <asio/ip/udp.hpp>
+#include <chrono>
 #include <ctime>
 #include <stdexcept>
 
@@ -59,6 +60,10 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
     if (error == asio::error::would_block) return 0;
   }
   return 0;
+}
+
+LocalTime UdpTransport::received_by(LocalTime now) const {
+  return std::max(now, LocalTime(std::chrono::steady_clock::now().time_since_epoch()));
 }
 
 void UdpTransport::wait(Duration timeout) {

@@ -24,6 +24,9 @@ class UdpTransport : public Link {
   /// As Link says. Empty datagrams are skipped: they say nothing, and 0 means that none is waiting.
   std::size_t receive(Address& from, std::span<std::byte> buffer) override;
 
+  /// The time by std::chrono::steady_clock, as run() passes it.
+  LocalTime received_by(LocalTime now) const override;
+
   /// Sleeps until a datagram can be received or `timeout` is over; a signal handler may end it sooner.
   /// A timeout of zero or less does not sleep.
   void wait(Duration timeout);

@@ -106,13 +106,14 @@ void Observer::end(LocalTime now, Contact contact, std::string words) {
   back_off_ = std::min(2 * back_off_, config_.retry_max);
 }
 
-/// True when there may be more in the link.
-bool Observer::drain(LocalTime now) {
+/// True when there may be more in the link. `now` goes on with what it takes.
+bool Observer::drain(LocalTime& now) {
   std::array<std::byte, kMaxDatagram + 1> buffer;  // one more: what is too large stays too large after the cut
   for (int i = 0; i < config_.max_datagrams; ++i) {
     Address from;
     const std::size_t size = link_.receive(from, buffer);
     if (size == 0) return false;
+    now = link_.received_by(now);
     if (from != server_) continue;
     const auto datagram = std::span<const std::byte>(buffer).first(std::min(size, buffer.size()));
     if (handshake_) {

@@ -68,7 +68,7 @@ class Observer {
   void greet(LocalTime now);
   void settle(LocalTime now);
   void end(LocalTime now, Contact contact, std::string words);
-  bool drain(LocalTime now);
+  bool drain(LocalTime& now);
   void take_events(LocalTime now);
   void take_answer(LocalTime now, const Session::RequestAnswered& answered);
   void ask(LocalTime now);

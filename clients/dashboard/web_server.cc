@@ -75,7 +75,8 @@ Bytes bytes_of(const beast::flat_buffer& buffer) {
 /// A UDP socket that talks to the server and to nobody else.
 class ServerSocket : public Link {
  public:
-  ServerSocket(asio::io_context& context, const Address& server) : server_(server), socket_(context) {
+  ServerSocket(asio::io_context& context, const Address& server, WebServer::Clock clock)
+      : server_(server), clock_(clock), socket_(context) {
     error_code error;
     socket_.connect(udp::endpoint(ip_of(server), server.port), error);
     if (!error) socket_.non_blocking(true, error);
@@ -100,6 +101,8 @@ class ServerSocket : public Link {
     return 0;
   }
 
+  LocalTime received_by(LocalTime now) const override { return std::max(now, clock_()); }
+
   template <class Handler>
   void when_readable(Handler handler) {
     socket_.async_wait(udp::socket::wait_read, std::move(handler));
@@ -107,6 +110,7 @@ class ServerSocket : public Link {
 
  private:
   Address server_;
+  WebServer::Clock clock_;
   udp::socket socket_;
 };
 
@@ -301,7 +305,7 @@ class Connection {
     web_socket_->read_message_max(live ? kMaxLine : kMaxDatagram);
     if (!live) {
       try {
-        server_ = std::make_unique<ServerSocket>(shared_.context, shared_.config.server);
+        server_ = std::make_unique<ServerSocket>(shared_.context, shared_.config.server, shared_.clock);
       } catch (const std::runtime_error&) {
         return close();
       }
@@ -392,7 +396,7 @@ struct WebServer::State {
                .bridge = bridge,
                .clock = clock,
                .connections = {}},
-        link(shared.context, config.server) {
+        link(shared.context, config.server, clock) {
     const tcp::endpoint at(ip_of(config.listen), config.listen.port);
     error_code error;
     acceptor.open(at.protocol(), error);

@@ -102,12 +102,15 @@ const std::set<std::string_view> kSystemHeaders = {"dlfcn.h",   "fcntl.h", "ifad
                                                    "pthread.h", "sched.h", "signal.h",  "spawn.h",  "unistd.h"};
 const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
 
-/// The threads of the server and of the client library wait and read the clock once for each turn; everybody else is
-/// told the time. tests/core/time_test.cc shows that the time types of core have no now().
+/// The threads of the server and of the client library wait and read the clock once for each turn, and their sockets
+/// when they have received something; everybody else is told the time. tests/core/time_test.cc shows that the time
+/// types of core have no now().
 const Names kClockReaders = {"server/clock.h",
                              "server/clock.cc",
                              "server/server.cc",
+                             "server/udp_link.cc",
                              "clients/cpp/run.cc",
+                             "clients/cpp/udp_transport.cc",
                              "clients/softbody/softbody_main.cc",
                              "tests/bench/",
                              "tests/e2e/",

@@ -517,6 +517,42 @@ TEST_F(SealedServer, TellsAControllerOnceASecondHowItsForcesFareAndAnObserverNot
   EXPECT_FALSE(b.client->report().has_value());
 }
 
+/// 20 ms each way, and one of the two ends loses its processor for 36 ms, once, in the middle of a turn: what has come
+/// meanwhile it takes by the time at which the turn began.
+class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
+
+TEST_P(InterruptedTurn, MakesNoWayLookShort) {
+  const bool of_server = GetParam();
+  Client a = controller(wall_, "192.0.2.1:4000");
+  std::deque<std::pair<LocalTime, Datagram>> under_way;
+  const LocalTime begins = now_ + milliseconds(2000);
+  const LocalTime goes_on = begins + milliseconds(36);
+  for (const LocalTime end = now_ + milliseconds(5500); now_ < end; now_ += milliseconds(1)) {
+    DeviceState state;
+    state.tick = ++tick_;
+    state.sampled = PeerTime(now_.time_since_epoch());
+    mail_->state.put(state);
+    for (; !under_way.empty() && under_way.front().first <= now_; under_way.pop_front()) {
+      const Datagram& datagram = under_way.front().second;
+      (datagram.to == server_.self ? server_ : *a.end).inbox.push_back(datagram);
+    }
+    const bool interrupted = now_ >= begins && now_ < goes_on;
+    const LocalTime told = now_ == goes_on ? begins : now_;
+    End& end_of_it = of_server ? server_ : *a.end;
+    end_of_it.taken = now_;
+    if (!(interrupted && of_server)) loop_->turn(of_server ? told : now_);
+    if (!(interrupted && !of_server)) a.client->turn(of_server ? now_ : told);
+    for (; count_ < wire_.size(); ++count_) under_way.emplace_back(now_ + milliseconds(20), wire_[count_]);
+  }
+  ASSERT_TRUE(a.client->report() && a.client->report()->to_server && a.client->report()->to_client);
+  for (const auto& way : {a.client->report()->to_server, a.client->report()->to_client}) {
+    EXPECT_GE(way->median, milliseconds(18));
+    EXPECT_LE(way->median, milliseconds(22));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(OfTheServerAndOfTheClient, InterruptedTurn, testing::Bool());
+
 TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
   Client a = controller(wall_, "192.0.2.1:4000");
   run(milliseconds(1500), {&a});

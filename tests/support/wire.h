@@ -39,8 +39,10 @@ class End : public Link {
     std::copy_n(datagram.bytes.begin(), std::min(buffer.size(), datagram.bytes.size()), buffer.begin());
     return datagram.bytes.size();
   }
+  LocalTime received_by(LocalTime now) const override { return std::max(now, taken); }
 
   Address self;
+  LocalTime taken{};  ///< when it was read, where that is later than the turn's time
   std::deque<Datagram> inbox;
   std::size_t sent = 0;  ///< bytes
 

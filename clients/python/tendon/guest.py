@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import logging
 import socket
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
@@ -45,11 +46,12 @@ def parse_address(text: str) -> tuple[str, int]:
 class Guest:
     """`turn(now)` does all there is to do. One thread, or one event loop, at a time."""
 
-    def __init__(self, server: str, config: Config, now: int) -> None:
+    def __init__(self, server: str, config: Config, now: int, clock: Callable[[], int] = time.monotonic_ns) -> None:
         """Raises ValueError when `server` is no HOST:PORT, OSError when the system cannot reach it."""
         self.server = server
         self.socket = _connected(server)
         self.core = ForceClient(config, now)
+        self.clock = clock
         self._doubt = "is tendond running there" + (", and does it know our key" if config.key else "")
         self._said = ""
         self._told: LinkReport | None = None
@@ -84,6 +86,8 @@ class Guest:
             datagram = self._receive()
             if datagram is None:
                 break
+            # It may have come since the turn began, and must not be taken for older than it is.
+            now = max(now, self.clock())
             self.core.receive(now, datagram)
         self.core.tick(now)
         self.flush(now)

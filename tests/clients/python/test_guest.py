@@ -49,7 +49,7 @@ class Socket:
 
 
 def guest(*received):
-    it = Guest("127.0.0.1:9", Config(), 0)
+    it = Guest("127.0.0.1:9", Config(), 0, clock=lambda: 0)
     it.socket.close()
     it.socket = Socket(*received)
     return it
@@ -67,3 +67,15 @@ def test_a_flood_of_reports_does_not_keep_it_from_sending():
     it = guest(*[OSError(errno.EHOSTUNREACH, "No route to host")] * 100_000)
     it.turn(0)
     assert len(it.socket.sent) == 1
+
+
+def test_what_a_turn_finds_late_it_does_not_take_for_as_old_as_its_beginning(monkeypatch):
+    """A process that loses its processor in the middle of a turn: the round trip would look short by as much."""
+    it = guest(b"one", b"two")
+    times = iter([2, 9])
+    it.clock = lambda: next(times)
+    taken = []
+    monkeypatch.setattr(it.core, "receive", lambda now, datagram: taken.append((now, datagram)))
+    monkeypatch.setattr(it.core, "tick", lambda now: taken.append((now, None)))
+    it.turn(3)
+    assert taken == [(3, b"one"), (9, b"two"), (9, None)]
