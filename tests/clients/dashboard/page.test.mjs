@@ -104,7 +104,7 @@ keys = "keys"
 async function guarded(test) {
   const folder = scratch(test);
   mkdirSync(join(folder, "keys"));
-  for (const name of ["engine", "operator", "screen"]) {
+  for (const name of ["engine", "operator", "colleague", "screen"]) {
     const made = new Program(test, "tendond", ["keygen", name, ...(name === "screen" ? ["--observer"] : [])], folder);
     assert.equal(await made.ended, 0, made.lines.join("\n"));
     copyFileSync(join(folder, `${name}.key`), join(folder, "keys", `${name}.key`));
@@ -143,6 +143,17 @@ it("arms and disarms by two buttons, beside an engine that goes on, and says wha
   await page.click("#arm");
   await result(page, "good", "Armed: it gives forces.");
   await until("force is given again", async () => (await applied(page)) > 0);
+
+  // Another operator disarms: that it was armed is no news any more.
+  const { url: elsewhere, operatorUrl: colleagues } = await startDash(test, server.address, ...key("colleague"), "--arm", "operator");
+  const authorization = `Bearer ${colleagues.split("/").at(-1)}`;
+  await until("the colleague has disarmed it", async () => {
+    await page.click("#arm"); // so that it is told as done just now
+    await result(page, "good", "Armed: it gives forces.");
+    return (await fetch(`${elsewhere}/api/disarm?device=0`, { method: "POST", headers: { origin: elsewhere, authorization } })).status === 202;
+  });
+  await says(page, ".arming", "Disarmed: gives no force until it is armed again.");
+  assert.equal(await page.locator(".arming .result").isVisible(), false);
   assert.equal(server.program.lines.filter((line) => /refused|denied/.test(line)).length, 0);
   assert.ok(program.process.exitCode === null);
 });

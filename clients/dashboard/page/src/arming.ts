@@ -54,7 +54,9 @@ export class Arming {
       this.#toldAt = this.#told === undefined ? -Infinity : performance.now();
       this.#told = told;
     }
-    const old = server?.press?.state === "done" && performance.now() - this.#toldAt > kToldMs;
+    // Nor is it news that it was armed, when it is no longer.
+    const over = server?.press?.order === "arm" && state.level !== "good";
+    const old = server?.press?.state === "done" && (over || performance.now() - this.#toldAt > kToldMs);
     const press = server?.press?.device === device && !old ? server.press : undefined;
     const objection = server ? (server.devices.find((d) => d.number === device)?.arming_objection ?? "The server has not said which devices it has.") : "tendon-dash does not answer.";
     const busy = server?.press?.state === "under_way" ? server.press : undefined;
