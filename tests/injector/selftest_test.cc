@@ -26,8 +26,8 @@ namespace {
 constexpr double kMs = 1e6;  // ns
 
 /// Enough to see every wrong law below.
-constexpr SelftestOptions kSome{.count = 100'000};
-constexpr SelftestOptions kMany{.count = 500'000};
+const SelftestOptions kSome{.count = 100'000};
+const SelftestOptions kMany{.count = 500'000};
 
 Cdf normal_law(double mean_ms, double deviation_ms) {
   return [=](double x) { return x < 0 ? 0 : normal_cdf((x - mean_ms * kMs) / (deviation_ms * kMs)); };
