@@ -157,7 +157,8 @@ Paced at_1_khz(std::size_t count, Duration length) {
   return result;
 }
 
-Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::optional<double> ten) {
+/// `ten`: the median of ten devices, which this fills in when it comes to them.
+Row row_of(const Paced& paced, std::size_t count, const std::string& what, std::optional<double>& ten) {
   std::vector<double> each;
   for (const double round : paced.rounds) each.push_back(1e3 * round / static_cast<double>(count));
   const double p50 = quantile(each, 0.5);
@@ -194,9 +195,7 @@ void measure_lanes(Run& run, const std::string& what, const std::vector<std::siz
   std::optional<double> ten;
   for (const std::size_t count : counts) {
     const Paced paced = at_1_khz<AnyLane>(count, std::chrono::milliseconds(run.options.quick ? 50 : 3000));
-    const Row row = row_of(paced, count, what, ten);
-    if (count == 10) ten = row.p50;
-    run.add(row);
+    run.add(row_of(paced, count, what, ten));
     if (quantile(paced.rounds, 0.5) > 1000) break;  // here it breaks
   }
 }

@@ -132,6 +132,13 @@ TEST(UdpLink, TheDoorbellEndsAWaitAndIsAnswered) {
   EXPECT_FALSE(is_readable(bell.fd()));
 }
 
+TEST(UdpLink, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
+  const UdpLink link(parse_address("127.0.0.1:0"));
+  const LocalTime long_ago{};
+  EXPECT_GT(link.received_by(long_ago), long_ago);
+  EXPECT_EQ(link.received_by(LocalTime::max()), LocalTime::max());
+}
+
 TEST(UdpLink, AWaitWithoutTimeLeftDoesNotWait) {
   UdpLink link(kAnyPort4);
   link.wait(0s);

@@ -76,6 +76,13 @@ TEST(UdpTransport, TalksWithItsServer) {
   EXPECT_EQ(a.receive(from, buffer), 0U) << "none left, and no waiting";
 }
 
+TEST(UdpTransport, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
+  const UdpTransport link(parse_address("127.0.0.1:9"));
+  const LocalTime long_ago{};
+  EXPECT_GT(link.received_by(long_ago), long_ago);
+  EXPECT_EQ(link.received_by(LocalTime::max()), LocalTime::max());
+}
+
 TEST(UdpTransport, TellsTheFullSizeOfADatagramItHadToCut) {
   Z z;
   UdpTransport a(z.address());

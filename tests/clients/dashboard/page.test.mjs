@@ -2,11 +2,11 @@
 //
 // The page on a live server, as a person uses it.
 import assert from "node:assert/strict";
-import { copyFileSync, mkdirSync, writeFileSync } from "node:fs";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
 import { painted, picture, says, shown, visit } from "./browser.mjs";
-import { Program, scratch, startDash, startServer, until } from "./support.mjs";
+import { Program, makeKeys, scratch, startDash, startServer, until } from "./support.mjs";
 
 it("shows live what the server does, stands still when it is told to, and goes on", async (test) => {
   const folder = scratch(test);
@@ -103,12 +103,8 @@ keys = "keys"
 /** A server with keys for an engine, an operator and a screen. */
 async function guarded(test) {
   const folder = scratch(test);
-  mkdirSync(join(folder, "keys"));
-  for (const name of ["engine", "operator", "colleague", "screen"]) {
-    const made = new Program(test, "tendond", ["keygen", name, ...(name === "screen" ? ["--observer"] : [])], folder);
-    assert.equal(await made.ended, 0, made.lines.join("\n"));
-    copyFileSync(join(folder, `${name}.key`), join(folder, "keys", `${name}.key`));
-  }
+  await makeKeys(test, folder, ["engine", "operator", "colleague"]);
+  await makeKeys(test, folder, ["screen"], "--observer");
   writeFileSync(join(folder, "guarded.toml"), kGuarded);
   const server = await startServer(test, folder, [join(folder, "guarded.toml")], "--record", "/dev/null");
   const key = (name) => ["--key", join(folder, `${name}.key`)];

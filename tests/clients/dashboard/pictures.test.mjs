@@ -2,12 +2,12 @@
 //
 // Makes the pictures of deploy/screenshots anew; no test, but what a person should look at after a change of the page:
 //
-//     TENDON_PROGRAMS=$PWD/build/release/bin tests/clients/dashboard/run pictures
-import { copyFileSync, mkdirSync, writeFileSync } from "node:fs";
+//     tests/clients/dashboard/run pictures
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
 import { says, shown, visit } from "./browser.mjs";
-import { Program, kRoot, scratch, startDash, startServer, until } from "./support.mjs";
+import { Program, kRoot, makeKeys, scratch, startDash, startServer, until } from "./support.mjs";
 
 const shoot = (page, name, more = {}) => page.screenshot({ path: join(kRoot, "deploy/screenshots", `${name}.png`), ...more });
 const kDark = { colorScheme: "dark", viewport: { width: 1280, height: 960 } };
@@ -55,11 +55,7 @@ keys = "keys"
 /** A device with a safety layer, armed from the page, with an engine behind 20 ms. */
 async function armed(test, name, fastest) {
   const folder = scratch(test);
-  mkdirSync(join(folder, "keys"));
-  for (const who of ["engine", "operator"]) {
-    await new Program(test, "tendond", ["keygen", who], folder).ended;
-    copyFileSync(join(folder, `${who}.key`), join(folder, "keys", `${who}.key`));
-  }
+  await makeKeys(test, folder, ["engine", "operator"]);
   writeFileSync(join(folder, `${name}.toml`), kScene(fastest));
   const server = await startServer(test, folder, [join(folder, `${name}.toml`)], "--record", "run.mcap");
   const near = await inject(test, server.address, "delay=20ms loss=1%");

@@ -3,7 +3,7 @@
 // Programs of ours, as a user starts them, and patience.
 import { spawn } from "node:child_process";
 import { createSocket } from "node:dgram";
-import { mkdtempSync, rmSync } from "node:fs";
+import { copyFileSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { connect } from "node:net";
 import { tmpdir } from "node:os";
@@ -56,6 +56,16 @@ export async function until(what, done, more = () => "") {
     if (result) return result;
     if (performance.now() > deadline) throw new Error(`never came to be: ${what}\n${more()}`);
     await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+}
+
+/** NAME.key in `folder`, and a copy in its `keys`, where a scene's `keys = "keys"` looks. */
+export async function makeKeys(test, folder, names, ...more) {
+  mkdirSync(join(folder, "keys"), { recursive: true });
+  for (const name of names) {
+    const made = new Program(test, "tendond", ["keygen", name, ...more], folder);
+    if ((await made.ended) !== 0) throw new Error(made.lines.join("\n"));
+    copyFileSync(join(folder, `${name}.key`), join(folder, "keys", `${name}.key`));
   }
 }
 
