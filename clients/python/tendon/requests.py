@@ -102,17 +102,17 @@ class IncomingRequests:
             self._taken.add(control.id)
             if control.request is not None:
                 return control
-            self.answer(control.id, Code.UNSUPPORTED, "this version does not know that request")
+            self.answer(ControlAck(control.id, Code.UNSUPPORTED, "this version does not know that request"))
         return None
 
-    def answer(self, number: int, code: Code, detail: str) -> None:
+    def answer(self, ack: ControlAck) -> None:
         """Answers a request that `next` returned; any other id is ignored."""
-        if number not in self._taken:
+        if ack.id not in self._taken:
             return
-        self._taken.remove(number)
-        self._answers[number] = ControlAck(number, code, detail)
-        self._answers.pop(number - REQUEST_WINDOW, None)
-        self._due[number] = None
+        self._taken.remove(ack.id)
+        self._answers[ack.id] = ack
+        self._answers.pop(ack.id - REQUEST_WINDOW, None)
+        self._due[ack.id] = None
 
     def due(self) -> list[ControlAck]:
         """The answers to be sent now."""

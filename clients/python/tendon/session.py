@@ -15,6 +15,7 @@ from .messages import (
     Code,
     Control,
     ControlAck,
+    DeviceDescription,
     DeviceReport,
     DeviceState,
     ForceCommand,
@@ -159,9 +160,11 @@ class Session:
         """Queues a reliable request and returns its id; None when limits.REQUEST_WINDOW are open."""
         return self._asked.add(request)
 
-    def answer(self, number: int, code: Code, detail: str) -> None:
+    def answer(
+        self, number: int, code: Code, detail: str, wait_ms: int = 0, device: DeviceDescription | None = None
+    ) -> None:
         """Answers a Control that has arrived. Every one must be answered; an id that waits for none is ignored."""
-        self._answering.answer(number, code, detail)
+        self._answering.answer(ControlAck(number, code, detail, wait_ms, device))
 
     def close(self, code: Code, reason: str) -> None:
         """Says Bye and closes. What was not sent yet is dropped. No Closed comes: the owner knows."""

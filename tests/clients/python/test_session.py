@@ -335,7 +335,7 @@ def test_requests_are_handed_out_in_order_and_unknown_ones_answered_as_unsupport
     assert [(ack.id, ack.code) for ack in requests.due()] == [(2, Code.UNSUPPORTED)]
     assert not requests.take(Control(20, Rearm())), "beyond the window"
     assert not requests.take(Control(17, Rearm())), "1 is not answered yet"
-    requests.answer(1, Code.OK, "")
+    requests.answer(ControlAck(1, Code.OK))
     assert requests.take(Control(17, Rearm()))
 
 
@@ -343,7 +343,7 @@ def test_the_answer_goes_out_again_when_the_request_comes_again():
     requests = IncomingRequests()
     requests.take(Control(1, Rearm()))
     requests.next()
-    requests.answer(1, Code.OK, "yes")
+    requests.answer(ControlAck(1, Code.OK, "yes"))
     requests.sent(1)
     assert requests.due() == []
     requests.take(Control(1, Rearm()))
