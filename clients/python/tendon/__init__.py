@@ -17,9 +17,12 @@ from .force_client import Config, ForceClient, Phase, Stats
 from .guest import RefusedForGood
 from .keys import read_key
 from .messages import (
+    ChannelDescription,
+    ChannelRule,
     Code,
     Contact,
     Delays,
+    DeviceDescription,
     DeviceReport,
     DeviceState,
     ForceTable,
@@ -36,11 +39,14 @@ from .messages import (
 )
 
 __all__ = [
+    "ChannelDescription",
+    "ChannelRule",
     "Client",
     "Code",
     "Config",
     "Contact",
     "Delays",
+    "DeviceDescription",
     "DeviceReport",
     "DeviceState",
     "ForceClient",

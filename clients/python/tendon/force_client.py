@@ -15,20 +15,28 @@ from . import codec, limits
 from .deadband import Deadband, ForceDeadband, foretell, objection
 from .handshake import ClientHandshake
 from .messages import (
+    FEATURE_CHANNELS,
     FEATURE_DIAGNOSTICS,
     FEATURE_LOCAL_MODEL,
     NEVER,
     ZERO,
+    Claim,
     Code,
     Contact,
+    Control,
     ControlAck,
+    Describe,
+    DeviceDescription,
     DeviceReport,
     DeviceState,
     Disarm,
     ForceCommand,
     ForceTable,
+    GiveLease,
+    Grant,
     Hello,
     Instant,
+    LeaseLost,
     LinkReport,
     LinkStats,
     LocalModel,
@@ -40,6 +48,7 @@ from .messages import (
     SetStateDeadband,
     SetStateRate,
     Stiffness,
+    TakeLease,
     Touch,
     Vec3,
     Welcome,
@@ -55,6 +64,9 @@ _VALID_PERIODS = 3
 _MIN_VALID_FOR_NS = 20_000_000
 _MAX_OBSERVED_PERIOD_NS = 100_000_000
 
+_ASK_LEASE_AGAIN_NS = 50_000_000
+"""A lease is asked for again when it may be over, but not at a higher rate than this: the holder renews it all the time."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Config:
@@ -63,7 +75,14 @@ class Config:
     name: str = "guest"
     """For the server's log; at most 64 bytes."""
     role: Role = Role.CONTROLLER
-    """A controller sees states and sends forces, one per device; an observer looks on."""
+    """A controller sees states and sends forces, one per channel; an observer looks on."""
+    device: str = ""
+    """Of several devices of a server, by its name; empty: the first one. At most 24 bytes."""
+    channel: str = ""
+    """Of several channels of the device, likewise."""
+    take_lease: bool = False
+    """Where another controller holds the channel's lease: ask for it until we have it. It is asked again when the server says
+    that the lease may be over."""
     key: bytes | None = field(default=None, repr=False)
     """32 bytes that the server knows too (`read_key`): suite 1. None: plain, which servers accept on loopback only."""
     rate_hz: float = 0
@@ -101,6 +120,8 @@ class Config:
                 raise ValueError(sentence)
 
         require(len(self.name.encode(errors="replace")) <= limits.MAX_NAME, "name: at most 64 bytes")
+        require(len(self.device.encode(errors="replace")) <= limits.MAX_LABEL, "device: at most 24 bytes")
+        require(len(self.channel.encode(errors="replace")) <= limits.MAX_LABEL, "channel: at most 24 bytes")
         require(self.key is None or len(self.key) == KEY_SIZE, "key: expected 32 bytes")
         rate_possible = self.rate_hz == 0 or MIN_RATE_HZ <= self.rate_hz <= MAX_RATE_HZ
         require(rate_possible, "rate_hz: expected 0, or 0.001 to 100000")
@@ -137,6 +158,7 @@ class Stats:
     forces: int = 0  # forces sent
     forces_unusable: int = 0  # forces not sent: not finite, or out of bounds
     forces_alike: int = 0  # forces not sent: a hand could not have told them from the one before
+    lease_lost_to: str = ""  # name of the one that has taken the channel from us; empty: nobody
 
 
 _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
@@ -153,6 +175,10 @@ class ForceClient:
         """`random(n)`: n bytes from a cryptographic source. The first Hello is due at once."""
         self.welcome: Welcome | None = None
         """What the server said of itself and its device when the newest session opened."""
+        self.description: DeviceDescription | None = None
+        """What the device is and can do, when we have named a device or a channel and the server has answered."""
+        self.holds = False
+        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
         self.report: LinkReport | None = None
         """The server's newest word on how our forces fare, once a second while they come. Of the present session."""
         self.device_report: DeviceReport | None = None
@@ -166,6 +192,9 @@ class ForceClient:
         self._handshake: ClientHandshake | None = None
         self._session: Session | None = None
         self._ended: Session | None = None  # the last one, while it has a Bye to say
+        self._place = Grant(config.role)  # the numbers of our device and channel
+        self._asked_lease: int | None = None  # the request that waits for its answer
+        self._ask_lease: Instant = NEVER  # when to ask (again)
         self._give_up = now  # end of the present attempt's patience
         self._retry = now  # when the next attempt begins
         self._back_off = _ns(config.retry_min_s)  # wait before the attempt after that
@@ -197,6 +226,8 @@ class ForceClient:
         if self._session is not None:
             self._session.tick(now)
             self._take_events(now)
+            if self._asked_lease is None and now >= self._ask_lease and not self.take_lease():
+                self._ask_lease = now + _ASK_LEASE_AGAIN_NS
         elif self._handshake is not None:
             if now >= self._give_up:
                 self._end(now, Phase.UNANSWERED, Code.TIMED_OUT, "no answer")
@@ -205,8 +236,8 @@ class ForceClient:
 
     def send(self, hand: DeviceState, touch: Touch) -> None:
         """Answers a state. What has a number that is not finite, or out of bounds, is counted and not sent;
-        the server then treats this client as one that is late. Raises ValueError when it has a wrong shape,
-        PermissionError for an observer.
+        the server then treats this client as one that is late. While another one holds the channel, nothing is
+        sent. Raises ValueError when it has a wrong shape, PermissionError for an observer.
 
         Take a fresh `now` before the next call: the datagram's time stamp must not be older than the physics' work.
         """
@@ -216,7 +247,7 @@ class ForceClient:
         stiffness = None if touch.stiffness is None else _matrix(touch.stiffness)
         contact = None if touch.contact is None else _contact(touch.contact)
         session = self._session
-        if session is None or self.welcome is None:
+        if session is None or self.welcome is None or not self.holds:
             return
         if not (
             _usable(force)
@@ -244,6 +275,8 @@ class ForceClient:
                 force,
                 valid_for_us,
                 model,
+                self._place.device,
+                self._place.channel,
                 topology_changed=touch.topology_changed,
                 error=touch.error,
             )
@@ -253,11 +286,30 @@ class ForceClient:
     def rearm(self) -> bool:
         """Asks the server to clear a latched fault, and to take a disarm back. False when there is no session to ask in,
         or too many requests are open. Controllers only: the server refuses an observer."""
-        return self._session is not None and self._session.request(Rearm()) is not None
+        return self._session is not None and self._session.request(Rearm(self._place.device)) is not None
 
     def disarm(self) -> bool:
         """Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm()."""
-        return self._session is not None and self._session.request(Disarm()) is not None
+        return self._session is not None and self._session.request(Disarm(self._place.device)) is not None
+
+    def take_lease(self) -> bool:
+        """Asks for the channel's lease, once; what became of it `holds` says. False as for rearm()."""
+        wanted = TakeLease(self._place.device, self._place.channel)
+        asked = None if self._session is None else self._session.request(wanted)
+        if asked is None:
+            return False
+        self._asked_lease = asked
+        return True
+
+    def give_lease(self) -> bool:
+        """Gives it up, and asks for it no more. False as for rearm()."""
+        self._ask_lease = NEVER
+        given = GiveLease(self._place.device, self._place.channel)
+        if self._session is None or self._session.request(given) is None:
+            return False
+        self._asked_lease = None  # whatever the answer is, it is older than this
+        self.holds = False
+        return True
 
     def stop(self, now: int) -> None:
         """Ends for good. `next_datagram` then gives the Byes, so that the server need not wait for a timeout."""
@@ -282,7 +334,7 @@ class ForceClient:
 
     def next_state(self, now: int) -> DeviceState | None:
         """The newest state, when it is due and was not handed out before."""
-        if now < self._next_call:
+        if now < self._next_call or self._waits_for_lease():
             return None
         state = self._foretold(now) if self._foretell else self._unseen
         if state is None:
@@ -299,13 +351,16 @@ class ForceClient:
         if self._ended is not None:
             return self._ended.next_turn()
         if self._session is not None:
-            return self._session.next_turn()
+            ask = NEVER if self._asked_lease is not None else self._ask_lease
+            return min(self._session.next_turn(), ask)
         if self._handshake is not None:
             return min(self._give_up, self._handshake.next_turn())
         return self._retry if self.phase in _WAITING else NEVER
 
     def next_state_due(self) -> Instant:
-        """When `next_state` gives one; NEVER = not before another has come in."""
+        """When `next_state` gives one; NEVER = not before another has come in, or the channel is ours."""
+        if self._waits_for_lease():
+            return NEVER
         if not self._foretell:
             return NEVER if self._unseen is None else self._next_call
         if self._newest is None:
@@ -326,9 +381,19 @@ class ForceClient:
 
     # ---- Inside ----
 
+    def _claims(self) -> tuple[Claim, ...]:
+        config = self.config
+        named = config.device or config.channel
+        return (Claim(config.role, config.device, config.channel),) if named else ()
+
+    def _waits_for_lease(self) -> bool:
+        return self.config.role is Role.CONTROLLER and not self.holds
+
     def _greet(self, now: int) -> None:
-        features = (FEATURE_LOCAL_MODEL, FEATURE_DIAGNOSTICS) if self.config.diagnostics else (FEATURE_LOCAL_MODEL,)
-        hello = Hello(self.config.role, self.config.name, features)
+        features: tuple[str, ...] = (FEATURE_LOCAL_MODEL, FEATURE_CHANNELS)
+        if self.config.diagnostics:
+            features += (FEATURE_DIAGNOSTICS,)
+        hello = Hello(self.config.role, self.config.name, features, claims=self._claims())
         key = self.config.key
         ephemeral = b"" if key is None else self._random(KEY_SIZE)
         self._handshake = ClientHandshake(hello, self._random(16), now, key=key, ephemeral=ephemeral)
@@ -344,11 +409,24 @@ class ForceClient:
         if isinstance(outcome, Refused):
             self._end(now, Phase.REFUSED, outcome.code, outcome.detail)
             return
+        grants = outcome.welcome.grants
+        if self._claims() and len(grants) != 1:
+            sentence = "that server has one device, with one channel: name none"
+            self._end(now, Phase.REFUSED, Code.UNSUPPORTED, sentence)
+            return
         self._handshake = None
         self.welcome = outcome.welcome
+        self._place = grants[0] if grants else Grant(outcome.welcome.role)
+        self.holds = self._place.role is Role.CONTROLLER
+        self._asked_lease = None
+        self._ask_lease = now if self.config.take_lease and self._waits_for_lease() else NEVER
+        self._stats.lease_lost_to = ""
+        self.description = None
         self._session = Session(outcome.connection_id, now, outcome.cipher)
+        if self._claims():
+            self._session.request(Describe(self._place.device))
         if self.config.state_hz > 0:
-            self._session.request(SetStateRate(self.config.state_hz))
+            self._session.request(SetStateRate(self.config.state_hz, self._place.device))
         asked = self.config.state_deadband
         self._deadband_request = self._session.request(asked) if asked else None
         self._foretell = False
@@ -369,6 +447,7 @@ class ForceClient:
         self._stats.reason = reason
         self._handshake = None
         self._ended, self._session = self._session, None
+        self.holds = False
         self._unseen = self._newest = None
         self._retry = now + self._back_off
         self._back_off = min(2 * self._back_off, _ns(self.config.retry_max_s))
@@ -388,11 +467,40 @@ class ForceClient:
             elif isinstance(event, PeerReport):
                 self.peer_reports[event.channel] = event
             elif isinstance(event, ControlAck):
-                if event.id == self._deadband_request:
-                    self._foretell = event.code is Code.OK and self._period > 0 and self._silence_ns() > 0
+                self._take_answer(now, event)
+            elif isinstance(event, Control):
+                self._take_request(now, self._session, event)
             elif isinstance(event, Closed):
                 taken_over = event.code is Code.REPLACED  # to come back would be to take turns for ever
                 self._end(now, Phase.STOPPED if taken_over else Phase.LOST, event.code, event.reason)
+
+    def _take_answer(self, now: int, answer: ControlAck) -> None:
+        if answer.device is not None:
+            self.description = answer.device
+        if answer.id == self._deadband_request:
+            self._foretell = answer.code is Code.OK and self._period > 0 and self._silence_ns() > 0
+        if answer.id != self._asked_lease:
+            return
+        self._asked_lease = None
+        self.holds = answer.code is Code.OK
+        self._ask_lease = NEVER
+        if self.holds:
+            self._stats.lease_lost_to = ""
+        elif self.config.take_lease and answer.code is Code.BUSY:
+            self._ask_lease = now + max(1_000_000 * answer.wait_ms, _ASK_LEASE_AGAIN_NS)
+
+    def _take_request(self, now: int, session: Session, asked: Control) -> None:
+        lost = asked.request
+        if not isinstance(lost, LeaseLost):
+            session.answer(asked.id, Code.UNSUPPORTED, "that is a client's to ask")
+            return
+        session.answer(asked.id, Code.OK, "")
+        if (lost.device, lost.channel) != (self._place.device, self._place.channel):
+            return
+        self.holds = False
+        self._stats.lease_lost_to = lost.to
+        if self.config.take_lease:
+            self._ask_lease = now + _ASK_LEASE_AGAIN_NS
 
     def _haptic_period(self) -> int:
         return _ns(1 / self.welcome.loop_hz) if self.welcome else 0

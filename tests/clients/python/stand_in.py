@@ -9,20 +9,21 @@ from tendon import codec
 from tendon.cipher import Cipher, Plain, Sealed
 from tendon.codec import DatagramType, Header, Suite
 from tendon.handshake import key_id, prologue
-from tendon.messages import NEVER, Hello, Instant, Refused, Welcome
+from tendon.messages import NEVER, Grant, Hello, Instant, Refused, Welcome
 from tendon.session import Session
 
 COOKIE = bytes(range(1, 17))
 
 
 class StandIn:
-    """`refusal`: what it says instead of Welcome. `deaf`: it answers nothing at all."""
+    """`refusal`: what it says instead of Welcome. `deaf`: it answers nothing at all. `grants`: to whatever is claimed."""
 
     def __init__(self, key: bytes | None = None) -> None:
         self.key = key
         self.refusal: Refused | None = None
         self.deaf = False
         self.features: tuple[str, ...] = ("local-model",)
+        self.grants: tuple[Grant, ...] = ()
         self.version = 1
         self.hellos: list[Hello] = []  # with the cookie, each attempt once
         self.session: Session | None = None
@@ -74,7 +75,7 @@ class StandIn:
         self.hellos.append(said)
         self._welcomed += 1
         answer: codec.Answer = self.refusal or Welcome(
-            self.version, self.features, said.role, "stand-in", 8.0, 0.0, 1000, 2000, "test"
+            self.version, self.features, said.role, "stand-in", 8.0, 0.0, 1000, 2000, "test", self.grants
         )
         connection_id = 0 if self.refusal else self._welcomed
         body = codec.write_answer(answer)
