@@ -54,7 +54,8 @@ def _key(text: str) -> bytes:
 
 
 def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.ArgumentParser:
-    """--server, --key, --rate-hz, --duration-s, --json and --help; add what your program has besides."""
+    """--server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json and --help; add what your program has
+    besides."""
     example = f"Example: {name} --server 127.0.0.1:47100 --duration-s 10"
     line = argparse.ArgumentParser(name, description=purpose, epilog=example)
     line.add_argument(
@@ -66,6 +67,13 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
     )
     line.add_argument(
         "--key", type=_key, metavar="FILE", help="The key that tendond knows us by; without one only loopback is possible"
+    )
+    line.add_argument("--device", default="", metavar="NAME", help="Name of the device, of a server with several")
+    line.add_argument(
+        "--channel", default="", metavar="NAME", help="Name of the device's channel that is to take the forces"
+    )
+    line.add_argument(
+        "--take-lease", action="store_true", help="Where another client holds the channel: ask for it until it is ours"
     )
     line.add_argument(
         "--rate-hz",
@@ -104,6 +112,9 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
             name=options.name,
             role=Role.CONTROLLER if physics else Role.OBSERVER,
             key=options.key,
+            device=options.device,
+            channel=options.channel,
+            take_lease=options.take_lease,
             rate_hz=options.rate_hz,
             diagnostics=options.json and watch is not None,
         )

@@ -11,7 +11,7 @@ from typing import Union
 
 from .force_client import Config, Stats
 from .guest import Guest
-from .messages import NEVER, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
+from .messages import NEVER, DeviceDescription, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float]]]
 """The physics engine, seen from here: device state in, force (and stiffness) out."""
@@ -77,6 +77,18 @@ class Client:
         self._guest.flush(time.monotonic_ns())
         return asked
 
+    def take_lease(self) -> bool:
+        """Asks for the channel's lease, once; what became of it `holds` says. False when there is no session to ask in."""
+        asked = self._guest.core.take_lease()
+        self._guest.flush(time.monotonic_ns())
+        return asked
+
+    def give_lease(self) -> bool:
+        """Gives it up, and asks for it no more. False when there is no session to do it in."""
+        given = self._guest.core.give_lease()
+        self._guest.flush(time.monotonic_ns())
+        return given
+
     @property
     def stats(self) -> Stats:
         return self._guest.stats
@@ -85,6 +97,16 @@ class Client:
     def welcome(self) -> Welcome | None:
         """What the server said of itself and its device when the newest session opened; None before that."""
         return self._guest.welcome
+
+    @property
+    def description(self) -> DeviceDescription | None:
+        """What the device is and can do, when we have named a device or a channel and the server has answered."""
+        return self._guest.description
+
+    @property
+    def holds(self) -> bool:
+        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
+        return self._guest.holds
 
     @property
     def report(self) -> LinkReport | None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
-from .messages import Code, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
+from .messages import Code, DeviceDescription, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
 
 log = logging.getLogger("tendon")
 
@@ -64,6 +64,16 @@ class Guest:
     def welcome(self) -> Welcome | None:
         """What the server said of itself and its device when the newest session opened; None before that."""
         return self.core.welcome
+
+    @property
+    def description(self) -> DeviceDescription | None:
+        """What the device is and can do, when we have named a device or a channel and the server has answered."""
+        return self.core.description
+
+    @property
+    def holds(self) -> bool:
+        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
+        return self.core.holds
 
     @property
     def report(self) -> LinkReport | None:

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
@@ -20,6 +20,24 @@ from conftest import ROOT
 PATIENCE_S = 30
 PROGRAMS = Path(os.environ.get("TENDON_PROGRAMS", ROOT / "build" / "release" / "bin"))
 EXAMPLES = ROOT / "clients" / "python" / "examples"
+
+PRESSING_HAND = """
+[device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 300
+"""
+"""A scene: a hand that goes into the region x > 0 and stays there."""
 
 
 class Process:
@@ -92,14 +110,23 @@ def tendond() -> Path:
 class Server(Process):
     """tendond with the demo's scene: a hand that presses into the region x > 0 twice a second."""
 
-    def __init__(self, folder: Path, listen: str = "127.0.0.1:0", keys: Path | None = None) -> None:
-        """`keys`: a folder of key files; only they are let in."""
-        text = (ROOT / "deploy" / "scenes" / "demo.toml").read_text(encoding="utf-8")
-        if keys is not None:
-            text += f'\n[network]\nkeys = "{keys}"\n'
-        scene = folder / "scene.toml"
-        scene.write_text(text, encoding="utf-8")
-        super().__init__(folder, [tendond(), scene, "--listen", listen, "--duration-s", "120", "--json"])
+    def __init__(
+        self,
+        folder: Path,
+        listen: str = "127.0.0.1:0",
+        keys: Path | None = None,
+        scenes: Mapping[str, str] | None = None,
+    ) -> None:
+        """`keys`: a folder of key files; only they are let in. `scenes`: others, by the names of their devices."""
+        if scenes is None:
+            text = (ROOT / "deploy" / "scenes" / "demo.toml").read_text(encoding="utf-8")
+            if keys is not None:
+                text += f'\n[network]\nkeys = "{keys}"\n'
+            scenes = {"scene": text}
+        files = [folder / f"{name}.toml" for name in scenes]
+        for file, text in zip(files, scenes.values()):
+            file.write_text(text, encoding="utf-8")
+        super().__init__(folder, [tendond(), *files, "--listen", listen, "--duration-s", "120", "--json"])
         self.address = str(json.loads(self.wait_for_line('"listening"'))["address"])
 
     def end(self) -> dict[str, Any]:

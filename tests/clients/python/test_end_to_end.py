@@ -10,11 +10,14 @@ import socket
 import subprocess
 
 import pytest
-from processes import Server, example, summary_of, tendond
+from processes import PRESSING_HAND, Server, example, summary_of, tendond
 
 from tendon import Client, Config, DeviceState, Phase, RefusedForGood, Role, Touch, aio, read_key
 
 STIFFNESS = 2000
+
+LEASED = '[[channel]]\nname = "tissue"\nlease_ms = 300\n[network]\ncontroller_timeout_ms = 60000\n'
+"""Of a scene: whoever sends no force for 0.3 s loses the channel to one that asks, and his session only after a minute."""
 
 
 def wall(hand: DeviceState) -> Touch:
@@ -155,6 +158,66 @@ def test_an_observer_with_json_is_told_of_the_loop_and_of_the_engine(tmp_path):
             if peer["link"]["forces"] > 0 and peer["link"]["round_trip_ms"] is not None:
                 break
         assert echo.stop() == 0
+
+
+def test_an_engine_drives_the_device_that_it_names_and_no_other(tmp_path):
+    with Server(tmp_path, scenes={"left": PRESSING_HAND, "right": PRESSING_HAND}) as server:
+        with example(tmp_path, "virtual_wall", "--server", server.address, "--device", "right") as engine:
+            engine.wait_for_line("connected")
+            with Client(server.address, Config(role=Role.OBSERVER, device="right")) as observer:
+                assert any(felt(hand) and observer.description is not None for hand in observer.states(30))
+                assert (observer.description.name, observer.description.channels[0].holder) == ("right", "virtual_wall")
+            assert engine.stop() == 0
+        left, right = (device["channels"][0]["forces"] for device in server.end()["devices"])
+        assert left == 0 < right
+
+
+def test_a_device_that_is_not_there_is_refused_for_good(tmp_path):
+    with Server(tmp_path) as server:
+        with example(tmp_path, "virtual_wall", "--server", server.address, "--device", "none") as engine:
+            engine.wait_for_line("refuses")
+            assert engine.wait() == 1
+
+
+def test_a_lease_is_taken_from_an_engine_that_hangs_which_is_told_so_and_takes_it_back(tmp_path):
+    def waits_until(client, has_come_true):
+        """Lets it live until then."""
+        for _ in range(300):
+            list(client.states(0.1))
+            if has_come_true():
+                return True
+        return False
+
+    with Server(tmp_path, scenes={"device": PRESSING_HAND + LEASED}) as server:
+        first = Client(server.address, Config(name="first", channel="tissue"))
+        second = Client(server.address, Config(name="second", channel="tissue", take_lease=True))
+        with first, second:
+            assert next(first.states(30)) and first.holds
+            # From here on `first` hangs.
+            for hand in second.states(30):
+                second.send(hand, wall(hand))
+                if felt(hand):
+                    break
+            assert second.holds
+            server.wait_for_line("takes device/tissue from")
+            assert waits_until(first, lambda: not first.holds)
+            assert first.stats.lease_lost_to == "second"
+            assert second.give_lease() and not second.holds
+            assert first.take_lease() and waits_until(first, lambda: first.holds)
+            assert (first.stats.sessions, first.stats.lease_lost_to) == (1, "")
+        end = server.end()
+        assert (end["devices"][0]["channels"][0]["handovers"], end["replaced"], end["welcomed"]) == (1, 0, 2)
+
+
+def test_an_example_takes_the_lease_of_the_channel_that_its_command_line_names(tmp_path):
+    with Server(tmp_path, scenes={"device": PRESSING_HAND + LEASED}) as server:
+        with Client(server.address, Config(channel="tissue")) as first:
+            assert next(first.states(30))
+            with example(
+                tmp_path, "virtual_wall", "--server", server.address, "--channel", "tissue", "--take-lease"
+            ) as second:
+                server.wait_for_line("takes device/tissue from")
+                assert second.stop() == 0
 
 
 def test_without_a_server_an_example_says_so_and_leaves_with_1(tmp_path):

@@ -5,7 +5,7 @@ import errno
 
 import pytest
 
-from tendon import Config, Phase
+from tendon import Client, Config, Phase, aio
 from tendon.guest import Guest, parse_address
 
 
@@ -79,3 +79,25 @@ def test_what_a_turn_finds_late_it_does_not_take_for_as_old_as_its_beginning(mon
     monkeypatch.setattr(it.core, "tick", lambda now: taken.append((now, None)))
     it.turn(3)
     assert taken == [(3, b"one"), (9, b"two"), (9, None)]
+
+
+@pytest.mark.parametrize("kind", [Client, aio.Client])
+@pytest.mark.parametrize("order", ["rearm", "disarm", "take_lease", "give_lease"])
+def test_what_a_client_asks_for_leaves_at_once(kind, order, monkeypatch):
+    client = kind("127.0.0.1:9")
+    client._guest.socket.close()
+    done = []
+    monkeypatch.setattr(client._guest.core, order, lambda: done.append(order) or True)
+    monkeypatch.setattr(client._guest, "flush", lambda now: done.append("flush"))
+    assert getattr(client, order)()
+    assert done == [order, "flush"]
+
+
+@pytest.mark.parametrize("kind", [Client, aio.Client])
+@pytest.mark.parametrize("what", ["holds", "description"])
+def test_a_client_tells_what_its_core_knows(kind, what):
+    client = kind("127.0.0.1:9")
+    client._guest.socket.close()
+    known = object()
+    setattr(client._guest.core, what, known)
+    assert getattr(client, what) is known

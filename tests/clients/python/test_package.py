@@ -76,7 +76,8 @@ def test_an_example_has_at_most_25_lines_and_explains_itself(example):
     file = PACKAGE / "examples" / example
     assert len(file.read_text(encoding="utf-8").splitlines()) <= 25
     help_text = run(sys.executable, file, "--help", env={"PYTHONPATH": str(PACKAGE), "PATH": ""})
-    for word in ("--server", "--key", "--rate-hz", "--duration-s", "--json", f"Example: {file.stem}"):
+    common = ("--server", "--key", "--device", "--channel", "--take-lease", "--rate-hz", "--duration-s", "--json")
+    for word in (*common, f"Example: {file.stem}"):
         assert word in help_text
     for wrong in (["--server", "nowhere"], ["--rate-hz", "nan"], ["--duration-s", "-1"]):
         done = subprocess.run([sys.executable, file, *wrong], env={"PYTHONPATH": str(PACKAGE)}, capture_output=True)
