@@ -97,6 +97,7 @@ bool ForceClient::take_lease() {
 bool ForceClient::give_lease() {
   ask_lease_ = LocalTime::max();
   if (!session_ || !session_->request(GiveLease{.device = place_.device, .channel = place_.channel})) return false;
+  asked_lease_.reset();  // what is answered to that is older than this
   holds_ = false;
   return true;
 }

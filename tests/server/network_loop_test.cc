@@ -442,6 +442,18 @@ TEST_F(TwoDevices, AGivenLeaseIsFree) {
   EXPECT_TRUE(first.client->holds());
 }
 
+TEST_F(TwoDevices, WhoGivesALeaseBackBeforeItHasHeardOfItDoesNotThinkThatItHoldsIt) {
+  Client first = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
+  run(milliseconds(300), {&first});
+  EXPECT_TRUE(first.client->give_lease());
+  run(milliseconds(50), {&first});
+  EXPECT_TRUE(first.client->take_lease());
+  EXPECT_TRUE(first.client->give_lease());
+  run(milliseconds(50), {&first});
+  EXPECT_EQ(tissue().holder, "");
+  EXPECT_FALSE(first.client->holds()) << "what was asked before is answered after";
+}
+
 TEST_F(TwoDevices, ArmsAndDisarmsTheDeviceOfAControllerAlsoWhenAnotherHoldsTheLease) {
   Client holder = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
   run(milliseconds(300), {&holder});
@@ -475,6 +487,8 @@ TEST_F(TwoDevices, WhoCannotBeDisarmedAtOnceIsToldToAskAgain) {
   ASSERT_TRUE(a.client->disarm());
   run(milliseconds(100), {&a});
   EXPECT_TRUE(loop_->take_notices().empty()) << "what was not done is not told";
+  ASSERT_TRUE(a.client->order_answer().has_value());
+  EXPECT_EQ(a.client->order_answer()->code, Code::kBusy);
 }
 
 TEST_F(SealedServer, AnObserverMayNotDisarm) {
