@@ -101,17 +101,17 @@ export class IncomingRequests {
       mine.stage = "taken";
       const { id, request } = mine.control;
       if (request) return { id, request };
-      this.answer(id, Code.UNSUPPORTED, "this version does not know that request");
+      this.answer({ id, code: Code.UNSUPPORTED, detail: "this version does not know that request" });
     }
     return undefined;
   }
 
   /** Answers a request that `next` returned; any other id is ignored. */
-  answer(id: number, code: Code, detail: string): void {
-    const mine = this.#slot(id);
-    if (mine?.control.id !== id || mine.stage !== "taken") return;
+  answer(answer: ControlAck): void {
+    const mine = this.#slot(answer.id);
+    if (mine?.control.id !== answer.id || mine.stage !== "taken") return;
     mine.stage = "answered";
-    mine.answer = { id, code, detail };
+    mine.answer = answer;
     mine.due = true;
   }
 

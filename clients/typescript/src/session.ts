@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-import { decodeData, encodeFrame, encodeHead, type DataContent, type Echo, type Frame } from "./codec.js";
+import {
+  decodeData, encodeFrame, encodeHead, type ControlAck, type DataContent, type Echo, type Frame,
+} from "./codec.js";
 import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
 import { kByes, kMaxDatagram, kMaxPacketNumber } from "./limits.js";
 import {
@@ -73,7 +75,7 @@ export type SessionEvent =
   | { readonly kind: "report"; readonly report: LinkReport }
   | Diagnosis
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
-  | { readonly kind: "answered"; readonly id: number; readonly code: Code; readonly detail: string }
+  | ({ readonly kind: "answered" } & ControlAck)
   /** As the peer said Bye; Code.TIMED_OUT: it fell silent; Code.EXPIRED: too old. The last event. */
   | { readonly kind: "closed"; readonly code: Code; readonly reason: string };
 
@@ -209,8 +211,8 @@ export class Session {
     return this.#asked.add(request);
   }
   /** Answers a request; an id that waits for no answer is ignored. */
-  answer(id: number, code: Code, detail: string): void {
-    this.#answering.answer(id, code, detail);
+  answer(answer: ControlAck): void {
+    this.#answering.answer(answer);
   }
   /** Says Bye and closes; what was not sent yet is dropped. No event comes: the owner knows. */
   close(code: Code, reason: string): void {

@@ -130,7 +130,7 @@ export class Server {
       if (event.kind === "force") this.forces.push({ at: now, command: event.command });
       if (event.kind === "request") {
         this.requests.push(event.request);
-        session.answer(event.id, conduct.answer, "done");
+        session.answer({ id: event.id, code: conduct.answer, detail: "done" });
       }
     }
     for (let datagram; (datagram = session.nextDatagram(time)); ) send(datagram);
