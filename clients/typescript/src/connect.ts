@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
-import type { DeviceReport, LinkReport, PeerReport, Welcome } from "./messages.js";
+import type { DeviceDescription, DeviceReport, LinkReport, PeerReport, Welcome } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
 /** Where datagrams to one server leave. */
@@ -23,6 +23,10 @@ export interface ConnectConfig extends ClientConfig {
 export interface Guest {
   readonly phase: Phase;
   readonly welcome: Welcome | undefined;
+  /** What the device is and can do, when `device` or `channel` was named and the server has answered. */
+  readonly description: DeviceDescription | undefined;
+  /** The channel takes our forces; while it does not, the physics is not called. */
+  readonly holds: boolean;
   /** The server's newest word on how our forces fare, once a second while they come. */
   readonly report: LinkReport | undefined;
   /** With `diagnostics`, the newest word on how the device's loop does, once a second … */
@@ -32,6 +36,9 @@ export interface Guest {
   stats(): ClientStats;
   rearm(): boolean;
   disarm(): boolean;
+  /** Asks for the channel's lease, once, or gives it up. */
+  takeLease(): boolean;
+  giveLease(): boolean;
   /** Says Bye and ends. */
   stop(): void;
   /** Resolves at the end; rejects with what a callback threw. */
@@ -98,6 +105,12 @@ class RealTimeGuest implements Guest {
   get welcome(): Welcome | undefined {
     return this.#client.welcome;
   }
+  get description(): DeviceDescription | undefined {
+    return this.#client.description;
+  }
+  get holds(): boolean {
+    return this.#client.holds;
+  }
   get report(): LinkReport | undefined {
     return this.#client.report;
   }
@@ -111,18 +124,27 @@ class RealTimeGuest implements Guest {
     return this.#client.stats();
   }
   rearm(): boolean {
-    const asked = this.#client.rearm();
-    this.#wake();
-    return asked;
+    return this.#ask(() => this.#client.rearm());
   }
   disarm(): boolean {
-    const asked = this.#client.disarm();
-    this.#wake();
-    return asked;
+    return this.#ask(() => this.#client.disarm());
+  }
+  takeLease(): boolean {
+    return this.#ask(() => this.#client.takeLease());
+  }
+  giveLease(): boolean {
+    return this.#ask(() => this.#client.giveLease());
   }
   stop(): void {
     this.#client.stop(readClock());
     this.#end();
+  }
+
+  /** A request leaves in the next turn. */
+  #ask(request: () => boolean): boolean {
+    const asked = request();
+    this.#wake();
+    return asked;
   }
 
   #receive(datagram: Uint8Array): void {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 import { randomBytes } from "@noble/hashes/utils";
-import { isContact, isError, isForce, isRadius, isStiffness } from "./codec.js";
+import { isContact, isError, isForce, isRadius, isStiffness, type ControlAck } from "./codec.js";
 import { Deadband, foretell, forceDeadbandObjection, stateDeadbandObjection, type ForceDeadband } from "./deadband.js";
 import { ClientHandshake } from "./handshake.js";
-import { kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
+import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, type Contact, kFeatureDiagnostics, kFeatureLocalModel, kProtocolVersion, Role, type DeviceReport, type DeviceState, type LinkReport,
-  type PeerReport, type StateDeadband, type Stiffness, type Vec3, type Welcome,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureLocalModel, kProtocolVersion, Role, type Contact, type DeviceDescription,
+  type DeviceReport, type DeviceState, type Grant, type Hello, type LinkReport, type PeerReport, type Request, type StateDeadband,
+  type Stiffness, type Vec3, type Welcome,
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
@@ -40,6 +41,14 @@ export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
 export interface ClientConfig {
   /** For the server's log; at most 64 bytes. */
   readonly name?: string;
+  /** Of several devices and channels of a server, by their names, at most 24 bytes each; empty: the first one. */
+  readonly device?: string;
+  readonly channel?: string;
+  /**
+   * Where another controller holds the channel's lease: ask for it until we have it. It is asked again when the server says
+   * that the lease may be over.
+   */
+  readonly takeLease?: boolean;
   /** The 32 bytes that the server knows too: everything is encrypted, and only loopback does without. */
   readonly key?: Uint8Array | undefined;
   /** Calls of the callback per second, 0.001 … 100 000; 0 = one for every new state. */
@@ -105,17 +114,24 @@ export interface ClientStats {
   forcesUnusable: number;
   /** Forces not sent: a hand could not have told them from the one before. */
   forcesAlike: number;
+  /** Name of the one that has taken the channel from us; empty: nobody. */
+  leaseLostTo: string;
 }
 
 const kValidPeriods = 3;
 const kMinValidForMs = 20;
 /** A gap is not a period; an engine slower than 10 Hz says so by rateHz. */
 const kMaxObservedPeriodMs = 100;
+/** A lease is asked for again when it may be over, but no more often than this: the holder renews it all the time. */
+const kAskLeaseAgain = fromMilliseconds(50);
 
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
-  name: "guest", rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000,
-  random: randomBytes,
+  name: "guest", device: "", channel: "", takeLease: false, rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false,
+  patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
 };
+
+/** What those have who name no device and no channel. */
+const kFirstPlace: Omit<Grant, "role"> = { device: 0, channel: 0 };
 
 function checked(config: ClientConfig): Required<ClientConfig> {
   const given = Object.fromEntries(Object.entries(config).filter(([, value]) => value !== undefined));
@@ -125,7 +141,10 @@ function checked(config: ClientConfig): Required<ClientConfig> {
   const require = (ok: boolean, sentence: string): void => {
     if (!ok) throw new RangeError(sentence);
   };
-  require(new TextEncoder().encode(full.name).length <= kMaxName, `name: at most ${kMaxName} bytes`);
+  const size = (text: string): number => new TextEncoder().encode(text).length;
+  require(size(full.name) <= kMaxName, `name: at most ${kMaxName} bytes`);
+  require(size(full.device) <= kMaxLabel, `device: at most ${kMaxLabel} bytes`);
+  require(size(full.channel) <= kMaxLabel, `channel: at most ${kMaxLabel} bytes`);
   require(!full.key || full.key.length === kKeySize, `key: expected ${kKeySize} bytes, got ${full.key?.length}`);
   require(full.rateHz === 0 || (full.rateHz >= 1e-3 && full.rateHz <= 1e5), "rateHz: expected 0, or 0.001 to 100000");
   require(Number.isInteger(full.stateHz) && full.stateHz >= 0 && full.stateHz <= kMaxLoopHz,
@@ -167,6 +186,14 @@ export class ForceClient {
   #handshake: ClientHandshake | undefined;
   #session: Session | undefined;
   #welcome: Welcome | undefined;
+  #description: DeviceDescription | undefined;
+  /** The numbers of our device and channel. */
+  #place = kFirstPlace;
+  #holds = false;
+  /** The request for the lease that waits for its answer. */
+  #askedLease: number | undefined;
+  /** When to ask for the lease (again). */
+  #askLease = kNever;
   /** End of the present attempt's patience. */
   #giveUp = 0n;
   /** When the next attempt begins. */
@@ -196,7 +223,7 @@ export class ForceClient {
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
     phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesForetold: 0,
-    statesSkipped: 0, forces: 0, forcesUnusable: 0, forcesAlike: 0,
+    statesSkipped: 0, forces: 0, forcesUnusable: 0, forcesAlike: 0, leaseLostTo: "",
   };
 
   /**
@@ -248,11 +275,32 @@ export class ForceClient {
    * refused. False when there is no session to ask in, or too many requests are open.
    */
   rearm(): boolean {
-    return this.#session?.request({ kind: "rearm", device: 0 }) !== undefined;
+    return this.#session?.request({ kind: "rearm", device: this.#place.device }) !== undefined;
   }
   /** Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm(). */
   disarm(): boolean {
-    return this.#session?.request({ kind: "disarm", device: 0 }) !== undefined;
+    return this.#session?.request({ kind: "disarm", device: this.#place.device }) !== undefined;
+  }
+
+  /** The channel takes our forces; while it does not, the physics is not called. */
+  get holds(): boolean {
+    return this.#holds;
+  }
+  /** Asks for the channel's lease, once. False as for rearm(). */
+  takeLease(): boolean {
+    const { device, channel } = this.#place;
+    const asked = this.#session?.request({ kind: "takeLease", device, channel });
+    this.#askedLease = asked ?? this.#askedLease;
+    return asked !== undefined;
+  }
+  /** Gives the lease up, and asks for it no more. False as for rearm(). */
+  giveLease(): boolean {
+    const { device, channel } = this.#place;
+    this.#askLease = kNever;
+    if (this.#session?.request({ kind: "giveLease", device, channel }) === undefined) return false;
+    this.#askedLease = undefined; // its answer is over by then: the server takes requests in their order
+    this.#holds = false;
+    return true;
   }
 
   /** Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing. */
@@ -275,6 +323,10 @@ export class ForceClient {
   get welcome(): Welcome | undefined {
     return this.#welcome;
   }
+  /** What the device is and can do, when we have named a device or a channel and the server has answered. */
+  get description(): DeviceDescription | undefined {
+    return this.#description;
+  }
 
   /** The server's newest word on how our forces fare, once a second while they come. Of the present session. */
   get report(): LinkReport | undefined {
@@ -290,13 +342,19 @@ export class ForceClient {
     return this.#peerReports;
   }
 
+  get #claims(): boolean {
+    return this.#config.device !== "" || this.#config.channel !== "";
+  }
+
   #greet(now: Nanoseconds): void {
-    const hello = {
+    const { name, device, channel, diagnostics } = this.#config;
+    const hello: Hello = {
       versionMin: kProtocolVersion,
       versionMax: kProtocolVersion,
       role: this.#role,
-      name: this.#config.name,
-      features: this.#config.diagnostics ? [kFeatureLocalModel, kFeatureDiagnostics] : [kFeatureLocalModel],
+      name,
+      features: [kFeatureLocalModel, kFeatureChannels, ...(diagnostics ? [kFeatureDiagnostics] : [])],
+      claims: this.#claims ? [{ device, channel, role: this.#role }] : [],
     };
     this.#handshake = new ClientHandshake(hello, this.#config.key, this.#config.random, now);
     this.#giveUp = now + fromMilliseconds(this.#config.patienceMs);
@@ -313,10 +371,23 @@ export class ForceClient {
       return;
     }
     const { connectionId, welcome, seal } = outcome;
+    if (this.#claims && welcome.grants?.length !== 1) {
+      this.#end(now, "refused", Code.UNSUPPORTED, "that server has one device, with one channel: name none");
+      return;
+    }
     this.#handshake = undefined;
     this.#welcome = welcome;
+    const grant = welcome.grants?.[0];
+    this.#place = grant ?? kFirstPlace;
+    this.#holds = (grant ?? welcome).role === Role.CONTROLLER;
+    this.#askedLease = undefined;
+    this.#askLease = this.#config.takeLease && this.#role === Role.CONTROLLER && !this.#holds ? now : kNever;
+    this.#stats.leaseLostTo = "";
+    this.#description = undefined;
     this.#session = new Session({ connectionId, seal }, now);
-    if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz, device: 0 });
+    const { device } = this.#place;
+    if (this.#claims) this.#session.request({ kind: "describe", device });
+    if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz, device });
     const { deadband, stateDeadband } = this.#config;
     this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
     this.#foretells = false;
@@ -333,6 +404,7 @@ export class ForceClient {
     Object.assign(this.#stats, { phase, code, reason, link: this.#session?.stats ?? this.#stats.link });
     this.#handshake = undefined;
     this.#session = undefined;
+    this.#holds = false;
     this.#unseen = this.#newest = undefined;
     this.#retry = now + this.#backOff;
     this.#backOff = earliest(2n * this.#backOff, fromMilliseconds(this.#config.retryMaxMs));
@@ -343,6 +415,9 @@ export class ForceClient {
     if (this.#session) {
       this.#session.tick(now);
       this.#takeEvents(now);
+      if (this.#session && this.#askedLease === undefined && now >= this.#askLease && !this.takeLease()) {
+        this.#askLease = now + kAskLeaseAgain;
+      }
     } else if (this.#handshake) {
       if (now >= this.#giveUp) this.#end(now, "unanswered", Code.TIMED_OUT, "no answer");
       else this.#handshake.tick(now);
@@ -366,8 +441,10 @@ export class ForceClient {
         this.#deviceReport = event.value;
       } else if (event.kind === "peerReport") {
         this.#peerReports = new Map(this.#peerReports).set(event.value.channel, event.value);
-      } else if (event.kind === "answered" && event.id === this.#deadbandRequest) {
-        this.#foretells = event.code === Code.OK && this.#period > 0n && this.#silence() > 0n;
+      } else if (event.kind === "answered") {
+        this.#takeAnswer(now, event);
+      } else if (event.kind === "request") {
+        this.#takeRequest(now, event.id, event.request);
       } else if (event.kind === "closed") {
         this.#flush(now); // our own Bye, when the session ends by its age
         // Two programs with one key would otherwise take the place from each other for ever.
@@ -376,13 +453,40 @@ export class ForceClient {
     }
   }
 
+  #takeAnswer(now: Nanoseconds, { id, code, device, waitMs = 0 }: ControlAck): void {
+    if (device) this.#description = device;
+    if (id === this.#deadbandRequest) this.#foretells = code === Code.OK && this.#period > 0n && this.#silence() > 0n;
+    if (id !== this.#askedLease) return;
+    this.#askedLease = undefined;
+    this.#askLease = kNever;
+    this.#holds = code === Code.OK;
+    if (this.#holds) {
+      this.#stats.leaseLostTo = "";
+    } else if (this.#config.takeLease && code === Code.BUSY) {
+      this.#askLease = now + latest(fromMilliseconds(waitMs), kAskLeaseAgain);
+    }
+  }
+
+  #takeRequest(now: Nanoseconds, id: number, request: Request): void {
+    if (request.kind !== "leaseLost") {
+      this.#session?.answer({ id, code: Code.UNSUPPORTED, detail: "that is a client's to ask" });
+      return;
+    }
+    this.#session?.answer({ id, code: Code.OK, detail: "" });
+    if (request.device !== this.#place.device || request.channel !== this.#place.channel) return;
+    this.#holds = false;
+    this.#askedLease = undefined; // its answer may be older than this: one that was lost is repeated
+    this.#stats.leaseLostTo = request.to;
+    if (this.#config.takeLease) this.#askLease = now + kAskLeaseAgain;
+  }
+
   #flush(now: Nanoseconds): void {
     for (let datagram; (datagram = (this.#session ?? this.#handshake)?.nextDatagram(now)); ) this.#send(datagram);
   }
 
   /** True when a force now waits to be sent. */
   #call(now: Nanoseconds): boolean {
-    if (now < this.#nextCall) return false;
+    if (now < this.#nextCall || (this.#physics && !this.#holds)) return false;
     const hand = this.#foretells ? this.#foretold(now) : this.#unseen;
     if (!hand) return false;
     this.#unseen = undefined;
@@ -437,8 +541,8 @@ export class ForceClient {
       sequence: ++this.#sequence,
       basedOnTick: hand.tick,
       force,
-      device: hand.device,
-      channel: 0,
+      device: this.#place.device,
+      channel: this.#place.channel,
       model: withModel ? { at: hand.position, stiffness: stiffness ?? [0], validRadius, contact } : undefined,
       topologyChanged,
       error,
@@ -467,7 +571,9 @@ export class ForceClient {
 
   #nextTurn(): Nanoseconds {
     if (this.#session) {
-      return earliest(this.#nextDue(), this.#session.nextTick());
+      const call = this.#physics && !this.#holds ? kNever : this.#nextDue();
+      const ask = this.#askedLease === undefined ? this.#askLease : kNever;
+      return earliest(this.#session.nextTick(), earliest(call, ask));
     }
     if (this.#handshake) return earliest(this.#giveUp, this.#handshake.nextTick());
     return this.phase === "stopped" ? kNever : this.#retry;

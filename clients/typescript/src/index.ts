@@ -7,8 +7,9 @@ export {
 export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
-  Code, Mode, reasonNames, Role, Safety, type Contact, type Delays, type DeviceReport, type DeviceState, type ForceTable,
-  type LinkReport, type PeerReport, type StateDeadband, type Stiffness, type Vec3, type Welcome,
+  ChannelRule, Code, Mode, reasonNames, Role, Safety, type ChannelDescription, type Contact, type Delays,
+  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type LinkReport, type PeerReport,
+  type StateDeadband, type Stiffness, type Vec3, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";
 export type { Nanoseconds } from "./time.js";

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two ends and what lies between them, on virtual time: A is the guest under test, Z a server put together from the
 // protocol's own parts, and the network loses, delays, reorders and doubles by one seed.
-import { decodeHelloMessage, encodeAnswerMessage } from "../../../../clients/typescript/src/codec.js";
+import { decodeHelloMessage, encodeAnswerMessage, type ControlAck } from "../../../../clients/typescript/src/codec.js";
 import {
   CipherSuite, concat, decodeHello, encodeAnswer, encodeRetry, equal, helloHeader, type HelloDatagram,
 } from "../../../../clients/typescript/src/datagram.js";
 import { ForceClient, type ClientConfig } from "../../../../clients/typescript/src/force_client.js";
 import {
-  Code, Mode, type DeviceState, type ForceCommand, type Hello, type Refused, type Request, type Welcome,
+  Code, Mode, type DeviceState, type ForceCommand, type Grant, type Hello, type Refused, type Request, type Welcome,
 } from "../../../../clients/typescript/src/messages.js";
 import { keyId } from "../../../../clients/typescript/src/noise.js";
 import { NoiseSeal, PlainSeal, type Seal } from "../../../../clients/typescript/src/seal.js";
@@ -57,6 +57,7 @@ export interface ServerConduct {
   up: boolean;
   refuse: Refused | undefined;
   features: string[];
+  grants: readonly Grant[];
   /** Suite 1 with this key; undefined: suite 0. */
   key: Uint8Array | undefined;
   /** When it renews its key, so often that a test sees it. */
@@ -64,8 +65,7 @@ export interface ServerConduct {
   state: (tick: bigint) => DeviceState;
   /** One tick in so many is sent. */
   every: bigint;
-  /** To every request. */
-  answer: Code;
+  answer: (request: Request) => Omit<ControlAck, "id">;
 }
 
 export const kWelcome: Omit<Welcome, "role" | "features"> = {
@@ -80,10 +80,11 @@ export class Server {
     up: true,
     refuse: undefined,
     features: ["local-model"],
+    grants: [],
     key: undefined,
     renewAfter: NoiseSeal.kRenewAfter,
     every: 1n,
-    answer: Code.OK,
+    answer: () => ({ code: Code.OK, detail: "done" }),
     state: (tick) => ({
       tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) / 1e6, y: 0, z: 0 },
       velocity: { x: 0, y: 0, z: 0 }, forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0,
@@ -93,6 +94,8 @@ export class Server {
   readonly hellos: { readonly datagram: HelloDatagram; readonly hello: Hello }[] = [];
   readonly forces: { readonly at: Nanoseconds; readonly command: ForceCommand }[] = [];
   readonly requests: Request[] = [];
+  /** To the server's own requests. */
+  readonly answers: { readonly code: Code; readonly detail: string }[] = [];
   session: Session | undefined;
   #nextId = 1;
   /** The answer to the attempt of this random, repeated when it comes again. */
@@ -130,15 +133,16 @@ export class Server {
       if (event.kind === "force") this.forces.push({ at: now, command: event.command });
       if (event.kind === "request") {
         this.requests.push(event.request);
-        session.answer({ id: event.id, code: conduct.answer, detail: "done" });
+        session.answer({ id: event.id, ...conduct.answer(event.request) });
       }
+      if (event.kind === "answered") this.answers.push({ code: event.code, detail: event.detail });
     }
     for (let datagram; (datagram = session.nextDatagram(time)); ) send(datagram);
   }
 
   #meet(now: Nanoseconds, datagram: HelloDatagram, send: (datagram: Uint8Array) => void): void {
     if (this.#answered && equal(this.#answered.random, datagram.random)) return send(this.#answered.datagram);
-    const { key, refuse, features, renewAfter } = this.conduct;
+    const { key, refuse, features, grants, renewAfter } = this.conduct;
     const id = key ? keyId(key) : new Uint8Array(0);
     if (datagram.suite !== (key ? CipherSuite.Noise : CipherSuite.Plain)) return;
     if (!equal(datagram.content.subarray(0, id.length), id)) return;
@@ -150,7 +154,7 @@ export class Server {
     if (!hello) return;
     this.hellos.push({ datagram, hello });
 
-    const answer = refuse ?? { ...kWelcome, features, role: hello.role };
+    const answer = refuse ?? { ...kWelcome, features, role: hello.role, grants };
     const finished = noise?.answer(this.random.bytes(32), encodeAnswerMessage(answer));
     const connectionId = refuse ? 0 : this.#nextId++;
     const content = finished?.message2 ?? encodeAnswerMessage(answer);
