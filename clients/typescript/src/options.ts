@@ -2,6 +2,7 @@
 import { parseArgs, type ParseArgsConfig } from "node:util";
 import { readClientKey } from "./client_key.js";
 import type { ClientConfig } from "./force_client.js";
+import { kMaxLabel } from "./limits.js";
 import { parseAddress } from "./udp.js";
 
 /** What run() needs to know; commandLine() fills it. */
@@ -30,10 +31,17 @@ function number(option: string, text: string, least: number, most: number): numb
   throw new RangeError(`--${option}: expected ${least > 0 ? "0, or " : ""}${least} to ${most}, got "${text}"`);
 }
 
+/** The name of a device or a channel. */
+function label(option: string, text: string): string {
+  const size = new TextEncoder().encode(text).length;
+  if (size <= kMaxLabel) return text;
+  throw new RangeError(`--${option}: expected at most ${kMaxLabel} bytes, got ${size}: "${text}"`);
+}
+
 /**
- * The command line that all guests share, --server, --key, --rate-hz, --duration-s, --json and --help, and what a program adds to
- * it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. After --help and after a wrong usage, which stderr is told,
- * the process ends, with 0 and 2.
+ * The command line that all guests share, --server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json
+ * and --help, and what a program adds to it: `{ "stiffness-n-per-m": [2000, "How hard the wall is"] }`. After --help and after a
+ * wrong usage, which stderr is told, the process ends, with 0 and 2.
  */
 export function commandLine<Extras extends Record<string, Extra> = Record<never, never>>(
   purpose: string,
@@ -44,6 +52,9 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
     help: { type: "boolean", short: "h" },
     server: { type: "string", default: "127.0.0.1:47100" },
     key: { type: "string" },
+    device: { type: "string", default: "" },
+    channel: { type: "string", default: "" },
+    "take-lease": { type: "boolean", default: false },
     "rate-hz": { type: "string", default: String(defaults.rateHz) },
     "duration-s": { type: "string", default: "0" },
     json: { type: "boolean", default: false },
@@ -72,6 +83,9 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
       name: defaults.name,
       server,
       key,
+      device: label("device", text("device")),
+      channel: label("channel", text("channel")),
+      takeLease: values["take-lease"] === true,
       rateHz: number("rate-hz", text("rate-hz"), 1e-3, 1e5),
       durationS: number("duration-s", text("duration-s"), 0, 1e9),
       json: values.json === true,
@@ -90,6 +104,9 @@ function help(purpose: string, { name, rateHz }: Shared, extras: Record<string, 
     ["-h, --help", "Print this and leave"],
     ["--server HOST:PORT", "Where tendond listens [127.0.0.1:47100]"],
     ["--key FILE", "Key file (see `tendond keygen`); needed unless the server is here and has no keys"],
+    ["--device NAME", "Name of the device, of a server with several"],
+    ["--channel NAME", "Name of the device's channel that is to take the forces"],
+    ["--take-lease", "Where another client holds the channel: ask for it until it is ours"],
     ["--rate-hz NUMBER", `Times per second; 0 = for every device state that arrives [${rateHz}]`],
     ["--duration-s NUMBER", "Leave after this time; 0 = at Ctrl-C [0]"],
     ["--json", "One JSON object per line on stdout"],

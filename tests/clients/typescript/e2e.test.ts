@@ -15,7 +15,7 @@ import { encodeAnswerMessage, encodeFrame, encodeHead } from "../../../clients/t
 import { Role } from "../../../clients/typescript/src/messages.js";
 import { connect, readClientKey, udp, webSocket, type DeviceState, type Guest } from "../../../clients/typescript/src/node.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
-import { findTendond, kDemoScene, startNode, startTendond, until } from "./support/program.js";
+import { findTendond, kDemoScene, scene, startNode, startTendond, until } from "./support/program.js";
 import { kRoot } from "./support/paths.js";
 import { Random } from "./support/random.js";
 import { kWelcome, Server } from "./support/world.js";
@@ -69,6 +69,56 @@ describe("a TypeScript wall", () => {
   });
 });
 
+describe("of several", () => {
+  it("the device that a TypeScript wall names is the one at which it is felt, and no other", async (test) => {
+    const tendond = await startTendond(test, { scenes: [scene("left"), scene("right")] });
+    if (!tendond) return;
+    let felt = 0;
+    const left = guest(test, connect(udp(tendond.address), { device: "left" }, {
+      watch: ({ forceApplied: { x, y, z } }) => {
+        felt = Math.max(felt, Math.hypot(x, y, z));
+      },
+    }));
+    const at = ["--server", tendond.address, "--json", "--device", "right"];
+    const push = startNode(test, "examples/virtual_wall", ...at);
+    const echo = startNode(test, "examples/echo_motion", ...at, "--rate-hz", "0");
+    await echo.line(isPush);
+    await until("the device is described", () => left.description !== undefined);
+    assert.deepEqual([left.description!.device, left.description!.name], [0, "left"]);
+    assert.ok(left.stats().states > 0);
+    assert.equal(felt, 0);
+    assert.equal(await push.end("SIGINT"), 0);
+    const nowhere = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--device", "middle");
+    assert.equal(await nowhere.end(), 1);
+    assert.match(nowhere.lines.join("\n"), /refuses: there is no device "middle", but "left", "right"/);
+  });
+
+  it("a channel's lease goes from an engine that falls silent to one that waits, and from one that leaves to the next", async (test) => {
+    const tendond = await startTendond(test, { scenes: [scene("two-engines")] });
+    if (!tendond) return;
+    let silent = false;
+    const first = guest(test, connect(udp(tendond.address), { channel: "tissue" }, {
+      physics: (hand) => (silent ? { x: NaN, y: 0, z: 0 } : wall(hand)), // what is not finite is not sent
+    }));
+    await until("the first holds it", () => first.holds && first.stats().forces > 0);
+    const options = ["--server", tendond.address, "--channel", "tissue", "--take-lease"];
+    const second = startNode(test, "examples/virtual_wall", ...options);
+    await second.line((line) => line.includes("connected"));
+    silent = true;
+    await until("the first has lost it", () => first.stats().leaseLostTo === "virtual_wall");
+    assert.deepEqual([first.holds, first.phase], [false, "open"]);
+    const echo = startNode(test, "examples/echo_motion", "--server", tendond.address, "--json", "--rate-hz", "0");
+    await echo.line(isPush);
+    const third = guest(test, connect(udp(tendond.address), { channel: "tissue", takeLease: true }, { physics: wall }));
+    await until("the third has come", () => third.description !== undefined);
+    assert.deepEqual(third.description!.channels.map(({ name }) => name), ["wall", "tissue", "guidance"]);
+    assert.equal(await second.end("SIGINT"), 0);
+    await until("the third has it", () => third.holds && third.stats().forces > 0);
+    assert.deepEqual([third.giveLease(), third.holds, third.takeLease()], [true, false, true]);
+    await until("the third has it again", () => third.holds);
+  });
+});
+
 describe("with a key", () => {
   it("a TypeScript wall is felt over UDP and through the bridge, and nobody else is let in", async (test) => {
     const folder = mkdtempSync(join(tmpdir(), "tendon-"));
@@ -78,9 +128,9 @@ describe("with a key", () => {
     if (!execFileSync(tool, ["--help"], { encoding: "utf8" }).includes("keygen")) return test.skip("tendond has no keys yet");
     const keys = join(folder, "wall.key");
     execFileSync(tool, ["keygen", "wall", "--out", keys], { stdio: "ignore" });
-    const scene = join(folder, "scene.toml");
-    writeFileSync(scene, `${readFileSync(kDemoScene, "utf8")}\n[network]\nkeys = "."\n`);
-    const tendond = await startTendond(test, { scene });
+    const withKeys = join(folder, "scene.toml");
+    writeFileSync(withKeys, `${readFileSync(kDemoScene, "utf8")}\n[network]\nkeys = "."\n`);
+    const tendond = await startTendond(test, { scenes: [withKeys] });
     if (!tendond) return;
 
     const push = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--key", keys, "--json");
@@ -172,6 +222,8 @@ describe("the programs", () => {
       ["examples/virtual_wall", ["--stiffness-n-per-m", "nan"], /--stiffness-n-per-m: expected 0 to .* got "nan"/],
       ["examples/virtual_wall", ["--key", join(folder, "none")], /--key: .*none: .*no such file/],
       ["examples/virtual_wall", ["--key", open], /--key: .*others may read this key/],
+      ["examples/virtual_wall", ["--device", "d".repeat(25)], /--device: expected at most 24 bytes, got 25: "d+"/],
+      ["examples/virtual_wall", ["--channel", "ä".repeat(13)], /--channel: expected at most 24 bytes, got 26: "ä+"/],
       ["examples/echo_motion", ["--rate-hz", "-1"], /rate-hz/],
       ["examples/echo_motion", ["--sevrer", "127.0.0.1:47100"], /--sevrer/],
       ["bridge_main", ["--listen", "here"], /expected HOST:PORT .* got "here"/],

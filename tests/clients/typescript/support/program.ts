@@ -58,16 +58,17 @@ export function findTendond(test: TestContext): string {
   return programs ? join(programs, "tendond") : "";
 }
 
-export const kDemoScene = join(kRoot, "deploy/scenes/demo.toml");
+export const scene = (name: string): string => join(kRoot, "deploy/scenes", `${name}.toml`);
+export const kDemoScene = scene("demo");
 
-/** tendond on a port of its own; undefined, and the test is skipped, where there is none. */
+/** tendond on a port of its own, with a device for each scene; undefined, and the test is skipped, where there is none. */
 export async function startTendond(
   test: TestContext,
-  { listen = "127.0.0.1:0", scene = kDemoScene } = {},
+  { listen = "127.0.0.1:0", scenes = [kDemoScene] } = {},
 ): Promise<{ readonly program: Program; readonly address: string } | undefined> {
   const tendond = findTendond(test);
   if (!tendond) return undefined;
-  const program = new Program(test, tendond, [scene, "--listen", listen, "--record", "/dev/null", "--json"]);
+  const program = new Program(test, tendond, [...scenes, "--listen", listen, "--record", "/dev/null", "--json"]);
   const said = await program.line((line) => line.includes('"listening"'));
   return { program, address: JSON.parse(said).address };
 }
