@@ -292,8 +292,8 @@ void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& ans
   }
   if (answered.id != asked_lease_) return;
   asked_lease_.reset();
-  holds_ = answered.code == Code::kOk;
   ask_lease_ = LocalTime::max();
+  if (answered.code != Code::kUnsupported) holds_ = answered.code == Code::kOk;  // else it knows no leases
   if (holds_) {
     stats_.lease_lost_to.clear();
   } else if (config_.take_lease && answered.code == Code::kBusy) {
@@ -308,6 +308,8 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
   if (lost->device != place_.device || lost->channel != place_.channel) return;
   holds_ = false;
   stats_.lease_lost_to = lost->to;
+  // What we have asked before may be answered before this or after it; what we ask now, after it.
+  if (asked_lease_ && take_lease()) return;
   if (config_.take_lease) ask_lease_ = now + kAskLeaseAgain;
 }
 

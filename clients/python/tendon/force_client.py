@@ -482,8 +482,9 @@ class ForceClient:
         if answer.id != self._asked_lease:
             return
         self._asked_lease = None
-        self.holds = answer.code is Code.OK
         self._ask_lease = NEVER
+        if answer.code is not Code.UNSUPPORTED:  # else it knows no leases
+            self.holds = answer.code is Code.OK
         if self.holds:
             self._stats.lease_lost_to = ""
         elif self.config.take_lease and answer.code is Code.BUSY:
@@ -499,6 +500,9 @@ class ForceClient:
             return
         self.holds = False
         self._stats.lease_lost_to = lost.to
+        # What we have asked before may be answered before this or after it; what we ask now, after it.
+        if self._asked_lease is not None and self.take_lease():
+            return
         if self.config.take_lease:
             self._ask_lease = now + _ASK_LEASE_AGAIN_NS
 

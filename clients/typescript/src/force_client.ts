@@ -298,7 +298,7 @@ export class ForceClient {
     const { device, channel } = this.#place;
     this.#askLease = kNever;
     if (this.#session?.request({ kind: "giveLease", device, channel }) === undefined) return false;
-    this.#askedLease = undefined; // its answer is over by then: the server takes requests in their order
+    this.#askedLease = undefined; // what is answered to that is older than this
     this.#holds = false;
     return true;
   }
@@ -459,7 +459,7 @@ export class ForceClient {
     if (id !== this.#askedLease) return;
     this.#askedLease = undefined;
     this.#askLease = kNever;
-    this.#holds = code === Code.OK;
+    if (code !== Code.UNSUPPORTED) this.#holds = code === Code.OK; // else it knows no leases
     if (this.#holds) {
       this.#stats.leaseLostTo = "";
     } else if (this.#config.takeLease && code === Code.BUSY) {
@@ -475,8 +475,9 @@ export class ForceClient {
     this.#session?.answer({ id, code: Code.OK, detail: "" });
     if (request.device !== this.#place.device || request.channel !== this.#place.channel) return;
     this.#holds = false;
-    this.#askedLease = undefined; // its answer may be older than this: one that was lost is repeated
     this.#stats.leaseLostTo = request.to;
+    // What we have asked before may be answered before this or after it; what we ask now, after it.
+    if (this.#askedLease !== undefined && this.takeLease()) return;
     if (this.#config.takeLease) this.#askLease = now + kAskLeaseAgain;
   }
 

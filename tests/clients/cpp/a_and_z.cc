@@ -60,7 +60,11 @@ LocalTime Server::turn(LocalTime now) {
       forces.emplace_back(now, force->command);
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
       requests.push_back(request->request);
-      session_->answer(request->id, Code::kOk, "");
+      if (const auto* wanted = std::get_if<TakeLease>(&request->request)) {
+        give_lease(request->id, *wanted);
+      } else {
+        session_->answer(request->id, Code::kOk, "");
+      }
     } else if (const auto* end = std::get_if<Session::Closed>(&*event)) {
       closed = end->code;
       session_.reset();
@@ -68,6 +72,18 @@ LocalTime Server::turn(LocalTime now) {
   }
   flush(now);
   return session_ ? std::min(session_->next_tick(), next_state_) : LocalTime::max();
+}
+
+void Server::give_lease(std::uint32_t id, const TakeLease& wanted) {
+  Code code = Code::kOk;
+  if (!lease_answers.empty()) {
+    code = lease_answers.front();
+    lease_answers.erase(lease_answers.begin());
+  }
+  session_->answer(id, code, "");
+  if (code != Code::kOk || snatches == 0) return;
+  --snatches;
+  session_->request(LeaseLost{.device = wanted.device, .channel = wanted.channel, .to = "another"});
 }
 
 void Server::say_bye(LocalTime now, Code code) {

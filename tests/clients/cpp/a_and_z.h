@@ -92,6 +92,9 @@ class Server {
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
 
+  std::vector<Code> lease_answers;  ///< to take_lease, in this order; then kOk
+  int snatches = 0;                 ///< so many leases are another one's as soon as they are given
+
   std::vector<LocalTime> attempts;  ///< when Hellos with a good cookie came, one per attempt
   std::vector<Hello> hellos;        ///< … and what they said
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
@@ -107,6 +110,7 @@ class Server {
     return config;
   }
   void hello(LocalTime now, const Address& from, std::span<const std::byte> datagram);
+  void give_lease(std::uint32_t id, const TakeLease& wanted);
   void flush(LocalTime now);
 
   Link& link_;

@@ -366,6 +366,32 @@ TEST(ForceClient, ReportsARefusalAndAsksAgainEverMoreSeldom) {
   EXPECT_TRUE(world.run_until(Phase::kOpen, 3 * kSecond)) << "let in as soon as the place is free";
 }
 
+TEST(ForceClient, ALeaseThatItHasHadAndLostBeforeItHearsOfEitherIsLostUnlessItIsGivenOnceMore) {
+  for (const Code once_more : {Code::kBusy, Code::kOk}) {
+    World world(21, kFineWeather);
+    world.connect({}, answer);
+    ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
+    world.z->lease_answers = {Code::kOk, once_more};
+    world.z->snatches = 1;
+    ASSERT_TRUE(world.a->take_lease());
+    world.run(kSecond);
+    EXPECT_EQ(world.a->holds(), once_more == Code::kOk);
+    EXPECT_EQ(world.a->stats().lease_lost_to, once_more == Code::kOk ? "" : "another");
+    EXPECT_EQ(world.z->requests.size(), 2U) << "it has asked again, once";
+  }
+}
+
+TEST(ForceClient, AServerThatKnowsNoLeasesLeavesItTheChannelThatItHas) {
+  World world(22, kFineWeather);
+  world.connect({}, answer);
+  ASSERT_TRUE(world.run_until(Phase::kOpen, kSecond));
+  world.z->lease_answers = {Code::kUnsupported};
+  ASSERT_TRUE(world.a->take_lease());
+  world.run(kSecond);
+  EXPECT_TRUE(world.a->holds());
+  EXPECT_GT(world.z->forces.size(), 900U);
+}
+
 TEST(ForceClient, EveryAttemptHasItsOwnRandom) {
   World world(16, kFineWeather);
   world.z->refusal = Refused{Code::kBusy, "busy", 1, 1};

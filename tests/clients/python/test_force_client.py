@@ -97,6 +97,8 @@ class Stage:
         self.answers: list[ControlAck] = []  # to what the server has asked
         self.grant = Code.OK
         self.wait_ms = 0  # said with each answer
+        self.lease_answers: list[Code] = []  # to TakeLease, in this order; then `grant`
+        self.snatches = 0  # so many leases are another one's as soon as they are given
         self.speed = 0.0  # m/s
         self.every = 1  # ms from one state to the next that is sent
         self._next_state = World.START
@@ -113,8 +115,13 @@ class Stage:
             elif isinstance(event, Control):
                 self.requests.append(event)
                 self.requested_at.append(now)
-                described = isinstance(event.request, Describe) and self.grant is Code.OK
-                session.answer(event.id, self.grant, "", self.wait_ms, DESCRIPTION if described else None)
+                asks_lease = isinstance(event.request, TakeLease)
+                code = self.lease_answers.pop(0) if asks_lease and self.lease_answers else self.grant
+                described = isinstance(event.request, Describe) and code is Code.OK
+                session.answer(event.id, code, "", self.wait_ms, DESCRIPTION if described else None)
+                if asks_lease and code is Code.OK and self.snatches > 0:
+                    self.snatches -= 1
+                    session.request(LeaseLost(1, 2, "another"))
             elif isinstance(event, ControlAck):
                 self.answers.append(event)
         if now >= self._next_state:
@@ -777,6 +784,27 @@ def test_a_lease_that_was_given_up_is_not_asked_for_again_and_an_older_answer_do
     assert not stage.client.holds
     assert stage.seen == seen
     assert len(leases(stage)) == 1
+
+
+@pytest.mark.parametrize("once_more", [Code.BUSY, Code.OK])
+def test_a_lease_that_it_has_had_and_lost_before_it_hears_of_either_is_lost_unless_it_is_given_once_more(once_more):
+    stage = named(ANOTHERS)
+    stage.run(100 * MS)
+    stage.lease_answers, stage.snatches = [Code.OK, once_more], 1
+    assert stage.client.take_lease()
+    stage.run(1 * SECOND)
+    ours = once_more is Code.OK
+    assert (stage.client.holds, stage.client.stats.lease_lost_to) == (ours, "" if ours else "another")
+    assert len(leases(stage)) == 2, "it has asked again, once"
+
+
+def test_a_server_that_knows_no_leases_leaves_it_the_channel_that_it_has():
+    stage = Stage(Config())
+    stage.run(100 * MS)
+    stage.grant = Code.UNSUPPORTED
+    assert stage.client.take_lease()
+    stage.run(1 * SECOND)
+    assert stage.client.holds and len(stage.forces) > 900
 
 
 def test_who_waits_for_a_lease_and_gives_it_up_asks_no_more():
