@@ -121,8 +121,10 @@ TEST(Monitoring, TheAlertsAskForWhatIsExported) {
   EXPECT_EQ(summaries, alerts.size());
 }
 
-TEST(Monitoring, PrometheusLoadsTheseAlerts) {
+TEST(Monitoring, PrometheusLoadsTheseAlertsAndLooksAtThemAsOftenAsItScrapes) {
   const std::string text = read("prometheus.yml");
+  EXPECT_NE(text.find("\n  scrape_interval: 5s\n"), std::string::npos);
+  EXPECT_NE(text.find("\n  evaluation_interval: 5s"), std::string::npos);
   EXPECT_NE(text.find("\n  - alerts.yml\n"), std::string::npos);
   EXPECT_NE(text.find("127.0.0.1:8080"), std::string::npos);
 }
