@@ -2,11 +2,13 @@
 //
 // The page on recordings, as a person uses it.
 import assert from "node:assert/strict";
-import { copyFileSync, truncateSync, writeFileSync } from "node:fs";
+import { closeSync, copyFileSync, openSync, readFileSync, statSync, truncateSync, writeFileSync, writeSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
 import { painted, picture, says, visit } from "./browser.mjs";
-import { Program, scratch, startDash, startServer, until } from "./support.mjs";
+import { packageOf, Program, scratch, startDash, startServer, until } from "./support.mjs";
+
+const { McapStreamReader, McapWriter } = packageOf("clients/dashboard/page", "@mcap/core");
 
 it("opens recordings, scrubs them, and shows two side by side", async (test) => {
   const folder = scratch(test);
@@ -73,4 +75,68 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
   await says(page, "[role=alert]", "noise.mcap is no recording");
   await page.goto(`${url}/#/recordings/nothing.mcap`);
   await says(page, "[role=alert]", "There is no such recording.");
+});
+
+/** A recording of `count` steps, one each millisecond: those of another one, again and again. */
+async function lengthen(from, to, count) {
+  const reader = new McapStreamReader();
+  reader.append(readFileSync(from));
+  const [steps, schemas] = [[], new Map()];
+  let channel;
+  for (let record = reader.nextRecord(); record; record = reader.nextRecord()) {
+    if (record.type === "Schema") schemas.set(record.id, record);
+    else if (record.type === "Channel" && record.topic.endsWith("haptic/step")) channel = record;
+    else if (record.type === "Message" && record.channelId === channel?.id) steps.push(record);
+  }
+  const file = openSync(to, "w");
+  let written = 0n;
+  const writer = new McapWriter({
+    writable: { position: () => written, write: async (bytes) => { written += BigInt(writeSync(file, bytes)); } },
+    chunkSize: 1 << 20,
+  });
+  await writer.start({ profile: "", library: "" });
+  const schemaId = await writer.registerSchema(schemas.get(channel.schemaId));
+  const channelId = await writer.registerChannel({ ...channel, schemaId });
+  const began = steps[0].logTime;
+  for (let i = 0; i < count; ++i) {
+    const at = began + BigInt(i) * 1_000_000n;
+    await writer.addMessage({ channelId, sequence: i, logTime: at, publishTime: at, data: steps[i % steps.length].data });
+  }
+  await writer.end();
+  closeSync(file);
+}
+
+it("reads a recording of more than ten minutes in parts, and of the file only what it shows", async (test) => {
+  const folder = scratch(test);
+  const server = await startServer(test, folder, ["demo"], "--record", "short.mcap", "--duration-s", "1");
+  await server.program.ended;
+  await lengthen(join(folder, "short.mcap"), join(folder, "long.mcap"), 660_000);
+  const size = statSync(join(folder, "long.mcap")).size;
+  assert.ok(size > 48 * 1024 * 1024, "else it would be fetched whole");
+  const { url } = await startDash(test, "127.0.0.1:9", "--recordings", folder);
+  const page = await visit(test, url);
+  let fetched = 0;
+  page.on("response", (answer) => { fetched += answer.url().endsWith("/long.mcap") && answer.status() === 206 ? Number(answer.headers()["content-length"]) : 0; });
+  const shown = () => page.locator(".run .head .quiet").textContent();
+
+  await page.goto(`${url}/#/recordings/long.mcap`);
+  await says(page, ".run .part", "this is 0\u00a0s to 9\u00a0min 59\u00a0s");
+  assert.match(await shown(), /· 600\ss · 600\u202f000 steps/);
+  const began = (await shown()).split(" · ")[0];
+
+  fetched = 0;
+  await page.click("a:has-text('Go on from 10\u00a0min 0\u00a0s')");
+  await says(page, ".run .part", "this is 10\u00a0min 0\u00a0s to 10\u00a0min 59\u00a0s");
+  assert.match(await shown(), /· 60\ss · 60\u202f000 steps/);
+  assert.equal((await shown()).split(" · ")[0], began, "it is the same recording");
+  assert.ok(fetched < size / 3, `${fetched} of ${size} bytes for an eleventh of the steps`);
+  assert.ok((await painted(page, "[data-chart=position] canvas")) > 2000);
+  assert.equal(Number(await page.locator(".scrubber .window").getAttribute("aria-valuenow")), 600);
+  await page.click("#whole");
+  await until("all of the part is shown", async () => Number((await page.locator("[data-tile=state] .note").textContent()).replace(/\D/g, "")) > 59_000);
+
+  await page.click("a:has-text('From the beginning')");
+  await says(page, ".run .part", "this is 0\u00a0s");
+  await page.goto(`${url}/#/recordings/long.mcap?from=3600`);
+  await says(page, "[role=alert]", "long.mcap ends before 60\u00a0min 0\u00a0s.");
 });

@@ -46,13 +46,15 @@ document.body.append(
   place);
 
 function route(): void {
-  const [, where = "live", ...names] = location.hash.split("/");
+  const [path = "", query] = location.hash.split("?");
+  const [, where = "live", ...names] = path.split("/");
   if (where === "operator" && names[0]) return takePass(names[0]);
   const recordings = where === "recordings";
   tabs.live.classList.toggle("here", !recordings);
   tabs.recordings.classList.toggle("here", recordings);
   place.replaceChildren(recordings ? runs.element : live.element);
-  if (recordings) void runs.show(names.map(decodeURIComponent));
+  const from = Number(new URLSearchParams(query).get("from"));
+  if (recordings) void runs.show(names.map(decodeURIComponent), from > 0 && Number.isFinite(from) ? from : 0);
 }
 window.addEventListener("hashchange", route);
 window.addEventListener("resize", () => (live.repaint(), runs.repaint()));

@@ -4,6 +4,7 @@ import { FileDescriptorSetSchema, type DescriptorProto, type FileDescriptorSet }
 import { BinaryReader } from "@bufbuild/protobuf/wire";
 import { McapIndexedReader, McapStreamReader, type McapTypes } from "@mcap/core";
 import { Track, type Sample } from "./track.js";
+import { moment } from "./words.js";
 
 /** Steps that are read at once: ten minutes at 1 kHz. A longer recording is opened in parts. */
 const kMaxSteps = 600_000;
@@ -23,29 +24,45 @@ export interface Recording {
   readonly scene: { readonly text: string; readonly version: string; readonly commit: string } | undefined;
   /** ns since 1970 of the first step. */
   readonly began: bigint;
-  /** What the person should know: that it is cut short, that only a part is shown. */
+  /** What the person should know: that it is cut short. */
   readonly remarks: readonly string[];
+  /** Where the part begins that was read, and the one after it, s after the recording's beginning. */
+  readonly from: number;
+  readonly next: number | undefined;
 }
 
-/** Reads the steps of a recording; `progress` hears how many so far. Throws a sentence when it is none. */
-export async function readRecording(url: string, name: string, progress: (steps: number) => void): Promise<Recording> {
+/**
+ * Reads the steps of a recording from `from` on, s after its beginning, as many as are read at once; `progress` hears how many so
+ * far. Throws a sentence when it is none.
+ */
+export async function readRecording(url: string, name: string, from: number, progress: (steps: number) => void): Promise<Recording> {
   const file = await openFile(url);
-  const collected = new Collector(name);
+  const collected = new Collector(name, from);
+  let indexed = false;
   try {
     const reader = await McapIndexedReader.Initialize({ readable: file });
     const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || t === "/scene");
     for (const channel of reader.channelsById.values()) collected.channel(channel, reader.schemasById.get(channel.schemaId));
-    for await (const message of reader.readMessages({ topics })) {
+    if (from > 0) {
+      // The scene, and when it all began.
+      for await (const message of reader.readMessages({ topics })) {
+        collected.message(message);
+        if (collected.began !== undefined) break;
+      }
+    }
+    const startTime = collected.began === undefined ? undefined : collected.began + BigInt(Math.floor(1e9 * from));
+    for await (const message of reader.readMessages({ topics, ...(startTime !== undefined && { startTime }) })) {
       if (!collected.message(message)) break;
       if (collected.steps % 5000 === 0) {
         progress(collected.steps);
         await new Promise((resolve) => setTimeout(resolve));
       }
     }
-    return collected.recording();
+    indexed = true;
   } catch (error) {
-    if (collected.steps > 0) return collected.recording("It could be read up to here: " + String(error));
+    if (collected.began !== undefined) return collected.recording("It could be read up to here: " + String(error));
   }
+  if (indexed) return collected.recording();
   // Without an index: the server was killed, or still records.
   const reader = new McapStreamReader();
   const size = await file.size();
@@ -62,9 +79,8 @@ export async function readRecording(url: string, name: string, progress: (steps:
       progress(collected.steps);
     }
   } catch (error) {
-    if (collected.steps === 0) throw new Error(`${name} is no recording: ${String(error)}`);
+    if (collected.began === undefined) throw new Error(`${name} is no recording: ${String(error)}`);
   }
-  if (collected.steps === 0) throw new Error(`There is no haptic step in ${name}.`);
   return collected.recording("It has no end: the server was killed, or it still records. This is all up to the last whole piece.");
 }
 
@@ -76,10 +92,11 @@ class Collector {
   #sceneChannel: number | undefined;
   #sceneFields: Map<string, number> | undefined;
   #scene: Recording["scene"];
-  #began: bigint | undefined;
-  #full = false;
+  /** The log time of the first step, shown or not. */
+  began: bigint | undefined;
+  #next: number | undefined;
 
-  constructor(readonly name: string) {}
+  constructor(readonly name: string, readonly from: number) {}
 
   schema(schema: McapTypes.TypedMcapRecords["Schema"]): void {
     this.schemas.set(schema.id, schema);
@@ -105,24 +122,28 @@ class Collector {
     }
     const device = this.#tracks.get(message.channelId);
     if (!device) return true;
+    this.began ??= message.logTime;
+    const t = Number(message.logTime - this.began) / 1e9;
+    if (t < this.from) return true;
     if (this.steps >= kMaxSteps) {
-      this.#full = true;
+      this.#next = t;
       return false;
     }
-    this.#began ??= message.logTime;
     const sample = device.decode(message.data);
-    sample.t = Number(message.logTime - this.#began) / 1e9;
+    sample.t = t;
     device.track.push(sample);
     ++this.steps;
     return true;
   }
 
+  #none(): string {
+    return this.from > 0 && this.began !== undefined ? `${this.name} ends before ${moment(this.from)}.` : `There is no haptic step in ${this.name}.`;
+  }
+
   recording(remark = ""): Recording {
-    const remarks = remark ? [remark] : [];
-    if (this.#full) remarks.push(`It is longer: these are its first ${kMaxSteps.toLocaleString("en-US")} steps.`);
     const devices = [...this.#tracks.values()].filter((d) => d.track.length > 0).map(({ name, track }) => ({ name, track }));
-    if (devices.length === 0) throw new Error(`There is no haptic step in ${this.name}.`);
-    return { name: this.name, devices, scene: this.#scene, began: this.#began ?? 0n, remarks };
+    if (devices.length === 0) throw new Error(this.#none());
+    return { name: this.name, devices, scene: this.#scene, began: this.began ?? 0n, remarks: remark ? [remark] : [], from: this.from, next: this.#next };
   }
 }
 

@@ -4,7 +4,7 @@ import { readRecording, type DeviceTrack, type Recording } from "./recording.js"
 import { Scrubber } from "./scrubber.js";
 import { quantiles, type Track } from "./track.js";
 import { View, type Facts } from "./view.js";
-import { bytes, count, duration } from "./words.js";
+import { bytes, count, duration, moment } from "./words.js";
 
 interface Entry {
   readonly name: string;
@@ -32,8 +32,8 @@ export class Runs {
     this.#draw();
   }
 
-  /** No name: the list. One or two: these. */
-  async show(names: readonly string[]): Promise<void> {
+  /** No name: the list. One or two: these, from `from` on, s after their beginnings. */
+  async show(names: readonly string[], from: number): Promise<void> {
     const asked = ++this.#asked;
     for (const run of this.#open) run.view.destroy();
     this.#open = [];
@@ -49,7 +49,7 @@ export class Runs {
       }
       const read: Recording[] = [];
       for (const name of wanted) {
-        read.push(await readRecording(`recordings/${encodeURIComponent(name)}`, name, (n) => say(said, `Reading ${name}: ${count(n)} steps …`)));
+        read.push(await readRecording(`recordings/${encodeURIComponent(name)}`, name, from, (n) => say(said, `Reading ${name}: ${count(n)} steps …`)));
         if (asked !== this.#asked) return;
       }
       this.#present(read);
@@ -66,32 +66,36 @@ export class Runs {
     };
     const events = {
       zoom: moved,
-      reset: () => moved(0, this.#end),
+      reset: () => moved(this.#begin, this.#end),
       hover: (time: number | undefined) => {
         this.#cursor = time;
         this.#later();
       },
     };
-    this.#open = read.map((recording) => new Run(recording, new View(events), () => this.#later()));
+    const names = read.map((r) => r.name);
+    this.#open = read.map((recording) => new Run(recording, addressOf(names), new View(events), () => this.#later()));
     this.#scrubber = new Scrubber(moved);
     const zoom = (factor: number): void => {
       const [middle, half] = [(this.#from + this.#to) / 2, ((this.#to - this.#from) / 2) * factor];
-      if (half >= 0.001) moved(Math.max(middle - half, 0), Math.min(middle + half, this.#end));
+      if (half >= 0.001) moved(Math.max(middle - half, this.#begin), Math.min(middle + half, this.#end));
     };
-    const names = read.map((r) => r.name);
     const bar = h("div", { class: "bar" }, h("a", { href: "#/recordings" }, "‹ All recordings"), h("span", { class: "space" }),
-      names.length === 2 && h("a", { href: `#/recordings/${names.map(encodeURIComponent).reverse().join("/")}` }, "Swap sides"),
+      names.length === 2 && h("a", { href: addressOf([...names].reverse()) }, "Swap sides"),
       h("span", { class: "group" },
         h("button", { type: "button", id: "zoom-in", "aria-label": "Zoom in", title: "Zoom in", click: () => zoom(0.5) }, "+"),
         h("button", { type: "button", id: "zoom-out", "aria-label": "Zoom out", title: "Zoom out", click: () => zoom(2) }, "−")),
-      h("button", { type: "button", id: "whole", click: () => moved(0, this.#end) }, "All of it"));
+      h("button", { type: "button", id: "whole", click: () => moved(this.#begin, this.#end) }, "All of it"));
     this.element.replaceChildren(bar, this.#scrubber.element, h("div", { class: read.length === 2 ? "runs two" : "runs" }, ...this.#open.map((run) => run.element)));
     this.#cursor = undefined;
-    moved(0, Math.min(this.#end, 10));
+    moved(this.#begin, Math.min(this.#end, this.#begin + 10));
+  }
+
+  get #begin(): number {
+    return Math.min(...this.#open.map((run) => run.track.first));
   }
 
   get #end(): number {
-    return Math.max(...this.#open.map((run) => run.track.last), 0.01);
+    return Math.max(...this.#open.map((run) => run.track.last), this.#begin + 0.01);
   }
 
   #later(): void {
@@ -115,14 +119,18 @@ export class Runs {
   }
 }
 
+const addressOf = (names: readonly string[]): string => `#/recordings/${names.map(encodeURIComponent).join("/")}`;
+
 /** One recording in its view. */
 class Run {
   readonly element: HTMLElement;
   #device: DeviceTrack;
   #facts: { key: string; facts: Facts } | undefined;
 
+  /** `address`: of all that is shown, from its beginning. */
   constructor(
     readonly recording: Recording,
+    address: string,
     readonly view: View,
     changed: () => void,
   ) {
@@ -133,9 +141,15 @@ class Run {
       changed();
     } }, ...recording.devices.map((d) => h("option", {}, d.name || "first device")));
     const when = new Date(Number(recording.began / 1_000_000n));
-    const facts = [recording.began > 10n ** 17n ? when.toLocaleString() : "simulated", duration(this.track.last), `${count(this.track.length)} steps`, recording.scene?.version].filter(Boolean).join(" · ");
+    const { from, next } = recording;
+    const part = from > 0 || next !== undefined
+      ? h("div", { class: "alert part" }, `It is read in parts: this is ${moment(this.track.first)} to ${moment(this.track.last)}.`,
+        from > 0 && h("a", { href: address }, "From the beginning"), next !== undefined && h("a", { href: `${address}?from=${next}` }, `Go on from ${moment(next)}`))
+      : undefined;
+    const facts = [recording.began > 10n ** 17n ? when.toLocaleString() : "simulated", duration(this.track.last - this.track.first), `${count(this.track.length)} steps`, recording.scene?.version].filter(Boolean).join(" · ");
     this.element = h("section", { class: "run", "data-run": recording.name },
       h("div", { class: "head" }, h("h2", { text: recording.name }), h("span", { class: "quiet", text: facts }), device),
+      part,
       ...recording.remarks.map((text) => h("div", { class: "alert", text })),
       view.element,
       recording.scene && h("details", {}, h("summary", { text: "Scene" }), h("pre", { text: recording.scene.text })));
@@ -198,7 +212,7 @@ function list(entries: readonly Entry[]): HTMLElement {
   }
   const chosen = new Set<string>();
   const compare = h("button", { type: "button", id: "compare", class: "primary", disabled: true, click: () => {
-    location.hash = `#/recordings/${[...chosen].map(encodeURIComponent).join("/")}`;
+    location.hash = addressOf([...chosen]);
   } }, "Compare two");
   const rows = entries.map((entry) => {
     const box = h("input", { type: "checkbox", "aria-label": `Compare ${entry.name}`, change: () => {
@@ -207,7 +221,7 @@ function list(entries: readonly Entry[]): HTMLElement {
       compare.disabled = chosen.size !== 2;
       compare.textContent = chosen.size === 1 ? "Choose one more to compare" : "Compare two";
     } });
-    return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: `#/recordings/${encodeURIComponent(entry.name)}` }, entry.name)),
+    return h("tr", {}, h("td", {}, box), h("td", {}, h("a", { href: addressOf([entry.name]) }, entry.name)),
       h("td", { text: bytes(entry.size_bytes) }), h("td", { class: "date", text: new Date(entry.modified_unix_s * 1e3).toLocaleString() }));
   });
   return h("div", {}, h("div", { class: "bar" }, h("span", { class: "quiet", text: `${count(entries.length)} ${entries.length === 1 ? "recording" : "recordings. Open one, or choose two to see them side by side"}.` }), h("span", { class: "space" }), compare),

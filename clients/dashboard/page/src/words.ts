@@ -82,6 +82,12 @@ export function duration(seconds: number): string {
   return `${Number(value.toPrecision(3))}\u00a0${unit}`;
 }
 
+/** When in a recording: "59.5 s", "10 min 4 s". */
+export function moment(seconds: number): string {
+  if (seconds < 60) return `${digits(seconds)}\u00a0s`;
+  return `${Math.floor(seconds / 60)}\u00a0min ${Math.floor(seconds % 60)}\u00a0s`;
+}
+
 export function bytes(size: number): string {
   return size < 1e6 ? `${digits(size / 1e3)} kB` : size < 1e9 ? `${digits(size / 1e6)} MB` : `${digits(size / 1e9)} GB`;
 }
