@@ -9,24 +9,14 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from types import TracebackType
 from typing import Union
 
-from .force_client import Config, Stats
-from .guest import Guest
-from .messages import (
-    NEVER,
-    DeviceDescription,
-    DeviceReport,
-    DeviceState,
-    Instant,
-    LinkReport,
-    PeerReport,
-    Touch,
-    Welcome,
-)
+from .force_client import Config
+from .guest import AnyClient
+from .messages import NEVER, DeviceState, Instant, Touch
 
 Physics = Callable[[DeviceState], Awaitable[Union[Touch, Sequence[float]]]]
 
 
-class Client:
+class Client(AnyClient):
     """A guest at a Tendon server, as tendon.Client, in an event loop that can watch sockets (on Windows
     asyncio's SelectorEventLoop):
 
@@ -38,9 +28,7 @@ class Client:
     """
 
     def __init__(self, server: str, config: Config = Config()) -> None:
-        """`server`: HOST:PORT. Raises ValueError or OSError when there is no such address; nobody need listen
-        there yet."""
-        self._guest = Guest(server, config, time.monotonic_ns())
+        super().__init__(server, config)
         self._timer: asyncio.TimerHandle | None = None
         self._waiter: asyncio.Future[None] | None = None
         self._wake_at: Instant = NEVER
@@ -62,73 +50,10 @@ class Client:
                 await self._wait_until(min(core.next_state_due(), end))
             now = time.monotonic_ns()
 
-    def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
-        """Sends at once what the hand is to feel there: a force in N on the hand, or a Touch with the stiffness too."""
-        self._guest.send(hand, touch)
-        self._guest.flush(time.monotonic_ns())
-
     async def drive(self, physics: Physics, duration_s: float | None = None) -> None:
         """Answers every state with what `physics` makes of it. Raises RefusedForGood, and what `physics` raises."""
         async for hand in self.states(duration_s):
             self.send(hand, await physics(hand))
-
-    def rearm(self) -> bool:
-        """Asks the server to clear a latched fault of its device. False when there is no session to ask in."""
-        asked = self._guest.core.rearm()
-        self._guest.flush(time.monotonic_ns())
-        return asked
-
-    def disarm(self) -> bool:
-        """Asks the server for no force of its device until somebody rearms. False when there is no session to ask in."""
-        asked = self._guest.core.disarm()
-        self._guest.flush(time.monotonic_ns())
-        return asked
-
-    def take_lease(self) -> bool:
-        """Asks for the channel's lease, once; what became of it `holds` says. False when there is no session to ask in."""
-        asked = self._guest.core.take_lease()
-        self._guest.flush(time.monotonic_ns())
-        return asked
-
-    def give_lease(self) -> bool:
-        """Gives it up, and asks for it no more. False when there is no session to do it in."""
-        given = self._guest.core.give_lease()
-        self._guest.flush(time.monotonic_ns())
-        return given
-
-    @property
-    def stats(self) -> Stats:
-        return self._guest.stats
-
-    @property
-    def welcome(self) -> Welcome | None:
-        """What the server said of itself and its device when the newest session opened; None before that."""
-        return self._guest.welcome
-
-    @property
-    def description(self) -> DeviceDescription | None:
-        """What the device is and can do, when we have named a device or a channel and the server has answered."""
-        return self._guest.description
-
-    @property
-    def holds(self) -> bool:
-        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
-        return self._guest.holds
-
-    @property
-    def report(self) -> LinkReport | None:
-        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
-        return self._guest.report
-
-    @property
-    def device_report(self) -> DeviceReport | None:
-        """With Config.diagnostics, how the device's loop does, once a second; None before the first."""
-        return self._guest.device_report
-
-    @property
-    def peer_reports(self) -> dict[int, PeerReport]:
-        """With Config.diagnostics, how the engine of each channel does, or did last."""
-        return self._guest.peer_reports
 
     async def __aenter__(self) -> Client:
         asyncio.get_running_loop().add_reader(self._guest.socket, self._turn)

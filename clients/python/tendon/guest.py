@@ -56,40 +56,6 @@ class Guest:
         self._said = ""
         self._told: LinkReport | None = None
 
-    @property
-    def stats(self) -> Stats:
-        return self.core.stats
-
-    @property
-    def welcome(self) -> Welcome | None:
-        """What the server said of itself and its device when the newest session opened; None before that."""
-        return self.core.welcome
-
-    @property
-    def description(self) -> DeviceDescription | None:
-        """What the device is and can do, when we have named a device or a channel and the server has answered."""
-        return self.core.description
-
-    @property
-    def holds(self) -> bool:
-        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
-        return self.core.holds
-
-    @property
-    def report(self) -> LinkReport | None:
-        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
-        return self.core.report
-
-    @property
-    def device_report(self) -> DeviceReport | None:
-        """With Config.diagnostics, how the device's loop does, once a second; None before the first."""
-        return self.core.device_report
-
-    @property
-    def peer_reports(self) -> dict[int, PeerReport]:
-        """With Config.diagnostics, how the engine of each channel does, or did last."""
-        return self.core.peer_reports
-
     def turn(self, now: int) -> None:
         """Takes what has come in, does what is due, sends what is to be sent."""
         for _ in range(MAX_DATAGRAMS):
@@ -158,10 +124,79 @@ class Guest:
         if phase is Phase.UNANSWERED:
             return f"no answer from {self.server}; {self._doubt}? Trying on"
         if phase is Phase.REFUSED:
-            return f"{self.server} refuses: {self.stats.reason}"
+            return f"{self.server} refuses: {self.core.stats.reason}"
         if phase is Phase.LOST:
-            return f"lost {self.server}: {self.stats.reason}"
+            return f"lost {self.server}: {self.core.stats.reason}"
         return ""
+
+
+class AnyClient:
+    """What the blocking and the asyncio client have in common: forces and requests out, and what is known of the guest."""
+
+    def __init__(self, server: str, config: Config = Config()) -> None:
+        """`server`: HOST:PORT. Raises ValueError or OSError when there is no such address; nobody need listen
+        there yet."""
+        self._guest = Guest(server, config, time.monotonic_ns())
+
+    def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
+        """Sends at once what the hand is to feel there: a force in N on the hand, or a Touch with the stiffness too."""
+        self._guest.send(hand, touch)
+        self._guest.flush(time.monotonic_ns())
+
+    def rearm(self) -> bool:
+        """Asks the server to clear a latched fault of its device. False when there is no session to ask in."""
+        return self._ask(self._guest.core.rearm)
+
+    def disarm(self) -> bool:
+        """Asks the server for no force of its device until somebody rearms. False when there is no session to ask in."""
+        return self._ask(self._guest.core.disarm)
+
+    def take_lease(self) -> bool:
+        """Asks for the channel's lease, once; what became of it `holds` says. False when there is no session to ask in."""
+        return self._ask(self._guest.core.take_lease)
+
+    def give_lease(self) -> bool:
+        """Gives it up, and asks for it no more. False when there is no session to do it in."""
+        return self._ask(self._guest.core.give_lease)
+
+    @property
+    def stats(self) -> Stats:
+        return self._guest.core.stats
+
+    @property
+    def welcome(self) -> Welcome | None:
+        """What the server said of itself and its device when the newest session opened; None before that."""
+        return self._guest.core.welcome
+
+    @property
+    def description(self) -> DeviceDescription | None:
+        """What the device is and can do, when we have named a device or a channel and the server has answered."""
+        return self._guest.core.description
+
+    @property
+    def holds(self) -> bool:
+        """Whether the channel takes our forces. While it does not, a controller is handed no states."""
+        return self._guest.core.holds
+
+    @property
+    def report(self) -> LinkReport | None:
+        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
+        return self._guest.core.report
+
+    @property
+    def device_report(self) -> DeviceReport | None:
+        """With Config.diagnostics, how the device's loop does, once a second; None before the first."""
+        return self._guest.core.device_report
+
+    @property
+    def peer_reports(self) -> dict[int, PeerReport]:
+        """With Config.diagnostics, how the engine of each channel does, or did last."""
+        return self._guest.core.peer_reports
+
+    def _ask(self, request: Callable[[], bool]) -> bool:
+        asked = request()
+        self._guest.flush(time.monotonic_ns())
+        return asked
 
 
 def _connected(server: str) -> socket.socket:
