@@ -175,7 +175,7 @@ class ForceClient {
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.
   bool holds() const noexcept { return holds_; }
-  /// Asks for the channel's lease, once, or gives it up. False as for rearm().
+  /// Asks for the channel's lease, once more when it is lost before the answer; or gives it up. False as for rearm().
   bool take_lease();
   bool give_lease();
 

@@ -69,8 +69,8 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
     ASSERT_GE(step.loop_age, 2 * std::chrono::milliseconds(15)) << "tick " << step.tick;
   }
   EXPECT_GT(peak, 1);  // N: it is felt
-  EXPECT_GT(in_time,
-            100U);  // steps of which the claim holds without exception; of 3000, where others take the processors
+  // The claim holds of these without exception. Of 3000, where others take the processors.
+  EXPECT_GT(in_time, 100U);
 
   EXPECT_FALSE(recording.truncated);
   EXPECT_EQ(recording.losses, 0U);

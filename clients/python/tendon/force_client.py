@@ -293,7 +293,8 @@ class ForceClient:
         return self._session is not None and self._session.request(Disarm(self._place.device)) is not None
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, once; what became of it `holds` says. False as for rearm()."""
+        """Asks for the channel's lease, once more when it is lost before the answer; what became of it `holds` says. False as
+        for rearm()."""
         wanted = TakeLease(self._place.device, self._place.channel)
         asked = None if self._session is None else self._session.request(wanted)
         if asked is None:

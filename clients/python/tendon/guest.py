@@ -152,7 +152,8 @@ class AnyClient:
         return self._ask(self._guest.core.disarm)
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, once; what became of it `holds` says. False when there is no session to ask in."""
+        """Asks for the channel's lease, once more when it is lost before the answer; what became of it `holds` says. False when
+        there is no session to ask in."""
         return self._ask(self._guest.core.take_lease)
 
     def give_lease(self) -> bool:

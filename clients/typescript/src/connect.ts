@@ -36,7 +36,7 @@ export interface Guest {
   stats(): ClientStats;
   rearm(): boolean;
   disarm(): boolean;
-  /** Asks for the channel's lease, once, or gives it up. */
+  /** Asks for the channel's lease, once more when it is lost before the answer; or gives it up. */
   takeLease(): boolean;
   giveLease(): boolean;
   /** Says Bye and ends. */

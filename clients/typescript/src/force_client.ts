@@ -286,7 +286,7 @@ export class ForceClient {
   get holds(): boolean {
     return this.#holds;
   }
-  /** Asks for the channel's lease, once. False as for rearm(). */
+  /** Asks for the channel's lease, once more when it is lost before the answer. False as for rearm(). */
   takeLease(): boolean {
     const { device, channel } = this.#place;
     const asked = this.#session?.request({ kind: "takeLease", device, channel });

@@ -21,23 +21,10 @@ PATIENCE_S = 30
 PROGRAMS = Path(os.environ.get("TENDON_PROGRAMS", ROOT / "build" / "release" / "bin"))
 EXAMPLES = ROOT / "clients" / "python" / "examples"
 
-PRESSING_HAND = """
-[device]
-kind = "simulated"
-profile = "falcon"
 
-[device.hand]
-stiffness_n_per_m = 300
-damping_n_s_per_m = 3
-mass_kg = 0.05
-
-[device.hand.motion]
-kind = "ramp-hold"
-from_mm = [-10, 0, 0]
-to_mm = [15, 0, 0]
-ramp_ms = 300
-"""
-"""A scene: a hand that goes into the region x > 0 and stays there."""
+def scene(name: str) -> str:
+    """The text of a scene of deploy/scenes; their hands press into the region x > 0."""
+    return (ROOT / "deploy" / "scenes" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 class Process:
@@ -119,7 +106,7 @@ class Server(Process):
     ) -> None:
         """`keys`: a folder of key files; only they are let in. `scenes`: others, by the names of their devices."""
         if scenes is None:
-            text = (ROOT / "deploy" / "scenes" / "demo.toml").read_text(encoding="utf-8")
+            text = scene("demo")
             if keys is not None:
                 text += f'\n[network]\nkeys = "{keys}"\n'
             scenes = {"scene": text}

@@ -10,7 +10,7 @@ import socket
 import subprocess
 
 import pytest
-from processes import PRESSING_HAND, Server, example, summary_of, tendond
+from processes import Server, example, scene, summary_of, tendond
 
 from tendon import Client, Config, DeviceState, Phase, RefusedForGood, Role, Touch, aio, read_key
 
@@ -161,7 +161,7 @@ def test_an_observer_with_json_is_told_of_the_loop_and_of_the_engine(tmp_path):
 
 
 def test_an_engine_drives_the_device_that_it_names_and_no_other(tmp_path):
-    with Server(tmp_path, scenes={"left": PRESSING_HAND, "right": PRESSING_HAND}) as server:
+    with Server(tmp_path, scenes={name: scene(name) for name in ("left", "right")}) as server:
         with example(tmp_path, "virtual_wall", "--server", server.address, "--device", "right") as engine:
             engine.wait_for_line("connected")
             with Client(server.address, Config(role=Role.OBSERVER, device="right")) as observer:
@@ -188,7 +188,7 @@ def test_a_lease_is_taken_from_an_engine_that_hangs_which_is_told_so_and_takes_i
                 return True
         return False
 
-    with Server(tmp_path, scenes={"device": PRESSING_HAND + LEASED}) as server:
+    with Server(tmp_path, scenes={"device": scene("left") + LEASED}) as server:
         first = Client(server.address, Config(name="first", channel="tissue"))
         second = Client(server.address, Config(name="second", channel="tissue", take_lease=True))
         with first, second:
@@ -210,7 +210,7 @@ def test_a_lease_is_taken_from_an_engine_that_hangs_which_is_told_so_and_takes_i
 
 
 def test_an_example_takes_the_lease_of_the_channel_that_its_command_line_names(tmp_path):
-    with Server(tmp_path, scenes={"device": PRESSING_HAND + LEASED}) as server:
+    with Server(tmp_path, scenes={"device": scene("left") + LEASED}) as server:
         with Client(server.address, Config(channel="tissue")) as first:
             assert next(first.states(30))
             with example(
