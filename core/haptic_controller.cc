@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/force_limits.h"
+#include "core/control/force_limits.h"
 
 namespace tendon {
 

@@ -5,18 +5,18 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/mode.h"
+#include "core/base/motion.h"
+#include "core/base/reason.h"
 #include "core/control/admittance_loop.h"
 #include "core/control/limiter.h"
-#include "core/force_channels.h"
-#include "core/friction_map.h"
-#include "core/mode.h"
-#include "core/motion.h"
-#include "core/reason.h"
-#include "core/remote_force.h"
+#include "core/ledger/friction_map.h"
+#include "core/remote/force_channels.h"
+#include "core/remote/remote_force.h"
 
 namespace tendon {
 
-/// What one haptic step found and decided. Enough to take the step again (tests/replay).
+/// What one haptic step found and decided. Enough to take the step again (tests/tools/replay).
 struct Step {
   Motion hand;                       ///< the motion it saw; hand.at = when
   Duration held{};                   ///< T_act: length of the interval that this step ended; 0 in the first

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 namespace tendon {
 

@@ -11,15 +11,15 @@
 #include <variant>
 #include <vector>
 
-#include "core/time.h"
-#include "protocol/client_key.h"
-#include "protocol/codec.h"
-#include "protocol/crypto.h"
-#include "protocol/hello_limit.h"
+#include "core/base/time.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
-#include "protocol/noise.h"
-#include "protocol/seal.h"
+#include "protocol/secrets/client_key.h"
+#include "protocol/secrets/crypto.h"
+#include "protocol/secrets/hello_limit.h"
+#include "protocol/secrets/noise.h"
+#include "protocol/secrets/seal.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/time.h"
+#include "core/base/time.h"
 
 // Every bound that the wire has, each with its reason. Both ends must agree on them: they are part of
 // the protocol (WIRE.md lists them), not settings. What is beyond a bound is refused by the receiver

@@ -12,11 +12,11 @@
 #include <variant>
 #include <vector>
 
-#include "core/channel_rule.h"
-#include "core/mode.h"
-#include "core/motion.h"
-#include "core/remote_force.h"
-#include "core/time.h"
+#include "core/base/mode.h"
+#include "core/base/motion.h"
+#include "core/base/time.h"
+#include "core/remote/channel_rule.h"
+#include "core/remote/remote_force.h"
 #include "protocol/limits.h"
 
 // What peers say to each other, as plain values. tendon.proto holds the same nouns as bytes, WIRE.md
@@ -58,7 +58,7 @@ struct DeviceState {
   Vec3 force_applied = Vec3::Zero();  ///< N, what the device really gives out from this step on
   double energy = 0;                  ///< J, the energy ledger at this step
   double permitted_force = 0;         ///< N, the limiter's bound at this step; +infinity when there is none
-  std::uint32_t reasons = 0;          ///< why the force is not what was asked for: core/reason.h
+  std::uint32_t reasons = 0;          ///< why the force is not what was asked for: core/base/reason.h
   std::uint64_t force_sequence = 0;   ///< ForceCommand rendered now; 0 = none
   Duration force_age{};               ///< its age since it arrived; 0 when none
   Mode mode = Mode::kIdle;

@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "protocol/codec.h"
 #include "protocol/limits.h"
-#include "protocol/replay_window.h"
-#include "protocol/requests.h"
-#include "protocol/round_trip.h"
+#include "protocol/reliable/replay_window.h"
+#include "protocol/reliable/requests.h"
+#include "protocol/reliable/round_trip.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon {
 namespace {

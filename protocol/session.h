@@ -9,12 +9,12 @@
 #include <string>
 #include <variant>
 
+#include "core/base/time.h"
 #include "core/estimation/clock_offset_estimator.h"
-#include "core/time.h"
 #include "protocol/limits.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
-#include "protocol/seal.h"
+#include "protocol/secrets/seal.h"
 
 namespace tendon {
 

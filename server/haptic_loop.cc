@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/arithmetic.h"
+#include "core/base/arithmetic.h"
 
 namespace tendon {
 

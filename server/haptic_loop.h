@@ -4,8 +4,8 @@
 #include <atomic>
 #include <cstdint>
 
-#include "core/counter.h"
 #include "core/estimation/velocity_estimator.h"
+#include "core/exchange/counter.h"
 #include "core/haptic_controller.h"
 #include "devices/device.h"
 #include "server/mailboxes.h"

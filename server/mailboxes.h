@@ -6,14 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/flight_recorder.h"
-#include "core/latest.h"
-#include "core/remote_force.h"
-#include "core/spsc_ring.h"
+#include "core/exchange/flight_recorder.h"
+#include "core/exchange/latest.h"
+#include "core/exchange/spsc_ring.h"
+#include "core/remote/remote_force.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
-#include "server/health.h"
-#include "server/records.h"
+#include "server/guests/health.h"
+#include "server/recording/records.h"
 
 namespace tendon {
 

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon {
 

@@ -9,14 +9,14 @@
 #include <variant>
 #include <vector>
 
-#include "protocol/deadband.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
-#include "protocol/link_meter.h"
 #include "protocol/messages.h"
-#include "protocol/rate_adaptation.h"
+#include "protocol/narrow/deadband.h"
+#include "protocol/narrow/link_meter.h"
+#include "protocol/narrow/rate_adaptation.h"
 #include "protocol/session.h"
-#include "server/lateness.h"
+#include "server/guests/lateness.h"
 #include "server/mailboxes.h"
 
 namespace tendon {

@@ -17,12 +17,12 @@
 #include "devices/usb/usb.h"
 #include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "server/build_info.h"
-#include "server/clock.h"
-#include "server/flight_file.h"
-#include "server/key_folder.h"
-#include "server/log.h"
-#include "server/randomness.h"
-#include "server/realtime.h"
+#include "server/machine/clock.h"
+#include "server/machine/log.h"
+#include "server/machine/randomness.h"
+#include "server/machine/realtime.h"
+#include "server/recording/flight_file.h"
+#include "server/scene/key_folder.h"
 
 namespace tendon {
 

@@ -12,16 +12,16 @@
 #include "devices/device.h"
 #include "devices/safety/guardian.h"
 #include "devices/safety/safe_device.h"
-#include "server/byte_sink.h"
-#include "server/doorbell.h"
+#include "server/guests/health.h"
 #include "server/haptic_loop.h"
-#include "server/health.h"
+#include "server/machine/doorbell.h"
+#include "server/machine/realtime.h"
+#include "server/machine/udp_link.h"
 #include "server/mailboxes.h"
 #include "server/network_loop.h"
-#include "server/realtime.h"
-#include "server/recorder.h"
-#include "server/scene.h"
-#include "server/udp_link.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
+#include "server/scene/scene.h"
 
 namespace tendon {
 

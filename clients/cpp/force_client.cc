@@ -8,7 +8,7 @@
 #include <utility>
 #include <variant>
 
-#include "core/arithmetic.h"
+#include "core/base/arithmetic.h"
 #include "protocol/limits.h"
 
 namespace tendon {

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "protocol/crypto.h"
-#include "protocol/deadband.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
+#include "protocol/narrow/deadband.h"
+#include "protocol/secrets/crypto.h"
 #include "protocol/session.h"
 
 namespace tendon {
@@ -26,7 +26,7 @@ struct Touch {
   Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
 
   Vec3 force = Vec3::Zero();  ///< N, on the hand: a wall that resists motion along +x sends −x
-  // What lets the device loop follow the hand until the next answer (core/estimation/answer.h), as much of it as the
+  // What lets the device loop follow the hand until the next answer (core/remote/answer.h), as much of it as the
   // engine knows; used when the server has agreed to `kFeatureLocalModel`.
   std::optional<Mat3> stiffness{};  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
   double valid_radius = std::numeric_limits<double>::infinity();  ///< m, how far from there the stiffness holds

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "protocol/client_key.h"
+#include "protocol/secrets/client_key.h"
 
 namespace tendon {
 

@@ -60,7 +60,7 @@ class Board {
     std::vector<DeviceState> waiting;  ///< that the page has not been told, in order
     std::uint64_t dropped = 0;         ///< of those, because nobody took them
     std::uint64_t states = 0;
-    std::array<std::uint64_t, kReasons> limited{};  ///< states with each bit of core/reason.h
+    std::array<std::uint64_t, kReasons> limited{};  ///< states with each bit of core/base/reason.h
     std::optional<DeviceReport> report;
     // Sums over all reports.
     LatenessHistogram lateness{};

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon::dash {
 

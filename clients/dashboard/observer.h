@@ -7,9 +7,9 @@
 #include <string>
 
 #include "clients/dashboard/board.h"
-#include "protocol/crypto.h"
 #include "protocol/handshake.h"
 #include "protocol/link.h"
+#include "protocol/secrets/crypto.h"
 #include "protocol/session.h"
 
 namespace tendon::dash {

@@ -7,8 +7,8 @@
 
 #include "clients/cpp/force_client.h"
 #include "clients/dashboard/board.h"
-#include "protocol/crypto.h"
 #include "protocol/link.h"
+#include "protocol/secrets/crypto.h"
 
 namespace tendon::dash {
 

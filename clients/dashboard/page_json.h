@@ -50,7 +50,7 @@ std::string_view name(Mode mode) noexcept;
 /// "armed", "fault" …
 std::string_view name(Safety safety) noexcept;
 std::string_view name(Contact contact) noexcept;
-/// "energy", "max_force" … of bit `bit` of core/reason.h; "bit_20" of one that has no name yet.
+/// "energy", "max_force" … of bit `bit` of core/base/reason.h; "bit_20" of one that has no name yet.
 std::string reason_name(std::size_t bit);
 
 }  // namespace tendon::dash

@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "clients/dashboard/page_json.h"
-#include "protocol/crypto.h"
+#include "protocol/secrets/crypto.h"
 
 namespace tendon::dash {
 namespace {

@@ -9,15 +9,15 @@
 #include <string>
 #include <utility>
 
-#include "clients/softbody/explicit.h"
-#include "clients/softbody/friction.h"
-#include "clients/softbody/gmsh.h"
-#include "clients/softbody/linear.h"
-#include "clients/softbody/mass_spring.h"
-#include "clients/softbody/modal.h"
-#include "clients/softbody/projective.h"
-#include "clients/softbody/sphere.h"
-#include "clients/softbody/xpbd.h"
+#include "clients/softbody/fem/gmsh.h"
+#include "clients/softbody/models/explicit.h"
+#include "clients/softbody/models/linear.h"
+#include "clients/softbody/models/mass_spring.h"
+#include "clients/softbody/models/modal.h"
+#include "clients/softbody/models/projective.h"
+#include "clients/softbody/models/xpbd.h"
+#include "clients/softbody/touch/friction.h"
+#include "clients/softbody/touch/sphere.h"
 
 namespace tendon::softbody {
 namespace {

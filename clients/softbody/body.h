@@ -13,13 +13,13 @@
 #include <variant>
 #include <vector>
 
-#include "clients/softbody/contact.h"
-#include "clients/softbody/cutting.h"
-#include "clients/softbody/effects.h"
-#include "clients/softbody/material.h"
-#include "clients/softbody/plasticity.h"
-#include "clients/softbody/quasi_static.h"
-#include "clients/softbody/stiffening.h"
+#include "clients/softbody/effects/cutting.h"
+#include "clients/softbody/effects/effects.h"
+#include "clients/softbody/fem/material.h"
+#include "clients/softbody/models/plasticity.h"
+#include "clients/softbody/models/quasi_static.h"
+#include "clients/softbody/models/stiffening.h"
+#include "clients/softbody/touch/contact.h"
 
 namespace tendon::softbody {
 

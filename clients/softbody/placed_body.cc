@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/arithmetic.h"
+#include "core/base/arithmetic.h"
 
 namespace tendon::softbody {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "clients/cpp/engine/self_test.h"
 #include "clients/cpp/options.h"
-#include "clients/cpp/self_test.h"
 #include "clients/softbody/explain.h"
 #include "clients/softbody/placed_body.h"
 

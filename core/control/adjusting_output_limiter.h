@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/control/stability_controller.h"
-#include "core/friction.h"
+#include "core/ledger/friction.h"
 
 namespace tendon {
 

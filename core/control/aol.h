@@ -7,7 +7,7 @@
 #include "core/control/adjusting_output_limiter.h"
 #include "core/control/stability_controller.h"
 #include "core/control/worst_loss.h"
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 
 namespace tendon {
 

@@ -8,9 +8,9 @@
 #include "core/control/aol.h"
 #include "core/control/stability_controller.h"
 #include "core/control/worst_loss.h"
-#include "core/energy_ledger.h"
-#include "core/friction.h"
-#include "core/robust_ledger.h"
+#include "core/ledger/energy_ledger.h"
+#include "core/ledger/friction.h"
+#include "core/ledger/robust_ledger.h"
 
 namespace tendon {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/control/stability_controller.h"
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 
 namespace tendon {
 

@@ -3,7 +3,7 @@
 
 #include "core/control/passivity_controller.h"
 #include "core/control/stability_controller.h"
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 
 namespace tendon {
 

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <concepts>
 
-#include "core/reason.h"
-#include "core/time.h"
+#include "core/base/reason.h"
+#include "core/base/time.h"
 
 namespace tendon {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/control/stability_controller.h"
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 
 namespace tendon {
 

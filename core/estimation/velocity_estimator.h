@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 namespace tendon {
 

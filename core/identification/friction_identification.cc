@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "core/friction.h"
 #include "core/identification/integral_fit.h"
 #include "core/identification/kelly_fit.h"
 #include "core/identification/ramp_run.h"
+#include "core/ledger/friction.h"
 
 namespace tendon {
 

@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
-#include "core/friction.h"
 #include "core/identification/ramp_run.h"
+#include "core/ledger/friction.h"
 
 namespace tendon {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/friction.h"
 #include "core/identification/ramp_run.h"
+#include "core/ledger/friction.h"
 
 namespace tendon {
 

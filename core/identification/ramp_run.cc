@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

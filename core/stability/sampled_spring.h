@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/time.h"
+#include "core/base/time.h"
 
 namespace tendon {
 

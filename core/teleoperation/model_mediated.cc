@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 

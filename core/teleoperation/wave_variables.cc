@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 

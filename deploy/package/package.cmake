@@ -63,7 +63,7 @@ foreach(room core protocol clients/cpp)
   install(DIRECTORY ${room}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tendon/${room} COMPONENT development
           FILES_MATCHING PATTERN "*.h")
 endforeach()
-install(FILES protocol/tendon.proto protocol/WIRE.md protocol/SESSION.md DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/protocol
+install(FILES protocol/wire/tendon.proto protocol/WIRE.md protocol/SESSION.md DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/protocol
         COMPONENT development)
 configure_package_config_file(deploy/package/tendon-config.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/tendon-config.cmake
                               INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/tendon)

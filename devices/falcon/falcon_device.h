@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/counter.h"
+#include "core/exchange/counter.h"
 #include "devices/device.h"
 #include "devices/falcon/firmware.h"
 #include "devices/falcon/kinematics.h"

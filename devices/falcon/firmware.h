@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/time.h"
+#include "core/base/time.h"
 #include "devices/usb/ftdi.h"
 #include "devices/usb/pipe.h"
 

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <numbers>
 
-#include "core/arithmetic.h"
+#include "core/base/arithmetic.h"
 
 namespace tendon::falcon {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 #include "devices/falcon/packet.h"
 
 /// Where the Falcon's grip is, from its three motors' encoders, and which torques give the hand a force. The Falcon is

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 

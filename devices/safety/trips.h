@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
+#include "core/base/motion.h"
 #include "core/estimation/velocity_estimator.h"
-#include "core/motion.h"
 
 namespace tendon {
 

@@ -10,7 +10,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/friction.h"
-#include "core/motion.h"
+#include "core/base/motion.h"
+#include "core/ledger/friction.h"
 #include "devices/simulated/mechanism.h"
 
 namespace tendon {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 #include "devices/falcon/kinematics.h"
 
 namespace tendon {

@@ -3,7 +3,7 @@
 
 #include <variant>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 namespace tendon {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 #include "devices/simulated/scripted_motion.h"
 
 namespace tendon {

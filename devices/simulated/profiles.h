@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/friction.h"
+#include "core/ledger/friction.h"
 #include "devices/simulated/simulated_device.h"
 
 namespace tendon {

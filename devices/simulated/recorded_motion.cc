@@ -10,7 +10,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 namespace tendon {
 

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "core/friction.h"
-#include "core/motion.h"
+#include "core/base/motion.h"
+#include "core/ledger/friction.h"
 #include "devices/device.h"
 #include "devices/simulated/forces_under_way.h"
 #include "devices/simulated/joint_friction.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

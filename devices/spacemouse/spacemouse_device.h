@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/counter.h"
+#include "core/exchange/counter.h"
 #include "devices/device.h"
 #include "devices/spacemouse/report.h"
 #include "devices/usb/pipe.h"

@@ -14,7 +14,7 @@
 #include <system_error>
 #include <thread>
 
-#include "core/spsc_ring.h"
+#include "core/exchange/spsc_ring.h"
 #include "devices/usb/usb.h"
 
 namespace tendon::usb {

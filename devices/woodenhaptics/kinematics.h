@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 #include "devices/woodenhaptics/model.h"
 
 /// Where the arm's tip is, from its three encoders, and which currents give the hand a force. The kinematics of

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "core/expect.h"
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {

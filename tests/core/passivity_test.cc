@@ -3,7 +3,7 @@
 // The promise of the whole project at the level of the control law: whatever the hand does, whatever the
 // remote environment asks for and however late, the ledger never is negative, no force is above its
 // bound, and nothing that is not a number reaches the device. ctest asks RapidCheck for 10 000 seeds (see
-// CMakeLists.txt). Worlds with a network are in tests/simulation.
+// CMakeLists.txt). Worlds with a network are in tests/tools/worlds.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/time.h"
+#include "core/base/time.h"
 #include "devices/usb/pipe.h"
 
 namespace tendon {

@@ -15,8 +15,8 @@
 
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/udp_transport.h"
-#include "server/clock.h"
-#include "tests/e2e/stage.h"
+#include "server/machine/clock.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "tests/e2e/stage.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "server/clock.h"
-#include "server/realtime.h"
-#include "tests/e2e/falcon_stage.h"
+#include "server/machine/clock.h"
+#include "server/machine/realtime.h"
+#include "tests/e2e/stage/falcon_stage.h"
 
 namespace {
 

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "devices/falcon/packet.h"
-#include "tests/e2e/falcon_stage.h"
-#include "tests/e2e/threads.h"
+#include "tests/e2e/stage/falcon_stage.h"
+#include "tests/e2e/stage/threads.h"
 
 namespace tendon::e2e {
 namespace {

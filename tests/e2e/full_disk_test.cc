@@ -9,7 +9,7 @@
 #include <string>
 #include <system_error>
 
-#include "tests/e2e/stage.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

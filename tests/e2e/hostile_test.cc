@@ -15,10 +15,10 @@
 #include <thread>
 #include <vector>
 
-#include "protocol/codec.h"
-#include "server/udp_link.h"
-#include "tests/e2e/relay.h"
-#include "tests/e2e/stage.h"
+#include "protocol/wire/codec.h"
+#include "server/machine/udp_link.h"
+#include "tests/e2e/stage/relay.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

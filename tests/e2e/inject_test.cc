@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/stage.h"
-#include "tests/injector/trace.h"
-#include "tests/injector/udp_batch.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
+#include "tests/tools/injector/proxy/udp_batch.h"
+#include "tests/tools/injector/traces/trace.h"
 
 namespace tendon::e2e {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/e2e/process.h"
-#include "tests/e2e/stage.h"
+#include "tests/e2e/stage/process.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

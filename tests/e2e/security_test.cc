@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "tests/e2e/process.h"
-#include "tests/e2e/stage.h"
+#include "tests/e2e/stage/process.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 // Real programs and suite 1: making keys, who gets in, who does not.

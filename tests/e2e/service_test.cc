@@ -13,8 +13,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "tests/e2e/process.h"
-#include "tests/e2e/stage.h"
+#include "tests/e2e/stage/process.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // server/THREADS.md against the server.
-#include "tests/e2e/threads.h"
+#include "tests/e2e/stage/threads.h"
 
 #include <gtest/gtest.h>
 
 #include <chrono>
 
-#include "tests/e2e/stage.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
 namespace tendon::e2e {

@@ -17,7 +17,7 @@
 #include <variant>
 #include <vector>
 
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon {
 namespace {

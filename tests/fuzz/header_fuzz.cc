@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 #include "tests/fuzz/target.h"
 
 // The clear header and the layout of the handshake: what is read comes out again as it was.

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "protocol/client_key.h"
+#include "protocol/secrets/client_key.h"
 #include "tests/fuzz/target.h"
 
 // The text of a key file, and its permissions: refused with a sentence that does not hold the key, or taken for a key

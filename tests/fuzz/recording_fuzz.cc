@@ -5,8 +5,8 @@
 #include <string_view>
 #include <variant>
 
-#include "server/recording_codec.h"
-#include "server/recording_reader.h"
+#include "server/recording/recording_codec.h"
+#include "server/recording/recording_reader.h"
 #include "tests/fuzz/target.h"
 
 // A recording: every byte sequence gives records and then ends, or is refused by name. What is read says the same

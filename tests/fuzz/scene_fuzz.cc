@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <string_view>
 
-#include "server/scene.h"
+#include "server/scene/scene.h"
 #include "tests/fuzz/target.h"
 
 // A scene file: refused by a SceneError, or a scene that the device and the haptic loop take without a complaint.

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "tests/fuzz/target.h"
-#include "tests/injector/trace.h"
-#include "tests/injector/trace_player.h"
+#include "tests/tools/injector/traces/trace.h"
+#include "tests/tools/injector/traces/trace_player.h"
 
 // A recorded network: refused with file and line, or a trace that reads back as itself, that can be played, and
 // whose fates never come before what they happen to.

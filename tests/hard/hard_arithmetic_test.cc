@@ -18,16 +18,16 @@
 #include <vector>
 
 #include "clients/softbody/placed_body.h"
-#include "core/arithmetic.h"
-#include "core/energy_ledger.h"
-#include "core/robust_ledger.h"
+#include "core/base/arithmetic.h"
+#include "core/ledger/energy_ledger.h"
+#include "core/ledger/robust_ledger.h"
 #include "devices/simulated/profiles.h"
 #include "devices/simulated/simulated_device.h"
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 #include "server/haptic_loop.h"
 #include "tests/clients/softbody/scene_text.h"
 #include "tests/hard/row.h"
-#include "tests/simulation/world.h"
+#include "tests/tools/worlds/world.h"
 
 namespace tendon {
 namespace {
@@ -87,18 +87,18 @@ TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
   const std::string sentence = "Tendon is not built with -ffast-math";
   const std::string preprocess =
       TENDON_COMPILER " -std=c++20 -Wfatal-errors -E -o /dev/null -I" TENDON_SOURCES " " TENDON_INCLUDES " ";
-  const auto [status, said] = run(preprocess + "-O2 -x c++ " TENDON_SOURCES "/core/arithmetic.h");
+  const auto [status, said] = run(preprocess + "-O2 -x c++ " TENDON_SOURCES "/core/base/arithmetic.h");
   EXPECT_EQ(status, 0) << said;
   int stopped = 0;
   for (const std::string flag : {"-ffast-math", "-Ofast", "-O2 -ffinite-math-only"}) {
-    const auto [failed, why] = run(preprocess + flag + " -x c++ " TENDON_SOURCES "/core/arithmetic.h");
+    const auto [failed, why] = run(preprocess + flag + " -x c++ " TENDON_SOURCES "/core/base/arithmetic.h");
     EXPECT_NE(failed, 0) << flag;
     EXPECT_NE(why.find(sentence), std::string::npos) << why;
     stopped += failed != 0 ? 1 : 0;
   }
-  const std::vector<std::string> files = {"core/energy_ledger.cc",       "core/robust_ledger.cc",
-                                          "protocol/codec.cc",           "server/haptic_loop.cc",
-                                          "clients/cpp/force_client.cc", "clients/softbody/contact.cc"};
+  const std::vector<std::string> files = {"core/ledger/energy_ledger.cc", "core/ledger/robust_ledger.cc",
+                                          "protocol/wire/codec.cc",       "server/haptic_loop.cc",
+                                          "clients/cpp/force_client.cc",  "clients/softbody/touch/contact.cc"};
   for (const std::string& file : files) {
     const auto [failed, why] = run(preprocess + "-ffast-math " TENDON_SOURCES "/" + file);
     EXPECT_NE(failed, 0) << file;

@@ -28,10 +28,10 @@
 
 #include "devices/simulated/simulated_device.h"
 #include "tests/hard/row.h"
-#include "tests/simulation/adversary.h"
-#include "tests/simulation/watched_device.h"
-#include "tests/simulation/world.h"
 #include "tests/support/dice.h"
+#include "tests/tools/worlds/adversary.h"
+#include "tests/tools/worlds/watched_device.h"
+#include "tests/tools/worlds/world.h"
 
 namespace tendon::hard {
 namespace {
@@ -806,7 +806,7 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
 
 // Oracle: passive, bounded, quiet; an engine whose clock is set back waits for so long, its force fades meanwhile, and
 // it is back after it: at once, or where the session has ended meanwhile, when it has noticed that. The server itself
-// has one clock, CLOCK_MONOTONIC (server/clock.cc; tests/rooms sees that nobody reads another), which cannot be set; a
+// has one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms sees that nobody reads another), which cannot be set; a
 // device whose time stamps go back changes no force by it.
 TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
   constexpr Duration kWithin = seconds(5);

@@ -21,11 +21,11 @@
 #include <utility>
 #include <vector>
 
-#include "clients/softbody/cutting.h"
-#include "clients/softbody/explicit.h"
-#include "clients/softbody/gmsh.h"
-#include "clients/softbody/linear.h"
-#include "clients/softbody/quasi_static.h"
+#include "clients/softbody/effects/cutting.h"
+#include "clients/softbody/fem/gmsh.h"
+#include "clients/softbody/models/explicit.h"
+#include "clients/softbody/models/linear.h"
+#include "clients/softbody/models/quasi_static.h"
 #include "clients/softbody/scene.h"
 #include "tests/clients/softbody/pressed_block.h"
 #include "tests/hard/row.h"

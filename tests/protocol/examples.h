@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 
 // One example of everything that is said: the golden datagrams of WIRE.md are made of these.
 

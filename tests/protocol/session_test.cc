@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include "protocol/codec.h"
 #include "protocol/limits.h"
-#include "protocol/round_trip.h"
+#include "protocol/reliable/round_trip.h"
+#include "protocol/wire/codec.h"
 #include "tests/protocol/examples.h"
-#include "tests/protocol/raw_protobuf.h"
+#include "tests/protocol/wire/raw_protobuf.h"
 
 namespace tendon {
 namespace {

@@ -16,8 +16,8 @@
 
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/udp_transport.h"
-#include "core/reason.h"
-#include "server/clock.h"
+#include "core/base/reason.h"
+#include "server/machine/clock.h"
 
 namespace tendon::soak {
 

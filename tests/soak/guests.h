@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/time.h"
+#include "core/base/time.h"
 #include "protocol/link.h"
 
 namespace tendon::soak {

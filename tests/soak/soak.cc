@@ -19,12 +19,12 @@
 #include <thread>
 
 #include "protocol/link.h"
-#include "server/clock.h"
-#include "tests/e2e/process.h"
-#include "tests/e2e/stage.h"
-#include "tests/lab/json.h"
+#include "server/machine/clock.h"
+#include "tests/e2e/stage/process.h"
+#include "tests/e2e/stage/stage.h"
 #include "tests/soak/guests.h"
 #include "tests/soak/vital_signs.h"
+#include "tests/tools/lab/pictures/json.h"
 
 namespace tendon::soak {
 

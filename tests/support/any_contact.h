@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/remote_force.h"
+#include "core/remote/remote_force.h"
 #include "tests/support/dice.h"
 
 namespace tendon {
 
 /// What an engine can say of a surface while its tool is at `position`, true of a wall at x = 0 or of nothing at all;
-/// sound (core/estimation/answer.h) in any case.
+/// sound (core/remote/answer.h) in any case.
 inline Contact any_contact(Dice& dice, const Vec3& position) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
   if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <random>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 namespace tendon {
 

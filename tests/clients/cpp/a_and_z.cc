@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon::a_and_z {
 

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "core/reason.h"
+#include "core/base/reason.h"
 
 namespace tendon::dash {
 namespace {

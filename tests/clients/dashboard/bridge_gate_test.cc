@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "protocol/codec.h"
+#include "protocol/wire/codec.h"
 
 namespace tendon::dash {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "clients/dashboard/board.h"
-#include "core/reason.h"
+#include "core/base/reason.h"
 
 namespace tendon::dash {
 

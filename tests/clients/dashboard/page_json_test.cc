@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "core/reason.h"
+#include "core/base/reason.h"
 
 namespace tendon::dash {
 namespace {

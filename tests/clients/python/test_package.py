@@ -29,7 +29,7 @@ def test_the_generated_code_is_that_of_tendon_proto(tmp_path):
     if shutil.which("protoc") is None:
         pytest.skip("no protoc: apt-get install protobuf-compiler")
     described = tmp_path / "tendon.bin"
-    run("protoc", f"--proto_path={ROOT / 'protocol'}", f"--descriptor_set_out={described}", "tendon.proto")
+    run("protoc", f"--proto_path={ROOT / 'protocol/wire'}", f"--descriptor_set_out={described}", "tendon.proto")
     (file,) = FileDescriptorSet.FromString(described.read_bytes()).file
     for message in file.message_type:
         for field in message.field:

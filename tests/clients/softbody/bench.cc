@@ -10,7 +10,7 @@
 #include <type_traits>
 
 #include "clients/softbody/body.h"
-#include "clients/softbody/linear.h"
+#include "clients/softbody/models/linear.h"
 #include "tests/clients/softbody/pressed_block.h"
 
 namespace tendon::softbody {

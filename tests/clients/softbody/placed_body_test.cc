@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "core/estimation/answer.h"
+#include "core/remote/answer.h"
 #include "tests/clients/softbody/scene_text.h"
 
 namespace tendon::softbody {

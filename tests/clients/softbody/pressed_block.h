@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "clients/softbody/body.h"
-#include "clients/softbody/quasi_static.h"
-#include "clients/softbody/solid.h"
+#include "clients/softbody/fem/solid.h"
+#include "clients/softbody/models/quasi_static.h"
 
 namespace tendon::softbody::testing {
 

@@ -10,7 +10,7 @@
 #include <limits>
 #include <random>
 
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 
 namespace tendon {
 namespace {

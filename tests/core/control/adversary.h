@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "core/control/stability_controller.h"
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
 
 namespace tendon {

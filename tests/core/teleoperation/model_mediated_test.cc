@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/energy_ledger.h"
+#include "core/ledger/energy_ledger.h"
 #include "tests/support/dice.h"
 
 namespace tendon {

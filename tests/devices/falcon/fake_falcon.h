@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 #include "tests/devices/usb/usb_model.h"
 #include "tests/support/dice.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 /// The Falcon's geometry as it was published: by the half-angle of Stamper's thesis, with the Jacobian of libnifalcon,
 /// wrong z column and all. A second derivation of what devices/falcon/kinematics.cc computes.

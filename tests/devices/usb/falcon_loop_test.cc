@@ -11,8 +11,8 @@
 
 #include "devices/falcon/falcon_device.h"
 #include "devices/usb/usb.h"
-#include "server/clock.h"
 #include "server/haptic_loop.h"
+#include "server/machine/clock.h"
 #include "tests/devices/usb/usbfs_shim.h"
 #include "tests/realtime/heap_guard.h"
 

@@ -17,7 +17,7 @@
 #include <system_error>
 #include <utility>
 
-#include "server/realtime.h"
+#include "server/machine/realtime.h"
 
 namespace tendon {
 namespace {

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/time.h"
+#include "core/base/time.h"
 #include "tests/devices/falcon/fake_falcon.h"
 #include "tests/devices/falcon/socket_cable.h"
 

@@ -15,7 +15,7 @@
 #include "devices/safety/safe_device.h"
 #include "devices/spacemouse/spacemouse_device.h"
 #include "devices/usb/usb.h"
-#include "server/devices_report.h"
+#include "server/commands/devices_report.h"
 #include "tests/devices/falcon/fake_falcon.h"
 #include "tests/devices/spacemouse/fake_spacemouse.h"
 #include "tests/devices/usb/as_nobody.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/time.h"
+#include "core/base/time.h"
 
 namespace tendon {
 

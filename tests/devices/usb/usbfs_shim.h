@@ -4,7 +4,7 @@
 #include <condition_variable>
 #include <thread>
 
-#include "core/time.h"
+#include "core/base/time.h"
 #include "tests/devices/falcon/fake_falcon.h"
 #include "tests/devices/usb/usbfs_node.h"
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 #include "tests/devices/woodenhaptics/published_arm.h"
 #include "tests/support/dice.h"
 

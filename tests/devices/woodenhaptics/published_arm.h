@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/motion.h"
+#include "core/base/motion.h"
 
 /// The arms as they were published, each number in its published place, with a kinematics of its own: turns of links
 /// instead of sums of sines, and circles that cross instead of the law of cosines. Nothing of devices/woodenhaptics.

@@ -11,7 +11,7 @@ export interface ReasonWords {
   readonly limits: boolean;
 }
 
-/** The bits of core/reason.h. */
+/** The bits of core/base/reason.h. */
 export const kReasons: readonly ReasonWords[] = [
   { bit: 8, name: "Fault", meaning: "a latched fault holds the force at zero", limits: true },
   { bit: 13, name: "Disarmed", meaning: "an operator has disarmed the device: zero until it is armed again", limits: true },

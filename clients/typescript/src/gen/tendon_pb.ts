@@ -250,7 +250,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   permittedForceN: number;
 
   /**
-   * bits of core/reason.h: why the force is not what was asked for
+   * bits of core/base/reason.h: why the force is not what was asked for
    *
    * @generated from field: fixed32 reasons = 8;
    */

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/engine/tool_coupling.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace tendon {
+namespace {
+
+void expect(bool ok, const char* field) {
+  if (!ok) throw std::invalid_argument(std::string("ToolCoupling: ") + field + " is impossible");
+}
+bool positive(double value) { return value > 0 && std::isfinite(value); }
+
+}  // namespace
+
+ToolCoupling::ToolCoupling(const Config& config) : config_(config) {
+  expect(positive(config.stiffness), "stiffness");
+  expect(config.damping >= 0 && std::isfinite(config.damping), "damping");
+  expect(positive(config.tool_mass), "tool_mass");
+  expect(positive(config.step_s), "step_s");
+  expect(positive(config.max_force), "max_force");
+  share_ = 1 / (1 + (config.damping + config.stiffness * config.step_s) * config.step_s / config.tool_mass);
+}
+
+ToolCoupling::Forces ToolCoupling::couple(const DeviceState& hand, const Vec3& tool_position,
+                                          const Vec3& tool_velocity) const noexcept {
+  const Vec3 apart = hand.position - tool_position;
+  const Vec3 parting = hand.velocity - tool_velocity;
+  Vec3 force = share_ * (config_.stiffness * (apart + config_.step_s * parting) + config_.damping * parting);
+  const double size = force.norm();
+  if (size > config_.max_force) force *= config_.max_force / size;
+  return {.on_tool = force, .on_hand = -force};
+}
+
+}  // namespace tendon

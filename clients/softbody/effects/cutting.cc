@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/effects/cutting.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace tendon::softbody {
+namespace {
+
+/// Of the distance between two middles: a plane that goes through one is seen on its far side wherever it is rounded
+/// to.
+constexpr double kOnPlane = 1e-6;
+
+/// Things that hang together, by their numbers (union-find).
+class Groups {
+ public:
+  explicit Groups(std::size_t size) : of_(size) { std::iota(of_.begin(), of_.end(), 0); }
+  int find(int item) {
+    while (of_[at(item)] != item) item = of_[at(item)] = of_[at(of_[at(item)])];
+    return item;
+  }
+  void unite(int a, int b) {
+    a = find(a);
+    b = find(b);
+    of_[at(std::max(a, b))] = std::min(a, b);  // the lowest number stands for all
+  }
+
+ private:
+  std::vector<int> of_;
+};
+
+Vec3 middle(const Mesh& mesh, int element) {
+  Vec3 sum = Vec3::Zero();
+  const auto corners = mesh.element(element).first(at(corners_of(mesh.shape)));
+  for (const int node : corners) sum += mesh.nodes[at(node)];
+  return sum / static_cast<double>(corners.size());
+}
+
+bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
+  const Vec3 normal = cut.along.cross(cut.deep);
+  const double least = kOnPlane * normal.norm() * (to - from).norm();
+  const double before = normal.dot(from - cut.corner) + least;
+  const double after = normal.dot(to - cut.corner) + least;
+  if ((before > 0) == (after > 0)) return false;
+  const Vec3 place = from + before / (before - after) * (to - from) - cut.corner;
+  const double s = place.cross(cut.deep).dot(normal) / normal.squaredNorm();
+  const double t = cut.along.cross(place).dot(normal) / normal.squaredNorm();
+  return s >= -kOnPlane && s <= 1 + kOnPlane && t >= -kOnPlane && t <= 1 + kOnPlane;
+}
+
+/// Gives each group of elements that hang together around a node, but not through one of the faces that are opened, a
+/// node of its own.
+void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed, Division& to) {
+  const int per = nodes_of(mesh.shape);
+  const auto place_of = [&](int element, int node) {
+    const auto nodes = mesh.element(element);
+    return element * per + static_cast<int>(std::ranges::find(nodes, node) - nodes.begin());
+  };
+  Groups places(mesh.elements.size());
+  std::vector<bool> on_cut(mesh.nodes.size());
+  for (const auto& [face, opposite] : inner_faces(mesh)) {
+    const Vec3 from = middle(mesh, face.element);
+    const Vec3 to_there = middle(mesh, opposite.element);
+    const bool open = std::ranges::any_of(cuts, [&](const Cut& cut) { return between(cut, from, to_there); });
+    to.opened += open ? 1 : 0;
+    for (const int node : nodes_on(mesh, face)) {
+      if (open) on_cut[at(node)] = true;
+      if (!open) places.unite(place_of(face.element, node), place_of(opposite.element, node));
+    }
+  }
+  std::vector<int> first(mesh.nodes.size(), -1);         // group that keeps the node's number
+  std::vector<int> number_of(mesh.elements.size(), -1);  // by group
+  to.mesh = mesh;
+  to.fixed = fixed;
+  to.node_before.resize(mesh.nodes.size());
+  std::iota(to.node_before.begin(), to.node_before.end(), 0);
+  for (std::size_t i = 0; i < mesh.elements.size(); ++i) {
+    const int node = mesh.elements[i];
+    if (!on_cut[at(node)]) continue;
+    const int group = places.find(static_cast<int>(i));
+    if (first[at(node)] < 0) {
+      first[at(node)] = group;
+      number_of[at(group)] = node;
+    }
+    int& number = number_of[at(group)];
+    if (number < 0) {
+      number = static_cast<int>(to.mesh.nodes.size());
+      to.mesh.nodes.push_back(mesh.nodes[at(node)]);
+      to.node_before.push_back(node);
+      for (int c = 0; c < 3; ++c) to.fixed.push_back(fixed[at(3 * node + c)]);
+    }
+    to.mesh.elements[i] = number;
+  }
+}
+
+/// Takes out the pieces that three held nodes, not on one line, do not keep from moving as a whole.
+void drop_loose(Division& to) {
+  Mesh& mesh = to.mesh;
+  Groups pieces(mesh.nodes.size());
+  for (int e = 0; e < mesh.element_count(); ++e) {
+    for (const int node : mesh.element(e)) pieces.unite(mesh.element(e).front(), node);
+  }
+  struct Hold {
+    std::optional<Vec3> first;
+    std::optional<Vec3> second;
+    bool fast = false;
+  };
+  std::vector<Hold> holds(mesh.nodes.size());
+  for (int node = 0; node < static_cast<int>(mesh.nodes.size()); ++node) {
+    if (!to.fixed[at(3 * node)] || !to.fixed[at(3 * node + 1)] || !to.fixed[at(3 * node + 2)]) continue;
+    Hold& hold = holds[at(pieces.find(node))];
+    const Vec3& place = mesh.nodes[at(node)];
+    if (!hold.first) {
+      hold.first = place;
+    } else if (!hold.second && place != *hold.first) {
+      hold.second = place;
+    } else if (hold.second) {
+      const Vec3 line = *hold.second - *hold.first;
+      hold.fast = hold.fast || line.cross(place - *hold.first).norm() > kOnPlane * line.squaredNorm();
+    }
+  }
+  std::vector<int> kept;
+  std::vector<bool> used(mesh.nodes.size());
+  for (int e = 0; e < mesh.element_count(); ++e) {
+    const auto nodes = mesh.element(e);
+    if (!holds[at(pieces.find(nodes.front()))].fast) {
+      ++to.lost;
+      continue;
+    }
+    kept.insert(kept.end(), nodes.begin(), nodes.end());
+    for (const int node : nodes) used[at(node)] = true;
+  }
+  if (to.lost == 0) return;
+  mesh.elements = std::move(kept);
+  for (std::size_t i = 0; i < to.fixed.size(); ++i) to.fixed[i] = to.fixed[i] || !used[i / 3];
+}
+
+}  // namespace
+
+Division divide(const Mesh& mesh, const Fixed& fixed, std::span<const Cut> cuts) {
+  Division division;
+  part_nodes(mesh, cuts, fixed, division);
+  drop_loose(division);
+  return division;
+}
+
+std::vector<int> twins(const Elastic& divided, const Division& division) {
+  std::vector<int> twin_of;
+  const int nodes = static_cast<int>(division.node_before.size());
+  for (int node = 0; node < nodes; ++node) {
+    if (division.node_before[at(node)] == node) continue;
+    for (int c = 0; c < 3; ++c) {
+      if (divided.free_of(3 * node + c) >= 0) {
+        twin_of.push_back(divided.free_of(3 * division.node_before[at(node)] + c));
+      }
+    }
+  }
+  return twin_of;
+}
+
+Cutting::Cutting(std::vector<PlannedCut> plan) : plan_(std::move(plan)) {
+  for (std::size_t i = 0; i < plan_.size(); ++i) {
+    const auto refuse = [&](const std::string& what) {
+      throw std::invalid_argument("`cutting`: cut " + std::to_string(i + 1) + ' ' + what);
+    };
+    const Cut& cut = plan_[i].cut;
+    if (!cut.corner.allFinite() || !(cut.along.cross(cut.deep).norm() > 0) ||
+        !std::isfinite(cut.along.cross(cut.deep).norm())) {
+      refuse("has no area");
+    }
+    const bool timed = plan_[i].when == PlannedCut::When::kTime;
+    if (timed && !(plan_[i].value >= 0)) refuse("wants a time of 0 or more");
+    if (!timed && !(plan_[i].value > 0)) refuse("wants a force above 0");
+  }
+  made_.reserve(plan_.size());
+}
+
+bool Cutting::due(PlannedCut::When when, double value) const noexcept {
+  if (left() == 0 || plan_[made_.size()].when != when) return false;
+  const double wanted = plan_[made_.size()].value;
+  return when == PlannedCut::When::kTime ? value >= wanted : value > wanted;
+}
+
+std::span<const Cut> Cutting::make_next() {
+  made_.push_back(plan_[made_.size()].cut);
+  changed_ = true;
+  return made_;
+}
+
+bool Cutting::take_changed() noexcept { return std::exchange(changed_, false); }
+
+std::size_t Cutting::bytes() const noexcept {
+  return sizeof *this + plan_.size() * sizeof(PlannedCut) + made_.capacity() * sizeof(Cut);
+}
+
+}  // namespace tendon::softbody

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "clients/softbody/fem/elastic.h"
+
+namespace tendon::softbody {
+
+/// Something else than elasticity that acts on all of a body. As one step of time sees it, it is an energy that is
+/// quadratic in the free displacements u, and the body goes where the sum of all energies is least; with inertia that
+/// is the implicit Euler method. An effect that a scene does not list is not constructed: it has no state, and no
+/// instruction of a step is its.
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Effect {
+ public:
+  Effect() = default;
+  virtual ~Effect() = default;
+  Effect(const Effect&) = delete;
+  Effect& operator=(const Effect&) = delete;
+
+  virtual double energy(const VectorXd& u) const = 0;                    ///< J, but for a constant
+  virtual void add_force(const VectorXd& u, VectorXd& force) const = 0;  ///< N, −∂energy/∂u
+  virtual void add_stiffness(SymmetricMatrix& to) const = 0;             ///< N/m, ∂²energy/∂u², which is constant
+  virtual void advance(const VectorXd& u) = 0;                           ///< a step ends at u; the next begins there
+  virtual std::size_t bytes() const noexcept = 0;
+};
+
+/// Weight: −Σ m g·u.
+class Gravity : public Effect {
+ public:
+  /// `acceleration` in the body's frame, m/s²; `density` kg/m³.
+  Gravity(const Elastic& elastic, const Vec3& acceleration, double density);
+  double energy(const VectorXd& u) const override { return -weight_.dot(u); }
+  void add_force(const VectorXd&, VectorXd& force) const override { force += weight_; }
+  void add_stiffness(SymmetricMatrix&) const override {}
+  void advance(const VectorXd&) override {}
+  std::size_t bytes() const noexcept override;
+
+ private:
+  VectorXd weight_;  ///< N
+};
+
+/// Mass that keeps on: ½ Σ m (u − u₀ − v₀ dt)² / dt², of a step from u₀ with the velocity v₀.
+class Inertia : public Effect {
+ public:
+  Inertia(const Elastic& elastic, const VectorXd& u, double density, double dt);
+  double energy(const VectorXd& u) const override;
+  void add_force(const VectorXd& u, VectorXd& force) const override;
+  void add_stiffness(SymmetricMatrix& to) const override;
+  void advance(const VectorXd& u) override;
+  std::size_t bytes() const noexcept override;
+
+ private:
+  VectorXd weight_;  ///< m/dt², N/m
+  VectorXd start_;   ///< u₀, m
+  VectorXd ahead_;   ///< u₀ + v₀ dt, m
+};
+
+/// A bath around every particle, which pulls with −rate·m·v: ½ Σ rate/dt m (u − u₀)². It also slows a body that moves
+/// as a whole, and so is for bringing one to rest rather than for tissue.
+class Damping : public Effect {
+ public:
+  /// `rate` 1/s.
+  Damping(const Elastic& elastic, const VectorXd& u, double density, double rate, double dt);
+  double energy(const VectorXd& u) const override;
+  void add_force(const VectorXd& u, VectorXd& force) const override;
+  void add_stiffness(SymmetricMatrix& to) const override;
+  void advance(const VectorXd& u) override { start_ = u; }
+  std::size_t bytes() const noexcept override;
+
+ private:
+  VectorXd drag_;   ///< rate·m/dt, N/m
+  VectorXd start_;  ///< u₀, m
+};
+
+/// A material that resists being deformed quickly (Kelvin and Voigt): the stress of a strain ε is that of ε + τ ∂ε/∂t,
+/// with the stiffness K₀ of the body at rest: ½ τ/dt (u − u₀)ᵀ K₀ (u − u₀). Right for small rotations: a body that
+/// turns as a whole is slowed too.
+class Viscosity : public Effect {
+ public:
+  /// `relaxation` τ, s.
+  Viscosity(const Elastic& elastic, const VectorXd& u, double relaxation, double dt);
+  double energy(const VectorXd& u) const override;
+  void add_force(const VectorXd& u, VectorXd& force) const override;
+  void add_stiffness(SymmetricMatrix& to) const override;
+  void advance(const VectorXd& u) override { start_ = u; }
+  std::size_t bytes() const noexcept override;
+
+ private:
+  SymmetricMatrix resistance_;  ///< τ/dt K₀, N/m
+  VectorXd start_;              ///< u₀, m
+};
+
+/// The effects of a scene. What is empty or false is not there.
+struct EffectsConfig {
+  double density = 0;                    ///< kg/m³, above 0; for gravity, inertia and damping
+  double step = 0;                       ///< s, above 0: how long an answer lasts; for those with time
+  std::optional<Vec3> gravity = {};      ///< m/s², in the body's frame
+  bool inertia = false;                  ///< has time, and so have the next two
+  std::optional<double> damping = {};    ///< 1/s
+  std::optional<double> viscosity = {};  ///< s
+
+  bool has_time() const noexcept { return inertia || damping || viscosity; }
+};
+
+/// Throws std::invalid_argument that names the field.
+void check(const EffectsConfig& config);
+
+/// For models that are made of steps of time: throws std::invalid_argument without inertia and with viscosity.
+void check_only_with_inertia(const EffectsConfig& config);
+
+using Effects = std::vector<std::unique_ptr<Effect>>;
+
+/// What acts on a body at rest too; and what acts only on one that moves, here from rest at u (m, free displacements).
+Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic);
+void add_effects_of_time(Effects& effects, const EffectsConfig& config, const Elastic& elastic, const VectorXd& u);
+
+/// Their energy and forces at u (m, all nodes), to those of elasticity; the forces of free displacements.
+void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to);
+
+std::size_t bytes(const Effects& effects) noexcept;
+
+}  // namespace tendon::softbody

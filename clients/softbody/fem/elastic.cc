@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/fem/elastic.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace tendon::softbody {
+
+Elastic::Elastic(Mesh mesh, const Fixed& fixed) : mesh_(std::move(mesh)) {
+  check(mesh_, "mesh");
+  if (fixed.size() != 3 * mesh_.nodes.size() || std::ranges::find(fixed, true) == fixed.end()) {
+    throw std::invalid_argument("nothing holds the body: some of its nodes must be fixed");
+  }
+  for (std::size_t i = 0; i < fixed.size(); ++i) {
+    free_of_.push_back(fixed[i] ? -1 : static_cast<int>(all_of_.size()));
+    if (!fixed[i]) all_of_.push_back(static_cast<int>(i));
+  }
+  // Neighbours of each node, itself included.
+  std::vector<std::vector<int>> near(mesh_.nodes.size());
+  for (int e = 0; e < mesh_.element_count(); ++e) {
+    for (const int a : mesh_.element(e)) {
+      near[at(a)].insert(near[at(a)].end(), mesh_.element(e).begin(), mesh_.element(e).end());
+    }
+  }
+  for (auto& list : near) {
+    std::ranges::sort(list);
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+  pattern_.size = free_count();
+  pattern_.column_starts.push_back(0);
+  for (int column = 0; column < free_count(); ++column) {
+    for (const int node : near[at(all_of_[at(column)] / 3)]) {
+      for (int c = 0; c < 3; ++c) {
+        const int row = free_of_[at(3 * node + c)];
+        if (row >= column) pattern_.rows.push_back(row);
+      }
+    }
+    pattern_.column_starts.push_back(static_cast<int>(pattern_.rows.size()));
+  }
+  pattern_.values.assign(pattern_.rows.size(), 0);
+}
+
+int Elastic::slot(int row_component, int column_component) const {
+  const int row = free_of(row_component);
+  const int column = free_of(column_component);
+  return column < 0 || row < column ? -1 : pattern_.slot(row, column);
+}
+
+Fixed Elastic::fixed() const {
+  Fixed fixed(free_of_.size());
+  for (std::size_t i = 0; i < fixed.size(); ++i) fixed[i] = free_of_[i] < 0;
+  return fixed;
+}
+
+VectorXd Elastic::to_free(const VectorXd& all) const {
+  VectorXd free(free_count());
+  for (int i = 0; i < free_count(); ++i) free[i] = all[all_of_[at(i)]];
+  return free;
+}
+
+void Elastic::add_free(const VectorXd& free, VectorXd& all) const {
+  for (int i = 0; i < free_count(); ++i) all[all_of_[at(i)]] += free[i];
+}
+
+std::size_t Elastic::mesh_bytes() const noexcept {
+  return mesh_.nodes.size() * sizeof(Vec3) + mesh_.elements.size() * sizeof(int) +
+         (free_of_.size() + all_of_.size()) * sizeof(int) + pattern_.bytes();
+}
+
+VectorXd lumped_mass(const Elastic& elastic, double density) {
+  const std::vector<double> volumes = nodal_volumes(elastic.mesh());
+  VectorXd all(elastic.size());
+  for (int i = 0; i < elastic.size(); ++i) all[i] = density * volumes[at(i / 3)];
+  return elastic.to_free(all);
+}
+
+VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch) {
+  VectorXd all = VectorXd::Zero(elastic.size());
+  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
+    all.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]) = -patch.weights[i] * normal;
+  }
+  return all;
+}
+
+double depth_below(const Patch& patch, const Vec3& normal, const VectorXd& u) {
+  double depth = 0;
+  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
+    depth -= patch.weights[i] * normal.dot(u.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
+  }
+  return depth;
+}
+
+Vec2 slope_below(const Patch& patch, const Vec3& normal, const VectorXd& u) {
+  Vec2 slope = Vec2::Zero();
+  for (Eigen::Index i = 0; i < patch.weights.size(); ++i) {
+    slope -= patch.slopes.col(i) * normal.dot(u.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
+  }
+  return slope;
+}
+
+}  // namespace tendon::softbody

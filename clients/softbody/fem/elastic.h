@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "clients/softbody/fem/mesh.h"
+#include "clients/softbody/fem/patch.h"
+#include "clients/softbody/fem/sparse.h"
+
+namespace tendon::softbody {
+
+/// Which displacements are given, and which are to be found. Component c of node i has the number 3 i + c.
+using Fixed = std::vector<bool>;
+
+/// The number 3 i + c of every component of every node for which `holds(position)`.
+template <class Predicate>
+Fixed fix_where(const Mesh& mesh, Predicate holds) {
+  Fixed fixed(3 * mesh.nodes.size());
+  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
+    const bool held = holds(mesh.nodes[i]);
+    for (std::size_t c = 0; c < 3; ++c) fixed[3 * i + c] = held;
+  }
+  return fixed;
+}
+
+/// A mesh, held somewhere, with an elastic energy: its value and first two derivatives by the displacements u (m, all
+/// nodes). The energy has a minimum of 0 at u = 0, and nodes act on each other only within an element.
+///
+/// Without state. Thread-safe: yes, once built. Realtime-safe: no.
+class Elastic {
+ public:
+  virtual ~Elastic() = default;
+
+  const Mesh& mesh() const noexcept { return mesh_; }
+
+  int size() const noexcept { return static_cast<int>(free_of_.size()); }  ///< of u: 3 for each node
+  int free_count() const noexcept { return static_cast<int>(all_of_.size()); }
+  int free_of(int component) const noexcept { return free_of_[at(component)]; }  ///< its number among the free, or −1
+  Fixed fixed() const;
+  VectorXd to_free(const VectorXd& all) const;
+  void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free; the fixed ones stay
+
+  virtual double energy(const VectorXd& u) const = 0;  ///< J
+  /// ∂energy/∂u, N: what must act on the nodes from outside to hold them there.
+  struct Forces {
+    double energy;
+    VectorXd force;
+  };
+  virtual Forces forces(const VectorXd& u) const = 0;
+
+  enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
+  /// The second derivative by the free displacements, N/m.
+  virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
+  /// Its pattern, with zeros.
+  const SymmetricMatrix& pattern() const noexcept { return pattern_; }
+
+  virtual std::size_t bytes() const noexcept = 0;
+
+ protected:
+  /// Throws std::invalid_argument when the mesh is not sound or nothing is fixed.
+  Elastic(Mesh mesh, const Fixed& fixed);
+  Elastic(const Elastic&) = default;
+  Elastic(Elastic&&) = default;
+  Elastic& operator=(const Elastic&) = default;
+  Elastic& operator=(Elastic&&) = default;
+
+  /// Where the entry of two components is among the pattern's values; −1: above the diagonal, or one is fixed.
+  int slot(int row_component, int column_component) const;
+  std::size_t mesh_bytes() const noexcept;  ///< of what this base keeps
+
+ private:
+  Mesh mesh_;
+  std::vector<int> free_of_;  ///< by component
+  std::vector<int> all_of_;   ///< by free component
+  SymmetricMatrix pattern_;
+};
+
+/// The kg that are at each free displacement.
+VectorXd lumped_mass(const Elastic& elastic, double density);
+
+/// 1 N on the patch, against the normal, as forces on all nodes.
+VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
+
+/// The mean depth of a patch, m, and its change as the patch moves, of a body with the displacements u.
+double depth_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
+Vec2 slope_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
+
+}  // namespace tendon::softbody

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/fem/gmsh.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <unordered_map>
+#include <vector>
+
+namespace tendon::softbody {
+namespace {
+
+constexpr int kMaxCount = 10'000'000;
+
+/// The words of a text, and the line that each is on.
+class Words {
+ public:
+  Words(std::string_view text, std::string_view name) : rest_(text), name_(name) {}
+
+  std::string_view word(std::string_view expected) {
+    const std::string_view found = next();
+    if (found.empty()) fail("expected " + std::string(expected) + ", found the end of the file");
+    return found;
+  }
+
+  double number() { return value<double>("a number"); }
+  std::int64_t whole() { return value<std::int64_t>("a whole number"); }
+  std::int64_t count() {
+    const auto found = whole();
+    if (found < 0 || found > kMaxCount) fail("expected a count of at most 10 million, found " + std::to_string(found));
+    return found;
+  }
+
+  void expect(std::string_view keyword) {
+    const auto found = word(keyword);
+    if (found != keyword) fail("expected " + std::string(keyword) + ", found \"" + std::string(found) + '"');
+  }
+
+  /// Goes on behind the line that is `keyword`. False when there is none.
+  bool seek(std::string_view keyword) {
+    for (;;) {
+      const std::string_view found = next();
+      if (found.empty()) return false;
+      if (found == keyword) return true;
+    }
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw std::invalid_argument(std::string(name_) + ":" + std::to_string(line_) + ": " + what);
+  }
+
+ private:
+  std::string_view next() {
+    std::size_t begin = 0;
+    while (begin < rest_.size() &&
+           (rest_[begin] == ' ' || rest_[begin] == '\t' || rest_[begin] == '\r' || rest_[begin] == '\n')) {
+      line_ += rest_[begin] == '\n' ? 1 : 0;
+      ++begin;
+    }
+    const std::size_t end = std::min(rest_.find_first_of(" \t\r\n", begin), rest_.size());
+    const std::string_view found = rest_.substr(begin, end - begin);
+    rest_.remove_prefix(end);
+    return found;
+  }
+
+  template <class T>
+  T value(std::string_view what) {
+    const std::string_view found = word(what);
+    T result{};
+    const auto [stop, error] = std::from_chars(found.data(), found.data() + found.size(), result);
+    bool good = error == std::errc{} && stop == found.data() + found.size();
+    if constexpr (std::is_floating_point_v<T>) good = good && std::isfinite(result);
+    if (!good) fail("expected " + std::string(what) + ", found \"" + std::string(found) + '"');
+    return result;
+  }
+
+  std::string_view rest_;
+  std::string_view name_;
+  int line_ = 1;
+};
+
+/// gmsh's number of an element's type: how many nodes it has, and its shape when it is a volume of ours.
+struct Type {
+  int number;
+  int nodes;
+  std::optional<Shape> shape;
+  bool volume;
+};
+constexpr Type kTypes[] = {
+    {1, 2, {}, false},          {2, 3, {}, false},          {3, 4, {}, false},
+    {4, 4, Shape::kTet4, true}, {5, 8, Shape::kHex8, true}, {6, 6, {}, true},
+    {7, 5, {}, true},           {8, 3, {}, false},          {9, 6, {}, false},
+    {10, 9, {}, false},         {11, 10, {}, true},         {12, 27, Shape::kHex27, true},
+    {15, 1, {}, false},         {16, 8, {}, false},         {17, 20, Shape::kHex20, true},
+};
+
+struct FileElement {
+  std::int64_t number;
+  std::vector<std::int64_t> nodes;
+};
+
+/// What a file has, in its own numbers.
+struct Content {
+  std::unordered_map<std::int64_t, Vec3> nodes;
+  std::vector<FileElement> elements;
+  std::optional<Shape> shape;
+};
+
+class Reader {
+ public:
+  Reader(std::string_view text, std::string_view name) : words_(text, name), name_(name) {}
+
+  Content read() {
+    const std::string_view first = words_.word("$MeshFormat or $NOD");
+    if (first == "$NOD") {
+      read_nodes();
+      words_.expect("$ENDNOD");
+      words_.expect("$ELM");
+      read_elements_of_format_1();
+      words_.expect("$ENDELM");
+    } else if (first == "$MeshFormat") {
+      const double version = words_.number();
+      if (words_.whole() != 0) words_.fail("a binary file; save it as text");
+      if (version != 2.2 && version != 4.1) words_.fail("expected format 2.2 or 4.1");
+      seek("$Nodes");
+      version < 4 ? read_nodes() : read_nodes_of_format_4();
+      words_.expect("$EndNodes");
+      seek("$Elements");
+      version < 4 ? read_elements_of_format_2() : read_elements_of_format_4();
+      words_.expect("$EndElements");
+    } else {
+      words_.fail("expected $MeshFormat or $NOD: this is not a mesh file of gmsh");
+    }
+    return std::move(content_);
+  }
+
+ private:
+  void seek(std::string_view keyword) {
+    if (!words_.seek(keyword)) words_.fail("there is no " + std::string(keyword));
+  }
+
+  void add_node(std::int64_t number) {
+    const double x = words_.number();
+    const double y = words_.number();
+    const double z = words_.number();
+    if (!content_.nodes.try_emplace(number, x, y, z).second) {
+      words_.fail("node " + std::to_string(number) + " is there twice");
+    }
+  }
+
+  void read_nodes() {
+    for (auto left = words_.count(); left > 0; --left) add_node(words_.whole());
+  }
+
+  void read_nodes_of_format_4() {
+    const auto blocks = words_.count();
+    for (int skipped = 0; skipped < 3; ++skipped) words_.count();
+    for (std::int64_t block = 0; block < blocks; ++block) {
+      words_.whole();
+      words_.whole();
+      if (words_.whole() != 0) words_.fail("parametric nodes are not read");
+      std::vector<std::int64_t> numbers(static_cast<std::size_t>(words_.count()));
+      for (auto& number : numbers) number = words_.whole();
+      for (const auto number : numbers) add_node(number);
+    }
+  }
+
+  const Type& type(std::int64_t number) {
+    const auto* const found = std::ranges::find(kTypes, number, &Type::number);
+    if (found == std::end(kTypes)) words_.fail("unknown type of element: " + std::to_string(number));
+    return *found;
+  }
+
+  void add_element(std::int64_t number, const Type& type) {
+    FileElement element{number, std::vector<std::int64_t>(static_cast<std::size_t>(type.nodes))};
+    for (auto& node : element.nodes) node = words_.whole();
+    if (!type.volume) return;
+    const std::string who = "element " + std::to_string(number);
+    if (!type.shape) words_.fail(who + " is neither a tetrahedron of 4 nodes nor a hexahedron of 8, 20 or 27");
+    if (content_.shape && *content_.shape != *type.shape) words_.fail(who + " is not of the shape of those before it");
+    content_.shape = type.shape;
+    for (const auto node : element.nodes) {
+      if (!content_.nodes.contains(node))
+        words_.fail(who + " has the node " + std::to_string(node) + ", which is not there");
+    }
+    if (std::set(element.nodes.begin(), element.nodes.end()).size() != element.nodes.size()) {
+      words_.fail(who + " has a node twice");
+    }
+    content_.elements.push_back(std::move(element));
+  }
+
+  void read_elements_of_format_1() {
+    for (auto left = words_.count(); left > 0; --left) {
+      const auto number = words_.whole();
+      const Type& kind = type(words_.whole());
+      words_.whole();
+      words_.whole();
+      if (words_.whole() != kind.nodes)
+        words_.fail("element " + std::to_string(number) + " has a wrong number of nodes");
+      add_element(number, kind);
+    }
+  }
+
+  void read_elements_of_format_2() {
+    for (auto left = words_.count(); left > 0; --left) {
+      const auto number = words_.whole();
+      const Type& kind = type(words_.whole());
+      for (auto tags = words_.count(); tags > 0; --tags) words_.whole();
+      add_element(number, kind);
+    }
+  }
+
+  void read_elements_of_format_4() {
+    const auto blocks = words_.count();
+    for (int skipped = 0; skipped < 3; ++skipped) words_.count();
+    for (std::int64_t block = 0; block < blocks; ++block) {
+      words_.whole();
+      words_.whole();
+      const Type& kind = type(words_.whole());
+      for (auto left = words_.count(); left > 0; --left) add_element(words_.whole(), kind);
+    }
+  }
+
+  Words words_;
+  std::string_view name_;
+  Content content_;
+};
+
+/// check() counts the elements of a Mesh; a person looks for the file's own number.
+void check_each(const Mesh& mesh, const std::vector<FileElement>& named, std::string_view name) {
+  Mesh one{.shape = mesh.shape, .nodes = mesh.nodes, .elements = {}};
+  try {
+    check(mesh, name);
+  } catch (const std::invalid_argument&) {
+    for (int e = 0; e < mesh.element_count(); ++e) {
+      const auto nodes = mesh.element(e);
+      one.elements.assign(nodes.begin(), nodes.end());
+      try {
+        check(one, name);
+      } catch (const std::invalid_argument& error) {
+        std::string what = error.what();
+        const std::string_view first = "element 1 ";
+        what.replace(what.find(first), first.size(),
+                     "element " + std::to_string(named[static_cast<std::size_t>(e)].number) + " ");
+        throw std::invalid_argument(what);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Mesh parse_gmsh(std::string_view text, std::string_view name, double scale) {
+  const Content content = Reader(text, name).read();
+  if (!content.shape) throw std::invalid_argument(std::string(name) + ": no volume element: this is a surface");
+  Mesh mesh{.shape = *content.shape, .nodes = {}, .elements = {}};
+  std::unordered_map<std::int64_t, int> index;
+  for (const FileElement& element : content.elements) {
+    for (const auto node : element.nodes) {
+      const auto [found, is_new] = index.try_emplace(node, static_cast<int>(mesh.nodes.size()));
+      if (is_new) mesh.nodes.emplace_back(scale * content.nodes.at(node));
+      mesh.elements.push_back(found->second);
+    }
+  }
+  check_each(mesh, content.elements, name);
+  return mesh;
+}
+
+Mesh read_gmsh(const std::filesystem::path& file, double scale) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(file, error);
+  if (error) throw std::invalid_argument("cannot read " + file.string() + ": " + error.message());
+  if (bytes > kMaxMeshBytes) throw std::invalid_argument(file.string() + ": larger than 256 MiB");
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  if (!stream) throw std::invalid_argument("cannot read " + file.string());
+  return parse_gmsh(text, file.string(), scale);
+}
+
+}  // namespace tendon::softbody

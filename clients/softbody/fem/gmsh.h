@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+#include "clients/softbody/fem/mesh.h"
+
+namespace tendon::softbody {
+
+/// Reads the volume elements of a mesh file of gmsh: text of the formats 1, 2.2 and 4.1, tetrahedra or hexahedra (8,
+/// 20 or 27 nodes), of one shape. Points, lines and faces are left out, and so are nodes that no volume element has.
+/// Coordinates are multiplied by `scale` to become m: 1e-3 for a file in mm.
+///
+/// Strict: throws std::invalid_argument "FILE: …" that names the element (by the file's own number) or the line when
+/// a number is missing, out of range or not finite, a node is not there or named twice, an element has a node twice, is
+/// turned inside out or has no volume, or shapes are mixed.
+Mesh read_gmsh(const std::filesystem::path& file, double scale);
+
+/// The same for text in memory; `name` is what errors call it.
+Mesh parse_gmsh(std::string_view text, std::string_view name, double scale);
+
+/// A larger file is refused: a mesh with a million nodes is far beyond what any model here answers with in time.
+inline constexpr std::uintmax_t kMaxMeshBytes = 256U << 20U;
+
+}  // namespace tendon::softbody

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "clients/softbody/fem/element.h"
+
+namespace tendon::softbody {
+
+/// Energy densities Ψ(F), F = I + ∂u/∂X. All agree for small strains, and all are linear in µ and λ, which is what
+/// selective reduced integration needs. With J = det F, ε = sym(F − I), E = ½(FᵀF − I), R the rotation next to F:
+///
+///     linear         µ ε:ε + ½ λ (tr ε)²                             a rotation is a strain
+///     corotational   µ |F − R|² + ½ λ (tr(RᵀF) − 3)²
+///     StVK           µ E:E + ½ λ (tr E)²                             soft in compression, then inverts and stays so
+///     Neo-Hookean    ½ µ (|F|² − 3) − µ (J − 1) + ½ (λ + µ) (J − 1)²   "stable": finite through J ≤ 0, and pushes back
+///
+/// (Müller & Gross 2004; Smith, de Goes & Kim 2018, without their barrier for the collapse to a point.)
+enum class Law : std::uint8_t { kLinear, kCorotational, kStVenantKirchhoff, kNeoHookean };
+
+/// An isotropic solid.
+struct Material {
+  double young = 0;    ///< E, Pa; > 0
+  double poisson = 0;  ///< ν, 0 ≤ ν < ½
+
+  double mu() const noexcept { return young / (2 * (1 + poisson)); }
+  double lambda() const noexcept { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
+};
+
+/// Throws std::invalid_argument that names the field.
+void check(const Material& material);
+
+using Mat9 = Eigen::Matrix<double, 9, 9>;
+
+/// A linear map of matrices, as one of columns: `change(dF)` for each entry of dF.
+template <class Change>
+Mat9 by_columns(const Change& change) {
+  Mat9 all;
+  for (int column = 0; column < 9; ++column) {
+    Mat3 df = Mat3::Zero();
+    df(column % 3, column / 3) = 1;
+    const Mat3 dp = change(df);
+    all.col(column) = dp.reshaped();
+  }
+  return all;
+}
+
+/// What a law says at one F.
+struct Stress {
+  double energy;  ///< Ψ, J/m³
+  Mat3 piola;     ///< P = ∂Ψ/∂F, Pa
+};
+Stress stress(Law law, const Mat3& f, double mu, double lambda);
+
+/// ∂P/∂F, Pa; F and P as columns one below the other. Symmetric. Not definite where the material can buckle.
+Mat9 tangent(Law law, const Mat3& f, double mu, double lambda);
+
+/// The nearest matrix without negative eigenvalues: a Newton step with it always goes downhill.
+Mat9 without_negative(const Mat9& symmetric);
+
+/// The rotation R that is nearest to F (polar decomposition); a rotation also where F is turned inside out.
+Mat3 nearest_rotation(const Mat3& f);
+
+}  // namespace tendon::softbody

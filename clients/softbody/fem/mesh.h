@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "clients/softbody/fem/element.h"
+
+namespace tendon::softbody {
+
+/// A body at rest, cut into elements of one shape.
+struct Mesh {
+  Shape shape = Shape::kTet4;
+  std::vector<Vec3> nodes;    ///< m
+  std::vector<int> elements;  ///< the nodes of each element, one after the other, in gmsh's order
+
+  int element_count() const noexcept { return static_cast<int>(elements.size()) / nodes_of(shape); }
+  std::span<const int> element(int index) const noexcept;
+};
+
+/// A block whose layers lie at `xs`, `ys` and `zs` (m, ascending, at least two each): equal steps, or finer where it
+/// is touched. Tetrahedra are cut so that the two halves of an even block are mirror images: a
+/// press in the middle has no force aside.
+Mesh block(Shape shape, std::span<const double> xs, std::span<const double> ys, std::span<const double> zs);
+
+/// A block of `size` m on the plane z = 0, its middle above the origin, in `cells` equal cells for each axis.
+Mesh block(Shape shape, const Vec3& size, const std::array<int, 3>& cells);
+
+/// A cylinder on the plane z = 0 around the z axis: `across` cells from side to side of its square core, half as many
+/// from the core to the mantle, `up` along the axis. Throws std::invalid_argument when `across` is odd.
+Mesh cylinder(Shape shape, double radius, double height, int across, int up);
+
+/// The volume of the elements, m³. Throws std::invalid_argument "`name`: element N: …" when one is turned inside out or
+/// has no volume: its Jacobian is not above `kLeastQuality` times that of a cube with the same longest edge.
+double check(const Mesh& mesh, std::string_view name);
+
+/// 1e-9: rounding in a file of 6 digits leaves 1e-6 of a flat element, and no mesh generator
+/// hands out slivers below 1e-4.
+inline constexpr double kLeastQuality = 1e-9;
+
+/// The share of each node in the volume of the body, m³, all above 0: the diagonal of the consistent mass matrix,
+/// scaled so that their sum is the volume (Hinton, Rock & Zienkiewicz 1976).
+std::vector<double> nodal_volumes(const Mesh& mesh);
+
+/// A face of an element.
+struct Facet {
+  int element;
+  int face;
+};
+
+/// Those where no other lies: the body's surface. The two sides of a cut that is not open yet lie on each other, and
+/// are none.
+std::vector<Facet> surface(const Mesh& mesh);
+
+/// Those of one element alone: the surface, and the two sides of a cut also where they lie on each other.
+std::vector<Facet> sides(const Mesh& mesh);
+
+/// Those that two elements share.
+std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh);
+
+/// The nodes on a facet.
+std::vector<int> nodes_on(const Mesh& mesh, const Facet& facet);
+
+}  // namespace tendon::softbody

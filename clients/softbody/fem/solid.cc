@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/fem/solid.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace tendon::softbody {
+
+Solid::Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed)
+    : Elastic(std::move(at_rest), fixed),
+      element_(element),
+      material_(material),
+      law_(law),
+      per_element_(static_cast<int>(quadrature(element).size())) {
+  softbody::check(material);
+  if (info(element).shape != mesh().shape) {
+    throw std::invalid_argument("the mesh has no elements of the kind " + std::string(info(element).name));
+  }
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    for (const QuadraturePoint& point : quadrature(element_)) place(point, mesh().element(e));
+  }
+  connect();
+}
+
+void Solid::place(const QuadraturePoint& point, std::span<const int> nodes) {
+  const ShapeValues shape = shape_at(mesh().shape, point.at);
+  Mat3 jacobian = Mat3::Zero();
+  for (int i = 0; i < shape.value.size(); ++i) {
+    jacobian += mesh().nodes[at(nodes[at(i)])] * shape.gradient.col(i).transpose();
+  }
+  points_.push_back(
+      {point.weight * jacobian.determinant(), point.mu * material_.mu(), point.lambda * material_.lambda()});
+  const Nodal gradient = jacobian.inverse().transpose() * shape.gradient;
+  gradients_.insert(gradients_.end(), gradient.data(), gradient.data() + gradient.size());
+}
+
+void Solid::connect() {
+  const int nodes = nodes_of(mesh().shape);
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const auto element = mesh().element(e);
+    for (int j = 0; j < 3 * nodes; ++j) {
+      for (int i = 0; i < 3 * nodes; ++i) {
+        slots_.push_back(slot(3 * element[at(i / 3)] + i % 3, 3 * element[at(j / 3)] + j % 3));
+      }
+    }
+  }
+}
+
+Solid::Nodal Solid::displacements(const VectorXd& u, int element) const {
+  const auto nodes = mesh().element(element);
+  Nodal local(3, static_cast<Eigen::Index>(nodes.size()));
+  for (int i = 0; i < local.cols(); ++i) local.col(i) = u.segment<3>(3 * nodes[at(i)]);
+  return local;
+}
+
+Eigen::Map<const Solid::Nodal> Solid::gradient(int element, int point) const {
+  const int nodes = nodes_of(mesh().shape);
+  return {gradients_.data() + static_cast<std::ptrdiff_t>(element * per_element_ + point) * 3 * nodes, 3, nodes};
+}
+
+double Solid::energy(const VectorXd& u) const {
+  double sum = 0;
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    for (int q = 0; q < per_element_; ++q) {
+      const Point& point = points_[at(e * per_element_ + q)];
+      const Mat3 f = Mat3::Identity() + local * gradient(e, q).transpose();
+      sum += point.volume * stress(law_, f, point.mu, point.lambda).energy;
+    }
+  }
+  return sum;
+}
+
+Solid::Forces Solid::forces(const VectorXd& u) const {
+  return sum_forces(u, [this](int element, int index, const Mat3& f) {
+    const Point& here = point(element, index);
+    return stress(law_, f, here.mu, here.lambda);
+  });
+}
+
+void Solid::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const {
+  const auto tangent_at = [&](int element, int index, const Mat3& f) -> Mat9 {
+    const Point& here = point(element, index);
+    const Mat9 exact = tangent(law_, f, here.mu, here.lambda);
+    return curvature == Curvature::kExact ? exact : without_negative(exact);
+  };
+  sum_stiffness(u, tangent_at, to);
+}
+
+int Solid::inverted(const VectorXd& u) const {
+  int count = 0;
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    bool bad = false;
+    for (int q = 0; q < per_element_; ++q) {
+      bad = bad || (Mat3::Identity() + local * gradient(e, q).transpose()).determinant() <= 0;
+    }
+    count += bad ? 1 : 0;
+  }
+  return count;
+}
+
+double Solid::largest_turn(const VectorXd& u) const {
+  double largest = 0;
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    for (int q = 0; q < per_element_; ++q) {
+      const Mat3 turn = nearest_rotation(Mat3::Identity() + local * gradient(e, q).transpose());
+      largest = std::max(largest, Eigen::AngleAxisd(turn).angle());
+    }
+  }
+  return largest;
+}
+
+std::size_t Solid::bytes() const noexcept {
+  return mesh_bytes() + slots_.size() * sizeof(int) + points_.size() * sizeof(Point) +
+         gradients_.size() * sizeof(double);
+}
+
+}  // namespace tendon::softbody

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "clients/softbody/fem/elastic.h"
+#include "clients/softbody/fem/material.h"
+
+namespace tendon::softbody {
+
+/// A mesh of a material: finite elements.
+///
+/// Without state. Thread-safe: yes, once built. Realtime-safe: no.
+class Solid : public Elastic {
+ public:
+  /// Throws std::invalid_argument when the mesh is not sound, the element is not of the mesh's shape, the material is
+  /// impossible or nothing is fixed.
+  Solid(Mesh at_rest, Element element, const Material& material, Law law, const Fixed& fixed);
+
+  Element element() const noexcept { return element_; }
+  const Material& material() const noexcept { return material_; }
+  Law law() const noexcept { return law_; }
+
+  double energy(const VectorXd& u) const override;
+  Forces forces(const VectorXd& u) const override;
+  void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
+
+  /// Elements with a point at which det F ≤ 0.
+  int inverted(const VectorXd& u) const;
+  /// rad, the largest angle by which the material is turned at a point of integration.
+  double largest_turn(const VectorXd& u) const;
+
+  std::size_t bytes() const noexcept override;
+
+  /// A point of integration: the part of an element that it stands for, and of which of its moduli.
+  struct Point {
+    double volume;  ///< m³
+    double mu;      ///< Pa; 0 where only λ is integrated
+    double lambda;  ///< Pa; 0 where only µ is
+  };
+  int points_per_element() const noexcept { return per_element_; }
+  const Point& point(int element, int index) const { return points_[at(element * per_element_ + index)]; }
+  using Nodal = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxNodes>;
+  Eigen::Map<const Nodal> gradient(int element, int point) const;  ///< ∂Nᵢ/∂X there, 1/m
+  Nodal displacements(const VectorXd& u, int element) const;       ///< of an element's nodes, m
+
+ protected:
+  /// Energy and forces of a material of which `stress_at(element, point, F)` says the Stress.
+  template <class StressAt>
+  Forces sum_forces(const VectorXd& u, const StressAt& stress_at) const;
+  /// The stiffness of one of which `tangent_at(element, point, F)` says the tangent.
+  template <class TangentAt>
+  void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
+
+ private:
+  void place(const QuadraturePoint& point, std::span<const int> nodes);
+  void connect();
+
+  Element element_;
+  Material material_;
+  Law law_;
+  int per_element_;                ///< points of integration
+  std::vector<Point> points_;      ///< of each element, one after the other
+  std::vector<double> gradients_;  ///< ∂N/∂X of each point: 3 × nodes
+  std::vector<int> slots_;         ///< where each entry of an element's lower triangle goes; −1: nowhere
+};
+
+template <class StressAt>
+Solid::Forces Solid::sum_forces(const VectorXd& u, const StressAt& stress_at) const {
+  Forces all{0, VectorXd::Zero(size())};
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    Nodal force = Nodal::Zero(3, local.cols());
+    for (int q = 0; q < per_element_; ++q) {
+      const double volume = point(e, q).volume;
+      const auto g = gradient(e, q);
+      const Stress here = stress_at(e, q, Mat3::Identity() + local * g.transpose());
+      all.energy += volume * here.energy;
+      force += volume * here.piola * g;
+    }
+    const auto nodes = mesh().element(e);
+    for (int i = 0; i < local.cols(); ++i) all.force.segment<3>(3 * nodes[at(i)]) += force.col(i);
+  }
+  return all;
+}
+
+template <class TangentAt>
+void Solid::sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const {
+  std::ranges::fill(to.values, 0.0);
+  const int nodes = nodes_of(mesh().shape);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3 * kMaxNodes, 3 * kMaxNodes> k(3 * nodes, 3 * nodes);
+  auto slot = slots_.begin();
+  for (int e = 0; e < mesh().element_count(); ++e) {
+    const Nodal local = displacements(u, e);
+    k.setZero();
+    for (int q = 0; q < per_element_; ++q) {
+      const auto g = gradient(e, q);
+      const Mat9 a = point(e, q).volume * tangent_at(e, q, Mat3::Identity() + local * g.transpose());
+      for (int j = 0; j < nodes; ++j) {
+        Eigen::Matrix<double, 9, 3> strained = a.middleCols<3>(0) * g(0, j);
+        strained += a.middleCols<3>(3) * g(1, j);
+        strained += a.middleCols<3>(6) * g(2, j);
+        for (int i = 0; i < nodes; ++i) {
+          k.block<3, 3>(3 * i, 3 * j) += g(0, i) * strained.middleRows<3>(0) + g(1, i) * strained.middleRows<3>(3) +
+                                         g(2, i) * strained.middleRows<3>(6);
+        }
+      }
+    }
+    for (const double entry : k.reshaped()) {
+      if (*slot >= 0) to.values[at(*slot)] += entry;
+      ++slot;
+    }
+  }
+}
+
+}  // namespace tendon::softbody

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/models/linear.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "clients/softbody/effects/cutting.h"
+
+namespace tendon::softbody {
+namespace {
+
+SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
+  if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
+  SymmetricMatrix stiffness = solid.pattern();
+  solid.stiffness(VectorXd::Zero(solid.size()), Solid::Curvature::kExact, stiffness);
+  for (const auto& effect : effects) effect->add_stiffness(stiffness);
+  return stiffness;
+}
+
+Factor factor_of(const SymmetricMatrix& stiffness) {
+  Factor factor(stiffness);
+  if (!factor.factorize(stiffness)) {
+    throw std::runtime_error("the body can still move as a whole: more of its nodes must be fixed");
+  }
+  return factor;
+}
+
+}  // namespace
+
+Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value) {
+  const double compliance = patch.weights.dot(depth_per_newton);
+  Reaction reaction;
+  reaction.stiffness = 1 / compliance;
+  reaction.force = constrained_force(given, value, 0, compliance);
+  reaction.depth = given == Given::kDepth ? value : reaction.force * compliance;
+  reaction.slope = reaction.force * (patch.slopes * depth_per_newton);
+  return reaction;
+}
+
+LinearModel::LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects)
+    : solid_(solid),
+      normal_(surface.normal()),
+      factor_(factor_of(stiffness_of(solid, {}))),
+      step_(effects.has_time() ? effects.step : 0),
+      effects_(effects_at_rest(effects, solid)) {
+  if (effects.has_time()) {
+    const VectorXd rest = untouched();
+    rest_ = VectorXd::Zero(solid.size());
+    solid.add_free(rest, rest_);
+    add_effects_of_time(effects_, effects, solid, rest);
+    factor_ = factor_of(stiffness_of(solid, effects_));
+  }
+}
+
+void LinearModel::cut(const Division& division, const EffectsConfig& effects) {
+  effects_ = effects_at_rest(effects, solid_);
+  const SymmetricMatrix stiffness = stiffness_of(solid_, effects_);
+  if (division.lost > 0 || !factor_.split(stiffness, twins(solid_, division))) factor_ = factor_of(stiffness);
+}
+
+VectorXd LinearModel::displacements(const Patch& patch) const {
+  return factor_.solve(solid_.to_free(patch_load(solid_, normal_, patch)));
+}
+
+VectorXd LinearModel::untouched() const {
+  const VectorXd zero = VectorXd::Zero(solid_.free_count());
+  VectorXd force = zero;
+  for (const auto& effect : effects_) effect->add_force(zero, force);
+  return factor_.solve(force);
+}
+
+Reaction LinearModel::press(const Patch& patch, Given given, double value) {
+  if (!effects_.empty()) return press_among_effects(patch, given, value);
+  VectorXd all = VectorXd::Zero(solid_.size());
+  solid_.add_free(displacements(patch), all);
+  VectorXd depth(patch.weights.size());
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    depth[i] = -normal_.dot(all.segment<3>(3 * patch.nodes[static_cast<std::size_t>(i)]));
+  }
+  return linear_reaction(patch, depth, given, value);
+}
+
+Reaction LinearModel::press_among_effects(const Patch& patch, Given given, double value) {
+  const VectorXd per_newton = displacements(patch);
+  VectorXd u = untouched();
+  const VectorXd load = solid_.to_free(patch_load(solid_, normal_, patch));
+  const double compliance = load.dot(per_newton);
+  Reaction reaction;
+  reaction.force = constrained_force(given, value, load.dot(u), compliance);
+  u += reaction.force * per_newton;
+  for (const auto& effect : effects_) effect->advance(u);
+
+  VectorXd all = VectorXd::Zero(solid_.size());
+  solid_.add_free(u, all);
+  reaction.depth = depth_below(patch, normal_, all);
+  reaction.slope = slope_below(patch, normal_, all);
+  reaction.stiffness = step_ > 0 ? secant(reaction, depth_below(patch, normal_, rest_)) : 1 / compliance;
+  return reaction;
+}
+
+std::size_t LinearModel::bytes() const noexcept {
+  return factor_.bytes() + softbody::bytes(effects_) + static_cast<std::size_t>(rest_.size()) * sizeof(double);
+}
+
+CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
+    : nodes_(nodes), row_of_(solid.mesh().nodes.size(), -1) {
+  const Factor factor = factor_of(stiffness_of(solid, {}));
+  const auto count = static_cast<Eigen::Index>(nodes_.size());
+  for (Eigen::Index i = 0; i < count; ++i) row_of_[at(nodes_[static_cast<std::size_t>(i)])] = static_cast<int>(i);
+  table_.resize(count, count);
+  constexpr Eigen::Index kAtOnce = 64;  // columns: CHOLMOD's blocks are then products of matrices
+  for (Eigen::Index first = 0; first < count; first += kAtOnce) {
+    const Eigen::Index some = std::min(kAtOnce, count - first);
+    MatrixXd loads(solid.free_count(), some);
+    for (Eigen::Index j = 0; j < some; ++j) {
+      Patch alone;
+      alone.nodes = {nodes_[static_cast<std::size_t>(first + j)]};
+      alone.weights = VectorXd::Ones(1);
+      loads.col(j) = solid.to_free(patch_load(solid, surface.normal(), alone));
+    }
+    // The same functional reads the depth that wrote the load: the table is symmetric by its making.
+    const MatrixXd solution = factor.solve(loads);
+    for (Eigen::Index j = 0; j < some; ++j) {
+      VectorXd all = VectorXd::Zero(solid.size());
+      solid.add_free(solution.col(j), all);
+      for (Eigen::Index i = 0; i < count; ++i) {
+        table_(i, first + j) = -surface.normal().dot(all.segment<3>(3 * nodes_[static_cast<std::size_t>(i)]));
+      }
+    }
+  }
+  table_ = 0.5 * (table_ + table_.transpose()).eval();
+}
+
+Reaction CondensedModel::press(const Patch& patch, Given given, double value) {
+  rows_.clear();
+  for (const int node : patch.nodes) {
+    const int row = row_of_.at(at(node));
+    if (row < 0) throw std::out_of_range("the patch leaves the part of the body that was condensed");
+    rows_.push_back(row);
+  }
+  const auto size = patch.weights.size();
+  VectorXd depth = VectorXd::Zero(size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    const double weight = patch.weights[j];
+    const double* const column = table_.col(rows_[static_cast<std::size_t>(j)]).data();
+    for (Eigen::Index i = 0; i < size; ++i) depth[i] += weight * column[rows_[static_cast<std::size_t>(i)]];
+  }
+  return linear_reaction(patch, depth, given, value);
+}
+
+std::size_t CondensedModel::bytes() const noexcept {
+  return static_cast<std::size_t>(table_.size()) * sizeof(double) + (nodes_.size() + row_of_.size()) * sizeof(int);
+}
+
+}  // namespace tendon::softbody

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "clients/softbody/effects/effects.h"
+#include "clients/softbody/fem/solid.h"
+#include "clients/softbody/models/model.h"
+
+namespace tendon::softbody {
+
+/// Linear elasticity, K u = f, at rest at every instant: the factor of K is kept, an answer is one solution with it.
+/// Effects that act on all of the body add to K and f; an answer is then two solutions. Right for small strains and
+/// rotations.
+class LinearModel : public Model {
+ public:
+  /// Throws std::invalid_argument when the solid's law is not linear, std::runtime_error when it is not held fast. The
+  /// solid must outlive this. It begins at rest, under its weight if it has any.
+  LinearModel(const Solid& solid, const TouchSurface& surface, const EffectsConfig& effects = {});
+
+  Reaction press(const Patch& patch, Given given, double value) override;
+  void cut(const Division& division, const EffectsConfig& effects) override;
+  double step() const noexcept override { return step_; }
+  bool still() const noexcept override { return effects_.empty(); }
+  std::size_t bytes() const noexcept override;
+
+  /// The displacements (m, free ones) that 1 N on the patch adds.
+  VectorXd displacements(const Patch& patch) const;
+
+ private:
+  Reaction press_among_effects(const Patch& patch, Given given, double value);
+  VectorXd untouched() const;
+
+  const Solid& solid_;
+  Vec3 normal_;
+  Factor factor_;
+  double step_;
+  Effects effects_;
+  VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
+};
+
+/// The reaction of a linear body, from how deep each node of the patch is under 1 N on it.
+Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value);
+
+/// The same answers from a table: how far each touchable node gives way along the normal when another is pushed with 1
+/// N (a discrete Green's function; James & Pai 1999). What lies below the surface costs no time any more: an answer is
+/// wᵀ G w over the patch.
+class CondensedModel : public Model {
+ public:
+  /// The table of `nodes` (TouchSurface::nodes_of_patches). Solves once for each; neither solid nor surface is kept.
+  CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes);
+
+  /// Throws std::out_of_range when the patch has a node that is not in the table.
+  Reaction press(const Patch& patch, Given given, double value) override;
+  std::size_t bytes() const noexcept override;
+
+  /// m/N, symmetric: rows and columns in the order of `nodes`.
+  const MatrixXd& table() const noexcept { return table_; }
+  const std::vector<int>& nodes() const noexcept { return nodes_; }
+
+ private:
+  std::vector<int> nodes_;
+  std::vector<int> row_of_;  ///< by node; −1 = not in the table
+  MatrixXd table_;
+  std::vector<int> rows_;  ///< of the present patch
+};
+
+}  // namespace tendon::softbody

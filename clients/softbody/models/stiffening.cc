@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/models/stiffening.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+#include <utility>
+
+namespace tendon::softbody {
+
+double StiffnessOverTime::factor_at(double time) const {
+  const auto next = static_cast<std::size_t>(std::ranges::upper_bound(at, time) - at.begin());
+  if (next == 0) return factor.front();
+  if (next == at.size()) return factor.back();
+  const double share = (time - at[next - 1]) / (at[next] - at[next - 1]);
+  return factor[next - 1] + share * (factor[next] - factor[next - 1]);
+}
+
+void check(const StiffnessOverTime& law) {
+  if (law.at.empty() || !std::ranges::is_sorted(law.at, std::less_equal<>()) ||
+      !std::ranges::all_of(law.at, [](double time) { return std::isfinite(time); })) {
+    throw std::invalid_argument("`stiffening.at`: expected ascending times, one or more");
+  }
+  if (law.factor.size() != law.at.size() ||
+      !std::ranges::all_of(law.factor, [](double factor) { return factor > 0 && std::isfinite(factor); })) {
+    throw std::invalid_argument("`stiffening.factor`: expected a number above 0 for each time");
+  }
+}
+
+StiffeningModel::StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law)
+    : model_(std::move(model)), law_(std::move(law)), factor_(1) {
+  check(law_);
+  tick(0);
+}
+
+std::size_t StiffeningModel::bytes() const noexcept {
+  return sizeof *this + (law_.at.size() + law_.factor.size()) * sizeof(double) + model_->bytes();
+}
+
+Reaction StiffeningModel::press(const Patch& patch, Given given, double value) {
+  Reaction reaction = model_->press(patch, given, given == Given::kForce ? value / factor_ : value);
+  reaction.force *= factor_;
+  reaction.stiffness *= factor_;
+  reaction.error *= factor_;
+  return reaction;
+}
+
+}  // namespace tendon::softbody

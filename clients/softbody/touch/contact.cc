@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/touch/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "core/base/arithmetic.h"
+
+namespace tendon::softbody {
+
+PatchContact::PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
+                           std::unique_ptr<Friction> friction)
+    : model_(model), surface_(surface), tool_radius_(tool_radius), side_(side), friction_(std::move(friction)) {
+  if (!(tool_radius >= 0) || !std::isfinite(tool_radius)) {
+    throw std::invalid_argument("the tool's radius: expected 0 or more");
+  }
+}
+
+Feel PatchContact::at(const Vec3& tool) {
+  Feel feel;
+  feel.gap = std::numeric_limits<double>::infinity();
+  const auto patch = tool.allFinite() ? surface_.patch(surface_.across(tool)) : std::nullopt;
+  if (!patch) {
+    stuck_ = false;
+    if (friction_) friction_->let_go();
+    if (!model_.still()) model_.press({}, Given::kForce, 0);
+    return feel;
+  }
+  const Vec3& n = surface_.normal();
+  double height = 0;
+  Vec2 height_slope = Vec2::Zero();
+  for (Eigen::Index i = 0; i < patch->weights.size(); ++i) {
+    const double here = surface_.height(patch->nodes[static_cast<std::size_t>(i)]);
+    height += patch->weights[i] * here;
+    height_slope += patch->slopes.col(i) * here;
+  }
+  feel.gap = n.dot(tool) - tool_radius_ - height;
+  Reaction reaction;
+  feel.touching = stuck_;
+  if (feel.gap < 0 || stuck_ || !model_.still()) {
+    reaction = model_.press(*patch, stuck_ ? Given::kDepth : Given::kLeastDepth, -feel.gap);
+    feel.touching = stuck_ || reaction.force > 0;
+  }
+  if (!feel.touching) {
+    if (friction_) friction_->let_go();
+    feel.gap += reaction.depth;
+    feel.valid_radius = std::max(0.0, feel.gap);
+    return feel;
+  }
+  stuck_ = side_ == Side::kBilateral;
+
+  const Vec3 tilt = surface_.from_across(reaction.slope - height_slope);
+  feel.force = reaction.force * (n + tilt);
+  const Vec3 steepest = n + surface_.from_across(2 * reaction.slope - height_slope);
+  feel.stiffness = reaction.stiffness * steepest * steepest.transpose();
+  feel.error = reaction.error;
+  feel.valid_radius = surface_.radius() / 4;  // across, a patch is another one there
+  if (friction_) rub(surface_.across(tool), reaction.force, feel);
+  return feel;
+}
+
+void PatchContact::rub(const Vec2& place, double normal_force, Feel& feel) {
+  const Friction::Drag drag = friction_->move(place, normal_force);
+  feel.force += surface_.from_across(drag.force);
+  const Vec3& n = surface_.normal();
+  feel.stiffness += drag.stiffness * (Mat3::Identity() - n * n.transpose());
+  if (drag.until_slip > 0) feel.valid_radius = std::min(feel.valid_radius, drag.until_slip);
+}
+
+}  // namespace tendon::softbody

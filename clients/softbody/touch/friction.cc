@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/touch/friction.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace tendon::softbody {
+
+Friction::Friction(double coefficient, double stiffness) : coefficient_(coefficient), stiffness_(stiffness) {
+  if (!(coefficient >= 0) || !std::isfinite(coefficient)) {
+    throw std::invalid_argument("`friction`: expected a coefficient of 0 or more");
+  }
+  if (!(stiffness > 0)) throw std::invalid_argument("friction: expected a stiffness above 0");
+}
+
+Friction::Drag Friction::move(const Vec2& place, double normal_force) {
+  if (!(normal_force > 0)) {
+    let_go();
+    return {};
+  }
+  if (!anchor_) anchor_ = place;
+  const double most = coefficient_ * normal_force / stiffness_;  // m, that the spring can be stretched
+  const Vec2 stretch = place - *anchor_;
+  const double length = stretch.norm();
+  if (length <= most) return {-stiffness_ * stretch, stiffness_, most - length};
+  anchor_ = place - most / length * stretch;
+  return {-stiffness_ * most / length * stretch, 0, 0};
+}
+
+double sideways_stiffness(const Material& material, double radius) {
+  return 8 * material.mu() * radius / (2 - material.poisson);
+}
+
+}  // namespace tendon::softbody

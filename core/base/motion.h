@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "core/base/time.h"
+
+namespace tendon {
+
+/// Vectors are in the device base frame and in SI units: m, m/s, N.
+using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
+
+/// Where the hand is, as the device saw it at one instant.
+struct Motion {
+  LocalTime at{};                ///< when the position was sampled
+  Vec3 position = Vec3::Zero();  ///< m
+  Vec3 velocity = Vec3::Zero();  ///< m/s, an estimate (see VelocityEstimator)
+};
+
+}  // namespace tendon

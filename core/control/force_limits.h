@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/motion.h"
+#include "core/base/reason.h"
+
+namespace tendon {
+
+/// A force after a memoryless limit, and why.
+struct Limited {
+  Vec3 force;
+  Reasons reasons;
+};
+
+/// Bounds the norm of a force and keeps its direction: ‖F‖ ≤ max (N).
+///
+/// Thread-safe, realtime-safe.
+inline Limited saturate(const Vec3& wanted, double max) noexcept {
+  const double size = wanted.norm();
+  if (size <= max) return {wanted, {}};
+  return {wanted * (max / size), Reason::kMaxForce};
+}
+
+/// Bounds how fast a force may change: ‖F − F_before‖ ≤ rate · elapsed, with rate in N/s. What is left
+/// of the change keeps its direction. An infinite rate changes nothing; in an interval that is not positive nothing
+/// may change.
+///
+/// Thread-safe, realtime-safe.
+inline Limited limit_slew(const Vec3& wanted, const Vec3& before, double rate, Duration elapsed) noexcept {
+  if (std::isinf(rate)) return {wanted, {}};  // ∞ · 0 s would not be a number
+  const Vec3 change = wanted - before;
+  const double size = change.norm();
+  const double allowed = rate * std::max(0.0, seconds(elapsed));
+  if (size <= allowed) return {wanted, {}};
+  return {before + change * (allowed / size), Reason::kSlew};
+}
+
+}  // namespace tendon

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/remote/force_channels.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+/// 0 is the freshest.
+int staleness(Mode mode) noexcept {
+  switch (mode) {
+    case Mode::kActive:
+      return 0;
+    case Mode::kHolding:
+      return 1;
+    case Mode::kDecaying:
+      return 2;
+    case Mode::kSafeStop:
+    case Mode::kFault:
+      return 3;
+    case Mode::kIdle:
+      return 4;
+  }
+  return 4;
+}
+
+}  // namespace
+
+ForceChannels::ForceChannels(const Config& config) : ramp_(config.hold.ramp_in) {
+  if (config.rules.empty()) throw std::invalid_argument("a device needs at least one channel");
+  for (const ChannelRule rule : config.rules) {
+    channels_.push_back(
+        {.held = HeldForce(config.hold), .rule = rule, .weight = rule == ChannelRule::kSum ? 1.0 : 0.0});
+  }
+}
+
+void ForceChannels::disengage() noexcept {
+  for (Channel& channel : channels_) channel.held.disengage();
+}
+
+void ForceChannels::shift_weights(LocalTime now) noexcept {
+  const auto ranked = [](const Channel& channel) { return channel.rule == ChannelRule::kPriority; };
+  const auto first = std::find_if(channels_.begin(), channels_.end(), ranked);
+  if (first == channels_.end()) return;
+  auto winner = first;
+  for (auto channel = first + 1; channel != channels_.end(); ++channel) {
+    if (ranked(*channel) && staleness(channel->wants.mode) < staleness(winner->wants.mode)) winner = channel;
+  }
+  double others = 0;
+  for (const Channel& channel : channels_) {
+    if (ranked(channel)) others += channel.weight;
+  }
+  others -= winner->weight;
+  // Nobody to fade from.
+  const double step = others <= 0 ? 1.0 : ramp_ > Duration::zero() ? seconds(now - last_) / seconds(ramp_) : 1.0;
+  const double mine = std::min(1.0, winner->weight + std::max(0.0, step));
+  const double share = others > 0 ? (1 - mine) / others : 0.0;
+  for (Channel& channel : channels_) {
+    if (ranked(channel)) channel.weight *= share;
+  }
+  winner->weight = mine;
+}
+
+ForceChannels::Wanted ForceChannels::wanted(const Motion& hand) noexcept {
+  if (channels_.size() == 1) return {channels_.front().held.wanted(hand), 0};
+  for (Channel& channel : channels_) channel.wants = channel.held.wanted(hand);
+  shift_weights(hand.at);
+  last_ = hand.at;
+
+  const auto lead = std::min_element(channels_.begin(), channels_.end(), [](const Channel& a, const Channel& b) {
+    return staleness(a.wants.mode) < staleness(b.wants.mode);
+  });
+  Wanted sum{lead->wants, static_cast<std::size_t>(lead - channels_.begin())};
+  sum.force.setZero();
+  sum.stiffness.setZero();
+  for (const Channel& channel : channels_) {
+    if (channel.weight == 0) continue;
+    sum.force += channel.weight * channel.wants.force;
+    sum.stiffness += channel.weight * channel.wants.stiffness;
+    // A channel that has stopped beside one that goes on is no safe stop of the device.
+    if (channel.wants.mode != Mode::kSafeStop) sum.reasons |= channel.wants.reasons;
+  }
+  return sum;
+}
+
+}  // namespace tendon

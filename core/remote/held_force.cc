@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/remote/held_force.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "core/remote/answer.h"
+
+namespace tendon {
+
+HeldForce::HeldForce(const Config& config) : config_(config) {
+  const auto at_least = [](Duration value, Duration least, const char* name) {
+    if (value < least) {
+      throw std::invalid_argument(std::string(name) + " must be at least " + std::to_string(seconds(least)) +
+                                  " s, got " + std::to_string(seconds(value)) + " s");
+    }
+  };
+  at_least(config.hold, Duration::zero(), "hold");
+  at_least(config.decay, Duration(1), "decay");
+  at_least(config.safe_stop, config.hold, "safe_stop");
+  at_least(config.ramp_in, Duration::zero(), "ramp_in");
+  at_least(config.max_valid_for, Duration(1), "max_valid_for");
+  if (!(config.max_stiffness > 0)) {
+    throw std::invalid_argument("max_stiffness must be above zero, got " + std::to_string(config.max_stiffness));
+  }
+  if (config.adaptive_local_model && config.output_estimator) {
+    throw std::invalid_argument("adaptive_local_model and output_estimator both say what lies between two forces");
+  }
+  if (config.adaptive_local_model) local_model_.emplace(*config.adaptive_local_model);
+  if (config.output_estimator) estimator_ = std::make_unique<OutputEstimator>(*config.output_estimator);
+}
+
+bool HeldForce::observe(const RemoteForce& force) noexcept {
+  if (!is_sound(force)) return false;
+  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop || newest_->source != force.source) {
+    engaged_ = force.received;
+    from_ = rendered_;
+    if (local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
+  }
+  newest_ = believed(force, config_.max_stiffness);
+  if (local_model_) local_model_->observe(*newest_);
+  if (estimator_) estimator_->correct(*newest_);
+  mode_ = Mode::kActive;
+  return true;
+}
+
+void HeldForce::release(std::uint32_t source, LocalTime now) noexcept {
+  if (newest_ && newest_->source == source) newest_->valid_for = std::min(newest_->valid_for, now - newest_->received);
+}
+
+Duration HeldForce::validity() const noexcept { return std::min(newest_->valid_for, config_.max_valid_for); }
+
+Prediction HeldForce::follow(const Motion& hand) const noexcept {
+  if (local_model_) {
+    if (const auto blended = local_model_->predict(hand)) return *blended;
+  }
+  if (!estimator_) return reconstruct(*newest_, hand.position);
+  return estimator_->predict(hand).value_or(Prediction{.force = newest_->force, .stiffness = Mat3::Zero()});
+}
+
+HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
+  if (estimator_) estimator_->observe(hand);
+  if (!newest_) return {};
+  Wanted result;
+  // A force may come after the device took the sample that this step is about; an age below zero has no place on the
+  // wire.
+  result.age = std::max(Duration::zero(), hand.at - newest_->received);
+  const Duration overdue = result.age - validity();
+  // A safe stop is only left by `observe`: a clock that stands still must not revive a force.
+  if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
+    mode_ = Mode::kSafeStop;
+    rendered_.setZero();
+    result.mode = mode_;
+    result.reasons = Reason::kSafeStop;
+    return result;
+  }
+
+  double gain = 1;
+  if (overdue <= Duration::zero()) {
+    mode_ = Mode::kActive;
+  } else if (overdue <= config_.hold) {
+    mode_ = Mode::kHolding;
+    result.reasons |= Reason::kHeld;
+  } else {
+    mode_ = Mode::kDecaying;
+    result.reasons |= Reason::kDecaying;
+    gain = std::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
+  }
+  const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
+  Vec3 rest = Vec3::Zero();
+  if (since_engaged < config_.ramp_in) {
+    result.reasons |= Reason::kRampIn;
+    const double ramp = seconds(since_engaged) / seconds(config_.ramp_in);
+    rest = from_ * (gain * (1 - ramp));
+    gain *= ramp;
+  }
+
+  result.mode = mode_;
+  const Prediction environment = follow(hand);
+  result.force = environment.force * gain + rest;
+  result.stiffness = environment.stiffness * gain;
+  rendered_ = result.force;
+  return result;
+}
+
+}  // namespace tendon

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "core/base/mode.h"
+#include "core/base/motion.h"
+#include "core/base/reason.h"
+#include "core/remote/adaptive_local_model.h"
+#include "core/remote/output_estimator.h"
+#include "core/remote/remote_force.h"
+
+namespace tendon {
+
+/// Holds the newest remote force between arrivals, and decides what to render when they stop coming.
+///
+/// With age = now − received and v = valid_for (clipped to max_valid_for):
+///
+///     age ≤ v                        Active     F(x)                    as it was sent
+///     age ≤ v + hold                 Holding    F(x)
+///     age < v + safe_stop            Decaying   F(x) · e^(−(age − v − hold)/decay)
+///     otherwise                      SafeStop   0, until a fresh force comes
+///
+/// F(x) follows the hand between two arrivals:
+///
+///     without a part         as the remote environment's local model says, with its contact and its table, or the
+///                            force alone when it sent none                      (reconstruct, estimation/answer.h)
+///     adaptive_local_model   its stiffness, but a new one is blended in          (AdaptiveLocalModel)
+///     output_estimator       a model of the environment, learned on the way      (OutputEstimator)
+///
+/// Of what was sent that is followed which can be believed (answer.h): no stiffness above `max_stiffness`, no model
+/// when the answer says that the body is another one now.
+///
+/// The first force ever, the first one after a safe stop, and the first one of another source are ramped in linearly
+/// over `ramp_in`, from what is rendered at that moment: the hand is never kicked by an engine that comes back, or by
+/// one that takes over. An answer that is not sound (answer.h) is refused, and the one before it ages on.
+///
+/// It decides what is *wanted*; that it cannot hurt is the business of the limiter downstream.
+///
+/// Thread-safe: no. Realtime-safe: yes.
+class HeldForce {
+ public:
+  struct Config {
+    /// Bridges two lost datagrams of a 100 Hz engine.
+    Duration hold = std::chrono::milliseconds(20);
+    /// Time constant: 90 % gone after 115 ms, too slow to be felt as a kick, too fast to be leant on.
+    Duration decay = std::chrono::milliseconds(50);
+    /// Counted from the end of validity; the force has faded to 1 % by then.
+    Duration safe_stop = std::chrono::milliseconds(250);
+    Duration ramp_in = std::chrono::milliseconds(100);
+    /// No engine can ask to be believed for longer.
+    Duration max_valid_for = std::chrono::milliseconds(500);
+    /// N/m, > 0: the stiffest that is followed between two forces. Above what grounded devices render stably at 1 kHz.
+    double max_stiffness = 5000;
+    /// At most one of these. What is empty is not there and costs nothing.
+    std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
+    std::optional<OutputEstimator::Config> output_estimator{};
+  };
+
+  struct Wanted {
+    Vec3 force = Vec3::Zero();      ///< N, on the hand
+    Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m; zero without a local model
+    Mode mode = Mode::kIdle;
+    Reasons reasons;
+    Duration age{};  ///< since it was received; 0 when idle
+  };
+
+  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive,
+  /// safe_stop is shorter than hold, max_stiffness is not above zero, a part cannot be, or both are there.
+  explicit HeldForce(const Config& config);
+
+  /// Takes a newer force. Returns false, and changes nothing, when it is not sound.
+  bool observe(const RemoteForce& force) noexcept;
+
+  /// The remote environment `source` has left: its force, when it is the one that is held, is no longer fresh from now
+  /// on.
+  void release(std::uint32_t source, LocalTime now) noexcept;
+
+  /// Forgets the force: idle, until a fresh one comes and is ramped in.
+  void disengage() noexcept {
+    newest_.reset();
+    mode_ = Mode::kIdle;
+    rendered_.setZero();
+  }
+
+  /// What is wanted at `hand.position` at `hand.at`. Once in each haptic step: an estimator learns from it.
+  Wanted wanted(const Motion& hand) noexcept;
+
+  /// The force that is held, as it is believed; empty when idle.
+  const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
+
+ private:
+  Prediction follow(const Motion& hand) const noexcept;
+  Duration validity() const noexcept;
+
+  Config config_;
+  std::optional<RemoteForce> newest_;
+  Mode mode_ = Mode::kIdle;
+  LocalTime engaged_{};       ///< start of the ramp …
+  Vec3 from_ = Vec3::Zero();  ///< … and the force it starts from
+  Vec3 rendered_ = Vec3::Zero();
+  std::optional<AdaptiveLocalModel> local_model_;
+  std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB that only those pay who list it
+};
+
+}  // namespace tendon

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/base/time.h"
+
+namespace tendon {
+
+/// How long to and fro takes, and how long to wait for an answer before asking again (RFC 6298):
+///
+///     first sample R:  SRTT = R, RTTVAR = R/2
+///     then:            RTTVAR += (|SRTT − R| − RTTVAR)/4,  SRTT += (R − SRTT)/8
+///     wait for:        max(minimum, SRTT + 4 RTTVAR)
+class RoundTrip {
+ public:
+  /// What to wait before the first sample. The RFC says 1 s; a handshake has just gone through, so the
+  /// peer is there, and 100 ms is beyond the round trip of any link on which touch makes sense.
+  static constexpr Duration kFirstTimeout = std::chrono::milliseconds(100);
+
+  void observe(Duration sample) noexcept {
+    newest_ = sample;
+    if (!known_) {
+      smoothed_ = sample;
+      variation_ = sample / 2;
+      known_ = true;
+      return;
+    }
+    const Duration error = sample - smoothed_;
+    variation_ += (std::chrono::abs(error) - variation_) / 4;
+    smoothed_ += error / 8;
+  }
+
+  Duration newest() const noexcept { return newest_; }
+  Duration smoothed() const noexcept { return smoothed_; }
+  Duration variation() const noexcept { return variation_; }
+  Duration timeout(Duration minimum) const noexcept {
+    return std::max(minimum, known_ ? smoothed_ + 4 * variation_ : kFirstTimeout);
+  }
+
+ private:
+  bool known_ = false;
+  Duration newest_{};
+  Duration smoothed_{};
+  Duration variation_{};
+};
+
+}  // namespace tendon

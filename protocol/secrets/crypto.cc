@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/secrets/crypto.h"
+
+#include <sodium.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace tendon {
+namespace {
+
+const unsigned char* in(std::span<const std::byte> bytes) noexcept {
+  return reinterpret_cast<const unsigned char*>(bytes.data());
+}
+unsigned char* out(std::span<std::byte> bytes) noexcept { return reinterpret_cast<unsigned char*>(bytes.data()); }
+
+using Nonce = std::array<unsigned char, crypto_aead_chacha20poly1305_IETF_NPUBBYTES>;
+
+Nonce nonce(std::uint64_t number) noexcept {
+  Nonce nonce{};
+  for (std::size_t i = 0; i < 8; ++i) nonce[4 + i] = static_cast<unsigned char>(number >> (8 * i));
+  return nonce;
+}
+
+static_assert(crypto_hash_sha256_BYTES == sizeof(Bytes32) && crypto_auth_hmacsha256_BYTES == sizeof(Bytes32));
+static_assert(crypto_scalarmult_BYTES == sizeof(Bytes32) && crypto_scalarmult_SCALARBYTES == sizeof(Bytes32));
+static_assert(crypto_aead_chacha20poly1305_IETF_KEYBYTES == sizeof(Bytes32));
+static_assert(crypto_aead_chacha20poly1305_IETF_ABYTES == crypto::kTagSize);
+static_assert(crypto_shorthash_KEYBYTES == 16 && crypto_shorthash_BYTES == sizeof(std::uint64_t));
+static_assert(crypto_stream_chacha20_ietf_KEYBYTES == sizeof(Bytes32));
+
+}  // namespace
+
+Key::~Key() { sodium_memzero(bytes_.data(), bytes_.size()); }
+
+namespace crypto {
+
+void start() {
+  if (sodium_init() < 0) throw std::runtime_error("libsodium cannot be initialised");
+}
+
+Bytes32 sha256(Pieces message) noexcept {
+  Bytes32 digest;
+  crypto_hash_sha256_state state;
+  crypto_hash_sha256_init(&state);
+  for (const auto& piece : message) crypto_hash_sha256_update(&state, in(piece), piece.size());
+  crypto_hash_sha256_final(&state, out(digest));
+  return digest;
+}
+
+Bytes32 hmac_sha256(std::span<const std::byte> key, Pieces message) noexcept {
+  Bytes32 tag;
+  crypto_auth_hmacsha256_state state;
+  crypto_auth_hmacsha256_init(&state, in(key), key.size());
+  for (const auto& piece : message) crypto_auth_hmacsha256_update(&state, in(piece), piece.size());
+  crypto_auth_hmacsha256_final(&state, out(tag));
+  sodium_memzero(&state, sizeof state);
+  return tag;
+}
+
+Bytes32 x25519_public(const Key& secret) noexcept {
+  Bytes32 point;
+  crypto_scalarmult_base(out(point), in(secret.bytes()));
+  return point;
+}
+
+bool x25519(const Key& secret, const Bytes32& point, Key& shared) noexcept {
+  return crypto_scalarmult(out(shared.bytes()), in(secret.bytes()), in(point)) == 0;
+}
+
+void seal(const Key& key, std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> text,
+          std::span<std::byte> sealed) noexcept {
+  crypto_aead_chacha20poly1305_ietf_encrypt(out(sealed), nullptr, in(text), text.size(), in(associated),
+                                            associated.size(), nullptr, nonce(number).data(), in(key.bytes()));
+}
+
+bool open(const Key& key, std::uint64_t number, std::span<const std::byte> associated,
+          std::span<const std::byte> sealed, std::span<std::byte> text) noexcept {
+  return crypto_aead_chacha20poly1305_ietf_decrypt(out(text), nullptr, nullptr, in(sealed), sealed.size(),
+                                                   in(associated), associated.size(), nonce(number).data(),
+                                                   in(key.bytes())) == 0;
+}
+
+Key renewed(const Key& key) noexcept {
+  constexpr Bytes32 kZeros{};
+  std::array<std::byte, sizeof(Bytes32) + kTagSize> sealed;
+  seal(key, ~std::uint64_t{0}, {}, kZeros, sealed);
+  Key next;
+  std::copy_n(sealed.begin(), sizeof(Bytes32), next.bytes().begin());
+  sodium_memzero(sealed.data(), sealed.size());
+  return next;
+}
+
+bool equal(std::span<const std::byte> a, std::span<const std::byte> b) noexcept {
+  return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+std::uint64_t short_hash(const std::array<std::byte, 16>& key, std::span<const std::byte> message) noexcept {
+  std::array<std::byte, sizeof(std::uint64_t)> hash;
+  crypto_shorthash(out(hash), in(message), message.size(), in(key));
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < hash.size(); ++i) value |= std::to_integer<std::uint64_t>(hash[i]) << (8 * i);
+  return value;
+}
+
+}  // namespace crypto
+
+Seed::Seed(std::uint64_t number) noexcept {
+  for (std::size_t i = 0; i < sizeof number; ++i) bytes[i] = static_cast<std::byte>(number >> (8 * i) & 0xFFU);
+}
+
+Key Ratchet::next() noexcept {
+  std::array<std::byte, 2 * sizeof(Bytes32)> block;
+  const Nonce zeros{};  // each key is used for one block only
+  crypto_stream_chacha20_ietf(out(block), block.size(), zeros.data(), in(state_.bytes()));
+  Key given;
+  std::copy_n(block.begin(), sizeof(Bytes32), state_.bytes().begin());
+  std::copy_n(block.begin() + sizeof(Bytes32), sizeof(Bytes32), given.bytes().begin());
+  sodium_memzero(block.data(), block.size());
+  return given;
+}
+
+}  // namespace tendon

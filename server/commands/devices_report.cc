@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/devices_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <iomanip>
+#include <sstream>
+
+#include "devices/falcon/falcon_device.h"
+#include "devices/spacemouse/spacemouse_device.h"
+#include "devices/woodenhaptics/woodenhaptics_device.h"
+
+namespace tendon {
+namespace {
+
+std::string id_of(const usb::PluggedIn& plugged) {
+  std::ostringstream text;
+  text << std::hex << std::setfill('0') << std::setw(4) << plugged.id.vendor << ':' << std::setw(4)
+       << plugged.id.product;
+  return text.str();
+}
+
+struct Known {
+  const char* name;
+  const char* kind;
+};
+
+std::optional<Known> driver_for(const usb::Id& id) {
+  if (id == FalconDevice::kId) return Known{"Novint Falcon", "falcon"};
+  if (id == WoodenHapticsDevice::kId) return Known{"WoodenHaptics, or another HID gadget of mbed", "woodenhaptics"};
+  if (std::ranges::find(SpaceMouseDevice::kIds, id) == SpaceMouseDevice::kIds.end()) return std::nullopt;
+  return Known{"3Dconnexion SpaceMouse", "spacemouse"};
+}
+
+/// A string of JSON: sentences may have a path with anything in it.
+std::string quoted(const std::string& text) {
+  std::ostringstream out;
+  out << '"';
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out << '\\' << c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out << "\\u" << std::hex << std::setfill('0') << std::setw(4) << static_cast<int>(c) << std::dec;
+    } else {
+      out << c;
+    }
+  }
+  out << '"';
+  return out.str();
+}
+
+}  // namespace
+
+std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
+                                          const std::optional<std::string>& firmware_problem) {
+  std::vector<PluggedDevice> reports;
+  for (const usb::PluggedIn& one : plugged) {
+    const auto known = driver_for(one.id);
+    if (!known) continue;
+    const bool falcon = one.id == FalconDevice::kId;
+    PluggedDevice report{.name = known->name, .kind = known->kind, .plugged = one, .lacks = {}};
+    if (!one.has_node) {
+      report.lacks.push_back({"there is no " + one.node + " here, although the kernel has the device",
+                              "give it to this container: docker run -v /dev/bus/usb:/dev/bus/usb "
+                              "--device-cgroup-rule 'c 189:* rmw'"});
+    } else if (!one.may_open) {
+      report.lacks.push_back(
+          {"this user may not open " + one.node,
+           "copy deploy/udev/60-tendon.rules to /etc/udev/rules.d, run `udevadm control --reload`, plug the device out "
+           "and in; who is not logged in at this machine itself has to be in the group plugdev"});
+    }
+    if (falcon && !firmware_problem) {
+      report.lacks.push_back(
+          {"no firmware file, which it wants after each time without power",
+           "give the file of your own Novint software by --falcon-firmware FILE, or as `firmware` in the scene's "
+           "[device]; Tendon may not bring it (devices/falcon/README.md)"});
+    } else if (falcon && !firmware_problem->empty()) {
+      report.lacks.push_back({*firmware_problem, "give the file of your own Novint software"});
+    }
+    reports.push_back(std::move(report));
+  }
+  return reports;
+}
+
+std::string in_words(std::span<const PluggedDevice> devices) {
+  if (devices.empty()) {
+    return "no device that Tendon has a driver for is plugged in; a Falcon needs its own power supply besides USB\n";
+  }
+  std::ostringstream text;
+  for (const PluggedDevice& device : devices) {
+    text << device.name << "  " << id_of(device.plugged) << "  port " << device.plugged.port << "  "
+         << device.plugged.node << "\n  scene: [device] kind = \"" << device.kind << "\"\n";
+    for (const auto& [what, mend] : device.lacks) text << "  missing: " << what << "\n    " << mend << '\n';
+    if (device.lacks.empty()) text << "  nothing is missing\n";
+  }
+  return text.str();
+}
+
+std::string in_json(std::span<const PluggedDevice> devices) {
+  std::ostringstream text;
+  for (const PluggedDevice& device : devices) {
+    text << "{\"name\":" << quoted(device.name) << ",\"kind\":" << quoted(device.kind)
+         << ",\"id\":" << quoted(id_of(device.plugged)) << ",\"port\":" << quoted(device.plugged.port)
+         << ",\"node\":" << quoted(device.plugged.node)
+         << ",\"may_open\":" << (device.plugged.may_open ? "true" : "false") << ",\"missing\":[";
+    for (const auto& [what, mend] : device.lacks) {
+      text << (&what == &device.lacks.front().what ? "" : ",") << "{\"what\":" << quoted(what)
+           << ",\"mend\":" << quoted(mend) << '}';
+    }
+    text << "]}\n";
+  }
+  return text.str();
+}
+
+}  // namespace tendon

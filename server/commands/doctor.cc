@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/doctor.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+#include <iomanip>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <thread>
+
+#include "server/machine/realtime.h"
+
+namespace tendon {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Duration kPeriod = std::chrono::milliseconds(1);
+constexpr std::size_t kWakeUps = 1000;
+
+/// The text of a small file, without white space at its end; empty when there is none, or none to read.
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file);
+  std::string text(std::istreambuf_iterator<char>(stream), {});
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
+  return text;
+}
+
+std::optional<std::int64_t> number_of(const std::string& text) {
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+/// The word after the first line's beginning `start`: of "key value" and "key=value" files.
+std::string value_after(const std::string& text, std::string_view start) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(start)) continue;
+    std::istringstream rest(line.substr(start.size()));
+    std::string value;
+    rest >> value;
+    return value;
+  }
+  return {};
+}
+
+using Finding = Diagnosis::Finding;
+
+Finding kernel(const fs::path& root) {
+  const std::string release = text_of(root / "proc/sys/kernel/osrelease");
+  if (text_of(root / "sys/kernel/realtime") == "1") return {"kernel", release + ", PREEMPT_RT", ""};
+  if (release.empty()) return {"kernel", "unknown", ""};
+  return {"kernel", release + ", without PREEMPT_RT",
+          "a kernel with PREEMPT_RT bounds how late a thread may wake: linux-image-rt-amd64 on Debian"};
+}
+
+Finding tick(const fs::path& root) {
+  const std::string config = text_of(root / "boot" / ("config-" + text_of(root / "proc/sys/kernel/osrelease")));
+  const std::string hz = value_after(config, "CONFIG_HZ=");
+  if (hz.empty()) return {"tick", "unknown", ""};
+  if (value_after(config, "CONFIG_HIGH_RES_TIMERS=") == "y") {
+    return {"tick", hz + " Hz, and timers that do not wait for it", ""};
+  }
+  return {"tick", hz + " Hz, and timers that wait for it", "a kernel with CONFIG_HIGH_RES_TIMERS"};
+}
+
+Finding governor(const fs::path& root) {
+  std::set<std::string> governors;
+  std::error_code none;
+  for (const auto& cpu : fs::directory_iterator(root / "sys/devices/system/cpu", none)) {
+    const std::string name = text_of(cpu.path() / "cpufreq/scaling_governor");
+    if (!name.empty()) governors.insert(name);
+  }
+  if (governors.empty()) return {"governor", "unknown", ""};
+  std::string all;
+  for (const std::string& name : governors) all += (all.empty() ? "" : ", ") + name;
+  if (governors == std::set<std::string>{"performance"}) return {"governor", all, ""};
+  return {"governor", all, "`cpupower frequency-set -g performance`: a processor that has slowed down wakes late"};
+}
+
+Finding autosuspend(const fs::path& root) {
+  const auto seconds = number_of(text_of(root / "sys/module/usbcore/parameters/autosuspend"));
+  if (!seconds) return {"usb_autosuspend", "unknown", ""};
+  if (*seconds < 0) return {"usb_autosuspend", "off", ""};
+  return {"usb_autosuspend", "after " + std::to_string(*seconds) + " s",
+          "`usbcore.autosuspend=-1` to the kernel, or a udev rule with ATTR{power/control}=\"on\" for the device"};
+}
+
+Finding priority_limit(const fs::path& root) {
+  const std::string limit = value_after(text_of(root / "proc/self/limits"), "Max realtime priority");
+  const auto number = number_of(limit);
+  if (limit.empty()) return {"rtprio_limit", "unknown", ""};
+  if (!number || *number >= kHapticPriority) return {"rtprio_limit", limit, ""};
+  return {"rtprio_limit", limit,
+          "LimitRTPRIO=" + std::to_string(kHapticPriority) +
+              " in the unit, or rtprio in /etc/security/limits.d (root needs none)"};
+}
+
+Finding memory_limit(const fs::path& root) {
+  const std::string limit = value_after(text_of(root / "proc/self/limits"), "Max locked memory");
+  if (limit.empty()) return {"memlock_limit", "unknown", ""};
+  if (!number_of(limit)) return {"memlock_limit", limit, ""};
+  return {"memlock_limit", limit + " bytes",
+          "LimitMEMLOCK=infinity in the unit, or memlock in /etc/security/limits.d (root needs none)"};
+}
+
+Finding isolation(const fs::path& root) {
+  if (!fs::exists(root / "sys/devices/system/cpu/isolated")) return {"isolated_cpus", "unknown", ""};
+  const std::string isolated = text_of(root / "sys/devices/system/cpu/isolated");
+  const std::string without_tick = text_of(root / "sys/devices/system/cpu/nohz_full");
+  if (isolated.empty()) {
+    return {
+        "isolated_cpus", "none",
+        "where other programs load this machine: `isolcpus=N nohz_full=N rcu_nocbs=N` to the kernel, and `cpu = N` in "
+        "the scene's [loop]"};
+  }
+  const bool some = !without_tick.empty() && without_tick != "(null)";
+  return {"isolated_cpus", isolated + (some ? ", without tick " + without_tick : ""), ""};
+}
+
+/// How long the deepest sleep takes to wake from, which a server may forbid for as long as it runs.
+Finding sleep(const fs::path& root) {
+  constexpr std::int64_t kNoticed = 20;  // µs: what a thread on an ordinary kernel wakes late anyway
+  std::optional<std::int64_t> deepest;
+  std::error_code none;
+  for (const auto& state : fs::directory_iterator(root / "sys/devices/system/cpu/cpu0/cpuidle", none)) {
+    const auto latency = number_of(text_of(state.path() / "latency"));
+    if (latency) deepest = std::max(deepest.value_or(0), *latency);
+  }
+  if (!deepest) return {"cpu_sleep", "unknown", ""};
+  const std::string found = "up to " + std::to_string(*deepest) + " µs to wake";
+  if (*deepest <= kNoticed) return {"cpu_sleep", found, ""};
+  if (access((root / "dev/cpu_dma_latency").c_str(), W_OK) == 0) {
+    return {"cpu_sleep", found + " (the server forbids it while it runs)", ""};
+  }
+  return {"cpu_sleep", found,
+          "a udev rule that lets the server forbid it: KERNEL==\"cpu_dma_latency\", GROUP=\"plugdev\", MODE=\"0660\""};
+}
+
+Finding slack(const fs::path& root) {
+  const auto ns = number_of(text_of(root / "proc/self/timerslack_ns"));
+  if (!ns) return {"timer_slack", "unknown", ""};
+  return {"timer_slack", std::to_string(*ns) + " ns (the server asks for 1 ns for its own threads)", ""};
+}
+
+Finding throttling(const fs::path& root) {
+  const auto runtime = number_of(text_of(root / "proc/sys/kernel/sched_rt_runtime_us"));
+  const auto period = number_of(text_of(root / "proc/sys/kernel/sched_rt_period_us"));
+  if (!runtime || !period) return {"rt_throttling", "unknown", ""};
+  if (*runtime < 0) return {"rt_throttling", "off", ""};
+  return {"rt_throttling",
+          std::to_string(*runtime) + " of each " + std::to_string(*period) + " µs for real-time threads",
+          *runtime * 2 < *period ? "`sysctl kernel.sched_rt_runtime_us=950000`, the kernel's default" : ""};
+}
+
+Finding machine(const fs::path& root) {
+  const std::string cpus = text_of(root / "proc/cpuinfo");
+  if (cpus.empty()) return {"machine", "unknown", ""};
+  if (cpus.find(" hypervisor") == std::string::npos) return {"machine", "not virtual", ""};
+  return {"machine", "virtual", "not for a real device: the host may stop the whole machine for 20 ms and more"};
+}
+
+double us(Duration time) { return seconds(time) * 1e6; }
+
+void add_json(std::ostringstream& out, std::string_view name, const Diagnosis::WakeUps& wakes) {
+  out << std::quoted(name) << ":{\"n\":" << wakes.count << ",\"p50_us\":" << us(wakes.median)
+      << ",\"p99_us\":" << us(wakes.p99) << ",\"max_us\":" << us(wakes.longest) << '}';
+}
+
+void add_words(std::ostringstream& out, std::string_view name, const Diagnosis::WakeUps& wakes) {
+  out << "  " << std::left << std::setw(18) << name << std::right << std::fixed << std::setprecision(0) << "median "
+      << std::setw(5) << us(wakes.median) << " µs, p99 " << std::setw(5) << us(wakes.p99) << " µs, longest "
+      << std::setw(6) << us(wakes.longest) << " µs   (" << wakes.count << " wake-ups)\n";
+}
+
+}  // namespace
+
+Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, std::size_t count) {
+  std::vector<Duration> late(count);
+  LocalTime due = clock.now();
+  for (Duration& one : late) {
+    due += period;
+    clock.sleep_until(due);
+    const LocalTime now = clock.now();
+    one = now - due;
+    due = std::max(due, now - period);  // after a pause not one wake-up for each period of it
+  }
+  std::sort(late.begin(), late.end());
+  return {count, late[count / 2], late[count * 99 / 100], late.back()};
+}
+
+std::vector<Diagnosis::Finding> look_around(const fs::path& root) {
+  return {kernel(root),      tick(root),      machine(root), governor(root),   priority_limit(root), memory_limit(root),
+          autosuspend(root), isolation(root), sleep(root),   throttling(root), slack(root)};
+}
+
+Diagnosis diagnose(const WakeUpClock& clock) {
+  Diagnosis diagnosis;
+  diagnosis.findings = look_around("/");
+  std::thread([&] { diagnosis.ordinary = measure_wake_ups(clock, kPeriod, kWakeUps); }).join();
+  std::thread([&] {
+    diagnosis.refused = enter_realtime(kHapticPriority);
+    diagnosis.realtime = measure_wake_ups(clock, kPeriod, kWakeUps);
+  }).join();
+  return diagnosis;
+}
+
+std::string in_words(const Diagnosis& diagnosis) {
+  std::ostringstream out;
+  out << "how late a thread wakes:\n";
+  add_words(out, "ordinary", diagnosis.ordinary);
+  add_words(out, "as haptic thread", diagnosis.realtime);
+  for (const std::string& refused : diagnosis.refused) out << "  refused: " << refused << '\n';
+  out << "what the machine is like:\n";
+  for (const auto& [key, found, advice] : diagnosis.findings) {
+    out << "  " << std::left << std::setw(18) << key << found << '\n';
+    if (!advice.empty()) out << "                    → " << advice << '\n';
+  }
+  return out.str();
+}
+
+std::string in_json(const Diagnosis& diagnosis) {
+  std::ostringstream out;
+  out << "{\"wake_ups\":{";
+  add_json(out, "ordinary", diagnosis.ordinary);
+  out << ',';
+  add_json(out, "realtime", diagnosis.realtime);
+  out << "},\"refused\":[";
+  for (const std::string& refused : diagnosis.refused) {
+    out << (&refused == diagnosis.refused.data() ? "" : ",") << std::quoted(refused);
+  }
+  out << "],\"findings\":[";
+  for (const Finding& finding : diagnosis.findings) {
+    out << (&finding == diagnosis.findings.data() ? "" : ",") << "{\"key\":" << std::quoted(finding.key)
+        << ",\"found\":" << std::quoted(finding.found) << ",\"advice\":";
+    if (finding.advice.empty()) {
+      out << "null}";
+    } else {
+      out << std::quoted(finding.advice) << '}';
+    }
+  }
+  out << "]}";
+  return out.str();
+}
+
+}  // namespace tendon

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "core/base/time.h"
+#include "protocol/messages.h"
+#include "server/recording/records.h"
+
+namespace tendon {
+
+/// How one device's loop does: what the log thread knows, and the network thread tells observers who ask. Numbers of
+/// things are since the server started, so that one that was not seen is in the next.
+struct Health {
+  LocalTime at{};
+  std::uint64_t steps = 0;     ///< haptic steps
+  std::uint64_t missed = 0;    ///< periods without a step, because the one before came so late
+  std::uint64_t overruns = 0;  ///< steps with Reason::kOverrun
+  std::uint64_t unseen = 0;    ///< … and with kUnseen
+  LatenessHistogram lateness{};
+  Safety safety = Safety::kAbsent;
+  std::string_view fault{};  ///< of static storage; empty: none
+
+  // What the server does less of:
+  bool not_realtime = false;  ///< the kernel refused the haptic thread something, see enter_realtime
+  bool recording_ended = false;
+};
+
+/// Counts what a loop's steps tell of it, in the order in which they were taken; some may be missing.
+///
+///     late   = hand.at − scheduled, when the loop woke less when it was to
+///     missed = ⌊(scheduled − scheduled before) / period⌋ − (tick − tick before)
+///
+/// Thread-safe: no. Realtime-safe: yes, but for the constructor.
+class HealthMeter {
+ public:
+  /// `period` of the loop. Throws std::invalid_argument when it is not above zero.
+  explicit HealthMeter(Duration period);
+
+  void observe(const StepRecord& step) noexcept;
+  /// The numbers as they are now; `at` and what steps do not tell are for others to fill in.
+  const Health& counted() const noexcept { return counted_; }
+
+ private:
+  struct Before {
+    std::uint64_t tick;
+    LocalTime scheduled;
+  };
+  Duration period_;
+  std::optional<Before> before_;
+  Health counted_;
+};
+
+/// What there is to tell of the time between two of them: all but `number` and `device`.
+DeviceReport report(const Health& before, const Health& now);
+
+}  // namespace tendon

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/machine/realtime.h"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <system_error>
+
+namespace tendon {
+
+namespace {
+
+// Faults in the part of the stack that the loop will use, so that it never does so in a step.
+void touch_stack() {
+  constexpr std::size_t kBytes = 128 * 1024;
+  constexpr std::size_t kPage = 4096;
+  std::array<volatile std::byte, kBytes> stack;
+  for (std::size_t i = 0; i < kBytes; i += kPage) stack[i] = std::byte{0};
+}
+
+}  // namespace
+
+void name_thread(const std::string& name) { prctl(PR_SET_NAME, name.c_str(), 0UL, 0UL, 0UL); }
+
+void enter_punctual() { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
+
+std::vector<std::string> enter_realtime(int priority) {
+  std::vector<std::string> refused;
+  enter_punctual();
+  sched_param param{};
+  param.sched_priority = priority;
+  if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param); error != 0) {
+    refused.push_back("the haptic thread runs without real-time priority (SCHED_FIFO " + std::to_string(priority) +
+                      ": " + std::system_category().message(error) +
+                      "); expect late steps under load. Grant it with LimitRTPRIO= in the unit, or rtprio in "
+                      "/etc/security/limits.d");
+  }
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    refused.push_back(
+        "memory is not locked (mlockall: " + std::system_category().message(errno) +
+        "); a page fault may delay a step. Grant it with LimitMEMLOCK=infinity in the unit, or memlock in "
+        "/etc/security/limits.d");
+  }
+  touch_stack();
+  return refused;
+}
+
+std::optional<std::string> stay_on(std::uint32_t cpu) {
+  cpu_set_t only;
+  CPU_ZERO(&only);
+  int error = EINVAL;
+  if (cpu < CPU_SETSIZE) {
+    CPU_SET(cpu, &only);
+    error = pthread_setaffinity_np(pthread_self(), sizeof only, &only);
+  }
+  if (error == 0) return std::nullopt;
+  return "the haptic thread does not stay on processor " + std::to_string(cpu) +
+         " (sched_setaffinity: " + std::system_category().message(error) +
+         "); name one of `nproc --all`, from 0, that the unit's AllowedCPUs= and CPUAffinity= leave";
+}
+
+WakefulProcessors::WakefulProcessors(const std::filesystem::path& file)
+    : file_(open(file.c_str(), O_WRONLY | O_CLOEXEC)) {
+  if (file_ < 0 && errno == ENOENT) return;
+  const std::int32_t none = 0;  // µs
+  held_ = file_ >= 0 && write(file_, &none, sizeof none) == static_cast<ssize_t>(sizeof none);
+  if (held_) return;
+  refused_ = "processors may sleep deep (" + file.string() + ": " + std::system_category().message(errno) +
+             "); waking may take a step 0.1 ms and more. Grant it with a udev rule: KERNEL==\"cpu_dma_latency\", "
+             "GROUP=\"plugdev\", MODE=\"0660\"";
+}
+
+WakefulProcessors::~WakefulProcessors() {
+  if (file_ >= 0) close(file_);
+}
+
+}  // namespace tendon

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/base/time.h"
+#include "protocol/link.h"
+#include "server/machine/doorbell.h"
+
+namespace tendon {
+
+/// Who may reach a socket.
+enum class Reach : std::uint8_t {
+  kThisMachine,  ///< loopback only
+  kAnywhere,     ///< for those who let in nobody without a key
+};
+
+/// The real link: one UDP socket on one address of this machine, IPv4 or IPv6.
+///
+/// send() and receive() never wait; wait() is the only place where the network thread sleeps.
+/// Datagrams are whatever anyone on this machine cares to send: nothing here looks inside them.
+///
+/// Thread-safe: no. Realtime-safe: no (system calls).
+class UdpLink : public Link {
+ public:
+  /// Opens and binds; port 0 lets the system choose one (see local_address()).
+  /// Throws std::invalid_argument when `listen` is not a loopback address, unless the caller says that it is
+  /// meant: without keys anyone on a network could command forces.
+  /// Throws std::runtime_error when the system refuses:
+  /// "cannot listen on 127.0.0.1:47100: Address already in use".
+  explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine);
+  ~UdpLink() override;
+
+  /// A datagram that the system does not take at once (full buffer, no route, other address family)
+  /// is lost, and counted in send_failures().
+  void send(const Address& to, std::span<const std::byte> datagram) override;
+
+  /// As Link says. Empty datagrams are skipped: they say nothing, and 0 means that none is waiting.
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override;
+
+  /// The time by clock::now().
+  LocalTime received_by(LocalTime now) const override;
+
+  /// Waits until a datagram can be received, or the doorbell rings (it is then answered), or
+  /// `timeout` is over, whichever comes first; a signal handler may end it sooner. A timeout of zero
+  /// or less does not wait. The resolution is the kernel's: set the thread's timer slack to 1 ns if
+  /// 50 µs matter.
+  void wait(Duration timeout, Doorbell* doorbell = nullptr);
+
+  /// Where peers can reach this socket; the port is the real one.
+  Address local_address() const;
+
+  /// Datagrams that send() could not hand to the system.
+  std::uint64_t send_failures() const noexcept { return send_failures_; }
+
+  /// The socket's file descriptor, for whoever polls several links at once.
+  int fd() const noexcept;
+
+ private:
+  struct Socket;  // keeps Asio out of this header
+  std::unique_ptr<Socket> socket_;
+  std::uint64_t send_failures_ = 0;
+};
+
+}  // namespace tendon

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/flight_file.h"
+
+#include <stdexcept>
+#include <system_error>
+
+namespace tendon {
+
+std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
+                                  int number) {
+  std::filesystem::path path = "tendon.mcap";
+  if (recording) {
+    std::error_code unknown;  // a recording that somebody has moved away was a file
+    const auto kind = std::filesystem::status(*recording, unknown).type();
+    if (kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found) path = *recording;
+  }
+  path.replace_extension((device.empty() ? "" : "." + device) + ".fault-" + std::to_string(number) + ".mcap");
+  return path;
+}
+
+void write_flight(const decltype(Mailboxes::flight)& flight, const Recorder::Config& config, ByteSink& sink) {
+  Recorder recorder(config, sink);
+  for (std::size_t i = 0; i < flight.size(); ++i) recorder.record(flight[i]);
+  recorder.close();
+  if (const std::string error = recorder.status().error; !error.empty()) throw std::runtime_error(error);
+}
+
+}  // namespace tendon

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "server/mailboxes.h"
+#include "server/recording/recorder.h"
+
+namespace tendon {
+
+/// Where the steps before a device's `number`-th fault go: `run.fault-1.mcap` beside a recording `run.mcap`, and
+/// `tendon.fault-1.mcap` in the working directory where there is none, or none that has a place of its own (/dev/null,
+/// a pipe). `device` is its name, `run.left.fault-1.mcap`, or empty when it is the only one.
+std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
+                                  int number);
+
+/// Writes the steps that led to a fault as a recording of its own.
+///
+/// `flight` must be frozen, and is left so. Throws std::runtime_error with the sink's reason when not all of them could
+/// be written. Log thread only.
+void write_flight(const decltype(Mailboxes::flight)& flight, const Recorder::Config& config, ByteSink& sink);
+
+}  // namespace tendon

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/recorder.h"
+
+#include <utility>
+
+namespace tendon {
+namespace {
+
+std::uint16_t add_channel(McapWriter& writer, const recording::Channel& channel) {
+  const auto schema = writer.add_schema(channel.schema, recording::kEncoding, recording::schema_data());
+  return writer.add_channel(schema, channel.topic, recording::kEncoding);
+}
+
+}  // namespace
+
+Recorder::Recorder(const Config& config, ByteSink& sink)
+    : config_(config),
+      sink_(sink),
+      writer_("tendon " + config.scene.version, sink),
+      scene_channel_(add_channel(writer_, recording::kScene)),
+      step_channels_{add_channel(writer_, recording::kStep)},
+      datagram_channel_(add_channel(writer_, recording::kDatagram)),
+      loss_channel_(add_channel(writer_, recording::kLoss)) {
+  write(scene_channel_, config_.started, recording::encode(config_.scene));
+  for (const Device& device : config_.more_devices) {
+    const auto of_device = [&](const recording::Channel& channel) {
+      const std::string topic = "/" + device.name + std::string(channel.topic);
+      return add_channel(writer_, {topic, channel.schema});
+    };
+    write(of_device(recording::kScene), config_.started, recording::encode(device.scene));
+    step_channels_.push_back(of_device(recording::kStep));
+  }
+  settle(writer_.flush_chunk());
+}
+
+void Recorder::record(const StepRecord& step, std::size_t device) {
+  if (!recording()) {
+    ++lost_.steps;
+    return;
+  }
+  ++pending_.steps;
+  write(step_channels_[device], step.hand.at, recording::encode(step));
+}
+
+void Recorder::record(const DatagramRecord& datagram) {
+  if (!recording()) {
+    ++lost_.datagrams;
+    return;
+  }
+  ++pending_.datagrams;
+  write(datagram_channel_, datagram.at, recording::encode(datagram));
+}
+
+void Recorder::lost(LocalTime at, std::uint64_t steps, std::uint64_t datagrams) {
+  lost_.steps += steps;
+  lost_.datagrams += datagrams;
+  if (recording()) write(loss_channel_, at, recording::encode(LossRecord{at, steps, datagrams}));
+}
+
+void Recorder::tick(LocalTime now) {
+  if (chunk_opened_ && now - *chunk_opened_ >= config_.flush_after) settle(writer_.flush_chunk());
+}
+
+void Recorder::close() {
+  if (!recording()) return;
+  settle(writer_.flush_chunk());
+  failed_ = failed_ || !writer_.close();
+  closed_ = true;
+}
+
+Recorder::Status Recorder::status() const {
+  return {.bytes = writer_.bytes_written(),
+          .steps = kept_.steps + pending_.steps,
+          .datagrams = kept_.datagrams + pending_.datagrams,
+          .lost_steps = lost_.steps,
+          .lost_datagrams = lost_.datagrams,
+          .error = failed_ ? sink_.error() : std::string()};
+}
+
+void Recorder::write(std::uint16_t channel, LocalTime at, const std::string& message) {
+  if (!chunk_opened_) chunk_opened_ = at;
+  writer_.write(channel, recording::log_time(at, config_.scene.unix_offset), message);
+  if (writer_.chunk_size() >= config_.flush_size) settle(writer_.flush_chunk());
+  tick(at);
+}
+
+/// The open chunk has been handed over: books what was in it.
+void Recorder::settle(bool kept) {
+  Counts& account = kept ? kept_ : lost_;
+  account.steps += pending_.steps;
+  account.datagrams += pending_.datagrams;
+  pending_ = {};
+  chunk_opened_.reset();
+  failed_ = !kept;
+}
+
+}  // namespace tendon

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/time.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/mcap_writer.h"
+#include "server/recording/recording_codec.h"
+#include "server/recording/records.h"
+
+namespace tendon {
+
+/// Records a run: the scene, every haptic step and every datagram, as one MCAP file with protobuf messages
+/// (recording.proto) that Foxglove and PlotJuggler open as it is.
+///
+/// * A server killed at any instant leaves a readable file that lacks at most the last `flush_after` of its run.
+/// * The same calls give the same bytes: no clock is read and nothing depends on an address.
+/// * When the sink fails (a full disk), recording ends for good: later records are counted, nothing else happens, and
+///   what was written stays readable. `status().error` says why.
+///
+/// Steps come in the order of their time, and so do datagrams; how the two interleave does not matter.
+///
+/// Thread-safe: no; the log thread owns it. Realtime-safe: no.
+class Recorder {
+ public:
+  /// A device besides the first.
+  struct Device {
+    std::string name;  ///< its records are in channels /NAME/scene and /NAME/haptic/step
+    SceneRecord scene;
+  };
+  struct Config {
+    SceneRecord scene;
+    std::vector<Device> more_devices{};
+    LocalTime started{};  ///< time of the scene's message
+    /// The most recorded time that a kill can cost. Each flush costs one write(2) and some 300 bytes of chunk and
+    /// index.
+    Duration flush_after = std::chrono::milliseconds(250);
+    /// Bytes of messages at which a chunk closes earlier. A reader seeks by chunks and holds a few in memory.
+    std::size_t flush_size = std::size_t{256} * 1024;
+  };
+  struct Status {
+    std::uint64_t bytes = 0;           ///< in the file
+    std::uint64_t steps = 0;           ///< in the file, or in the open chunk
+    std::uint64_t datagrams = 0;       ///< likewise
+    std::uint64_t lost_steps = 0;      ///< not in the file: reported by `lost`, or given up by a failed sink
+    std::uint64_t lost_datagrams = 0;  ///< likewise
+    std::string error;                 ///< why recording has ended early; empty while it goes on
+  };
+
+  /// Writes the scene at once. `sink` must outlive the recorder; its failure shows in `status()`.
+  Recorder(const Config& config, ByteSink& sink);
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// `device` by number: 0 is the first, and those of `more_devices` follow.
+  void record(const StepRecord& step, std::size_t device = 0);
+  void record(const DatagramRecord& datagram);
+  /// Notes that records were dropped before they came here, so that a reader knows of the gap.
+  void lost(LocalTime at, std::uint64_t steps, std::uint64_t datagrams);
+
+  /// Flushes what is older than `flush_after`, though nothing new comes. Call it after each batch of records.
+  void tick(LocalTime now);
+
+  /// Ends the file with an index. Without it the file is readable, but counts as truncated, and opens slower.
+  /// Records that come later are lost, and counted.
+  void close();
+
+  Status status() const;
+
+ private:
+  struct Counts {
+    std::uint64_t steps = 0;
+    std::uint64_t datagrams = 0;
+  };
+
+  void write(std::uint16_t channel, LocalTime at, const std::string& message);
+  bool recording() const noexcept { return !failed_ && !closed_; }
+  void settle(bool kept);
+
+  Config config_;
+  ByteSink& sink_;
+  McapWriter writer_;
+  std::uint16_t scene_channel_;
+  std::vector<std::uint16_t> step_channels_;  ///< by device
+  std::uint16_t datagram_channel_;
+  std::uint16_t loss_channel_;
+  std::optional<LocalTime> chunk_opened_;
+  Counts kept_;     ///< taken by the sink
+  Counts pending_;  ///< in the open chunk
+  Counts lost_;
+  bool failed_ = false;
+  bool closed_ = false;
+};
+
+}  // namespace tendon

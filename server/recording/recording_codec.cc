@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/recording_codec.h"
+
+#include <google/protobuf/descriptor.pb.h>
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <stdexcept>
+
+#include "protocol/link.h"
+#include "protocol/wire/codec.h"
+#include "recording.pb.h"
+
+namespace tendon::recording {
+namespace {
+
+namespace pb = tendon::recording::v1;
+
+void put(pb::Vec3* out, const Vec3& v) {
+  out->set_x(v.x());
+  out->set_y(v.y());
+  out->set_z(v.z());
+}
+
+Vec3 vec3(const pb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+void put(pb::Reason* out, Reasons reasons) {
+  out->set_energy(reasons.has(Reason::kEnergy));
+  out->set_max_force(reasons.has(Reason::kMaxForce));
+  out->set_slew(reasons.has(Reason::kSlew));
+  out->set_ramp_in(reasons.has(Reason::kRampIn));
+  out->set_held(reasons.has(Reason::kHeld));
+  out->set_decaying(reasons.has(Reason::kDecaying));
+  out->set_safe_stop(reasons.has(Reason::kSafeStop));
+  out->set_not_finite(reasons.has(Reason::kNotFinite));
+  out->set_fault(reasons.has(Reason::kFault));
+  out->set_device_clamp(reasons.has(Reason::kDeviceClamp));
+  out->set_overrun(reasons.has(Reason::kOverrun));
+  out->set_watchdog(reasons.has(Reason::kWatchdog));
+  out->set_unseen(reasons.has(Reason::kUnseen));
+  out->set_disarmed(reasons.has(Reason::kDisarmed));
+}
+
+template <class Message>
+Message parse(std::string_view bytes) {
+  Message message;
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+    throw std::invalid_argument("the bytes are not a " + message.GetTypeName());
+  return message;
+}
+
+}  // namespace
+
+std::string schema_data() {
+  google::protobuf::FileDescriptorSet set;
+  pb::Step::descriptor()->file()->CopyTo(set.add_file());  // imports nothing
+  return set.SerializeAsString();
+}
+
+std::string encode(const SceneRecord& scene) {
+  pb::Scene out;
+  out.set_text(scene.text);
+  out.set_seed(scene.seed);
+  out.set_version(scene.version);
+  out.set_commit(scene.commit);
+  out.set_unix_offset_ns(scene.unix_offset.count());
+  return out.SerializeAsString();
+}
+
+std::string encode(const StepRecord& step) {
+  pb::Step out;
+  out.set_tick(step.tick);
+  out.set_late_ns((step.hand.at - step.scheduled).count());
+  out.set_interval_ns(step.held.count());
+  put(out.mutable_position_m(), step.hand.position);
+  put(out.mutable_velocity_mps(), step.hand.velocity);
+  put(out.mutable_force_held_n(), step.was_applied);
+  put(out.mutable_force_wanted_n(), step.wanted);
+  put(out.mutable_force_commanded_n(), step.force);
+  put(out.mutable_force_applied_n(), step.applied);
+  out.set_force_wanted_norm_n(step.wanted.norm());
+  out.set_force_applied_norm_n(step.applied.norm());
+  out.set_permitted_n(step.permitted);
+  out.set_energy_j(step.energy);
+  out.set_reason_bits(step.reasons.bits());
+  put(out.mutable_reason(), step.reasons);
+  out.set_mode(static_cast<pb::Mode>(step.mode));
+  out.set_force_sequence(step.force_sequence);
+  out.set_force_age_ns(step.force_age.count());
+  out.set_loop_age_ns(step.loop_age.count());
+  out.set_channel(step.channel);
+  if (step.hand_force) put(out.mutable_hand_force_n(), *step.hand_force);
+  if (step.force_error) out.set_force_error_n(*step.force_error);
+  out.set_rearmed(step.rearmed);
+  out.set_disarmed(step.disarmed);
+  if (!step.stiffness.isZero(0)) {
+    for (const auto row : step.stiffness.rowwise()) {
+      for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
+    }
+  }
+  return out.SerializeAsString();
+}
+
+std::string encode(const DatagramRecord& datagram) {
+  pb::Datagram out;
+  out.set_direction(static_cast<pb::Direction>(datagram.direction));
+  out.set_peer(to_string(datagram.peer));
+  out.set_size_bytes(datagram.size);
+  const auto payload = std::span(datagram.bytes).first(std::min<std::size_t>(datagram.size, datagram.bytes.size()));
+  out.set_payload(payload.data(), payload.size());
+  if (payload.size() < datagram.size) return out.SerializeAsString();  // too large for this protocol
+  if (const auto header = decode_header(payload)) {
+    out.set_type(static_cast<pb::DatagramType>(header->type));
+    out.set_connection_id(header->connection_id);
+    out.set_packet_number(header->packet_number);
+  }
+  return out.SerializeAsString();
+}
+
+std::string encode(const LossRecord& loss) {
+  pb::Lost out;
+  out.set_steps(loss.steps);
+  out.set_datagrams(loss.datagrams);
+  return out.SerializeAsString();
+}
+
+SceneRecord decode_scene(std::string_view message) {
+  const auto in = parse<pb::Scene>(message);
+  return {.text = in.text(),
+          .seed = in.seed(),
+          .version = in.version(),
+          .commit = in.commit(),
+          .unix_offset = Duration(in.unix_offset_ns())};
+}
+
+StepRecord decode_step(std::string_view message, LocalTime at) {
+  const auto in = parse<pb::Step>(message);
+  if (in.mode() == pb::MODE_UNSPECIFIED || !pb::Mode_IsValid(in.mode()))
+    throw std::invalid_argument("step " + std::to_string(in.tick()) + " has the unknown mode " +
+                                std::to_string(in.mode()));
+  StepRecord out;
+  out.tick = in.tick();
+  out.scheduled = at - Duration(in.late_ns());
+  out.hand = {.at = at, .position = vec3(in.position_m()), .velocity = vec3(in.velocity_mps())};
+  out.held = Duration(in.interval_ns());
+  out.was_applied = vec3(in.force_held_n());
+  out.wanted = vec3(in.force_wanted_n());
+  out.permitted = in.permitted_n();
+  out.force = vec3(in.force_commanded_n());
+  out.applied = vec3(in.force_applied_n());
+  out.energy = in.energy_j();
+  out.reasons = Reasons::from_bits(in.reason_bits());
+  out.mode = static_cast<Mode>(in.mode());
+  out.force_sequence = in.force_sequence();
+  out.force_age = Duration(in.force_age_ns());
+  out.loop_age = Duration(in.loop_age_ns());
+  out.channel = in.channel();
+  if (in.has_hand_force_n()) out.hand_force = vec3(in.hand_force_n());
+  if (in.has_force_error_n()) out.force_error = in.force_error_n();
+  out.rearmed = in.rearmed();
+  out.disarmed = in.disarmed();
+  if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
+    if (entries != 9)
+      throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +
+                                  std::to_string(entries) + " numbers instead of 9");
+    for (int i = 0; i < entries; ++i) out.stiffness(i / 3, i % 3) = in.stiffness_wanted_n_per_m(i);
+  }
+  return out;
+}
+
+DatagramRecord decode_datagram(std::string_view message, LocalTime at) {
+  const auto in = parse<pb::Datagram>(message);
+  if (in.direction() == pb::DIRECTION_UNSPECIFIED || !pb::Direction_IsValid(in.direction()))
+    throw std::invalid_argument("a datagram has the unknown direction " + std::to_string(in.direction()));
+  if (in.payload().size() != std::min<std::size_t>(in.size_bytes(), kMaxDatagram))
+    throw std::invalid_argument("a datagram of " + std::to_string(in.size_bytes()) + " bytes has a payload of " +
+                                std::to_string(in.payload().size()));
+  DatagramRecord out{.at = at,
+                     .direction = static_cast<DatagramRecord::Direction>(in.direction()),
+                     .peer = parse_address(in.peer()),
+                     .size = in.size_bytes(),
+                     .bytes = {}};
+  std::memcpy(out.bytes.data(), in.payload().data(), in.payload().size());
+  return out;
+}
+
+LossRecord decode_loss(std::string_view message, LocalTime at) {
+  const auto in = parse<pb::Lost>(message);
+  return {.at = at, .steps = in.steps(), .datagrams = in.datagrams()};
+}
+
+}  // namespace tendon::recording

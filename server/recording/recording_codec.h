@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "core/base/time.h"
+#include "server/recording/records.h"
+
+// Records as the messages of recording.proto, and back. The only place in the server that knows protobuf.
+
+namespace tendon {
+
+/// What was run: enough to run it again.
+struct SceneRecord {
+  std::string text;  ///< the scene file, whole; UTF-8
+  std::uint64_t seed = 0;
+  std::string version;     ///< of the program that recorded
+  std::string commit;      ///< it was built from
+  Duration unix_offset{};  ///< log_time − local time; 0 in simulations
+
+  bool operator==(const SceneRecord&) const = default;
+};
+
+/// Records that did not make it into the file, counted since the loss before.
+struct LossRecord {
+  LocalTime at{};  ///< when it was noticed
+  std::uint64_t steps = 0;
+  std::uint64_t datagrams = 0;
+
+  bool operator==(const LossRecord&) const = default;
+};
+
+namespace recording {
+
+/// Where a kind of record is found in the MCAP file.
+struct Channel {
+  std::string_view topic;
+  std::string_view schema;  ///< full name of its protobuf message
+};
+inline constexpr Channel kScene = {"/scene", "tendon.recording.v1.Scene"};
+inline constexpr Channel kStep = {"/haptic/step", "tendon.recording.v1.Step"};
+inline constexpr Channel kDatagram = {"/net/datagram", "tendon.recording.v1.Datagram"};
+inline constexpr Channel kLoss = {"/recording/lost", "tendon.recording.v1.Lost"};
+
+/// The MCAP name of both our schemas' and our messages' encoding.
+inline constexpr std::string_view kEncoding = "protobuf";
+
+/// A serialized FileDescriptorSet that holds every message of recording.proto.
+std::string schema_data();
+
+/// The same record gives the same bytes.
+std::string encode(const SceneRecord& scene);
+std::string encode(const StepRecord& step);
+std::string encode(const DatagramRecord& datagram);
+std::string encode(const LossRecord& loss);
+
+// A message back as a record; `at` is the message's time on the local clock. Every double comes back with all its
+// bits, NaN included. Throws std::invalid_argument with what is wrong when the bytes are not such a message.
+SceneRecord decode_scene(std::string_view message);
+StepRecord decode_step(std::string_view message, LocalTime at);
+DatagramRecord decode_datagram(std::string_view message, LocalTime at);
+LossRecord decode_loss(std::string_view message, LocalTime at);
+
+/// log_time = unix_offset + local time, in ns modulo 2⁶⁴; and its inverse.
+constexpr std::uint64_t log_time(LocalTime at, Duration unix_offset) noexcept {
+  return static_cast<std::uint64_t>(at.time_since_epoch().count()) + static_cast<std::uint64_t>(unix_offset.count());
+}
+constexpr LocalTime local_time(std::uint64_t log_time, Duration unix_offset) noexcept {
+  return LocalTime(Duration(static_cast<Duration::rep>(log_time - static_cast<std::uint64_t>(unix_offset.count()))));
+}
+
+}  // namespace recording
+}  // namespace tendon

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/time.h"
+#include "devices/replay/replay_device.h"
+#include "devices/safety/safe_device.h"
+#include "devices/simulated/simulated_device.h"
+#include "devices/spacemouse/spacemouse_device.h"
+#include "devices/woodenhaptics/woodenhaptics_device.h"
+#include "protocol/link.h"
+#include "server/haptic_loop.h"
+#include "server/network_loop.h"
+
+namespace tendon {
+
+/// All that a server is to run, as plain values in SI units, checked: what the constructors of the
+/// device and of the loops take without a complaint.
+struct Scene {
+  struct Network {
+    Address listen = parse_address("127.0.0.1:47100");
+    std::optional<std::filesystem::path> keys;  ///< folder; empty: anybody on this machine may come in
+    std::size_t max_observers = NetworkLoop::Config{}.max_observers;
+    Duration controller_timeout = NetworkLoop::Config{}.controller_timeout;
+    Duration observer_timeout = NetworkLoop::Config{}.observer_timeout;
+    bool adapt_state_rate = NetworkLoop::Config{}.adapt_state_rate;
+    std::vector<std::string> takeover{};  ///< see NetworkLoop
+  };
+  struct Channel {
+    std::string name = "main";
+    ChannelRule rule = ChannelRule::kSum;
+    Duration lease{};  ///< 0: its holder stays until it leaves
+  };
+
+  /// A Novint Falcon.
+  struct Falcon {
+    std::string port{};                               ///< as `tendond devices` names it; empty: the first free one
+    std::optional<std::filesystem::path> firmware{};  ///< empty: one that has its firmware already
+    bool accept_unknown_firmware = false;
+  };
+
+  struct SpaceMouse {
+    std::string port{};  ///< like a Falcon's
+    SpaceMouseDevice::Config motion{};
+  };
+
+  /// A WoodenHaptics, or a relative.
+  struct WoodenHaptics {
+    std::string port{};  ///< like a Falcon's
+    WoodenHapticsDevice::Config drive{};
+  };
+
+  std::string name;  ///< of the device, as clients claim it
+  // At most one of these; without one the device is simulated.
+  std::optional<Falcon> falcon;
+  std::optional<ReplayDevice::Config> replay;
+  std::optional<SpaceMouse> spacemouse;
+  std::optional<WoodenHaptics> woodenhaptics;
+  SimulatedDevice::Config
+      device;  ///< of a real device: what is known of it, and what stands in where costs are measured
+  std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
+  HapticLoop::Config loop;
+  std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere
+  std::vector<Channel> channels = {Channel{}};
+  Network network;
+  bool has_network = false;                        ///< the file says something about it
+  std::optional<std::filesystem::path> recording;  ///< relative to the current directory; empty: nothing is recorded
+  std::string text;                                ///< the file, whole, for the recording
+
+  /// Else it is an input only: whatever engines send, nobody feels it.
+  bool exerts_force() const noexcept { return !replay && !spacemouse; }
+  /// It is a real device with motors.
+  bool moves_a_hand() const noexcept { return falcon || woodenhaptics; }
+};
+
+/// What is wrong with a scene, for the operator to act on:
+/// "FILE:LINE: KEY: expected …, found …". The line is left out where nothing in the file is to blame
+/// (a table that is not there), the key where there is none (a syntax error).
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// No scene that a person writes comes near it, and a wrong path may lead to anything. Every second byte can
+/// nest one table deeper, and toml++ recurses: 4 times as much overflows a stack of 8 MiB.
+inline constexpr std::size_t kMaxSceneBytes = 16'384;
+
+/// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys.
+/// Throws SceneError; "cannot read FILE: No such file or directory" when there is no such file.
+///
+/// Of several mistakes the first in the file is reported; a key that is missing only when all that is
+/// there is right, because a misspelt key is both.
+Scene read_scene(const std::filesystem::path& file);
+
+/// The scenes of several devices that one server runs. Network and recording are the first one's; a later one that has
+/// such a table is refused, as are two devices of one name.
+std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files);
+
+/// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for
+/// relative to `directory`.
+///
+/// `settings` change what the text says, each "TABLE.KEY=VALUE" with a value in TOML or a word that needs no quotes;
+/// without a value the key, or the whole table, is taken out. `Scene::text` is the text all the same.
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
+                  std::span<const std::string> settings = {});
+
+/// Every key that a scene may have: meaning, what is accepted in which unit, and what holds without it.
+std::string scene_reference();
+
+}  // namespace tendon

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/models/quasi_static.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "clients/softbody/models/linear.h"
+#include "tests/clients/softbody/pressed_block.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::kB1PatchRadius;
+using testing::pressed_block;
+using testing::PressedByNewton;
+
+constexpr Law kLaws[] = {Law::kCorotational, Law::kStVenantKirchhoff, Law::kNeoHookean};
+
+TEST(QuasiStatic, SmallPressesAreAnsweredAsByTheLinearModel) {
+  for (const Element element : {Element::kTet4, Element::kHex8Sri}) {
+    const Solid linear = pressed_block(element, 4, 0.45);
+    const TouchSurface top(linear.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+    const double expected = LinearModel(linear, top).press(*top.patch(Vec2::Zero()), Given::kDepth, 1e-6).force;
+    for (const Law law : kLaws) {
+      PressedByNewton pressed(element, 4, law);
+      const Reaction found = pressed.model.press(pressed.patch, Given::kDepth, 1e-6);
+      EXPECT_NEAR(found.force / expected, 1, 2e-4) << static_cast<int>(law);
+      EXPECT_NEAR(found.depth, 1e-6, 1e-12);
+    }
+  }
+}
+
+TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
+  for (const Law law : kLaws) {
+    PressedByNewton pressed(Element::kHex8Sri, 4, law);
+    const double h = 1e-5;
+    const auto press = [&](double depth) {
+      const Reaction reaction = pressed.model.press(pressed.patch, Given::kDepth, depth);
+      return std::pair(reaction, pressed.solid.energy(pressed.model.displacements()));
+    };
+    const auto [low, energy_low] = press(0.004 - h);
+    const auto [here, energy] = press(0.004);
+    const auto [high, energy_high] = press(0.004 + h);
+    EXPECT_NEAR((energy_high - energy_low) / (2 * h) / here.force, 1, 1e-5);
+    EXPECT_NEAR((high.force - low.force) / (2 * h) / here.stiffness, 1, 2e-3);
+    EXPECT_LT(here.error, 1e-5 * here.force);
+  }
+}
+
+TEST(QuasiStatic, TheSameForceComesFromDepthAsFromForceAndFromOneStepAsFromMany) {
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    PressedByNewton at_once(Element::kHex8Sri, 4, law);
+    const Reaction deep = at_once.model.press(at_once.patch, Given::kDepth, 0.01);
+    PressedByNewton slowly(Element::kHex8Sri, 4, law);
+    for (const double depth : {0.002, 0.004, 0.006, 0.008}) slowly.model.press(slowly.patch, Given::kDepth, depth);
+    EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kDepth, 0.01).force / deep.force, 1, 1e-6);
+    EXPECT_NEAR(slowly.model.press(slowly.patch, Given::kForce, deep.force).depth, 0.01, 1e-7);
+  }
+}
+
+TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
+  for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
+    PressedByNewton kept(Element::kHex8Sri, 4, law);
+    int answers = 0;
+    for (double time = 0; time < 2; time += 0.01) {  // 100 answers a second, 0.5 to 2.5 mm deep
+      const double depth = 0.0015 + 0.001 * std::sin(5 * time);
+      const Reaction found = kept.model.press(kept.patch, Given::kDepth, depth);
+      EXPECT_LE(kept.model.iterations(), 12);
+      EXPECT_LE(found.error, 1e-5 * found.force);
+      if (++answers % 20 != 0) continue;
+      PressedByNewton anew(Element::kHex8Sri, 4, law);
+      EXPECT_NEAR(found.force / anew.model.press(anew.patch, Given::kDepth, depth).force, 1, 1e-6);
+      const double h = 1e-6;
+      const double high = anew.model.press(anew.patch, Given::kDepth, depth + h).force;
+      const double low = anew.model.press(anew.patch, Given::kDepth, depth - h).force;
+      EXPECT_NEAR((high - low) / (2 * h) / found.stiffness, 1, 5e-3);
+    }
+    EXPECT_LT(kept.model.factors(), answers / 10);
+  }
+}
+
+TEST(QuasiStatic, OneIterationAtEachAnswerFollowsAMovingToolAndSaysHowFarItIsOff) {
+  PressedByNewton exact(Element::kHex8Sri, 4, Law::kNeoHookean);
+  PressedByNewton hasty(Element::kHex8Sri, 4, Law::kNeoHookean, 1);
+  for (int i = 1; i <= 20; ++i) {
+    const double depth = 5e-4 * i;
+    const double truth = exact.model.press(exact.patch, Given::kDepth, depth).force;
+    const Reaction found = hasty.model.press(hasty.patch, Given::kDepth, depth);
+    EXPECT_EQ(hasty.model.iterations(), 1);
+    EXPECT_NEAR(found.force, truth, 0.03 * truth + 1e-9);
+    EXPECT_GE(found.error, std::abs(found.force - truth));
+  }
+}
+
+TEST(QuasiStatic, WhatCannotBeIsRefused) {
+  const Solid solid = pressed_block(Element::kHex8Sri, 2, 0.45, Law::kNeoHookean);
+  const TouchSurface top(solid.mesh(), Vec3::UnitZ(), kB1PatchRadius);
+  EXPECT_THROW(QuasiStaticModel(solid, top, {.max_iterations = 0}), std::invalid_argument);
+  EXPECT_THROW(QuasiStaticModel(solid, top, {.tolerance = 0}), std::invalid_argument);
+  EXPECT_THROW(LinearModel(solid, top), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tendon::softbody

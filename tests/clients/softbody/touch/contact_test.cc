@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/softbody/touch/contact.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "clients/softbody/models/linear.h"
+#include "tests/clients/softbody/pressed_block.h"
+#include "tests/support/dice.h"
+
+namespace tendon::softbody {
+namespace {
+
+using testing::kB1PatchRadius;
+using testing::pressed_block;
+
+class Contacts : public ::testing::Test {
+ protected:
+  Solid solid_ = pressed_block(Element::kHex8Sri, 8, 0.45);
+  TouchSurface top_{solid_.mesh(), Vec3::UnitZ(), kB1PatchRadius};
+  CondensedModel model_{solid_, top_, top_.nodes()};
+};
+
+TEST_F(Contacts, NothingIsFeltOutsideAndThePushIsUpwardsInside) {
+  PatchContact contact(model_, top_, 0, PatchContact::Side::kUnilateral);
+  const Feel outside = contact.at(Vec3(0, 0, 0.053));
+  EXPECT_EQ(outside.force, Vec3::Zero());
+  EXPECT_FALSE(outside.touching);
+  EXPECT_NEAR(outside.gap, 0.003, 1e-12);
+  EXPECT_NEAR(outside.valid_radius, 0.003, 1e-12);
+  const Feel inside = contact.at(Vec3(0, 0, 0.048));
+  EXPECT_TRUE(inside.touching);
+  EXPECT_NEAR(inside.gap, -0.002, 1e-12);
+  EXPECT_NEAR(inside.force.z(), 0.002 * inside.stiffness(2, 2), 1e-9);
+  EXPECT_LT(inside.force.head<2>().norm(), 1e-9);  // in the middle nothing pulls aside
+}
+
+TEST_F(Contacts, ASphereTouchesARadiusEarlier) {
+  PatchContact point(model_, top_, 0, PatchContact::Side::kUnilateral);
+  PatchContact sphere(model_, top_, 0.01, PatchContact::Side::kUnilateral);
+  EXPECT_LT((point.at(Vec3(0.01, 0, 0.049)).force - sphere.at(Vec3(0.01, 0, 0.059)).force).norm(), 1e-12);
+  EXPECT_THROW(PatchContact(model_, top_, -1, PatchContact::Side::kUnilateral), std::invalid_argument);
+}
+
+TEST_F(Contacts, OnlyABilateralToolPullsAndOnlyOnceItHasTouched) {
+  PatchContact sticky(model_, top_, 0, PatchContact::Side::kBilateral);
+  EXPECT_EQ(sticky.at(Vec3(0, 0, 0.052)).force, Vec3::Zero());
+  EXPECT_GT(sticky.at(Vec3(0, 0, 0.048)).force.z(), 0);
+  EXPECT_LT(sticky.at(Vec3(0, 0, 0.052)).force.z(), 0);
+  PatchContact loose(model_, top_, 0, PatchContact::Side::kUnilateral);
+  EXPECT_GT(loose.at(Vec3(0, 0, 0.048)).force.z(), 0);
+  EXPECT_EQ(loose.at(Vec3(0, 0, 0.052)).force, Vec3::Zero());
+}
+
+/// J, on a closed way the work that the hand has done. A midpoint rule in small steps.
+double work_around(PatchContact& contact, int steps) {
+  const auto place = [](double turn) {
+    const double angle = 2 * std::numbers::pi * turn;
+    return Vec3(0.02 + 0.012 * std::cos(angle), -0.015 + 0.012 * std::sin(angle), 0.048 + 0.0015 * std::sin(2 * angle));
+  };
+  double work = 0;
+  for (int i = 0; i < steps; ++i) {
+    const Vec3 from = place(static_cast<double>(i) / steps);
+    const Vec3 to = place((i + 1.0) / steps);
+    work -= contact.at(0.5 * (from + to)).force.dot(to - from);
+  }
+  return work;
+}
+
+TEST_F(Contacts, AClosedWayThroughTheBodyGivesBackExactlyWhatItTook) {
+  PatchContact contact(model_, top_, 0, PatchContact::Side::kUnilateral);
+  // About 5 mJ go in and out. Without the force across, 0.1 mJ would be left.
+  EXPECT_LT(std::abs(work_around(contact, 2000)), 2e-8);
+}
+
+TEST_F(Contacts, StiffnessIsTheForcesOwnSlopeAlongTheNormal) {
+  PatchContact contact(model_, top_, 0, PatchContact::Side::kUnilateral);
+  Dice dice(5);
+  for (int i = 0; i < 20; ++i) {
+    const Vec3 tool(dice.within(-0.03, 0.03), dice.within(-0.03, 0.03), dice.within(0.046, 0.0495));
+    const Mat3 k = contact.at(tool).stiffness;
+    const double h = 1e-7;
+    const Vec3 slope =
+        -(contact.at(tool + h * Vec3::UnitZ()).force - contact.at(tool - h * Vec3::UnitZ()).force) / (2 * h);
+    EXPECT_LT((slope - k.col(2)).norm(), 1e-4 * k.norm());
+    EXPECT_LT((k - k.transpose()).norm(), 1e-9);
+    Mat3 measured;
+    for (int c = 0; c < 3; ++c) {
+      measured.col(c) =
+          -(contact.at(tool + 1e-5 * Vec3::Unit(c)).force - contact.at(tool - 1e-5 * Vec3::Unit(c)).force) / 2e-5;
+    }
+    EXPECT_LT((k - measured).norm(), 0.05 * k.norm());  // what is left out is ∂²/∂c²
+  }
+}
+
+TEST_F(Contacts, OffTheBodyOrNowhereNothingIsFelt) {
+  PatchContact contact(model_, top_, 0, PatchContact::Side::kBilateral);
+  EXPECT_EQ(contact.at(Vec3(0.2, 0, 0.01)).force, Vec3::Zero());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Vec3& tool : {Vec3(nan, 0, 0), Vec3(0, 0, nan), Vec3(0, 0, -std::numeric_limits<double>::infinity())}) {
+    const Feel feel = contact.at(tool);
+    EXPECT_EQ(feel.force, Vec3::Zero());
+    EXPECT_FALSE(feel.touching);
+  }
+}
+
+}  // namespace
+}  // namespace tendon::softbody

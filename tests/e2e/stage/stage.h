@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/recording/records.h"
+#include "server/scene/scene.h"
+#include "tests/e2e/stage/process.h"
+
+namespace tendon::e2e {
+
+/// A built program: tendond, tendon-inject, virtual_wall …
+std::filesystem::path program(const std::string& name);
+
+/// The scene that comes with Tendon, deploy/scenes/demo.toml.
+std::filesystem::path demo_scene();
+
+/// A hand that goes into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
+/// every stage of the age policy is seen.
+inline constexpr std::string_view kPressingHand = R"([device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "ramp-hold"
+from_mm = [-10, 0, 0]
+to_mm = [15, 0, 0]
+ramp_ms = 300
+
+[force]
+hold_ms = 200
+safe_stop_ms = 1000
+)";
+
+/// Writes `file`; its path as text, for a command line.
+std::string write(const std::filesystem::path& file, std::string_view text);
+
+/// The number, or the first number of the array, that one of our JSON lines has under `key`. Throws
+/// std::runtime_error when there is none.
+double number_in(std::string_view json, const std::string& key);
+std::uint64_t count_in(std::string_view json, const std::string& key);
+/// The text under `key`. Ours have no escapes.
+std::string text_in(std::string_view json, const std::string& key);
+
+/// A program of ours that has been started on port 0 and has told its address. It ends by itself after two minutes,
+/// should the test be killed.
+class Service {
+ public:
+  /// Starts `name` in `folder`; `event` is the JSON event that tells the address under `key`.
+  Service(const std::string& name, std::vector<std::string> arguments, const std::filesystem::path& folder,
+          const std::string& event, const std::string& key, std::vector<std::string> more_environment = {});
+
+  const std::string& address() const noexcept { return address_; }
+  Process& process() noexcept { return process_; }
+
+  /// SIGTERM; the last line on stdout. Throws std::runtime_error when the exit code is not 0.
+  std::string stop(int signal = SIGTERM);
+
+ private:
+  Process process_;
+  std::string address_;
+};
+
+/// tendond with `scene`.
+class Server : public Service {
+ public:
+  Server(const std::filesystem::path& folder, const std::filesystem::path& scene, std::vector<std::string> more = {},
+         std::vector<std::string> more_environment = {});
+};
+
+/// A client of ours: "virtual_wall", "echo_motion". As Service, it ends by itself.
+class Client : public Process {
+ public:
+  Client(const std::string& name, const std::string& server, const std::filesystem::path& folder,
+         std::vector<std::string> more = {});
+};
+
+/// Watches through echo_motion until `enough` says so of the force along x, N; gives up after kPatience.
+template <class Enough>
+void watch_force(Process& echo, Enough enough) {
+  while (!enough(number_in(echo.wait_for_line(R"("force_n")"), "force_n"))) {
+  }
+}
+
+/// A recording, read back.
+struct Recording {
+  std::vector<StepRecord> steps;
+  std::vector<DatagramRecord> arrived;  ///< of the datagrams, those that came in
+  std::uint64_t losses = 0;             ///< reports of records that are missing
+  bool truncated = false;
+};
+Recording read_recording(const std::filesystem::path& file);
+
+/// What must hold of every recording that was made with the limiter on: each step follows the one before it; no force
+/// is above the limiter's bound; the ledger is never below −1 nJ. Only after an overrun it may be; then it does not
+/// fall except by another overrun, and no force is above the Coulomb friction that the limiter counts on.
+void expect_passive(const Recording& recording, const Scene& scene);
+
+}  // namespace tendon::e2e

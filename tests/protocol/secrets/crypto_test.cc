@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/secrets/crypto.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+// The known answers are in vectors_test.cc.
+
+namespace tendon {
+namespace {
+
+TEST(Ratchet, GivesTheSameSecretsForTheSameSeedAndNoneTwice) {
+  Ratchet a(1);
+  Ratchet z(1);
+  Ratchet other(2);
+  std::set<Bytes32> seen;
+  for (int i = 0; i < 1000; ++i) {
+    const Bytes32 secret = a.next().bytes();
+    EXPECT_EQ(secret, z.next().bytes());
+    EXPECT_TRUE(seen.insert(secret).second);
+    EXPECT_TRUE(seen.insert(other.next().bytes()).second);
+  }
+}
+
+TEST(Ratchet, HoldsNothingOfWhatItHasGiven) {
+  Ratchet ratchet(1);
+  const Bytes32 given = ratchet.next().bytes();
+  const auto memory = std::as_bytes(std::span(&ratchet, 1));
+  EXPECT_EQ(std::search(memory.begin(), memory.end(), given.begin(), given.end()), memory.end());
+}
+
+TEST(Crypto, APointOfLowOrderMakesNoSecret) {
+  Key shared;
+  Bytes32 point{};
+  EXPECT_FALSE(crypto::x25519(Ratchet(1).next(), point, shared));
+  point[0] = std::byte{1};
+  EXPECT_FALSE(crypto::x25519(Ratchet(1).next(), point, shared));
+}
+
+TEST(Crypto, ARenewedKeyIsAnother) {
+  const Key key = Ratchet(1).next();
+  EXPECT_NE(crypto::renewed(key).bytes(), key.bytes());
+  EXPECT_NE(crypto::renewed(crypto::renewed(key)).bytes(), crypto::renewed(key).bytes());
+}
+
+}  // namespace
+}  // namespace tendon

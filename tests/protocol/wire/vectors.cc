@@ -1,0 +1,483 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/protocol/wire/vectors.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <optional>
+#include <span>
+#include <sstream>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "protocol/handshake.h"
+#include "protocol/reliable/replay_window.h"
+#include "protocol/secrets/client_key.h"
+#include "protocol/secrets/noise.h"
+#include "protocol/secrets/seal.h"
+#include "tendon.pb.h"
+#include "tests/protocol/examples.h"
+
+namespace tendon::vectors {
+namespace {
+
+using examples::Bytes;
+
+// ---- JSON ----
+
+std::string hex(std::span<const std::byte> bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string out;
+  for (const std::byte b : bytes) {
+    out += kDigits[std::to_integer<unsigned>(b) >> 4U];
+    out += kDigits[std::to_integer<unsigned>(b) & 15U];
+  }
+  return out;
+}
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    switch (c) {
+      case '\n':
+        out += "\\n";
+        break;
+      case '\r':
+        out += "\\r";
+        break;
+      case '\t':
+        out += "\\t";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out += '"';
+}
+
+std::string indented(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    out += c;
+    if (c == '\n') out += "  ";
+  }
+  return out;
+}
+
+/// An object whose fields stay in order. A value is JSON already.
+class Object {
+ public:
+  Object& json(std::string_view name, std::string_view value) {
+    text_ += (text_.empty() ? "\n  " : ",\n  ") + quoted(name) + ": " + indented(value);
+    return *this;
+  }
+  Object& text(std::string_view name, std::string_view value) { return json(name, quoted(value)); }
+  Object& bytes(std::string_view name, std::span<const std::byte> value) { return text(name, hex(value)); }
+  Object& number(std::string_view name, std::uint64_t value) { return json(name, std::to_string(value)); }
+  Object& flag(std::string_view name, bool value) { return json(name, value ? "true" : "false"); }
+  std::string str() const { return "{" + text_ + "\n}"; }
+
+ private:
+  std::string text_;
+};
+
+std::string list(const std::vector<std::string>& items) {
+  std::string out;
+  for (const std::string& item : items) out += (out.empty() ? "\n  " : ",\n  ") + indented(item);
+  return "[" + out + "\n]";
+}
+
+/// What the bytes say, in protobuf's own JSON.
+template <class Message>
+std::string meaning(std::span<const std::byte> body) {
+  Message message;
+  message.ParseFromArray(body.data(), static_cast<int>(body.size()));
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  std::string out;
+  if (!google::protobuf::util::MessageToJsonString(message, &out, options).ok()) out = "null";
+  return out;
+}
+
+std::span<const std::byte> text_bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
+
+/// A fixed key. Nobody should use it for anything else.
+Key key_of(std::string_view what) { return Key(crypto::sha256({text_bytes("tendon vectors: "), text_bytes(what)})); }
+
+template <std::size_t Size>
+Bytes first(const std::array<std::byte, Size>& buffer, std::size_t size) {
+  return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
+}
+
+using Buffer = std::array<std::byte, kMaxDatagram>;
+
+// ---- The conversation that is shown ----
+
+/// A Data datagram in the clear, as examples::datagrams() has it.
+struct Shown {
+  std::string name;
+  bool to_server;
+  std::uint64_t packet_number;
+  std::uint8_t epoch;
+  Bytes plain;
+};
+
+std::vector<Shown> shown(std::uint64_t far) {
+  const auto at = [](std::uint64_t packet_number, const auto&... frames) {
+    return examples::data(packet_number, packet_number == 0 ? std::optional<OutgoingEcho>() : examples::echo(),
+                          frames...);
+  };
+  const Control rate{.id = 7, .request = SetStateRate{.hz = 500}};
+  const Control rearm{.id = 8, .request = Rearm{}};
+  const ControlAck ack{.id = 7, .code = Code::kOk, .detail = "500 Hz"};
+  const auto request = [&](std::uint64_t packet_number, std::uint32_t id, const Request& what) {
+    return at(packet_number, Control{.id = id, .request = what});
+  };
+  const Bye bye{.code = Code::kShutdown, .reason = "SIGTERM"};
+  return {
+      {"keep-alive from the client", true, 0, 0, at(0)},
+      {"keep-alive from the server", false, 0, 0, at(0)},
+      {"state", false, 1, 0, at(1, examples::state())},
+      {"force", true, 1, 0, at(1, examples::force())},
+      {"force at packet number 255", true, 255, 0, at(255, examples::force())},
+      {"state rate", true, 256, 0, at(256, rate)},
+      {"rearm and a force in one datagram", true, 257, 0, at(257, examples::force(), rearm)},
+      {"states of two devices", false, 2, 0, at(2, examples::state(), examples::state_of_the_second_device())},
+      {"force to a channel", true, 258, 0, at(258, examples::force_to_a_channel())},
+      {"state rate of a device", true, 259, 0, request(259, 9, SetStateRate{.hz = 250, .device = 1})},
+      {"rearm a device", true, 260, 0, request(260, 10, Rearm{.device = 1})},
+      {"describe", true, 261, 0, request(261, 11, Describe{.device = 1})},
+      {"description", false, 3, 0, at(3, examples::described(11))},
+      {"take a lease", true, 262, 0, request(262, 12, TakeLease{.device = 1, .channel = 1})},
+      {"another one holds it", false, 4, 0, at(4, examples::busy(12))},
+      {"give a lease", true, 263, 0, request(263, 13, GiveLease{.device = 1, .channel = 1})},
+      {"a lease is lost", false, 5, 0, request(5, 1, LeaseLost{.device = 1, .channel = 1, .to = "wall"})},
+      {"answer to a request", false, 258, 0, at(258, ack)},
+      {"report on a client's forces", false, 261, 0, at(261, examples::report())},
+      {"deadband of states", true, 264, 0, at(264, examples::state_deadband())},
+      {"force with all that it can say", true, 265, 0, at(265, examples::force_with_all())},
+      {"state with the force that is wanted", false, 266, 0, at(266, examples::state_with_wanted())},
+      {"reports on a device and on an engine", false, 267, 0,
+       at(267, examples::device_report(), examples::peer_report())},
+      {"disarm a device", true, 268, 0, request(268, 14, Disarm{.device = 1})},
+      {"force far away", true, far, 0, at(far, examples::force())},
+      {"bye", false, 259, 0, at(259, bye)},
+  };
+}
+
+DeviceState later_state() {
+  DeviceState state = examples::state();
+  ++state.tick;
+  return state;
+}
+
+std::string direction(bool to_server) { return to_server ? "client_to_server" : "server_to_client"; }
+
+std::string plain_file() {
+  const Bytes hello = write_body(examples::hello());
+  const Bytes welcome = write_body(Answer(examples::welcome()));
+  const Bytes refused = write_body(Answer(examples::refused()));
+  const Bytes claims = write_body(examples::hello_with_claims());
+  const Bytes grants = write_body(Answer(examples::welcome_with_grants()));
+  const auto datagrams = examples::datagrams();
+  std::vector<std::string> data;
+  for (const Shown& d : shown(std::uint64_t{1} << 32)) {
+    const auto body = std::span(d.plain).subspan(kHeaderSize);
+    data.push_back(Object()
+                       .text("name", d.name)
+                       .text("direction", direction(d.to_server))
+                       .text("packet_number", std::to_string(d.packet_number))
+                       .json("message", meaning<v1::Datagram>(body))
+                       .bytes("body", body)
+                       .bytes("datagram", d.plain)
+                       .str());
+  }
+  return Object()
+             .number("suite", 0)
+             .bytes("client_random", examples::random())
+             .bytes("cookie", examples::cookie())
+             .number("connection_id", examples::kConnection)
+             .json("hello", Object()
+                                .json("message", meaning<v1::Hello>(hello))
+                                .bytes("body", hello)
+                                .bytes("datagram", datagrams[0].bytes)
+                                .str())
+             .json("retry", Object().bytes("datagram", datagrams[1].bytes).str())
+             .json("welcome", Object()
+                                  .json("message", meaning<v1::Answer>(welcome))
+                                  .bytes("body", welcome)
+                                  .bytes("datagram", datagrams[2].bytes)
+                                  .str())
+             .json("refused", Object()
+                                  .json("message", meaning<v1::Answer>(refused))
+                                  .bytes("body", refused)
+                                  .bytes("datagram", datagrams[3].bytes)
+                                  .str())
+             .json("hello_with_claims", Object()
+                                            .json("message", meaning<v1::Hello>(claims))
+                                            .bytes("body", claims)
+                                            .bytes("datagram", examples::hello_datagram(examples::hello_with_claims()))
+                                            .str())
+             .json("welcome_with_grants",
+                   Object()
+                       .json("message", meaning<v1::Answer>(grants))
+                       .bytes("body", grants)
+                       .bytes("datagram",
+                              examples::answer_datagram(examples::kConnection, examples::welcome_with_grants()))
+                       .str())
+             .json("data", list(data))
+             .str() +
+         "\n";
+}
+
+/// The server's answer to one Noise message 1.
+struct Answered {
+  std::string json;
+  NoiseSplit split;
+};
+Answered answered(const Key& psk, std::span<const std::byte> prologue, const NoiseInitiator& client,
+                  std::string_view ephemeral_name, std::uint32_t connection_id, const Answer& answer) {
+  const Key ephemeral = key_of(ephemeral_name);
+  const Bytes body = write_body(answer);
+  const auto server = NoiseResponder::read(psk, prologue, client.message());
+  const auto reply = server->reply(ephemeral, body);
+  const AnswerDatagram datagram{
+      .suite = Suite::kNoise, .connection_id = connection_id, .random = examples::random(), .body = reply->message};
+  Object json;
+  json.json("message", meaning<v1::Answer>(body))
+      .bytes("body", body)
+      .bytes("server_ephemeral", ephemeral.bytes())
+      .bytes("noise_message", reply->message)
+      .bytes("datagram", examples::encoded(datagram))
+      .bytes("handshake_hash", reply->split.handshake_hash)
+      .bytes("client_to_server_key", reply->split.initiator_to_responder.bytes())
+      .bytes("server_to_client_key", reply->split.responder_to_initiator.bytes());
+  return {json.str(), reply->split};
+}
+
+Bytes sealed(const Key& key, Header header, std::span<const std::byte> body) {
+  header.suite = Suite::kNoise;
+  const auto clear = encode_header(header);
+  Bytes out(clear.begin(), clear.end());
+  out.resize(kHeaderSize + body.size() + crypto::kTagSize);
+  crypto::seal(key, header.packet_number, clear, body, std::span(out).subspan(kHeaderSize));
+  return out;
+}
+
+std::string sealed_file() {
+  const Key psk = key_of("key");
+  const KeyId id = key_id(psk);
+  const Bytes hello = write_body(examples::hello());
+
+  Bytes prologue;
+  const auto append = [](Bytes& to, std::span<const std::byte> piece) {
+    to.insert(to.end(), piece.begin(), piece.end());
+  };
+  append(prologue, text_bytes("tendon-1"));
+  append(prologue, encode_header({.type = DatagramType::kHello, .suite = Suite::kNoise}));
+  append(prologue, id);
+  append(prologue, examples::random());
+  const NoiseInitiator client(psk, key_of("client ephemeral"), prologue, hello);
+  Bytes body(id.begin(), id.end());
+  append(body, client.message());
+  const auto hello_datagram = [&](const Cookie& cookie) {
+    return examples::encoded(
+        HelloDatagram{.suite = Suite::kNoise, .random = examples::random(), .cookie = cookie, .body = body});
+  };
+  const auto welcome = answered(psk, prologue, client, "server ephemeral", examples::kConnection, examples::welcome());
+  const auto refused = answered(psk, prologue, client, "another server ephemeral", 0, examples::refused());
+
+  const Key& up = welcome.split.initiator_to_responder;
+  const Key& down = welcome.split.responder_to_initiator;
+  const Key next_up = crypto::renewed(up);
+  const Key next_down = crypto::renewed(down);
+  std::vector<Shown> all = shown(std::uint64_t{1} << 32);
+  // The bye stays last: of the key before, and late.
+  const std::uint64_t far = (std::uint64_t{1} << 32) + 1;
+  all.insert(all.end() - 1,
+             {{"force after the first rekey", true, far, 1, examples::data(far, examples::echo(), examples::force())},
+              {"state after the first rekey", false, 260, 1, examples::data(260, examples::echo(), later_state())}});
+  std::vector<std::string> data;
+  for (const Shown& d : all) {
+    const Key& key = d.to_server ? (d.epoch == 0 ? up : next_up) : (d.epoch == 0 ? down : next_down);
+    const auto plain = std::span(d.plain).subspan(kHeaderSize);
+    const Header header{.epoch = d.epoch, .connection_id = examples::kConnection, .packet_number = d.packet_number};
+    data.push_back(Object()
+                       .text("name", d.name)
+                       .text("direction", direction(d.to_server))
+                       .text("packet_number", std::to_string(d.packet_number))
+                       .number("epoch", d.epoch)
+                       .bytes("key", key.bytes())
+                       .json("message", meaning<v1::Datagram>(plain))
+                       .bytes("body", plain)
+                       .bytes("datagram", sealed(key, header, plain))
+                       .str());
+  }
+
+  // What a client that has just been welcomed drops, each sent to it as it is here.
+  Bytes state = examples::data(1, examples::echo(), examples::state());
+  state.erase(state.begin(), state.begin() + kHeaderSize);
+  const Header good{.connection_id = examples::kConnection, .packet_number = 1};
+  std::vector<std::string> dropped;
+  const auto drop = [&](std::string_view name, std::string_view counter, const Bytes& datagram) {
+    dropped.push_back(Object().text("name", name).text("counter", counter).bytes("datagram", datagram).str());
+  };
+  const auto spoiled = [&](std::size_t at, bool from_end) {
+    Bytes bad = sealed(down, good, state);
+    bad[from_end ? bad.size() - at : at] ^= std::byte{1};
+    return bad;
+  };
+  const auto with = [&](auto change, const Key& key) {
+    Header header = good;
+    change(header);
+    return sealed(key, header, state);
+  };
+  drop("a bit of the packet number has changed", "forged", spoiled(8, false));
+  drop("a bit of the body has changed", "forged", spoiled(kHeaderSize, false));
+  drop("a bit of the tag has changed", "forged", spoiled(1, true));
+  drop("sealed with the key of the other direction", "forged", sealed(up, good, state));
+  drop("says epoch 1, sealed with the key of epoch 0", "forged", with([](Header& h) { h.epoch = 1; }, down));
+  drop("epoch 2", "old_key", with([](Header& h) { h.epoch = 2; }, crypto::renewed(next_down)));
+  drop("epoch 255, before the first", "old_key", with([](Header& h) { h.epoch = 255; }, down));
+  drop("packet number 2^60", "malformed", with([](Header& h) { h.packet_number = std::uint64_t{1} << 60; }, down));
+  drop("connection id of somebody else", "malformed", with([](Header& h) { ++h.connection_id; }, down));
+  drop("in the clear, suite 0", "malformed", examples::data(1, examples::echo(), examples::state()));
+  drop("authentic, but no protobuf", "malformed", sealed(down, good, Bytes(3, std::byte{0xFF})));
+  Bytes cut = sealed(down, good, state);
+  cut.resize(kHeaderSize + crypto::kTagSize / 2);
+  drop("header and half a tag", "forged", cut);
+
+  return Object()
+             .number("suite", 1)
+             .text("protocol", "Noise_NNpsk0_25519_ChaChaPoly_SHA256")
+             .bytes("psk", psk.bytes())
+             .bytes("key_id", id)
+             .bytes("client_random", examples::random())
+             .bytes("client_ephemeral", key_of("client ephemeral").bytes())
+             .bytes("cookie", examples::cookie())
+             .number("connection_id", examples::kConnection)
+             .json("hello", Object()
+                                .json("message", meaning<v1::Hello>(hello))
+                                .bytes("body", hello)
+                                .bytes("prologue", prologue)
+                                .bytes("noise_message", client.message())
+                                .bytes("first_datagram", hello_datagram({}))
+                                .bytes("datagram", hello_datagram(examples::cookie()))
+                                .str())
+             .json("retry", Object()
+                                .bytes("datagram", examples::encoded(RetryDatagram{.suite = Suite::kNoise,
+                                                                                   .random = examples::random(),
+                                                                                   .cookie = examples::cookie()}))
+                                .str())
+             .json("welcome", welcome.json)
+             .json("refused", refused.json)
+             .json("data", list(data))
+             .json("dropped", list(dropped))
+             .str() +
+         "\n";
+}
+
+std::string replay_file() {
+  struct Script {
+    std::string_view name;
+    std::vector<std::uint64_t> numbers;
+  };
+  const std::vector<Script> scripts = {
+      {"in order, each once", {0, 1, 2, 3, 2, 3, 4}},
+      {"out of order", {5, 3, 4, 3, 5, 0, 1, 2, 6}},
+      {"the first is not 0", {1000, 999, 1000, 0, 0}},
+      {"the horizon is 1984 behind the newest", {0, 1, 2, 1984, 0, 1, 3, 1985, 2, 3, 4}},
+      {"a jump beyond the whole window", {0, 1, 2, 10000, 2, 9999, 8017, 8016, 10000}},
+      {"a jump by exactly the window", {7, 2055, 7, 71, 72, 2054, 2055}},
+      {"neighbours of a word of 64", {63, 64, 65, 127, 128, 64, 63, 62, 127}},
+      {"beyond 32 bits", {4294967295, 4294967296, 4294967295, 4294967297, 4294965313, 4294965314}},
+  };
+  std::vector<std::string> out;
+  for (const Script& script : scripts) {
+    ReplayWindow window;
+    std::string numbers;
+    std::string accept;
+    for (const std::uint64_t number : script.numbers) {
+      const bool good = !window.contains(number);
+      if (good) window.insert(number);
+      numbers += (numbers.empty() ? "" : ", ") + std::to_string(number);
+      accept += std::string(accept.empty() ? "" : ", ") + (good ? "true" : "false");
+    }
+    out.push_back(Object()
+                      .text("name", script.name)
+                      .json("packet_numbers", "[" + numbers + "]")
+                      .json("accept", "[" + accept + "]")
+                      .str());
+  }
+  return Object()
+             .number("bits", ReplayWindow::kBits)
+             .number("remembered", ReplayWindow::kRemembered)
+             .json("scripts", list(out))
+             .str() +
+         "\n";
+}
+
+std::string key_files() {
+  const Key key = key_of("key");
+  const std::string digits = hex(key.bytes());
+  std::string upper = digits;
+  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  const auto repeated = [](std::string_view what, std::size_t times) {
+    std::string out;
+    for (std::size_t i = 0; i < times; ++i) out += what;
+    return out;
+  };
+  std::string counting;
+  for (unsigned i = 0; i < 32; ++i) counting += hex(std::array{static_cast<std::byte>(i)});
+  struct Case {
+    std::string_view name;
+    std::string text;
+  };
+  const std::vector<Case> cases = {
+      {"as keygen writes it", key_file_text({.name = "wall", .role = Role::kController, .key = key})},
+      {"an observer's", key_file_text({.name = "screen", .role = Role::kObserver, .key = key})},
+      {"without comment or end of line", "controller " + digits},
+      {"capitals, tabs, empty lines, ends of line of DOS", "\r\n# a comment\r\n\r\n\tobserver\t" + upper + " \r\n"},
+      {"empty", ""},
+      {"a comment only", "# controller " + digits + "\n"},
+      {"without a role", digits + "\n"},
+      {"an unknown role", "admin " + digits + "\n"},
+      {"too short", "controller " + digits.substr(0, 62) + "\n"},
+      {"too long", "controller " + digits + "00\n"},
+      {"not hexadecimal", "controller " + digits.substr(0, 63) + "g\n"},
+      {"two keys", "controller " + digits + "\nobserver " + digits + "\n"},
+      {"three words", "controller " + digits + " wall\n"},
+      {"weak: zeros", "controller " + repeated("00", 32) + "\n"},
+      {"weak: a few bytes again and again", "controller " + repeated("0123456789abcdef", 4) + "\n"},
+      {"weak: counting", "controller " + counting + "\n"},
+      {"weak: text", "controller " + hex(text_bytes("The quick brown fox jumps over !")) + "\n"},
+  };
+  std::vector<std::string> out;
+  for (const Case& c : cases) {
+    Object json;
+    json.text("name", c.name).text("text", c.text);
+    try {
+      const ClientKey read = read_key_file(c.text, 0600, "test");
+      json.flag("accept", true)
+          .text("role", read.role == Role::kController ? "controller" : "observer")
+          .bytes("key", read.key.bytes())
+          .bytes("key_id", key_id(read.key));
+    } catch (const std::invalid_argument&) {
+      json.flag("accept", false);
+    }
+    out.push_back(json.str());
+  }
+  return Object().json("files", list(out)).str() + "\n";
+}
+
+}  // namespace
+
+std::map<std::string, std::string> files() {
+  return {{"plain.json", plain_file()},
+          {"sealed.json", sealed_file()},
+          {"replay.json", replay_file()},
+          {"key_files.json", key_files()}};
+}
+
+}  // namespace tendon::vectors

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/protocol/wire/vectors.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "protocol/handshake.h"
+#include "protocol/reliable/replay_window.h"
+#include "protocol/secrets/client_key.h"
+#include "protocol/secrets/noise.h"
+#include "protocol/session.h"
+#include "tests/protocol/examples.h"
+
+// protocol/vectors/ is what other languages check themselves against: it is true, and it is what we do.
+
+namespace tendon {
+namespace {
+
+using examples::Bytes;
+using Json = nlohmann::json;
+
+const std::filesystem::path kFolder = TENDON_VECTORS;
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  EXPECT_TRUE(stream.is_open()) << file;
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+Json read(const std::string& name) { return Json::parse(text_of(kFolder / name)); }
+
+std::string text(const Json& json, const std::string& name) { return json.at(name).get<std::string>(); }
+
+Bytes bytes(const std::string& hex) {
+  Bytes out;
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
+    out.push_back(static_cast<std::byte>(std::stoul(hex.substr(i, 2), nullptr, 16)));
+  }
+  return out;
+}
+Bytes bytes(const Json& json, const std::string& name) { return bytes(text(json, name)); }
+Key key(const std::string& hex) {
+  Key key;
+  const Bytes from = bytes(hex);
+  EXPECT_EQ(from.size(), key.bytes().size()) << hex;
+  std::copy(from.begin(), from.end(), key.bytes().begin());
+  return key;
+}
+Key key(const Json& json, const std::string& name) { return key(text(json, name)); }
+
+// ---- what others have computed ----
+
+TEST(Vectors, X25519GivesTheAnswersOfRfc7748) {
+  const Json file = read("primitives.json");
+  for (const Json& v : file.at("x25519")) {
+    Key result;
+    ASSERT_TRUE(crypto::x25519(key(v, "scalar"), key(v, "point").bytes(), result));
+    EXPECT_EQ(result.bytes(), key(v, "result").bytes()) << text(v, "source");
+    if (text(v, "point") == "09" + std::string(62, '0')) {
+      EXPECT_EQ(crypto::x25519_public(key(v, "scalar")), result.bytes());
+    }
+  }
+}
+
+TEST(Vectors, HmacGivesTheAnswersOfRfc4231) {
+  const Json file = read("primitives.json");
+  for (const Json& v : file.at("hmac_sha256")) {
+    const Bytes data = bytes(v, "data");
+    const auto half = std::span(data).first(data.size() / 2);
+    const auto rest = std::span(data).subspan(data.size() / 2);
+    EXPECT_EQ(crypto::hmac_sha256(bytes(v, "key"), {half, rest}), key(v, "result").bytes()) << text(v, "source");
+  }
+}
+
+TEST(Vectors, ChaCha20Poly1305GivesTheAnswersOfRfc8439) {
+  const Json file = read("primitives.json");
+  for (const Json& v : file.at("chacha20_poly1305")) {
+    const Bytes nonce = bytes(v, "nonce");
+    const Bytes plain = bytes(v, "text");
+    const Bytes sealed = bytes(v, "sealed");
+    std::uint64_t number = 0;
+    for (std::size_t i = 8; i-- > 0;) number = number << 8U | std::to_integer<std::uint64_t>(nonce[4 + i]);
+    const bool as_in_noise =
+        std::all_of(nonce.begin(), nonce.begin() + 4, [](std::byte b) { return b == std::byte{}; });
+    if (!as_in_noise) continue;  // for those whose library takes any nonce
+    Bytes out(sealed.size());
+    crypto::seal(key(v, "key"), number, bytes(v, "associated_data"), plain, out);
+    EXPECT_EQ(out, sealed) << text(v, "source");
+    Bytes opened(plain.size());
+    EXPECT_TRUE(crypto::open(key(v, "key"), number, bytes(v, "associated_data"), sealed, opened));
+    EXPECT_EQ(opened, plain);
+  }
+}
+
+TEST(Vectors, OurNoiseIsThatOfCacophony) {
+  const Json file = read("noise.json");
+  ASSERT_EQ(file.at("vectors").size(), 1U);
+  const Json& v = file.at("vectors").at(0);
+  const auto& messages = v.at("messages");
+  const Key psk = key(v.at("init_psks").at(0).get<std::string>());
+  const Bytes prologue = bytes(v, "init_prologue");
+
+  const NoiseInitiator a(psk, key(v, "init_ephemeral"), prologue, bytes(messages.at(0), "payload"));
+  EXPECT_EQ(a.message(), bytes(messages.at(0), "ciphertext"));
+  const auto z = NoiseResponder::read(psk, prologue, a.message());
+  ASSERT_TRUE(z.has_value());
+  EXPECT_EQ(z->payload(), bytes(messages.at(0), "payload"));
+  const auto reply = z->reply(key(v, "resp_ephemeral"), bytes(messages.at(1), "payload"));
+  ASSERT_TRUE(reply.has_value());
+  EXPECT_EQ(reply->message, bytes(messages.at(1), "ciphertext"));
+  const auto answer = a.read(reply->message);
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(answer->payload, bytes(messages.at(1), "payload"));
+
+  for (const NoiseSplit& split : {answer->split, reply->split}) {
+    EXPECT_EQ(Bytes(split.handshake_hash.begin(), split.handshake_hash.end()), bytes(v, "handshake_hash"));
+    for (std::size_t i = 2; i < messages.size(); ++i) {
+      const Bytes payload = bytes(messages.at(i), "payload");
+      const Key& from = i % 2 == 0 ? split.initiator_to_responder : split.responder_to_initiator;
+      Bytes sealed(payload.size() + crypto::kTagSize);
+      crypto::seal(from, i / 2 - 1, {}, payload, sealed);
+      EXPECT_EQ(sealed, bytes(messages.at(i), "ciphertext")) << i;
+    }
+  }
+}
+
+// ---- our own bytes ----
+
+TEST(Vectors, AreWhatTheCodeWrites) {
+  for (const auto& [name, ours] : vectors::files()) {
+    EXPECT_TRUE(text_of(kFolder / name) == ours)
+        << name << " has changed; was that meant? Then: write_vectors " << kFolder;
+  }
+}
+
+TEST(Vectors, AreAllTested) {
+  std::set<std::string> names = {"README.md", "noise.json", "primitives.json"};
+  for (const auto& [name, ours] : vectors::files()) names.insert(name);
+  for (const auto& entry : std::filesystem::directory_iterator(kFolder)) {
+    EXPECT_EQ(names.erase(entry.path().filename().string()), 1U) << entry.path();
+  }
+  EXPECT_TRUE(names.empty());
+}
+
+/// A client and a session as the file describes them: nothing here is computed from the code that wrote it.
+class SealedVectors : public testing::Test {
+ protected:
+  static constexpr LocalTime kNow{std::chrono::seconds(10)};
+  ClientHandshake::Config config() const {
+    ClientHandshake::Config config;
+    config.hello = examples::hello();
+    config.random = examples::random();
+    config.secret = {.key = key(file_, "psk"), .ephemeral = key(file_, "client_ephemeral")};
+    return config;
+  }
+  static Bytes next(auto& from) {
+    std::array<std::byte, kMaxDatagram> buffer;
+    const std::size_t size = from.next_datagram(kNow, buffer);
+    return {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)};
+  }
+
+  Json file_ = read("sealed.json");
+};
+
+TEST_F(SealedVectors, AClientSaysAndUnderstandsThem) {
+  ClientHandshake client(config(), kNow);
+  EXPECT_EQ(next(client), bytes(file_.at("hello"), "first_datagram"));
+  client.receive(kNow, bytes(file_.at("retry"), "datagram"));
+  EXPECT_EQ(next(client), bytes(file_.at("hello"), "datagram"));
+  ClientHandshake other = client;
+
+  client.receive(kNow, bytes(file_.at("welcome"), "datagram"));
+  ASSERT_TRUE(client.outcome().has_value());
+  const auto& accepted = std::get<ClientHandshake::Accepted>(*client.outcome());
+  EXPECT_EQ(accepted.connection_id, examples::kConnection);
+  EXPECT_EQ(accepted.keys->send.bytes(), key(file_.at("welcome"), "client_to_server_key").bytes());
+  EXPECT_EQ(accepted.keys->receive.bytes(), key(file_.at("welcome"), "server_to_client_key").bytes());
+
+  other.receive(kNow, bytes(file_.at("refused"), "datagram"));
+  ASSERT_TRUE(other.outcome().has_value());
+  EXPECT_EQ(std::get<Refused>(*other.outcome()).code, Code::kBusy);
+}
+
+TEST_F(SealedVectors, ASessionOpensThemAcrossTheRekey) {
+  for (const bool to_server : {true, false}) {
+    const Json& welcome = file_.at("welcome");
+    const Key up = key(welcome, "client_to_server_key");
+    const Key down = key(welcome, "server_to_client_key");
+    const SessionKeys keys =
+        to_server ? SessionKeys{.send = down, .receive = up} : SessionKeys{.send = up, .receive = down};
+    Session session({.connection_id = examples::kConnection}, keys, kNow);
+    std::uint64_t taken = 0;
+    for (const Json& datagram : file_.at("data")) {
+      if ((text(datagram, "direction") == "client_to_server") != to_server) continue;
+      session.receive(kNow, bytes(datagram, "datagram"));
+      EXPECT_EQ(session.stats().datagrams_received, ++taken) << text(datagram, "name");
+    }
+    EXPECT_GE(taken, 4U);
+  }
+}
+
+TEST_F(SealedVectors, AClientDropsWhatIsToBeDroppedAndCountsWhy) {
+  const Json& welcome = file_.at("welcome");
+  for (const Json& datagram : file_.at("dropped")) {
+    Session session(
+        {.connection_id = examples::kConnection},
+        SessionKeys{.send = key(welcome, "client_to_server_key"), .receive = key(welcome, "server_to_client_key")},
+        kNow);
+    EXPECT_FALSE(session.receive(kNow, bytes(datagram, "datagram")));
+    const LinkStats& s = session.stats();
+    const std::map<std::string, std::uint64_t> counters = {
+        {"malformed", s.malformed}, {"forged", s.forged}, {"old_key", s.old_key}};
+    EXPECT_EQ(counters.at(text(datagram, "counter")), 1U) << text(datagram, "name");
+    EXPECT_EQ(s.malformed + s.forged + s.old_key, 1U) << text(datagram, "name");
+    EXPECT_EQ(s.datagrams_received, 0U);
+  }
+}
+
+TEST(Vectors, TheReplayScriptsAreDecidedAsASetWouldDecide) {
+  const Json file = read("replay.json");
+  EXPECT_EQ(file.at("remembered").get<std::uint64_t>(), ReplayWindow::kRemembered);
+  for (const Json& script : file.at("scripts")) {
+    std::set<std::uint64_t> seen;
+    const auto& numbers = script.at("packet_numbers");
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto number = numbers.at(i).get<std::uint64_t>();
+      const bool too_old = !seen.empty() && number + ReplayWindow::kRemembered <= *seen.rbegin();
+      const bool accept = !too_old && seen.insert(number).second;
+      EXPECT_EQ(script.at("accept").at(i).get<bool>(), accept) << text(script, "name") << ' ' << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tendon

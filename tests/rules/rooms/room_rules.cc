@@ -1,0 +1,435 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/rules/rooms/room_rules.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstddef>
+#include <fstream>
+#include <initializer_list>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <regex>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tendon::rooms {
+namespace {
+
+using Names = std::vector<std::string_view>;
+
+// ---- The rules, as tables -------------------------------------------------------------------------------------------
+
+struct Room {
+  std::string_view name;
+  Names may_include;
+};
+
+/// `tests` is not here: it may see all.
+const std::vector<Room>& rooms() {
+  static const std::vector<Room> kRooms = {
+      {"core", {"core"}},
+      {"protocol", {"protocol", "core"}},
+      {"devices", {"devices", "core"}},
+      {"server", {"server", "protocol", "core", "devices"}},
+      // A guest sees the types of core through the headers of protocol, its own folder, and the library for guests in
+      // C++, clients/cpp; not another guest.
+      {"clients", {"protocol"}},
+  };
+  return kRooms;
+}
+
+const Names kRoomFolders = {"clients", "core", "deploy", "devices", "protocol", "server", "tests"};
+
+const Names kAtTheRoot = {".ci",          ".dockerignore",  ".clang-format",     ".clang-tidy",     ".gitignore",
+                          "CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE",
+                          "README.md"};
+
+/// No type, but what a processor does with the numbers of all rooms.
+constexpr std::string_view kForAllRooms = "core/base/arithmetic.h";
+
+/// Paths that end with a slash are folders; those that begin with a star are endings.
+struct Door {
+  std::string_view library;
+  Names headers;
+  Names files;
+};
+
+const std::vector<Door>& front_doors() {
+  static const std::vector<Door> kDoors = {
+      {"Asio", {"asio.hpp", "asio/"}, {"server/machine/udp_link.cc", "clients/cpp/udp_transport.cc"}},
+      // HTTP and WebSockets of a process of its own, which is not the haptic one.
+      {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/dashboard/web_server.cc"}},
+      {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/fem/sparse.cc"}},
+      {"CLI11", {"CLI/"}, {"server/main.cc", "clients/cpp/options.cc", "*_main.cc"}},
+      {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
+      {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
+      {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},
+      {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
+      {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
+      {"protobuf", {"google/protobuf/", "*.pb.h"}, {"protocol/wire/codec.cc", "server/recording/recording_codec.cc"}},
+      {"libsystemd", {"systemd/"}, {"server/machine/service.cc"}},
+      {"Spectra", {"Spectra/"}, {"clients/softbody/fem/spectrum.cc"}},
+      {"spdlog", {"spdlog/"}, {"server/machine/log.cc"}},
+      {"toml++", {"toml++/"}, {"server/scene/scene.cc", "clients/softbody/scene.cc"}},
+      {"umockdev", {"umockdev.h"}, {"tests/devices/usb/mock_usb.cc"}},
+      {"zlib", {"zlib.h"}, {"server/recording/mcap_format.cc"}},
+  };
+  return kDoors;
+}
+
+/// What the standard library offers to mathematics: no thread, no lock, no clock, no file, no stream, no randomness.
+const std::set<std::string_view> kStandardForCore = {
+    "algorithm",   "array",    "atomic",      "bit",       "bitset",     "cassert",
+    "cfloat",      "charconv", "cmath",       "compare",   "complex",    "concepts",
+    "cstddef",     "cstdint",  "cstring",     "exception", "functional", "initializer_list",
+    "iterator",    "limits",   "memory",      "new",       "numbers",    "numeric",
+    "optional",    "ratio",    "ranges",      "span",      "stdexcept",  "string",
+    "string_view", "tuple",    "type_traits", "utility",   "variant",    "vector",
+    "version"};
+
+/// protocol does no input or output, waits for nothing and is used by one thread at a time.
+const std::set<std::string_view> kNotForProtocol = {
+    "condition_variable", "fcntl.h",   "filesystem",   "fstream", "future",  "iostream", "mutex", "netdb.h", "poll.h",
+    "pthread.h",          "semaphore", "shared_mutex", "thread",  "unistd.h"};
+
+/// Headers of the operating system that are not in a folder. C headers have their C++ name (<cmath>).
+const std::set<std::string_view> kSystemHeaders = {"dlfcn.h",   "fcntl.h", "ifaddrs.h", "malloc.h", "netdb.h", "poll.h",
+                                                   "pthread.h", "sched.h", "signal.h",  "spawn.h",  "unistd.h"};
+const Names kSystemFolders = {"arpa/", "linux/", "net/", "netinet/", "sys/"};
+
+/// The threads of the server and of the client library wait and read the clock once for each turn, and their sockets
+/// when they have received something; everybody else is told the time. tests/core/base/time_test.cc shows that the time
+/// types of core have no now().
+const Names kClockReaders = {"server/machine/clock.h",
+                             "server/machine/clock.cc",
+                             "server/server.cc",
+                             "server/machine/udp_link.cc",
+                             "clients/cpp/run.cc",
+                             "clients/cpp/udp_transport.cc",
+                             "clients/softbody/softbody_main.cc",
+                             "tests/tools/bench/",
+                             "tests/e2e/",
+                             "tests/realtime/",
+                             "tests/soak/",
+                             "tests/devices/usb/",
+                             "tests/core/base/time_test.cc",
+                             "tests/tools/lab/experiments/meter.cc",
+                             "tests/tools/injector/proxy/real_time.cc",
+                             "tests/tools/conformance/udp_wire.cc",
+                             "*_main.cc"};
+
+// ---- Reading --------------------------------------------------------------------------------------------------------
+
+bool one_of(std::string_view path, const Names& patterns) {
+  return std::ranges::any_of(patterns, [&](std::string_view pattern) {
+    if (pattern.starts_with('*')) {
+      return path.ends_with(pattern.substr(1));
+    }
+    return pattern.ends_with('/') ? path.starts_with(pattern) : path == pattern;
+  });
+}
+
+std::string_view first_folder(std::string_view path) { return path.substr(0, path.find('/')); }
+
+/// "clients/cpp/" for "clients/cpp/run.cc".
+std::string_view guest_folder(std::string_view path) {
+  const auto end = path.find('/', path.find('/') + 1);
+  return end == std::string_view::npos ? std::string_view() : path.substr(0, end + 1);
+}
+
+std::vector<std::string_view> lines_of(std::string_view text) {
+  std::vector<std::string_view> lines;
+  while (!text.empty()) {
+    const auto end = text.find('\n');
+    lines.push_back(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return lines;
+}
+
+struct Include {
+  int line = 0;
+  bool quoted = false;
+  std::string name;
+};
+
+bool is_cpp(std::string_view path) { return path.ends_with(".h") || path.ends_with(".cc"); }
+
+bool is_source(const File& file) {
+  return one_of(file.path, {"*.h", "*.cc", "*.in", "*.proto", "*.cmake", "*CMakeLists.txt", "*.mjs", "*.js", "*.ts",
+                            "*.py", "*.sh", "*.toml"}) ||
+         file.text.starts_with("#!");
+}
+
+std::string join(std::initializer_list<std::string_view> parts) {
+  std::string all;
+  for (const auto part : parts) {
+    all += part;
+  }
+  return all;
+}
+
+std::string list(const Names& names) {
+  std::string all;
+  for (const auto name : names) {
+    all += all.empty() ? "" : ", ";
+    all += name;
+  }
+  return all;
+}
+
+// ---- The rules about one file ---------------------------------------------------------------------------------------
+
+std::optional<std::string> broken_by_project_include(const std::string& path, const Include& include) {
+  const auto here = first_folder(path);
+  const auto there = first_folder(include.name);
+  if (here == "tests" || include.name == kForAllRooms) {
+    return std::nullopt;
+  }
+  if (here == "clients" && (include.name.starts_with(guest_folder(path)) || include.name.starts_with("clients/cpp/"))) {
+    return std::nullopt;
+  }
+  const auto room = std::ranges::find(rooms(), here, &Room::name);
+  if (room == rooms().end() || std::ranges::find(room->may_include, there) != room->may_include.end()) {
+    return std::nullopt;
+  }
+  return join({here, " may include ", list(room->may_include),
+               here == "clients" ? ", clients/cpp and the guest's own folder" : "", ", not ", include.name});
+}
+
+std::optional<std::string> broken_by_library_include(const std::string& path, const Include& include) {
+  const auto here = first_folder(path);
+  const std::string_view name = include.name;
+  if (here == "tests") {
+    return std::nullopt;
+  }
+  for (const auto& door : front_doors()) {
+    if (one_of(name, door.headers)) {
+      if (one_of(path, door.files)) {
+        return std::nullopt;
+      }
+      return join({door.library, " has its front door in ", list(door.files), ", not here"});
+    }
+  }
+  if (here == "core" && !kStandardForCore.contains(name) && !(name == "chrono" && path == "core/base/time.h")) {
+    return join({"core is mathematics and must not know <", name, ">"});
+  }
+  if (here == "protocol" && (kNotForProtocol.contains(name) || name.starts_with("sys/"))) {
+    return join({"protocol does no input or output and must not know <", name, ">"});
+  }
+  const bool standard = name.find_first_of("./") == std::string_view::npos;
+  if (!standard && !kSystemHeaders.contains(name) && !one_of(name, kSystemFolders)) {
+    return join({"<", name, "> is of a library that has no front door in tests/rules/rooms/room_rules.cc"});
+  }
+  return std::nullopt;
+}
+
+void check_includes(const File& file, const std::vector<std::string_view>& lines, std::vector<Finding>& findings) {
+  static const std::regex kInclude(R"re(^\s*#\s*include\s*(["<])([^">]*)[">])re");
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    std::match_results<std::string_view::const_iterator> match;
+    if (!std::regex_search(lines[i].begin(), lines[i].end(), match, kInclude)) {
+      continue;
+    }
+    const Include include{static_cast<int>(i) + 1, match.str(1) == "\"", match.str(2)};
+    const auto there = first_folder(include.name);
+    const bool generated = include.name.ends_with(".pb.h");
+    const bool of_ours =
+        include.name.find('/') != std::string::npos && std::ranges::find(kRoomFolders, there) != kRoomFolders.end();
+    std::optional<std::string> broken;
+    if (of_ours) {
+      broken = broken_by_project_include(file.path, include);
+    } else if (include.quoted && !generated) {
+      broken = join({"\"", include.name, "\": the paths of our own headers begin at the root"});
+    } else {
+      broken = broken_by_library_include(file.path, include);
+    }
+    if (broken) {
+      findings.push_back({file.path, include.line, *broken});
+    }
+  }
+}
+
+struct Forbidden {
+  std::regex pattern;
+  std::string_view rule;
+  bool (*applies)(std::string_view path);
+};
+
+const std::vector<Forbidden>& forbidden_words() {
+  static const std::vector<Forbidden> kForbidden = [] {
+    const auto everywhere = [](std::string_view) { return true; };
+    const auto but_clock_readers = [](std::string_view path) { return !one_of(path, kClockReaders); };
+    const auto headers = [](std::string_view path) { return path.ends_with(".h"); };
+    std::vector<Forbidden> words;
+    words.push_back(
+        {std::regex(R"(::\s*now\s*\(|\b(clock_gettime|gettimeofday|timespec_get)\s*\(|\bstd::(time|clock)\s*\()"),
+         "time is passed, never taken: only the clock files read a clock", but_clock_readers});
+    words.push_back({std::regex(R"(\bstd::\w+_distribution\b)"),
+                     "distributions differ between standard libraries: use an inverse CDF over std::mt19937_64",
+                     everywhere});
+    words.push_back({std::regex(R"(\b(std::)?(shared_ptr|make_shared)\b)"),
+                     "own plainly: values, references, std::unique_ptr, no std::shared_ptr", everywhere});
+    words.push_back({std::regex(R"(\busing\s+namespace\b)"),
+                     "no using namespace in a header: it reaches everyone who includes it", headers});
+    return words;
+  }();
+  return kForbidden;
+}
+
+void check_words(const File& file, const std::vector<std::string_view>& lines, std::vector<Finding>& findings) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    for (const auto& word : forbidden_words()) {
+      if (word.applies(file.path) && std::regex_search(lines[i].begin(), lines[i].end(), word.pattern)) {
+        findings.push_back({file.path, static_cast<int>(i) + 1, std::string(word.rule)});
+      }
+    }
+  }
+}
+
+void check_first_lines(const File& file, std::vector<Finding>& findings) {
+  const auto lines = lines_of(file.text);
+  const std::size_t first = file.text.starts_with("#!") ? 1 : 0;
+  const std::string_view mark =
+      one_of(file.path, {"*.h", "*.cc", "*.proto", "*.mjs", "*.js", "*.ts", "*.h.in"}) ? "//" : "#";
+  const std::string licence = join({mark, " SPDX-License-", "Identifier: Apache-2.0"});
+  if (lines.size() <= first || lines[first] != licence) {
+    findings.push_back({file.path, static_cast<int>(first) + 1, join({"a source file begins with ", licence})});
+  }
+  if (file.path.ends_with(".h") && std::ranges::find(lines, "#pragma once") == lines.end()) {
+    findings.push_back({file.path, 1, "a header has #pragma once"});
+  }
+}
+
+// ---- The rules about the tree ---------------------------------------------------------------------------------------
+
+void check_places(const std::vector<File>& tree, std::vector<Finding>& findings) {
+  std::set<std::string_view> paths;
+  std::map<std::string_view, std::string_view> at_the_root;
+  for (const auto& file : tree) {
+    paths.insert(file.path);
+    at_the_root.emplace(first_folder(file.path), file.path);
+  }
+  for (const auto& [name, example] : at_the_root) {
+    if (std::ranges::find(kRoomFolders, name) == kRoomFolders.end() &&
+        std::ranges::find(kAtTheRoot, name) == kAtTheRoot.end()) {
+      findings.push_back({std::string(example), 1, join({name, " has no place at the root"})});
+    }
+  }
+  for (const auto room : kRoomFolders) {
+    const auto page = join({room, "/README.md"});
+    if (at_the_root.contains(room) && !paths.contains(page)) {
+      findings.push_back({page, 1, join({"the room ", room, " has no README.md"})});
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Finding> check(const std::vector<File>& tree) {
+  std::vector<Finding> findings;
+  for (const auto& file : tree) {
+    std::vector<Finding> in_file;
+    if (is_source(file)) {
+      check_first_lines(file, in_file);
+    }
+    if (is_cpp(file.path)) {
+      const auto code = without_comments_and_strings(file.text);
+      const auto lines = lines_of(code);
+      check_includes(file, lines, in_file);
+      check_words(file, lines, in_file);
+    }
+    std::ranges::stable_sort(in_file, {}, &Finding::line);
+    std::ranges::move(in_file, std::back_inserter(findings));
+  }
+  check_places(tree, findings);
+  return findings;
+}
+
+std::vector<File> read_tree(const std::filesystem::path& root) {
+  static const std::set<std::string> kMadeHere = {".git", ".cache", "__pycache__", "build", "dist", "node_modules"};
+  std::vector<File> tree;
+  for (auto entry = std::filesystem::recursive_directory_iterator(root); entry != std::filesystem::end(entry);
+       ++entry) {
+    if (kMadeHere.contains(entry->path().filename().string())) {
+      entry.disable_recursion_pending();
+    } else if (entry->is_regular_file() && entry->path().extension() != ".mcap") {
+      std::ifstream stream(entry->path(), std::ios::binary);
+      tree.push_back({entry->path().lexically_relative(root).generic_string(),
+                      std::string(std::istreambuf_iterator<char>(stream), {})});
+    }
+  }
+  std::ranges::sort(tree, {}, &File::path);
+  return tree;
+}
+
+std::string to_string(const Finding& finding) {
+  return join({finding.path, ":", std::to_string(finding.line), ": ", finding.rule});
+}
+
+std::string without_comments_and_strings(std::string_view text) {
+  std::string code(text);
+  const auto blank = [&](std::size_t from, std::size_t to) {
+    for (auto i = from; i < std::min(to, code.size()); ++i) {
+      code[i] = code[i] == '\n' ? '\n' : ' ';
+    }
+  };
+  const auto end_after = [&](std::string_view mark, std::size_t from) {
+    const auto at = text.find(mark, from);
+    return at == std::string_view::npos ? text.size() : at + mark.size();
+  };
+  // The end of a literal that begins at `from` with `quote`.
+  const auto end_of_literal = [&](std::size_t from, char quote) {
+    auto i = from + 1;
+    while (i < text.size() && text[i] != quote && text[i] != '\n') {
+      i += text[i] == '\\' ? 2 : 1;
+    }
+    return std::min(i, text.size());
+  };
+  const auto is_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+
+  bool in_include = false;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto rest = text.substr(i);
+    if (text[i] == '\n') {
+      in_include = false;
+      ++i;
+    } else if (text[i] == '#') {
+      in_include = rest.substr(1).find_first_not_of(" \t") != std::string_view::npos &&
+                   rest.substr(1 + rest.substr(1).find_first_not_of(" \t")).starts_with("include");
+      ++i;
+    } else if (rest.starts_with("//")) {
+      const auto end = std::min(text.find('\n', i), text.size());
+      blank(i, end);
+      i = end;
+    } else if (rest.starts_with("/*")) {
+      const auto end = end_after("*/", i + 2);
+      blank(i, end);
+      i = end;
+    } else if (rest.starts_with("R\"") && (i == 0 || !is_name(text[i - 1]))) {
+      const auto open = text.find('(', i);
+      const auto mark = open == std::string_view::npos ? std::string_view() : text.substr(i + 2, open - i - 2);
+      const auto end = end_after(join({")", mark, "\""}), i + 2);
+      blank(i, end);
+      i = end;
+    } else if (text[i] == '"' && !in_include) {
+      const auto end = end_of_literal(i, '"');
+      blank(i + 1, end);
+      i = end + 1;
+    } else if (text[i] == '\'' && (i == 0 || !is_name(text[i - 1]))) {  // not the ' of 1'000
+      const auto end = end_of_literal(i, '\'');
+      blank(i + 1, end);
+      i = end + 1;
+    } else {
+      ++i;
+    }
+  }
+  return code;
+}
+
+}  // namespace tendon::rooms

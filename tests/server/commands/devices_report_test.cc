@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/devices_report.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace tendon {
+namespace {
+
+usb::PluggedIn falcon(bool may_open) {
+  return {.id = {0x0403, 0xCB48}, .port = "1-2.3", .node = "/dev/bus/usb/001/007", .may_open = may_open};
+}
+
+const usb::PluggedIn kMouse = {
+    .id = {0x046D, 0xC077}, .port = "1-1", .node = "/dev/bus/usb/001/002", .may_open = false};
+
+TEST(DevicesReport, NamesWhatTendonHasADriverForAndNothingElse) {
+  const std::vector<usb::PluggedIn> plugged = {kMouse, falcon(true)};
+  const auto devices = report_devices(plugged, "");
+  ASSERT_EQ(devices.size(), 1U);
+  EXPECT_EQ(devices[0].kind, "falcon");
+  EXPECT_TRUE(devices[0].lacks.empty());
+  const std::string words = in_words(devices);
+  EXPECT_NE(words.find("Novint Falcon  0403:cb48  port 1-2.3  /dev/bus/usb/001/007\n"), std::string::npos) << words;
+  EXPECT_NE(words.find("nothing is missing"), std::string::npos) << words;
+  EXPECT_NE(in_words({}).find("no device"), std::string::npos);
+  EXPECT_EQ(in_json({}), "");
+}
+
+TEST(DevicesReport, ASpaceMouseWantsNoFirmwareButTheRightToBeOpened) {
+  std::vector<usb::PluggedIn> plugged = {falcon(true)};
+  plugged[0].id = {0x256F, 0xC635};
+  const auto devices = report_devices(plugged, std::nullopt);
+  ASSERT_EQ(devices.size(), 1U);
+  EXPECT_EQ(devices[0].kind, "spacemouse");
+  EXPECT_TRUE(devices[0].lacks.empty());
+  plugged[0].may_open = false;
+  EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
+}
+
+TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubtBecauseOtherGadgetsHaveItsNumber) {
+  std::vector<usb::PluggedIn> plugged = {falcon(true)};
+  plugged[0].id = {0x1234, 0x0006};
+  const auto devices = report_devices(plugged, std::nullopt);
+  ASSERT_EQ(devices.size(), 1U);
+  EXPECT_EQ(devices[0].kind, "woodenhaptics");
+  EXPECT_NE(devices[0].name.find("or another HID gadget of mbed"), std::string::npos);
+  EXPECT_TRUE(devices[0].lacks.empty()) << "it wants no firmware from us";
+  plugged[0].may_open = false;
+  EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
+}
+
+TEST(DevicesReport, ANodeThatIsNotHereIsMendedByTheContainerAndNotByTheRightToOpenIt) {
+  std::vector<usb::PluggedIn> plugged = {falcon(false)};
+  plugged[0].has_node = false;
+  const auto devices = report_devices(plugged, "");
+  ASSERT_EQ(devices[0].lacks.size(), 1U);
+  EXPECT_NE(devices[0].lacks[0].what.find("/dev/bus/usb/001/007"), std::string::npos);
+  EXPECT_NE(devices[0].lacks[0].mend.find("container"), std::string::npos);
+}
+
+TEST(DevicesReport, SaysWhatIsMissingAndHowToMendIt) {
+  const std::vector<usb::PluggedIn> plugged = {falcon(false), falcon(true)};
+  const auto devices = report_devices(plugged, std::nullopt);
+  ASSERT_EQ(devices.size(), 2U);
+  ASSERT_EQ(devices[0].lacks.size(), 2U);
+  EXPECT_NE(devices[0].lacks[0].mend.find("deploy/udev/60-tendon.rules"), std::string::npos);
+  EXPECT_NE(devices[0].lacks[1].mend.find("--falcon-firmware"), std::string::npos);
+  EXPECT_EQ(devices[1].lacks.size(), 1U);
+  const auto refused = report_devices(std::span(plugged).subspan(1), "a\"b: expected something else");
+  ASSERT_EQ(refused[0].lacks.size(), 1U);
+  EXPECT_EQ(refused[0].lacks[0].what, "a\"b: expected something else");
+}
+
+TEST(DevicesReport, IsOneJsonObjectForEachDevice) {
+  const std::vector<usb::PluggedIn> plugged = {falcon(false)};
+  const std::string text = in_json(report_devices(plugged, "a\\b\"\n: no"));
+  EXPECT_EQ(text.find('\n'), text.size() - 1);
+  const auto json = nlohmann::json::parse(text);
+  EXPECT_EQ(json["id"], "0403:cb48");
+  EXPECT_EQ(json["may_open"], false);
+  ASSERT_EQ(json["missing"].size(), 2U);
+  EXPECT_EQ(json["missing"][1]["what"], "a\\b\"\n: no");
+}
+
+// The rule that `tendond devices` speaks of is there, and is about this device.
+TEST(DevicesReport, TheUdevRuleNamesTheDevice) {
+  std::ifstream file(std::filesystem::path(TENDON_SCENES).parent_path() / "udev" / "60-tendon.rules");
+  const std::string rules(std::istreambuf_iterator<char>(file), {});
+  EXPECT_NE(rules.find("ATTR{idVendor}==\"0403\", ATTR{idProduct}==\"cb48\", MODE=\"0660\""), std::string::npos);
+  EXPECT_NE(rules.find("ATTR{idVendor}==\"1234\", ATTR{idProduct}==\"0006\", MODE=\"0660\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/explain.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+
+Scene shipped(const char* name) { return read_scene(std::filesystem::path(TENDON_SCENES) / name); }
+
+constexpr int kRounds = 4;  // a clock that ticks evenly tells in the first what it would in the eightieth
+
+/// Time that passes by 1 µs whenever somebody looks.
+std::function<Duration()> ticking() {
+  return [now = Duration{}]() mutable { return now += 1us; };
+}
+
+/// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
+std::set<std::string> optional_parts() {
+  std::set<std::string> keys = {"device.hand", "loop.max_speed_m_per_s", "safety", "limiter", "admittance"};
+  std::istringstream reference(scene_reference());
+  std::string table;
+  for (std::string line; std::getline(reference, line);) {
+    if (line.starts_with('[')) table = line.substr(1, line.find(']') - 1);
+    const bool part = line.starts_with('[') && (table.starts_with("safety.") || table.starts_with("limiter.") ||
+                                                table.starts_with("force.") || table.starts_with("device.effects."));
+    if (part) keys.insert(table);
+    const bool key = line.starts_with("  ") && line.find_first_of(" ", 2) == std::string::npos;
+    if (table == "device.effects" && key && line != "  mass_kg") keys.insert(table + "." + line.substr(2));
+  }
+  return keys;
+}
+
+TEST(Explain, NamesEveryPartThatASceneMayLeaveOut) {
+  std::set<std::string> named;
+  for (const auto& part : explain(shipped("demo.toml"), ticking(), kRounds).parts) named.insert(std::string(part.key));
+  EXPECT_GT(named.size(), 15U);
+  EXPECT_EQ(named, optional_parts());
+}
+
+TEST(Explain, OnlyWhatIsListedHasACost) {
+  std::set<std::string> listed;
+  for (const auto& part : explain(shipped("admittance.toml"), ticking(), kRounds).parts) {
+    if (part.cost_ns) listed.insert(std::string(part.key));
+  }
+  EXPECT_EQ(listed, (std::set<std::string>{"admittance", "device.effects.coulomb_friction_n",
+                                           "device.effects.force_sensor", "device.effects.max_force_n",
+                                           "device.effects.viscous_friction_n_s_per_m", "device.hand", "limiter"}));
+}
+
+TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
+  // A round of 200 steps lasts one tick, but the second trial without a part, that without the hand's friction, whose
+  // steps are free: so the whole 5 ns of a step are the part's.
+  const Scene scene = shipped("demo.toml");
+  std::size_t looks = 0;
+  const std::size_t trials = 2 + 11;  // twice the whole scene, and 11 parts
+  Duration now{};
+  const auto time = [&] {
+    const std::size_t trial = looks++ / 2 % (trials + 1);
+    if (looks % 2 == 0 && trial != 3) now += 1us;
+    return now;
+  };
+  const Explanation explanation = explain(scene, time, kRounds);
+  EXPECT_NEAR(explanation.step_ns, 5, 1e-9);
+  EXPECT_NEAR(explanation.device_ns, 5, 1e-9);
+  EXPECT_NEAR(explanation.resolution_ns, 0, 1e-9);
+  for (const auto& part : explanation.parts) {
+    if (!part.cost_ns) continue;
+    EXPECT_NEAR(*part.cost_ns, part.key == "device.effects.viscous_friction_n_s_per_m" ? 5 : 0, 1e-9) << part.key;
+  }
+}
+
+TEST(Explain, JsonAndWordsSayTheSame) {
+  const Scene scene = shipped("admittance.toml");
+  const Explanation explanation = explain(scene, ticking(), kRounds);
+  const auto json = nlohmann::json::parse(in_json(scene, explanation));
+  const std::string words = in_words(scene, explanation);
+  EXPECT_EQ(json["parts"].size(), explanation.parts.size());
+  const std::size_t absent = words.find("is not listed");
+  for (const auto& part : json["parts"]) {
+    const std::size_t place = words.find("  " + part["key"].get<std::string>() + ' ');
+    ASSERT_NE(place, std::string::npos) << part;
+    EXPECT_EQ(place < absent, part["listed"].get<bool>()) << part;
+    EXPECT_EQ(part["cost_ns"].is_null(), !part["listed"].get<bool>());
+  }
+}
+
+}  // namespace
+}  // namespace tendon

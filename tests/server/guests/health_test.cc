@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/guests/health.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+
+#include "devices/simulated/profiles.h"
+#include "devices/simulated/simulated_device.h"
+#include "server/haptic_loop.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+std::uint64_t sum(const LatenessHistogram& lateness) {
+  return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
+}
+
+/// A loop at 1 kHz whose thread wakes when the test says so, and the log thread behind it.
+class Loop {
+ public:
+  Loop() : loop_({.period = milliseconds(1), .control = control()}, device_, *mail_) {}
+
+  /// One step, `late` after it was due; which is counted unless it is `lost`.
+  void step(Duration late, bool lost = false) {
+    due_ = loop_.step(due_ + late);
+    while (const StepRecord* step = mail_->steps.front()) {
+      if (!lost) meter.observe(*step);
+      mail_->steps.pop();
+    }
+  }
+  std::uint64_t steps() const { return loop_.stats().steps; }
+  std::uint64_t overruns() const { return loop_.stats().overruns; }
+
+  HealthMeter meter{milliseconds(1)};
+
+ private:
+  static HapticController::Config control() {
+    HapticController::Config control;
+    control.limiter.friction = {0.3, 0.8};
+    control.limiter.longest_hold = milliseconds(2);
+    control.max_force = 8;
+    control.max_slew = 1000;
+    return control;
+  }
+  static SimulatedDevice::Config still() {
+    SimulatedDevice::Config config = find_device_profile("falcon")->device();
+    config.hand = OperatorHand::Config{
+        .stiffness = 300, .damping = 20, .mass = 0.05, .motion = ScriptedMotion(ScriptedMotion::Sine{})};
+    return config;
+  }
+  SimulatedDevice device_{still()};
+  std::unique_ptr<Mailboxes> mail_ = std::make_unique<Mailboxes>();
+  HapticLoop loop_;
+  LocalTime due_{std::chrono::seconds(1)};
+};
+
+TEST(HealthMeter, CountsEachStepInTheBucketOfItsLateness) {
+  Loop loop;
+  for (int i = 0; i < 50; ++i) loop.step(Duration{0});
+  for (int i = 0; i < 30; ++i) loop.step(microseconds(60));
+  for (int i = 0; i < 5; ++i) loop.step(microseconds(600));
+  const Health& counted = loop.meter.counted();
+  EXPECT_EQ(counted.lateness[0], 50U);
+  EXPECT_EQ(counted.lateness[6], 30U);
+  EXPECT_EQ(counted.lateness[10], 5U);
+  EXPECT_EQ(sum(counted.lateness), loop.steps());
+  EXPECT_EQ(counted.steps, loop.steps());
+  EXPECT_EQ(counted.missed, 0U);
+  EXPECT_EQ(counted.overruns, 0U);
+}
+
+TEST(HealthMeter, APeriodWithoutAStepIsMissedAndTheStepAfterAnOverrun) {
+  Loop loop;
+  for (int i = 0; i < 10; ++i) loop.step(Duration{0});
+  loop.step(microseconds(999));  // late, but within its period
+  EXPECT_EQ(loop.meter.counted().missed, 0U);
+  loop.step(microseconds(5000));  // five have passed, the loop goes on from here
+  loop.step(Duration{0});
+  EXPECT_EQ(loop.meter.counted().missed, 5U);
+  EXPECT_EQ(loop.meter.counted().lateness[13], 1U);
+  EXPECT_EQ(loop.meter.counted().overruns, loop.overruns());
+  EXPECT_EQ(loop.overruns(), 1U);
+}
+
+TEST(HealthMeter, AStepThatItWasNotShownIsNeitherCountedNorMissed) {
+  Loop loop;
+  for (int i = 0; i < 10; ++i) loop.step(Duration{0});
+  Health before = loop.meter.counted();
+  for (int i = 0; i < 4; ++i) loop.step(Duration{0}, true);
+  for (int i = 0; i < 10; ++i) loop.step(Duration{0});
+  const DeviceReport told = report(before, loop.meter.counted());
+  EXPECT_EQ(told.steps, 14U);
+  EXPECT_EQ(sum(told.lateness), 10U);
+  EXPECT_EQ(told.missed, 0U);
+  EXPECT_EQ(told.degraded, "the log thread does not follow");
+}
+
+TEST(HealthMeter, CountsStepsInWhichTheDeviceWasNotSeen) {
+  HealthMeter meter(milliseconds(1));
+  StepRecord step;
+  step.tick = 1;
+  step.reasons = Reason::kUnseen;
+  meter.observe(step);
+  EXPECT_EQ(meter.counted().unseen, 1U);
+}
+
+TEST(HealthMeter, WantsAPeriod) { EXPECT_THROW(HealthMeter(Duration{0}), std::invalid_argument); }
+
+TEST(Health, IsToldAsWhatHasHappenedBetween) {
+  Health before;
+  before.at = LocalTime(std::chrono::seconds(5));
+  before.steps = 100;
+  before.lateness[3] = 100;
+  before.missed = before.overruns = before.unseen = 1;
+  Health now = before;
+  now.at += milliseconds(1200);
+  now.steps += 1190;
+  now.lateness[3] += 1180;
+  now.lateness[23] += 10;
+  now.missed += 10;
+  now.overruns += 2;
+  now.unseen += 3;
+  now.safety = Safety::kArmed;
+  now.fault = "words";
+  const DeviceReport told = report(before, now);
+  EXPECT_EQ(told.until, PeerTime(std::chrono::milliseconds(6200)));
+  EXPECT_EQ(told.span, milliseconds(1200));
+  EXPECT_EQ(told.steps, 1190U);
+  EXPECT_EQ(told.lateness[3], 1180U);
+  EXPECT_EQ(told.lateness[23], 10U);
+  EXPECT_EQ(told.missed, 10U);
+  EXPECT_EQ(told.overruns, 2U);
+  EXPECT_EQ(told.unseen, 3U);
+  EXPECT_EQ(told.safety, Safety::kArmed);
+  EXPECT_EQ(told.fault, "words");
+  EXPECT_EQ(told.degraded, "");
+}
+
+TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
+  Health now;
+  now.steps = 1;
+  now.not_realtime = now.recording_ended = true;
+  const std::string degraded = report({}, now).degraded;
+  EXPECT_EQ(degraded,
+            "the kernel refused the haptic thread real time; the log thread does not follow; the recording has ended");
+  EXPECT_LE(degraded.size(), limits::kMaxDetail);
+}
+
+}  // namespace
+}  // namespace tendon

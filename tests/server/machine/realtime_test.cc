@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/machine/realtime.h"
+
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <sched.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
+
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using testing::ScratchFolder;
+
+cpu_set_t allowed() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  pthread_getaffinity_np(pthread_self(), sizeof set, &set);
+  return set;
+}
+
+std::uint32_t last_of(const cpu_set_t& set) {
+  std::uint32_t last = 0;
+  for (std::uint32_t cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(cpu, &set)) last = cpu;
+  }
+  return last;
+}
+
+TEST(StayOn, KeepsTheThreadThatAsksOnThatProcessorAndNoOther) {
+  const cpu_set_t before = allowed();
+  const std::uint32_t cpu = last_of(before);
+  std::thread([cpu] {
+    EXPECT_FALSE(stay_on(cpu));
+    const cpu_set_t now = allowed();
+    EXPECT_EQ(CPU_COUNT(&now), 1);
+    EXPECT_TRUE(CPU_ISSET(cpu, &now));
+    EXPECT_EQ(sched_getcpu(), static_cast<int>(cpu));
+  }).join();
+  const cpu_set_t after = allowed();
+  EXPECT_TRUE(CPU_EQUAL(&before, &after)) << "of the thread only";
+}
+
+TEST(StayOn, SaysWhatToDoAboutAProcessorThatIsNotThereAndChangesNothing) {
+  for (const std::uint32_t cpu : {1023U, 1024U, 4'000'000'000U}) {
+    std::thread([cpu] {
+      const cpu_set_t before = allowed();
+      if (CPU_ISSET(1023, &before)) return;  // a machine that has it
+      const auto refused = stay_on(cpu);
+      ASSERT_TRUE(refused);
+      EXPECT_NE(refused->find("processor " + std::to_string(cpu)), std::string::npos) << *refused;
+      EXPECT_NE(refused->find("`nproc --all`"), std::string::npos) << *refused;
+      const cpu_set_t after = allowed();
+      EXPECT_TRUE(CPU_EQUAL(&before, &after));
+    }).join();
+  }
+}
+
+TEST(WakefulProcessors, AskForNoLatencyIn32BitsAndHoldTheFileOpen) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "cpu_dma_latency";
+  std::ofstream(file) << "????";
+  const auto open_files = [&file] {
+    int count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+      std::error_code gone;
+      if (std::filesystem::read_symlink(entry, gone) == file) ++count;
+    }
+    return count;
+  };
+  {
+    const WakefulProcessors wakeful(file);
+    EXPECT_TRUE(wakeful.held());
+    EXPECT_FALSE(wakeful.refused());
+    EXPECT_EQ(open_files(), 1) << "the kernel holds to it for as long as the file is open";
+  }
+  EXPECT_EQ(open_files(), 0);
+  std::ifstream stream(file);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}), std::string(4, '\0'));
+}
+
+TEST(WakefulProcessors, AreNoRefusalWhereTheKernelHasNoSuchFile) {
+  const ScratchFolder folder;
+  const WakefulProcessors wakeful(folder.path() / "none");
+  EXPECT_FALSE(wakeful.held());
+  EXPECT_FALSE(wakeful.refused());
+}
+
+TEST(WakefulProcessors, SayWhatItWouldTakeWhenRefused) {
+  const ScratchFolder folder;  // a folder cannot be opened for writing, whoever asks
+  const WakefulProcessors wakeful(folder.path());
+  EXPECT_FALSE(wakeful.held());
+  ASSERT_TRUE(wakeful.refused());
+  EXPECT_NE(wakeful.refused()->find("Grant it with a udev rule"), std::string::npos) << *wakeful.refused();
+}
+
+}  // namespace
+}  // namespace tendon

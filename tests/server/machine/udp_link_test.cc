@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/machine/udp_link.h"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <cerrno>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Longer than any wait that a right link makes here: reached only by a test that fails.
+constexpr Duration kForever = 10s;
+
+constexpr Address kAnyPort4 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 127, 0, 0, 1}, .port = 0};
+constexpr Address kAnyPort6 = {.ip = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1}, .port = 0};
+
+std::vector<std::byte> bytes(std::size_t size, int first) {
+  std::vector<std::byte> result(size);
+  for (std::size_t i = 0; i < size; ++i) result[i] = static_cast<std::byte>(first + static_cast<int>(i));
+  return result;
+}
+
+template <typename Error>
+std::string complaint_about(const Address& listen) {
+  try {
+    const UdpLink link(listen);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool is_readable(int fd) {
+  pollfd entry{fd, POLLIN, 0};
+  return ::poll(&entry, 1, 0) == 1;
+}
+
+class UdpLinkTest : public testing::TestWithParam<Address> {};
+
+TEST_P(UdpLinkTest, BringsDatagramsFromAToZInOrderWithTheirSender) {
+  UdpLink a(GetParam());
+  UdpLink z(GetParam());
+  a.send(z.local_address(), bytes(3, 1));
+  a.send(z.local_address(), bytes(kMaxDatagram, 2));
+  std::vector<std::byte> buffer(kMaxDatagram);
+  Address from;
+  for (const auto& sent : {bytes(3, 1), bytes(kMaxDatagram, 2)}) {
+    z.wait(kForever);
+    ASSERT_EQ(z.receive(from, buffer), sent.size());
+    EXPECT_TRUE(std::equal(sent.begin(), sent.end(), buffer.begin()));
+    EXPECT_EQ(from, a.local_address());
+  }
+  EXPECT_EQ(z.receive(from, buffer), 0U);
+  EXPECT_EQ(a.send_failures(), 0U);
+}
+
+TEST_P(UdpLinkTest, TellsTheFullSizeOfADatagramThatWasCut) {
+  UdpLink a(GetParam());
+  UdpLink z(GetParam());
+  a.send(z.local_address(), bytes(5000, 1));
+  std::vector<std::byte> buffer(kMaxDatagram + 1, std::byte{0xee});
+  Address from;
+  z.wait(kForever);
+  EXPECT_EQ(z.receive(from, std::span(buffer).first(kMaxDatagram)), 5000U);
+  EXPECT_EQ(buffer.back(), std::byte{0xee});
+  EXPECT_EQ(z.receive(from, buffer), 0U) << "the rest must be gone";
+}
+
+TEST_P(UdpLinkTest, SkipsEmptyDatagramsToReachTheOneBehindThem) {
+  UdpLink a(GetParam());
+  UdpLink z(GetParam());
+  for (int i = 0; i < 10; ++i) a.send(z.local_address(), {});
+  a.send(z.local_address(), bytes(7, 1));
+  std::vector<std::byte> buffer(kMaxDatagram);
+  Address from;
+  z.wait(kForever);
+  EXPECT_EQ(z.receive(from, buffer), 7U);
+}
+
+TEST_P(UdpLinkTest, CountsWhatItCouldNotSendAndLivesOn) {
+  UdpLink a(GetParam());
+  UdpLink z(GetParam());
+  a.send(z.local_address(), std::vector<std::byte>(70'000));  // larger than UDP can carry
+  EXPECT_EQ(a.send_failures(), 1U);
+  a.send(GetParam() == kAnyPort4 ? parse_address("[::1]:9") : parse_address("127.0.0.1:9"), bytes(1, 1));
+  EXPECT_EQ(a.send_failures(), 2U);
+  a.send(z.local_address(), bytes(1, 1));
+  EXPECT_EQ(a.send_failures(), 2U);
+  z.wait(kForever);
+  std::vector<std::byte> buffer(kMaxDatagram);
+  Address from;
+  EXPECT_EQ(z.receive(from, buffer), 1U);
+}
+
+TEST_P(UdpLinkTest, APortInUseIsRefusedByNameAndReason) {
+  const UdpLink first(GetParam());
+  const Address taken = first.local_address();
+  EXPECT_EQ(complaint_about<std::runtime_error>(taken),
+            "cannot listen on " + to_string(taken) + ": Address already in use");
+}
+
+INSTANTIATE_TEST_SUITE_P(Ipv4AndIpv6, UdpLinkTest, testing::Values(kAnyPort4, kAnyPort6),
+                         [](const auto& test) { return test.param == kAnyPort4 ? "Ipv4" : "Ipv6"; });
+
+TEST(UdpLink, RefusesAnAddressThatOthersCanReachAndSaysWhy) {
+  for (const char* const text : {"0.0.0.0:47100", "[::]:47100", "192.168.1.20:47100"}) {
+    EXPECT_EQ(complaint_about<std::invalid_argument>(parse_address(text)),
+              "refusing to listen on " + std::string(text) +
+                  ": there are no keys, so anyone on the network could command forces; use a loopback address "
+                  "(127.0.0.1 or [::1]), or give each client a key (`tendond keygen NAME`, and `keys` in the scene's "
+                  "[network])");
+  }
+}
+
+TEST(UdpLink, ListensWhereItIsToldToWhenThatIsMeant) {
+  const UdpLink link(parse_address("0.0.0.0:0"), Reach::kAnywhere);
+  EXPECT_NE(link.local_address().port, 0);
+}
+
+TEST(UdpLink, TheDoorbellEndsAWaitAndIsAnswered) {
+  UdpLink link(kAnyPort4);
+  Doorbell bell;
+  bell.ring();
+  bell.ring();
+  link.wait(kForever, &bell);
+  EXPECT_FALSE(is_readable(bell.fd()));
+}
+
+TEST(UdpLink, WhatItHasReceivedWasHereByNowAndNotBeforeTheTurn) {
+  const UdpLink link(parse_address("127.0.0.1:0"));
+  const LocalTime long_ago{};
+  EXPECT_GT(link.received_by(long_ago), long_ago);
+  EXPECT_EQ(link.received_by(LocalTime::max()), LocalTime::max());
+}
+
+TEST(UdpLink, AWaitWithoutTimeLeftDoesNotWait) {
+  UdpLink link(kAnyPort4);
+  link.wait(0s);
+  link.wait(-1h);
+}
+
+TEST(Doorbell, IsReadableFromTheFirstRingUntilItIsAnswered) {
+  Doorbell bell;
+  EXPECT_FALSE(is_readable(bell.fd()));
+  bell.ring();
+  bell.ring();
+  EXPECT_TRUE(is_readable(bell.fd()));
+  bell.answer();
+  EXPECT_FALSE(is_readable(bell.fd()));
+  bell.answer();
+}
+
+TEST(Doorbell, KeepsErrnoForTheCodeThatASignalInterrupted) {
+  Doorbell bell;
+  errno = ENOENT;
+  bell.ring();
+  EXPECT_EQ(errno, ENOENT);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/byte_sink.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "tests/server/recording/recording_samples.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using testing::ScratchFolder;
+
+std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
+
+TEST(FileSink, LeavesTheFileOfAnotherRecordingThatStillRunsAlone) {
+  const testing::ScratchFolder folder;
+  const auto path = folder.path() / "shared.mcap";
+  const std::array<std::byte, 3> piece{};
+  FileSink first(path);
+  ASSERT_TRUE(first.append(piece));
+  EXPECT_THROW(FileSink{path}, std::runtime_error);
+  EXPECT_EQ(std::filesystem::file_size(path), 3U);
+  ASSERT_TRUE(first.append(piece));
+  EXPECT_EQ(std::filesystem::file_size(path), 6U);
+}
+
+TEST(FileSink, SharesWhatHasNothingToLose) {
+  FileSink one("/dev/null");
+  FileSink other("/dev/null");
+  const std::array<std::byte, 3> bytes{};
+  EXPECT_TRUE(one.append(bytes));
+  EXPECT_TRUE(other.append(bytes));
+}
+
+TEST(FileSink, NamesPathAndReasonWhenItCannotOpen) {
+  try {
+    FileSink sink("/nowhere/at/all/run.mcap");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "cannot write recording /nowhere/at/all/run.mcap: No such file or directory");
+  }
+}
+
+TEST(FileSink, ReportsAFullDisk) {
+  FileSink sink("/dev/full");
+  EXPECT_EQ(sink.error(), "");
+  EXPECT_FALSE(sink.append(bytes("abc")));
+  EXPECT_EQ(sink.error(), "cannot write recording /dev/full: No space left on device");
+}
+
+TEST(FileSink, ReplacesWhatWasThere) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  { ASSERT_TRUE(FileSink(path).append(bytes("old and long"))); }
+  { ASSERT_TRUE(FileSink(path).append(bytes("new"))); }
+  EXPECT_EQ(std::filesystem::file_size(path), 3U);
+}
+
+/// A disk with room for part of the piece only: the kernel's limit on the size of a file plays it.
+TEST(FileSink, CutsOffAPieceThatDidNotFit) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  FileSink sink(path);
+  ASSERT_TRUE(sink.append(bytes("whole")));
+
+  rlimit small = before;
+  small.rlim_cur = 8;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const bool fitted = sink.append(bytes("too long"));
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+
+  EXPECT_FALSE(fitted);
+  EXPECT_NE(sink.error().find("File too large"), std::string::npos) << sink.error();
+  EXPECT_EQ(std::filesystem::file_size(path), 5U);
+  EXPECT_TRUE(sink.append(bytes("!")));
+  EXPECT_EQ(std::filesystem::file_size(path), 6U);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/flight_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "tests/server/recording/recording_samples.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using testing::ScratchFolder;
+
+TEST(FlightPath, IsBesideTheRecordingAlsoWhenThatHasBeenMovedAway) {
+  const ScratchFolder folder;
+  const auto recording = folder.path() / "run.2.mcap";
+  EXPECT_EQ(flight_path(recording, "", 1), folder.path() / "run.2.fault-1.mcap");
+  std::ofstream(recording) << "steps";
+  EXPECT_EQ(flight_path(recording, "", 1), folder.path() / "run.2.fault-1.mcap");
+  EXPECT_EQ(flight_path(recording, "left", 12), folder.path() / "run.2.left.fault-12.mcap");
+}
+
+TEST(FlightPath, IsInTheWorkingDirectoryWhereTheRecordingIsNoFileOrThereIsNone) {
+  const ScratchFolder folder;
+  const auto pipe = folder.path() / "pipe.mcap";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const auto link = folder.path() / "link.mcap";
+  std::filesystem::create_symlink("/dev/null", link);
+  EXPECT_EQ(flight_path("/dev/null", "", 1), "tendon.fault-1.mcap");
+  EXPECT_EQ(flight_path(pipe, "", 2), "tendon.fault-2.mcap");
+  EXPECT_EQ(flight_path(link, "", 3), "tendon.fault-3.mcap");
+  EXPECT_EQ(flight_path({}, "left", 4), "tendon.left.fault-4.mcap");
+}
+
+TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
+  Mailboxes mail;
+  for (std::uint64_t tick = 0; tick < 100; ++tick) mail.flight.record(testing::sample_step(tick));
+  mail.flight.freeze();
+  FileSink full("/dev/full");
+  try {
+    write_flight(mail.flight, testing::sample_config(), full);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "cannot write recording /dev/full: No space left on device");
+  }
+  MemorySink memory;
+  write_flight(mail.flight, testing::sample_config(), memory);
+  EXPECT_EQ(testing::read_all(memory.bytes()).steps.size(), 100U);
+}
+
+}  // namespace
+}  // namespace tendon

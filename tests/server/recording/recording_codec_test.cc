@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/recording_codec.h"
+
+#include <google/protobuf/descriptor.pb.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "core/base/reason.h"
+#include "recording.pb.h"
+#include "tests/server/recording/recording_samples.h"
+
+namespace tendon {
+namespace {
+
+namespace pb = tendon::recording::v1;
+
+TEST(RecordingCodec, SpellsOutEveryReasonThatCoreHas) {
+  for (int bit = 0; bit < 32; ++bit) {
+    const Reasons reasons = Reasons::from_bits(std::uint32_t{1} << bit);
+    std::string name = to_string(reasons);
+    if (name.empty()) continue;
+    std::ranges::replace_if(
+        name, [](char c) { return c == ' ' || c == '-'; }, '_');
+
+    StepRecord step = testing::sample_step(1);
+    step.reasons = reasons;
+    pb::Step message;
+    ASSERT_TRUE(message.ParseFromString(recording::encode(step)));
+    EXPECT_EQ(message.reason_bits(), reasons.bits());
+    const auto* field = pb::Reason::descriptor()->FindFieldByName(name);
+    ASSERT_NE(field, nullptr) << "Reason in recording.proto has no field " << name;
+    EXPECT_EQ(message.reason().ByteSizeLong(), 2U) << "only " << name << " is set";
+    EXPECT_TRUE(message.reason().GetReflection()->GetBool(message.reason(), field)) << name;
+  }
+}
+
+TEST(RecordingCodec, TheSchemaStandsAlone) {
+  google::protobuf::FileDescriptorSet files;
+  ASSERT_TRUE(files.ParseFromString(recording::schema_data()));
+  google::protobuf::DescriptorPool pool;
+  for (const auto& file : files.file()) ASSERT_NE(pool.BuildFile(file), nullptr);
+  for (const auto& kind : {recording::kScene, recording::kStep, recording::kDatagram, recording::kLoss})
+    EXPECT_NE(pool.FindMessageTypeByName(std::string(kind.schema)), nullptr) << kind.schema;
+}
+
+// PlotJuggler takes a field of that name for the time in seconds, and its kind for double.
+TEST(RecordingCodec, NoFieldIsCalledTimestamp) {
+  const auto* file = pb::Step::descriptor()->file();
+  for (int m = 0; m < file->message_type_count(); ++m)
+    EXPECT_EQ(file->message_type(m)->FindFieldByName("timestamp"), nullptr) << file->message_type(m)->full_name();
+}
+
+TEST(RecordingCodec, GivesPlotsTheNormsOfTheForces) {
+  pb::Step message;
+  ASSERT_TRUE(message.ParseFromString(recording::encode(testing::sample_step(1))));
+  EXPECT_DOUBLE_EQ(message.force_wanted_norm_n(), 5);
+  EXPECT_DOUBLE_EQ(message.force_applied_norm_n(), 2);
+}
+
+TEST(RecordingCodec, GivesPlotsThePacketNumber) {
+  const auto packet = [](DatagramRecord datagram) {
+    pb::Datagram message;
+    EXPECT_TRUE(message.ParseFromString(recording::encode(datagram)));
+    return message;
+  };
+  DatagramRecord datagram = testing::sample_datagram(testing::ms(1), 40, true);
+  EXPECT_EQ(packet(datagram).type(), pb::DATAGRAM_TYPE_UNSPECIFIED) << "garbage is garbage";
+
+  const std::array<std::uint8_t, 16> header = {0x54, 0x13, 0, 0, 0x78, 0x56, 0x34, 0x12, 7, 0, 0, 0, 0, 0, 0, 0};
+  std::ranges::transform(header, datagram.bytes.begin(), [](std::uint8_t b) { return std::byte{b}; });
+  EXPECT_EQ(packet(datagram).type(), pb::DATAGRAM_TYPE_DATA);
+  EXPECT_EQ(packet(datagram).connection_id(), 0x12345678U);
+  EXPECT_EQ(packet(datagram).packet_number(), 7U);
+
+  datagram.size = kMaxDatagram + 1;
+  EXPECT_EQ(packet(datagram).type(), pb::DATAGRAM_TYPE_UNSPECIFIED) << "too large for a datagram of ours";
+}
+
+TEST(RecordingCodec, KeepsWhatFitsOfADatagramThatWasTooLarge) {
+  const auto datagram = testing::sample_datagram(testing::ms(1), 60'000, true);
+  const auto read = recording::decode_datagram(recording::encode(datagram), testing::ms(1));
+  EXPECT_EQ(read.size, 60'000U);
+  EXPECT_EQ(read.bytes, datagram.bytes);
+}
+
+}  // namespace
+}  // namespace tendon

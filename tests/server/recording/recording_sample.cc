@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// recording_sample FOLDER: writes two seconds of a run as FOLDER/whole.mcap, and as FOLDER/killed.mcap what is left of
+// it when the server is killed in the middle of a write. For tests that read recordings with programs of others.
+
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <span>
+
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
+#include "tests/server/recording/recording_samples.h"
+
+int main(int argc, char** argv) {
+  using namespace tendon;
+  if (argc != 2) {
+    std::cerr << "usage: recording_sample FOLDER\n";
+    return 2;
+  }
+  try {
+    const std::filesystem::path folder = argv[1];
+    std::filesystem::create_directories(folder);
+    Recorder::Config config = testing::sample_config();
+    config.scene.unix_offset = std::chrono::seconds(1'700'000'000);
+    MemorySink sink;
+    Recorder recorder(config, sink);
+    testing::record_samples(recorder, 2000);
+    recorder.lost(testing::ms(2000), 3, 1);
+    recorder.close();
+
+    const std::span<const std::byte> bytes = sink.bytes();
+    FileSink whole(folder / "whole.mcap");
+    FileSink killed(folder / "killed.mcap");
+    if (!whole.append(bytes) || !killed.append(bytes.first(bytes.size() / 2))) {
+      std::cerr << whole.error() << killed.error() << '\n';
+      return 1;
+    }
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

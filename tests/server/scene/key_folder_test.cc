@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/key_folder.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using testing::ScratchFolder;
+
+ClientKey some_key(const std::string& name, std::uint64_t seed, Role role = Role::kController) {
+  return {.name = name, .role = role, .key = Ratchet(seed).next()};
+}
+
+std::string complaint_about(const std::filesystem::path& folder) {
+  try {
+    read_key_folder(folder);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(KeyFolder, GivesBackTheKeysThatWereWrittenByName) {
+  const ScratchFolder folder;
+  write_key_file(folder.path() / "wall.key", some_key("wall", 1));
+  write_key_file(folder.path() / "screen.key", some_key("screen", 2, Role::kObserver));
+  std::ofstream(folder.path() / "README") << "not a key";
+  const auto keys = read_key_folder(folder.path());
+  ASSERT_EQ(keys.size(), 2U);
+  EXPECT_EQ(keys[0].name, "screen");
+  EXPECT_EQ(keys[0].role, Role::kObserver);
+  EXPECT_EQ(keys[1].name, "wall");
+  EXPECT_EQ(keys[1].key.bytes(), some_key("wall", 1).key.bytes());
+}
+
+TEST(KeyFolder, AKeyIsWrittenForItsOwnerOnlyAndNeverOverAnother) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "wall.key";
+  const mode_t before = umask(0);
+  write_key_file(file, some_key("wall", 1));
+  umask(before);
+  EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0600));
+  EXPECT_THROW(write_key_file(file, some_key("wall", 2)), std::runtime_error);
+  EXPECT_EQ(read_key_folder(folder.path())[0].key.bytes(), some_key("wall", 1).key.bytes());
+}
+
+TEST(KeyFolder, SaysWhichFileIsWrongAndWhy) {
+  const ScratchFolder folder;
+  const std::string file = (folder.path() / "wall.key").string();
+  EXPECT_EQ(complaint_about(folder.path() / "none"),
+            (folder.path() / "none").string() + ": cannot read this folder of keys: No such file or directory");
+  EXPECT_EQ(
+      complaint_about(folder.path()),
+      folder.path().string() + ": there is no key in this folder; make one for each client with `tendond keygen NAME`");
+  write_key_file(file, some_key("wall", 1));
+  std::filesystem::permissions(file, std::filesystem::perms(0640));
+  EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": others than its owner may read"));
+  std::filesystem::permissions(file, std::filesystem::perms(0600));
+  std::ofstream(file) << "controller " << std::string(64, '0') << '\n';
+  EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": the key is weak: it repeats the same few bytes"));
+  std::ofstream(file) << "controller 00\n";
+  EXPECT_TRUE(complaint_about(folder.path()).starts_with(file + ": the key is too short"));
+}
+
+}  // namespace
+}  // namespace tendon

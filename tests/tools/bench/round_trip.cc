@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// From a state handed over to the force that answers it, decoded in its box, over the loopback and back through a
+// client like `virtual_wall` in another process; and a bare ping-pong of datagrams of the same sizes between the same
+// two processes and the same kinds of sockets that waits in the same way. The two take turns in blocks, so that what
+// else the machine does falls on both. For suite 1 there is a second floor: the ping-pong that seals and opens each
+// datagram with libsodium, and does nothing else.
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "clients/cpp/force_client.h"
+#include "clients/cpp/udp_transport.h"
+#include "protocol/secrets/crypto.h"
+#include "protocol/wire/codec.h"
+#include "server/machine/clock.h"
+#include "server/machine/udp_link.h"
+#include "server/network_loop.h"
+#include "tests/tools/bench/bench.h"
+#include "tests/tools/bench/measure.h"
+
+namespace tendon::bench {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+/// Nothing on a loopback takes so long: something is broken.
+constexpr Duration kGiveUp = std::chrono::seconds(10);
+
+struct Options {
+  int blocks = 40;
+  int exchanges = 500;  ///< of each kind in a block
+  int warm_up = 50;     ///< at the beginning of each, not counted: caches, and the processor's clock
+  int priority = 0;     ///< of both processes
+};
+
+enum class Wait : std::uint8_t { kBusy, kBlocking };
+
+/// What the other process is to do. In memory that both share.
+struct Orders {
+  enum Job : int { kRest, kEcho, kSealedEcho, kTendon, kQuit };
+  std::atomic<int> job{kRest};
+  std::atomic<int> at_work{kRest};  ///< what it does
+  std::atomic<int> echo_bytes{0};   ///< what it echoes with
+};
+
+/// One end of a bare ping-pong. The server's is one socket for whoever comes, as a server's is; the client's is
+/// connected. `sealed`: what follows the first 16 bytes is sealed and opened by libsodium.
+class BareSocket {
+ public:
+  BareSocket(int fd, const Address* peer, Wait wait, bool sealed) : fd_(fd), wait_(wait), sealed_(sealed) {
+    if (peer != nullptr) to_ = to_sockaddr(*peer);
+  }
+
+  void send(std::size_t size) {
+    if (sealed_) {
+      const auto body = std::span(buffer_).subspan(kHeaderSize, size - kHeaderSize);
+      crypto::seal(key_, 0, std::span(buffer_).first(kHeaderSize), body.first(body.size() - crypto::kTagSize), body);
+    }
+    const auto* const to = to_ ? reinterpret_cast<const sockaddr*>(&*to_) : nullptr;
+    if (::sendto(fd_, buffer_.data(), size, 0, to, to_ ? sizeof *to_ : 0) < 0) {
+      throw std::system_error(errno, std::generic_category(), "send");
+    }
+  }
+  /// True when a datagram has come; waits as long as it may.
+  bool receive() {
+    if (wait_ == Wait::kBlocking) {
+      pollfd readable{fd_, POLLIN, 0};
+      const timespec time{0, 1'000'000};
+      ::ppoll(&readable, 1, &time, nullptr);
+    }
+    sockaddr_in from{};
+    socklen_t length = sizeof from;
+    const ssize_t size = ::recvfrom(fd_, buffer_.data(), buffer_.size(), MSG_DONTWAIT,
+                                    to_ ? reinterpret_cast<sockaddr*>(&from) : nullptr, to_ ? &length : nullptr);
+    if (size <= 0 || !sealed_) return size > 0;
+    const auto body = std::span(buffer_).subspan(kHeaderSize, static_cast<std::size_t>(size) - kHeaderSize);
+    return crypto::open(key_, 0, std::span(buffer_).first(kHeaderSize), body,
+                        body.first(body.size() - crypto::kTagSize));
+  }
+
+  static sockaddr_in to_sockaddr(const Address& ipv4) {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(ipv4.port);
+    std::copy(ipv4.ip.end() - 4, ipv4.ip.end(), reinterpret_cast<std::uint8_t*>(&to.sin_addr));
+    return to;
+  }
+
+ private:
+  int fd_;
+  Wait wait_;
+  bool sealed_;
+  Key key_;
+  std::optional<sockaddr_in> to_;
+  std::array<std::byte, kMaxDatagram> buffer_{};
+};
+
+/// The server's link; between its system calls it looks into the box, as the haptic thread does on a core of its own.
+class WatchedLink : public Link {
+ public:
+  WatchedLink(UdpLink& link, Mailboxes& mail) : link_(link), mail_(mail) {}
+
+  void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override {
+    look();
+    return link_.receive(from, buffer);
+  }
+  LocalTime received_by(LocalTime now) const override { return link_.received_by(now); }
+  void look() {
+    const RemoteForce* const force = mail_.forces.front().take();
+    if (force == nullptr) return;
+    answered_tick = force->answers_tick;
+    seen = clock::now();
+  }
+
+  std::uint64_t answered_tick = 0;  ///< by the newest force in the box
+  LocalTime seen{};                 ///< when it was there
+
+ private:
+  UdpLink& link_;
+  Mailboxes& mail_;
+};
+
+void connect(int fd, const Address& to) {
+  const sockaddr_in address = BareSocket::to_sockaddr(to);
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::system_error(errno, std::generic_category(), "cannot connect a bare socket");
+  }
+}
+
+/// The other process: a wall at x = 0, or the echo.
+void serve(Orders& orders, const Address& server, int echo, Wait wait, const std::optional<Key>& key) {
+  UdpTransport transport(server);
+  ForceClient::Config config;
+  config.name = "wall";
+  config.key = key;
+  config.seed = 7;
+  ForceClient client(
+      transport, server, config,
+      [](const DeviceState& hand) -> Touch { return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0); },
+      clock::now());
+  BareSocket bare(echo, nullptr, wait, false);
+  BareSocket sealed(echo, nullptr, wait, true);
+  for (;;) {
+    const int job = orders.job.load(std::memory_order_acquire);
+    orders.at_work.store(job, std::memory_order_release);
+    if (job == Orders::kQuit) return;
+    if (job == Orders::kEcho || job == Orders::kSealedEcho) {
+      BareSocket& socket = job == Orders::kEcho ? bare : sealed;
+      if (socket.receive()) socket.send(static_cast<std::size_t>(orders.echo_bytes.load(std::memory_order_relaxed)));
+    } else if (job == Orders::kTendon) {
+      const LocalTime now = clock::now();
+      const LocalTime next = client.turn(now);
+      if (wait == Wait::kBlocking) transport.wait(std::min<Duration>(next - now, milliseconds(1)));
+    } else {
+      std::this_thread::sleep_for(microseconds(50));
+    }
+  }
+}
+
+struct Result {
+  std::vector<double> bare;    ///< µs, each
+  std::vector<double> sealed;  ///< suite 1: as `bare`, with libsodium at both ends
+  std::vector<double> tendon;
+  std::size_t state_bytes = 0;
+  std::size_t force_bytes = 0;
+};
+
+double us(Duration d) { return 1e6 * seconds(d); }
+
+class RoundTrip {
+ public:
+  RoundTrip(const Options& options, Wait wait, bool sealed)
+      : options_(options), wait_(wait), sealed_(sealed), key_(Ratchet(3).next()) {
+    NetworkLoop::Config config;
+    config.devices = {{.name = "bench", .model = "bench", .max_force = 10, .loop_hz = 1000, .channels = {{}}}};
+    if (sealed) config.keys = {{.name = "wall", .role = Role::kController, .key = key_}};
+    network_.emplace(config, watched_, std::vector{&mail_});
+    connect(bare_client_.fd(), bare_server_.local_address());
+    void* const shared = ::mmap(nullptr, sizeof(Orders), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
+    orders_ = new (shared) Orders;
+    const Address server = link_.local_address();
+    child_ = ::fork();
+    if (child_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+    if (child_ == 0) {
+      try {
+        const AtPriority high(options.priority);
+        serve(*orders_, server, bare_client_.fd(), wait, sealed ? std::optional(key_) : std::nullopt);
+        ::_exit(0);
+      } catch (const std::exception& error) {
+        std::fprintf(stderr, "tendon-lab bench: the client: %s\n", error.what());
+        ::_exit(1);
+      }
+    }
+  }
+  ~RoundTrip() {
+    orders_->job = Orders::kQuit;
+    ::waitpid(child_, nullptr, 0);
+    ::munmap(orders_, sizeof(Orders));
+  }
+  RoundTrip(const RoundTrip&) = delete;
+  RoundTrip& operator=(const RoundTrip&) = delete;
+
+  Result run() {
+    order(Orders::kTendon);
+    exchange();  // the handshake
+    for (int i = 0; i < options_.warm_up; ++i) exchange();
+    Result result;
+    for (int block = 0; block < options_.blocks; ++block) {
+      orders_->echo_bytes = static_cast<int>(force_bytes_);
+      ping_pong(Orders::kEcho, result.bare);
+      if (sealed_) ping_pong(Orders::kSealedEcho, result.sealed);
+      order(Orders::kTendon);
+      for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
+        const Duration took = exchange();
+        if (i >= 0) result.tendon.push_back(us(took));
+      }
+    }
+    result.state_bytes = state_bytes_;
+    result.force_bytes = force_bytes_;
+    return result;
+  }
+
+ private:
+  static void check(LocalTime began) {
+    if (clock::now() - began > kGiveUp) throw std::runtime_error("the other process does not answer");
+  }
+
+  void ping_pong(Orders::Job job, std::vector<double>& times) {
+    const Address peer = bare_client_.local_address();
+    BareSocket socket(bare_server_.fd(), &peer, wait_, job == Orders::kSealedEcho);
+    order(job);
+    for (int i = -options_.warm_up; i < options_.exchanges; ++i) {
+      const LocalTime began = clock::now();
+      socket.send(state_bytes_);
+      while (!socket.receive()) check(began);
+      if (i >= 0) times.push_back(us(clock::now() - began));
+    }
+  }
+
+  void order(Orders::Job job) {
+    orders_->job.store(job, std::memory_order_release);
+    const LocalTime began = clock::now();
+    while (orders_->at_work.load(std::memory_order_acquire) != job) {
+      check(began);
+      std::this_thread::sleep_for(microseconds(20));
+    }
+  }
+
+  /// A state into its box, and rounds of the network loop until the force that answers it is in its own.
+  Duration exchange() {
+    DeviceState state;
+    state.tick = ++tick_;
+    state.position = Vec3(0.0123, -0.0456, 0.0789);
+    state.velocity = Vec3(0.1, -0.2, 0.3);
+    state.force_applied = Vec3(-1.5, 2.5, 0.25);
+    state.energy = 0.0123;
+    state.permitted_force = 3.4;
+    state.force_sequence = tick_;
+    state.force_age = milliseconds(7);
+    state.mode = Mode::kActive;
+    const LocalTime began = clock::now();
+    state.sampled = PeerTime(began.time_since_epoch());
+    mail_.state.put(state);
+    network_->turn(began);
+    for (LocalTime put = began;;) {
+      if (wait_ == Wait::kBlocking) link_.wait(milliseconds(1));
+      const LocalTime now = clock::now();
+      network_->turn(now);
+      watched_.look();
+      if (watched_.answered_tick == tick_) {
+        see_sizes();
+        return watched_.seen - began;
+      }
+      check(began);
+      // The other one is not there yet, or the datagram is lost.
+      if (now - put > milliseconds(200)) {
+        put = now;
+        state.tick = ++tick_;
+        mail_.state.put(state);
+      }
+    }
+  }
+
+  /// What the log thread does in production.
+  void see_sizes() {
+    while (const DatagramRecord* record = mail_.datagrams.front()) {
+      (record->direction == DatagramRecord::Direction::kOut ? state_bytes_ : force_bytes_) = record->size;
+      mail_.datagrams.pop();
+    }
+  }
+
+  Options options_;
+  Wait wait_;
+  bool sealed_;
+  Key key_;
+  Mailboxes mail_{{.steps = 16, .flight = 16, .datagrams = 1024}};
+  UdpLink link_{parse_address("127.0.0.1:0")};
+  WatchedLink watched_{link_, mail_};
+  std::optional<NetworkLoop> network_;
+  UdpLink bare_server_{parse_address("127.0.0.1:0")};
+  UdpLink bare_client_{parse_address("127.0.0.1:0")};
+  Orders* orders_ = nullptr;
+  pid_t child_ = 0;
+  std::uint64_t tick_ = 0;
+  std::size_t state_bytes_ = 0;
+  std::size_t force_bytes_ = 0;
+};
+
+}  // namespace
+
+void measure_round_trip(Run& run) {
+  Options options;
+  if (run.options.quick) options = {.blocks = 1, .exchanges = 20, .warm_up = 1};
+  options.priority = run.options.priority;
+  for (const Wait wait : {Wait::kBusy, Wait::kBlocking}) {
+    for (const bool sealed : {false, true}) {
+      RoundTrip round_trip(options, wait, sealed);  // forks before it has a priority of its own
+      const AtPriority high(options.priority);
+      const Result r = round_trip.run();
+      const double ratio = quantile(r.tendon, 0.5) / quantile(r.bare, 0.5);
+      const double target = wait == Wait::kBusy ? 1.3 : 1.15;
+      Row row{.section = {},
+              .what = std::string("state → force, ") + (wait == Wait::kBusy ? "busy-polling" : "blocking") +
+                      (sealed ? ", sealed" : ""),
+              .unit = "µs",
+              .n = r.tendon.size(),
+              .p50 = quantile(r.tendon, 0.5),
+              .p99 = quantile(r.tendon, 0.99),
+              .floor = "a bare ping-pong of " + std::to_string(r.state_bytes) + "/" + std::to_string(r.force_bytes) +
+                       " bytes",
+              .floor_p50 = quantile(r.bare, 0.5),
+              .floor_p99 = quantile(r.bare, 0.99),
+              .ratio = ratio,
+              .target = Row::Target{wait == Wait::kBusy ? "≤ 1.3 × the floor" : "≤ 1.15 × the floor", ratio <= target},
+              .note = {}};
+      if (sealed) {
+        char note[120];
+        const double bare = quantile(r.sealed, 0.5);
+        std::snprintf(note, sizeof note, "a ping-pong that libsodium seals and opens: %.1f; to that %.2f", bare,
+                      row.p50 / bare);
+        row.note = note;
+      }
+      run.add(row);
+    }
+  }
+}
+
+}  // namespace tendon::bench

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many sessions one server holds, and how many devices one process: until it breaks (fleet.h).
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "protocol/limits.h"
+#include "tests/tools/bench/bench.h"
+#include "tests/tools/bench/fleet.h"
+
+namespace tendon::bench {
+namespace {
+
+double us(Duration d) { return 1e6 * seconds(d); }
+double percent(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0 : 100 * static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// As many datagrams of such sizes as the fleet's, bare.
+BareResult floor_of(const Fleet& fleet, const FleetResult& result, std::size_t sockets) {
+  BareTraffic bare;
+  bare.sessions = result.sessions;
+  bare.sockets = sockets;
+  bare.period = from_seconds(1.0 / fleet.state_hz);
+  bare.length = fleet.length / 2;
+  bare.priority = fleet.priority;
+  // By what it would have sent had it kept up: what it left out is not to the floor's advantage.
+  const double rounds = result.seconds * fleet.state_hz * static_cast<double>(result.sessions);
+  const auto per_round = [&](std::uint64_t datagrams, double kept) {
+    return static_cast<std::size_t>(std::max(1.0, std::round(static_cast<double>(datagrams) / rounds / kept)));
+  };
+  const double kept = std::max(0.01, percent(result.states_received, result.states_owed) / 100);
+  bare.out_per_round = per_round(result.out_datagrams, std::min(1.0, kept));
+  bare.out_bytes = result.out_datagrams > 0 ? result.out_bytes / result.out_datagrams : 100;
+  bare.in_per_round = std::max<std::size_t>(1, per_round(result.in_datagrams, 1));
+  bare.in_bytes = result.in_datagrams > 0 ? result.in_bytes / result.in_datagrams : 100;
+  return run_bare(bare);
+}
+
+/// The age of a state when its guest's kernel has it, beside a datagram that is sent at once.
+Row row_of(const Fleet& fleet, const FleetResult& result, const BareResult& bare, std::string what) {
+  const double period = us(from_seconds(1.0 / fleet.state_hz));
+  Row row{.section = {},
+          .what = std::move(what),
+          .unit = "µs",
+          .n = result.state_age.count(),
+          .p50 = us(result.state_age.quantile(0.5)),
+          .p99 = us(result.state_age.quantile(0.99)),
+          .floor = "the same datagrams, bare",
+          .floor_p50 = us(bare.age.quantile(0.5)),
+          .floor_p99 = us(bare.age.quantile(0.99)),
+          .note = {}};
+  if (*row.floor_p50 > 0) row.ratio = row.p50 / *row.floor_p50;
+  const double rounds_owed = static_cast<double>(result.rounds + result.missed);
+  const auto per_device = [&](Duration spent) {
+    return us(spent) / (1000 * result.seconds) / static_cast<double>(fleet.devices);
+  };
+  const auto of_cores = [&](Duration spent) { return seconds(spent) / result.seconds; };
+  const auto bare_cores = [&](Duration spent) { return seconds(spent) / std::max(1e-9, bare.seconds); };
+  char note[600];
+  std::snprintf(
+      note, sizeof note,
+      "p99 is %.0f %% of a period; states received %.1f %%, forces taken %.1f %% of those owed; haptic rounds late by "
+      "%.0f µs (p99), %.2f %% missed; %.0f + %.0f datagrams/s of %.0f/%.0f bytes, lost %llu; processors: haptic %.2f "
+      "(%.2f µs a device and ms), network %.2f (%.2f), guests %.2f; bare %.2f, guests %.2f; force's whole loop %.1f ms "
+      "(p50), %.1f ms (p99)",
+      100 * row.p99 / period, percent(result.states_received, result.states_owed),
+      percent(result.forces_taken, result.forces_owed), us(result.late.quantile(0.99)),
+      100 * static_cast<double>(result.missed) / std::max(1.0, rounds_owed),
+      static_cast<double>(result.out_datagrams) / result.seconds,
+      static_cast<double>(result.in_datagrams) / result.seconds,
+      static_cast<double>(result.out_bytes) / std::max(1.0, static_cast<double>(result.out_datagrams)),
+      static_cast<double>(result.in_bytes) / std::max(1.0, static_cast<double>(result.in_datagrams)),
+      static_cast<unsigned long long>(result.lost), of_cores(result.haptic), per_device(result.haptic),
+      of_cores(result.network), per_device(result.network), of_cores(result.guests), bare_cores(bare.host),
+      bare_cores(bare.guests), 1e3 * seconds(result.loop_age.quantile(0.5)),
+      1e3 * seconds(result.loop_age.quantile(0.99)));
+  row.note = note;
+  return row;
+}
+
+bool keeps_up(const FleetResult& result) {
+  return result.all_came && percent(result.states_received, result.states_owed) >= 99 &&
+         percent(result.forces_taken, result.forces_owed) >= 99 && result.missed * 100 <= result.rounds;
+}
+
+void came(const FleetResult& result, const std::string& what) {
+  if (!result.all_came) {
+    throw std::runtime_error(what + ": only " + std::to_string(result.sessions) + " sessions were opened in 20 s");
+  }
+}
+
+}  // namespace
+
+void measure_sessions(Run& run) {
+  for (const std::uint32_t state_hz : {100U, 1000U}) {
+    std::vector<std::size_t> counts = {50, 100, 200, 400, 800};
+    if (run.options.quick) counts = {3};
+    for (const std::size_t count : counts) {
+      Fleet fleet;
+      fleet.devices = std::min<std::size_t>(limits::kMaxDevices, count);
+      fleet.channels = std::min<std::size_t>(limits::kMaxChannels, (count + fleet.devices - 1) / fleet.devices);
+      fleet.sessions = count;
+      fleet.state_hz = state_hz;
+      fleet.force_hz = 100;
+      fleet.seed = run.options.seed;
+      fleet.priority = run.options.priority;
+      if (run.options.quick) fleet.settle = std::chrono::milliseconds(20);
+      fleet.length = std::chrono::milliseconds(run.options.quick ? 60 : 4000);
+      const std::string what = std::to_string(count) + " sessions, states at " + std::to_string(state_hz) + " Hz";
+      const FleetResult result = run_fleet(fleet);
+      came(result, what);
+      Row row = row_of(fleet, result, floor_of(fleet, result, 1), what + ": age of a state");
+      if (result.controllers < result.sessions) {
+        row.note = std::to_string(result.controllers) + " controllers, the others observers; " + row.note;
+      }
+      const double period = us(from_seconds(1.0 / state_hz));
+      if (count == 200) {
+        row.target = Row::Target{"200 live, p99 below one period", keeps_up(result) && row.p99 < period};
+      }
+      run.add(row);
+      if (percent(result.states_received, result.states_owed) < 90 && count >= 200) break;  // it is broken
+    }
+  }
+}
+
+void measure_512(Run& run) {
+  std::vector<std::size_t> counts = {16, 64, 128, 256, 384, 512};
+  if (run.options.quick) counts = {32};
+  for (const std::size_t count : counts) {
+    Fleet fleet;
+    fleet.devices = count;
+    fleet.one_session_for_16 = true;
+    fleet.seed = run.options.seed;
+    fleet.priority = run.options.priority;
+    if (run.options.quick) fleet.settle = std::chrono::milliseconds(20);
+    fleet.length = std::chrono::milliseconds(run.options.quick ? 60 : 4000);
+    const std::string what = std::to_string(count) + " devices, states and forces at 1 kHz, sealed";
+    const FleetResult result = run_fleet(fleet);
+    came(result, what);
+    Row row = row_of(fleet, result, floor_of(fleet, result, result.sessions), what + ": age of a state");
+    if (count == 512) {
+      row.target =
+          Row::Target{"512 live: 99 % of states and forces, p99 below 1 ms", keeps_up(result) && row.p99 < 1000};
+    }
+    run.add(row);
+  }
+}
+
+}  // namespace tendon::bench

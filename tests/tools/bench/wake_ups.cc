@@ -1,0 +1,489 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How late the haptic thread wakes with a controller alone; with a recording besides; with 32 observers, who cost a
+// datagram each in every step; with tendon-dash and a page that listens to it; and beside them a thread that only
+// sleeps. All take turns in blocks within one run of one server, whose threads are those of tendond: haptic (real-time
+// priority where it is granted), network, and a log that takes records out. The observers are in one process, and cost
+// processor time themselves: it is told apart.
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "clients/cpp/force_client.h"
+#include "clients/cpp/udp_transport.h"
+#include "devices/simulated/profiles.h"
+#include "devices/simulated/simulated_device.h"
+#include "server/haptic_loop.h"
+#include "server/machine/clock.h"
+#include "server/machine/doorbell.h"
+#include "server/machine/realtime.h"
+#include "server/machine/udp_link.h"
+#include "server/network_loop.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
+#include "tests/e2e/stage/process.h"
+#include "tests/tools/bench/bench.h"
+#include "tests/tools/bench/measure.h"
+
+namespace tendon::bench {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// At the beginning of each block: guests have come or gone.
+constexpr Duration kSettle = milliseconds(200);
+
+struct Options {
+  std::size_t observers = 32;
+  int blocks = 60;  ///< of each kind: a minute in all
+  int block_ms = 1000;
+};
+
+/// All guests, in one process of their own: a wall, and observers who come when told to. It wakes once in a millisecond
+/// and takes what has come to all of them: 32 that wake by themselves would cost more than the server.
+class Guests {
+ public:
+  Guests(const Address& server, std::size_t observers) {
+    std::array<int, 2> ends{};
+    if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()) != 0) {
+      throw std::system_error(errno, std::generic_category(), "socketpair");
+    }
+    child_ = ::fork();
+    if (child_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+    orders_ = ends[child_ > 0 ? 0 : 1];
+    ::close(ends[child_ > 0 ? 1 : 0]);
+    if (child_ > 0) return;
+    try {
+      serve(server, observers);
+      ::_exit(0);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "tendon-lab bench: guests: %s\n", error.what());
+      ::_exit(1);
+    }
+  }
+  ~Guests() {
+    ::close(orders_);  // the end of its orders
+    ::waitpid(child_, nullptr, 0);
+  }
+  Guests(const Guests&) = delete;
+  Guests& operator=(const Guests&) = delete;
+
+  /// Returns when they are all there, or have gone.
+  void let_observers_in(bool in) {
+    const char order = in ? 'i' : 'o';
+    if (::write(orders_, &order, 1) != 1) throw std::runtime_error("the guests are gone");
+    pollfd fd{orders_, POLLIN, 0};
+    char done = 0;
+    if (::poll(&fd, 1, 30'000) != 1 || ::read(orders_, &done, 1) != 1) {
+      throw std::runtime_error("not all of the observers have come within 30 s");
+    }
+  }
+
+  pid_t pid() const { return child_; }
+
+ private:
+  struct Guest {
+    Guest(const Address& server, const ForceClient::Config& config, bool controls)
+        : link(server),
+          client(controls ? ForceClient(
+                                link, server, config,
+                                [](const DeviceState& hand) -> Touch {
+                                  return Vec3(-2000 * std::max(0.0, hand.position.x()), 0, 0);
+                                },
+                                clock::now())
+                          : ForceClient(
+                                link, server, config, [](const DeviceState&, const LinkStats&) {}, clock::now())) {}
+    UdpTransport link;
+    ForceClient client;
+  };
+
+  void serve(const Address& server, std::size_t observers) {
+    std::vector<std::unique_ptr<Guest>> guests;
+    ForceClient::Config config;
+    config.name = "wall";
+    config.seed = 1;
+    guests.push_back(std::make_unique<Guest>(server, config, true));
+    config.name = "observer";
+    std::size_t wanted = 0;
+    bool told = false;
+    for (;;) {
+      for (const auto& guest : guests) guest->client.turn(clock::now());
+      // One after the other: a server takes 16 at once.
+      if (guests.back()->client.phase() == ForceClient::Phase::kOpen) {
+        if (guests.size() <= wanted) {
+          guests.push_back(std::make_unique<Guest>(server, config, false));
+        } else if (std::exchange(told, false) && ::write(orders_, "d", 1) != 1) {
+          return;
+        }
+      }
+      pollfd fd{orders_, POLLIN, 0};
+      const timespec period{0, 1'000'000};
+      if (::ppoll(&fd, 1, &period, nullptr) <= 0) continue;
+      char order = 0;
+      if (::read(orders_, &order, 1) != 1) return;
+      wanted = order == 'i' ? observers : 0;
+      told = true;
+      if (wanted > 0) continue;
+      for (std::size_t i = 1; i < guests.size(); ++i) guests[i]->client.stop(clock::now());
+      guests.resize(1);
+    }
+  }
+
+  int orders_ = -1;
+  pid_t child_ = 0;
+};
+
+/// What a page does, but for drawing: a WebSocket at tendon-dash's /live (RFC 6455, section 4.1), all of which is read.
+class Page {
+ public:
+  explicit Page(const std::string& address) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const Address dash = parse_address(address);
+    sockaddr_in there{};
+    there.sin_family = AF_INET;
+    there.sin_port = htons(dash.port);
+    there.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const std::string hello = "GET /live HTTP/1.1\r\nHost: " + address + "\r\nOrigin: http://" + address +
+                              "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                              "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+    if (::connect(socket_, reinterpret_cast<const sockaddr*>(&there), sizeof there) != 0 ||
+        ::send(socket_, hello.data(), hello.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(hello.size())) {
+      const int error = errno;
+      ::close(socket_);
+      throw std::system_error(error, std::generic_category(), "tendon-dash at " + address);
+    }
+  }
+  ~Page() { ::close(socket_); }
+  Page(const Page&) = delete;
+  Page& operator=(const Page&) = delete;
+
+  /// Bytes that have come since the last call.
+  std::size_t read() {
+    std::array<char, 65536> bytes{};
+    std::size_t all = 0;
+    for (ssize_t size = 1; size > 0; all += static_cast<std::size_t>(std::max<ssize_t>(size, 0))) {
+      size = ::recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    }
+    return all;
+  }
+
+ private:
+  int socket_;
+};
+
+/// tendon-dash, in a process of its own, with a page.
+class Dashboard {
+ public:
+  Dashboard(const std::filesystem::path& program, const Address& server)
+      : process_(program, {"--server", to_string(server), "--listen", "127.0.0.1:0", "--json"}, "/"),
+        page_(address_in(process_.wait_for_line("\"listening\""))) {}
+  /// It says Bye, so that the next block is without it.
+  ~Dashboard() {
+    process_.signal(SIGTERM);
+    process_.wait();
+  }
+  Dashboard(const Dashboard&) = delete;
+  Dashboard& operator=(const Dashboard&) = delete;
+  std::size_t read() { return page_.read(); }
+
+ private:
+  static std::string address_in(const std::string& line) {
+    const std::string key = "127.0.0.1:";
+    const std::size_t begin = line.find(key);
+    return line.substr(begin, line.find_first_not_of("0123456789", begin + key.size()) - begin);
+  }
+
+  e2e::Process process_;
+  Page page_;
+};
+
+/// A recording into a file that is gone with it.
+class Recording {
+ public:
+  Recording() : path_(make()), sink_(path_), recorder_({}, sink_) {}
+  ~Recording() { std::filesystem::remove(path_); }
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+  Recorder& recorder() { return recorder_; }
+
+ private:
+  static std::filesystem::path make() {
+    std::string path = (std::filesystem::temp_directory_path() / "tendon-bench-XXXXXX").string();
+    const int file = ::mkstemp(path.data());
+    if (file < 0) throw std::system_error(errno, std::generic_category(), path);
+    ::close(file);
+    return path;
+  }
+
+  std::filesystem::path path_;
+  FileSink sink_;
+  Recorder recorder_;
+};
+
+/// Beside this program; empty where it was not built.
+std::optional<std::filesystem::path> dashboard_program() {
+  const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "tendon-dash";
+  return std::filesystem::exists(program) ? std::optional(program) : std::nullopt;
+}
+
+enum class Kind { kAlone, kRecorder, kObservers, kDashboard };
+
+/// Of one kind of block, all of them together.
+struct Figures {
+  std::vector<double> late;  ///< µs, of each wake-up
+  std::uint64_t overruns = 0;
+  std::uint64_t datagrams = 0;  ///< that the server has sent
+  Duration network_thread{};    ///< processor time
+  Duration guests{};            ///< likewise, of their process
+  std::uint64_t page_bytes = 0;
+};
+
+SimulatedDevice::Config device_config() {
+  SimulatedDevice::Config device = find_device_profile("falcon")->device();
+  device.hand =
+      OperatorHand::Config{.stiffness = 300,
+                           .damping = 3,
+                           .mass = 0.05,
+                           .motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5})};
+  return device;
+}
+
+class WakeUps {
+ public:
+  explicit WakeUps(const Options& options)
+      : options_(options),
+        device_(device_config()),
+        guests_(link_.local_address(), options.observers),
+        haptic_(loop_config(device_), device_, mail_),
+        network_(
+            [&] {
+              NetworkLoop::Config config;
+              config.max_observers = options.observers + 1;
+              DeviceDescription about;
+              about.name = "device";
+              about.model = device_.info().name;
+              about.max_force = device_.info().max_force;
+              about.loop_hz = 1000;
+              about.channels = {{.name = "main"}};
+              config.devices = {about};
+              return config;
+            }(),
+            link_, {&mail_}) {}
+
+  void run() {
+    std::thread network([this] { run_network(); });
+    std::thread haptic([this] { run_haptic(); });
+    try {
+      clockid_t network_clock{};
+      clockid_t guests_clock{};
+      pthread_getcpuclockid(network.native_handle(), &network_clock);
+      clock_getcpuclockid(guests_.pid(), &guests_clock);
+      const int kinds = dash_ ? 4 : 3;
+      for (int block = 0; block < kinds * options_.blocks; ++block) {
+        only_sleep();
+        const auto kind = static_cast<Kind>(block % kinds);
+        guests_.let_observers_in(kind == Kind::kObservers);
+        std::optional<Recording> recording;
+        if (kind == Kind::kRecorder) recording.emplace();
+        std::optional<Dashboard> dashboard;
+        if (kind == Kind::kDashboard) dashboard.emplace(*dash_, link_.local_address());
+        const auto look = [&](Duration lasts, Figures* into) {
+          watch(lasts, recording ? &recording->recorder() : nullptr, dashboard ? &*dashboard : nullptr, into);
+        };
+        look(kSettle, nullptr);
+        Figures& figures = of[static_cast<std::size_t>(kind)];
+        const std::uint64_t overruns = haptic_.stats().overruns;
+        const std::uint64_t sent = datagrams_;
+        const Duration network_before = read(network_clock);
+        const Duration guests_before = read(guests_clock);
+        look(milliseconds(options_.block_ms), &figures);
+        figures.overruns += haptic_.stats().overruns - overruns;
+        figures.datagrams += datagrams_ - sent;
+        figures.network_thread += read(network_clock) - network_before;
+        figures.guests += read(guests_clock) - guests_before;
+      }
+    } catch (...) {
+      end(haptic, network);
+      throw;
+    }
+    end(haptic, network);
+  }
+
+  Figures asleep;
+  std::array<Figures, 4> of;  ///< Kind
+  bool realtime = true;
+  std::uint64_t welcomed() const { return network_.stats().welcomed; }
+
+ private:
+  static HapticLoop::Config loop_config(const SimulatedDevice& device) {
+    HapticLoop::Config config;
+    config.control.limiter.friction = {0.3, 0.8};
+    config.control.limiter.longest_hold = milliseconds(2);
+    config.control.max_force = device.info().max_force;
+    config.control.max_slew = 1000;
+    return config;
+  }
+
+  void run_haptic() {
+    realtime = enter_realtime(kHapticPriority).empty();
+    LocalTime due = clock::now();
+    while (!stop_) {
+      if (resting_) {
+        clock::sleep_until(clock::now() + milliseconds(1));
+        due = clock::now();
+        continue;
+      }
+      due = haptic_.step(clock::now());
+      stepped_.ring();
+      clock::sleep_until(due);
+    }
+    haptic_.stop();
+  }
+
+  void run_network() {
+    enter_punctual();
+    LocalTime due = clock::now();
+    while (!stop_) {
+      const LocalTime before = clock::now();
+      if (due > before) link_.wait(std::min<Duration>(due - before, std::chrono::seconds(1)), &stepped_);
+      due = network_.turn(clock::now());
+    }
+    network_.close(clock::now());
+  }
+
+  /// A thread like the haptic one that does nothing else, while that one rests.
+  void only_sleep() {
+    resting_ = true;
+    clock::sleep_until(clock::now() + milliseconds(5));
+    std::thread sleeper([this] {
+      enter_realtime(kHapticPriority);
+      const LocalTime end = clock::now() + milliseconds(options_.block_ms);
+      for (LocalTime due = clock::now() + milliseconds(1); due < end;) {
+        clock::sleep_until(due);
+        const LocalTime now = clock::now();
+        asleep.late.push_back(1e6 * seconds(now - due));
+        due += milliseconds(1);
+        if (due <= now) due = now + milliseconds(1);
+      }
+    });
+    sleeper.join();
+    resting_ = false;
+  }
+
+  void end(std::thread& haptic, std::thread& network) {
+    stop_ = true;
+    haptic.join();
+    stepped_.ring();
+    network.join();
+  }
+
+  static Duration read(clockid_t clock) {
+    timespec time{};
+    clock_gettime(clock, &time);
+    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+  }
+
+  /// The log thread: takes records out, and keeps how late the steps were.
+  void watch(Duration lasts, Recorder* recorder, Dashboard* dashboard, Figures* into) {
+    for (const LocalTime end = clock::now() + lasts; clock::now() < end;) {
+      while (const StepRecord* step = mail_.steps.front()) {
+        if (into != nullptr) into->late.push_back(1e6 * seconds(step->hand.at - step->scheduled));
+        if (recorder != nullptr) recorder->record(*step, 0);
+        mail_.steps.pop();
+      }
+      while (const DatagramRecord* record = mail_.datagrams.front()) {
+        datagrams_ += record->direction == DatagramRecord::Direction::kOut ? 1 : 0;
+        if (recorder != nullptr) recorder->record(*record);
+        mail_.datagrams.pop();
+      }
+      const std::size_t page_bytes = dashboard != nullptr ? dashboard->read() : 0;
+      if (into != nullptr) into->page_bytes += page_bytes;
+      if (recorder != nullptr) recorder->tick(clock::now());
+      clock::sleep_until(clock::now() + milliseconds(20));
+    }
+  }
+
+  Options options_;
+  std::optional<std::filesystem::path> dash_ = dashboard_program();
+  SimulatedDevice device_;
+  Mailboxes mail_;
+  UdpLink link_{parse_address("127.0.0.1:0")};
+  Guests guests_;  // forks before there are threads
+  Doorbell stepped_;
+  HapticLoop haptic_;
+  NetworkLoop network_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> resting_{false};  ///< the haptic thread takes no steps
+  std::uint64_t datagrams_ = 0;
+};
+
+}  // namespace
+
+void measure_wake_ups(Run& run) {
+  Options options;
+  if (run.options.quick) options = {.observers = 3, .blocks = 1, .block_ms = 50};
+  WakeUps wake_ups(options);
+  wake_ups.run();
+  ::munlockall();  // of enter_realtime
+  const std::uint64_t expected = 1 + options.observers * static_cast<std::uint64_t>(options.blocks);
+  if (wake_ups.welcomed() < expected || wake_ups.of[0].late.empty() || wake_ups.of[2].late.empty()) {
+    throw std::runtime_error(std::to_string(wake_ups.welcomed()) + " sessions were opened, " +
+                             std::to_string(expected) + " expected");
+  }
+  const auto line = [&](const std::string& what, const Figures& figures) {
+    const double span = 1e-3 * options.block_ms * options.blocks;
+    const auto steps = static_cast<double>(figures.late.size());
+    Row row{.section = {},
+            .what = what,
+            .unit = "µs",
+            .n = figures.late.size(),
+            .p50 = quantile(figures.late, 0.5),
+            .p99 = quantile(figures.late, 0.99),
+            .floor = "a thread that only sleeps",
+            .floor_p50 = quantile(wake_ups.asleep.late, 0.5),
+            .floor_p99 = quantile(wake_ups.asleep.late, 0.99),
+            .note = {}};
+    row.ratio = row.p50 / *row.floor_p50;
+    char note[220];
+    std::snprintf(note, sizeof note,
+                  "%llu overruns; %.0f datagrams/s out; processor time for each step: network thread %.1f µs, guests "
+                  "%.1f µs%s",
+                  static_cast<unsigned long long>(figures.overruns), static_cast<double>(figures.datagrams) / span,
+                  1e6 * seconds(figures.network_thread) / steps, 1e6 * seconds(figures.guests) / steps,
+                  wake_ups.realtime ? "" : "; without real-time priority");
+    row.note = note;
+    run.add(row);
+  };
+  const auto of = [&](Kind kind) -> const Figures& { return wake_ups.of[static_cast<std::size_t>(kind)]; };
+  line("haptic thread, a controller alone", of(Kind::kAlone));
+  line("… and a recording", of(Kind::kRecorder));
+  line("… and " + std::to_string(options.observers) + " observers", of(Kind::kObservers));
+  const Figures& dashboard = of(Kind::kDashboard);
+  if (dashboard.late.empty()) return;  // tendon-dash is not built
+  if (dashboard.page_bytes == 0) throw std::runtime_error("tendon-dash told its page nothing");
+  line("… and tendon-dash with a page", dashboard);
+}
+
+}  // namespace tendon::bench

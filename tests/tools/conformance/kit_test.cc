@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The kit is judged too: a toy that keeps all rules passes, and one that breaks a rule fails the check of that rule and
+// no other.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/tools/conformance/client_checks.h"
+#include "tests/tools/conformance/server_checks.h"
+#include "tests/tools/conformance/toy_peer.h"
+
+namespace tendon::conformance {
+namespace {
+
+struct Broken {
+  Fault fault;
+  std::string_view check;
+  int suites = 2;  ///< 0 or 1: shows in this suite only; 2: in both
+};
+
+std::optional<Key> key_of(int suite) {
+  if (suite == 0) return std::nullopt;
+  return Key(Bytes32{std::byte{1}, std::byte{2}, std::byte{3}});
+}
+
+std::string told(const Report& report) {
+  std::string out;
+  for (const Verdict& verdict : report.verdicts()) {
+    const bool bad = verdict.outcome == Outcome::kFailed || verdict.outcome == Outcome::kUnreached;
+    if (bad) out += text_of(verdict) + '\n';
+  }
+  return out;
+}
+
+std::set<std::string_view> failed(const Report& report) {
+  std::set<std::string_view> out;
+  for (const Verdict& verdict : report.verdicts()) {
+    if (verdict.outcome == Outcome::kFailed) out.insert(verdict.check->name);
+  }
+  return out;
+}
+
+Report server_report(int suite, Fault fault) {
+  crypto::start();
+  const Options options{.key = key_of(suite), .long_checks = fault == Fault::kNeverRenews};
+  ToyServer server(options.key, fault);
+  ToyWire wire(server, true);
+  Report report(Side::kServer);
+  judge_server(wire, options, report);
+  return report;
+}
+
+Report client_report(int suite, Fault fault, pb::Role role = pb::ROLE_CONTROLLER) {
+  crypto::start();
+  const Options options{.key = key_of(suite), .long_checks = fault == Fault::kNeverRenews};
+  const bool asks = role == pb::ROLE_CONTROLLER;
+  ToyClient client(options.key, role, asks, fault);
+  ToyWire wire(client, false);
+  Report report(Side::kClient);
+  judge_client(wire, client, options, report);
+  return report;
+}
+
+const std::vector<Broken>& of_either_end() {
+  static const std::vector<Broken> kAll = {
+      {Fault::kWrongVersion, "data-header"},
+      {Fault::kSkipsNumbers, "packet-numbers"},
+      {Fault::kTimeGoesBack, "tx-time"},
+      {Fault::kEchoOfTheLast, "echo-newest"},
+      {Fault::kEchoTimeIsNow, "echo-times"},
+      {Fault::kEmptyMask, "echo-mask"},
+      {Fault::kNoKeepAlive, "keep-alive"},
+      {Fault::kTakesForeignHeaders, "foreign-header"},
+      {Fault::kTakesMalformed, "malformed-body"},
+      {Fault::kTakesForged, "forged", 1},
+      {Fault::kDamagedUsesNumber, "damaged-copy"},
+      {Fault::kTakesReplays, "replay"},
+      {Fault::kDropsTheLate, "reordering"},
+      {Fault::kLongWindow, "window-edge"},
+      {Fault::kShortWindow, "window-edge"},
+      {Fault::kDropsTheUnknown, "unknown-ignored"},
+      {Fault::kTakesAnyValue, "out-of-bounds"},
+      {Fault::kOlderWins, "newest-wins"},
+      {Fault::kDoesNotFollowRekey, "rekey-followed", 1},
+      {Fault::kNoOverlap, "old-key-overlap", 1},
+      {Fault::kOldKeyForEver, "old-key-over", 1},
+      {Fault::kNeverRenews, "rekey-sent", 1},
+      {Fault::kTalksAfterBye, "bye-silence"},
+      {Fault::kNoTimeout, "timeout"},
+      {Fault::kAnythingIsALifeSign, "timeout"},
+  };
+  return kAll;
+}
+
+enum class Toy : std::uint8_t { kServer, kClient, kObserver };
+struct Case {
+  Toy toy;
+  Broken broken;
+};
+
+class BrokenToy : public testing::TestWithParam<Case> {};
+
+TEST_P(BrokenToy, FailsTheCheckOfTheRuleItBreaksAndNoOther) {
+  const auto& [toy, broken] = GetParam();
+  for (int suite = 0; suite < 2; ++suite) {
+    if (broken.suites != 2 && broken.suites != suite) continue;
+    SCOPED_TRACE("suite " + std::to_string(suite));
+    const Report report =
+        toy == Toy::kServer
+            ? server_report(suite, broken.fault)
+            : client_report(suite, broken.fault, toy == Toy::kClient ? pb::ROLE_CONTROLLER : pb::ROLE_OBSERVER);
+    EXPECT_EQ(failed(report), std::set{broken.check}) << told(report);
+  }
+}
+
+std::vector<Case> cases(Toy toy, const std::vector<Broken>& all) {
+  std::vector<Case> out;
+  for (const Broken& broken : all) out.push_back({toy, broken});
+  return out;
+}
+
+std::string name_of(const testing::TestParamInfo<Case>& info) {
+  std::string out;
+  for (const char c : info.param.broken.check) out += c == '-' ? '_' : c;
+  return out + "_" + std::to_string(info.index);
+}
+
+TEST(ConformanceKit, AServerThatKeepsAllRulesPasses) {
+  for (int suite = 0; suite < 2; ++suite) {
+    const Report report = server_report(suite, Fault::kNone);
+    EXPECT_TRUE(report.passed()) << "suite " << suite << "\n" << told(report);
+  }
+}
+
+TEST(ConformanceKit, AServerThatKnowsNoChannelsPassesAndIsNotJudgedByThem) {
+  for (int suite = 0; suite < 2; ++suite) {
+    const Report all = server_report(suite, Fault::kNone);
+    const Report older = server_report(suite, Fault::kKnowsNoChannels);
+    EXPECT_TRUE(older.passed()) << "suite " << suite << "\n" << told(older);
+    EXPECT_EQ(older.count(Outcome::kNotApplicable), all.count(Outcome::kNotApplicable) + 9) << "suite " << suite;
+  }
+}
+
+TEST(ConformanceKit, AClientThatKeepsAllRulesPasses) {
+  for (int suite = 0; suite < 2; ++suite) {
+    for (const pb::Role role : {pb::ROLE_CONTROLLER, pb::ROLE_OBSERVER}) {
+      const Report report = client_report(suite, Fault::kNone, role);
+      EXPECT_TRUE(report.passed()) << "suite " << suite << ", role " << role << "\n" << told(report);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ServerData, BrokenToy, testing::ValuesIn(cases(Toy::kServer, of_either_end())), name_of);
+INSTANTIATE_TEST_SUITE_P(ClientData, BrokenToy, testing::ValuesIn(cases(Toy::kClient, of_either_end())), name_of);
+INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
+                         testing::ValuesIn(cases(Toy::kServer,
+                                                 {
+                                                     {Fault::kBodyIsNoMessage, "data-body"},
+                                                     {Fault::kLongRetry, "retry"},
+                                                     {Fault::kTwoRetries, "retry-once"},
+                                                     {Fault::kAnswersShortHellos, "bad-hello-silence"},
+                                                     {Fault::kTakesAnyHello, "bad-body-silence"},
+                                                     {Fault::kOneCookieForAll, "cookie-bound"},
+                                                     {Fault::kBadWelcome, "welcome"},
+                                                     {Fault::kInventsFeatures, "features"},
+                                                     {Fault::kSecondSession, "answer-again"},
+                                                     {Fault::kLowestVersion, "version-highest"},
+                                                     {Fault::kWelcomesAnyVersion, "version-mismatch"},
+                                                     {Fault::kWelcomesPlain, "plain-denied", 1},
+                                                     {Fault::kRefusesUnknownKeys, "unknown-key-silence", 1},
+                                                     {Fault::kStatesWhileHalfOpen, "half-open"},
+                                                     {Fault::kTwoControllers, "one-controller", 0},
+                                                     {Fault::kWrongReplacedCode, "replaced", 1},
+                                                     {Fault::kOneBye, "bye-thrice", 1},
+                                                     {Fault::kNoHelloLimit, "hello-limit"},
+                                                     {Fault::kTicksGoBack, "states"},
+                                                     {Fault::kAnswersStrays, "stray-data-silence"},
+                                                     {Fault::kRoamsByAnything, "roaming"},
+                                                     {Fault::kObserversPush, "observer-only-looks"},
+                                                     {Fault::kObserversRearm, "rearm-by-controller"},
+                                                     {Fault::kObserversDisarm, "disarm-by-controller"},
+                                                     {Fault::kRequestsAsTheyCome, "request-order"},
+                                                     {Fault::kRequestsAgain, "request-once"},
+                                                     {Fault::kForgetsAnswers, "answer-kept"},
+                                                     {Fault::kSilentToUnknownRequests, "request-unknown"},
+                                                     {Fault::kTakesAnyRequestId, "request-bounds"},
+                                                     {Fault::kGrantsUnasked, "claims-granted"},
+                                                     {Fault::kGrantsBackwards, "claims-granted"},
+                                                     {Fault::kGrantsAnything, "claim-refused"},
+                                                     {Fault::kDescribesAnother, "describe"},
+                                                     {Fault::kDescribesAnyNumber, "describe-unknown"},
+                                                     {Fault::kAnybodyTakesTheLease, "lease-denied"},
+                                                     {Fault::kDeniesTheHolder, "lease-kept"},
+                                                     {Fault::kKeepsTheLease, "lease-kept"},
+                                                     {Fault::kTakesAnyDeadband, "deadband-bounds"},
+                                                     {Fault::kSendsTheForetold, "deadband"},
+                                                     {Fault::kSilentWithDeadband, "deadband"},
+                                                     {Fault::kDeadbandForEver, "deadband"},
+                                                     {Fault::kTellsNothing, "link-report"},
+                                                     {Fault::kReportsAllTheTime, "link-report"},
+                                                     {Fault::kReportsOfOneNumber, "link-report"},
+                                                     {Fault::kReportsBeyondBounds, "link-report"},
+                                                     {Fault::kDiagnosesUnasked, "diagnostics-unasked"},
+                                                 })),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Client, BrokenToy,
+                         testing::ValuesIn(cases(Toy::kClient,
+                                                 {
+                                                     {Fault::kShortHello, "hello-size"},
+                                                     {Fault::kHelloWithConnection, "hello-header"},
+                                                     {Fault::kDirtyPadding, "hello-padding"},
+                                                     {Fault::kCookieFromTheStart, "hello-first-cookie"},
+                                                     {Fault::kNoRole, "hello-body"},
+                                                     {Fault::kSlowHellos, "hello-repeated"},
+                                                     {Fault::kHelloChanges, "hello-unchanged", 0},
+                                                     {Fault::kRandomStays, "hello-new-random"},
+                                                     {Fault::kIgnoresRetries, "cookie-returned"},
+                                                     {Fault::kPingPong, "retry-no-ping-pong"},
+                                                     {Fault::kTakesForeignRetry, "foreign-retry"},
+                                                     {Fault::kTakesForeignAnswer, "foreign-answer", 0},
+                                                     {Fault::kTakesAnyVersion, "version-not-offered"},
+                                                     {Fault::kTakesBadWelcome, "bad-answer"},
+                                                     {Fault::kTakesPlainAnswer, "plain-answer", 1},
+                                                     {Fault::kGoesOnWhenRefused, "refused"},
+                                                     {Fault::kOneBye, "bye-thrice"},
+                                                     {Fault::kSequenceStays, "forces"},
+                                                     {Fault::kValidForAnHour, "force-bounds"},
+                                                     {Fault::kAnswersNoState, "force-answers"},
+                                                     {Fault::kRequestsFromTwo, "request-numbers"},
+                                                     {Fault::kAsksOnce, "request-repeated"},
+                                                     {Fault::kAsksAllTheTime, "request-resend-rate"},
+                                                     {Fault::kAsksForEver, "request-stops"},
+                                                 })),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Observer, BrokenToy,
+                         testing::ValuesIn(cases(Toy::kObserver, {{Fault::kObserverPushes, "observer-sends-none"}})),
+                         name_of);
+
+}  // namespace
+}  // namespace tendon::conformance

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/conformance/report.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <stdexcept>
+#include <utility>
+
+namespace tendon::conformance {
+namespace {
+
+constexpr std::string_view kWire = "WIRE.md";
+constexpr std::string_view kSession = "SESSION.md";
+constexpr std::string_view kHeader = "Header: 16 bytes in the clear";
+constexpr std::string_view kHello = "Type 1, Hello: client → server, always 1200 bytes";
+constexpr std::string_view kRetry = "Type 2, Retry: server → client, 48 bytes";
+constexpr std::string_view kAnswer = "Type 4, Answer: server → client, shorter than a Hello";
+constexpr std::string_view kData = "Type 3, Data: either way";
+constexpr std::string_view kSuite1 = "Cipher suite 1";
+constexpr std::string_view kOpening = "Opening";
+constexpr std::string_view kStates = "States";
+constexpr std::string_view kSent = "What is sent when";
+constexpr std::string_view kNewest = "State, force and report: newest wins";
+constexpr std::string_view kRequests = "Requests: exactly once, in order, answered";
+constexpr std::string_view kChannels = "Channels and leases";
+constexpr std::string_view kDropped = "Dropped and counted";
+
+constexpr Side kServer = Side::kServer;
+constexpr Side kClient = Side::kClient;
+constexpr Side kBoth = Side::kBoth;
+
+constexpr std::array kChecks = {
+    // Opening, as a client does it.
+    Check{"hello-size", kClient, kWire, kHello, "always 1200 bytes"},
+    Check{"hello-header", kClient, kWire, kHeader, "Data: 0, 1, 2 … per direction, never twice; 0 in all others"},
+    Check{"hello-padding", kClient, kWire, kHello, "zeros"},
+    Check{"hello-first-cookie", kClient, kWire, kHello, "cookie from the last Retry; zeros in the first Hello"},
+    Check{"hello-body", kClient, kWire, kHello, "n, length of what follows, at most 1000"},
+    Check{"hello-repeated", kClient, kSession, kOpening,
+          "The client repeats its Hello every 100 ms until it is answered."},
+    Check{"hello-unchanged", kClient, kWire, kSuite1,
+          "one attempt has one Noise message 1, whatever cookies it collects"},
+    Check{"hello-new-random", kClient, kWire, kHello,
+          "client random: new for each attempt, from a cryptographic source"},
+    Check{"cookie-returned", kClient, kSession, kOpening, "It reacts at once to the first Retry only"},
+    Check{"retry-no-ping-pong", kClient, kSession, kOpening,
+          "a later one brings a new cookie, which is used at the next repetition"},
+    Check{"foreign-retry", kClient, kSession, kOpening, "Retry and Answer count only with the client's own random"},
+    Check{"foreign-answer", kClient, kSession, kOpening, "Retry and Answer count only with the client's own random"},
+    Check{"version-not-offered", kClient, kSession, kOpening,
+          "An Answer with a version that was not offered is ignored."},
+    Check{"bad-answer", kClient, kWire, kAnswer, "Bytes 16–31 the client random of the Hello, then to the end message"},
+    Check{"plain-answer", kClient, kSession, kOpening, "A client with a key speaks suite 1 only."},
+    Check{"refused", kClient, kWire, kAnswer, "why"},
+    // Opening, as a server does it.
+    Check{"retry", kServer, kWire, kRetry, "Bytes 16–31 the client random of the Hello, 32–47 the cookie."},
+    Check{"retry-once", kServer, kSession, kOpening, "never sends more bytes than it received"},
+    Check{"bad-hello-silence", kServer, kSession, kOpening,
+          "The server is silent for everything that is not a good Hello"},
+    Check{"bad-body-silence", kServer, kSession, kOpening,
+          "The server is silent for everything that is not a good Hello"},
+    Check{"cookie-bound", kServer, kSession, kOpening, "A cookie is bound to address, port and client random."},
+    Check{"welcome", kServer, kWire, kAnswer, "within the client's range"},
+    Check{"features", kServer, kSession, kOpening, "The features used are those both named."},
+    Check{"answer-again", kServer, kSession, kOpening,
+          "the server gives the same answer again and does not open a second session"},
+    Check{"version-highest", kServer, kSession, kOpening, "The highest version that both speak is used."},
+    Check{"version-mismatch", kServer, kSession, kOpening,
+          "With none in common the server refuses (CODE_UNSUPPORTED) and names its own range."},
+    Check{"plain-denied", kServer, kSession, kOpening,
+          "one that has keys refuses a plain guest on loopback (CODE_DENIED)"},
+    Check{"unknown-key-silence", kServer, kSession, kOpening,
+          "In suite 1 a server is silent towards an unknown key id and a Noise message that does not open."},
+    Check{"half-open", kServer, kSession, kOpening, "no role is taken, no older session ends, no state is sent"},
+    Check{"one-controller", kServer, kSession, kOpening, "One controller per channel: a second is refused (CODE_BUSY)"},
+    Check{"replaced", kServer, kSession, kOpening, "the one before is told CODE_REPLACED"},
+    Check{"hello-limit", kServer, kSession, kOpening,
+          "20 Hellos with a valid cookie a second for each source IP (an IPv6 /64), 40 at once; more are dropped and "
+          "counted."},
+    // Data.
+    Check{"first-data", kBoth, kSession, kOpening,
+          "of which the client sends one at once; the server answers it at once: both then have a round trip."},
+    Check{"data-header", kBoth, kWire, kHeader, "Type 3 has the version that the Answer names."},
+    Check{"data-size", kBoth, kWire, "Ground rules", "One UDP datagram is one unit; none is longer than 1200 bytes."},
+    Check{"data-opens", kBoth, kWire, kSuite1, "Nonce: 4 zeros ‖ packet number as 8 bytes LE"},
+    Check{"data-body", kBoth, kWire, kData, "After the header, to the end, message Datagram (suite 1: sealed):"},
+    Check{"packet-numbers", kBoth, kWire, kHeader, "Data: 0, 1, 2 … per direction, never twice; 0 in all others"},
+    Check{"tx-time", kBoth, kWire, "Ground rules",
+          "Times are nanoseconds of the sender's monotonic clock, |t| ≤ 2⁶⁰, never wall clock."},
+    Check{
+        "echo-newest", kBoth, kWire, kData,
+        "about the newest datagram accepted, that is the one with the highest packet number; absent before the first"},
+    Check{"echo-times", kBoth, kWire, kData, "when it arrived, on the clock of the one who echoes; T2 ≤ T3"},
+    Check{"echo-mask", kBoth, kWire, kData, "bit i: packet (peer_packet_number − 1 − i) has arrived too"},
+    Check{"keep-alive", kBoth, kSession, kSent, "an empty datagram after 50 ms of our silence"},
+    // What must be dropped, and what must not.
+    Check{"foreign-header", kBoth, kSession, kDropped,
+          "wrong length, header, suite or connection id, packet number ≥ 2⁶⁰"},
+    Check{"malformed-body", kBoth, kSession, kDropped,
+          "not protobuf, text that is not UTF-8, more than 64 frames, no usable tx_time_ns"},
+    Check{"forged", kBoth, kSession, kDropped, "did not open with the key of its epoch, or is too short to"},
+    Check{"damaged-copy", kBoth, kSession, kDropped, "a damaged copy does not shut out the good one"},
+    Check{"replay", kBoth, kSession, kDropped, "packet number seen before, 1984 or more numbers behind the newest"},
+    Check{"reordering", kBoth, kSession, kDropped, "accepted, but behind a newer one"},
+    Check{"window-edge", kBoth, kSession, kDropped,
+          "packet number seen before, 1984 or more numbers behind the newest"},
+    Check{"unknown-ignored", kBoth, kWire, "Ground rules", "Unknown fields, frames and requests are no error."},
+    Check{"out-of-bounds", kBoth, kWire, "Ground rules",
+          "A value out of bounds drops the frame it is in, and is counted."},
+    Check{"newest-wins", kBoth, kSession, kNewest,
+          "it counts only with a higher tick, sequence or number than any of these before (else stale)"},
+    Check{"golden-frame", kBoth, kWire, "Golden datagrams", "Bytes in hex, then what they say."},
+    Check{"rekey-followed", kBoth, kWire, kSuite1, "the next one (it then moves on, once such a datagram has opened)"},
+    Check{"old-key-overlap", kBoth, kWire, kSuite1, "for 2 s after moving on the one before"},
+    Check{"old-key-over", kBoth, kSession, kDropped,
+          "suite 1: of an epoch whose key is not held: over, or more than one ahead"},
+    Check{"rekey-sent", kBoth, kWire, kSuite1, "The sender renews its key at the latest after 2²⁰ datagrams or 600 s."},
+    // Frames.
+    Check{"states", kServer, kWire, kData, "number of the haptic step"},
+    Check{"stray-data-silence", kServer, kSession, kDropped,
+          "unknown_connection (Data for nobody, or in suite 0 from another address)"},
+    Check{"roaming", kServer, kSession, kOpening,
+          "The peer's address is the source of the authentic datagram with the highest packet number; in suite 0 it "
+          "never changes."},
+    Check{"observer-only-looks", kServer, kWire, kHello,
+          "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
+    Check{"rearm-by-controller", kServer, kWire, kData,
+          "client → server: clears a latched fault; from a controller of the device only"},
+    Check{"disarm-by-controller", kServer, kWire, kData, "client → server: no force until a rearm"},
+    Check{"forces", kClient, kWire, kData, "1, 2, 3 … per session, device and channel"},
+    Check{"force-bounds", kClient, kWire, kData, "µs from arrival during which it is fresh"},
+    Check{"force-answers", kClient, kWire, kData, "tick of the state it was computed from"},
+    Check{"observer-sends-none", kClient, kWire, kHello,
+          "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
+    // Requests.
+    Check{"request-order", kServer, kSession, kRequests,
+          "The answerer delivers each request once and in the order of the numbers, whatever order they arrive in."},
+    Check{"request-once", kServer, kSession, kRequests,
+          "The answerer delivers each request once and in the order of the numbers, whatever order they arrive in."},
+    Check{"answer-kept", kServer, kSession, kRequests, "When a request comes again, its answer goes out again."},
+    Check{"request-unknown", kServer, kSession, kRequests,
+          "A request this version does not know is answered CODE_UNSUPPORTED by the session itself."},
+    Check{"request-bounds", kServer, kWire, kData, "> 0, at most 16 unanswered"},
+    Check{"request-numbers", kClient, kSession, kRequests,
+          "The requester numbers its requests 1, 2, 3 …, has at most 16 open"},
+    Check{"request-repeated", kClient, kSession, kRequests, "repeats each until its answer has come"},
+    Check{"request-resend-rate", kClient, kSession, kSent,
+          "max(20 ms, SRTT + 4 RTTVAR), doubled with every repetition, at most 1 s in all"},
+    Check{"request-stops", kClient, kSession, kRequests, "The answer is the acknowledgement."},
+    // Devices and channels.
+    Check{"claims-granted", kServer, kWire, kAnswer, "one for each claim, in their order"},
+    Check{"claim-refused", kServer, kSession, kOpening,
+          "CODE_INVALID for what is not there (the sentence says what is), twice the same, or a role that is not the "
+          "highest of the claims'."},
+    Check{"describe", kServer, kWire, kData, "what it is: device_name of a Welcome"},
+    Check{"describe-unknown", kServer, kWire, kData, "answered CODE_INVALID beyond the server's last"},
+    Check{"lease-denied", kServer, kSession, kChannels, "not claimed by the asker as a controller | – | CODE_DENIED"},
+    Check{"lease-kept", kServer, kSession, kChannels, "free, or the asker's own | takes it | CODE_OK"},
+    Check{"deadband-bounds", kServer, kWire, kData, "answered CODE_INVALID beyond 0 … 0.5"},
+    Check{"deadband", kServer, kSession, "Narrow links",
+          "after a state with velocity v the next one sent is the first whose velocity differs from v by more than "
+          "max(share · |v|, floor), whose mode is another, or that comes max_silence_us later."},
+    Check{"link-report", kServer, kSession, "Report",
+          "From a controller's first force on, the server tells it once a second how its forces fare (LinkReport)"},
+    Check{"diagnostics-unasked", kServer, kSession, "Report",
+          "An observer that named the feature diagnostics, and nobody else, is told"},
+    // The end.
+    Check{"bye-silence", kBoth, kSession, kStates, "nothing is sent, believed or counted any more"},
+    Check{"bye-thrice", kBoth, kSession, kStates, "Bye is said three times, what was not sent is dropped"},
+    Check{"timeout", kBoth, kSession, kSent,
+          "A replayed, malformed or foreign datagram does not count as a sign of life."},
+};
+
+bool concerns(const Check& check, Side side) {
+  return (static_cast<unsigned>(check.side) & static_cast<unsigned>(side)) != 0;
+}
+
+std::string_view word(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::kPassed:
+      return "pass";
+    case Outcome::kFailed:
+      return "fail";
+    case Outcome::kNotApplicable:
+      return "not applicable";
+    case Outcome::kUnreached:
+      break;
+  }
+  return "not reached";
+}
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else {
+      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out + '"';
+}
+
+}  // namespace
+
+std::span<const Check> checks() { return kChecks; }
+
+std::string anchor(const Check& check) {
+  std::string out = std::string(check.document) + '#';
+  for (const char c : check.section) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || c == '-' || c == '_') out += static_cast<char>(std::tolower(byte));
+    if (c == ' ') out += '-';
+  }
+  return out;
+}
+
+Report::Report(Side side) {
+  for (const Check& check : kChecks) {
+    if (concerns(check, side)) verdicts_.push_back({.check = &check, .outcome = {}, .seen = {}, .expected = {}});
+  }
+}
+
+Verdict& Report::find(std::string_view name) {
+  const auto found = std::ranges::find(verdicts_, name, [](const Verdict& verdict) { return verdict.check->name; });
+  if (found == verdicts_.end()) throw std::logic_error("no check is called " + std::string(name));
+  return *found;
+}
+
+void Report::judge(std::string_view name, bool kept, std::string seen, std::string expected) {
+  Verdict& verdict = find(name);
+  if (verdict.outcome == Outcome::kFailed) return;
+  verdict.outcome = kept ? Outcome::kPassed : Outcome::kFailed;
+  if (kept) return;
+  verdict.seen = std::move(seen);
+  verdict.expected = std::move(expected);
+}
+
+void Report::not_applicable(std::string_view name, std::string why) {
+  Verdict& verdict = find(name);
+  if (verdict.outcome != Outcome::kUnreached) return;
+  verdict.outcome = Outcome::kNotApplicable;
+  verdict.seen = std::move(why);
+}
+
+std::size_t Report::count(Outcome outcome) const noexcept {
+  return static_cast<std::size_t>(std::ranges::count(verdicts_, outcome, &Verdict::outcome));
+}
+
+bool Report::failed(std::string_view name) const noexcept {
+  return std::ranges::any_of(verdicts_, [name](const Verdict& verdict) {
+    return verdict.outcome == Outcome::kFailed && verdict.check->name == name;
+  });
+}
+
+bool Report::passed() const noexcept { return count(Outcome::kFailed) == 0 && count(Outcome::kUnreached) == 0; }
+
+std::string text_of(const Verdict& verdict) {
+  std::string out = std::string(word(verdict.outcome)) + "  " + std::string(verdict.check->name);
+  if (verdict.outcome == Outcome::kPassed) return out;
+  if (verdict.outcome == Outcome::kFailed) {
+    return out + "\n    rule      " + anchor(*verdict.check) + ": " + std::string(verdict.check->sentence) +
+           "\n    expected  " + verdict.expected + "\n    seen      " + verdict.seen;
+  }
+  return out + "  (" + (verdict.seen.empty() ? "the conversation did not come so far" : verdict.seen) + ')';
+}
+
+std::string json_of(const Verdict& verdict) {
+  std::string out = R"({"check":)" + quoted(verdict.check->name) + R"(,"result":)" + quoted(word(verdict.outcome)) +
+                    R"(,"rule":)" + quoted(anchor(*verdict.check)) + R"(,"sentence":)" +
+                    quoted(verdict.check->sentence);
+  if (!verdict.seen.empty()) out += R"(,"seen":)" + quoted(verdict.seen);
+  if (!verdict.expected.empty()) out += R"(,"expected":)" + quoted(verdict.expected);
+  return out + '}';
+}
+
+}  // namespace tendon::conformance

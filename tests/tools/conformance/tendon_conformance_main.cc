@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-conformance: is this peer one that WIRE.md and SESSION.md describe?
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/key_file.h"
+#include "tests/tools/conformance/client_checks.h"
+#include "tests/tools/conformance/server_checks.h"
+#include "tests/tools/conformance/udp_wire.h"
+
+namespace tendon::conformance {
+namespace {
+
+struct Line {
+  std::string server;
+  std::string listen = "127.0.0.1:0";
+  std::string key;
+  std::string log;
+  std::vector<std::string> command;
+  bool long_checks = false;
+  bool json = false;
+};
+
+const char* name_of(Side side) { return side == Side::kServer ? "server" : side == Side::kClient ? "client" : "both"; }
+
+int list(bool json) {
+  for (const Check& check : checks()) {
+    if (json) {
+      std::printf("{\"check\":\"%s\",\"side\":\"%s\",\"rule\":\"%s\",\"sentence\":\"%s\"}\n", check.name.data(),
+                  name_of(check.side), anchor(check).c_str(), check.sentence.data());
+    } else {
+      std::printf("%-22s %-7s %s\n%31s%s\n", check.name.data(), name_of(check.side), anchor(check).c_str(), "",
+                  check.sentence.data());
+    }
+  }
+  return 0;
+}
+
+int tell(const Report& report, bool json) {
+  for (const Verdict& verdict : report.verdicts()) {
+    std::printf("%s\n", (json ? json_of(verdict) : text_of(verdict)).c_str());
+  }
+  const auto count = [&](Outcome outcome) { return report.count(outcome); };
+  std::fprintf(stderr, "%zu passed, %zu failed, %zu not applicable, %zu not reached\n", count(Outcome::kPassed),
+               count(Outcome::kFailed), count(Outcome::kNotApplicable), count(Outcome::kUnreached));
+  return report.passed() ? 0 : 1;
+}
+
+Options options_of(const Line& line) {
+  Options options{.long_checks = line.long_checks};
+  if (!line.key.empty()) options.key = read_client_key(line.key).key;
+  return options;
+}
+
+int judge_server(const Line& line) {
+  Options options = options_of(line);
+  const Address address = parse_address(line.server);
+  options.loopback = is_loopback(address);
+  UdpWire wire = UdpWire::to_server(address);
+  Report report(Side::kServer);
+  conformance::judge_server(wire, options, report);
+  return tell(report, line.json);
+}
+
+int judge_client(Line line) {
+  const Options options = options_of(line);
+  UdpWire wire = UdpWire::for_client(parse_address(line.listen));
+  const std::string address = to_string(wire.local_address());
+  bool told = false;
+  for (std::string& word : line.command) {
+    for (auto at = word.find("{}"); at != std::string::npos; at = word.find("{}", at + address.size())) {
+      word.replace(at, 2, address);
+      told = true;
+    }
+  }
+  if (!told) line.command.push_back(address);
+  GuestProgram guest(line.command, line.log);
+  Report report(Side::kClient);
+  conformance::judge_client(wire, guest, options, report);
+  return tell(report, line.json);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Talks to a client or a server over UDP and judges it by WIRE.md and SESSION.md.", "tendon-conformance");
+  app.footer(
+      "Examples: tendon-conformance server 127.0.0.1:47100\n"
+      "          tendon-conformance client --key wall.key -- python3 my_client.py --server {} --key wall.key\n"
+      "Exit status: 0 all checks that apply passed, 1 one failed or was not reached, 2 wrong usage.");
+  Line line;
+  bool list_only = false;
+  app.add_flag("--list", list_only, "Print every check, the section it comes from and the sentence it tests");
+  app.add_flag("--json", line.json, "One JSON object per check on stdout");
+  app.require_subcommand(0, 1);
+  const auto common = [&](CLI::App* command) {
+    command->add_option("--key", line.key, "Suite 1, with this key file (of a controller); without one suite 0")
+        ->type_name("FILE");
+    command->add_flag("--long", line.long_checks, "Also the check that takes 610 s: the peer renews its key");
+    command->add_flag("--json", line.json, "One JSON object per check on stdout");
+  };
+  CLI::App* const server = app.add_subcommand("server", "Be the clients of a server");
+  server->add_option("ADDRESS", line.server, "Where it listens; it needs no other controller")->required();
+  common(server);
+  CLI::App* const client = app.add_subcommand(
+      "client", "Be the server of a client, which is started several times, and asked to end by SIGTERM");
+  client->add_option("--listen", line.listen, "Where to wait for it; port 0: any")->capture_default_str();
+  client->add_option("--log", line.log, "A file for what the client says")->type_name("FILE");
+  client->add_option("COMMAND", line.command, "The client; {} stands for the address, which is else the last argument")
+      ->required();
+  common(client);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (list_only) return list(line.json);
+  if (*server) return judge_server(line);
+  if (*client) return judge_client(line);
+  std::fprintf(stderr, "%s", app.help().c_str());
+  return 2;
+}
+
+}  // namespace
+}  // namespace tendon::conformance
+
+int main(int argc, char** argv) {
+  try {
+    return tendon::conformance::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "tendon-conformance: %s\n", error.what());
+    return 2;
+  }
+}

@@ -1,0 +1,36 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# golden_decisions.sh SOURCE_DIR SCRATCH_DIR PROGRAM: the decisions of PROGRAM (golden_decisions, as this build's compiler
+# made it) have the checksums in tests/golden/injector.sha256.
+#
+# golden_decisions.sh SOURCE_DIR SCRATCH_DIR --with COMPILER: so have those of the same sources compiled with COMPILER; exit
+# 77 (skipped) when it is not installed.
+#
+# After a change that is meant: golden_decisions DIR && (cd DIR && sha256sum *.txt) > tests/golden/injector.sha256
+set -eu
+source=$1 scratch=$2 program=$3
+mkdir -p "$scratch"
+if [ "$program" = --with ]; then
+  compiler=$4
+  if ! command -v "$compiler" >/dev/null; then
+    echo "skipped: $compiler is not installed, so only one compiler has been compared"
+    exit 77
+  fi
+  program=$scratch/golden_decisions
+  cd "$source"
+  for file in bottleneck delay_model draws exact_math golden_decisions_main injector loss_model named_profiles profile \
+    quantile_table timeline units; do
+    "$compiler" -std=c++20 -O2 -ffp-contract=off -I. -c "tests/tools/injector/$file.cc" -o "$scratch/$file.o"
+    set -- "$@" "$scratch/$file.o"
+  done
+  shift 4
+  "$compiler" "$@" -o "$program"
+fi
+rm -rf "$scratch/decisions"
+"$program" "$scratch/decisions"
+cd "$scratch/decisions"
+sha256sum --check --strict --quiet "$source/tests/golden/injector.sha256"
+[ "$(ls | wc -l)" = "$(wc -l <"$source/tests/golden/injector.sha256")" ] || {
+  echo "there are other profiles than in tests/golden/injector.sha256"
+  exit 1
+}

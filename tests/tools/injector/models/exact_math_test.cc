@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/injector/models/exact_math.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+namespace tendon::injector::exact {
+namespace {
+
+TEST(ExactMath, RoundsToTheNearestWholeNumberEvenWhereAddingAHalfWouldNot) {
+  EXPECT_EQ(round(0.49999999999999994), 0);
+  EXPECT_EQ(round(0.5), 1);
+  EXPECT_EQ(round(-0.5), -1);
+  EXPECT_EQ(round(-2.4), -2);
+  EXPECT_EQ(round(4503599627370497.0), 4503599627370497);
+}
+
+TEST(ExactMath, LogarithmAndExponentialAgreeWithLibmInAllButTheLastBits) {
+  for (double x = 1e-300; x < 1e300; x *= 1.37) {
+    EXPECT_NEAR(log(x), std::log(x), 4e-16 * std::max(1.0, std::abs(std::log(x)))) << x;
+  }
+  for (double x = 0.9; x < 1.1; x += 0.0003) EXPECT_NEAR(log(x), std::log(x), 1e-16) << x;
+  for (double x = -700; x < 700; x += 0.317) EXPECT_NEAR(exp(x) / std::exp(x), 1, 1e-15) << x;
+  EXPECT_EQ(log(1), 0);
+  EXPECT_EQ(exp(0), 1);
+}
+
+TEST(ExactMath, NormalTailAgreesWithErfcAndIsTheInverseOfTheQuantile) {
+  for (double z = 0; z < 37; z += 0.013) {
+    EXPECT_NEAR(normal_tail(z) / (0.5 * std::erfc(z / std::sqrt(2.0))), 1, 1e-12) << z;
+  }
+  for (double p = 0.499; p > 1e-15; p *= 0.9) EXPECT_NEAR(normal_tail(-normal_quantile(p)) / p, 1, 2e-14) << p;
+  EXPECT_EQ(normal_quantile(0.5), 0);
+  EXPECT_EQ(normal_quantile(0.75), -normal_quantile(0.25));
+}
+
+/// 1 − F of a gamma distribution of whole shape k: e⁻ˣ Σ xⁱ/i!, i < k.
+double erlang_tail(int k, double x) {
+  double term = std::exp(-x);
+  double sum = term;
+  for (int i = 1; i < k; ++i) sum += term *= x / i;
+  return sum;
+}
+
+TEST(ExactMath, GammaQuantileInvertsTheClosedFormsOfWholeAndHalfShapes) {
+  for (double q = 0.999; q > 1e-12; q *= 0.7) {
+    EXPECT_NEAR(gamma_quantile(1, 1 - q, q) / -std::log(q), 1, 1e-9) << q;
+    for (const int k : {2, 4, 25, 400}) {
+      EXPECT_NEAR(erlang_tail(k, gamma_quantile(k, 1 - q, q)) / q, 1, 1e-7) << k << " " << q;
+    }
+    // Half of the square of a normal deviation.
+    EXPECT_NEAR(std::erfc(std::sqrt(gamma_quantile(0.5, 1 - q, q))) / q, 1, 1e-7) << q;
+  }
+  for (double p = 0.5; p > 1e-12; p *= 0.7) {
+    EXPECT_NEAR(gamma_quantile(1, p, 1 - p) / -std::log1p(-p), 1, 1e-9) << p;
+    EXPECT_NEAR(std::erf(std::sqrt(gamma_quantile(0.5, p, 1 - p))) / p, 1, 1e-9) << p;
+  }
+  // So far below shape 1, nearly all of it is at zero.
+  EXPECT_EQ(gamma_quantile(0.01, 1e-12, 1 - 1e-12), 0);
+}
+
+/// The bits are the promise: this is what every compiler and libm must give.
+TEST(ExactMath, GivesTheSameBitsEverywhere) {
+  std::uint64_t sum = 0;
+  const auto feed = [&sum](double x) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &x, sizeof bits);
+    sum = sum * 0x100000001b3 ^ bits;
+  };
+  for (double p = 0.5; p > 1e-12; p *= 0.71) {
+    feed(log(p));
+    feed(exp(-p * 30));
+    feed(normal_quantile(p));
+    feed(normal_tail(p * 16));
+    feed(gamma_quantile(0.3, p, 1 - p));
+    feed(gamma_quantile(17, 1 - p, p));
+  }
+  EXPECT_EQ(sum, 5764668087681210650U);
+}
+
+}  // namespace
+}  // namespace tendon::injector::exact

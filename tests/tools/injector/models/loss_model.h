@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "tests/tools/injector/models/draws.h"
+#include "tests/tools/injector/profile/profile.h"
+
+namespace tendon::injector {
+
+/// Decides datagram by datagram who is lost; see the types of Loss in profile.h for what each does.
+///
+/// Random loss is the first draw below p, so that more loss loses the same datagrams and more. The chains are Markov:
+/// a state, and for each state the chances of what comes next.
+///
+/// Thread-safe: no.
+class LossModel {
+ public:
+  /// `event` and `state` are the purposes of its two draws.
+  LossModel(const Loss& loss, Purpose event, Purpose state);
+
+  /// To be asked for each datagram, lost or not: the chain goes on by one.
+  bool lost(const Draws& draws, std::uint64_t index) noexcept;
+
+  /// Goes on from the state of `before`, where that is a chain of the same kind.
+  void continue_from(const LossModel& before) noexcept;
+
+ private:
+  static constexpr std::uint8_t kUnborn = 255;
+  enum class Kind : std::uint8_t { kNever, kRandom, kTwoState, kFourState, kPattern };
+
+  Purpose event_;
+  Purpose state_draw_;
+  Kind kind_ = Kind::kNever;
+  Chance random_{0};
+  /// Chances, added up, that the next state is 0, at most 1, at most 2; else it is 3.
+  using Row = std::array<Chance, 3>;
+  static constexpr Chance kNo = Chance(0);
+  static constexpr Chance kSure = Chance(1);
+  std::array<Chance, 4> loss_in_{kNo, kNo, kNo, kNo};
+  std::array<Row, 4> rows_{Row{kNo, kNo, kNo}, {kNo, kNo, kNo}, {kNo, kNo, kNo}, {kNo, kNo, kNo}};
+  Row stationary_{kNo, kNo, kNo};
+  std::uint8_t state_ = kUnborn;
+  std::vector<bool> pattern_;
+};
+
+}  // namespace tendon::injector

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/base/time.h"
+
+namespace tendon::injector {
+
+// ---- How long a datagram takes --------------------------------------------------------------------------------------
+
+/// A value, or the lower edge of a bin, and how much of the whole it is: share or count, only the ratio to the sum of
+/// all weights matters.
+struct Weighted {
+  Duration value{};
+  double weight = 0;
+  bool operator==(const Weighted&) const = default;
+};
+
+// One-way delays. What would be below zero is zero, what would be above kMaxDelay is kMaxDelay.
+
+struct ConstantDelay {  ///< delay=20ms
+  Duration value{};
+  bool operator==(const ConstantDelay&) const = default;
+};
+struct UniformDelay {  ///< delay=uniform(LOW,HIGH), both inclusive
+  Duration low{}, high{};
+  bool operator==(const UniformDelay&) const = default;
+};
+struct NormalDelay {  ///< delay=normal(MEAN,SD)
+  Duration mean{}, deviation{};
+  bool operator==(const NormalDelay&) const = default;
+};
+struct ExponentialDelay {  ///< delay=exponential(LEAST,MEAN): LEAST + an exponential of mean MEAN − LEAST
+  Duration least{}, mean{};
+  bool operator==(const ExponentialDelay&) const = default;
+};
+struct LognormalDelay {  ///< delay=lognormal(MEAN,SD): mean and standard deviation of the delay, not of its logarithm
+  Duration mean{}, deviation{};
+  bool operator==(const LognormalDelay&) const = default;
+};
+struct ParetoDelay {  ///< delay=pareto(LEAST,SHAPE): P(delay > x) = (LEAST/x)^SHAPE; no mean for SHAPE ≤ 1
+  Duration least{};
+  double shape = 0;
+  bool operator==(const ParetoDelay&) const = default;
+};
+struct GammaDelay {  ///< delay=gamma(MEAN,SD): shape (MEAN/SD)²
+  Duration mean{}, deviation{};
+  bool operator==(const GammaDelay&) const = default;
+};
+/// delay=histogram(LOWER:WEIGHT,…) or histogram(FILE.csv). Within a bin the delay is uniform; the last bin is as wide
+/// as the one before it, and a histogram of one bin is one constant delay.
+struct HistogramDelay {
+  std::vector<Weighted> bins;  ///< rising
+  bool operator==(const HistogramDelay&) const = default;
+};
+/// delay=samples(VALUE:WEIGHT,…), samples(FILE.csv) or netem(FILE.dist,MEAN,SD): these values and no others.
+struct SampledDelay {
+  std::vector<Weighted> values;  ///< rising
+  bool operator==(const SampledDelay&) const = default;
+};
+using Delay = std::variant<ConstantDelay, UniformDelay, NormalDelay, ExponentialDelay, LognormalDelay, ParetoDelay,
+                           GammaDelay, HistogramDelay, SampledDelay>;
+
+// ---- Who is lost ----------------------------------------------------------------------------------------------------
+
+struct RandomLoss {  ///< loss=2%: each by itself
+  double probability = 0;
+  bool operator==(const RandomLoss&) const = default;
+};
+/// loss=burst(2%,4): this share of all, in bursts of this mean length: Gilbert's chain with P(G→B) = p/(1 − p)/L and
+/// P(B→G) = 1/L. (As in WebRTC's SimulatedNetwork.)
+struct BurstLoss {
+  double probability = 0;
+  double length = 1;
+  bool operator==(const BurstLoss&) const = default;
+};
+/// loss=gilbert(P,R,BAD,GOOD): Gilbert and Elliott's chain. P = P(G→B), R = P(B→G) per datagram, lost with probability
+/// BAD (netem's 1−h) in B and GOOD (netem's 1−k) in G. As in the kernel the state before the transition decides; unlike
+/// there the chain begins in its stationary distribution, not in G, so that short runs are not better than long ones.
+struct GilbertLoss {
+  double to_bad = 0, to_good = 1, lost_in_bad = 1, lost_in_good = 0;
+  bool operator==(const GilbertLoss&) const = default;
+};
+/// loss=fourstate(P13,P31,P32,P23,P14), in netem's order. States: 1 received in a gap, 2 received in a burst, 3 lost in
+/// a burst, 4 lost alone (then always 1). Each datagram makes a transition, and is lost when that ends in 3 or 4.
+/// Begins in its stationary distribution.
+struct FourStateLoss {
+  double p13 = 0, p31 = 0, p32 = 0, p23 = 0, p14 = 0;
+  bool operator==(const FourStateLoss&) const = default;
+};
+struct PatternLoss {  ///< loss=pattern(0001): 1 is lost; begins with the first datagram and repeats
+  std::string pattern;
+  bool operator==(const PatternLoss&) const = default;
+};
+using Loss = std::variant<RandomLoss, BurstLoss, GilbertLoss, FourStateLoss, PatternLoss>;
+
+/// drop(byte=16,mask=0xf,value=3,50%): datagrams with (payload[byte] & mask) == value are lost with this probability:
+/// loss by message type.
+struct DropRule {
+  std::uint32_t byte = 0;
+  std::uint8_t mask = 0xff;
+  std::uint8_t value = 0;
+  double probability = 1;
+  bool operator==(const DropRule&) const = default;
+};
+
+// ---- What changes with time -----------------------------------------------------------------------------------------
+// Times count from when the profile came into force (for the first one: from the injector's start).
+
+/// regime(NAME,dwell=4s,delay=…,loss=…): one state of a Markov chain in continuous time, independent of the traffic. It
+/// lasts for an exponential time of this mean, then one of the others follows, each as likely. The first begins. While
+/// it lasts, its delay is added and its loss, when it has one, replaces the profile's.
+struct Regime {
+  std::string name;
+  Duration dwell{};
+  Delay delay;
+  std::optional<Loss> loss;
+  bool operator==(const Regime&) const = default;
+};
+
+/// at=5s,for=300ms once · every=15s,for=300ms at 15 s, 30 s, … · at=5s,every=15s,for=300ms at 5 s, 20 s, …
+struct Window {
+  Duration at{};
+  Duration every{};  ///< zero: once
+  Duration lasts{};  ///< shorter than `every`
+  bool operator==(const Window&) const = default;
+};
+
+struct Step {  ///< step(at=5s,20ms): from then on so much more (or less, when negative)
+  Duration at{}, change{};
+  bool operator==(const Step&) const = default;
+};
+struct Ramp {  ///< ramp(from=5s,to=10s,30ms): grows to so much more (or less), and stays there
+  Duration from{}, to{}, change{};
+  bool operator==(const Ramp&) const = default;
+};
+struct Spike {  ///< spike(every=15s,for=50ms,80ms): datagrams that arrive in the window take so much longer
+  Window when;
+  Duration extra{};
+  bool operator==(const Spike&) const = default;
+};
+struct Stall {  ///< stall(every=2s,for=100ms): nothing leaves in the window, and all of it together at its end
+  Window when;
+  bool operator==(const Stall&) const = default;
+};
+/// handover(every=15s,for=60ms,10ms): what arrives in the window is lost, and from its end on (until the next one) the
+/// path is longer by an amount that is uniform in ±10 ms.
+struct Handover {
+  Window when;
+  Duration change{};
+  bool operator==(const Handover&) const = default;
+};
+struct Outage {  ///< outage(at=5s,for=300ms): what arrives in the window is lost
+  Window when;
+  bool operator==(const Outage&) const = default;
+};
+
+// ---- Copies, damage, order ------------------------------------------------------------------------------------------
+
+struct Replay {  ///< replay(1%,64): with this probability one of the last 64 datagrams comes once more
+  double probability = 0;
+  std::uint32_t depth = 0;
+  bool operator==(const Replay&) const = default;
+};
+/// jump(1%,3): with this probability a datagram leaves just ahead of the one 3 before it, or of as many as it can still
+/// overtake when its own delay is `base` alone; jump(1%,1) swaps neighbours. The others are not moved by it.
+struct Jump {
+  double probability = 0;
+  std::uint32_t places = 0;
+  bool operator==(const Jump&) const = default;
+};
+enum class Order : std::uint8_t {
+  kFifo,  ///< order=fifo: release is monotone whatever the jitter, because a route does not reorder
+  kFree,  ///< order=free: each leaves when its own delay is over, as netem does it
+};
+
+// ---- The bottleneck -------------------------------------------------------------------------------------------------
+
+/// rate=10Mbit/s or opportunities(FILE), queue=64kB or queue=50packets, overhead=28. A datagram costs its payload and
+/// the overhead; one that finds no room in the queue is dropped (tail drop). The one being sent is still in the queue.
+///
+/// There is no head drop: whether a datagram dies of it, and when those behind it leave, depends on what arrives later,
+/// and a decision is final when it is made.
+struct Bottleneck {
+  std::uint64_t bits_per_second = 0;  ///< zero: none
+  /// Mahimahi's packet-delivery opportunities (mm-link): at each of these times, in ms, up to 1500 bytes leave; rising,
+  /// repeated with the period of the last one. Bytes that nobody waits for are lost. Not together with a rate.
+  std::vector<std::uint32_t> opportunities_ms;
+  std::uint64_t queue = 1000;  ///< netem's default, in packets
+  bool queue_in_bytes = false;
+  std::uint32_t overhead = 28;  ///< bytes per datagram: the IPv4 and UDP headers
+  bool exists() const { return bits_per_second > 0 || !opportunities_ms.empty(); }
+  bool operator==(const Bottleneck&) const = default;
+};
+
+/// What one direction of a bad network does to datagrams. As text it is one line, fields in any order, each at most
+/// once except drop, regime, step, ramp, spike, stall, handover and outage:
+///
+///     base=5ms delay=lognormal(20ms,5ms) rho=0.9 loss=burst(2%,4) spike(every=15s,for=50ms,80ms) rate=10Mbit/s
+///     queue=64kB
+///
+/// Durations are numbers with their unit (ns, us, ms, s), rounded to whole nanoseconds; probabilities 2% or 0.02.
+struct Profile {
+  Duration base{};  ///< base=5ms: constant part, added to everything else
+  Delay delay;
+  /// Correlation of consecutive delays: a Gaussian copula AR(1), z' = ρz + √(1 − ρ²)e, delay = F⁻¹(Φ(z)), so that the
+  /// distribution of delays is exact for every ρ. By packet (rho=0.9), or by time (memory=20ms): ρ = exp(−Δt/memory).
+  double rho = 0;
+  Duration memory{};  ///< zero: none
+  Loss loss;
+  std::vector<DropRule> rules;
+  std::vector<Regime> regimes;
+  std::vector<Step> steps;
+  std::vector<Ramp> ramps;
+  std::vector<Spike> spikes;
+  std::vector<Stall> stalls;
+  std::vector<Handover> handovers;
+  std::vector<Outage> outages;
+  double duplicate = 0;  ///< duplicate=1%: a second copy, with a delay of its own, never ahead of the first
+  Replay replay;
+  double flip = 0;      ///< flip=0.1%: one bit of the payload is flipped
+  double truncate = 0;  ///< truncate=0.1%: the payload is cut to 0 … size − 1 bytes
+  Duration rebind{};    ///< rebind(every=10s): the source port changes, as a NAT does it; zero: never
+  Order order = Order::kFifo;
+  Jump jump;
+  Bottleneck bottleneck;
+
+  bool operator==(const Profile&) const = default;
+};
+
+/// Nobody feels a force that is later than this, and it bounds what a proxy has to keep in memory.
+inline constexpr Duration kMaxDelay = std::chrono::seconds(60);
+
+/// Events of one kind, drop rules, regimes. Each is looked at for each datagram.
+inline constexpr std::size_t kMaxEvents = 64;
+
+/// Measured histograms have about 100 bins; the tables of netem 4096 values; a minute of 1 kHz 60 000 samples.
+inline constexpr std::size_t kMaxValues = 65'536;
+
+/// The longest traces that come with Mahimahi are 15 minutes of LTE: 700 000 opportunities.
+inline constexpr std::size_t kMaxOpportunities = 1'000'000;
+
+/// How far back a stale replay may reach: as many datagrams a driver keeps.
+inline constexpr std::uint32_t kMaxReplayDepth = 64;
+inline constexpr std::uint32_t kMaxJump = 64;
+
+/// Throws std::invalid_argument naming field, value and what was expected, when `profile` is impossible:
+/// "loss is 150%, expected a probability from 0% to 100%".
+void check(const Profile& profile);
+
+/// The profile as one line; what is as by default is left out. Tables are written out (histogram(0.56ms:72,…)), so that
+/// the line alone replays a run. parse_profile(to_string(p)) == p exactly, for every p that passes check().
+std::string to_string(const Profile& profile);
+
+/// Reads such a line, and the files that it names. Throws std::invalid_argument naming field, value and what was
+/// expected; the result has passed check().
+Profile parse_profile(std::string_view line);
+
+/// The same on top of a profile: fields of the line replace those that are there, events are added to them.
+Profile parse_profile(std::string_view line, Profile onto);
+
+}  // namespace tendon::injector

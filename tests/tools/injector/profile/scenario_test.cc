@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/injector/profile/scenario.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/tools/injector/injector.h"
+#include "tests/tools/injector/profile/named_profiles.h"
+
+namespace tendon::injector {
+namespace {
+
+using namespace std::chrono_literals;
+
+LocalTime at(Duration since_zero) { return LocalTime(since_zero); }
+
+std::string refusal(const std::string& toml) {
+  try {
+    parse_scenario(toml, "storm.toml");
+    return "";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+std::string refusal_of_command(const std::string& line) {
+  try {
+    parse_command(line);
+    return "";
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+}
+
+constexpr const char* kStorm = R"toml(
+seed = 7
+up = "delay=5ms"
+down = "wifi-good loss=1%"
+
+[[at]]
+t_s = 0.5004
+both = "delay=20ms loss=10%"
+note = "microwave oven on"
+
+[[at]]
+t_s = 1.0004
+link = 1
+up = "outage(at=100ms,for=200ms)"
+
+[[at]]
+t_s = 2
+note = "nothing happens"
+
+[[at]]
+t_s = 2.5
+both = "lan"
+
+[clock]
+offset_ms = 5
+drift_ppm = -20.5
+
+[[clock.step]]
+t_s = 10
+step_ms = -3
+)toml";
+
+TEST(Scenario, SaysWhatTheFileSays) {
+  const Scenario scenario = parse_scenario(kStorm, "storm.toml");
+  EXPECT_EQ(scenario.seed, 7U);
+  EXPECT_EQ(scenario.up, parse_profile("delay=5ms"));
+  EXPECT_EQ(scenario.down, resolve_profile("wifi-good loss=1%", Direction::kDown));
+  ASSERT_EQ(scenario.changes.size(), 4U);
+  EXPECT_EQ(scenario.changes[0].at, 500'400us);
+  EXPECT_EQ(scenario.changes[0].change.up, parse_profile("delay=20ms loss=10%"));
+  EXPECT_EQ(scenario.changes[0].change.down, scenario.changes[0].change.up);
+  EXPECT_EQ(scenario.changes[0].change.text, "both delay=20ms loss=10%, note microwave oven on");
+  EXPECT_EQ(scenario.changes[1].change.link, 1U);
+  EXPECT_EQ(scenario.changes[1].change.down, std::nullopt);
+  EXPECT_EQ(scenario.changes[1].change.text, "link 1 up outage(at=100ms,for=200ms)");
+  EXPECT_EQ(scenario.changes[2].change.up, std::nullopt);
+  EXPECT_EQ(scenario.changes[3].change.up, resolve_profile("lan", Direction::kUp));
+  EXPECT_EQ(scenario.changes[3].change.down, resolve_profile("lan", Direction::kDown));
+  EXPECT_EQ(scenario.clock, (DriftingClock::Config{5ms, -20'500, {{10s, -3ms}}}));
+}
+
+TEST(Scenario, AnEmptyFileIsAPerfectNetwork) {
+  const Scenario scenario = parse_scenario("", "empty.toml");
+  EXPECT_EQ(scenario.up, Profile{});
+  EXPECT_TRUE(scenario.changes.empty());
+  EXPECT_FALSE(scenario.clock);
+}
+
+TEST(Scenario, WhatIsWrongIsNamedWithFileLineAndKey) {
+  EXPECT_EQ(refusal("sed = 7"), "storm.toml:1: sed: unknown key; known here: seed, up, down, both, at, clock");
+  EXPECT_EQ(refusal("seed = -1"), "storm.toml:1: seed: expected a whole number from 0 to 9223372036854775807");
+  EXPECT_EQ(refusal("\nboth = 20"), "storm.toml:2: both: expected text in quotes");
+  EXPECT_EQ(refusal("both = \"lan\"\nup = \"lan\""), "storm.toml:2: up: expected either both, or up and down");
+  EXPECT_EQ(refusal("[[at]]\nt_s = 1\nboth = \"loss=150%\"").substr(0, 40), "storm.toml:3: at.both: loss is 150%, exp");
+  EXPECT_EQ(refusal("[[at]]\nboth = \"lan\""),
+            "storm.toml:1: at: t_s is missing, expected when, in seconds since the start");
+  EXPECT_EQ(refusal("[[at]]\nt_s = 1"), "storm.toml:1: at: expected up, down, both or note");
+  EXPECT_EQ(refusal("[[at]]\nt_s = -1"), "storm.toml:2: at.t_s: expected 0 or more, and at most a day");
+  EXPECT_EQ(refusal("[[at]]\nt_s = nan"), "storm.toml:2: at.t_s: expected a number");
+  EXPECT_EQ(refusal("[[at]]\nt_s = 2\nnote = \"a\"\n[[at]]\nt_s = 1\nnote = \"b\""),
+            "storm.toml:5: at.t_s: is earlier than the one before, expected the order of time");
+  EXPECT_EQ(refusal("[[at]]\nt_s = 1\nlink = 2"), "storm.toml:3: at.link: expected up, down or both with it");
+  EXPECT_EQ(refusal("[at]\nt_s = 1"), "storm.toml:1: at: expected tables [[at]]");
+  EXPECT_EQ(refusal("[[at]]\nt_s = 1\nbooth = \"lan\""),
+            "storm.toml:3: at.booth: unknown key; known here: t_s, up, down, both, link, note");
+  EXPECT_EQ(refusal("[clock]\nsteps = 1"),
+            "storm.toml:2: clock.steps: unknown key; known here: offset_ms, drift_ppm, step");
+  EXPECT_EQ(refusal("[clock]\ndrift_ppm = 1e6"), "storm.toml:1: clock: a clock's drift is beyond 100000 ppm");
+  EXPECT_EQ(refusal("[[clock.step]]\nt_s = 1"), "storm.toml:1: clock.step: expected t_s and step_ms");
+  EXPECT_EQ(refusal("seed = 7\n= 8").substr(0, 22), "storm.toml:2: not TOML");
+}
+
+// The same fates, however often the driver looks for changes between two datagrams, or only right before one.
+TEST(Scenario, InVirtualTimeTheSameSeedMeetsTheSameFates) {
+  const auto run = [](Duration poll) {
+    const Scenario scenario = parse_scenario(kStorm, "storm.toml");
+    ScenarioPlayer player(scenario, at(100s));
+    std::map<std::pair<Direction, std::uint32_t>, Injector> injectors;
+    std::vector<Decision> decisions;
+    const auto look = [&](LocalTime now) {
+      while (const auto due = player.next_due(now)) {
+        for (auto& [flow, injector] : injectors) {
+          const auto& [profile, since] = player.weather(flow.first, flow.second);
+          if (since == due->at) injector.change(profile, since);
+        }
+      }
+    };
+    LocalTime looked = at(100s);
+    for (int i = 0; i < 3000; ++i) {
+      const LocalTime now = at(100s + 1ms * i);
+      for (; poll > Duration::zero() && looked < now; looked += poll) look(looked);
+      look(now);
+      for (const Direction direction : {Direction::kUp, Direction::kDown}) {
+        // The second client comes in the middle of a regime of the scenario.
+        for (std::uint32_t link = 0; link < (i < 700 ? 1U : 2U); ++link) {
+          auto injector = injectors.find({direction, link});
+          if (injector == injectors.end()) {
+            const auto& [profile, since] = player.weather(direction, link);
+            injector =
+                injectors.emplace(std::pair(direction, link), Injector(profile, scenario.seed, link, direction, since))
+                    .first;
+          }
+          decisions.push_back(injector->second.decide({.arrival = now, .size = 100, .bytes = {}}));
+        }
+      }
+    }
+    return decisions;
+  };
+  const auto decisions = run(0ms);
+  EXPECT_EQ(run(333us), decisions);
+  EXPECT_EQ(run(17ms), decisions);
+  EXPECT_EQ(run(0ms), decisions);
+  // The outage of link 1: from 1.1004 s to 1.3004 s, of nobody else.
+  std::map<Duration, int> outage;
+  for (const Decision& decision : decisions) {
+    if (decision.cause == Cause::kOutage) ++outage[decision.arrival - at(100s)];
+  }
+  ASSERT_EQ(outage.size(), 200U);
+  EXPECT_EQ(outage.begin()->first, 1101ms);
+  EXPECT_EQ(outage.begin()->second, 1);
+  EXPECT_EQ(outage.rbegin()->first, 1300ms);
+}
+
+TEST(ScenarioPlayer, AChangeIsInForceFromItsTimeOnWheneverItIsAskedFor) {
+  ScenarioPlayer player(parse_scenario(kStorm, "storm.toml"), at(100s));
+  EXPECT_EQ(player.next_wake(), at(100s + 500'400us));
+  EXPECT_FALSE(player.next_due(at(100s + 500'399us)));
+  EXPECT_EQ(player.weather(Direction::kUp, 0).since, at(100s));
+  EXPECT_TRUE(player.next_due(at(100s + 500'400us)));
+  EXPECT_EQ(player.weather(Direction::kUp, 0).since, at(100s + 500'400us));
+  const auto late = player.next_due(at(200s));
+  ASSERT_TRUE(late);
+  EXPECT_EQ(late->at, at(101s + 400us));
+  EXPECT_EQ(player.weather(Direction::kUp, 1).since, at(101s + 400us));
+  EXPECT_TRUE(player.next_due(at(200s)));
+  EXPECT_TRUE(player.next_due(at(200s)));
+  EXPECT_FALSE(player.next_due(at(200s)));
+  EXPECT_FALSE(player.next_wake());
+}
+
+TEST(ScenarioPlayer, AChangeForOneLinkHoldsUntilOneForAll) {
+  ScenarioPlayer player(parse_scenario("both = \"delay=1ms\"", "x"), at(0s));
+  const auto delay = [&player](Direction direction, std::uint32_t link) {
+    return player.weather(direction, link).profile;
+  };
+  player.change(std::get<Change>(parse_command("link 2 up delay=9ms")), at(3s));
+  EXPECT_EQ(delay(Direction::kUp, 2), parse_profile("delay=9ms"));
+  EXPECT_EQ(player.weather(Direction::kUp, 2).since, at(3s));
+  EXPECT_EQ(delay(Direction::kDown, 2), parse_profile("delay=1ms"));
+  EXPECT_EQ(delay(Direction::kUp, 3), parse_profile("delay=1ms"));
+  player.change(std::get<Change>(parse_command("down delay=4ms")), at(4s));
+  EXPECT_EQ(delay(Direction::kUp, 2), parse_profile("delay=9ms"));
+  EXPECT_EQ(delay(Direction::kDown, 2), parse_profile("delay=4ms"));
+  player.change(std::get<Change>(parse_command("both delay=5ms")), at(5s));
+  EXPECT_EQ(delay(Direction::kUp, 2), parse_profile("delay=5ms"));
+}
+
+TEST(Command, IsOneLineOfText) {
+  const auto change = std::get<Change>(parse_command("  both  wifi-bad loss=5% \n"));
+  EXPECT_EQ(change.up, resolve_profile("wifi-bad loss=5%", Direction::kUp));
+  EXPECT_EQ(change.down, resolve_profile("wifi-bad loss=5%", Direction::kDown));
+  EXPECT_EQ(change.link, std::nullopt);
+  EXPECT_EQ(change.text, "both wifi-bad loss=5%");
+  EXPECT_EQ(std::get<Change>(parse_command("up lan")).down, std::nullopt);
+  EXPECT_EQ(std::get<Change>(parse_command("link 2 down lan")).text, "link 2 down lan");
+  EXPECT_EQ(std::get<Change>(parse_command("note oven on")).text, "note oven on");
+  EXPECT_EQ(parse_command("stats"), Command(Request::kStats));
+  EXPECT_EQ(parse_command("help\r\n"), Command(Request::kHelp));
+  EXPECT_EQ(parse_command("stop"), Command(Request::kStop));
+}
+
+// What a file says and what a command says is the same thing in the same words.
+TEST(Command, IsHowAScenariosChangeIsWrittenIntoTheTrace) {
+  const Scenario scenario = parse_scenario("[[at]]\nt_s = 1\nlink = 2\nboth = \"delay=3ms\"", "x");
+  EXPECT_EQ(parse_command(scenario.changes[0].change.text), Command(scenario.changes[0].change));
+}
+
+TEST(Command, AWrongOneSaysWhatWasExpected) {
+  EXPECT_EQ(refusal_of_command("faster"), "unknown command \"faster\", expected " + command_help());
+  EXPECT_EQ(refusal_of_command(""), "unknown command \"\", expected " + command_help());
+  EXPECT_EQ(refusal_of_command("stop now"), "unknown command \"stop\", expected " + command_help());
+  EXPECT_EQ(refusal_of_command("up").substr(0, 30), "\"up\" without a profile, expect");
+  EXPECT_EQ(refusal_of_command("link two both lan"),
+            "link: expected a client's number and what is to change, like: link 2 both wifi-bad");
+  EXPECT_EQ(refusal_of_command("note"), "note: expected the text after it");
+  EXPECT_NE(refusal_of_command("both delay=20").find("20ms"), std::string::npos);
+}
+
+TEST(Command, NoBytesWhateverDoMoreThanAnError) {
+  std::mt19937_64 random(1);
+  constexpr std::string_view kLikely = " \n\t0129=%(),-#[]\"\'abelinkupdownbothdelay\r\0\xff";
+  const std::string storm = kStorm;
+  for (int run = 0; run < 3000; ++run) {
+    std::string line = std::vector<std::string>{"link 2 both delay=20ms", "up wifi-bad", storm}[random() % 3];
+    for (std::uint64_t changes = 1 + random() % 3; changes > 0; --changes) {
+      line[random() % line.size()] = kLikely[random() % kLikely.size()];
+    }
+    try {
+      parse_command(line);
+    } catch (const std::invalid_argument&) {
+    }
+    try {
+      parse_scenario(line, "x");
+    } catch (const std::runtime_error&) {
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tendon::injector

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/injector/proxy/driver.h"
+
+#include <sched.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bitset>
+#include <cerrno>
+#include <ctime>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "tests/tools/injector/proxy/real_time.h"
+
+namespace tendon::injector {
+namespace {
+
+// What an event of epoll is about; everything else is a ClientIndex.
+constexpr std::uint64_t kListener = std::uint64_t{1} << 32;
+constexpr std::uint64_t kTimer = kListener + 1;
+constexpr std::uint64_t kBell = kListener + 2;
+
+/// People look a few times per second, and copying the histograms takes some 10 µs …
+constexpr Duration kPublishPeriod = std::chrono::milliseconds(200);
+/// … for which there should be time before the next release.
+constexpr Duration kPublishRoom = std::chrono::microseconds(100);
+
+/// Whether one system call can send both.
+bool by_the_same_socket(const TraceRecord& a, const TraceRecord& b) {
+  if (a.direction != b.direction) return false;
+  return a.direction == Direction::kDown || (a.link == b.link && a.rebinds == b.rebinds);
+}
+
+/// A hundred probes a second tell p99 within a few seconds, and cost a tenth of the wake-ups of a haptic loop.
+constexpr Duration kProbePeriod = std::chrono::milliseconds(10);
+
+int checked(int result, const char* what) {
+  if (result < 0) throw std::system_error(errno, std::generic_category(), what);
+  return result;
+}
+
+}  // namespace
+
+Driver::Driver(const Config& config, TraceRecorder* recorder)
+    : config_(config),
+      proxy_(config.proxy),
+      recorder_(recorder),
+      listener_(UdpBatch::listening(config.listen)),
+      epoll_(checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
+      // A timer of its own: the timeouts of poll and epoll are rounded up by 0.1 % of their length.
+      timer_(checked(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), "timerfd_create")),
+      bell_(checked(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC), "eventfd")) {
+  UdpBatch::connected(config.server);  // or throws now and not when the first client comes
+  watch(listener_.fd(), kListener, EPOLLIN);
+  watch(timer_, kTimer, EPOLLIN | EPOLLET);
+  watch(bell_, kBell, EPOLLIN);
+}
+
+Driver::~Driver() {
+  for (const int fd : {epoll_, timer_, bell_}) ::close(fd);
+}
+
+void Driver::watch(int fd, std::uint64_t source, std::uint32_t events) const {
+  epoll_event event{};
+  event.events = events;
+  event.data.u64 = source;
+  checked(::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
+}
+
+void Driver::stop() noexcept {
+  stop_ = true;
+  const int before = errno;
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = ::write(bell_, &one, sizeof one);
+  errno = before;
+}
+
+void Driver::change(Proxy::PreparedChange change) {
+  {
+    const std::lock_guard lock(mutex_);
+    changes_.push_back(std::move(change));
+  }
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = ::write(bell_, &one, sizeof one);
+}
+
+Status Driver::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+void Driver::run() {
+  if (config_.realtime) {
+    const sched_param priority{.sched_priority = *config_.realtime};
+    checked(::sched_setscheduler(0, SCHED_FIFO, &priority), "SCHED_FIFO");
+  }
+  start_ = monotonic_now();
+  next_publish_ = start_ + kPublishPeriod;
+  next_probe_ = start_ + kProbePeriod;
+  if (config_.duration) end_ = start_ + *config_.duration;
+  for (LocalTime now = start_; !stop_ && now < end_; now = monotonic_now()) {
+    now = send_due(now);
+    while (const auto client = proxy_.next_evicted(now)) {
+      if (const auto gone = upstreams_.find(*client); gone != upstreams_.end()) {
+        closed_overflowed_ += gone->second.socket.overflowed();
+        upstreams_.erase(gone);
+      }
+    }
+    if (recorder_ != nullptr) recorder_->put(proxy_.records());
+    if (now >= next_publish_ && publish(now)) next_publish_ = now + kPublishPeriod;
+    wait(now);
+  }
+  if (recorder_ != nullptr) recorder_->put(proxy_.records());
+  Status last = measure(monotonic_now());
+  const std::lock_guard lock(mutex_);
+  status_ = std::move(last);
+}
+
+void Driver::wait(LocalTime now) {
+  // Whatever comes first is what we are woken for.
+  const std::optional<LocalTime> due = proxy_.next_wake();
+  if (!probe_ && now >= next_probe_) probe_ = now + last_sleep_;
+  LocalTime at = std::min(next_publish_, end_);
+  Wake why = Wake::kOther;
+  if (probe_ && *probe_ <= at) {
+    at = *probe_;
+    why = Wake::kProbe;
+  }
+  if (due && *due - config_.spin <= at) {
+    at = *due - config_.spin;
+    why = Wake::kRelease;
+  }
+
+  int timeout_ms = 0;
+  if (at > now) {
+    timeout_ms = -1;
+    const auto since = at.time_since_epoch();
+    const auto whole = std::chrono::floor<std::chrono::seconds>(since);
+    const itimerspec timer{.it_interval = {}, .it_value = {whole.count(), (since - whole).count()}};
+    checked(::timerfd_settime(timer_, TFD_TIMER_ABSTIME, &timer, nullptr), "timerfd_settime");
+    if (why == Wake::kRelease) last_sleep_ = at - now;
+  }
+  std::array<epoll_event, 16> events;
+  const int ready = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), timeout_ms);
+  if (ready < 0 && errno != EINTR) checked(ready, "epoll_wait");
+
+  bool timer_rang = false;
+  for (const epoll_event& event : std::span(events).first(static_cast<std::size_t>(std::max(ready, 0)))) {
+    timer_rang = timer_rang || event.data.u64 == kTimer;
+  }
+  if (timer_rang && why != Wake::kOther) now = monotonic_now();
+  if (timer_rang && why == Wake::kProbe) timer_floor_.observe(now - at);
+  if (probe_ && now >= *probe_) {  // observed, or in vain: something else was going on at its time
+    probe_.reset();
+    next_probe_ = now + kProbePeriod;
+  }
+  if (timer_rang && why == Wake::kRelease) send_due(now);
+  for (const epoll_event& event : std::span(events).first(static_cast<std::size_t>(std::max(ready, 0)))) {
+    if (event.data.u64 == kBell) {
+      take_changes(monotonic_now());
+    } else if (event.data.u64 != kTimer) {
+      receive(event.data.u64);
+    }
+  }
+}
+
+void Driver::receive(std::uint64_t source) {
+  if (source == kListener) {
+    for (const UdpBatch::Arrival& arrival : listener_.receive(inbox_)) {
+      const auto client = proxy_.receive_from_client(arrival.from, arrival.datagram, arrival.at);
+      if (client && !upstreams_.contains(*client)) open_upstream(*client);
+    }
+  } else {
+    const auto client = static_cast<ClientIndex>(source);
+    const auto upstream = upstreams_.find(client);
+    if (upstream == upstreams_.end()) return;
+    for (const UdpBatch::Arrival& arrival : upstream->second.socket.receive(inbox_)) {
+      proxy_.receive_from_server(client, arrival.datagram, arrival.at);
+    }
+  }
+  // Those that are due must not wait until all sockets have been read.
+  send_due(monotonic_now());
+}
+
+void Driver::open_upstream(ClientIndex client) {
+  const auto opened = upstreams_.try_emplace(client, Upstream{UdpBatch::connected(config_.server)}).first;
+  watch(opened->second.socket.fd(), client, EPOLLIN);
+}
+
+LocalTime Driver::send_due(LocalTime now) {
+  for (;;) {
+    due_.clear();
+    while (due_.size() < kUdpBatch) {
+      auto next = proxy_.next_due(now);
+      if (!next) break;
+      due_.push_back(*next);
+    }
+    if (due_.empty()) return now;
+    // One system call for all that leave by the same socket: that of the first one not yet sent.
+    std::bitset<kUdpBatch> sent;
+    for (std::size_t first = 0; first < due_.size(); ++first) {
+      if (!sent.test(first)) sent |= send_with(first, sent);
+    }
+    now = monotonic_now();
+  }
+}
+
+std::bitset<kUdpBatch> Driver::send_with(std::size_t first, const std::bitset<kUdpBatch>& sent) {
+  UdpBatch& socket = socket_for(due_[first]);
+  std::array<UdpBatch::Outgoing, kUdpBatch> batch;
+  std::array<std::size_t, kUdpBatch> places;
+  std::size_t count = 0;
+  std::bitset<kUdpBatch> now_sent;
+  for (std::size_t i = first; i < due_.size(); ++i) {
+    if (sent.test(i) || !by_the_same_socket(due_[i].record, due_[first].record)) continue;
+    batch[count] = {due_[i].to, due_[i].datagram};
+    places[count++] = i;
+    now_sent.set(i);
+  }
+  const LocalTime begin = monotonic_now();
+  const std::bitset<kUdpBatch> refused = socket.send(std::span(batch).first(count));
+  const Duration took = monotonic_now() - begin;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Proxy::Departure& departure = due_[places[k]];
+    // A datagram leaves when the kernel turns to it: the call takes them one after the other. What it does then, up to
+    // waking the receiver, is the network's time and not ours.
+    const LocalTime left = begin + took * static_cast<std::int64_t>(k) / static_cast<std::int64_t>(count);
+    refused.test(k) ? proxy_.not_sent(departure) : proxy_.left(departure, left);
+  }
+  return now_sent;
+}
+
+UdpBatch& Driver::socket_for(const Proxy::Departure& departure) {
+  if (departure.record.direction == Direction::kDown) return listener_;
+  Upstream& upstream = upstreams_.at(departure.record.link);
+  if (departure.record.rebinds > upstream.rebinds) {
+    closed_overflowed_ += upstream.socket.overflowed();
+    upstream = {UdpBatch::connected(config_.server), departure.record.rebinds};
+    watch(upstream.socket.fd(), departure.record.link, EPOLLIN);
+  }
+  return upstream.socket;
+}
+
+void Driver::take_changes(LocalTime now) {
+  std::uint64_t rings = 0;
+  [[maybe_unused]] const auto got = ::read(bell_, &rings, sizeof rings);
+  std::vector<Proxy::PreparedChange> changes;
+  {
+    const std::lock_guard lock(mutex_);
+    changes.swap(changes_);
+  }
+  for (const Proxy::PreparedChange& change : changes) proxy_.change(change, now);
+}
+
+Status Driver::measure(LocalTime now) const {
+  Status status;
+  status.elapsed = now - start_;
+  for (const Direction direction : {Direction::kUp, Direction::kDown}) {
+    status.directions[static_cast<std::size_t>(direction)] = proxy_.measurements(direction);
+  }
+  status.clients = proxy_.clients();
+  status.in_flight = proxy_.in_flight();
+  status.timer_floor = timer_floor_;
+  status.overflowed = closed_overflowed_ + listener_.overflowed();
+  for (const auto& [client, upstream] : upstreams_) status.overflowed += upstream.socket.overflowed();
+  if (recorder_ != nullptr) status.unrecorded = recorder_->lost();
+  status.scenario_steps = config_.proxy.timeline.size();
+  status.scenario_done = proxy_.steps_done();
+  status.last_change = proxy_.last_change();
+  return status;
+}
+
+bool Driver::publish(LocalTime now) {
+  const std::optional<LocalTime> due = proxy_.next_wake();
+  if (due && *due - now < kPublishRoom && now - next_publish_ < kPublishPeriod) return false;
+  proxy_.follow_timeline(now);
+  Status status = measure(now);
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock) return false;
+  status_ = std::move(status);
+  return true;
+}
+
+}  // namespace tendon::injector

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/time.h"
+#include "tests/tools/injector/injector.h"
+
+namespace tendon::injector {
+
+/// The newest datagrams of one direction of one link, from which a stale replay takes its bytes. Keep one only where
+/// the profile replays: it copies every datagram.
+///
+/// Thread-safe: no.
+class History {
+ public:
+  /// The furthest back that a replay can reach.
+  static constexpr std::size_t kDepth = kMaxReplayDepth;
+
+  void remember(std::span<const std::byte> datagram) {
+    auto& place = ring_[count_++ % kDepth];
+    place.assign(datagram.begin(), datagram.end());
+  }
+
+  /// The datagram remembered `back` calls ago, 1 being the newest; empty when that is further than kDepth or than the
+  /// beginning.
+  std::optional<std::span<const std::byte>> back(std::size_t back) const {
+    if (back == 0 || back > kDepth || back > count_) return std::nullopt;
+    return ring_[(count_ - back) % kDepth];
+  }
+
+ private:
+  std::array<std::vector<std::byte>, kDepth> ring_;
+  std::size_t count_ = 0;
+};
+
+/// Which of the datagrams that one decision may send on their way.
+enum class Copy : std::uint8_t {
+  kFirst,   ///< the datagram itself, damaged where the decision says so
+  kSecond,  ///< its duplicate, whole: copies are made before the damage
+  kStale,   ///< an earlier datagram once more, whole, even one that had been lost
+};
+
+/// Datagrams on their way, in order of due time; those due at the same time leave in the order in which they were
+/// launched. Carries out a Decision: copies, stale replays, truncation and bit flips. What `Tag` holds comes out with
+/// the datagram: where it goes, for whoever sends it.
+///
+/// No allocation once warm: places and buffers (of powers of two, 64 bytes … 64 kB) are used again.
+///
+/// Thread-safe: no.
+template <class Tag>
+class Flight {
+ public:
+  /// 64 MB hold the longest delay (60 s) at 1 kHz in both directions with 400-byte datagrams.
+  static constexpr std::size_t kDefaultMaxBytes = std::size_t{64} << 20;
+
+  /// `max_bytes`: what may be on its way at one time, buffers and bookkeeping; more is refused.
+  explicit Flight(std::size_t max_bytes = kDefaultMaxBytes) : max_bytes_(max_bytes) {}
+
+  /// Sends on their way what `decision` lets through of `datagram`: nothing, the datagram, or copies besides.
+  /// `history` is that of the datagram's own direction and link; null means that nothing is replayed. A copy that does
+  /// not fit into the memory is left out. False when the datagram itself did not fit.
+  bool launch(const Decision& decision, std::span<const std::byte> datagram, const Tag& tag,
+              History* history = nullptr) {
+    bool fits = true;
+    if (decision.verdict != Verdict::kDrop) {
+      const std::size_t size = std::min<std::size_t>(datagram.size(), decision.truncated_to.value_or(UINT32_MAX));
+      std::byte* const bytes = take_off(datagram.first(size), decision.release, Copy::kFirst, tag);
+      fits = bytes != nullptr;
+      // A bit that was cut off, or that a recorded decision flips in a shorter datagram, is not there to be flipped.
+      if (fits && decision.flipped_bit && *decision.flipped_bit / 8 < size) {
+        bytes[*decision.flipped_bit / 8] ^= std::byte{1} << (*decision.flipped_bit % 8);
+      }
+      if (decision.duplicate) take_off(datagram, *decision.duplicate, Copy::kSecond, tag);
+    }
+    if (history != nullptr) {
+      const auto old = decision.stale ? history->back(decision.stale->back) : std::nullopt;
+      if (old) take_off(*old, decision.stale->release, Copy::kStale, tag);
+      history->remember(datagram);
+    }
+    return fits;
+  }
+
+  struct Departure {
+    Tag tag;
+    Copy copy{};
+    LocalTime due{};                      ///< when it should leave
+    std::span<const std::byte> datagram;  ///< valid until the next launch
+  };
+  /// Takes out the next datagram that is due at `now`; empty when there is none.
+  std::optional<Departure> next_due(LocalTime now) {
+    if (heap_.empty() || heap_.front().due > now) return std::nullopt;
+    const Waiting next = heap_.front();
+    std::pop_heap(heap_.begin(), heap_.end(), later);
+    heap_.pop_back();
+    Place& place = places_[next.place];
+    free_places_.push_back(next.place);
+    bytes_ -= cost(place.size_class);
+    Departure departure{place.tag, place.copy, next.due, {place.buffer.get(), place.size}};
+    // The bytes stay as they are until a launch takes this buffer again.
+    free_buffers_[place.size_class].push_back(std::move(place.buffer));
+    return departure;
+  }
+
+  /// When next_due will have something again; empty when nothing is on its way.
+  std::optional<LocalTime> next_wake() const {
+    if (heap_.empty()) return std::nullopt;
+    return heap_.front().due;
+  }
+
+  std::size_t size() const noexcept { return heap_.size(); }
+  /// On their way: buffers and bookkeeping.
+  std::size_t bytes() const noexcept { return bytes_; }
+
+ private:
+  using Buffer = std::unique_ptr<std::byte[]>;
+  static constexpr std::size_t kSmallestBuffer = 64;
+  static constexpr std::size_t kSizeClasses = 11;  // 64 bytes … 64 kB, more than the largest UDP datagram
+
+  struct Place {
+    Tag tag{};
+    Buffer buffer;
+    std::uint32_t size = 0;
+    std::uint8_t size_class = 0;
+    Copy copy{};
+  };
+  struct Waiting {
+    LocalTime due;
+    std::uint64_t launched;
+    std::uint32_t place;
+  };
+  static bool later(const Waiting& a, const Waiting& b) noexcept {
+    return a.due != b.due ? a.due > b.due : a.launched > b.launched;
+  }
+
+  static std::uint8_t size_class_of(std::size_t size) noexcept {
+    return static_cast<std::uint8_t>(std::bit_width((std::max(size, kSmallestBuffer) - 1) / kSmallestBuffer));
+  }
+  static constexpr std::size_t cost(std::size_t size_class) noexcept {
+    return (kSmallestBuffer << size_class) + sizeof(Place) + sizeof(Waiting);
+  }
+
+  /// The copy's own bytes, or null when it does not fit.
+  std::byte* take_off(std::span<const std::byte> datagram, LocalTime due, Copy copy, const Tag& tag) {
+    const std::uint8_t size_class = size_class_of(datagram.size());
+    if (size_class >= kSizeClasses || cost(size_class) > max_bytes_ - bytes_) return nullptr;
+    bytes_ += cost(size_class);
+    if (free_places_.empty()) {
+      free_places_.push_back(static_cast<std::uint32_t>(places_.size()));
+      places_.emplace_back();
+    }
+    const std::uint32_t index = free_places_.back();
+    free_places_.pop_back();
+    Place& place = places_[index];
+    place.tag = tag;
+    place.copy = copy;
+    place.buffer = buffer_of(size_class);
+    place.size = static_cast<std::uint32_t>(datagram.size());
+    place.size_class = size_class;
+    if (!datagram.empty()) std::memcpy(place.buffer.get(), datagram.data(), datagram.size());
+    heap_.push_back({due, launched_++, index});
+    std::push_heap(heap_.begin(), heap_.end(), later);
+    return place.buffer.get();
+  }
+
+  Buffer buffer_of(std::uint8_t size_class) {
+    auto& free = free_buffers_[size_class];
+    if (free.empty()) {
+      const std::size_t size = kSmallestBuffer << size_class;
+      if (size > max_bytes_ - std::min(held_, max_bytes_)) give_back();
+      held_ += size;
+      return Buffer(new std::byte[size]);
+    }
+    Buffer buffer = std::move(free.back());
+    free.pop_back();
+    return buffer;
+  }
+
+  /// Buffers of all sizes that wait for another use: when the sizes of datagrams change for good, those of the sizes
+  /// before would stay for ever.
+  void give_back() {
+    for (std::size_t size_class = 0; size_class < kSizeClasses; ++size_class) {
+      held_ -= free_buffers_[size_class].size() * (kSmallestBuffer << size_class);
+      free_buffers_[size_class].clear();
+    }
+  }
+
+  std::size_t max_bytes_;
+  std::size_t bytes_ = 0;
+  std::size_t held_ = 0;  // in buffers, in use or free
+  std::uint64_t launched_ = 0;
+  std::vector<Place> places_;
+  std::vector<std::uint32_t> free_places_;
+  std::array<std::vector<Buffer>, kSizeClasses> free_buffers_;
+  std::vector<Waiting> heap_;
+};
+
+}  // namespace tendon::injector

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/injector/proxy/live_run.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <deque>
+#include <exception>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "tests/tools/injector/proxy/control_socket.h"
+#include "tests/tools/injector/proxy/driver.h"
+#include "tests/tools/injector/proxy/real_time.h"
+#include "tests/tools/injector/proxy/terminal.h"
+#include "tests/tools/injector/proxy/terminal_view.h"
+#include "tests/tools/injector/traces/trace_recorder.h"
+
+namespace tendon::injector {
+namespace {
+
+/// As often as the driver has something new to say.
+constexpr Duration kRedrawPeriod = std::chrono::milliseconds(200);
+constexpr Duration kReportPeriod = std::chrono::seconds(1);
+
+std::atomic<Driver*> driver_to_stop = nullptr;
+
+void request_stop(int /*signal*/) {
+  if (Driver* const driver = driver_to_stop) driver->stop();
+}
+
+/// While it lives, SIGINT and SIGTERM stop the driver, and a reader of our output who leaves does not kill us.
+class Signals {
+ public:
+  explicit Signals(Driver& driver) {
+    driver_to_stop = &driver;
+    struct sigaction stop {};
+    stop.sa_handler = request_stop;
+    struct sigaction ignore {};
+    ignore.sa_handler = SIG_IGN;
+    ::sigaction(SIGINT, &stop, &before_[0]);
+    ::sigaction(SIGTERM, &stop, &before_[1]);
+    ::sigaction(SIGPIPE, &ignore, &before_[2]);
+  }
+  ~Signals() {
+    ::sigaction(SIGINT, &before_[0], nullptr);
+    ::sigaction(SIGTERM, &before_[1], nullptr);
+    ::sigaction(SIGPIPE, &before_[2], nullptr);
+    driver_to_stop = nullptr;
+  }
+  Signals(const Signals&) = delete;
+  Signals& operator=(const Signals&) = delete;
+
+ private:
+  std::array<struct sigaction, 3> before_{};
+};
+
+/// Runs the driver; its end can be polled for.
+class DriverThread {
+ public:
+  explicit DriverThread(Driver& driver)
+      : driver_(driver), ended_(::eventfd(0, EFD_CLOEXEC)), thread_([this] { run(); }) {}
+  ~DriverThread() {
+    driver_.stop();
+    if (thread_.joinable()) thread_.join();
+    ::close(ended_);
+  }
+  DriverThread(const DriverThread&) = delete;
+  DriverThread& operator=(const DriverThread&) = delete;
+
+  int fd() const { return ended_; }
+  /// Waits for the end, and throws what it ended with.
+  void join() {
+    thread_.join();
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  void run() {
+    try {
+      driver_.run();
+    } catch (...) {
+      error_ = std::current_exception();
+    }
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = ::write(ended_, &one, sizeof one);
+  }
+
+  Driver& driver_;
+  int ended_;
+  std::exception_ptr error_;
+  std::thread thread_;
+};
+
+Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& options) {
+  return {.listen = options.listen,
+          .server = options.server,
+          .proxy = {.networks = network.networks,
+                    .timeline = network.timeline,
+                    .replay = network.replay.get(),
+                    .replay_by = network.replay_by,
+                    .record = !options.record.empty(),
+                    .max_clients = options.max_clients},
+          .spin = options.spin,
+          .realtime = options.realtime,
+          .duration = options.duration};
+}
+
+/// What is said and heard while the driver runs.
+class Conversation {
+ public:
+  Conversation(const PreparedNetwork& network, const LiveRun& options, Driver& driver, TraceRecorder* recorder)
+      : network_(network), options_(options), driver_(driver), recorder_(recorder) {
+    heading_ = {to_string(driver.local_address()), to_string(options.server), network.seed, network.text,
+                options.max_release_error};
+    if (!options.control.empty()) control_.emplace(options.control);
+    if (!options.json) terminal_ = Terminal::take();
+    said_.emplace_back();
+  }
+
+  void begin() {
+    if (options_.json) {
+      std::cout << R"({"event":"start","listen":")" << heading_.listen << R"(","to":")" << heading_.server
+                << R"(","seed":)" << heading_.seed << R"(,"up":)" << json_string(network_.text[0]) << R"(,"down":)"
+                << json_string(network_.text[1]) << "}" << std::endl;
+    } else if (!terminal_) {
+      std::cout << "tendon-inject: " << heading_.listen << " -> " << heading_.server << ", seed " << heading_.seed
+                << "\n  up:   " << network_.text[0] << "\n  down: " << network_.text[1] << std::endl;
+    }
+  }
+
+  void run_until(int ended) {
+    const Duration period = terminal_ ? kRedrawPeriod : kReportPeriod;
+    LocalTime next = monotonic_now() + period;
+    for (;;) {
+      std::vector<pollfd> fds = {{ended, POLLIN, 0}};
+      if (terminal_) fds.push_back({Terminal::fd(), POLLIN, 0});
+      if (control_) control_->wait_for(fds);
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(next - monotonic_now());
+      ::poll(fds.data(), fds.size(), static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+      if (fds.front().revents != 0) return;
+      if (control_) control_->turn([this](std::string_view line) { return answer(line); });
+      if (terminal_) listen_to_user();
+      const LocalTime now = monotonic_now();
+      if (now < next) continue;
+      next += period * ((now - next) / period + 1);
+      report();
+    }
+  }
+
+  /// Returns the verdict.
+  bool end() {
+    const Status last = driver_.status();
+    tell_of_clients(last);
+    note_changes(last);
+    if (terminal_) {
+      draw(last);
+      terminal_.reset();
+    }
+    if (options_.json) {
+      std::cout << R"({"event":"end","seed":)" << heading_.seed << "," << json_members(last, options_.max_release_error)
+                << "}" << std::endl;
+    } else {
+      std::cout << end_text(heading_, last) << std::flush;
+    }
+    return why_invalid(last, options_.max_release_error).empty();
+  }
+
+ private:
+  void report() {
+    Status status = driver_.status();
+    tell_of_clients(status);
+    note_changes(status);
+    if (terminal_) {
+      draw(status);
+    } else if (options_.json) {
+      std::cout << R"({"event":"report","seed":)" << heading_.seed << ","
+                << json_members(status, options_.max_release_error) << "}" << std::endl;
+    } else {
+      std::cout << log_line(status, said_.back()) << std::endl;
+    }
+    // The picture shows the last second, the reports what is new since the one before.
+    said_.push_back(std::move(status));
+    while (said_.size() > 1 && (!terminal_ || said_.back().elapsed - said_[1].elapsed >= kReportPeriod)) {
+      said_.pop_front();
+    }
+  }
+
+  void draw(const Status& status) {
+    const std::string typed = terminal_->typed().empty() ? said_to_user_ : terminal_->typed();
+    terminal_->draw(terminal_view(heading_, status, said_.front(), typed, terminal_->columns()));
+  }
+
+  void tell_of_clients(const Status& status) {
+    if (terminal_) return;  // it shows them
+    for (const Proxy::ClientSummary& client : status.clients) {
+      if (client.index < known_clients_) continue;
+      known_clients_ = client.index + 1;
+      std::cerr << "tendon-inject: client " << client.index << " is " << to_string(client.address) << "\n";
+    }
+  }
+
+  /// The steps of the timeline, into the trace.
+  void note_changes(const Status& status) {
+    for (; noted_ < status.scenario_done; ++noted_) {
+      if (recorder_ != nullptr) recorder_->note(network_.timeline[noted_].change.text);
+    }
+  }
+
+  void listen_to_user() {
+    while (const auto line = terminal_->next_line()) {
+      said_to_user_ = line->empty() ? "" : *line + ": " + answer(*line);
+    }
+    draw(driver_.status());
+  }
+
+  /// Does what the line says, and answers with one line.
+  std::string answer(std::string_view line) {
+    try {
+      return execute(line);
+    } catch (const std::exception& error) {
+      return std::string("error: ") + error.what();
+    }
+  }
+
+  std::string execute(std::string_view line);
+
+  const PreparedNetwork& network_;
+  const LiveRun& options_;
+  Driver& driver_;
+  TraceRecorder* recorder_;
+  Heading heading_;
+  std::optional<ControlSocket> control_;
+  std::unique_ptr<Terminal> terminal_;
+  std::deque<Status> said_;
+  std::string said_to_user_;
+  ClientIndex known_clients_ = 0;
+  std::size_t noted_ = 0;  // steps of the timeline
+};
+
+std::string Conversation::execute(std::string_view line) {
+  const Command command = parse_command(line);
+  if (const auto* request = std::get_if<Request>(&command)) {
+    switch (*request) {
+      case Request::kStats:
+        return "{" + json_members(driver_.status(), options_.max_release_error) + "}";
+      case Request::kHelp:
+        return command_help();
+      case Request::kStop:
+        driver_.stop();
+        return "ok";
+    }
+  }
+  const Change& change = std::get<Change>(command);
+  if (network_.replay && (change.up || change.down)) {
+    throw std::invalid_argument("a trace is replayed: its network cannot be changed");
+  }
+  driver_.change(prepare(change, network_.seed));
+  if (recorder_ != nullptr) recorder_->note(change.text);
+  if (options_.json) std::cout << R"({"event":"change","change":)" << json_string(change.text) << "}" << std::endl;
+  return "ok";
+}
+
+}  // namespace
+
+int live_run(const PreparedNetwork& network, const LiveRun& options) {
+  std::optional<TraceRecorder> recorder;
+  std::optional<Driver> driver;
+  std::optional<Conversation> made;
+  try {
+    if (!options.record.empty()) recorder.emplace(options.record, network.header());
+    driver.emplace(driver_config(network, options), recorder ? &*recorder : nullptr);
+    made.emplace(network, options, *driver, recorder ? &*recorder : nullptr);
+  } catch (const std::runtime_error& error) {  // addresses and files that cannot be used
+    throw std::invalid_argument(error.what());
+  }
+  Conversation& conversation = *made;
+  const Signals signals(*driver);
+  conversation.begin();
+  DriverThread thread(*driver);
+  conversation.run_until(thread.fd());
+  thread.join();
+  const bool valid = conversation.end();
+  if (recorder) recorder->finish();
+  return valid ? 0 : 1;
+}
+
+}  // namespace tendon::injector

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-inject: a bad network that can be replayed, as a UDP proxy. What it can be asked for is in command_line.cc.
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "tests/tools/injector/command_line.h"
+#include "tests/tools/injector/profile/named_profiles.h"
+#include "tests/tools/injector/proxy/control_socket.h"
+
+namespace tendon::injector {
+namespace {
+
+/// One for each thing that can be asked for; returns the exit code.
+struct Runner {
+  int operator()(const HelpTask& task) const {
+    std::cout << task.text;
+    return 0;
+  }
+
+  int operator()(const ProfilesTask& task) const {
+    for (const NamedProfile& profile : named_profiles()) {
+      if (task.json) {
+        std::cout << R"({"name":)" << json_string(std::string(profile.name)) << R"(,"what":)"
+                  << json_string(std::string(profile.what)) << R"(,"up":)" << json_string(std::string(profile.up))
+                  << R"(,"down":)" << json_string(std::string(profile.down)) << "}\n";
+      } else {
+        std::cout << profile.name << "\n    " << profile.what << "\n    up:   " << profile.up
+                  << "\n    down: " << profile.down << "\n";
+      }
+    }
+    return 0;
+  }
+
+  int operator()(const ControlTask& task) const {
+    const std::string answer = ask_control_socket(task.socket, task.line);
+    const bool refused = answer.starts_with("error: ");
+    (refused ? std::cerr : std::cout) << answer << "\n";
+    return refused ? 1 : 0;
+  }
+
+  int operator()(const DryTask& task) const {
+    const PreparedNetwork network = prepare(task.network);
+    std::ofstream file;
+    std::optional<TraceWriter> trace;
+    if (!task.record.empty()) {
+      file.open(task.record, std::ios::binary);
+      if (!file) throw std::invalid_argument("--record: cannot write " + task.record.string());
+      trace.emplace(file, network.header());
+    }
+    if (!task.run.json) std::cout << "seed " << network.seed << "\n";
+    dry_run(network, task.run, std::cout, trace ? &*trace : nullptr);
+    file.flush();
+    if (!std::cout || (trace && !file)) throw std::runtime_error("not all could be written");
+    return 0;
+  }
+
+  int operator()(const ImportTask& task) const {
+    std::ifstream from(task.from, std::ios::binary);
+    if (!from) throw std::invalid_argument("cannot read " + task.from.string());
+    const std::string name = task.from.string();
+    const Trace trace = task.format == "ping"   ? import_ping(from, name, task.options)
+                        : task.format == "irtt" ? import_irtt(from, name, task.options)
+                        : task.format == "csv"  ? import_csv(from, name, task.options)
+                                                : import_mahimahi_log(from, name, task.options);
+    std::ofstream to(task.to, std::ios::binary);
+    write_trace(to, trace);
+    to.flush();
+    if (!to) throw std::runtime_error("cannot write " + task.to.string());
+    std::cerr << "tendon-inject: " << trace.records.size() << " datagrams; replay them with --replay "
+              << task.to.string() << " --by time\n";
+    return 0;
+  }
+
+  int operator()(const ExportTask& task) const {
+    write_delays(std::cout, read_trace(task.trace));
+    if (!std::cout.flush()) throw std::runtime_error("not all could be written");
+    return 0;
+  }
+
+  int operator()(const SelftestTask& task) const { return selftest(task.options, std::cout) ? 0 : 1; }
+
+  int operator()(const LiveTask& task) const { return live_run(prepare(task.network), task.run); }
+};
+
+int main(int argc, char** argv) {
+  try {
+    return std::visit(Runner{}, parse_command_line(argc, argv));
+  } catch (const std::invalid_argument& error) {
+    std::cerr << "tendon-inject: " << error.what() << "\n";
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-inject: " << error.what() << "\n";
+    return 1;
+  }
+}
+
+}  // namespace
+}  // namespace tendon::injector
+
+int main(int argc, char** argv) { return tendon::injector::main(argc, argv); }

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/injector/traces/trace_player.h"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+namespace tendon::injector {
+namespace {
+
+template <class Keep>
+Duration median(const std::vector<TraceRecord>& records, const Keep& keep) {
+  std::vector<Duration> delays;
+  for (const TraceRecord& record : records) {
+    if (record.verdict != Verdict::kDrop && keep(record)) delays.push_back(record.release - record.arrival);
+  }
+  if (delays.empty()) return Duration::zero();
+  const auto middle = delays.begin() + static_cast<std::ptrdiff_t>((delays.size() - 1) / 2);
+  std::ranges::nth_element(delays, middle);
+  return *middle;
+}
+
+std::uint32_t recorded_link(const Trace& trace, std::uint32_t link) {
+  std::set<std::uint32_t> links;
+  for (const TraceRecord& record : trace.records) links.insert(record.link);
+  if (links.empty() || links.contains(link)) return link;
+  return *std::next(links.begin(), static_cast<std::ptrdiff_t>(link % links.size()));
+}
+
+}  // namespace
+
+Duration median_delay(const Trace& trace, Direction direction) {
+  return median(trace.records, [direction](const TraceRecord& record) { return record.direction == direction; });
+}
+
+TracePlayer::TracePlayer(const Trace& trace, Direction direction, std::uint32_t link, By by, LocalTime start)
+    : by_(by), start_(start), recorded_start_(trace.start), wraps_(!trace.sparse()) {
+  if (by == By::kTime && trace.sparse()) {
+    throw std::invalid_argument("a sparse trace cannot be replayed by time, only by index");
+  }
+  const std::uint32_t wanted = recorded_link(trace, link);
+  for (const TraceRecord& record : trace.records) {
+    if (record.direction == direction && record.link == wanted) records_.push_back(record);
+  }
+  std::ranges::sort(records_, {}, &TraceRecord::index);
+
+  benign_ = trace.sparse() ? trace.benign[static_cast<std::size_t>(direction)].value_or(Duration::zero())
+                           : median(records_, [](const TraceRecord&) { return true; });
+  if (records_.empty()) {
+    wraps_ = false;
+    return;
+  }
+  LocalTime newest = LocalTime::min();
+  for (const TraceRecord& record : records_) {
+    if (record.verdict == Verdict::kDrop) continue;
+    in_order_ = in_order_ && record.release >= newest;
+    newest = record.release;
+  }
+  length_ = records_.back().index + 1;
+  const auto [first, last] = std::ranges::minmax(trace.records, {}, &TraceRecord::arrival);
+  const auto distances = static_cast<std::int64_t>(std::max<std::size_t>(trace.records.size() - 1, 1));
+  period_ = std::max(last.arrival - recorded_start_ + (last.arrival - first.arrival) / distances, Duration(1));
+}
+
+TracePlayer::Found TracePlayer::find_by_index(std::uint64_t index) {
+  if (records_.empty()) return {};
+  const std::uint64_t cycle = wraps_ ? index / length_ : 0;
+  const std::uint64_t wanted = wraps_ ? index % length_ : index;
+  if (wanted == 0) cursor_ = 0;
+  while (cursor_ < records_.size() && records_[cursor_].index < wanted) ++cursor_;
+  const bool there = cursor_ < records_.size() && records_[cursor_].index == wanted;
+  return {there ? &records_[cursor_] : nullptr, cycle};
+}
+
+TracePlayer::Found TracePlayer::find_by_time(LocalTime arrival) const {
+  if (records_.empty()) return {};
+  const Duration since = std::max(arrival - start_, Duration::zero());
+  const LocalTime then = recorded_start_ + since % period_;
+  const auto after = std::ranges::upper_bound(records_, then, {}, &TraceRecord::arrival);
+  const TraceRecord* const record = after == records_.begin() ? &*after : &*std::prev(after);
+  return {record, static_cast<std::uint64_t>(since / period_)};
+}
+
+Decision TracePlayer::decide(const Packet& packet) {
+  const std::uint64_t index = next_index_++;
+  const Found found = by_ == By::kIndex ? find_by_index(index) : find_by_time(packet.arrival);
+
+  Decision decision;
+  decision.cause = Cause::kReplay;
+  decision.release = packet.arrival + benign_;
+  if (found.record != nullptr) {
+    decision = *found.record;
+    const auto moved = [&](LocalTime at) { return packet.arrival + (at - found.record->arrival); };
+    decision.release = moved(decision.release);
+    if (decision.duplicate) decision.duplicate = moved(*decision.duplicate);
+    if (decision.stale) decision.stale->release = moved(decision.stale->release);
+    // Counted on, because a driver takes another port when the number changes, and a smaller one would be no new port.
+    rebinds_ = static_cast<std::uint32_t>(found.cycle * records_.back().rebinds + found.record->rebinds);
+  }
+  decision.index = index;
+  decision.arrival = packet.arrival;
+  decision.size = packet.size;
+  decision.rebinds = rebinds_;
+  if (decision.verdict == Verdict::kDrop) return decision;
+
+  if (in_order_ && decision.release < last_release_) decision.release = last_release_;
+  if (decision.duplicate) decision.duplicate = std::max(*decision.duplicate, decision.release);
+  last_release_ = decision.release;
+  return decision;
+}
+
+}  // namespace tendon::injector

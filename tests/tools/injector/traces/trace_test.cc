@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/injector/traces/trace.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "tests/tools/injector/injector.h"
+
+namespace tendon::injector {
+namespace {
+
+using namespace std::chrono_literals;
+
+LocalTime at(Duration since_zero) { return LocalTime(since_zero); }
+
+/// A record with each optional member there or not, as `bits` says.
+TraceRecord record_of(std::uint64_t index, std::uint64_t bits) {
+  TraceRecord record;
+  record.direction = (bits & 1) != 0 ? Direction::kDown : Direction::kUp;
+  record.link = static_cast<std::uint32_t>(bits >> 1 & 3);
+  record.index = index;
+  record.arrival = at(Duration(index * 1'000'003));
+  record.size = static_cast<std::uint32_t>(bits % 1201);
+  record.cause = static_cast<Cause>(bits % 12);
+  record.release = record.arrival + Duration(bits % 50'000'000);
+  if ((bits & 8) != 0) record.payload_hash = bits * 0x9e3779b97f4a7c15;
+  if ((bits & 16) != 0) record.actual = record.release + 80us;
+  if ((bits & 32) != 0) {
+    record.verdict = Verdict::kDuplicate;
+    record.duplicate = record.release + 1ms;
+  } else if ((bits & 64) != 0) {
+    record.verdict = Verdict::kDrop;
+  }
+  if ((bits & 128) != 0) record.stale = {record.arrival + 2ms, static_cast<std::uint32_t>(1 + bits % 64)};
+  if ((bits & 256) != 0) record.flipped_bit = static_cast<std::uint32_t>(bits % 9600);
+  if ((bits & 512) != 0) record.truncated_to = static_cast<std::uint32_t>(bits % 1200);
+  record.rebinds = static_cast<std::uint32_t>(bits >> 20 & 7);
+  return record;
+}
+
+Trace any_trace(std::size_t count) {
+  std::mt19937_64 random(7);
+  Trace trace;
+  trace.seed = 18'446'744'073'709'551'615U;
+  trace.start = at(-5ms);
+  trace.up = "delay=lognormal(20ms,5ms) loss=burst(2%,4)";
+  trace.down = "delay=20ms";
+  trace.tables = {0x0123456789abcdef, 0};
+  trace.build = "v0.1.0-12-gabc1234";
+  for (std::size_t i = 0; i < count; ++i) trace.records.push_back(record_of(i, random()));
+  trace.notes = {{0, "begins"}, {count / 2, "5000000000 both wifi-bad"}, {count / 2, ""}, {count, "ends"}};
+  return trace;
+}
+
+std::string written(const Trace& trace) {
+  std::ostringstream text;
+  write_trace(text, trace);
+  return text.str();
+}
+
+Trace read(const std::string& text) {
+  std::istringstream from(text);
+  return read_trace(from, "run.csv");
+}
+
+std::string refusal(const std::string& text) {
+  try {
+    read(text);
+    return "";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+constexpr std::string_view kColumns =
+    "dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,stale_back,stale_ns,flipped_bit,"
+    "truncated_to,rebinds\n";
+
+std::string with_lines(std::string_view lines) {
+  return "# tendon-trace 1\n# seed 7\n" + std::string(kColumns) + std::string(lines);
+}
+
+TEST(Trace, ReadsBackExactlyWhatWasWritten) {
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{5000}}) {
+    const Trace trace = any_trace(count);
+    EXPECT_EQ(read(written(trace)), trace);
+    EXPECT_EQ(written(read(written(trace))), written(trace));
+  }
+}
+
+TEST(Trace, AHeaderThatSaysNothingIsReadBackToo) {
+  const Trace trace;
+  EXPECT_EQ(read(written(trace)), trace);
+}
+
+TEST(Trace, ASparseTraceIsReadBackAsOne) {
+  Trace trace = any_trace(10);
+  trace.benign = {20ms, std::nullopt};
+  EXPECT_TRUE(read(written(trace)).sparse());
+  EXPECT_EQ(read(written(trace)), trace);
+}
+
+// The format itself: other programs read it, and traces are kept.
+TEST(Trace, TheTextIsTheOneThatIsDocumented) {
+  Trace trace;
+  trace.seed = 7;
+  trace.up = "delay=20ms";
+  trace.tables = {0x3c0ffee0ddba11ad};
+  trace.build = "v0.1.0";
+  TraceRecord record;
+  record.arrival = at(1ms);
+  record.size = 213;
+  record.release = at(21340211ns);
+  record.payload_hash = 0xb1946ac92492d234;
+  record.actual = at(21391002ns);
+  trace.records.push_back(record);
+  record.direction = Direction::kDown;
+  record.link = 2;
+  record.index = 1;
+  record.verdict = Verdict::kDuplicate;
+  record.cause = Cause::kFifo;
+  record.payload_hash.reset();
+  record.actual.reset();
+  record.duplicate = at(22ms);
+  record.stale = {at(23ms), 5};
+  record.flipped_bit = 9;
+  record.truncated_to = 100;
+  record.rebinds = 3;
+  trace.records.push_back(record);
+  trace.notes = {{1, "5000000 both wifi-bad"}};
+  EXPECT_EQ(written(trace),
+            "# tendon-trace 1\n# seed 7\n# start 0\n# up delay=20ms\n# tables 3c0ffee0ddba11ad\n"
+            "# build v0.1.0\n" +
+                std::string(kColumns) +
+                "up,0,0,1000000,213,b1946ac92492d234,pass,delay,21340211,21391002,,,,,,0\n"
+                "# note 5000000 both wifi-bad\n"
+                "down,2,1,1000000,213,,dup,fifo,21340211,,22000000,5,23000000,9,100,3\n");
+}
+
+TEST(Trace, RecordsOfOneFlowMayComeInAnyOrder) {
+  const std::string text = with_lines(
+      "up,0,1,2000,9,,drop,loss,2000,,,,,,,0\n"
+      "up,0,0,1000,9,,pass,delay,9000,,,,,,,0\n");
+  EXPECT_EQ(read(text).records.front().index, 1U);
+}
+
+TEST(Trace, WhatIsWrongIsNamedWithFileAndLine) {
+  const std::string good = "up,0,0,1000,9,,pass,delay,9000,,,,,,,0\n";
+  EXPECT_EQ(refusal(""), "run.csv:1: expected the first line of a trace, \"# tendon-trace 1\"");
+  EXPECT_EQ(refusal("# tendon-trace 2\n"), "run.csv:1: expected the first line of a trace, \"# tendon-trace 1\"");
+  EXPECT_EQ(refusal("# tendon-trace 1\n"), "run.csv:2: the trace ends before its column names");
+  EXPECT_EQ(
+      refusal("# tendon-trace 1\n# sed 7\n"),
+      "run.csv:2: # \"sed\" is not known, expected seed, start, up, down, tables, build, benign up or benign down");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# seed 7\n# seed 7\n"), "run.csv:3: # seed is there twice");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# seed -1\n"), "run.csv:2: seed is \"-1\", expected a whole number");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# seed\n"), "run.csv:2: # seed has no value");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# benign up -1\n"),
+            "run.csv:2: benign up is \"-1\", expected a delay of 0 ns or more");
+  // Nothing could write such a text again.
+  EXPECT_EQ(refusal("# tendon-trace 1\n# down a\rb\n"),
+            "run.csv:2: there is a carriage return, expected lines that end with \\n");
+  EXPECT_EQ(refusal(with_lines("# note a\rb\n")),
+            "run.csv:4: there is a carriage return, expected lines that end with \\n");
+  EXPECT_EQ(refusal("# tendon-trace 1\n# tables 12 34\n"),
+            "run.csv:2: tables is \"12\", expected 16 hexadecimal digits");
+  EXPECT_EQ(refusal("# tendon-trace 1\nup,0,0\n").substr(0, 36), "run.csv:2: expected the column names");
+  EXPECT_EQ(refusal(with_lines("up,0,0\n")), "run.csv:4: expected 16 fields, found 3");
+  EXPECT_EQ(refusal(with_lines(good + "left,0,1,1000,9,,pass,delay,9000,,,,,,,0\n")),
+            "run.csv:5: dir is \"left\", expected up or down");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,lost,delay,9000,,,,,,,0\n")),
+            "run.csv:4: verdict is \"lost\", expected pass, drop or dup");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,magic,9000,,,,,,,0\n")),
+            "run.csv:4: cause is \"magic\", which is none that this program knows");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,999,,,,,,,0\n")),
+            "run.csv:4: t_out_ns is earlier than t_in_ns");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1e9,9,,pass,delay,999,,,,,,,0\n")),
+            "run.csv:4: t_in_ns is \"1e9\", expected whole nanoseconds");
+  EXPECT_EQ(refusal(with_lines("up,0,0,9000000000000000000,9,,pass,delay,9000000000000000000,,,,,,,0\n")),
+            "run.csv:4: t_in_ns is \"9000000000000000000\", expected a time within 73 years of zero");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,12,pass,delay,9000,,,,,,,0\n")),
+            "run.csv:4: hash is \"12\", expected 16 hexadecimal digits");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,dup,delay,9000,,,,,,,0\n")),
+            "run.csv:4: duplicate_ns: expected a time where verdict is dup, and none elsewhere");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,9000,,,4,,,,0\n")),
+            "run.csv:4: stale_back and stale_ns: expected both or neither");
+  EXPECT_EQ(refusal(with_lines("up,0,0,1000,9,,pass,delay,9000,,,65,2000,,,0\n")),
+            "run.csv:4: stale_back is \"65\", expected 1 to 64");
+  EXPECT_EQ(refusal(with_lines(good + "# note half\n" + good)),
+            "run.csv:6: datagram 0 of this flow is there twice, first in line 4");
+  EXPECT_EQ(refusal(with_lines(good + "up,0,1,999,9,,pass,delay,9000,,,,,,,0\n")),
+            "run.csv:5: t_in_ns is earlier than that of a datagram of the same flow with a smaller index");
+  EXPECT_EQ(refusal(with_lines("up,0,1,999,9,,pass,delay,9000,,,,,,,0\n" + good)),
+            "run.csv:4: t_in_ns is earlier than that of a datagram of the same flow with a smaller index");
+  EXPECT_EQ(refusal(with_lines(good.substr(0, 20))),
+            "run.csv:4: the last line is not complete; remove it to use the trace without it");
+}
+
+// What a libFuzzer target would do, with the bytes that matter most: a trace with a few of them changed, cut or moved.
+TEST(Trace, NoBytesWhateverDoMoreThanAnError) {
+  std::mt19937_64 random(1);
+  const std::string good = written(any_trace(20));
+  constexpr std::string_view kLikely = ",,\n\n0123456789-# abcdefupdown\r\0\xff";
+  std::size_t read_well = 0;
+  for (int run = 0; run < 4000; ++run) {
+    std::string text = good;
+    for (std::uint64_t changes = random() % 4; changes > 0; --changes) {
+      const std::size_t where = random() % text.size();
+      switch (random() % 3) {
+        case 0:
+          text[where] = kLikely[random() % kLikely.size()];
+          break;
+        case 1:
+          text.erase(where, random() % 40);
+          break;
+        default:
+          text.insert(where, text.substr(random() % text.size(), random() % 40));
+      }
+      if (text.empty()) break;
+    }
+    try {
+      const Trace trace = read(text);
+      ++read_well;
+      EXPECT_EQ(read(written(trace)), trace);
+    } catch (const std::runtime_error&) {
+    }
+  }
+  EXPECT_GT(read_well, 500U);
+}
+
+TEST(Trace, AHeaderWithALineBreakIsRefusedAndANoteLosesIt) {
+  Trace trace;
+  trace.up = "delay=20ms\n# seed 8";
+  EXPECT_THROW(written(trace), std::invalid_argument);
+  trace.up.clear();
+  trace.notes = {{0, "one\ntwo\r"}};
+  EXPECT_EQ(read(written(trace)).notes.front().text, "one two ");
+}
+
+TEST(Trace, DelaysAreExportedInMillisecondsWithoutRounding) {
+  Trace trace;
+  trace.start = at(1s);
+  TraceRecord record;
+  record.arrival = at(1s + 1ns);
+  record.release = at(1s + 20'500'001ns);
+  record.actual = at(1s + 20'600'000ns);
+  trace.records.push_back(record);
+  record.index = 1;
+  record.verdict = Verdict::kDrop;
+  record.actual.reset();
+  trace.records.push_back(record);
+  std::ostringstream text;
+  write_delays(text, trace);
+  EXPECT_EQ(text.str(),
+            "dir,link,index,t_ms,delay_ms,actual_delay_ms\n"
+            "up,0,0,0.000001,20.500000,20.599999\n"
+            "up,0,1,0.000001,,\n");
+}
+
+// The vectors of xxHash's own specification tool: xxhsum -H1 of "", "a" and "abc".
+TEST(Trace, PayloadsAreHashedWithXxh64) {
+  const auto hash = [](std::string_view text) { return payload_hash(std::as_bytes(std::span(text))); };
+  EXPECT_EQ(hash(""), 0xef46db3751d8e999U);
+  EXPECT_EQ(hash("a"), 0xd24ec4f1a98c6e5bU);
+  EXPECT_EQ(hash("abc"), 0x44bc2cf5ad770999U);
+}
+
+}  // namespace
+}  // namespace tendon::injector

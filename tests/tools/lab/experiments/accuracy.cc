@@ -1,0 +1,889 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+#include "clients/softbody/fem/mesh.h"
+#include "clients/softbody/fem/solid.h"
+#include "clients/softbody/models/explicit.h"
+#include "clients/softbody/models/linear.h"
+#include "clients/softbody/models/quasi_static.h"
+#include "server/build_info.h"
+#include "tests/tools/injector/injector.h"
+#include "tests/tools/injector/profile/named_profiles.h"
+#include "tests/tools/lab/pictures/gnuplot.h"
+#include "tests/tools/lab/pictures/json.h"
+#include "tests/tools/lab/pictures/panels.h"
+
+namespace tendon::lab {
+namespace {
+
+using namespace softbody;
+
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kManyUpdates = 400;  // timed; fewer if …
+constexpr double kSettled = 0.03;          // two times through the script have so nearly the same median, or after …
+constexpr double kLongestTiming = 4;       // s
+constexpr std::size_t kFirstUpdates = 10;  // show whether it is far too slow
+constexpr int kMostPresses = 10;           // of Newton's method, for an answer under a load
+constexpr double kReach = 0.3;             // patch radii, that a table of the surface holds
+constexpr int kStaticModes = 3;            // along each axis of that, of a modal body
+constexpr double kUnfeltMs = 0.1;          // a tenth of a period of the device: nobody feels who is quicker by less
+/// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
+constexpr double kJustNoticeable = 15;  // %
+
+std::array<int, 3> cells_of(const PressedBlock& block, int n) {
+  const auto along = [&](int axis) {
+    return std::max(1, static_cast<int>(std::lround(n * block.size[axis] / block.size.x())));
+  };
+  return {n, along(1), along(2)};
+}
+
+/// The block of water's density, cut up and held.
+constexpr double kDensity = 1000;  // kg/m³
+
+Solid solid_of(const PressedBlock& block, const Candidate& candidate, softbody::Law law, const Material& material) {
+  Mesh mesh = softbody::block(info(candidate.element).shape, block.size, cells_of(block, candidate.n));
+  const Fixed fixed = fix_where(mesh, [](const Vec3& node) { return node.z() < 1e-9; });
+  return {std::move(mesh), candidate.element, material, law, fixed};
+}
+
+BodyConfig body_of(const PressedBlock& block, const Candidate& candidate) {
+  BodyConfig config;
+  config.shape = BlockShape{block.size, cells_of(block, candidate.n)};
+  config.element = candidate.element;
+  config.material = block.material;
+  config.model = candidate.model;
+  config.patch_radius = block.patch_radius;
+  config.reach = kReach * block.patch_radius;
+  config.middle = block.touch_point();
+  config.static_modes = kStaticModes;
+  if (info(candidate.model).has_time()) {
+    // Slowed enough to be at rest soon. Explicit steps as long as they may be, with something to spare for a body that
+    // is pressed together, and none longer than a period of the device.
+    const double step = std::min(
+        1e-3, 0.7 * largest_step(solid_of(block, candidate, info(candidate.model).law, block.material), kDensity));
+    config.effects = {.density = kDensity, .step = step, .inertia = true, .damping = 40};
+  }
+  return config;
+}
+
+/// What a model becomes on a fine mesh: see Accuracy.
+Material material_of(const PressedBlock& block, ModelKind model) {
+  switch (model) {
+    case ModelKind::kProjective:
+      return {.young = 2 * block.material.mu(), .poisson = 0};
+    case ModelKind::kMassSpring:
+      return {.young = block.material.young, .poisson = 0.25};
+    default:
+      return block.material;
+  }
+}
+
+/// What the law of a model makes of its mesh, solved until rounding is all that is left. Models with a law in common
+/// share the answers.
+class OnMesh {
+ public:
+  explicit OnMesh(const PressedBlock& block) : block_(block) {}
+
+  const std::array<Stiffness, 2>& of(const Candidate& candidate) {
+    const Material material = material_of(block_, candidate.model);
+    const Key key{info(candidate.model).law, candidate.element, candidate.n, material.young, material.poisson};
+    const auto known = known_.find(key);
+    return known != known_.end() ? known->second : known_.emplace(key, found(candidate, material)).first->second;
+  }
+
+ private:
+  using Key = std::tuple<softbody::Law, Element, int, double, double>;
+
+  std::array<Stiffness, 2> found(const Candidate& candidate, const Material& material) const {
+    const Solid solid = solid_of(block_, candidate, info(candidate.model).law, material);
+    const TouchSurface top(solid.mesh(), Vec3::UnitZ(), block_.patch_radius);
+    const Patch patch = *top.patch(top.across(block_.touch_point()));
+    std::unique_ptr<Model> model;
+    if (solid.law() == softbody::Law::kLinear) {
+      model = std::make_unique<LinearModel>(solid, top);
+    } else {
+      model = std::make_unique<QuasiStaticModel>(solid, top, QuasiStaticModel::Config{.tolerance = 1e-10});
+    }
+    std::array<Stiffness, 2> result;
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      const Reaction reaction = model->press(patch, Given::kForce, block_.loads[i]);
+      result[i] = {reaction.force / reaction.depth, reaction.stiffness};
+    }
+    return result;
+  }
+
+  const PressedBlock& block_;
+  std::map<Key, std::array<Stiffness, 2>> known_;
+};
+
+/// A body with time waits until it is at rest, and rounds until they change nothing. Newton's method is there at once;
+/// or never, where the body collapses.
+Reaction at_rest(Body& body, ModelKind model, double load) {
+  if (body.step() > 0 || model == ModelKind::kProjective) return body.settle(Given::kForce, load);
+  Reaction reaction;
+  for (int i = 0; i < kMostPresses && !(i > 0 && reaction.error <= 1e-4 * load); ++i) {
+    reaction = body.press(Given::kForce, load);
+  }
+  return reaction;
+}
+
+/// What a settled answer comes to; whose fault it is is not known yet.
+Accuracy accuracy_of(const Reaction& reaction, const Stiffness& right) {
+  const double k = reaction.force / reaction.depth;
+  return {.k = k,
+          .total = k / right.secant - 1,
+          .model = kNoNumber,
+          .discretisation = kNoNumber,
+          .solver = kNoNumber,
+          .tangent = reaction.stiffness / right.tangent - 1};
+}
+
+void split_error(AccuracyPoint& point, Truth& truth, OnMesh& on_mesh) {
+  const ModelKind model = point.candidate.model;
+  const Material material = material_of(truth.block(), model);
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    const auto limit = truth.limit(info(model).law, material, load);
+    if (!limit) continue;
+    Accuracy& error = point.at_load[load];
+    const double right = truth.stiffness(load).secant;
+    const double mesh = on_mesh.of(point.candidate)[load].secant;
+    if (model == ModelKind::kMassSpring) {
+      // They have settled, on a mesh whose error is that of the body with ν = 1/4.
+      error.model = limit->secant * error.k / mesh / right - 1;
+      error.discretisation = error.total - error.model;
+      error.solver = 0;
+    } else {
+      error.model = limit->secant / right - 1;
+      error.discretisation = (mesh - limit->secant) / right;
+      error.solver = (error.k - mesh) / right;
+    }
+  }
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return kNoNumber;
+  const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+Route route_of(const Network& network, double update_ms) {
+  return {.there = injector::resolve_profile(network.name, injector::Direction::kDown),
+          .back = injector::resolve_profile(network.name, injector::Direction::kUp),
+          .compute = from_seconds(1e-3 * update_ms)};
+}
+
+/// What the meter itself costs.
+double floor_of(const Meter& meter) {
+  std::vector<double> idle;
+  for (int i = 0; i < 200; ++i) {
+    const Meter::Reading before = meter.read();
+    idle.push_back((meter.read() - before).processor);
+  }
+  return quantile(idle, 0.5);
+}
+
+/// The tool goes from one place of the script to the next, in as many steps as a body with time makes meanwhile.
+template <class Touch>
+void walk(const Body& body, const std::vector<Touched>& script, std::size_t to, Touch touch) {
+  const int steps =
+      body.step() > 0 ? std::max(1, static_cast<int>(std::lround(Truth::kScriptInterval / body.step()))) : 1;
+  const Vec3& from = script[to == 0 ? 0 : to - 1].tool;
+  for (int step = 1; step <= steps; ++step) touch(from + static_cast<double>(step) / steps * (script[to].tool - from));
+}
+
+/// Follows the script and times the updates; again, as often as their median asks for.
+void follow_script(Body& body, const std::vector<Touched>& script, const Meter& meter, double slowest_ms,
+                   AccuracyPoint& point) {
+  const double floor = floor_of(meter);
+  std::vector<double> times;
+  std::vector<double> instructions;
+  const auto touch = [&](const Vec3& tool) {
+    const Meter::Reading before = meter.read();
+    const Feel feel = body.touch(tool);
+    const Meter::Reading took = meter.read() - before;
+    if (feel.touching) {
+      times.push_back(std::max(0.0, took.processor - floor));
+      if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
+      // Twice as long is no accident of a busy machine.
+      if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
+        throw TooSlow("an update takes more than " + JsonLine::number(slowest_ms) + " ms");
+      }
+    }
+    return feel.force;
+  };
+
+  const Meter::Reading start = meter.read();
+  double squares = 0;
+  double true_squares = 0;
+  double largest = 0;
+  double aside = 0;
+  for (std::size_t i = 0; i < script.size(); ++i) {
+    Vec3 force = Vec3::Zero();
+    walk(body, script, i, [&](const Vec3& tool) { force = touch(tool); });
+    const Vec3 error = force - script[i].force;
+    squares += error.squaredNorm();
+    true_squares += script[i].force.squaredNorm();
+    largest = std::max(largest, script[i].force.norm());
+    point.force_most = std::max(point.force_most, error.norm());
+    if (i < script.size() / 3) aside = std::max(aside, error.head<2>().norm());  // it still goes straight down
+  }
+  point.force_error = std::sqrt(squares / static_cast<double>(script.size()));
+  point.force_relative = std::sqrt(squares / true_squares);
+  point.lateral = aside / largest;
+
+  bool settled = times.empty();
+  while (!settled && times.size() < kManyUpdates && (meter.read() - start).processor < kLongestTiming) {
+    const double before = quantile(times, 0.5);
+    for (std::size_t i = 0; i < script.size(); ++i) walk(body, script, i, touch);
+    settled = std::abs(quantile(times, 0.5) / before - 1) < kSettled;
+  }
+  point.update_ms_p50 = 1e3 * quantile(times, 0.5);
+  point.update_ms_p99 = 1e3 * quantile(times, 0.99);
+  if (!instructions.empty()) point.instructions = quantile(instructions, 0.5);
+}
+
+/// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
+using Figures = std::vector<std::pair<const char*, double>>;
+Figures figures(const AccuracyPoint& p, Truth& truth) {
+  const Accuracy& small = p.at_load[0];
+  const Accuracy& hard = p.at_load[1];
+  const auto& loads = truth.block().loads;
+  Figures all{{"n", p.candidate.n},
+              {"nodes", static_cast<double>(p.size.nodes)},
+              {"k_n_per_m", small.k},
+              {"error_percent", 100 * small.total},
+              {"update_ms_p50", p.update_ms_p50},
+              {"setup_s", p.setup_s},
+              {"bytes", static_cast<double>(p.size.bytes)},
+              {"load_n", loads[0]},
+              {"error_n", loads[0] * small.total},
+              {"model_percent", 100 * small.model},
+              {"discretisation_percent", 100 * small.discretisation},
+              {"solver_percent", 100 * small.solver},
+              {"tangent_error_percent", 100 * small.tangent},
+              {"hard_load_n", loads[1]},
+              {"hard_k_n_per_m", hard.k},
+              {"hard_error_percent", 100 * hard.total},
+              {"hard_error_n", loads[1] * hard.total},
+              {"hard_model_percent", 100 * hard.model},
+              {"hard_discretisation_percent", 100 * hard.discretisation},
+              {"hard_solver_percent", 100 * hard.solver},
+              {"hard_tangent_error_percent", 100 * hard.tangent},
+              {"script_rms_error_n", p.force_error},
+              {"script_largest_error_n", p.force_most},
+              {"script_rms_error_percent", 100 * p.force_relative},
+              {"spurious_lateral_percent", 100 * p.lateral},
+              {"update_ms_p99", p.update_ms_p99},
+              {"hz", 1e3 / p.update_ms_p50},
+              {"step_ms", p.step_ms},
+              {"instructions", p.instructions.value_or(kNoNumber)},
+              {"elements", static_cast<double>(p.size.elements)},
+              {"free", static_cast<double>(p.size.free)},
+              {"truth_k_n_per_m", truth.stiffness(0).secant},
+              {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
+  if (p.felt) {
+    all.insert(all.end(), {{"felt_error_percent", 100 * p.felt->force_error},
+                           {"felt_error_held_percent", 100 * p.felt->held_error},
+                           {"felt_stiffness_percent", 100 * p.felt->displayed},
+                           {"felt_limited_percent", 100 * p.felt->limited_share},
+                           {"felt_vibration_m_s", p.felt->vibration},
+                           {"felt_latency_ms", 1e3 * p.felt->latency}});
+  }
+  return all;
+}
+
+void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth) {
+  std::ofstream csv(file);
+  csv << "model";
+  if (!points.empty()) {
+    for (const auto& [name, value] : figures(points.front(), truth)) csv << ',' << name;
+  }
+  csv << ",commit\n";
+  for (const AccuracyPoint& point : points) {
+    csv << point.candidate.name();
+    for (const auto& [name, value] : figures(point, truth)) {
+      csv << ',' << (std::isfinite(value) ? JsonLine::number(value) : std::string());
+    }
+    csv << ',' << kCommit << '\n';
+  }
+  if (!csv.flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+// ---- The refinement ladders -----------------------------------------------------------------------------------------
+
+/// What a larger n would cost, from the last two: cost ∝ n^p; from one alone with the p that is given.
+double predicted(const std::vector<AccuracyPoint>& ladder, int n, double AccuracyPoint::*cost, double power) {
+  if (ladder.empty()) return 0;
+  const AccuracyPoint& last = ladder.back();
+  if (ladder.size() > 1) {
+    const AccuracyPoint& before = ladder[ladder.size() - 2];
+    power = std::log(last.*cost / before.*cost) / std::log(static_cast<double>(last.candidate.n) / before.candidate.n);
+  }
+  return last.*cost * std::pow(static_cast<double>(n) / last.candidate.n, power);
+}
+
+constexpr double kPowerOfFactors = 6;
+constexpr double kPowerOfSolutions = 4;
+constexpr double kPowerOfMeasuring = 2;  // much of it is the loop at the hand, which knows no mesh
+
+/// The same model and element on finer and finer meshes, up to what an update, a set-up and all of the measuring may
+/// cost. `measured` makes a point of a candidate, or throws.
+template <class Measured>
+std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const AccuracyOptions& options,
+                                  std::vector<std::string>& left_out, Measured measured) {
+  std::vector<AccuracyPoint> points;
+  if (info(model).tetrahedra && element != Element::kTet4) return points;
+  const double longest_setup = options.longest_setup_s.value_or(options.budget_ms ? 5 : 30);
+  for (const int n : options.resolutions) {
+    const Candidate candidate{model, element, n};
+    const std::string name = candidate.name() + " n=" + std::to_string(n);
+    if (predicted(points, n, &AccuracyPoint::update_ms_p50, kPowerOfSolutions) > options.slowest_ms ||
+        predicted(points, n, &AccuracyPoint::setup_s, kPowerOfFactors) > longest_setup ||
+        predicted(points, n, &AccuracyPoint::measuring_s, kPowerOfMeasuring) > options.longest_point_s) {
+      left_out.push_back(name + ": would take too long");
+      break;
+    }
+    if (options.progress) std::cerr << "\r" << name << "            " << std::flush;
+    try {
+      points.push_back(measured(candidate));
+    } catch (const TooSlow& error) {
+      left_out.push_back(name + ": " + error.what());
+      break;
+    } catch (const std::exception& error) {
+      left_out.push_back(name + ": " + error.what());
+    }
+  }
+  return points;
+}
+
+bool for_comparison(ModelKind kind) { return kind == ModelKind::kStVenantKirchhoff || kind >= ModelKind::kMassSpring; }
+
+std::vector<ModelKind> models_of(const AccuracyOptions& options) {
+  if (!options.models.empty()) return options.models;
+  // The quickest first: it is what the others have to beat.
+  if (options.budget_ms) return {ModelKind::kCondensed, ModelKind::kCorotational, ModelKind::kNeoHookean};
+  std::vector<ModelKind> all;
+  for (const ModelInfo& model : models()) all.push_back(model.kind);
+  return all;
+}
+
+std::vector<Element> elements_of(const AccuracyOptions& options) {
+  if (!options.elements.empty()) return options.elements;
+  std::vector<Element> all;
+  for (const ElementInfo& element : elements()) all.push_back(element.element);
+  return all;
+}
+
+// ---- Table and figures ----------------------------------------------------------------------------------------------
+
+void write_row(std::ostream& out, const AccuracyPoint& p) {
+  const Accuracy& small = p.at_load[0];
+  const Accuracy& hard = p.at_load[1];
+  std::array<char, 220> line{};
+  std::snprintf(line.data(), line.size(),
+                "%-24s %3d %6zu %8.1f %+8.1f %+8.1f | %+6.1f %+7.1f %+7.2f | %7.1f %7.1f %8.2f | %9.4f %9.4f %8.0f "
+                "%8.2f %8.2f\n",
+                p.candidate.name().c_str(), p.candidate.n, p.size.nodes, small.k, 100 * small.total, 100 * hard.total,
+                100 * hard.model, 100 * hard.discretisation, 100 * hard.solver, 100 * hard.tangent,
+                100 * p.force_relative, 100 * p.lateral, p.update_ms_p50, p.update_ms_p99, 1e3 / p.update_ms_p50,
+                p.setup_s, static_cast<double>(p.size.bytes) / 1e6);
+  out << line.data();
+}
+
+void write_felt(std::ostream& out, const AccuracyPoint& p) {
+  std::array<char, 160> line{};
+  std::snprintf(line.data(), line.size(), "%-24s %3d %9.4f %+8.1f %8.1f %8.1f %8.0f %8.0f %9.2f %9.0f\n",
+                p.candidate.name().c_str(), p.candidate.n, p.update_ms_p50, 100 * p.at_load[0].total,
+                100 * p.felt->force_error, 100 * p.felt->held_error, 100 * p.felt->displayed,
+                100 * p.felt->limited_share, 1e3 * p.felt->vibration, 1e3 * p.felt->latency);
+  out << line.data();
+}
+
+constexpr const char* kFeltHeading =
+    "                              update  error %        felt error %   shows %  limited vibration   latency\n"
+    "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
+
+constexpr const char* kHeading =
+    "                                           error %   error % | of the hard load's    | tangent  script lateral |"
+    "  update ms                        set-up      MB\n"
+    "model                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %       %        % "
+    "|"
+    "       p50       p99       Hz        s\n";
+
+const char* colour_of(std::size_t i) {
+  constexpr std::array kColours{kBlue, kVermilion, kGreen, kPurple, kOrange, kSky, kPale};
+  return kColours.at(i % kColours.size());
+}
+
+/// A line for a model, the same in all panels; broken for those that are there for comparison …
+Curve curve_of(ModelKind kind) {
+  return {.name = std::string(info(kind).name),
+          .colour = colour_of(static_cast<std::size_t>(kind)),
+          .style = for_comparison(kind) ? Curve::Style::kDashed : Curve::Style::kLine};
+}
+
+/// … whose points are rings.
+Curve::Style points_on(const Curve& line) {
+  return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
+}
+
+/// Draws a curve and its points; points alone where they make no line.
+void add_with_points(Panel& panel, Curve curve) {
+  Curve points{.name = "", .colour = curve.colour, .points = curve.points, .style = points_on(curve)};
+  if (curve.points.size() < 2) {
+    points.name = std::move(curve.name);
+  } else {
+    panel.curves.push_back(std::move(curve));
+  }
+  panel.curves.push_back(std::move(points));
+}
+
+using Ladders = std::vector<std::vector<AccuracyPoint>>;
+
+std::vector<ModelKind> kinds_in(const Ladders& ladders) {
+  std::vector<ModelKind> kinds;
+  for (const auto& ladder : ladders) {
+    if (kinds.empty() || kinds.back() != ladder.front().candidate.model)
+      kinds.push_back(ladder.front().candidate.model);
+  }
+  return kinds;
+}
+
+/// All of a model, or of all of them.
+std::vector<AccuracyPoint> points_of(const Ladders& ladders, std::optional<ModelKind> kind) {
+  std::vector<AccuracyPoint> points;
+  for (const auto& ladder : ladders) {
+    if (!kind || ladder.front().candidate.model == *kind) points.insert(points.end(), ladder.begin(), ladder.end());
+  }
+  return points;
+}
+
+/// |error| over time: a point for everything, a line for each model through those that nothing else of the same model
+/// is both quicker and closer than.
+Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
+  Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
+  const auto place = [&](const AccuracyPoint& p) {
+    return std::pair(p.update_ms_p50 + extra_ms, std::max(0.01, 100 * std::abs(p.at_load.at(load).total)));
+  };
+  const std::vector<AccuracyPoint> all = points_of(ladders, {});
+  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
+  for (const AccuracyPoint& p : all) {
+    range = {std::min(range.first, place(p).first), std::max(range.second, place(p).first)};
+  }
+  panel.x_range = {{range.first / 1.5, range.second * 1.5}};
+  panel.curves.push_back({.name = "not noticed",
+                          .colour = kGrey,
+                          .points = {{panel.x_range->first, kJustNoticeable}, {panel.x_range->second, kJustNoticeable}},
+                          .style = Curve::Style::kBelow});
+  Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
+  for (const AccuracyPoint& p : pareto_front(all, load)) front.points.push_back(place(p));
+  panel.curves.push_back(front);
+  for (const ModelKind kind : kinds_in(ladders)) {
+    Curve line = curve_of(kind);
+    Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
+    for (const AccuracyPoint& p : points_of(ladders, kind)) points.points.push_back(place(p));
+    // A model that collapses on a fine mesh has no parts, and no such points: its name still goes with its colour.
+    for (const AccuracyPoint& p : pareto_front(points_of(ladders, kind), load)) line.points.push_back(place(p));
+    if (line.points.size() < 2) points.name = std::move(line.name);
+    if (line.points.size() >= 2) panel.curves.push_back(std::move(line));
+    panel.curves.push_back(std::move(points));
+  }
+  return panel;
+}
+
+/// |error| of each element over n, for the first model: what refining brings.
+Panel error_over_n(const Ladders& ladders) {
+  const ModelKind kind = ladders.front().front().candidate.model;
+  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
+  Panel panel{.title = "|error| of K, %, over cells along x, an element each: " + std::string(info(kind).name),
+              .x_label = "n",
+              .log_y = true};
+  std::size_t colour = 0;
+  for (const auto& ladder : ladders) {
+    if (ladder.front().candidate.model != kind) continue;
+    range = {std::min<double>(range.first, ladder.front().candidate.n),
+             std::max<double>(range.second, ladder.back().candidate.n)};
+    Curve curve{.name = std::string(info(ladder.front().candidate.element).name), .colour = colour_of(colour++)};
+    for (const AccuracyPoint& p : ladder) {
+      curve.points.emplace_back(p.candidate.n, std::max(0.01, 100 * std::abs(p.at_load[0].total)));
+    }
+    add_with_points(panel, std::move(curve));
+  }
+  panel.x_range = {{range.first - 0.5, range.second + 0.5}};
+  return panel;
+}
+
+std::string load_text(double newtons) { return JsonLine::number(newtons) + " N"; }
+
+}  // namespace
+
+std::string Candidate::name() const { return std::string(info(model).name) + "-" + std::string(info(element).name); }
+
+namespace {
+
+/// A candidate on its way to a point: what has been measured of it, and the body for what has not.
+struct Trial {
+  AccuracyPoint point;
+  Body body;
+};
+
+/// What it costs and answers. Whose fault its errors are, and what is left at the hand, is not asked.
+Trial tried(const Candidate& candidate, Truth& truth, const Meter& meter, double slowest_ms) {
+  const PressedBlock& block = truth.block();
+  const Meter::Reading before = meter.read();
+  Trial trial{.point = {.candidate = candidate}, .body = Body(body_of(block, candidate))};
+  AccuracyPoint& point = trial.point;
+  point.setup_s = (meter.read() - before).processor;
+  point.size = trial.body.size();
+  point.step_ms = 1e3 * trial.body.step();
+  follow_script(trial.body, truth.script(), meter, slowest_ms, point);
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    point.at_load[load] = accuracy_of(at_rest(trial.body, candidate.model, block.loads[load]), truth.stiffness(load));
+  }
+  return trial;
+}
+
+void feel(Trial& trial, Truth& truth, const Network& network, double longest_s) {
+  AccuracyPoint& point = trial.point;
+  point.felt =
+      felt(trial.body, truth, route_of(network, std::max(point.update_ms_p50, point.step_ms)), network.seed, longest_s);
+}
+
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh, const Meter& meter,
+                      const std::optional<Network>& network, const Patience& patience) {
+  // What is found once for all points is none of this one's work.
+  truth.script();
+  truth.limit(info(candidate.model).law, material_of(truth.block(), candidate.model), 0);
+  const Meter::Reading before = meter.read();
+  Trial trial = tried(candidate, truth, meter, patience.update_ms);
+  split_error(trial.point, truth, on_mesh);
+  if (network) feel(trial, truth, *network, patience.felt_s);
+  trial.point.measuring_s = (meter.read() - before).processor;
+  return trial.point;
+}
+
+double at_the_hand_ms(const AccuracyPoint& p) { return std::max({p.update_ms_p50, p.step_ms, kUnfeltMs}); }
+
+}  // namespace
+
+AccuracyPoint measure(const Candidate& candidate, Truth& truth, const Meter& meter,
+                      const std::optional<Network>& network, const Patience& patience) {
+  OnMesh on_mesh(truth.block());
+  return measure(candidate, truth, on_mesh, meter, network, patience);
+}
+
+bool may_be_best(const AccuracyPoint& point, const std::vector<AccuracyPoint>& others) {
+  for (std::size_t load = 0; load < point.at_load.size(); ++load) {
+    const Accuracy& own = point.at_load[load];
+    const double error = std::isfinite(own.without_luck()) ? own.without_luck() : std::abs(own.total);
+    const bool beaten = std::ranges::any_of(others, [&](const AccuracyPoint& other) {
+      // The same mesh by another way is not closer.
+      return at_the_hand_ms(other) <= at_the_hand_ms(point) && 0.999 * other.at_load[load].without_luck() <= error;
+    });
+    if (!beaten && std::isfinite(error)) return true;
+  }
+  return false;
+}
+
+std::vector<AccuracyPoint> pareto_front(std::vector<AccuracyPoint> points, std::size_t load) {
+  const auto error = [load](const AccuracyPoint& p) { return p.at_load.at(load).without_luck(); };
+  std::erase_if(points, [&](const AccuracyPoint& p) { return !std::isfinite(error(p)); });
+  std::ranges::sort(points, {}, &AccuracyPoint::update_ms_p50);
+  double best = std::numeric_limits<double>::infinity();
+  std::erase_if(points, [&](const AccuracyPoint& p) {
+    if (error(p) > 0.999 * best) return true;  // the same mesh by another way is not closer
+    best = error(p);
+    return false;
+  });
+  return points;
+}
+
+double cost_exponent(const std::vector<AccuracyPoint>& ladder) {
+  const auto count = static_cast<double>(ladder.size());
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double xy = 0;
+  for (const AccuracyPoint& p : ladder) {
+    const double unknowns = std::log(static_cast<double>(p.size.free));
+    const double cost = std::log(p.update_ms_p50);
+    x += unknowns;
+    y += cost;
+    xx += unknowns * unknowns;
+    xy += unknowns * cost;
+  }
+  const double spread = count * xx - x * x;
+  return spread > 1e-9 * count * xx ? (count * xy - x * y) / spread : kNoNumber;
+}
+
+const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& points, double budget_ms) {
+  const AccuracyPoint* best = nullptr;
+  for (const AccuracyPoint& p : points) {
+    if (!p.felt || !(p.update_ms_p50 <= budget_ms) || !(p.felt->vibration <= kMostVibration)) continue;
+    if (best == nullptr || p.felt->force_error < best->felt->force_error) best = &p;
+  }
+  return best;
+}
+
+std::string to_json(const AccuracyPoint& point, Truth& truth) {
+  JsonLine line;
+  line.add("model", point.candidate.name());
+  for (const auto& [name, value] : figures(point, truth)) line.add(name, value);
+  return line.add("commit", kCommit).str();
+}
+
+namespace {
+
+/// "420.2"
+std::string with_tenths(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1f", value);
+  return text.data();
+}
+
+void write_truth(std::ostream& out, Truth& truth) {
+  const auto& loads = truth.block().loads;
+  out << "The truth: " << with_tenths(truth.limit(softbody::Law::kLinear, 0)->secant)
+      << " N/m while strains are small, " << with_tenths(truth.stiffness(0).secant) << " N/m under "
+      << load_text(loads[0]) << ", " << with_tenths(truth.stiffness(1).secant) << " N/m under " << load_text(loads[1])
+      << "; its own meshes leave " << with_tenths(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n";
+}
+
+/// What refining costs: a line for each ladder.
+void write_exponents(std::ostream& out, const Ladders& ladders) {
+  out << "\nAn update takes as long as its unknowns to the power of\n";
+  for (const auto& ladder : ladders) {
+    if (ladder.size() < 2) continue;
+    std::array<char, 160> line{};
+    std::snprintf(line.data(), line.size(), "%-24s %5.2f   n = %d to %d, %zu to %zu unknowns, %.4f to %.4f ms\n",
+                  ladder.front().candidate.name().c_str(), cost_exponent(ladder), ladder.front().candidate.n,
+                  ladder.back().candidate.n, ladder.front().size.free, ladder.back().size.free,
+                  ladder.front().update_ms_p50, ladder.back().update_ms_p50);
+    out << line.data();
+  }
+}
+
+/// Which one to take.
+void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
+                  Truth& truth) {
+  if (options.json) {
+    JsonLine line;
+    line.add("budget_ms", *options.budget_ms).add("network", options.network->name);
+    if (best) {
+      line.add("model", best->candidate.name());
+      for (const auto& [name, value] : figures(*best, truth)) line.add(name, value);
+    } else {
+      line.add("model", std::optional<double>());
+    }
+    out << line.add("commit", kCommit).str() << "\n";
+  } else if (!best) {
+    out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
+  } else {
+    out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
+    if (options.budget_ms) out << ", in " << JsonLine::number(*options.budget_ms) << " ms";
+    out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
+        << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
+        << with_tenths(100 * best->at_load[0].total) << " %.\n";
+  }
+}
+
+/// The answer to AccuracyOptions::budget_ms.
+std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& truth, OnMesh& on_mesh,
+                                         const Meter& meter) {
+  std::vector<Trial> kept;
+  std::vector<AccuracyPoint> rivals;  // points of the same
+  const auto keep = [&](Trial trial) {
+    if (!may_be_best(trial.point, rivals)) return;  // whoever's fault its errors are
+    split_error(trial.point, truth, on_mesh);
+    if (!may_be_best(trial.point, rivals)) return;
+    std::erase_if(kept, [&](const Trial& one) { return !may_be_best(one.point, {trial.point}); });
+    kept.push_back(std::move(trial));
+    rivals.clear();
+    for (const Trial& one : kept) rivals.push_back(one.point);
+  };
+  std::vector<std::string> left_out;
+  for (const ModelKind model : models_of(options)) {
+    for (const Element element : elements_of(options)) {
+      ladder(model, element, options, left_out, [&](const Candidate& candidate) {
+        const Meter::Reading before = meter.read();
+        Trial trial = tried(candidate, truth, meter, *options.budget_ms);
+        trial.point.measuring_s = (meter.read() - before).processor;
+        AccuracyPoint point = trial.point;
+        if (point.update_ms_p50 <= *options.budget_ms) keep(std::move(trial));
+        return point;
+      });
+    }
+  }
+  std::vector<AccuracyPoint> at_hand;
+  for (Trial& trial : kept) {
+    if (options.progress) {
+      std::cerr << "\rat the hand: " << trial.point.candidate.name() << " n=" << trial.point.candidate.n
+                << "            " << std::flush;
+    }
+    feel(trial, truth, *options.network, std::numeric_limits<double>::infinity());
+    at_hand.push_back(trial.point);
+  }
+  if (options.progress) std::cerr << "\n";
+  const AccuracyPoint* const best = closest_at_the_hand(at_hand, *options.budget_ms);
+  return best == nullptr ? std::nullopt : std::optional(*best);
+}
+
+/// ms, the median of both ways.
+double round_trip_ms(const Network& network) {
+  const Route route = route_of(network, 0);
+  std::vector<double> ms;
+  injector::Injector there(route.there, network.seed, 0, injector::Direction::kDown, LocalTime{});
+  injector::Injector back(route.back, network.seed, 0, injector::Direction::kUp, LocalTime{});
+  for (int i = 0; i < 2000; ++i) {
+    const LocalTime sent{std::chrono::milliseconds(i)};
+    const LocalTime arrived = there.decide({.arrival = sent, .size = 200}).release;
+    ms.push_back(1e3 * seconds(back.decide({.arrival = arrived, .size = 200}).release - sent));
+  }
+  return quantile(ms, 0.5);
+}
+
+/// Of all elements of a model the ladder with the point that is felt best.
+std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
+  std::vector<const std::vector<AccuracyPoint>*> best;
+  const auto least = [](const std::vector<AccuracyPoint>& ladder) {
+    double error = std::numeric_limits<double>::infinity();
+    for (const AccuracyPoint& p : ladder) error = std::min(error, p.felt->force_error);
+    return error;
+  };
+  for (const auto& ladder : ladders) {
+    const auto same = std::ranges::find_if(
+        best, [&](const auto* known) { return known->front().candidate.model == ladder.front().candidate.model; });
+    if (same == best.end()) {
+      best.push_back(&ladder);
+    } else if (least(ladder) < least(**same)) {
+      *same = &ladder;
+    }
+  }
+  return best;
+}
+
+/// What refining a model brings to the hand, over `x` of its points.
+template <class X>
+Panel felt_over(const std::string& title, const std::string& label, const Ladders& ladders, bool log_x, X x) {
+  Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};
+  std::pair<double, double> range{std::numeric_limits<double>::infinity(), 0};
+  for (const auto* ladder : felt_best(ladders)) {
+    Curve curve = curve_of(ladder->front().candidate.model);
+    for (const AccuracyPoint& p : *ladder) {
+      range = {std::min<double>(range.first, x(p)), std::max<double>(range.second, x(p))};
+      curve.points.emplace_back(x(p), 100 * p.felt->force_error);
+    }
+    add_with_points(panel, std::move(curve));
+  }
+  panel.x_range =
+      log_x ? std::pair(range.first / 1.5, range.second * 1.5) : std::pair(range.first - 0.5, range.second + 0.5);
+  return panel;
+}
+
+void draw(const AccuracyOptions& options, const Ladders& ladders) {
+  const auto& loads = options.block.loads;
+  std::vector<Panel> panels{
+      error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0, 0),
+      error_over_time("… under " + load_text(loads[1]), ladders, 0, 1), error_over_n(ladders)};
+  if (options.network) {
+    panels.push_back(error_over_time(
+        "… under " + load_text(loads[0]) + ", over that and " + options.network->name + ", there and back", ladders,
+        round_trip_ms(*options.network), 0));
+    panels.push_back(felt_over("Error at the hand, %, over cells along x, each model with its best element", "n",
+                               ladders, false, [](const AccuracyPoint& p) { return p.candidate.n; }));
+    panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
+                               [](const AccuracyPoint& p) { return p.update_ms_p50; }));
+  }
+  draw_panels(*options.out / "accuracy", "What accuracy costs in time",
+              "processor time of one core; commit " + std::string(kCommit), panels);
+}
+
+}  // namespace
+
+void accuracy(const AccuracyOptions& options, std::ostream& out) {
+  if (options.resolutions.empty() || options.resolutions.front() < 1 ||
+      !std::ranges::is_sorted(options.resolutions, std::less_equal<>())) {
+    throw std::invalid_argument("--n: expected ascending numbers of cells, as in 4,8,16");
+  }
+  if (options.budget_ms && !options.network) throw std::invalid_argument("--budget-ms: say --network too");
+  if (options.budget_ms && options.out) {
+    throw std::invalid_argument("--out: there is no figure with --budget-ms, which measures no more than it must");
+  }
+  if (options.network) route_of(*options.network, 0);  // an unknown one is refused before anything is measured
+  if (options.progress) std::cerr << "the truth …" << std::flush;
+  Truth truth(options.block, options.truth);
+  truth.script();  // all that every point needs of it, so that the first one is not charged with it
+  const Meter meter;
+  OnMesh on_mesh(options.block);
+  if (options.budget_ms) {
+    write_answer(out, options, best_within(options, truth, on_mesh, meter), truth);
+    return;
+  }
+  const bool rows = !options.json;
+  if (rows) {
+    write_truth(out, truth);
+    out << kHeading;
+  }
+  std::vector<std::string> left_out;
+  Ladders ladders;
+  std::vector<AccuracyPoint> all;
+  for (const ModelKind model : models_of(options)) {
+    for (const Element element : elements_of(options)) {
+      std::vector<AccuracyPoint> points = ladder(model, element, options, left_out, [&](const Candidate& candidate) {
+        const AccuracyPoint point = measure(candidate, truth, on_mesh, meter, options.network,
+                                            {.update_ms = options.slowest_ms, .felt_s = options.longest_point_s});
+        if (rows) {
+          write_row(out, point);
+        } else {
+          out << to_json(point, truth) << "\n";
+        }
+        out.flush();
+        return point;
+      });
+      all.insert(all.end(), points.begin(), points.end());
+      if (!points.empty()) ladders.push_back(std::move(points));
+    }
+  }
+  if (options.progress) std::cerr << "\n";
+  if (rows) {
+    out << "\nThe best, small load: nothing else is both quicker and closer (errors that cancel do not count):\n"
+        << kHeading;
+    for (const AccuracyPoint& point : pareto_front(all, 0)) write_row(out, point);
+    write_exponents(out, ladders);
+    if (options.network) {
+      out << "\nAt the hand, behind " << options.network->name << ", seed " << options.network->seed << ":\n"
+          << kFeltHeading;
+      for (const AccuracyPoint& point : all) write_felt(out, point);
+    }
+    for (const std::string& one : left_out) out << "left out: " << one << "\n";
+  }
+  if (options.network && rows) {
+    std::vector<AccuracyPoint> asked = all;
+    if (options.models.empty()) std::erase_if(asked, [](const auto& p) { return for_comparison(p.candidate.model); });
+    if (const AccuracyPoint* const best = closest_at_the_hand(asked, std::numeric_limits<double>::infinity())) {
+      write_answer(out, options, *best, truth);
+    }
+  }
+  if (options.out) {
+    std::filesystem::create_directories(*options.out);
+    write_csv(*options.out / "accuracy.csv", all, truth);
+    if (!ladders.empty()) draw(options, ladders);
+    if (rows) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
+  }
+  if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
+}
+
+}  // namespace tendon::lab

@@ -1,0 +1,400 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/compare.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <stdexcept>
+
+#include "server/build_info.h"
+#include "tests/tools/lab/experiments/paper.h"
+#include "tests/tools/lab/pictures/gnuplot.h"
+#include "tests/tools/lab/pictures/json.h"
+#include "tests/tools/lab/pictures/panels.h"
+
+namespace tendon::lab {
+namespace {
+
+struct TestDevice {
+  const char* name;
+  Friction friction;
+};
+constexpr std::array kDevices = {TestDevice{"0.26 N s/m", {.coulomb = 0.02, .viscous = 0.26}},
+                                 TestDevice{"0.05 N s/m", {.coulomb = 0.04, .viscous = 0.05}},
+                                 TestDevice{"0.005 N s/m", {.coulomb = 0.04, .viscous = 0.005}}};
+constexpr std::array kStiffnesses = {100.0, 300.0, 500.0, 1000.0, 2000.0, 8000.0};  // N/m
+constexpr Duration kLength = std::chrono::seconds(2);
+
+/// Bounded acceleration where 2b/T is less than what objects are made of.
+AolPlus<1, 3>::Parts parts_for(const Friction& friction) {
+  return friction.viscous >= 0.1 ? default_parts(kPaperEncoder) : low_friction_parts(kPaperEncoder);
+}
+
+std::string text(const char* format, double value) {
+  std::array<char, 64> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), format, value);
+  return buffer.data();
+}
+
+double relative_error(const Cell& cell) {
+  return cell.outcome.true_force > 0 ? cell.outcome.force_error / cell.outcome.true_force : 0;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+constexpr const char* kColumns =
+    "law,stiffness_n_per_m,delay_ms,jitter_ms,rate_hz,loss,b_n_s_per_m,fc_n,hand,passive,energy_given_out_j,k_op_n_per_"
+    "m,"
+    "force_error_n,true_force_n,hf_velocity_m_s,limited_share,latency_s,max_force_n,seed,commit";
+
+void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
+  const Situation& s = cell.situation;
+  const Outcome& o = cell.outcome;
+  out << info(cell.law).name;
+  for (const double value :
+       {s.stiffness, s.delay_ms, s.jitter_ms, s.rate_hz, s.loss, s.friction.viscous, s.friction.coulomb}) {
+    out << "," << JsonLine::number(value);
+  }
+  out << "," << (s.firm ? "firm" : "loose") << "," << (cell.passive() ? 1 : 0);
+  for (const double value : {std::max(0.0, -o.least_energy), o.operational_stiffness, o.force_error, o.true_force,
+                             o.late_vibration, o.limited_share, o.latency, o.largest_force}) {
+    out << "," << JsonLine::number(value);
+  }
+  out << "," << seed << "," << kCommit << "\n";
+}
+
+std::string to_json(const Cell& cell, std::uint64_t seed) {
+  const Situation& s = cell.situation;
+  const Outcome& o = cell.outcome;
+  return JsonLine()
+      .add("law", info(cell.law).name)
+      .add("stiffness_n_per_m", s.stiffness)
+      .add("delay_ms", s.delay_ms)
+      .add("jitter_ms", s.jitter_ms)
+      .add("rate_hz", s.rate_hz)
+      .add("loss", s.loss)
+      .add("b_n_s_per_m", s.friction.viscous)
+      .add("fc_n", s.friction.coulomb)
+      .add("hand", s.firm ? "firm" : "loose")
+      .add("passive", cell.passive())
+      .add("energy_given_out_j", std::max(0.0, -o.least_energy))
+      .add("k_op_n_per_m", o.operational_stiffness)
+      .add("force_error_n", o.force_error)
+      .add("true_force_n", o.true_force)
+      .add("hf_velocity_m_s", o.late_vibration)
+      .add("limited_share", o.limited_share)
+      .add("latency_s", o.latency)
+      .add("max_force_n", o.largest_force)
+      .add("seed", seed)
+      .add("commit", kCommit)
+      .str();
+}
+
+/// Some of the cells by law: what they come down to.
+struct Summary {
+  Law law;
+  std::size_t cells = 0;
+  double passive = 0;    ///< share
+  double stable = 0;     ///< share
+  double error = 0;      ///< median of the relative force error
+  double vibration = 0;  ///< m/s, median
+  double given_out = 0;  ///< J, the most
+  double limited = 0;    ///< median share
+  double latency = 0;    ///< s, median
+};
+
+std::vector<Summary> summaries(const std::vector<Cell>& cells, const std::function<bool(const Situation&)>& where) {
+  std::vector<Summary> result;
+  for (const LawInfo& law : laws()) {
+    Summary summary{.law = law.law};
+    std::vector<double> errors;
+    std::vector<double> vibrations;
+    std::vector<double> limited;
+    std::vector<double> latencies;
+    for (const Cell& cell : cells) {
+      if (cell.law != law.law || !where(cell.situation)) continue;
+      summary.passive += cell.passive() ? 1 : 0;
+      summary.stable += cell.outcome.stable ? 1 : 0;
+      summary.given_out = std::max(summary.given_out, -cell.outcome.least_energy);
+      errors.push_back(relative_error(cell));
+      vibrations.push_back(cell.outcome.late_vibration);
+      limited.push_back(cell.outcome.limited_share);
+      latencies.push_back(cell.outcome.latency);
+    }
+    summary.cells = errors.size();
+    if (errors.empty()) continue;
+    const auto n = static_cast<double>(errors.size());
+    summary.passive /= n;
+    summary.stable /= n;
+    summary.error = median(errors);
+    summary.vibration = median(vibrations);
+    summary.limited = median(limited);
+    summary.latency = median(latencies);
+    result.push_back(summary);
+  }
+  return result;
+}
+
+/// A sentence: the law with the least force error of those that promise to be passive, and were, and were stable
+/// throughout; and what would have been better still here, without a promise.
+void recommend(std::ostream& out, const std::string& where, const std::vector<Summary>& laws) {
+  const auto best_of = [&](bool promised) {
+    const Summary* best = nullptr;
+    for (const bool stable : {true, false}) {
+      for (const Summary& law : laws) {
+        if (law.law == Law::kNone || info(law.law).passive != promised || law.passive < 1) continue;
+        if (stable && law.stable < 1) continue;
+        if (best == nullptr || law.error < best->error) best = &law;
+      }
+      if (best != nullptr) break;
+    }
+    return best;
+  };
+  const auto percent = [](double share) { return text("%.1f", share * 100) + " %"; };
+  const Summary* const safe = best_of(true);
+  const Summary* const lucky = best_of(false);
+  out << "  " << where << ": ";
+  if (safe == nullptr) {
+    out << "none that keeps its promise.\n";
+    return;
+  }
+  out << info(safe->law).name << " (force error " << percent(safe->error) << ", stable in " << percent(safe->stable)
+      << " of " << safe->cells << " cells)";
+  if (lucky != nullptr && lucky->error < safe->error && lucky->stable >= safe->stable) {
+    out << "; without a promise for every object: " << info(lucky->law).name << " (" << percent(lucky->error) << ")";
+  }
+  out << ".\n";
+}
+
+void draw(const std::filesystem::path& folder, const std::vector<Cell>& cells, std::vector<std::string>& pictures) {
+  constexpr std::array kColours = {kOrange, kBlue, kGreen, kVermilion, kPurple, kSky};
+  constexpr std::array kDrawn = {Law::kPassivityController, Law::kAol, Law::kAolPlus, Law::kEnergyBounding,
+                                 Law::kPassiveSynthesis};
+  std::vector<Panel> panels;
+  for (const TestDevice& device : {kDevices.front(), kDevices.back()}) {
+    const bool damped = device.friction.viscous == kDevices.front().friction.viscous;
+    Panel error{.title = damped ? "Force error, % of the true force: damped device" : "… device without damping",
+                .x_label = "stiffness, N/m",
+                .log_x = true};
+    Panel vibration{.title = damped ? "Vibration, mm/s: damped device" : "… device without damping",
+                    .x_label = "stiffness, N/m",
+                    .log_x = true,
+                    .log_y = true};
+    for (std::size_t i = 0; i < kDrawn.size(); ++i) {
+      Curve errors{.name = std::string(info(kDrawn[i]).name), .colour = kColours[i]};
+      Curve vibrations = errors;
+      for (const double k : kStiffnesses) {
+        const auto at = summaries(cells, [&](const Situation& s) {
+          return s.friction.viscous == device.friction.viscous && s.stiffness == k;
+        });
+        for (const Summary& summary : at) {
+          if (summary.law != kDrawn[i]) continue;
+          errors.points.emplace_back(k, summary.error * 100);
+          vibrations.points.emplace_back(k, std::max(summary.vibration * 1e3, 1e-3));
+        }
+      }
+      error.curves.push_back(errors);
+      vibration.curves.push_back(vibrations);
+    }
+    panels.push_back(error);
+    panels.push_back(vibration);
+  }
+  for (const auto& file :
+       draw_panels(folder / "compare", "Laws compared: medians over delay, rate, loss and hand",
+                   std::to_string(cells.size()) + " cells; commit " + std::string(kCommit), panels)) {
+    pictures.push_back(file.string());
+  }
+}
+
+}  // namespace
+
+std::vector<Situation> comparison_grid() {
+  std::vector<Situation> grid;
+  for (const double stiffness : kStiffnesses) {
+    for (const double delay : {0.0, 5.0, 20.0, 80.0}) {
+      for (const double jitter : {0.0, 10.0}) {
+        for (const double rate : {1000.0, 200.0, 50.0, 25.0}) {
+          for (const double loss : {0.0, 0.2}) {
+            for (const TestDevice& device : kDevices) {
+              for (const bool firm : {false, true}) {
+                grid.push_back({.stiffness = stiffness,
+                                .delay_ms = delay,
+                                .jitter_ms = jitter,
+                                .rate_hz = rate,
+                                .loss = loss,
+                                .friction = device.friction,
+                                .firm = firm});
+              }
+            }
+          }
+        }
+      }
+    }
+  }
+  return grid;
+}
+
+Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed) {
+  return compare_cell(situation, law, seed, parts_for(situation.friction));
+}
+
+Cell compare_cell(const Situation& situation, Law law, std::uint64_t seed, const AolPlus<1, 3>::Parts& parts) {
+  FreeHand hand = paper_hand(situation.friction);
+  hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.015, .frequency = 0.5});
+  if (situation.firm) {
+    hand.hand->stiffness = 800;
+    hand.hand->damping = 3;
+    hand.hand->mass = 0.1;
+  }
+  Experiment set;
+  set.environment = {.force = [k = situation.stiffness](double, const Vec3& x) { return Vec3(-k * x); },
+                     .period = from_seconds(1 / situation.rate_hz),
+                     .delay = from_seconds(situation.delay_ms * 1e-3),
+                     .jitter = from_seconds(situation.jitter_ms * 1e-3),
+                     .loss = situation.loss};
+  set.hand = hand;
+  set.limiter.law = law;
+  set.limiter.friction = situation.friction;
+  set.limiter.parts = parts;
+  set.limiter.environment_stiffness = situation.stiffness;
+  set.limiter.environment_delay = set.environment.delay;
+  set.length = kLength;
+  set.max_force = kPaperMaxForce;
+  set.seed = seed;
+  return {situation, law, outcome(run(set), set.period)};
+}
+
+Verdict verdict(const std::vector<Cell>& cells, std::uint64_t seed, std::size_t every) {
+  Verdict result;
+  const std::size_t each = laws().size();
+  for (std::size_t first = 0; first + each <= cells.size(); first += each) {
+    const auto begin = cells.begin() + static_cast<std::ptrdiff_t>(first);
+    const auto end = begin + static_cast<std::ptrdiff_t>(each);
+    const auto plus = std::find_if(begin, end, [](const Cell& cell) { return cell.law == Law::kAolPlus; });
+    ++result.cells;
+    if (plus->passive()) ++result.passive;
+    const Cell* best = nullptr;
+    for (auto cell = begin; cell != end; ++cell) {
+      if (cell == plus || !info(cell->law).passive || !cell->passive()) continue;
+      if (best == nullptr || cell->outcome.force_error < best->outcome.force_error) best = &*cell;
+    }
+    if (best == nullptr || best->outcome.force_error >= plus->outcome.force_error) continue;
+    ++result.beaten;
+    if (best->outcome.force_error < 0.95 * plus->outcome.force_error) ++result.beaten_clearly;
+
+    const auto without = [&](auto drop) {
+      auto parts = parts_for(plus->situation.friction);
+      drop(parts);
+      const Cell cell = compare_cell(plus->situation, Law::kAolPlus, seed + first / each * every, parts);
+      return cell.outcome.force_error <= best->outcome.force_error;
+    };
+    using Parts = AolPlus<1, 3>::Parts;
+    if (without([](Parts& parts) { parts.robust_ledger.reset(); })) {
+      ++result.robust_ledger;
+    } else if (without([](Parts& parts) { parts.knee.reset(); })) {
+      ++result.knee;
+    } else if (without([](Parts& parts) { parts.energy_cap.reset(); })) {
+      ++result.energy_cap;
+    } else if (without([](Parts& parts) { parts.bounded_acceleration.reset(); })) {
+      ++result.bounded_acceleration;
+    } else if (!plus->outcome.stable) {
+      ++result.vibrating;
+    } else {
+      ++result.no_single_part;
+    }
+  }
+  return result;
+}
+
+void compare(const CompareOptions& options, std::ostream& out) {
+  if (options.every == 0) throw std::invalid_argument("--every must be 1 or more");
+  const std::vector<Situation> grid = comparison_grid();
+  std::vector<Cell> cells;
+  for (std::size_t i = 0; i < grid.size(); i += options.every) {
+    for (const LawInfo& law : laws()) {
+      cells.push_back(compare_cell(grid[i], law.law, options.seed + i));
+      if (options.json) out << to_json(cells.back(), options.seed + i) << "\n";
+    }
+    if (options.progress) std::cerr << "\r" << i + 1 << " of " << grid.size() << " situations" << std::flush;
+  }
+  if (options.progress) std::cerr << "\n";
+
+  std::vector<std::string> written;
+  if (options.out) {
+    std::filesystem::create_directories(*options.out);
+    std::ofstream csv(*options.out / "compare.csv");
+    csv << kColumns << "\n";
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      write_csv(csv, cells[i], options.seed + i / laws().size() * options.every);
+    }
+    if (!csv.flush()) throw std::runtime_error("cannot write " + (*options.out / "compare.csv").string());
+    written.push_back((*options.out / "compare.csv").string());
+    draw(*options.out, cells, written);
+  }
+  if (options.json) {
+    if (!out.flush()) throw std::runtime_error("cannot write the cells: is the disk full?");
+    return;
+  }
+
+  out << cells.size() << " cells: " << cells.size() / laws().size() << " situations, " << laws().size()
+      << " laws; seed " << options.seed << ", commit " << kCommit << "\n\n";
+  std::array<char, 200> line{};
+  std::snprintf(line.data(), line.size(), "%-26s %8s %8s %12s %10s %12s %9s %9s\n", "law", "passive", "stable",
+                "given out J", "error", "vibration", "limited", "latency");
+  out << line.data();
+  for (const Summary& s : summaries(cells, [](const Situation&) { return true; })) {
+    std::snprintf(line.data(), line.size(), "%-26s %6.1f %% %6.1f %% %12.2g %8.0f %% %7.1f mm/s %7.0f %% %6.0f ms\n",
+                  std::string(info(s.law).name).c_str(), s.passive * 100, s.stable * 100, std::max(0.0, s.given_out),
+                  s.error * 100, s.vibration * 1e3, s.limited * 100, s.latency * 1e3);
+    out << line.data();
+  }
+  out << "\npassive: the true ledger never below -1 nJ; given out: the most in any cell; error (rms, of the true "
+         "force), "
+         "vibration (last\nsecond), limited and latency: medians. Stable: vibration at most 8 mm/s.\n";
+
+  out << "\nWhich one to use (the least median force error among the laws that promise to be passive and were, if "
+         "possible stable\nthroughout):\n";
+  for (const TestDevice& device : kDevices) {
+    for (const bool soft : {true, false}) {
+      const std::string object =
+          std::string("device of ") + device.name + (soft ? ", up to 500 N/m, " : ", 1000 N/m and more, ");
+      const auto here = [&](const Situation& s) {
+        return s.friction.viscous == device.friction.viscous && (s.stiffness <= 500) == soft;
+      };
+      recommend(out, object + "on this machine (no delay, 1 kHz)", summaries(cells, [&](const Situation& s) {
+                  return here(s) && s.delay_ms == 0 && s.jitter_ms == 0 && s.rate_hz == 1000;
+                }));
+      recommend(out, object + "near (to 5 ms, from 200 Hz)",
+                summaries(cells, [&](const Situation& s) { return here(s) && s.delay_ms <= 5 && s.rate_hz >= 200; }));
+      recommend(out, object + "far or slow (20 ms and more, or 50 Hz and less)",
+                summaries(cells, [&](const Situation& s) { return here(s) && (s.delay_ms >= 20 || s.rate_hz <= 50); }));
+    }
+  }
+
+  const Verdict v = verdict(cells, options.seed, options.every);
+  const auto share = [&](std::size_t n) {
+    return std::to_string(n) + " (" + text("%.1f", 100.0 * static_cast<double>(n) / static_cast<double>(v.cells)) +
+           " %)";
+  };
+  out << "\naol+ is passive in " << v.passive << " of its " << v.cells << " cells. In " << share(v.beaten)
+      << " of them another law that promises to be passive, and was, has a lower force\nerror; in "
+      << share(v.beaten_clearly) << " by more than 5 %. Run again without one part at a time, it would not have been "
+      << "beaten without its robust\nledger (which pays for the counts of the encoder) in " << v.robust_ledger
+      << ", its knee in " << v.knee << ", its energy cap in " << v.energy_cap << ", bounded acceleration in "
+      << v.bounded_acceleration << "; in " << v.vibrating
+      << " it vibrates with an\nobject that the other law shows softer; in " << v.no_single_part
+      << " no single part is the reason.\n";
+  for (const std::string& file : written) out << "written: " << file << "\n";
+  if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");
+}
+
+}  // namespace tendon::lab

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/felt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "tests/tools/lab/experiments/meter.h"
+#include "tests/tools/lab/experiments/paper.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr Duration kLength = std::chrono::seconds(3);
+constexpr Friction kDevice{.coulomb = 0.02, .viscous = 0.26};
+
+/// An engine's answers: force and stiffness of each are asked for one after the other. A body with time goes on between
+/// two of them for as long as has gone by, as tendon-softbody has it, with the tool on its way from the one place to
+/// the other: a tool that jumps strikes the surface away from itself. An engine that cannot keep up falls behind.
+class Answers {
+ public:
+  /// `compute`: s, that the engine takes for a step of the body's time or for an answer of one without.
+  Answers(softbody::Body& body, double compute, double longest)
+      : body_(body), pace_(std::max(body.step(), compute)), longest_(longest) {}
+
+  /// Time begins anew, for another hand.
+  void restart() {
+    given_.clear();
+    again();
+  }
+
+  /// … for the same: what a hand that goes its way asks once more is not found once more.
+  void again() {
+    went_on_to_ = 0;
+    asked_at_ = -1;
+    asked_.reset();
+    next_ = 0;
+  }
+
+  const softbody::Feel& at(double t, const Vec3& tool) {
+    if (t == asked_at_ && tool == asked_) return feel_;
+    if ((meter_.read() - start_).processor > longest_) throw TooSlow("what is left at the hand takes too long to find");
+    if (next_ < given_.size() && given_[next_].t == t && given_[next_].tool == tool) {
+      feel_ = given_[next_++].feel;
+    } else {
+      go_on(t, tool);
+    }
+    asked_at_ = t;
+    asked_ = tool;
+    return feel_;
+  }
+
+ private:
+  struct Answer {
+    double t;  ///< s
+    Vec3 tool;
+    softbody::Feel feel;
+  };
+
+  void go_on(double t, const Vec3& tool) {
+    const Vec3 from = asked_.value_or(tool);
+    const double steps = body_.step() > 0 ? std::max(1.0, std::floor((t - went_on_to_) / pace_)) : 1;
+    for (double step = 1; step <= steps; ++step) feel_ = body_.touch(from + step / steps * (tool - from));
+    went_on_to_ += steps * pace_;
+    given_.resize(next_++);  // whatever was to come after this is of another hand
+    given_.push_back({t, tool, feel_});
+  }
+
+  softbody::Body& body_;
+  double pace_;     ///< s
+  double longest_;  ///< s
+  Meter meter_;
+  Meter::Reading start_ = meter_.read();
+  double went_on_to_ = 0;  ///< s
+  double asked_at_ = -1;   ///< s
+  std::optional<Vec3> asked_;
+  softbody::Feel feel_;
+  std::vector<Answer> given_;
+  std::size_t next_ = 0;  ///< of them
+};
+
+/// How far the hand is below the surface, m.
+double depth_at(double t, double deepest) {
+  const double turn = 2 * std::numbers::pi * t;
+  return deepest * (0.37 - 0.47 * std::cos(0.8 * turn) + 0.13 * std::sin(2.3 * turn));
+}
+
+/// Share of the true stiffness, over the time in which there is something to feel.
+double displayed(const std::vector<Moment>& record, double surface) {
+  double shown = 0;
+  double right = 0;
+  for (const Moment& m : record) {
+    const double depth = surface - m.position.z();
+    if (depth <= 0) continue;
+    shown += m.step.force.z() * depth;
+    right += m.true_force.z() * depth;
+  }
+  return shown / right;
+}
+
+double relative_error(const Outcome& outcome) { return outcome.force_error / outcome.true_force; }
+
+}  // namespace
+
+Felt felt(softbody::Body& body, Truth& truth, const Route& route, std::uint64_t seed, double longest_s) {
+  const Vec3 surface = truth.block().touch_point();
+  const double deepest = truth.block().loads[1] / truth.stiffness(1).secant;
+  Answers answers(body, seconds(route.compute), longest_s);
+
+  Experiment set;
+  set.environment.force = [&](double t, const Vec3& tool) { return answers.at(t, tool).force; };
+  set.environment.truth = [&](double, const Vec3& tool) { return truth.force(tool); };
+  set.environment.route = route;
+  set.limiter = {.law = Law::kAolPlus, .friction = kDevice, .parts = default_parts(kPaperEncoder)};
+  set.max_force = kPaperMaxForce;
+  set.length = kLength;
+  set.seed = seed;
+  set.hand = PrescribedMotion{
+      .position = [&](double t) { return Vec3(surface - Vec3(0, 0, depth_at(t, deepest))); },
+      .friction = kDevice,
+      .encoder_step = kPaperEncoder,
+  };
+
+  Felt result;
+  result.held_error = relative_error(outcome(run(set), set.period));
+  set.environment.stiffness = [&](double t, const Vec3& tool) { return answers.at(t, tool).stiffness; };
+  answers.again();
+  const std::vector<Moment> record = run(set);
+  const Outcome followed = outcome(record, set.period);
+  result.displayed = displayed(record, surface.z());
+  result.force_error = relative_error(followed);
+  result.limited_share = followed.limited_share;
+  result.latency = followed.latency;
+
+  FreeHand hand = paper_hand(kDevice);
+  hand.hand->motion = ScriptedMotion(ScriptedMotion::Sine{.amplitude = 0.6 * deepest,
+                                                          .frequency = 0.8,
+                                                          .centre = surface - Vec3(0, 0, 0.4 * deepest),
+                                                          .direction = Vec3::UnitZ()});
+  set.hand = hand;
+  set.environment.truth = [](double, const Vec3&) { return Vec3::Zero().eval(); };  // how it shakes is asked, no more
+  answers.restart();
+  result.vibration = outcome(run(set), set.period).late_vibration;
+  return result;
+}
+
+}  // namespace tendon::lab

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/friction_tables.h"
+
+#include <gtest/gtest.h>
+
+namespace tendon::lab {
+namespace {
+
+TEST(FrictionTables, WhereTheTravelIsShortKellyIsOffByTenTimesAndTheIntegralIsTrusted) {
+  const std::vector<FrictionTable> tables = friction_tables();
+  ASSERT_EQ(tables.size(), 3U);
+  for (const FrictionTable& table : tables) {
+    const PlaceEstimate& place = table.found.places.front();
+    EXPECT_NEAR(place.integral.viscous, table.truth.viscous, 0.0015) << table.truth.viscous;
+    EXPECT_LE(table.found.lower_bound.viscous, table.truth.viscous);
+    EXPECT_LE(table.found.lower_bound.coulomb, table.truth.coulomb);
+  }
+  EXPECT_EQ(tables.front().found.trust, Trust::kBoth);
+  EXPECT_EQ(tables.back().found.trust, Trust::kIntegral);
+  EXPECT_GT(tables.back().found.places.front().kelly.viscous, 10 * tables.back().truth.viscous);
+}
+
+}  // namespace
+}  // namespace tendon::lab

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-identify: the friction of a device from runs in which its force rises until it moves. Its command line.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/tools/lab/identify/identify.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+int complain(const std::exception& error, int code) {
+  std::cerr << "tendon-identify: " << error.what() << (code == kWrongUsage ? " (see --help)\n" : "\n");
+  return code;
+}
+
+int main(int argc, char** argv) {
+  CLI::App app("Viscous and Coulomb friction of a haptic device, as lower bounds for the limiter.", "tendon-identify");
+  app.footer(
+      "\nA run: one axis free, the others held, gravity compensated, nobody touches the handle; the force rises from 0 "
+      "at\n"
+      "a constant rate until the handle has run through its workspace. Do 3 slopes, 5 times each, in both directions, "
+      "at\n"
+      "5 poses of each axis. One CSV file each, with a header line and the columns t_s, x_m, force_n (force on the "
+      "hand).\n"
+      "\nExample: without hardware\n"
+      "  tendon-identify --simulate-friction 0.005,0.05\n"
+      "Example: recorded runs\n"
+      "  tendon-identify forth.csv back.csv --axis x --axis x --mass-kg 0.075 --encoder-step-m 3e-5\n"
+      "\nExit: 0 done; 1 a file is bad or a run cannot be used; 2 wrong usage.");
+
+  IdentifyOptions options;
+  std::vector<std::string> files;
+  std::string profile;
+  std::vector<double> friction;
+  double mass = 0;
+  double encoder_step = 0;
+  app.add_option("RUN", files, "runs, one file each")->type_name("FILE.csv");
+  app.add_option("--axis", options.places, "axis and pose of a run; once for each file, in order")
+      ->type_name("TEXT")
+      ->allow_extra_args(false);
+  CLI::Option* const mass_option =
+      app.add_option("--mass-kg", mass, "handle and mechanism; left out: fitted")->type_name("KG");
+  CLI::Option* const step_option =
+      app.add_option("--encoder-step-m", encoder_step, "one count; left out: 3e-5")->type_name("M");
+  app.add_option("--simulate", profile, "simulate a device instead: phantom-premium, touch, falcon")
+      ->type_name("PROFILE");
+  app.add_option("--simulate-friction", friction, "simulate 75 g with b (N·s/m) and f_c (N) instead")
+      ->type_name("B,FC")
+      ->delimiter(',')
+      ->expected(2);
+  app.add_option("--seed", options.seed, "of the simulation's noise")->type_name("N");
+  app.add_flag("--json", options.json, "one JSON object for each run and a last one for the result");
+
+  try {
+    app.parse(argc, argv);
+    options.files.assign(files.begin(), files.end());
+    if (!profile.empty()) options.profile = profile;
+    if (!friction.empty()) options.simulated_friction = Friction{.coulomb = friction[1], .viscous = friction[0]};
+    if (*mass_option) options.mass = mass;
+    if (*step_option) options.encoder_step = encoder_step;
+    identify(options, std::cout);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return complain(error, kWrongUsage);
+  } catch (const std::invalid_argument& error) {
+    return complain(error, kWrongUsage);
+  } catch (const std::exception& error) {
+    return complain(error, kFailed);
+  }
+  return kDone;
+}
+
+}  // namespace
+}  // namespace tendon::lab
+
+int main(int argc, char** argv) { return tendon::lab::main(argc, argv); }

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/identify/identify.h"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/server/scratch_folder.h"
+#include "tests/tools/lab/identify/simulated_ramps.h"
+
+namespace tendon::lab {
+namespace {
+
+class Identify : public ::testing::Test {
+ protected:
+  /// Runs of a device with b = 0.005 N·s/m and f_c = 0.05 N, as files.
+  std::vector<std::filesystem::path> recorded_runs() {
+    RampExperiment experiment;
+    experiment.device.mass = 0.075;
+    experiment.device.viscous_friction = 0.005;
+    experiment.device.coulomb_friction = 0.05;
+    experiment.device.encoder_step = 3e-5;
+    experiment.repeats = 2;
+    std::vector<std::filesystem::path> files;
+    for (const RampRun& run : simulated_ramps(experiment)) {
+      files.push_back(folder_.path() / (std::to_string(files.size()) + ".csv"));
+      std::ofstream file(files.back());
+      file.precision(12);
+      file << "t_s,x_m,force_n\n";
+      for (const RampSample& sample : run.samples) {
+        file << sample.t << ',' << sample.position << ',' << sample.force << '\n';
+      }
+    }
+    return files;
+  }
+
+  std::string output_of(const IdentifyOptions& options) {
+    std::ostringstream out;
+    identify(options, out);
+    return out.str();
+  }
+
+  std::string error_of(const IdentifyOptions& options) {
+    std::ostringstream out;
+    try {
+      identify(options, out);
+    } catch (const std::exception& error) {
+      EXPECT_EQ(out.str(), "");
+      return error.what();
+    }
+    return "no error";
+  }
+
+  tendon::testing::ScratchFolder folder_;
+};
+
+double value_after(const std::string& text, const std::string& key) {
+  const auto at = text.find(key);
+  if (at == std::string::npos) throw std::runtime_error("no " + key + " in " + text);
+  return std::stod(text.substr(at + key.size()));
+}
+
+bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST_F(Identify, EndsWithAFragmentOfAScene) {
+  const std::string text = output_of({.simulated_friction = Friction{.coulomb = 0.05, .viscous = 0.005}});
+  const auto fragment = text.find("\n[limiter]\n");
+  ASSERT_NE(fragment, std::string::npos) << text;
+  EXPECT_NEAR(value_after(text.substr(fragment), "coulomb_friction_n = "), 0.0497, 0.0003);
+  EXPECT_NEAR(value_after(text.substr(fragment), "viscous_friction_n_s_per_m = "), 0.0042, 0.0008);
+  EXPECT_TRUE(holds(text, "Trusted: integral. Kelly's line is no asymptote yet at x: the slide of")) << text;
+}
+
+TEST_F(Identify, TrustsBothOnMuchFriction) {
+  const std::string text = output_of({.simulated_friction = Friction{.coulomb = 0.05, .viscous = 0.26}});
+  EXPECT_TRUE(holds(text, "Trusted: both.")) << text;
+}
+
+TEST_F(Identify, ReadsRecordedRunsAndGivesOneObjectForEachAndOneForTheResult) {
+  const auto files = recorded_runs();
+  const std::string text = output_of({.files = files, .mass = 0.075, .json = true});
+  std::istringstream lines(text);
+  std::size_t runs = 0;
+  std::string line;
+  std::string last;
+  for (; std::getline(lines, line); last = line) {
+    EXPECT_EQ(line.front(), '{');
+    EXPECT_EQ(line.back(), '}');
+    if (line.starts_with("{\"run\":")) ++runs;
+  }
+  EXPECT_EQ(runs, files.size());
+  ASSERT_TRUE(last.starts_with("{\"result\":\"integral\"")) << last;
+  EXPECT_NEAR(value_after(last, "\"estimate_viscous_n_s_per_m\":"), 0.005, 0.0015);
+  EXPECT_NEAR(value_after(last, "\"estimate_coulomb_n\":"), 0.05, 0.001);
+  EXPECT_LT(value_after(last, "\"lower_bound_viscous_n_s_per_m\":"), 0.005);
+}
+
+TEST_F(Identify, KeepsPlacesApart) {
+  const auto files = recorded_runs();
+  std::vector<std::string> places(files.size(), "x, arm \"bent\"");
+  places.back() = "y";
+  const std::string text = output_of({.files = files, .places = places, .mass = 0.075, .json = true});
+  EXPECT_TRUE(holds(text, "\"place\":\"x, arm \\\"bent\\\"\"")) << text;
+  EXPECT_TRUE(holds(text, "one direction only at y")) << text;
+}
+
+TEST_F(Identify, SimulatesEveryProfile) {
+  for (const std::string profile : {"phantom-premium", "touch", "falcon"}) {
+    EXPECT_TRUE(holds(output_of({.profile = profile}), "\n[limiter]\n")) << profile;
+  }
+}
+
+TEST_F(Identify, NamesTheFileAndTheLineThatIsBad) {
+  auto files = recorded_runs();
+  {
+    std::ofstream file(files[3]);
+    file << "t_s,x_m,force_n\n0,0,0\n0.001,oops,0\n";
+  }
+  EXPECT_EQ(error_of({.files = files}), files[3].string() + ":3: expected a finite number as x_m, found 'oops'");
+}
+
+TEST_F(Identify, NamesTheFileWhoseRunCannotBeUsed) {
+  auto files = recorded_runs();
+  {
+    std::ofstream file(files[3]);
+    file << "t_s,x_m,force_n\n0,0,0\n0.001,0,0\n";
+  }
+  EXPECT_EQ(error_of({.files = files}), files[3].string() + ": expected a run of 50 samples or more, found 2");
+  EXPECT_TRUE(holds(error_of({.files = {folder_.path() / "none.csv"}}), "cannot open it"));
+}
+
+TEST_F(Identify, RefusesOptionsThatMakeNoSense) {
+  EXPECT_TRUE(holds(error_of({}), "expected a CSV file"));
+  EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .profile = "touch"}), "more than one"));
+  EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .places = {"x", "y"}}), "--axis once for each of 1 files, found 2"));
+  EXPECT_EQ(error_of({.profile = "tuch"}), "--simulate tuch: expected one of phantom-premium, touch, falcon");
+  EXPECT_TRUE(holds(error_of({.profile = "touch", .mass = -1}), "--mass-kg -1"));
+  EXPECT_TRUE(holds(error_of({.profile = "touch", .encoder_step = 0}), "--encoder-step-m 0"));
+  EXPECT_TRUE(holds(error_of({.simulated_friction = Friction{.coulomb = -1, .viscous = 0.1}}), "coulomb_friction"));
+}
+
+}  // namespace
+}  // namespace tendon::lab

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/pictures/panels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <sstream>
+
+#include "tests/tools/lab/pictures/gnuplot.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr int kWidth = 1600;
+constexpr int kRow = 470;      ///< pixels for a row of panels
+constexpr int kHeading = 110;  ///< … and for what is above all of them
+constexpr std::size_t kMostPoints = 1200;
+constexpr std::size_t kNamesInRow = 4;  ///< of the key; two rows of it have room, each further one takes …
+constexpr int kKeyRow = 18;             ///< … pixels
+
+const char* words(Curve::Style style) {
+  switch (style) {
+    case Curve::Style::kArea:
+      return "using 1:(-$2):2 with filledcurves fs solid 0.35 noborder lc rgb ";
+    case Curve::Style::kPoints:
+      return "using 1:2 with points pt 7 ps 0.7 lc rgb ";
+    case Curve::Style::kRings:
+      return "using 1:2 with points pt 6 ps 0.8 lw 1.3 lc rgb ";
+    case Curve::Style::kDashed:
+      return "using 1:2 with lines lw 2 dt 2 lc rgb ";
+    case Curve::Style::kBold:
+      return "using 1:2 with lines lw 5 lc rgb ";
+    case Curve::Style::kBelow:
+      return "using 1:2 with filledcurves x1 fs solid 1 noborder lc rgb ";
+    case Curve::Style::kLine:
+      break;
+  }
+  return "using 1:2 with lines lw 1.6 lc rgb ";
+}
+
+/// Pixels, beyond what every panel has, for the longest key among them.
+int room_for_keys(const std::vector<Panel>& panels) {
+  std::size_t rows = 2;
+  for (const Panel& panel : panels) {
+    const auto names = static_cast<std::size_t>(
+        std::ranges::count_if(panel.curves, [](const Curve& c) { return !c.name.empty() && !c.points.empty(); }));
+    rows = std::max(rows, (names + kNamesInRow - 1) / kNamesInRow);
+  }
+  return kKeyRow * static_cast<int>(rows - 2);
+}
+
+void range(std::ostream& out, char axis, const std::optional<std::pair<double, double>>& range) {
+  out << "set " << axis << "range [";
+  if (range) {
+    out << range->first << ":" << range->second;
+  } else {
+    out << "*:*";
+  }
+  out << "]\n";
+}
+
+/// Along a logarithmic axis gnuplot names powers of ten, of which a short one may have none: some between them then.
+void ticks(std::ostream& out, const Panel& panel) {
+  constexpr double kShort = 30;
+  if (!panel.log_x || !panel.x_range || panel.x_range->second > kShort * panel.x_range->first) {
+    out << "set xtics autofreq\n";
+    return;
+  }
+  const char* separator = "set xtics (";
+  for (double power = std::pow(10, std::floor(std::log10(panel.x_range->first))); power < panel.x_range->second;
+       power *= 10) {
+    for (const double one : {1.0, 2.0, 3.0, 5.0, 7.0}) {
+      out << separator << one * power;
+      separator = ", ";
+    }
+  }
+  out << ")\n";
+}
+
+}  // namespace
+
+std::vector<std::pair<double, double>> thinned(const std::vector<std::pair<double, double>>& points) {
+  if (points.size() <= kMostPoints) return points;
+  const std::size_t stretch = points.size() / (kMostPoints / 2) + 1;
+  std::vector<std::pair<double, double>> result;
+  for (std::size_t i = 0; i < points.size(); i += stretch) {
+    const auto begin = points.begin() + static_cast<std::ptrdiff_t>(i);
+    const auto end = points.begin() + static_cast<std::ptrdiff_t>(std::min(i + stretch, points.size()));
+    auto [least, most] = std::minmax_element(begin, end, [](auto& a, auto& b) { return a.second < b.second; });
+    if (least->first > most->first) std::swap(least, most);
+    result.push_back(*least);
+    if (least != most) result.push_back(*most);
+  }
+  return result;
+}
+
+std::string panels_script(const std::filesystem::path& path, const std::string& heading, const std::string& figures,
+                          const std::vector<Panel>& panels) {
+  check_picture_name(path);
+  const std::size_t rows = (panels.size() + 1) / 2;
+  const int keys = room_for_keys(panels);
+  const int height = kHeading + (kRow + keys) * static_cast<int>(rows);
+  std::ostringstream out;
+  out << begin_picture(path, kWidth, height) << "set border 3 lc rgb '" << kPale << "'\n"
+      << "set tics nomirror out scale 0.6 textcolor rgb '" << kPale << "'\n"
+      << "set grid ytics lc rgb '#e4e4e4' lt 1 lw 1\n";
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    for (std::size_t c = 0; c < panels[p].curves.size(); ++c) {
+      out << "$d" << p << "_" << c << " << EOD\n";
+      for (const auto& [x, y] : thinned(panels[p].curves[c].points)) {
+        if (std::isfinite(x) && std::isfinite(y)) out << x << " " << y << "\n";
+      }
+      out << "EOD\n";
+    }
+  }
+  const auto up = [height](double pixels_from_top) { return 1 - pixels_from_top / height; };
+  out << "set multiplot\n";
+  out << "set label " << literal(heading) << " at screen 0.04," << up(34) << " noenhanced font ':Bold,20' tc rgb '"
+      << kInk << "'\n";
+  out << "set label " << literal(figures) << " at screen 0.04," << up(70) << " noenhanced tc rgb '" << kPale << "'\n";
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const Panel& panel = panels[p];
+    const double left = p % 2 == 0 ? 0.045 : 0.545;
+    const double right = left + 0.435;
+    const std::size_t row = p / 2;
+    const double top = kHeading + static_cast<double>(row) * (kRow + keys) + keys + 74;
+    out << "set lmargin at screen " << left << "\nset rmargin at screen " << right << "\nset tmargin at screen "
+        << up(top) << "\nset bmargin at screen " << up(top + kRow - 144) << "\n";
+    out << "set label " << literal(panel.title) << " at screen " << left << "," << up(top - keys - 54)
+        << " noenhanced font ':Bold' tc rgb '" << kInk << "'\n";
+    out << "set key at screen " << right << "," << up(top - keys / 2.0 - 20)
+        << " right center horizontal samplen 1.5 noenhanced textcolor rgb '" << kInk << "'\n";
+    out << "set xlabel " << literal(panel.x_label) << " noenhanced offset 0,0.4 textcolor rgb '" << kPale << "'\n";
+    out << (panel.log_x ? "set logscale x\n" : "unset logscale x\n")
+        << (panel.log_y ? "set logscale y\n" : "unset logscale y\n");
+    ticks(out, panel);
+    range(out, 'x', panel.x_range);
+    range(out, 'y', panel.y_range);
+    const char* separator = "plot ";
+    for (std::size_t c = 0; c < panel.curves.size(); ++c) {
+      const Curve& curve = panel.curves[c];
+      if (curve.points.empty()) continue;
+      out << separator << "$d" << p << "_" << c << " " << words(curve.style) << "'" << curve.colour << "' "
+          << (curve.name.empty() ? "notitle" : "title " + literal(curve.name));
+      separator = ", ";
+    }
+    out << "\nunset label\n";
+  }
+  out << "unset multiplot\nunset output\n";
+  return out.str();
+}
+
+std::vector<std::filesystem::path> draw_panels(const std::filesystem::path& stem, const std::string& heading,
+                                               const std::string& figures, const std::vector<Panel>& panels) {
+  std::vector<std::filesystem::path> files;
+  for (const char* const extension : {".svg", ".png"}) {
+    std::filesystem::path file = stem;
+    file += extension;
+    run_gnuplot(panels_script(file, heading, figures, panels), file);
+    files.push_back(file);
+  }
+  return files;
+}
+
+}  // namespace tendon::lab

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/pictures/table.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/reason.h"
+
+namespace tendon::lab {
+namespace {
+
+double ms(Duration d) { return seconds(d) * 1e3; }
+
+struct ReasonName {
+  Reason reason;
+  const char* key;      ///< in JSON
+  const char* meaning;  ///< in the table
+};
+constexpr std::array kReasonNames = {
+    ReasonName{Reason::kEnergy, "energy", "the limiter: energy was not earned"},
+    ReasonName{Reason::kMaxForce, "max_force", "above the largest force"},
+    ReasonName{Reason::kSlew, "slew", "force may not jump that fast"},
+    ReasonName{Reason::kRampIn, "ramp_in", "forces just began: ramped in"},
+    ReasonName{Reason::kHeld, "held", "late: last force held"},
+    ReasonName{Reason::kDecaying, "decaying", "later: fading it out"},
+    ReasonName{Reason::kSafeStop, "safe_stop", "too late: safe stop"},
+    ReasonName{Reason::kNotFinite, "not_finite", "not a number"},
+    ReasonName{Reason::kFault, "fault", "latched fault"},
+    ReasonName{Reason::kDeviceClamp, "device_clamp", "the device gave less"},
+    ReasonName{Reason::kUnseen, "unseen", "the device gave no position"},
+    ReasonName{Reason::kDisarmed, "disarmed", "the operator disarmed"},
+};
+
+// ---- For people -------------------------------------------------------------------------------------------------
+
+std::string digits(double value, const char* format) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+std::string count(std::uint64_t n) {
+  std::string text = std::to_string(n);
+  for (std::size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, " ");
+  return text;
+}
+
+std::string percent(double share) {
+  if (share == 0) return "0 %";
+  if (share < 0.001) return "< 0.1 %";
+  return digits(share * 100, share < 0.9995 ? "%.1f %%" : "%.0f %%");
+}
+
+std::string spread(const std::optional<Spread>& times) {
+  if (!times) return "none seen";
+  return digits(ms(times->p50), "%.1f") + " / " + digits(ms(times->p99), "%.1f ms");
+}
+
+std::string felt(const RunSummary& run) {
+  if (!run.stable) return "not stable";
+  if (!run.operational_stiffness) return "no contact";
+  return digits(*run.operational_stiffness, "%.0f N/m");
+}
+
+/// Columns on a terminal: the text has no combining and no wide characters.
+std::size_t width(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+std::string padded(const std::string& text, std::size_t to) {
+  return text + std::string(to - std::min(to, width(text)), ' ');
+}
+std::string padded_left(const std::string& text, std::size_t to) {
+  return std::string(to - std::min(to, width(text)), ' ') + text;
+}
+
+using Cell = std::function<std::string(const Run&)>;
+struct Row {
+  std::string name;
+  Cell cell;  ///< empty: a heading
+};
+
+std::vector<Row> rows(std::span<const Run> runs) {
+  std::vector<Row> rows = {
+      {"recording", [](const Run& run) { return run.recording; }},
+      {"Energy", {}},
+      {"  given out beyond what was put in",
+       [](const Run& run) { return with_unit(run.summary.energy_given_out, "J"); }},
+      {"  least energy owed, overruns apart", [](const Run& run) { return with_unit(run.summary.least_energy, "J"); }},
+      {"  promise kept: never below −1 nJ", [](const Run& run) { return run.summary.passive() ? "yes" : "NO"; }},
+      {"Touch", {}},
+      {"  stiffness that was felt", [](const Run& run) { return felt(run.summary); }},
+      {"  peak speed", [](const Run& run) { return digits(run.summary.peak_speed, "%.2f m/s"); }},
+      {"  peak force", [](const Run& run) { return digits(run.summary.peak_force, "%.2f N"); }},
+      {"Force is not the one asked for in", [](const Run& run) { return percent(run.summary.share_limited()); }},
+  };
+  for (const ReasonName& name : kReasonNames) {
+    const auto occurs = [&](const Run& run) { return run.summary.share_limited(name.reason) > 0; };
+    if (std::ranges::none_of(runs, occurs)) continue;
+    rows.push_back({std::string("  ") + name.meaning,
+                    [&name](const Run& run) { return percent(run.summary.share_limited(name.reason)); }});
+  }
+  rows.insert(
+      rows.end(),
+      {
+          {"Network", {}},
+          {"  hand to force, p50 / p99", [](const Run& run) { return spread(run.summary.loop_age); }},
+          {"  round trip, p50 / p99", [](const Run& run) { return spread(run.summary.round_trip); }},
+          {"  forces used per second",
+           [](const Run& run) {
+             return run.summary.forces_per_s ? digits(*run.summary.forces_per_s, "%.1f") : "none";
+           }},
+          {"Haptic loop", {}},
+          {"  time recorded", [](const Run& run) { return digits(seconds(run.summary.span), "%.2f s"); }},
+          {"  steps", [](const Run& run) { return count(run.summary.steps); }},
+          {"  overruns", [](const Run& run) { return count(run.summary.overruns); }},
+          {"  longest interval", [](const Run& run) { return digits(ms(run.summary.longest_interval), "%.2f ms"); }},
+      });
+  return rows;
+}
+
+std::string notes(std::span<const Run> runs) {
+  std::string text;
+  const auto note = [&text](const std::string& line) { text += line + "\n"; };
+  const auto some = [&runs](auto&& holds) { return std::ranges::any_of(runs, holds); };
+  if (some([](const Run& run) { return !run.summary.stable; })) {
+    note("not stable: the device gave out energy and the hand was shaken (most of its motion was faster than 3 Hz),");
+    note("            so a stiffness would mean nothing.");
+  }
+  if (some([](const Run& run) { return run.summary.overruns > 0; })) {
+    note("overrun: the computer paused the haptic loop for longer than the limiter was told to expect. What that cost");
+    note("         is in the energy given out, not in the least energy.");
+  }
+  for (const Run& run : runs) {
+    if (run.truncated)
+      note(run.recording +
+           ": has no end mark (the server was killed, or the disk was full). All that is there was read.");
+    if (run.lost_steps + run.lost_datagrams > 0)
+      note(run.recording + ": lacks " + count(run.lost_steps) + " steps and " + count(run.lost_datagrams) +
+           " datagrams that were not written in time.");
+  }
+  return text;
+}
+
+// ---- For programs -----------------------------------------------------------------------------------------------
+
+/// Members of one JSON object, in the order in which they are added.
+class Json {
+ public:
+  Json& add(std::string_view key, std::string_view value) { return put(key, quoted(value)); }
+  Json& add(std::string_view key, bool value) { return put(key, value ? "true" : "false"); }
+  Json& add(std::string_view key, std::uint64_t value) { return put(key, std::to_string(value)); }
+  Json& add(std::string_view key, double value) { return put(key, number(value)); }
+  Json& add(std::string_view key, const std::optional<double>& value) {
+    return put(key, value ? number(*value) : "null");
+  }
+  Json& add(std::string_view key, const Json& value) { return put(key, value.text()); }
+  std::string text() const { return "{" + members_ + "}"; }
+
+ private:
+  Json& put(std::string_view key, const std::string& value) {
+    if (!members_.empty()) members_ += ",";
+    members_ += quoted(key) + ":" + value;
+    return *this;
+  }
+  /// The shortest text that reads back as the same number.
+  static std::string number(double value) {
+    if (!std::isfinite(value)) return "null";
+    std::array<char, 32> text{};
+    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+  }
+  static std::string quoted(std::string_view text) {
+    std::string result = "\"";
+    for (const char c : text) {
+      if (c == '"' || c == '\\') {
+        result += '\\';
+        result += c;
+      } else if (static_cast<unsigned char>(c) < 0x20) {
+        std::array<char, 8> escape{};
+        std::snprintf(escape.data(), escape.size(), "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
+        result += escape.data();
+      } else {
+        result += c;
+      }
+    }
+    return result + '"';
+  }
+
+  std::string members_;
+};
+
+std::optional<double> p50_ms(const std::optional<Spread>& times) {
+  return times ? std::optional(ms(times->p50)) : std::nullopt;
+}
+std::optional<double> p99_ms(const std::optional<Spread>& times) {
+  return times ? std::optional(ms(times->p99)) : std::nullopt;
+}
+
+}  // namespace
+
+std::string with_unit(double value, std::string_view unit) {
+  const std::string symbol = " " + std::string(unit);
+  if (std::isnan(value)) return "?" + symbol;
+  if (std::abs(value) < 0.005e-12) return "0" + symbol;  // would read 0.00 pJ
+  const std::string sign = value < 0 ? "−" : "";
+  double size = std::abs(value);
+  if (std::isinf(size)) return sign + "∞" + symbol;
+  static constexpr std::array kPrefixes = {"p", "n", "µ", "m", "", "k", "M", "G"};
+  std::size_t prefix = 4;
+  while (size < 0.9995 && prefix > 0) size *= 1e3, --prefix;
+  while (size >= 999.5 && prefix + 1 < kPrefixes.size()) size /= 1e3, ++prefix;
+  const char* format = size < 9.995 ? "%.2f" : size < 99.95 ? "%.1f" : "%.0f";
+  return sign + digits(size, format) + " " + kPrefixes[prefix] + std::string(unit);
+}
+
+std::string to_table(std::span<const Run> runs) {
+  constexpr std::size_t kGap = 3;
+  const std::vector<Row> all = rows(runs);
+  std::size_t names = 0;
+  for (const Row& row : all) names = std::max(names, width(row.name));
+  std::vector<std::size_t> widths;
+  std::string text(names, ' ');
+  for (const Run& run : runs) {
+    std::size_t needed = width(run.label);
+    for (const Row& row : all) needed = std::max(needed, row.cell ? width(row.cell(run)) : 0);
+    widths.push_back(needed + kGap);
+    text += padded_left(run.label, widths.back());
+  }
+  text += "\n";
+  for (const Row& row : all) {
+    if (!row.cell) {
+      text += row.name + "\n";
+      continue;
+    }
+    text += padded(row.name, names);
+    for (std::size_t i = 0; i < runs.size(); ++i) text += padded_left(row.cell(runs[i]), widths[i]);
+    text += "\n";
+  }
+  const std::string explained = notes(runs);
+  return explained.empty() ? text : text + "\n" + explained;
+}
+
+std::string to_json(const Run& run) {
+  const RunSummary& s = run.summary;
+  Json reasons;
+  for (const ReasonName& name : kReasonNames) reasons.add(name.key, s.share_limited(name.reason) * 100);
+  Json json;
+  json.add("recording", run.recording)
+      .add("label", run.label)
+      .add("truncated", run.truncated)
+      .add("lost_steps", run.lost_steps)
+      .add("lost_datagrams", run.lost_datagrams)
+      .add("limiter_on", s.limiter_on)
+      .add("energy_given_out_j", s.energy_given_out)
+      .add("least_energy_j", s.least_energy)
+      .add("passive", s.passive())
+      .add("peak_speed_m_per_s", s.peak_speed)
+      .add("peak_force_n", s.peak_force)
+      .add("limited_percent", s.share_limited() * 100)
+      .add("limited_percent_by_reason", reasons)
+      .add("stable", s.stable)
+      .add("operational_stiffness_n_per_m", s.stable ? s.operational_stiffness : std::nullopt)
+      .add("loop_age_p50_ms", p50_ms(s.loop_age))
+      .add("loop_age_p99_ms", p99_ms(s.loop_age))
+      .add("round_trip_p50_ms", p50_ms(s.round_trip))
+      .add("round_trip_p99_ms", p99_ms(s.round_trip))
+      .add("forces_per_s", s.forces_per_s)
+      .add("span_s", seconds(s.span))
+      .add("steps", s.steps)
+      .add("overruns", s.overruns)
+      .add("watchdogs", s.watchdogs)
+      .add("longest_interval_ms", ms(s.longest_interval));
+  return json.text();
+}
+
+}  // namespace tendon::lab

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "tests/tools/lab/recordings/run_summary.h"
+
+namespace tendon::lab {
+
+/// One recorded run: what it comes down to, and how far its recording can be trusted.
+struct Run {
+  std::string label;      ///< heads its column
+  std::string recording;  ///< the file
+  RunSummary summary;
+  bool truncated = false;  ///< the recording ended before its end mark
+  std::uint64_t lost_steps = 0;
+  std::uint64_t lost_datagrams = 0;
+};
+
+/// "12.3 mJ": three significant digits and a prefix from n to G; a true minus sign, "0 J", "∞ N".
+std::string with_unit(double value, std::string_view unit);
+
+/// A figure that each run has, and an explanation below when one needs it. Text for people, UTF-8, aligned.
+std::string to_table(std::span<const Run> runs);
+
+/// One line of JSON without its end; keys have the unit at their end, what is not known is null.
+std::string to_json(const Run& run);
+
+}  // namespace tendon::lab

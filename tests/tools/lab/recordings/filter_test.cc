@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/recordings/filter.h"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+namespace tendon::lab {
+namespace {
+
+FilterOptions aol() {
+  return {.limiter = {.law = Law::kAol,
+                      .friction = {.coulomb = 0.005, .viscous = 0.26},
+                      .longest_hold = std::chrono::milliseconds(1)}};
+}
+
+struct Result {
+  int bad;
+  std::string out;
+  std::string errors;
+};
+
+Result filtered(const std::string& text, const FilterOptions& options = aol()) {
+  std::istringstream in(text);
+  std::ostringstream out;
+  std::ostringstream errors;
+  const int bad = filter(options, in, out, errors);
+  return {bad, out.str(), errors.str()};
+}
+
+TEST(Filter, AddsWhatTheLawMakesOfEachRow) {
+  // Two steps worked out by hand: E = b (0.1 mm)² / 1 ms + f_c 0.1 mm = 3.1 µJ; f = f_c + 2 √(b E / T).
+  const Result result = filtered("t_s,x_m,wanted_n\n0,0,0\n0.001,0.0001,-1\n");
+  EXPECT_EQ(result.bad, 0);
+  EXPECT_EQ(result.out,
+            "t_s,x_m,wanted_n,applied_n,permitted_n,energy_j,reason\n"
+            "0,0,0,0,0.005,0,\n"
+            "0.001,0.0001,-1,-0.061780278266313556,0.061780278266313556,3.1e-06,energy\n");
+}
+
+TEST(Filter, NamesTheLineOfABadRowAndWritesNothingForIt) {
+  const Result result =
+      filtered("t_s,x_m,wanted_n\n0,0,0\n0.001,nan,-1\n0.002,0,-1,7\n0.003,0\n0.004,0.1 ,0\n0,0,0\n0.005,0,0\n");
+  EXPECT_EQ(result.bad, 5);
+  EXPECT_EQ(result.errors,
+            "line 3: cell 2: expected a finite number, got \"nan\"\n"
+            "line 4: expected 3 cells, got 4\n"
+            "line 5: expected 3 cells, got 2\n"
+            "line 6: cell 2: expected a finite number, got \"0.1 \"\n"
+            "line 7: time does not go on\n");
+  EXPECT_EQ(result.out.substr(result.out.find('\n') + 1), "0,0,0,0,0.005,0,\n0.005,0,0,0,0.005,0,overrun\n");
+}
+
+TEST(Filter, TakesThreeAxesAndKeepsTheDirectionOfTheForce) {
+  const Result result =
+      filtered("t_s,x_m,y_m,z_m,wanted_x_n,wanted_y_n,wanted_z_n\n0,0,0,0,0,0,0\n0.001,0.0001,0,0,-3,-4,0\n");
+  std::istringstream last(result.out.substr(result.out.rfind('\n', result.out.size() - 2) + 1));
+  std::vector<double> cells;
+  for (std::string cell; std::getline(last, cell, ',') && cells.size() < 10;) cells.push_back(std::stod(cell));
+  ASSERT_EQ(cells.size(), 10U);
+  EXPECT_NEAR(cells[7] / cells[8], 0.75, 1e-12);
+}
+
+TEST(Filter, RefusesAnUnknownHeader) { EXPECT_THROW(filtered("t,x,f\n0,0,0\n"), std::runtime_error); }
+
+TEST(Filter, WorksForEveryLawOfTheCatalogue) {
+  for (const LawInfo& law : laws()) {
+    FilterOptions options = aol();
+    options.limiter.law = law.law;
+    options.limiter.max_force = 8;
+    options.limiter.environment_stiffness = 500;
+    EXPECT_EQ(filtered("t_s,x_m,wanted_n\n0,0,0\n0.001,0.0001,-1\n0.002,0.0002,-1\n", options).bad, 0) << law.name;
+  }
+}
+
+}  // namespace
+}  // namespace tendon::lab

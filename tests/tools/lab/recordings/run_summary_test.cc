@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/recordings/run_summary.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "protocol/wire/codec.h"
+#include "tests/tools/lab/experiments/steps.h"
+
+namespace tendon::lab {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::spring_run;
+using testing::step_at;
+using testing::toy_run;
+
+std::vector<StepRecord> with_energies(const std::vector<double>& energies) {
+  std::vector<StepRecord> run;
+  for (const double energy : energies) {
+    run.push_back(step_at(run.size()));
+    run.back().energy = energy;
+  }
+  return run;
+}
+
+TEST(RunSummary, EnergyGivenOutIsHowFarTheLedgerEverWasBelowZero) {
+  const RunSummary run = summarise(with_energies({0, 0.2, -0.3, 0.1, -0.1}));
+  EXPECT_DOUBLE_EQ(run.energy_given_out, 0.3);
+  EXPECT_DOUBLE_EQ(run.least_energy, -0.3);
+  EXPECT_FALSE(run.passive());
+}
+
+TEST(RunSummary, ALedgerThatNeverWasBelowZeroGaveNothingOut) {
+  const RunSummary run = summarise(with_energies({0, 0.2, 0.1}));
+  EXPECT_EQ(run.energy_given_out, 0);
+  EXPECT_EQ(run.least_energy, 0);
+  EXPECT_TRUE(run.passive());
+}
+
+TEST(RunSummary, WhatAnOverrunDrewIsCountedButBreaksNoPromiseWhileTheLedgerRecovers) {
+  auto steps = with_energies({0, 0.1, -0.5, -0.4, -0.2, 0.3});
+  steps[2].reasons = Reason::kOverrun;
+  const RunSummary run = summarise(steps);
+  EXPECT_DOUBLE_EQ(run.energy_given_out, 0.5);
+  EXPECT_EQ(run.least_energy, 0);
+  EXPECT_TRUE(run.passive());
+  EXPECT_EQ(run.overruns, 1U);
+}
+
+TEST(RunSummary, AFallAfterAnOverrunBreaksThePromise) {
+  auto steps = with_energies({0, -0.5, -0.4, -0.7});
+  steps[1].reasons = Reason::kOverrun;
+  EXPECT_NEAR(summarise(steps).least_energy, -0.2, 1e-15);
+}
+
+TEST(RunSummary, AnOverrunExcusesOnlyWhatItDrewItself) {
+  auto steps = with_energies({0, -1, -1.1, -1.2});
+  steps[2].reasons = Reason::kOverrun;
+  EXPECT_NEAR(summarise(steps).least_energy, -1.1, 1e-15);
+}
+
+TEST(RunSummary, AnOverrunIsForgivenOnlyUntilTheLedgerHasRecovered) {
+  auto steps = with_energies({0, -0.5, 0.1, -0.2});
+  steps[1].reasons = Reason::kOverrun;
+  EXPECT_DOUBLE_EQ(summarise(steps).least_energy, -0.2);
+}
+
+TEST(RunSummary, SharesAreOfAllStepsAndFactsAboutAStepAreNoLimits) {
+  auto steps = with_energies(std::vector<double>(10, 0.0));
+  steps[1].reasons = Reason::kEnergy;
+  steps[2].reasons = Reason::kEnergy;
+  steps[2].reasons |= Reason::kSlew;
+  steps[3].reasons = Reason::kOverrun;
+  steps[4].reasons = Reason::kWatchdog;
+  const RunSummary run = summarise(steps);
+  EXPECT_DOUBLE_EQ(run.share_limited(), 0.2);
+  EXPECT_DOUBLE_EQ(run.share_limited(Reason::kEnergy), 0.2);
+  EXPECT_DOUBLE_EQ(run.share_limited(Reason::kSlew), 0.1);
+  EXPECT_DOUBLE_EQ(run.share_limited(Reason::kHeld), 0);
+  EXPECT_EQ(run.watchdogs, 1U);
+}
+
+TEST(RunSummary, ASpringIsFeltAsStiffAsItIs) {
+  const RunSummary run = summarise(spring_run(2000, 700, 0.002, 0));
+  ASSERT_TRUE(run.contact && run.contact->above);
+  EXPECT_NEAR(*run.contact->above, 0.002, 1e-9);
+  EXPECT_FALSE(run.contact->below);
+  EXPECT_TRUE(run.stable);
+  EXPECT_NEAR(run.operational_stiffness.value_or(0), 700, 0.03 * 700);
+}
+
+TEST(RunSummary, TheWallIsWhereItIsHoweverLateItsForcesCome) {
+  for (const std::uint64_t delay : {0U, 40U, 100U}) {
+    const RunSummary run = summarise(spring_run(4000, 700, 0.002, delay));
+    ASSERT_TRUE(run.contact && run.contact->above);
+    EXPECT_NEAR(*run.contact->above, 0.002, 1e-9) << delay;
+  }
+}
+
+TEST(RunSummary, AWallThatIsNoSpringBeginsBetweenNoForceAndForce) {
+  auto steps = spring_run(2000, 700, 0.002, 0);
+  for (StepRecord& step : steps)
+    if (step.wanted.x() < 0) step.wanted.x() = -5;
+  const RunSummary run = summarise(steps);
+  ASSERT_TRUE(run.contact && run.contact->above);
+  EXPECT_NEAR(*run.contact->above, 0.002, 6.3e-4);  // so far the hand moves between two forces
+}
+
+TEST(RunSummary, AWallThatPushesUpTheAxisIsFeltTheSame) {
+  auto steps = spring_run(2000, 700, 0.002, 0);
+  for (StepRecord& step : steps) {
+    step.hand.position *= -1;
+    step.wanted *= -1;
+    step.applied *= -1;
+  }
+  const RunSummary run = summarise(steps);
+  ASSERT_TRUE(run.contact && run.contact->below);
+  EXPECT_FALSE(run.contact->above);
+  EXPECT_NEAR(run.operational_stiffness.value_or(0), 700, 0.03 * 700);
+}
+
+TEST(RunSummary, ASpringToACentrePushesOnBothSidesOfIt) {
+  auto steps = spring_run(2000, 700, -1, 0);
+  for (StepRecord& step : steps) step.wanted.x() = step.applied.x() = -700 * step.hand.position.x();
+  EXPECT_NEAR(summarise(steps).operational_stiffness.value_or(0), 700, 0.03 * 700);
+}
+
+TEST(RunSummary, ForcesOfBothSignsAtTheSamePlacesAreNoContact) {
+  auto steps = spring_run(2000, 700, 0, 0);
+  for (StepRecord& step : steps) step.wanted.x() = step.tick % 20 < 10 ? 3 : -3;
+  const RunSummary run = summarise(steps);
+  EXPECT_FALSE(run.contact);
+  EXPECT_FALSE(run.operational_stiffness);
+}
+
+TEST(RunSummary, StiffnessIsWhatWasAppliedNotWhatWasWanted) {
+  auto steps = spring_run(2000, 2000, 0.002, 0);
+  for (StepRecord& step : steps) step.applied = step.wanted / 4;
+  EXPECT_NEAR(summarise(steps).operational_stiffness.value_or(0), 500, 0.03 * 500);
+}
+
+TEST(RunSummary, AHandThatIsNotTouchedByAForceHasNoContact) {
+  const RunSummary run = summarise(spring_run(2000, 700, 1, 0));
+  EXPECT_FALSE(run.contact);
+  EXPECT_FALSE(run.operational_stiffness);
+}
+
+TEST(RunSummary, TheMainAxisIsTheOneAlongWhichTheHandMoves) {
+  auto steps = spring_run(1000, 700, 0, 0);
+  for (StepRecord& step : steps) step.hand.position = Vec3(1, -2, 0.001) + Vec3(0, -2, 2) * step.hand.position.x();
+  const Vec3 axis = summarise(steps).axis;
+  EXPECT_NEAR(std::abs(axis.dot(Vec3(0, -1, 1).normalized())), 1, 1e-9);
+  EXPECT_GT(axis.cwiseAbs().maxCoeff(), 0.7);
+}
+
+TEST(RunSummary, AnAxisNearlyThatOfTheDeviceIsThatOfTheDevice) {
+  auto steps = spring_run(1000, 700, 0, 0);
+  for (StepRecord& step : steps) step.hand.position.y() = 0.05 * step.hand.position.x();
+  EXPECT_EQ(summarise(steps).axis, Vec3(Vec3::UnitX()));
+}
+
+TEST(RunSummary, ARunIsNotStableWhenItIsBothActiveAndFasterThanAHandChooses) {
+  const auto run = [](double frequency, double energy) {
+    auto steps = spring_run(4000, 700, 0, 0, 0.01, frequency);
+    for (StepRecord& step : steps) step.energy = energy;
+    return summarise(steps).stable;
+  };
+  EXPECT_FALSE(run(6, -1));
+  EXPECT_TRUE(run(6, 1));   // fast tapping on a passive wall
+  EXPECT_TRUE(run(1, -1));  // an active wall, held by a strong hand
+  EXPECT_FALSE(run(3.3, -1));
+  EXPECT_TRUE(run(2.7, -1));
+}
+
+TEST(RunSummary, LoopAgeIsTakenOncePerForceWhenItIsFirstUsed) {
+  std::vector<StepRecord> steps;
+  for (std::uint64_t n = 0; n < 1000; ++n) {
+    steps.push_back(step_at(n));
+    steps.back().force_sequence = n / 10 + 1;                  // 100 forces, 10 steps each
+    const auto first = static_cast<std::int64_t>(n / 10 + 1);  // 1, 2, … 100 ms
+    steps.back().loop_age = std::chrono::milliseconds(first + static_cast<std::int64_t>(n % 10));
+  }
+  const RunSummary run = summarise(steps);
+  ASSERT_TRUE(run.loop_age);
+  EXPECT_EQ(run.loop_age->p50, 50ms);
+  EXPECT_EQ(run.loop_age->p99, 99ms);
+  EXPECT_EQ(run.forces, 100U);
+  EXPECT_DOUBLE_EQ(run.forces_per_s.value_or(0), 100);
+}
+
+TEST(RunSummary, ARunWithoutForcesHasNoLoopAgeAndNoRate) {
+  const RunSummary run = summarise(with_energies({0, 0}));
+  EXPECT_FALSE(run.loop_age);
+  EXPECT_FALSE(run.forces_per_s);
+  EXPECT_FALSE(run.round_trip);
+}
+
+TEST(RunSummary, TheRoundTripIsWhatTheEchoesOfTheControllerSay) {
+  // Our state leaves at 100 ms; the peer has it at 7000.0 ms of its clock, answers at 7002.5, and that is here at 145.
+  DatagramRecord datagram;
+  datagram.at = testing::at_ms(145);
+  DataWriter writer;
+  // Written by the peer, to whom its own clock is local.
+  writer.begin(
+      datagram.bytes, {.connection_id = 1}, LocalTime(7002500us),
+      OutgoingEcho{.sent = PeerTime(100ms), .received = LocalTime(7000ms), .packet_number = 0, .received_mask = 0});
+  ASSERT_TRUE(writer.add(
+      ForceCommand{.sequence = 1, .based_on_tick = 1, .force = Vec3(1, 0, 0), .model = {}, .valid_for = 50ms}));
+  datagram.size = static_cast<std::uint32_t>(writer.size());
+
+  RunObserver observer;
+  observer.observe(datagram);
+  DatagramRecord garbage = datagram;
+  garbage.bytes.fill(std::byte{0x54});
+  observer.observe(garbage);
+  DatagramRecord out = datagram;
+  out.direction = DatagramRecord::Direction::kOut;
+  out.at += 1s;
+  observer.observe(out);
+  const auto round_trip = observer.summary().round_trip;
+  ASSERT_TRUE(round_trip);
+  EXPECT_EQ(round_trip->p50, 42500us);
+  EXPECT_EQ(round_trip->p99, 42500us);
+}
+
+TEST(RunSummary, AStepWithoutAPositionSaysNothingAboutMotion) {
+  auto steps = spring_run(1000, 700, 0.002, 0);
+  const RunSummary before = summarise(steps);
+  for (const std::size_t n : {250U, 251U, 700U}) {
+    steps[n].reasons |= Reason::kUnseen;
+    steps[n].hand.position = Vec3(0, 9, 0);
+    steps[n].hand.velocity = Vec3(0, 9, 0);
+  }
+  const RunSummary after = summarise(steps);
+  EXPECT_EQ(after.peak_speed, before.peak_speed);
+  EXPECT_EQ(after.axis, before.axis);
+  EXPECT_DOUBLE_EQ(after.share_limited(Reason::kUnseen), 0.003);
+}
+
+TEST(RunSummary, SpanIntervalAndPeaksAreThoseOfTheSteps) {
+  auto steps = with_energies(std::vector<double>(101, 0.0));
+  steps[7].held = 12ms;
+  steps[8].hand.velocity = Vec3(0.3, 0, -0.4);
+  steps[9].applied = Vec3(0, 3, 4);
+  steps[9].wanted = Vec3(0, 30, 40);
+  const RunSummary run = summarise(steps);
+  EXPECT_EQ(run.steps, 101U);
+  EXPECT_EQ(run.span, 100ms);
+  EXPECT_EQ(run.longest_interval, 12ms);
+  EXPECT_DOUBLE_EQ(run.peak_speed, 0.5);
+  EXPECT_DOUBLE_EQ(run.peak_force, 5);
+  EXPECT_FALSE(run.limiter_on);
+}
+
+TEST(RunSummary, TheRealControlLawKeepsThePromiseAndWithoutALimiterItIsBroken) {
+  const RunSummary on = summarise(toy_run(Law::kAol, 6000));
+  EXPECT_TRUE(on.passive());
+  EXPECT_TRUE(on.limiter_on);
+  EXPECT_TRUE(on.stable);
+  EXPECT_GT(on.share_limited(Reason::kEnergy), 0.05);
+  const RunSummary off = summarise(toy_run(Law::kNone, 6000));
+  EXPECT_GT(off.energy_given_out, 0.1);
+  EXPECT_FALSE(off.passive());
+  EXPECT_FALSE(off.limiter_on);
+  EXPECT_FALSE(off.stable);
+}
+
+TEST(Percentile, IsTheLeastSampleThatEnoughDoNotExceed) {
+  EXPECT_EQ(percentile<int>({}, 0.5), std::nullopt);
+  EXPECT_EQ(percentile<int>({3}, 0.99), 3);
+  EXPECT_EQ(percentile<int>({4, 1, 3, 2}, 0.5), 2);
+  EXPECT_EQ(percentile<int>({4, 1, 3, 2}, 0.51), 3);
+  EXPECT_EQ(percentile<int>({4, 1, 3, 2}, 1), 4);
+}
+
+TEST(Thinned, KeepsAllThatFitsAndThenEvenlySpacedOnes) {
+  Thinned<int> samples(4);
+  for (int i = 0; i < 4; ++i) samples.observe(i);
+  EXPECT_EQ(samples.kept(), (std::vector{0, 1, 2, 3}));
+  for (int i = 4; i < 16; ++i) samples.observe(i);
+  EXPECT_EQ(samples.kept(), (std::vector{0, 4, 8, 12}));
+  EXPECT_EQ(samples.seen(), 16U);
+}
+
+}  // namespace
+}  // namespace tendon::lab

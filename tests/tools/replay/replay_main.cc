@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-replay: a recording through the control law again.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+
+#include "core/control/limiter.h"
+#include "server/scene/scene.h"
+#include "tests/tools/replay/replay.h"
+
+int main(int argc, char** argv) {
+  constexpr int kDone = 0;
+  constexpr int kFailed = 1;
+  constexpr int kWrongUsage = 2;
+
+  std::string names;
+  for (const tendon::LawInfo& law : tendon::laws()) names += (names.empty() ? "" : "|") + std::string(law.name);
+
+  tendon::replay::Options options;
+  std::string recording;
+  std::string law;
+  std::string files;
+  std::string csv;
+  std::string picture;
+  CLI::App app(
+      "A recording through the control law again: bit for bit as it was recorded, or with another law or other "
+      "settings.",
+      "tendon-replay");
+  app.add_option("RECORDING", recording, "a recording of tendond, or what its flight recorder left")
+      ->type_name("FILE.mcap")
+      ->required()
+      ->check(CLI::ExistingFile.description(""));
+  app.add_option("--law", law, "another limiter, with the scene's friction bounds: " + names)->type_name("NAME");
+  app.add_option("--set", options.settings,
+                 "another value in the scene: limiter.kind=aol, force.max_force_n=2; without a "
+                 "value the key or table is taken out")
+      ->type_name("TABLE.KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--files", files, "folder of the files that the scene names")->type_name("DIR")->default_val(".");
+  app.add_option("--csv", csv, "write a row for each step there")->type_name("FILE.csv");
+  app.add_option("--out", picture, "draw both runs side by side (needs gnuplot)")->type_name("FILE.svg|FILE.png");
+  app.add_flag("--json", options.json, "JSON objects on stdout, a line each, instead of the table");
+  app.footer(
+      "\nExamples\n"
+      "  tendon-replay run.mcap                          is what was recorded what the law decides?\n"
+      "  tendon-replay run.mcap --law aol --out both.png  what would the law of 2009 have permitted?\n"
+      "\nExit: 0 done; 1 a step differs (it is named), or a file cannot be read or written; 2 wrong usage.");
+
+  const auto complain = [](const std::exception& error, int code) {
+    std::cerr << "tendon-replay: " << error.what() << (code == kWrongUsage ? " (see --help)\n" : "\n");
+    return code;
+  };
+  try {
+    app.parse(argc, argv);
+    options.recording = recording;
+    options.files = files;
+    if (!law.empty()) options.law = law;
+    if (!csv.empty()) options.csv = csv;
+    if (!picture.empty()) options.picture = picture;
+    options.progress = isatty(STDERR_FILENO) != 0;
+    return tendon::replay::replay(options, std::cout) ? kDone : kFailed;
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return complain(error, kWrongUsage);
+  } catch (const std::invalid_argument& error) {
+    return complain(error, kWrongUsage);
+  } catch (const tendon::SceneError& error) {
+    return complain(error, kWrongUsage);
+  } catch (const std::exception& error) {
+    return complain(error, kFailed);
+  }
+}

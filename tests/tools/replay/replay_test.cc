@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/replay/replay.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "devices/simulated/simulated_device.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
+#include "server/scene/scene.h"
+#include "tests/server/scratch_folder.h"
+#include "tests/tools/replay/tapping.h"
+#include "tests/tools/worlds/world.h"
+
+namespace tendon::replay {
+namespace {
+
+using tendon::testing::ScratchFolder;
+
+const std::string kScene = testing::kTapping + R"([limiter]
+kind = "aol+"
+[limiter.energy_cap]
+)";
+constexpr std::uint64_t kSteps = 2000;
+
+/// Two seconds of a remote wall over a bad network, as a server records them.
+std::vector<StepRecord> tapping() {
+  const Scene scene = parse_scene(kScene, "scene", ".");
+  SimulatedDevice device(scene.device);
+  simulation::World::Config config;
+  config.loop = scene.loop;
+  simulation::World world(config, device);
+  world.add_controller({.name = "wall", .rate_hz = 100}, [](const DeviceState& state) -> Touch {
+    return Vec3(-2000 * std::max(0.0, state.position.x()), 0, 0);
+  });
+  std::vector<StepRecord> steps;
+  world.watch_steps([&steps](const StepRecord& step) { steps.push_back(step); });
+  world.run_for(std::chrono::milliseconds(kSteps));
+  steps.resize(kSteps);
+  return steps;
+}
+
+std::filesystem::path write(const std::filesystem::path& file, const std::vector<StepRecord>& steps,
+                            const std::string& scene = kScene) {
+  FileSink sink(file);
+  Recorder::Config config;
+  config.scene.text = scene;
+  if (!steps.empty()) config.started = steps.front().hand.at;
+  Recorder recorder(config, sink);
+  for (const StepRecord& step : steps) {
+    recorder.record(step);
+    recorder.tick(step.hand.at);
+  }
+  recorder.close();
+  return file;
+}
+
+struct Outcome {
+  bool held;
+  std::string said;
+};
+
+Outcome run(const Options& options) {
+  std::ostringstream out;
+  const bool held = replay(options, out);
+  return {held, out.str()};
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::vector<std::string> lines_of(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST(Replay, SaysThatEveryStepOfARecordingIsTheSameBitForBit) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  const Outcome outcome = run({.recording = file});
+  EXPECT_TRUE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, "2000 of 2000 steps are the same bit for bit\n")) << outcome.said;
+  const Outcome json = run({.recording = file, .json = true});
+  EXPECT_EQ(
+      json.said.find(R"({"steps":2000,"same":2000,"gap_before_step":null,"differs_at_step":null,"difference":""})"), 0U)
+      << json.said;
+  EXPECT_EQ(std::count(json.said.begin(), json.said.end(), '\n'), 3);
+}
+
+TEST(Replay, NamesTheFirstStepThatDiffersAndFails) {
+  const ScratchFolder folder;
+  std::vector<StepRecord> steps = tapping();
+  steps[1233].permitted *= 1 + 1e-15;
+  ASSERT_NE(steps[1233].permitted, tapping()[1233].permitted);
+  const Outcome outcome = run({.recording = write(folder.path() / "run.mcap", steps)});
+  EXPECT_FALSE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said,
+                       "1233 of 2000 steps are the same bit for bit\n"
+                       "the first that differs is step 1234: permitted_n: recorded "))
+      << outcome.said;
+}
+
+TEST(Replay, AfterAGapItComparesNothingAndSaysSo) {
+  const ScratchFolder folder;
+  std::vector<StepRecord> steps = tapping();
+  steps.erase(steps.begin() + 500);
+  const Outcome outcome = run({.recording = write(folder.path() / "run.mcap", steps)});
+  EXPECT_TRUE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, "500 of 1999 steps are the same bit for bit\nthere is a gap before step 502"))
+      << outcome.said;
+}
+
+TEST(Replay, OfARecordingThatBeginsInTheMiddleNothingCanBeCompared) {
+  const ScratchFolder folder;
+  std::vector<StepRecord> steps = tapping();
+  steps.erase(steps.begin(), steps.begin() + 1000);
+  const auto file = write(folder.path() / "flight.mcap", steps);
+  const Outcome outcome = run({.recording = file});
+  EXPECT_FALSE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, "there is a gap before step 1001")) << outcome.said;
+  EXPECT_TRUE(run({.recording = file, .law = "aol"}).held) << "another law may begin anywhere";
+}
+
+TEST(Replay, ATornRecordingIsReplayedAsFarAsItGoes) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) * 2 / 3);
+  const Outcome outcome = run({.recording = file, .json = true});
+  EXPECT_TRUE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, R"("truncated":true)")) << outcome.said;
+}
+
+TEST(Replay, WithAnotherLawTheTableHasBothAndSaysThatTheHandIsTheRecordedOne) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  const Outcome outcome = run({.recording = file, .law = "none"});
+  EXPECT_TRUE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, "recorded")) << outcome.said;
+  EXPECT_TRUE(contains(outcome.said, "none")) << outcome.said;
+  EXPECT_TRUE(contains(outcome.said, "the hand moved as it was recorded")) << outcome.said;
+}
+
+TEST(Replay, ASettingIsTakenAndOneThatCannotBeIsNamed) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  const std::string said =
+      run({.recording = file, .settings = {"limiter.energy_cap=", "force.max_force_n=0.5"}, .json = true}).said;
+  const auto peak = [&said](std::size_t from) {
+    const std::string key = R"("peak_force_n":)";
+    return std::stod(said.substr(said.find(key, from) + key.size()));
+  };
+  EXPECT_GT(peak(0), 0.6);
+  EXPECT_DOUBLE_EQ(peak(said.find('\n')), 0.5);
+  for (const char* wrong : {"force.max_force_n=-1", "force.max_farce_n=1", "force", "limiter.kind.x=1"}) {
+    try {
+      run({.recording = file, .settings = {wrong}});
+      FAIL() << wrong << " was taken";
+    } catch (const SceneError& error) {
+      EXPECT_TRUE(contains(error.what(), "force") || contains(error.what(), "limiter.kind")) << error.what();
+    }
+  }
+  EXPECT_THROW(run({.recording = file, .law = "oal"}), SceneError);
+}
+
+TEST(Replay, WritesARowForEachStep) {
+  const ScratchFolder folder;
+  const auto file = write(folder.path() / "run.mcap", tapping());
+  const auto csv = folder.path() / "steps.csv";
+  run({.recording = file, .csv = csv});
+  const std::vector<std::string> lines = lines_of(csv);
+  ASSERT_EQ(lines.size(), kSteps + 1);
+  EXPECT_EQ(lines[0].find("t_s,step,x_m,"), 0U);
+  EXPECT_EQ(lines[1].find("0,1,"), 0U) << lines[1];
+  EXPECT_EQ(lines[kSteps].find("1.999,2000,"), 0U) << lines[kSteps];
+  EXPECT_THROW(run({.recording = file, .csv = folder.path() / "no" / "such.csv"}), std::runtime_error);
+}
+
+TEST(Replay, ARecordingWithoutAStepIsRefused) {
+  const ScratchFolder folder;
+  EXPECT_THROW(run({.recording = write(folder.path() / "empty.mcap", {})}), std::runtime_error);
+}
+
+TEST(Replay, ASceneThatCannotBeRunIsSaidToBeTheRecordedOne) {
+  const ScratchFolder folder;
+  try {
+    run({.recording = write(folder.path() / "run.mcap", tapping(), "[device]\nkind = 7\n")});
+    FAIL();
+  } catch (const SceneError& error) {
+    EXPECT_TRUE(contains(error.what(), "the recorded scene:2: device.kind")) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace tendon::replay

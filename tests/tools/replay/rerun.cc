@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/replay/rerun.h"
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+
+#include "core/base/arithmetic.h"
+
+namespace tendon::replay {
+
+namespace {
+
+/// What the forces' keeper found, of all reasons of a step.
+constexpr std::uint32_t kUpstream =
+    static_cast<std::uint32_t>(Reason::kRampIn) | static_cast<std::uint32_t>(Reason::kHeld) |
+    static_cast<std::uint32_t>(Reason::kDecaying) | static_cast<std::uint32_t>(Reason::kSafeStop);
+
+constexpr double kFurtherThanAnyHand = 1e100;  // m; its square is finite
+
+ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
+  ForceChannels::Wanted wanted;
+  wanted.force = recorded.wanted;
+  wanted.stiffness = recorded.stiffness;
+  wanted.mode = recorded.mode;
+  wanted.reasons = Reasons::from_bits(recorded.reasons.bits() & kUpstream);
+  wanted.age = recorded.force_age;
+  wanted.channel = recorded.channel;
+  return wanted;
+}
+
+std::string digits(double value) {
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
+std::string digits(const Vec3& value) {
+  return "(" + digits(value.x()) + ", " + digits(value.y()) + ", " + digits(value.z()) + ")";
+}
+
+bool same(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
+bool same(const Vec3& a, const Vec3& b) { return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z()); }
+
+/// The device clamps after the law has spoken.
+Reasons of_the_law(Reasons reasons) {
+  return Reasons::from_bits(reasons.bits() & ~static_cast<std::uint32_t>(Reason::kDeviceClamp));
+}
+
+}  // namespace
+
+Step Rerun::take(const StepRecord& recorded, const Vec3& applied) {
+  if (!recorded.reasons.has(Reason::kUnseen)) {
+    missed_ = 0;
+    return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded));
+  }
+  // Of a position that was not believed the record has only that it was not.
+  ++missed_;
+  Motion hand = recorded.hand;
+  const bool jumped = recorded.mode == Mode::kFault && controller_.fault() == HapticController::Fault::kNone;
+  if (recorded.reasons.has(Reason::kNotFinite)) {
+    hand.position.setConstant(std::numeric_limits<double>::quiet_NaN());
+  } else if (jumped && missed_ < max_missed_) {
+    hand.position.setConstant(kFurtherThanAnyHand);
+  } else {
+    return controller_.step_unseen(recorded.hand.at, applied);
+  }
+  return controller_.step(hand, applied, recorded.hand_force, wanted_in(recorded));
+}
+
+StepRecord Rerun::step(const StepRecord& recorded) {
+  const DenormalsOff off;
+  if (recorded.rearmed) {
+    controller_.rearm();
+    missed_ = 0;
+  }
+  if (recorded.disarmed) controller_.disarm();
+  StepRecord again = recorded;
+  static_cast<Step&>(again) = take(recorded, held_ == Held::kRecorded ? recorded.was_applied : own_);
+  // Of the force in use the record knows more than the law.
+  again.force_sequence = recorded.force_sequence;
+  again.loop_age = recorded.loop_age;
+  again.force_error = recorded.force_error;
+  own_ = again.force;
+  if (held_ == Held::kOwn) again.applied = own_;
+  return again;
+}
+
+std::string difference(const StepRecord& recorded, const StepRecord& again) {
+  std::string text;
+  const auto say = [&text](std::string_view name, const std::string& was, const std::string& is) {
+    text.append(text.empty() ? "" : "; ").append(name).append(": recorded ").append(was).append(", again ").append(is);
+  };
+  const auto number = [&say](std::string_view name, double was, double is) {
+    if (!same(was, is)) say(name, digits(was), digits(is));
+  };
+  if (recorded.held != again.held) {
+    say("interval_ns", std::to_string(recorded.held.count()), std::to_string(again.held.count()));
+  }
+  number("energy_j", recorded.energy, again.energy);
+  number("permitted_n", recorded.permitted, again.permitted);
+  if (!same(recorded.force, again.force)) say("force_commanded_n", digits(recorded.force), digits(again.force));
+  if (recorded.mode != again.mode) {
+    say("mode", std::to_string(static_cast<int>(recorded.mode)), std::to_string(static_cast<int>(again.mode)));
+  }
+  if (of_the_law(recorded.reasons) != of_the_law(again.reasons)) {
+    say("reasons", "\"" + to_string(of_the_law(recorded.reasons)) + "\"",
+        "\"" + to_string(of_the_law(again.reasons)) + "\"");
+  }
+  return text;
+}
+
+}  // namespace tendon::replay

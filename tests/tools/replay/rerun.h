@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/haptic_controller.h"
+#include "server/recording/records.h"
+
+namespace tendon::replay {
+
+/// Takes recorded steps again, one by one: the motion, the sensor and the forces that were wanted come from the record,
+/// all else from a controller of its own.
+///
+///     kRecorded   the interval is booked with the force that the device held then: the same law gives the same bits
+///     kOwn        … with the force that this law gave. Another law then keeps its own account. The hand still moves as
+///     it
+///                 was recorded; with other forces it would have moved otherwise
+///
+/// Thread-safe: no. Realtime-safe: no.
+class Rerun {
+ public:
+  enum class Held { kRecorded, kOwn };
+
+  /// Throws what HapticController throws.
+  Rerun(const HapticController::Config& control, Held held)
+      : controller_(control), max_missed_(control.max_missed), held_(held) {}
+
+  /// `recorded` with what this controller makes of it. `applied` is its own force with kOwn, else the recorded one.
+  StepRecord step(const StepRecord& recorded);
+
+ private:
+  Step take(const StepRecord& recorded, const Vec3& applied);
+
+  HapticController controller_;
+  std::uint32_t max_missed_;
+  std::uint32_t missed_ = 0;  ///< readings in a row
+  Held held_;
+  Vec3 own_ = Vec3::Zero();
+};
+
+/// What of a step a law decides, and that is not the same bit for bit: "energy_j: recorded 0.1, again 0.2". Empty when
+/// all is.
+std::string difference(const StepRecord& recorded, const StepRecord& again);
+
+}  // namespace tendon::replay

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Worlds drawn from seeds. That all of them keep every promise is what `tendon-worlds run` shows (ctest -R Worlds);
+// here is what that rests on: the same seed is the same world, broken worlds are found, and shrink to what matters.
+#include "tests/tools/worlds/explore.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tests/tools/injector/traces/trace.h"
+#include "tests/tools/worlds/runner.h"
+#include "tests/tools/worlds/shrink_world.h"
+
+namespace tendon::simulation {
+namespace {
+
+TEST(Worlds, SameSeedSameWorld) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    EXPECT_EQ(describe(draw_world(seed)), describe(draw_world(seed)));
+    const Outcome once = run(draw_world(seed));
+    const Outcome again = run(draw_world(seed));
+    EXPECT_EQ(once.least_energy, again.least_energy);
+    EXPECT_EQ(once.steps, again.steps);
+    EXPECT_EQ(once.network.sent, again.network.sent);
+    EXPECT_EQ(once.network.delivered, again.network.delivered);
+  }
+}
+
+TEST(Worlds, ItsRecordedNetworkMakesTheSameWorldAgain) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const DrawnWorld world = draw_world(seed);
+    const Outcome drawn = run(world);
+    const Outcome played = run_with_network(world, record_network(world));
+    EXPECT_EQ(drawn.least_energy, played.least_energy);
+    EXPECT_EQ(drawn.network.sent, played.network.sent);
+    EXPECT_EQ(drawn.network.delivered, played.network.delivered);
+  }
+}
+
+TEST(Worlds, ADeviceThatGivesOutOnePercentMoreThanTheBoundBreaksThem) {
+  int broken = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    const Outcome outcome = run(draw_world(seed, 1.01));
+    if (outcome.breach && outcome.breach->oracle == Oracle::kLedger) ++broken;
+  }
+  // The others hardly press against their bound, or have a law that keeps away from it.
+  EXPECT_GT(broken, 10);
+}
+
+TEST(Worlds, EveryOracleHasANameAndASentence) {
+  for (std::size_t i = 0; i < oracles().size(); ++i) {
+    EXPECT_EQ(static_cast<std::size_t>(oracles()[i].oracle), i);
+    EXPECT_FALSE(oracles()[i].name.empty());
+    EXPECT_FALSE(oracles()[i].sentence.empty());
+  }
+}
+
+TEST(Worlds, SeedsAreReadFromTheBeginningOfEachLine) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "seeds.txt";
+  std::ofstream(file) << "# why\n\n17 a bug\n4\n";
+  EXPECT_EQ(read_seeds(file), (std::vector<std::uint64_t>{17, 4}));
+  std::ofstream(file) << "17 a bug\nseventeen\n";
+  try {
+    read_seeds(file);
+    ADD_FAILURE();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("seeds.txt:2: expected a seed"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Worlds, AWorldThatKeepsItsPromisesIsNotShrunk) {
+  std::ostringstream out;
+  EXPECT_FALSE(shrink_world(1, std::filesystem::path(testing::TempDir()) / "world.csv", out));
+  EXPECT_NE(out.str().find("nothing to shrink"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tendon::simulation

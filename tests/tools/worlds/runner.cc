@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/worlds/runner.h"
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <exception>
+#include <fstream>
+#include <iomanip>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "tests/tools/lab/pictures/json.h"
+#include "tests/tools/worlds/explore.h"
+
+namespace tendon::simulation {
+
+namespace {
+
+constexpr Duration kTellEvery = std::chrono::milliseconds(500);
+/// So few worlds may by chance have no hand that comes to feel anything.
+constexpr std::uint64_t kEnoughToJudge = 200;
+
+struct Broken {
+  std::uint64_t seed = 0;
+  Breach breach;
+};
+
+struct Tally {
+  std::uint64_t worlds = 0;
+  std::uint64_t steps = 0;
+  std::uint64_t datagrams = 0;
+  std::uint64_t felt = 0;
+  std::uint64_t limited = 0;
+  std::uint64_t recovered = 0;
+  double least_energy = std::numeric_limits<double>::infinity();
+
+  void add(const Outcome& outcome) {
+    ++worlds;
+    steps += outcome.steps;
+    datagrams += outcome.network.sent;
+    felt += outcome.felt ? 1 : 0;
+    limited += outcome.limited ? 1 : 0;
+    recovered += outcome.recovered ? 1 : 0;
+    least_energy = std::min(least_energy, outcome.least_energy);
+  }
+};
+
+/// What the threads share.
+class Exploration {
+ public:
+  explicit Exploration(const RunOptions& options) : options_(options) {}
+
+  void work(std::ostream& progress) {
+    while (const auto seed = next()) {
+      const Outcome outcome = run(draw_world(*seed));
+      const std::scoped_lock lock(mutex_);
+      tally_.add(outcome);
+      if (outcome.breach) {
+        broken_.push_back({*seed, *outcome.breach});
+        stop_ = true;
+      }
+      tell(progress);
+    }
+  }
+
+  const Tally& tally() const { return tally_; }
+  std::vector<Broken> broken() {
+    std::ranges::sort(broken_, {}, &Broken::seed);
+    return broken_;
+  }
+
+ private:
+  std::optional<std::uint64_t> next() {
+    if (stop_) return std::nullopt;
+    const std::uint64_t number = handed_out_++;
+    if (number < options_.seeds.size()) return options_.seeds[number];
+    const std::uint64_t drawn = number - options_.seeds.size();
+    if (options_.budget ? options_.elapsed() >= *options_.budget : drawn >= options_.count) return std::nullopt;
+    return options_.first_seed + drawn;
+  }
+
+  void tell(std::ostream& progress) {
+    if (!options_.progress || options_.elapsed() - told_ < kTellEvery) return;
+    told_ = options_.elapsed();
+    progress << '\r' << tally_.worlds << " worlds, " << std::fixed << std::setprecision(0)
+             << static_cast<double>(tally_.worlds) / seconds(told_) << " per second" << std::defaultfloat << std::flush;
+  }
+
+  const RunOptions& options_;
+  std::atomic<std::uint64_t> handed_out_{0};
+  std::atomic<bool> stop_{false};
+  std::mutex mutex_;
+  Tally tally_;
+  std::vector<Broken> broken_;
+  Duration told_{};
+};
+
+std::string reproduce(std::uint64_t seed) { return "tendon-worlds run --seed " + std::to_string(seed) + " --verbose"; }
+
+void tell(const Broken& broken, bool json, std::ostream& out) {
+  const OracleInfo& oracle = info(broken.breach.oracle);
+  const double at = seconds(broken.breach.at.time_since_epoch());
+  if (json) {
+    out << lab::JsonLine()
+               .add("kind", "broken")
+               .add("seed", broken.seed)
+               .add("oracle", oracle.name)
+               .add("at_s", at)
+               .add("what", broken.breach.what)
+               .add("reproduce", reproduce(broken.seed))
+               .str()
+        << '\n';
+    return;
+  }
+  out << "seed " << broken.seed << " breaks \"" << oracle.name << "\" at " << at << " s: " << broken.breach.what
+      << "\n  the promise: " << oracle.sentence << "\n  again with:  " << reproduce(broken.seed) << '\n';
+}
+
+void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
+  const double simulated = static_cast<double>(tally.worlds) * seconds(DrawnWorld::kLength);
+  const auto worlds = static_cast<double>(tally.worlds);
+  if (json) {
+    out << lab::JsonLine()
+               .add("kind", "end")
+               .add("worlds", tally.worlds)
+               .add("elapsed_s", elapsed)
+               .add("worlds_per_s", worlds / elapsed)
+               .add("virtual_to_real", simulated / elapsed)
+               .add("haptic_steps", tally.steps)
+               .add("datagrams", tally.datagrams)
+               .add("felt", tally.felt)
+               .add("limited", tally.limited)
+               .add("recovered", tally.recovered)
+               .add("least_energy_j", tally.least_energy)
+               .str()
+        << '\n';
+    return;
+  }
+  out << tally.worlds << " worlds of " << seconds(DrawnWorld::kLength) << " s in " << std::fixed << std::setprecision(1)
+      << elapsed << " s: " << worlds / elapsed << " per second, " << std::setprecision(0) << simulated / elapsed
+      << " times real time\n"
+      << std::defaultfloat << std::setprecision(6) << tally.steps << " haptic steps, " << tally.datagrams
+      << " datagrams; forces felt in " << tally.felt << " worlds, limited in " << tally.limited
+      << ", recovery checked in " << tally.recovered << "; least energy " << tally.least_energy << " J\n";
+}
+
+}  // namespace
+
+bool explore(const RunOptions& options, std::ostream& out, std::ostream& progress) {
+  Exploration exploration(options);
+  std::vector<std::exception_ptr> failures(options.jobs);
+  {
+    std::vector<std::jthread> threads;
+    for (unsigned i = 0; i < options.jobs; ++i) {
+      threads.emplace_back([&exploration, &progress, &failure = failures[i]] {
+        try {
+          exploration.work(progress);
+        } catch (...) {
+          failure = std::current_exception();
+        }
+      });
+    }
+  }
+  if (options.progress) progress << "\r\x1b[K";
+  for (const auto& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
+  const std::vector<Broken> broken = exploration.broken();
+  const Tally& tally = exploration.tally();
+  for (const Broken& one : broken) tell(one, options.json, out);
+  tell(tally, seconds(options.elapsed()), options.json, out);
+  // Worlds in which nothing happens would prove nothing.
+  if (broken.empty() && tally.worlds >= kEnoughToJudge &&
+      (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||
+       tally.recovered < tally.worlds * 8 / 10)) {
+    throw std::runtime_error("too little happens in these worlds for them to prove anything");
+  }
+  return broken.empty();
+}
+
+bool run_one(std::uint64_t seed, bool verbose, std::ostream& out) {
+  const DrawnWorld world = draw_world(seed);
+  if (verbose) out << describe(world) << '\n';
+  const Outcome outcome = run(world);
+  if (verbose) {
+    const Network::Counts& counts = outcome.network;
+    out << "  " << outcome.steps << " haptic steps; network: " << counts.sent << " sent, " << counts.copies
+        << " copies, " << counts.delivered << " delivered, " << counts.lost << " lost, " << counts.nowhere
+        << " to nobody; least energy " << outcome.least_energy << " J\n";
+  }
+  if (outcome.breach) {
+    tell(Broken{seed, *outcome.breach}, false, out);
+  } else {
+    out << "seed " << seed << " keeps every promise\n";
+  }
+  return !outcome.breach;
+}
+
+std::vector<std::uint64_t> read_seeds(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in) throw std::runtime_error("cannot read " + file.string());
+  std::vector<std::uint64_t> seeds;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    if (line.empty() || line.front() == '#') continue;
+    std::uint64_t seed = 0;
+    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), seed);
+    if (error != std::errc() || (end != line.data() + line.size() && *end != ' ')) {
+      throw std::runtime_error(file.string() + ":" + std::to_string(number) +
+                               ": expected a seed and why, or a comment");
+    }
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+}  // namespace tendon::simulation

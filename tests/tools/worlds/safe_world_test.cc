@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The whole server around a device with a safety layer.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "devices/safety/safe_device.h"
+#include "devices/simulated/profiles.h"
+#include "devices/simulated/simulated_device.h"
+#include "tests/tools/worlds/watched_device.h"
+#include "tests/tools/worlds/world.h"
+
+namespace tendon::simulation {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr Friction kBounds = {.coulomb = 0.3, .viscous = 0.8};  // below the falcon's own
+
+/// A falcon in a hand that rests for a while, then goes to and fro through a wall at x = 0.
+SimulatedDevice::Config hand(const Vec3& to = Vec3(0.02, 0.004, 0)) {
+  SimulatedDevice::Config device = find_device_profile("falcon")->device();
+  device.hand = OperatorHand::Config{
+      .stiffness = 300,
+      .damping = 3,
+      .mass = 0.05,
+      .motion = ScriptedMotion(ScriptedMotion::RampHold{
+          .from = Vec3(-0.01, 0, 0), .to = to, .ramp = milliseconds(400), .hold = milliseconds(200)})};
+  return device;
+}
+
+World::Config world_config(const DeviceInfo& device) {
+  World::Config config;
+  config.seed = 7;
+  config.loop.control.limiter.friction = kBounds;
+  config.loop.control.limiter.longest_hold = milliseconds(2);
+  config.loop.control.max_force = device.max_force;
+  config.loop.control.max_slew = 1000;
+  return config;
+}
+
+ForceClient::Config at_100_hz() {
+  ForceClient::Config config;
+  config.name = "Z";
+  config.rate_hz = 100;
+  return config;
+}
+
+Physics wall() {
+  return [](const DeviceState& state) -> Touch { return Vec3(-2000 * std::max(0.0, state.position.x()), 0, 0); };
+}
+
+/// May be unplugged.
+class Pluggable final : public Device {
+ public:
+  explicit Pluggable(Device& device) : device_(device) {}
+  State stage = State::kHomed;
+
+  const DeviceInfo& info() const noexcept override { return device_.info(); }
+  State state() const noexcept override { return stage; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    auto sample = device_.read(now);
+    if (stage != State::kHomed) sample.reset();
+    return sample;
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return device_.apply(force); }
+
+ private:
+  Device& device_;
+};
+
+TEST(SafeWorld, TheAccountCountsWhatTheSafetyLayerHasLeftAndThePortStaysPassive) {
+  SimulatedDevice device(hand());
+  WatchedDevice witness(device, {.friction = kBounds});
+  SafeDevice::Config config;
+  config.arming.by = SafeDevice::Arming::By::kStart;
+  config.growth_limit = GrowthLimit::Config{.rate = 200};
+  config.force_limit = ForceLimit::Config{.max = 3};
+  config.heat_limit = HeatLimit::Config{.peak = 3, .continuous = 0.8, .time_constant = milliseconds(500)};
+  config.workspace =
+      Workspace::Config{.centre = Vec3(-0.02, 0, 0), .shape = Workspace::Sphere{.radius = 0.025}, .margin = 0.01};
+  config.ramp_in = RampIn::Config{.time = milliseconds(300)};
+  SafeDevice safe(config, witness);
+  World world(world_config(safe.info()), safe);
+  world.add_controller(at_100_hz(), wall());
+  double least = 0;
+  double peak = 0;
+  int left = 0;
+  world.watch_steps([&](const StepRecord& step) {
+    least = std::min(least, step.energy);
+    peak = std::max(peak, step.applied.norm());
+    left += step.applied != step.force ? 1 : 0;
+    ASSERT_LE(step.applied.norm(), step.permitted + 1e-12);
+  });
+  world.run_for(seconds(5));
+  EXPECT_EQ(safe.status().state, SafetyState::kArmed);
+  EXPECT_GT(peak, 1);     // N: it is felt
+  EXPECT_GT(left, 1000);  // steps in which it took something away
+  EXPECT_GE(least, -1e-9);
+  EXPECT_GE(witness.energy(), -1e-9);
+}
+
+TEST(SafeWorld, WhatIsUnpluggedInMidForceGivesForcesAgainOnlyAfterHomingAndTheEnginesRequest) {
+  SimulatedDevice device(hand(Vec3(0.015, 0, 0)));
+  Pluggable plug(device);
+  plug.stage = Device::State::kUnhomed;
+  SafeDevice safe({}, plug);
+  World world(world_config(safe.info()), safe);
+  const std::size_t engine = world.add_controller(at_100_hz(), wall());
+  std::vector<StepRecord> steps;
+  world.watch_steps([&](const StepRecord& step) { steps.push_back(step); });
+  const auto peak_of = [&](Duration duration) {
+    steps.clear();
+    world.run_for(duration);
+    double peak = 0;
+    for (const StepRecord& step : steps) peak = std::max(peak, step.applied.norm());
+    return peak;
+  };
+
+  EXPECT_EQ(peak_of(seconds(2)), 0);
+  EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone) << "not ready is no fault";
+  plug.stage = Device::State::kHomed;
+  EXPECT_EQ(peak_of(seconds(2)), 0);
+  EXPECT_TRUE(world.client(engine).rearm());
+  EXPECT_GT(peak_of(seconds(3)), 1);
+
+  plug.stage = Device::State::kAbsent;
+  EXPECT_EQ(peak_of(milliseconds(200)), 0);
+  EXPECT_EQ(safe.status().state, SafetyState::kFault);
+  plug.stage = Device::State::kHomed;
+  EXPECT_EQ(peak_of(seconds(2)), 0);
+  EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kDeviceSilent);
+  EXPECT_TRUE(world.client(engine).rearm());
+  EXPECT_GT(peak_of(seconds(3)), 1);
+  EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
+}
+
+TEST(SafeWorld, WhatItsEngineHasDisarmedInMidForceGivesNoneUntilItRearms) {
+  for (const bool guarded : {true, false}) {
+    SCOPED_TRACE(guarded ? "with a safety layer" : "without");
+    SimulatedDevice device(hand(Vec3(0.015, 0, 0)));
+    SafeDevice::Config config;
+    config.arming.by = SafeDevice::Arming::By::kStart;
+    SafeDevice safe(config, device);
+    World world(world_config(device.info()), guarded ? static_cast<Device&>(safe) : device);
+    const std::size_t engine = world.add_controller(at_100_hz(), wall());
+    std::vector<StepRecord> steps;
+    world.watch_steps([&](const StepRecord& step) { steps.push_back(step); });
+    const auto peak_of = [&](Duration duration) {
+      steps.clear();
+      world.run_for(duration);
+      double peak = 0;
+      for (const StepRecord& step : steps) peak = std::max(peak, step.applied.norm());
+      return peak;
+    };
+    EXPECT_GT(peak_of(seconds(2)), 1);
+    EXPECT_TRUE(world.client(engine).disarm());
+    world.run_for(milliseconds(500));  // the request is on its way
+    EXPECT_EQ(peak_of(seconds(2)), 0);
+    EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
+    if (guarded) {
+      EXPECT_EQ(safe.status().state, SafetyState::kHomed);
+    }
+    EXPECT_TRUE(world.client(engine).rearm());
+    EXPECT_GT(peak_of(seconds(3)), 1);
+  }
+}
+
+}  // namespace
+}  // namespace tendon::simulation

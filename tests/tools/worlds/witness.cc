@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/worlds/witness.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace tendon::simulation {
+
+namespace {
+
+constexpr double kRounding = 1e-9;  ///< J, and N where forces are compared
+/// A session's own hold of an echo, measured by a clock that drifts by 200 ppm: 50 ms of it are 10 µs.
+constexpr Duration kRoundTripError = std::chrono::microseconds(30);
+/// Each reading of a clock is cut to whole nanoseconds.
+constexpr Duration kClockRounding{4};
+/// Every end of a client that is served sends and receives at least once in this time.
+constexpr Duration kServed = std::chrono::milliseconds(400);
+
+constexpr std::array kOracles = {
+    OracleInfo{Oracle::kLedger, "ledger",
+               "the device never gives out energy that it was not given, −1 nJ for rounding"},
+    OracleInfo{Oracle::kTruth, "truth", "the hand has really done at least the work that the account of the port says"},
+    OracleInfo{Oracle::kBound, "bound", "no force is larger than the scene's bound, or than the law's own"},
+    OracleInfo{Oracle::kFinite, "finite", "only numbers reach the device"},
+    OracleInfo{Oracle::kFresh, "fresh", "a force is rendered as fresh only while one came within its validity"},
+    OracleInfo{Oracle::kStopped, "stopped", "long after the last force there is none, and none during a fault"},
+    OracleInfo{Oracle::kNewest, "newest",
+               "the motion that the rendered force answers never is older than the one before"},
+    OracleInfo{Oracle::kDrained, "drained", "who has had its turn has left no datagram unread"},
+    OracleInfo{Oracle::kCounters, "counters", "sent = received + lost + in flight; every datagram is counted once"},
+    OracleInfo{Oracle::kRoundTrip, "round-trip",
+               "the round trip measured is that of the network, whatever the clocks say"},
+    OracleInfo{Oracle::kClock, "clock",
+               "what the server says of a controller's clock is within the bound it publishes"},
+    OracleInfo{Oracle::kRecovery, "recovery", "after bad weather everybody is served again within the promised time"},
+    OracleInfo{Oracle::kCalm, "calm", "nobody wants to be called again and again"},
+};
+
+std::string number(double value) {
+  std::array<char, 32> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.6g", value);
+  return buffer.data();
+}
+std::string ms(Duration duration) { return number(seconds(duration) * 1e3) + " ms"; }
+
+Duration longest_validity(const DrawnWorld& world) {
+  const Duration most = world.config.loop.control.hold.max_valid_for;
+  if (world.believes_damage() || world.rogue()) return most;
+  Duration longest{};
+  for (const DrawnClient& client : world.clients) {
+    if (client.kind != DrawnClient::Kind::kController) continue;
+    // Left to the client it may be 3 × (100 ms, or its period).
+    longest = std::max(longest, client.config.valid_for > Duration::zero() ? client.config.valid_for : most);
+  }
+  // It travels in whole microseconds, rounded up.
+  return std::min(longest + std::chrono::microseconds(1), most);
+}
+
+/// Every datagram that a client has taken out of its link is one of these.
+std::uint64_t counted(const ForceClient::Stats& stats) {
+  const LinkStats& link = stats.link;
+  return link.datagrams_received + link.duplicated + link.malformed + link.forged + link.old_key + stats.strangers;
+}
+
+}  // namespace
+
+std::span<const OracleInfo> oracles() noexcept { return kOracles; }
+const OracleInfo& info(Oracle oracle) noexcept { return kOracles[static_cast<std::size_t>(oracle)]; }
+
+Duration recovery_promise(const DrawnWorld& world) {
+  Duration retry{};
+  for (const DrawnClient& client : world.clients) retry = std::max(retry, client.config.retry_max);
+  return Session::Config{}.timeout + retry + std::chrono::milliseconds(600);
+}
+
+Witness::Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& port, const SimulatedDevice* simulated)
+    : drawn_(drawn),
+      world_(world),
+      port_(port),
+      simulated_(simulated),
+      aol_([&] {
+        const Law law = drawn.config.loop.control.limiter.law;
+        return law == Law::kAol || law == Law::kAolPlus || law == Law::kAolPerAxis || law == Law::kAolBox;
+      }()),
+      valid_(longest_validity(drawn)),
+      safe_stop_(drawn.config.loop.control.hold.safe_stop),
+      slew_time_([&] {
+        const HapticController::Config& control = drawn.config.loop.control;
+        // The limit counts at most the longest hold of each interval; pauses add nothing.
+        return from_seconds(2 * control.max_force / control.max_slew) + 2 * control.limiter.longest_hold;
+      }()),
+      may_replay_ticks_(drawn.rogue() || drawn.believes_damage()),
+      clocks_step_(std::ranges::any_of(drawn.clients, [](const DrawnClient& c) { return !c.clock.steps.empty(); })) {}
+
+void Witness::report(Oracle oracle, std::string what) {
+  if (!breach_) breach_ = Breach{oracle, world_.now(), std::move(what)};
+}
+
+double Witness::account() const {
+  switch (drawn_.config.loop.control.limiter.law) {
+    case Law::kAolPerAxis:
+      return port_.least_of_axes();
+    case Law::kAolBox:
+      return port_.sum_of_axes();
+    default:
+      return port_.energy();
+  }
+}
+
+void Witness::see(const StepRecord& step) {
+  if (breach_) return;
+  const HapticController::Config& control = drawn_.config.loop.control;
+  const Vec3& told = port_.told();
+  if (!told.allFinite() || !port_.held().allFinite() || !step.hand.velocity.allFinite() ||
+      !std::isfinite(step.energy)) {
+    report(Oracle::kFinite, "force " + number(told.norm()) + " N, energy " + number(step.energy) + " J");
+  }
+  const double size = told.norm();
+  const double by_law = control.limiter.law == Law::kAolPerAxis ? told.cwiseAbs().maxCoeff() : size;
+  if (size > control.max_force * (1 + 1e-12) || by_law > step.permitted * (1 + 1e-12) + 1e-12) {
+    report(Oracle::kBound, number(size) + " N, where " + number(control.max_force) + " N and " +
+                               number(step.permitted) + " N are the bounds");
+  }
+  see_energy(step);
+  see_age(step);
+  if (step.mode == Mode::kActive) felt_ = true;
+  if (step.reasons.has(Reason::kEnergy)) limited_ = true;
+}
+
+void Witness::see_energy(const StepRecord& step) {
+  const double now = account();
+  const double before = std::exchange(last_account_, now);
+  if (step.reasons.has(Reason::kOverrun)) {
+    overdrawn_ = now < 0;
+    return;
+  }
+  // What the other laws do after an overrun, nobody promises.
+  if (drawn_.pauses() && !aol_) return;
+  if (overdrawn_ && now < -kRounding) {
+    if (now < before - kRounding) {
+      report(Oracle::kLedger,
+             "below zero after an overrun, and still falling: " + number(before) + " J to " + number(now) + " J");
+    }
+    return;
+  }
+  overdrawn_ = false;
+  least_energy_ = std::min(least_energy_, now);
+  if (now < -kRounding) report(Oracle::kLedger, number(now) + " J; the law says " + number(step.energy) + " J");
+}
+
+void Witness::see_age(const StepRecord& step) {
+  const LocalTime now = step.hand.at;
+  if (step.mode == Mode::kActive && (!last_force_ || now - *last_force_ > valid_)) {
+    report(Oracle::kFresh, last_force_
+                               ? "the last force came " + ms(now - *last_force_) + " ago, fresh are " + ms(valid_)
+                               : "no force has ever come");
+  }
+  const bool over = !last_force_ || now - *last_force_ > valid_ + safe_stop_;
+  if (over && !step.wanted.isZero(0)) {
+    report(Oracle::kStopped, number(step.wanted.norm()) + " N are wanted" +
+                                 (last_force_ ? ", " + ms(now - *last_force_) + " after the last force" : ""));
+  }
+  if (step.reasons.has(Reason::kUnseen)) {
+    if (!port_.told().isZero(0)) report(Oracle::kStopped, number(port_.told().norm()) + " N, and nobody sees the hand");
+    return;
+  }
+  // Down to zero through the slew limit. (Other laws than these may have a spring of their own to let go of.)
+  if (!over && step.mode != Mode::kFault)
+    silent_since_.reset();
+  else if (!silent_since_)
+    silent_since_ = now;
+  if (aol_ && silent_since_ && now - *silent_since_ > slew_time_ && !port_.told().isZero(0)) {
+    report(Oracle::kStopped, number(port_.told().norm()) + " N are given out, " + ms(now - *silent_since_) +
+                                 " after there should be none");
+  }
+  if (may_replay_ticks_ || step.force_sequence == 0) return;
+  const LocalTime answered = now - step.loop_age;
+  if (answered < answered_) {
+    report(Oracle::kNewest, "a force that answers a motion " + ms(answered_ - answered) + " older than the one before");
+  }
+  answered_ = answered;
+}
+
+void Witness::see(const World::Turn& turn) {
+  if (!turn.client) {
+    const std::uint64_t arrived = world_.network().arrived_at_server();
+    const bool more = std::exchange(server_wants_more_, turn.wants_more);
+    if (std::exchange(arrived_, arrived) != arrived || more) see_server();
+    if (!turn.wants_more && world_.network().unread_by_server() > 0) {
+      report(Oracle::kDrained, "the server has left " + std::to_string(world_.network().unread_by_server()));
+    }
+  } else if (const auto link = static_cast<std::uint32_t>(*turn.client);
+             world_.alive(link) && !turn.wants_more && world_.network().unread_by(link) > 0) {
+    report(Oracle::kDrained,
+           "client " + std::to_string(link) + " has left " + std::to_string(world_.network().unread_by(link)));
+  }
+}
+
+/// After a turn in which it has received something.
+void Witness::see_server() {
+  const NetworkLoop::Stats server = world_.server().stats();
+  if (std::exchange(forces_, server.forces) != server.forces) last_force_ = world_.now();
+  if (!clocks_step_ && !drawn_.believes_damage()) see_clock(server);
+}
+
+void Witness::see_clock(const NetworkLoop::Stats& server) {
+  if (!server.controller_clock) return;
+  const std::string& holder = server.channels.front().holder;
+  for (std::size_t i = 0; i < drawn_.clients.size(); ++i) {
+    if (drawn_.clients[i].kind != DrawnClient::Kind::kController || drawn_.clients[i].config.name != holder) continue;
+    const Duration truth = world_.clock(i).reading(world_.now()) - world_.now();
+    const Duration error = std::chrono::abs(server.controller_clock->offset - truth);
+    if (error > server.controller_clock->error_bound + kClockRounding) {
+      report(Oracle::kClock, "the clock of " + holder + " is " + ms(truth) + " ahead, and not " +
+                                 ms(server.controller_clock->offset) + " ± " +
+                                 ms(server.controller_clock->error_bound));
+    }
+  }
+}
+
+void Witness::weather_clears(LocalTime last_arrival) {
+  recovered_by_ = std::max(world_.now(), last_arrival) + recovery_promise(drawn_);
+}
+
+void Witness::see_recovered() {
+  marks_.assign(drawn_.clients.size(), {});
+  for (std::size_t i = 0; i < marks_.size(); ++i) {
+    if (!world_.alive(i)) continue;
+    const ForceClient::Stats stats = world_.client(i).stats();
+    marks_[i] = {.sessions = stats.sessions,
+                 .states = stats.states,
+                 .arrived = world_.network().arrived_at(static_cast<std::uint32_t>(i)),
+                 .accounted = counted(stats)};
+  }
+  forces_then_ = forces_;
+  checked_recovery_ = true;
+}
+
+void Witness::see_served() {
+  std::size_t controllers = 0;
+  std::size_t open_controllers = 0;
+  for (std::size_t i = 0; i < marks_.size(); ++i) {
+    if (!world_.alive(i)) continue;
+    const DrawnClient& drawn = drawn_.clients[i];
+    const ForceClient::Stats stats = world_.client(i).stats();
+    const bool controller = drawn.kind == DrawnClient::Kind::kController;
+    controllers += controller ? 1 : 0;
+    if (stats.phase != ForceClient::Phase::kOpen) {
+      if (!controller) {
+        report(Oracle::kRecovery, "observer " + drawn.config.name + " has no session: " + stats.reason);
+      }
+      continue;
+    }
+    open_controllers += controller ? 1 : 0;
+    if (stats.sessions != marks_[i].sessions) {
+      report(Oracle::kRecovery, drawn.config.name + " began a new session in fair weather, after: " + stats.reason);
+    } else if (stats.states <= marks_[i].states) {
+      report(Oracle::kRecovery, drawn.config.name + " has a session, and no states come");
+    }
+    const double least_rate = drawn.bad_days > 0 ? 100 : 10;
+    const bool sends = drawn.config.rate_hz == 0 || drawn.config.rate_hz >= least_rate;
+    if (controller && sends && forces_ <= forces_then_) {
+      report(Oracle::kRecovery, drawn.config.name + " has a session, and its forces do not come");
+    }
+  }
+  if (controllers > 0 && open_controllers != 1) {
+    report(Oracle::kRecovery, std::to_string(controllers) + " controllers live, " + std::to_string(open_controllers) +
+                                  " of them are served");
+  }
+  if (open_controllers == 1 && world_.haptic().stats().fault != HapticController::Fault::kNone) {
+    report(Oracle::kRecovery, "the fault is still there, though a controller has asked to clear it");
+  }
+}
+
+void Witness::see_round_trip(const char* whose, Duration round_trip) {
+  const Duration expected = drawn_.one_way_up + drawn_.one_way_down;
+  if (std::chrono::abs(round_trip - expected) > kRoundTripError) {
+    report(Oracle::kRoundTrip,
+           std::string(whose) + " measures " + ms(round_trip) + ", the network takes " + ms(expected));
+  }
+}
+
+void Witness::see_counters() {
+  for (std::size_t i = 0; i < marks_.size(); ++i) {
+    if (!world_.alive(i) || world_.client(i).phase() != ForceClient::Phase::kOpen) continue;
+    const ForceClient::Stats stats = world_.client(i).stats();
+    const auto link = static_cast<std::uint32_t>(i);
+    const std::uint64_t accounted = counted(stats);
+    if (world_.network().arrived_at(link) - marks_[i].arrived != accounted - marks_[i].accounted) {
+      report(Oracle::kCounters, drawn_.clients[i].config.name + " received " +
+                                    std::to_string(world_.network().arrived_at(link) - marks_[i].arrived) +
+                                    " datagrams and counted " + std::to_string(accounted - marks_[i].accounted));
+    }
+    see_round_trip("a client", stats.link.round_trip);
+    if (drawn_.clients[i].kind != DrawnClient::Kind::kController) continue;
+    const LinkStats& server = world_.server().stats().controller;
+    const std::size_t flying = world_.network().on_their_way_up(link);
+    if (stats.link.datagrams_sent != server.datagrams_received + server.lost + flying) {
+      report(Oracle::kCounters, std::to_string(stats.link.datagrams_sent) + " sent by " +
+                                    drawn_.clients[i].config.name + ", " + std::to_string(server.datagrams_received) +
+                                    " received, " + std::to_string(server.lost) + " lost, " + std::to_string(flying) +
+                                    " in flight");
+    }
+    see_round_trip("the server", server.round_trip);
+  }
+}
+
+void Witness::see_end() {
+  const Network::Counts& counts = world_.network().counts();
+  const std::uint64_t in = counts.sent + counts.copies;
+  const std::uint64_t out = counts.delivered + counts.lost + counts.nowhere + world_.network().in_flight();
+  if (in != out) {
+    report(Oracle::kCounters, "the network: " + std::to_string(in) + " went in, " + std::to_string(out) + " are known");
+  }
+  if (simulated_ != nullptr && drawn_.exact() && simulated_->truth().hand_work < port_.energy() - kRounding) {
+    report(Oracle::kTruth, "work of the hand " + number(simulated_->truth().hand_work) + " J, account " +
+                               number(port_.energy()) + " J");
+  }
+  // A flipped bit that the checksum of UDP does not see may be a number far ahead, behind which all true ones are late:
+  // where no cipher authenticates datagrams, only safety is promised then.
+  const bool long_enough = recovered_by_ && world_.now() - *recovered_by_ >= kServed;
+  if (!long_enough || drawn_.believes_damage()) return;
+  see_served();
+  see_counters();
+}
+
+}  // namespace tendon::simulation

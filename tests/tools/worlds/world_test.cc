@@ -1,0 +1,468 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The whole server and its clients over time: engagement, loss of the engine, faults, guests, recordings.
+#include "tests/tools/worlds/world.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <vector>
+
+#include "devices/simulated/profiles.h"
+#include "devices/simulated/simulated_device.h"
+#include "protocol/wire/codec.h"
+#include "server/recording/flight_file.h"
+#include "server/recording/recording_reader.h"
+#include "tests/tools/worlds/adversary.h"
+
+namespace tendon::simulation {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+constexpr double kStiffness = 2000;
+
+Physics wall() {
+  return [](const DeviceState& hand) -> Touch { return Vec3(-kStiffness * std::max(0.0, hand.position.x()), 0, 0); };
+}
+
+ForceClient::Config at_100_hz() {
+  ForceClient::Config config;
+  config.name = "Z";
+  config.rate_hz = 100;
+  return config;
+}
+
+// A falcon in a hand that presses against a wall at x = 0: in contact from half a second on.
+SimulatedDevice::Config pressing_hand() {
+  SimulatedDevice::Config device = find_device_profile("falcon")->device();
+  device.hand = OperatorHand::Config{
+      .stiffness = 300,
+      .damping = 3,
+      .mass = 0.05,
+      .motion = ScriptedMotion(ScriptedMotion::RampHold{
+          .from = Vec3(-0.01, 0, 0), .to = Vec3(0.015, 0, 0), .ramp = milliseconds(800), .hold = std::nullopt})};
+  return device;
+}
+
+World::Config world_config(const SimulatedDevice& device, std::uint64_t seed = 7) {
+  World::Config config;
+  config.seed = seed;
+  config.loop.control.limiter.friction = {0.3, 0.8};  // below the falcon's own
+  config.loop.control.limiter.longest_hold = milliseconds(2);
+  config.loop.control.max_force = device.info().max_force;
+  config.loop.control.max_slew = 1000;
+  return config;
+}
+
+struct Log {
+  std::vector<StepRecord> steps;
+  void attach(World& world) {
+    world.watch_steps([this](const StepRecord& step) { steps.push_back(step); });
+  }
+  // Largest growth of the force applied from one step to the next, N.
+  double largest_rise() const {
+    double largest = 0;
+    for (std::size_t i = 1; i < steps.size(); ++i) {
+      largest = std::max(largest, steps[i].applied.norm() - steps[i - 1].applied.norm());
+    }
+    return largest;
+  }
+  std::vector<Mode> modes() const {
+    std::vector<Mode> seen;
+    for (const StepRecord& step : steps) {
+      if (seen.empty() || seen.back() != step.mode) seen.push_back(step.mode);
+    }
+    return seen;
+  }
+};
+
+TEST(World, AHandFeelsARemoteLateSlowWallAndItStaysStable) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  world.add_controller(at_100_hz(), wall());
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(5));
+  double peak = 0;
+  for (const StepRecord& step : log.steps) {
+    EXPECT_GE(step.energy, -1e-9);
+    peak = std::max(peak, step.applied.norm());
+  }
+  EXPECT_GT(peak, 1);  // it is felt
+  const StepRecord& last = log.steps.back();
+  EXPECT_EQ(last.mode, Mode::kActive);
+  EXPECT_LT(last.hand.velocity.norm(), 0.005);  // and quiet
+  EXPECT_GE(last.loop_age, milliseconds(30));   // though the force is 30 … 70 ms old
+  EXPECT_LE(last.loop_age, milliseconds(90));
+}
+
+TEST(World, WithoutTheLimiterTheSameWallMakesThePortActive) {
+  SimulatedDevice::Config hand = pressing_hand();
+  SimulatedDevice device(hand);
+  World::Config config = world_config(device);
+  config.loop.control.limiter.law = Law::kNone;
+  World world(config, device);
+  world.add_controller(at_100_hz(), wall());
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(5));
+  double least = 0;
+  for (const StepRecord& step : log.steps) least = std::min(least, step.energy);
+  EXPECT_LT(least, -0.1);
+}
+
+TEST(World, SameSeedSameBytes) {
+  const auto recording = [](std::uint64_t seed) {
+    SimulatedDevice device(pressing_hand());
+    World::Config config = world_config(device, seed);
+    config.record = true;
+    config.latest_wake = milliseconds(1);
+    config.scene_text = "kind = 'world'";
+    World world(config, device);
+    world.add_controller(at_100_hz(), wall());
+    world.add_observer({.name = "Y"}, [](const DeviceState&, const LinkStats&) {});
+    world.run_for(seconds(2));
+    return world.finish_recording();
+  };
+  const auto first = recording(7);
+  EXPECT_GT(first.size(), 500'000U);
+  EXPECT_EQ(first, recording(7));
+  EXPECT_NE(first, recording(8));
+}
+
+TEST(World, ARecordingHoldsEveryStepAndEveryDatagram) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.record = true;
+  World world(config, device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(1));
+  const auto& bytes = world.finish_recording();
+  auto stream =
+      std::make_unique<std::istringstream>(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  RecordingReader reader(std::move(stream), "world");
+  std::size_t steps = 0;
+  std::size_t datagrams_in = 0;
+  while (const auto record = reader.next()) {
+    if (const auto* step = std::get_if<StepRecord>(&*record)) {
+      ASSERT_LT(steps, log.steps.size());
+      EXPECT_EQ(step->tick, log.steps[steps].tick);
+      EXPECT_EQ(step->hand.position, log.steps[steps].hand.position);
+      EXPECT_EQ(step->applied, log.steps[steps].applied);
+      ++steps;
+    } else if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) {
+      if (datagram->direction == DatagramRecord::Direction::kIn) ++datagrams_in;
+    }
+  }
+  EXPECT_FALSE(reader.truncated());
+  EXPECT_EQ(steps, log.steps.size());
+  EXPECT_GT(datagrams_in, world.client(z).stats().forces / 2);
+}
+
+TEST(World, WhenTheEngineIsKilledTheForceIsHeldThenFadesThenStopsAndComesBackRampedIn) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(3));
+  Log log;
+  log.attach(world);
+  world.run_for(milliseconds(100));
+  ASSERT_GT(log.steps.back().applied.norm(), 0.5);  // in contact
+  world.kill(z);
+  world.run_for(seconds(1));
+  EXPECT_EQ(log.modes(), (std::vector{Mode::kActive, Mode::kHolding, Mode::kDecaying, Mode::kSafeStop}));
+  EXPECT_EQ(log.steps.back().applied.norm(), 0);
+
+  log.steps.clear();
+  world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(6));
+  EXPECT_EQ(log.steps.back().mode, Mode::kActive);
+  EXPECT_GT(log.steps.back().applied.norm(), 0.5);
+  // The slew limit: 1000 N/s for at most the longest hold.
+  EXPECT_LE(log.largest_rise(), 1000 * 2e-3 + 1e-9);
+  bool ramped = false;
+  for (const StepRecord& step : log.steps) ramped = ramped || step.reasons.has(Reason::kRampIn);
+  EXPECT_TRUE(ramped);
+}
+
+TEST(World, AFaultOfTheDeviceZeroesTheForceSavesTheStepsBeforeItAndIsLeftByRearmOnly) {
+  class FailingDevice final : public Device {
+   public:
+    explicit FailingDevice(const SimulatedDevice::Config& config) : device_(config) {}
+    const DeviceInfo& info() const noexcept override { return device_.info(); }
+    std::optional<PositionSample> read(LocalTime now) noexcept override {
+      auto sample = device_.read(now);
+      if (failing) sample->position.x() = std::nan("");
+      return sample;
+    }
+    Vec3 apply(const Vec3& force) noexcept override { return device_.apply(force); }
+    bool failing = false;
+
+   private:
+    SimulatedDevice device_;
+  };
+  FailingDevice device(pressing_hand());
+  World::Config config = world_config(SimulatedDevice(pressing_hand()));
+  World world(config, device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(2));
+  device.failing = true;
+  world.run_for(milliseconds(10));
+  device.failing = false;
+  Log log;
+  log.attach(world);
+  world.run_for(milliseconds(200));
+  EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kPositionNotFinite);
+  EXPECT_EQ(log.modes(), std::vector{Mode::kFault});
+  for (const StepRecord& step : log.steps) EXPECT_EQ(step.applied.norm(), 0);
+
+  ASSERT_TRUE(world.mail().flight.frozen());
+  MemorySink sink;
+  write_flight(world.mail().flight, world.recorder_config(), sink);
+  RecordingReader reader(std::make_unique<std::istringstream>(
+                             std::string(reinterpret_cast<const char*>(sink.bytes().data()), sink.bytes().size())),
+                         "flight");
+  StepRecord last;
+  std::size_t steps = 0;
+  while (const auto record = reader.next()) {
+    if (const auto* step = std::get_if<StepRecord>(&*record)) {
+      last = *step;
+      ++steps;
+    }
+  }
+  EXPECT_GT(steps, 1900U);
+  EXPECT_TRUE(last.reasons.has(Reason::kNotFinite));  // the last thing in it is the fault itself
+
+  ASSERT_TRUE(world.client(z).rearm());
+  world.run_for(seconds(1));
+  EXPECT_EQ(world.haptic().stats().fault, HapticController::Fault::kNone);
+  // Idle in between, unless a fresh force came with the order; ramped in either way.
+  EXPECT_EQ(log.modes().front(), Mode::kFault);
+  EXPECT_EQ(log.modes().back(), Mode::kActive);
+  EXPECT_TRUE(std::ranges::any_of(log.steps, [](const StepRecord& step) { return step.reasons.has(Reason::kRampIn); }));
+  EXPECT_GT(log.steps.back().applied.norm(), 0.5);
+}
+
+TEST(World, OneControllerAndSeveralObserversAndNobodyElse) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.max_observers = 2;
+  World world(config, device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(2));
+  ForceClient::Config second = at_100_hz();
+  second.name = "Y";
+  second.seed = 1;
+  const std::size_t y = world.add_controller(second, wall());
+  std::vector<std::size_t> observers;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    observers.push_back(world.add_observer({.name = "X", .seed = 2 + i}, [](const DeviceState&, const LinkStats&) {}));
+    world.run_for(seconds(1));
+  }
+  world.run_for(seconds(1));
+  EXPECT_EQ(world.client(z).phase(), ForceClient::Phase::kOpen);
+  EXPECT_EQ(world.client(y).stats().code, Code::kBusy);
+  EXPECT_NE(world.client(y).stats().reason.find("controlled by \"Z\""), std::string::npos);
+  EXPECT_EQ(world.client(observers[0]).phase(), ForceClient::Phase::kOpen);
+  EXPECT_EQ(world.client(observers[1]).phase(), ForceClient::Phase::kOpen);
+  EXPECT_EQ(world.client(observers[2]).stats().code, Code::kBusy);
+  EXPECT_GT(world.client(observers[0]).stats().states, 1000U);
+}
+
+TEST(World, AnObserverCannotRearmNorSendForces) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const std::size_t y = world.add_observer({.name = "Y"}, [](const DeviceState&, const LinkStats&) {});
+  world.run_for(seconds(1));
+  ASSERT_TRUE(world.client(y).rearm());
+  world.run_for(seconds(1));
+  EXPECT_EQ(world.server().stats().denied, 1U);
+}
+
+TEST(World, ALocalModelIsUsedWhenBothEndsKnowItAndMakesTheContactStiffer) {
+  const auto depth = [](bool with_model) {
+    SimulatedDevice device(pressing_hand());
+    World world(world_config(device), device);
+    world.add_controller(at_100_hz(), [with_model](const DeviceState& hand) -> Touch {
+      Touch touch = wall()(hand);
+      if (with_model && hand.position.x() > 0) touch.stiffness = Vec3(kStiffness, 0, 0).asDiagonal();
+      return touch;
+    });
+    Log log;
+    log.attach(world);
+    world.run_for(seconds(5));
+    return log.steps.back().hand.position.x();
+  };
+  EXPECT_LT(depth(true), depth(false));
+}
+
+TEST(World, GarbageTruncatedOversizedAndReplayedDatagramsAreCountedAndChangeNothing) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(2));
+  const auto before = world.server().stats();
+  Dice dice(3);
+  const Address server = world.server_address();
+  const Address stranger{world.client_address(z).ip, 9};
+  for (int i = 0; i < 200; ++i) {
+    std::vector<std::byte> garbage(static_cast<std::size_t>(dice.within(0, 1199)) + 1);
+    for (std::byte& b : garbage) b = static_cast<std::byte>(dice.bits());
+    world.network().forge(i % 2 == 0 ? stranger : world.client_address(z), server, std::move(garbage));
+  }
+  world.network().forge(stranger, server, std::vector<std::byte>(60000));
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(1));
+  const auto after = world.server().stats();
+  const auto dropped = [](const NetworkLoop::Stats& stats) { return stats.malformed + stats.unknown_connection; };
+  EXPECT_GE(dropped(after) - dropped(before), 201U);
+  EXPECT_EQ(after.welcomed, before.welcomed);
+  EXPECT_EQ(world.client(z).phase(), ForceClient::Phase::kOpen);
+  EXPECT_GT(after.forces, before.forces + 80);
+  EXPECT_EQ(log.modes(), std::vector{Mode::kActive});
+}
+
+TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(2));
+  // No client of ours sends such a force: an attacker who has seen the session writes it.
+  const std::uint64_t sent = world.client(z).stats().link.datagrams_sent;
+  const std::uint64_t invalid = world.server().stats().controller.invalid;
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  std::uint64_t number = sent;
+  for (const double bad : {std::nan(""), kInf, -kInf, 1e300}) {
+    std::array<std::byte, kMaxDatagram> buffer;
+    DataWriter writer;
+    writer.begin(buffer, {.connection_id = 1, .packet_number = number++}, world.now(), std::nullopt);
+    ForceCommand command;
+    command.sequence = 1'000'000;
+    command.based_on_tick = 2000;
+    command.force = Vec3(bad, 0, 0);
+    command.valid_for = milliseconds(30);
+    writer.add(command);
+    world.network().forge(world.client_address(z), world.server_address(),
+                          {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size())});
+  }
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(1));
+  EXPECT_EQ(world.server().stats().controller.invalid, invalid + 4);
+  for (const StepRecord& step : log.steps) {
+    ASSERT_TRUE(step.applied.allFinite());
+    ASSERT_LE(step.applied.norm(), device.info().max_force);
+  }
+  EXPECT_EQ(log.steps.back().mode, Mode::kActive);
+}
+
+TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) {
+  SimulatedDevice::Config hand = pressing_hand();
+  hand.watchdog = milliseconds(5);
+  SimulatedDevice device(hand);
+  World::Config config = world_config(device);
+  config.loop.control.watchdog = milliseconds(5);
+  config.pause_probability = 5e-3;
+  config.pause = milliseconds(30);
+  World world(config, device);
+  world.add_controller(at_100_hz(), wall());
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(10));
+  std::uint64_t overruns = 0;
+  for (std::size_t i = 1; i < log.steps.size(); ++i) {
+    const StepRecord& step = log.steps[i];
+    if (step.reasons.has(Reason::kOverrun)) {
+      ++overruns;
+      continue;
+    }
+    // Between overruns it never falls below zero, and from below zero it only rises.
+    EXPECT_GE(step.energy, std::min(-1e-9, log.steps[i - 1].energy - 1e-15));
+    if (step.energy < 0) {
+      EXPECT_LE(step.applied.norm(), config.loop.control.limiter.friction.coulomb * (1 + 1e-9));
+    }
+  }
+  EXPECT_GT(overruns, 10U);
+  EXPECT_EQ(overruns, world.haptic().stats().overruns);
+}
+
+// 700 kbit/s carry 400 states a second.
+NetworkLoop::Stats on_a_narrow_link(bool adapt) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.weather = {.up = injector::parse_profile("base=5ms"),
+                    .down = injector::parse_profile("base=5ms rate=700kbit/s queue=2000packets")};
+  config.adapt_state_rate = adapt;
+  World world(config, device);
+  world.add_controller(at_100_hz(), wall());
+  world.run_for(seconds(14));
+  return world.server().stats();
+}
+
+TEST(World, WhereALinkIsNarrowStatesLeaveMoreRarelyAndSoArriveSooner) {
+  EXPECT_GT(on_a_narrow_link(false).controller.smoothed_round_trip, seconds(2));
+  EXPECT_LT(on_a_narrow_link(true).controller.smoothed_round_trip, milliseconds(30));
+}
+
+TEST(World, OverALinkThatLosesTooMuchForcesAreNotTakenWhereTheRateIsAdapted) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.weather = {.up = injector::parse_profile("base=5ms"), .down = injector::parse_profile("base=5ms loss=30%")};
+  config.adapt_state_rate = true;
+  World world(config, device);
+  world.add_controller(at_100_hz(), wall());
+  Log log;
+  log.attach(world);
+  world.run_for(seconds(12));
+  EXPECT_GT(world.server().stats().hopeless, 100U);
+  EXPECT_NE(log.steps.back().mode, Mode::kActive);
+}
+
+std::string told(World& world) {
+  std::string text;
+  for (const NetworkLoop::Notice& notice : world.server().take_notices()) text += notice.text + "\n";
+  return text;
+}
+
+TEST(World, TheOperatorIsToldWhyAForceWasLate) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.weather = {.up = injector::parse_profile("base=20ms"),
+                    .down = injector::parse_profile("base=20ms spike(at=3s,for=300ms,150ms)")};
+  World world(config, device);
+  const std::size_t z = world.add_controller(at_100_hz(), wall());
+  world.run_for(milliseconds(2900));
+  EXPECT_EQ(told(world).find("late"), std::string::npos);
+  world.run_for(seconds(2));
+  const std::string text = told(world);
+  EXPECT_NE(text.find("the network (round trip 19"), std::string::npos) << text;
+  EXPECT_NE(text.find("usually 40 ms)"), std::string::npos) << text;
+  world.kill(z);
+  world.run_for(milliseconds(1500));
+  EXPECT_NE(told(world).find("nothing is heard of the engine's machine"), std::string::npos);
+}
+
+TEST(World, TheServerKnowsTheClockOfTheEngineWithinTheBoundItStates) {
+  SimulatedDevice device(pressing_hand());
+  World world(world_config(device), device);
+  const injector::DriftingClock clock({.offset = std::chrono::hours(30), .drift_ppb = -150'000, .steps = {}});
+  world.add_controller(at_100_hz(), wall(), clock);
+  world.run_for(seconds(60));
+  const auto estimate = world.server().stats().controller_clock;
+  ASSERT_TRUE(estimate);
+  const Duration error = std::chrono::abs(estimate->offset - (clock.reading(world.now()) - world.now()));
+  EXPECT_LE(error, estimate->error_bound);
+  EXPECT_LT(error, milliseconds(3));
+  EXPECT_LT(estimate->error_bound, milliseconds(25));
+}
+
+}  // namespace
+}  // namespace tendon::simulation

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-worlds: simulated worlds, one for each seed. Here is its command line; each verb is a function of its own.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <ctime>
+#include <exception>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "tests/tools/lab/pictures/json.h"
+#include "tests/tools/worlds/day.h"
+#include "tests/tools/worlds/runner.h"
+#include "tests/tools/worlds/second_look.h"
+#include "tests/tools/worlds/shrink_world.h"
+
+namespace tendon::simulation {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+struct RunArguments {
+  RunOptions options;
+  std::optional<std::uint64_t> seed;
+  std::optional<double> for_s;
+  std::string seeds_file;
+  bool verbose = false;
+};
+
+int run(RunArguments& arguments) {
+  RunOptions& options = arguments.options;
+  if (arguments.seed) return run_one(*arguments.seed, arguments.verbose, std::cout) ? kDone : kFailed;
+  if (!arguments.seeds_file.empty()) options.seeds = read_seeds(arguments.seeds_file);
+  const auto began = std::chrono::steady_clock::now();
+  options.elapsed = [began] { return std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now() - began); };
+  if (arguments.for_s) options.budget = from_seconds(*arguments.for_s);
+  options.progress = isatty(STDERR_FILENO) != 0;
+  return explore(options, std::cout, std::cerr) ? kDone : kFailed;
+}
+
+void add_run(CLI::App& app, RunArguments& arguments) {
+  CLI::App* const verb = app.add_subcommand("run", "Explores worlds, one for each seed, until one breaks a promise");
+  auto* const count =
+      verb->add_option("--count", arguments.options.count, "worlds")->type_name("N")->capture_default_str();
+  verb->add_option("--for-s", arguments.for_s, "as many as there is time for")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber)
+      ->excludes(count);
+  verb->add_option("--first-seed", arguments.options.first_seed, "seed of the first; the others follow")
+      ->type_name("K")
+      ->capture_default_str();
+  verb->add_option("--jobs", arguments.options.jobs, "threads")
+      ->type_name("J")
+      ->check(CLI::Range(1U, 1024U))
+      ->default_str("one for each core");
+  verb->add_option("--seeds", arguments.seeds_file,
+                   "seeds to run before all others: a number at the beginning of a line")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile.description(""));
+  auto* const seed = verb->add_option("--seed", arguments.seed, "this world and no other")->type_name("N");
+  verb->add_flag("--verbose", arguments.verbose, "say what the world is like, and what happened")->needs(seed);
+  verb->add_flag("--json", arguments.options.json, "one JSON object for each broken world, and one at the end");
+  verb->footer(
+      "\nExample: ten minutes, then the world that it names\n"
+      "  tendon-worlds run --for-s 600\n"
+      "  tendon-worlds run --seed 1234 --verbose\n"
+      "\nExit: 0 every promise was kept; 1 one was broken; 2 wrong usage.");
+}
+
+struct ShrinkArguments {
+  std::uint64_t seed = 0;
+  std::string out;
+};
+
+void add_shrink(CLI::App& app, ShrinkArguments& arguments) {
+  CLI::App* const verb =
+      app.add_subcommand("shrink", "Reduces what the network did in a broken world to the few datagrams that matter");
+  verb->add_option("--seed", arguments.seed, "of the broken world")->type_name("N")->required();
+  verb->add_option("--out", arguments.out, "the network of the world, as a sparse trace: `replay` and tests load it")
+      ->type_name("FILE")
+      ->required();
+  verb->footer(
+      "\nExample:\n  tendon-worlds shrink --seed 1234 --out world-1234.csv\n"
+      "\nExit: 0 done; 1 that world breaks no promise, or not because of the network; 2 wrong usage.");
+}
+
+struct DayArguments {
+  DayConfig config;
+  double hours = 25;
+  bool json = false;
+};
+
+int day(const DayArguments& arguments) {
+  DayConfig config = arguments.config;
+  config.length = from_seconds(arguments.hours * 3600);
+  config.rekey.datagrams = config.rekey.datagrams * config.loop_hz / DayConfig{}.loop_hz;  // after as long at any rate
+  const DayReport report = run_day(config);
+  const std::vector<std::pair<const char*, std::variant<std::uint64_t, double>>> figures = {
+      {"seed", config.seed},
+      {"hours", arguments.hours},
+      {"loop_hz", std::uint64_t{config.loop_hz}},
+      {"troubles", report.troubles},
+      {"byes", report.byes},
+      {"deaths", report.deaths},
+      {"takeovers", report.takeovers},
+      {"sessions", report.sessions},
+      {"expired", report.expired},
+      {"longest_session_s", seconds(report.longest_session)},
+      {"rekeys", report.rekeys},
+      {"changes_of_address", report.roamed},
+      {"haptic_steps", report.steps},
+      {"forces", report.forces},
+      {"datagrams_sent", report.network.sent},
+      {"datagrams_lost", report.network.lost},
+      {"copies", report.network.copies},
+      {"forged", report.forged},
+      {"requests", report.requests},
+      {"carried_out", report.carried_out},
+      {"slowest_recovery_s", seconds(report.slowest_recovery)},
+      {"clock_error_us", seconds(report.clock_error) * 1e6},
+      {"clock_bound_us", seconds(report.clock_bound) * 1e6},
+      {"heap_first_half_bytes", std::uint64_t{report.heap_first_half}},
+      {"heap_second_half_bytes", std::uint64_t{report.heap_second_half}},
+      {"cpu_s", static_cast<double>(std::clock()) / CLOCKS_PER_SEC},
+  };
+  lab::JsonLine line;
+  for (const auto& [name, value] : figures) {
+    std::visit([&, key = name](auto number) { line.add(key, number); }, value);
+    if (!arguments.json) std::visit([key = name](auto number) { std::cout << key << ' ' << number << '\n'; }, value);
+  }
+  if (arguments.json) std::cout << line.add("broken", report.broken).str() << '\n';
+  if (report.broken && !arguments.json) std::cout << "broken at " << *report.broken << '\n';
+  return report.broken ? kFailed : kDone;
+}
+
+void add_day(CLI::App& app, DayArguments& arguments) {
+  CLI::App* const verb = app.add_subcommand("day", "A day in suite 1, in which no session may ever be wedged");
+  verb->add_option("--seed", arguments.config.seed, "of weather, leave-takings and keys")
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--hours", arguments.hours, "virtual hours; a session lives for 24")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--loop-hz", arguments.config.loop_hz, "haptic steps, states and forces per second")
+      ->check(CLI::Range(100U, 4000U))
+      ->capture_default_str();
+  verb->add_flag("--json", arguments.json, "one JSON object instead of the lines");
+  verb->footer(
+      "\nExample: an hour, in seconds\n  tendon-worlds day --seed 7 --hours 1\n"
+      "\nExit: 0 every promise was kept; 1 one was broken; 2 wrong usage.");
+}
+
+void add_replay(CLI::App& app, SecondLookOptions& options) {
+  CLI::App* const verb = app.add_subcommand(
+      "replay", "A scene and a wall over a recorded network, in virtual time, with one law after the other");
+  verb->add_option("SCENE", options.scene,
+                   "scene file: the device, the hand, the loop; its law is one of those compared")
+      ->type_name("SCENE.toml")
+      ->required()
+      ->check(CLI::ExistingFile.description(""));
+  verb->add_option("--trace", options.trace, "network recorded by tendon-inject --record")
+      ->type_name("FILE")
+      ->required()
+      ->check(CLI::ExistingFile.description(""));
+  verb->add_option("--law", options.laws, "law to try; any number of times (default: those that promise passivity)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  verb->add_option("--stiffness", options.stiffness, "of the wall at x = 0, N/m")->capture_default_str();
+  verb->add_option("--rate-hz", options.rate_hz, "forces per second of the wall's engine")->capture_default_str();
+  verb->add_option("--for-s", options.length_s, "virtual seconds (default: as long as the trace)");
+  verb->add_flag("--json", options.json, "one JSON object for each law on stdout instead of the table");
+  verb->footer(
+      "\nExample: what would energy bounding have felt on that same network?\n"
+      "  tendon-worlds replay scene.toml --trace run.csv --law energy-bounding --law aol+\n"
+      "\nExit: 0 done; 1 the trace or the scene cannot be read; 2 wrong usage.");
+}
+
+int main_of(int argc, char** argv) {
+  CLI::App app("Simulated worlds: the whole server, its clients, the network, the device and the hand, from one seed",
+               "tendon-worlds");
+  app.require_subcommand(1);
+  RunArguments run_arguments;
+  run_arguments.options.jobs = std::max(1U, std::thread::hardware_concurrency());
+  ShrinkArguments shrink_arguments;
+  SecondLookOptions replay_options;
+  add_run(app, run_arguments);
+  add_shrink(app, shrink_arguments);
+  DayArguments day_arguments;
+  add_day(app, day_arguments);
+  add_replay(app, replay_options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? kDone : kWrongUsage;
+  }
+  try {
+    if (app.got_subcommand("run")) return run(run_arguments);
+    if (app.got_subcommand("day")) return day(day_arguments);
+    if (app.got_subcommand("shrink")) {
+      return shrink_world(shrink_arguments.seed, shrink_arguments.out, std::cout) ? kDone : kFailed;
+    }
+    second_look(replay_options, std::cout);
+    return kDone;
+  } catch (const std::invalid_argument& error) {
+    std::cerr << "tendon-worlds: " << error.what() << " (see --help)\n";
+    return kWrongUsage;
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-worlds: " << error.what() << '\n';
+    return kFailed;
+  }
+}
+
+}  // namespace
+}  // namespace tendon::simulation
+
+int main(int argc, char** argv) { return tendon::simulation::main_of(argc, argv); }
