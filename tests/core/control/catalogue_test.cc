@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The lists of laws and of AOL+'s parts, against each other and against core/control/README.md.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "core/control/aol_parts.h"
+#include "core/control/limiter.h"
+
+namespace tendon {
+namespace {
+
+std::string readme() {
+  std::ifstream file(TENDON_CONTROL_README);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(Catalogue, EveryLawIsARowOfTheReadme) {
+  const std::string page = readme();
+  for (const LawInfo& law : laws()) {
+    EXPECT_NE(page.find("\n| `" + std::string(law.name) + "` |"), std::string::npos) << law.name;
+  }
+}
+
+TEST(Catalogue, EveryPartOfAolPlusIsARowOfTheReadme) {
+  const std::string page = readme();
+  for_each_aol_part([&](const auto& part) {
+    EXPECT_NE(page.find("\n| `" + std::string(part.name) + "` |"), std::string::npos) << part.name;
+    EXPECT_FALSE(part.what.empty()) << part.name;
+  });
+}
+
+TEST(Catalogue, EachPartOfAolPlusIsListedOnce) {
+  // Does not compile when Parts gains a member: then kAolParts needs one more row, too.
+  PointAolPlus::Parts parts;
+  const auto& [cap, robust, knee, reserve, bounded, adaptive] = parts;
+  EXPECT_EQ(std::tuple_size_v<decltype(kAolParts)>, 6U);
+  std::set<std::string_view> names;
+  std::set<const void*> members;
+  for_each_aol_part([&](const auto& part) {
+    names.insert(part.name);
+    members.insert(&(parts.*part.config));
+    (parts.*part.config).emplace();
+  });
+  EXPECT_EQ(names.size(), 6U);
+  EXPECT_EQ(members.size(), 6U);
+  EXPECT_TRUE(cap && robust && knee && reserve && bounded && adaptive);
+}
+
+}  // namespace
+}  // namespace tendon
