@@ -170,7 +170,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
 
   Server server(scenes);
   server.start();
-  log::info("tendond " + std::string(kVersion) + " (" + std::string(kCommit) + ") listens on " +
+  log::info("tendond " + version_text() + " listens on " +
             to_string(server.address()));
   if (const auto& recording = scenes.front().recording) log::info("recording to " + recording->string());
   if (json) {
@@ -318,7 +318,7 @@ int main(int argc, char** argv) {
       "How late a haptic thread would wake on this machine, and what to change for it. Takes two seconds and changes "
       "nothing: `tendond doctor`");
   doctor->add_flag("--json", json, "One JSON object on stdout");
-  app.set_version_flag("--version", std::string(kVersion) + " (" + std::string(kCommit) + ")");
+  app.set_version_flag("--version", version_text());
   try {
     app.parse(argc, argv);
     if (profiles) {

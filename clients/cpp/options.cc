@@ -66,6 +66,7 @@ CommandLine::CommandLine(std::string purpose, Options& options)
   CLI::App& app = parser_->app;
   parser_->set_example("");
   app.set_help_flag("-h,--help", "Print this and leave");
+  app.set_version_flag("--version", TENDON_VERSION);
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { options.server = parse_address(text); }, "Where tendond listens")
       ->type_name("HOST:PORT")

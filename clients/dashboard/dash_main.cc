@@ -74,6 +74,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
       "then open http://127.0.0.1:8080 in a browser.");
   app.set_help_flag("-h,--help", "Print this and leave");
+  app.set_version_flag("--version", TENDON_VERSION);
   std::string server = to_string(options.web.server);
   std::string listen = to_string(options.web.listen);
   const auto address = CLI::Validator(

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/cpp/key_file.h"
+#include "server/build_info.h"
 #include "tests/tools/conformance/client_checks.h"
 #include "tests/tools/conformance/server_checks.h"
 #include "tests/tools/conformance/udp_wire.h"
@@ -89,6 +90,7 @@ int run(int argc, char** argv) {
       "Examples: tendon-conformance server 127.0.0.1:47100\n"
       "          tendon-conformance client --key wall.key -- python3 my_client.py --server {} --key wall.key\n"
       "Exit status: 0 all checks that apply passed, 1 one failed or was not reached, 2 wrong usage.");
+  app.set_version_flag("--version", version_text());
   Line line;
   bool list_only = false;
   app.add_flag("--list", list_only, "Print every check, the section it comes from and the sentence it tests");

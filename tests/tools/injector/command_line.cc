@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "server/build_info.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 
 namespace tendon::injector {
@@ -275,6 +276,7 @@ Task parse_command_line(int argc, const char* const* argv) {
   Said said;
   CLI::App app(kAbout, "tendon-inject");
   app.footer(kExamples);
+  app.set_version_flag("--version", version_text());
   add_options(app, said);
   app.require_subcommand(0, 1);
   const Subcommands verbs = add_subcommands(app, said);
@@ -283,6 +285,8 @@ Task parse_command_line(int argc, const char* const* argv) {
   } catch (const CLI::CallForHelp&) {
     const auto chosen = app.get_subcommands();
     return HelpTask{chosen.empty() ? app.help() : chosen.front()->help()};
+  } catch (const CLI::CallForVersion& version) {
+    return HelpTask{std::string(version.what()) + "\n"};
   } catch (const CLI::ParseError& error) {
     throw std::invalid_argument(error.what());
   }

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "server/build_info.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/lab/experiments/accuracy.h"
@@ -355,6 +356,7 @@ void add_bench(CLI::App& app, bench::BenchOptions& options) {
 
 int main(int argc, char** argv) {
   CLI::App app("Experiments with Tendon.", "tendon-lab");
+  app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
       "\nExample: the same motion without and with the limiter, as a table and a picture\n"

@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/build_info.h"
 #include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/worlds/day.h"
 #include "tests/tools/worlds/runner.h"
@@ -187,6 +188,7 @@ void add_replay(CLI::App& app, SecondLookOptions& options) {
 int main_of(int argc, char** argv) {
   CLI::App app("Simulated worlds: the whole server, its clients, the network, the device and the hand, from one seed",
                "tendon-worlds");
+  app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   RunArguments run_arguments;
   run_arguments.options.jobs = std::max(1U, std::thread::hardware_concurrency());

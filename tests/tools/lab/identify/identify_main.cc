@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/build_info.h"
 #include "tests/tools/lab/identify/identify.h"
 
 namespace tendon::lab {
@@ -36,6 +37,7 @@ int main(int argc, char** argv) {
       "  tendon-identify forth.csv back.csv --axis x --axis x --mass-kg 0.075 --encoder-step-m 3e-5\n"
       "\nExit: 0 done; 1 a file is bad or a run cannot be used; 2 wrong usage.");
 
+  app.set_version_flag("--version", version_text());
   IdentifyOptions options;
   std::vector<std::string> files;
   std::string profile;

@@ -22,7 +22,7 @@ install(FILES deploy/scenes/demo.toml DESTINATION /etc/tendon RENAME scene.toml 
 # One file completes all programs; bash-completion looks for one by the name of each.
 set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 foreach(program ${programs})
-  install(FILES deploy/package/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT programs)
+  install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT programs)
 endforeach()
 
 # A manual page is what --help says.
@@ -65,7 +65,7 @@ foreach(room core protocol clients/cpp)
 endforeach()
 install(FILES protocol/wire/tendon.proto protocol/WIRE.md protocol/SESSION.md DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/protocol
         COMPONENT development)
-configure_package_config_file(deploy/package/tendon-config.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/tendon-config.cmake
+configure_package_config_file(deploy/packaging/tendon-config.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/tendon-config.cmake
                               INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/tendon)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/tendon-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/tendon-config.cmake ${CMAKE_CURRENT_BINARY_DIR}/tendon-config-version.cmake
@@ -93,7 +93,7 @@ set(CPACK_DEBIAN_RUN_PACKAGE_RECOMMENDS gnuplot-nox)
 set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-bounding output limiter
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")
-set(CPACK_DEBIAN_RUN_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_SOURCE_DIR}/deploy/package/conffiles)
+set(CPACK_DEBIAN_RUN_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_SOURCE_DIR}/deploy/packaging/conffiles)
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev")
