@@ -125,7 +125,7 @@ TEST(BadInput, OfAClientIsAnsweredWithWhatIsWrongAndExitCode2) {
   expect_refusals(folder.path(), inputs);
 }
 
-TEST(BadInput, ASecondServerOnAPortInUseSaysSoAndLeavesTheRecordingOfTheFirstAlone) {
+TEST(BadInput, ASecondServerOnAUsedPortSaysSoAndTouchesNoRecording) {
   const ScratchFolder folder;
   const auto file = folder.path() / "run.mcap";
   Server server(folder.path(), demo_scene(), {"--record", file.string()});

@@ -64,7 +64,7 @@ bool turn_until(std::vector<Guest*> guests, const std::function<bool()>& done) {
   return true;
 }
 
-TEST(Diagnostics, AnObserverSeesWhatIsWantedHowTheLoopDoesAndWhatTheEnginesNetworkDoes) {
+TEST(Diagnostics, AnObserverSeesWantedForcesTheLoopAndTheNetwork) {
   const ScratchFolder folder;
   Server server(folder.path(), write(folder.path() / "scene.toml", kPressingHand));
   Service network("tendon-inject",
@@ -101,7 +101,7 @@ TEST(Diagnostics, AnObserverSeesWhatIsWantedHowTheLoopDoesAndWhatTheEnginesNetwo
   server.stop();
 }
 
-TEST(Diagnostics, AnObserverSeesADeviceArmedAndItsFaultAndTheStepsBeforeItAreKept) {
+TEST(Diagnostics, AnObserverSeesArmingAndFaultAndStepsBeforeItAreKept) {
   const ScratchFolder folder;
   // A hand that rests for seconds, long enough to be armed, and then moves faster than is allowed.
   const std::string scene = R"([device]

@@ -187,7 +187,7 @@ TEST(Guardian, OutlivesWhatEndsTheDriversProcessGroup) {
 
 // A process under load gives its memory back for tens of milliseconds before it closes its files. Here it is stretched
 // for as long as we like: somebody else has the same files open.
-TEST(Guardian, WritesZeroAsSoonAsItsParentIsDeadAndAgainWhenTheDriversFilesAreClosed) {
+TEST(Guardian, WritesZeroWhenItsParentDiesAndAgainWhenTheFilesClose) {
   Heard device;
   std::array<int, 2> lingering{};
   ASSERT_EQ(pipe(lingering.data()), 0);

@@ -80,7 +80,7 @@ TEST(MainJob, AHandFeelsALateLossyRemoteWallAndTheDeviceNeverGivesOutEnergy) {
   EXPECT_NE(server_end.find(R"("recording_ended_early":false)"), std::string::npos) << server_end;
 }
 
-TEST(MainJob, WhenThePhysicsIsKilledInContactItsForceIsHeldFadesAndStopsAndItsSuccessorIsRampedIn) {
+TEST(MainJob, AKilledEnginesForceIsHeldFadesStopsAndTheNextOneRampsIn) {
   const ScratchFolder folder;
   const auto file = folder.path() / "run.mcap";
   const std::string scene_file = write(folder.path() / "scene.toml", kPressingHand);

@@ -143,7 +143,7 @@ class CarelessDevice final : public Device {
 bool slow(double value) { return std::fpclassify(value) == FP_SUBNORMAL; }
 
 // Oracle: the processor's own mode, and that what is below 2.2e-308 is 0 while a step lasts.
-TEST(HardArithmetic, DenormalsAreOffInEveryHapticStepAndInEveryAnswerOfTheSoftBody) {
+TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
   if (DenormalsOff::kFlush == 0) GTEST_SKIP() << "this processor's mode is not known to DenormalsOff";
   CarelessDevice device;
   HapticLoop::Config config;
@@ -269,7 +269,7 @@ struct Twin {
 
 // Oracle: a twin whose datagram has no frame instead of a bad one. Every number that the device, the hand and the
 // engine see is the same to the last bit.
-TEST(HardArithmetic, WhatIsNoNumberIsCountedAndLeavesServerAndEngineAsTheyWere) {
+TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   const std::array bad = {std::nan(""), -std::nan(""), kInf, -kInf, 1e300, -1e300, 1.1e12};
   std::uint64_t refused = 0;
