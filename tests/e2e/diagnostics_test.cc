@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What an observer is told that asks how it goes: of the real server's loop, of an engine behind a bad network, of a
-// device's safety. Nothing here measures a time; delays are bounded from below only.
+// Diagnostics that an observer receives: the real server's loop, an engine behind a bad network, a device's safety.
+// No test measures a time; delays are bounded from below only.
 #include <gtest/gtest.h>
 
 #include <algorithm>

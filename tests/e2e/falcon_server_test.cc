@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The whole server on a Falcon: tendond as it is, through the real libusb, with a remote wall in a process of its own.
-// What the motors do is looked at where the wire ends. falcon-server prints how well it is felt, and how late.
+// The tests check what the motors do at the end of the wire. falcon-server prints what is felt, and how late.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,8 +22,8 @@ namespace {
 
 constexpr std::uint8_t kOut = 0x02;  // the endpoint
 
-/// Runs `claim` on a stage of its own. The scene's watchdogs are for machines that do not stand still: on one that did,
-/// a claim that came to nothing is tried again, twice.
+/// Runs `claim` on its own stage. The scene's watchdogs assume a machine that does not pause: after a pause, a failed
+/// claim is tried again, at most twice.
 template <class Claim>
 void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   for (int left = 2;; --left) {
@@ -38,7 +38,7 @@ void on_a_stage(const FalconStage::Config& config, const Claim& claim) {
   }
 }
 
-/// A fault is the machine's, when it stood still.
+/// A fault is the machine's when the machine paused.
 void expect_no_fault(FalconStage& stage, const std::string& end) {
   const auto faults = count_in(end.substr(end.find("\"safety\"")), "faults");
   if (faults + count_in(end, "fault") == 0) return;

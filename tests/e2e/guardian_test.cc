@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A driver that streams forces to a device, and dies. The device is the other end of a socket; where the driver goes
-// through usbfs, this program's own ioctl stands in for the kernel's and writes endpoint and bytes to that socket.
+// A driver streams forces to a device and dies. The device is the other end of a socket. For usbfs, this program's own
+// ioctl replaces the kernel's and writes endpoint and bytes to that socket.
 #include "devices/safety/guardian.h"
 
 #include <fcntl.h>
@@ -65,7 +65,7 @@ const std::string kZero = "<AAAAAAAAAAAAAA>";
 ZeroPacket written(const std::string& bytes) { return ZeroPacket::written(std::as_bytes(std::span(bytes))); }
 ZeroPacket usb(const std::string& bytes) { return ZeroPacket::usb(2, std::as_bytes(std::span(bytes))); }
 
-/// The device: hears every packet that is written to it, whole.
+/// The device: receives every packet written to it, whole.
 class Heard {
  public:
   Heard() {
@@ -93,7 +93,7 @@ class Heard {
     const ssize_t size = read(near_, bytes.data(), bytes.size());
     return size > 0 ? std::string(bytes.data(), static_cast<std::size_t>(size)) : "";
   }
-  /// The last one of all; `heard` when none has come after it.
+  /// The very last packet; `heard` when none has come after it.
   std::string last(const std::string& heard = "") {
     std::string last = heard;
     for (std::string packet = next(); !packet.empty(); packet = next()) last = packet;
@@ -277,7 +277,7 @@ TEST(Guardian, KnowsNoDeviceBeyondItsLast) {
   EXPECT_THROW(written(std::string(65, 'A')), std::invalid_argument);
 }
 
-// No claim about time: virtual machines pause. The figure is for the page of a device.
+// No claim about time, because virtual machines pause. The figure goes into a device's page.
 TEST(Guardian, SaysHowLongTheForceOutlivesTheDriver) {
   std::vector<double> ms;
   for (int i = 0; i < 50; ++i) {
@@ -304,7 +304,7 @@ TEST(Guardian, SaysHowLongTheForceOutlivesTheDriver) {
 
 LocalTime now() { return LocalTime(std::chrono::duration_cast<Duration>(Clock::now().time_since_epoch())); }
 
-/// What becomes of a Falcon, in this process, whose driver, in another, is killed while it pushes.
+/// A Falcon model in this process, while its driver in another process is killed as it pushes.
 struct Killed {
   double pushed_for_ms = 0;             ///< after the kill
   bool pushes = true;                   ///< when nobody is left who could tell it to stop

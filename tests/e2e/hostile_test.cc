@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Whatever is sent to the server's port is counted, and changes nothing. The server's own counters are compared with
-// what its recording says has arrived, so that a datagram which the kernel dropped breaks no claim.
+// Junk sent to the server's port is counted and changes nothing. The server's counters are compared with the datagrams
+// that it says have arrived, so a datagram dropped by the kernel breaks no claim.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -50,7 +50,7 @@ void wait_until_said(const Relay& relay, std::size_t count) {
   }
 }
 
-/// What the server must have counted, from what has arrived.
+/// The counts that the server must show for what has arrived.
 struct Expected {
   std::uint64_t malformed = 0;   ///< of nobody's conversation
   std::uint64_t duplicated = 0;  ///< of the client's, with a number that was there before

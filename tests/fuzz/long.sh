@@ -15,7 +15,7 @@ declare -A longest=([header]=64 [payload]=400 [handshake]=24 [session]=24 [key]=
   [falcon_reply]=200 [falcon_loader]=60 [falcon_device]=200 [spacemouse_report]=64
   [woodenhaptics_report]=64 [woodenhaptics_device]=200)
 cmake --preset asan && cmake --build --preset asan --target fuzzers
-# Of a stack trace for each allocation nobody has anything, and entropic scheduling costs more than our targets do.
+# A stack trace for each allocation is of no use here, and entropic scheduling costs more than our targets do.
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=1:thread_local_quarantine_size_kb=16
 for target in "${targets[@]}"; do
   folder=build/asan/long/$target

@@ -10,7 +10,7 @@
 #include <streambuf>
 #include <string_view>
 
-// What the fuzz targets have in common. A property that fails ends the process: that is how libFuzzer is told.
+// Helpers that the fuzz targets share. A property that fails ends the process: that is how libFuzzer is told.
 
 namespace tendon::fuzz {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What breaks programs below their mathematics: rounding, what a compiler may leave out, numbers that are slow, and
-// numbers that are none.
+// Cases that break programs below their mathematics: rounding, compiler optimisations, denormals (slow numbers), and
+// NaN.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -71,7 +71,7 @@ TEST(HardArithmetic, AHundredMillionStepsOfTheLedgerAddUpToTheLastBit) {
        .without = "a plain double: " + text(std::abs(plain - 100)) + " J off; a float ends at " + text(single) + " J"});
 }
 
-/// What a program says, and how it ends.
+/// A program's output and exit status.
 std::pair<int, std::string> run(const std::string& command) {
   std::pair<int, std::string> result;
   FILE* pipe = popen((command + " 2>&1").c_str(), "r");
@@ -82,7 +82,7 @@ std::pair<int, std::string> run(const std::string& command) {
   return result;
 }
 
-// Oracle: the compiler itself, run on the sources in which NaN is caught or rounding made good.
+// Oracle: the compiler itself, run on the sources that catch NaN or compensate rounding.
 TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
   const std::string sentence = "Tendon is not built with -ffast-math";
   const std::string preprocess =
@@ -113,7 +113,7 @@ TEST(HardArithmetic, FastMathStopsTheBuildOfEveryRoomThatCatchesNaN) {
           .without = "the #error left out: everything compiles"});
 }
 
-/// A device that a careless library belongs to: it notes how its thread computes, and leaves that changed.
+/// A device with a careless library: it notes the thread's floating-point mode and leaves it changed.
 class CarelessDevice final : public Device {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
@@ -142,7 +142,7 @@ class CarelessDevice final : public Device {
 
 bool slow(double value) { return std::fpclassify(value) == FP_SUBNORMAL; }
 
-// Oracle: the processor's own mode, and that what is below 2.2e-308 is 0 while a step lasts.
+// Oracle: the processor's mode register, and that numbers below 2.2e-308 are 0 during a step.
 TEST(HardArithmetic, DenormalsAreOffInHapticStepsAndSoftBodyAnswers) {
   if (DenormalsOff::kFlush == 0) GTEST_SKIP() << "this processor's mode is not known to DenormalsOff";
   CarelessDevice device;
@@ -234,7 +234,7 @@ struct Twin {
     config.loop.control.max_slew = 1000;
     return config;
   }
-  /// With time, so that the body has a state that a bad place could spoil.
+  /// Dynamic, so that the body has a state which a bad position could spoil.
   static std::string scene() {
     std::string scene = softbody::testing::with("\"condensed\"", "\"linear\"");
     const std::string_view effects = "[\"contact\"]";
@@ -248,7 +248,7 @@ struct Twin {
     for (const double number : vector) bits.push_back(std::bit_cast<std::uint64_t>(number));
   }
 
-  /// What an attacker writes who has seen the session: the next datagram of one end, with a frame or with none.
+  /// A datagram forged by an attacker who has seen the session: the next one of one end, with a frame or without.
   template <class Frame>
   void forge(bool to_server, std::uint64_t number, const std::optional<Frame>& frame) {
     std::array<std::byte, kMaxDatagram> buffer{};
@@ -312,7 +312,7 @@ TEST(HardArithmetic, NaNIsCountedAndLeavesServerAndEngineAsTheyWere) {
     refused += more_by_server + more_by_engine;
     compared += spoilt.bits.size();
 
-    // The smallest of all numbers is one: it is taken, and does no harm.
+    // The smallest denormal is a number: it is accepted and does no harm.
     const auto before = spoilt.world.server().stats().controller;
     ForceCommand command;
     command.sequence = 1'000'001;

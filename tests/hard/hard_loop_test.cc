@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What breaks the loop of hand, device, network and engine. Each case runs the whole server with AOL+ and a real client
-// on a virtual clock, a hand that moves about in contact and then comes to rest, and a disturbance; the witness at the
-// device's port keeps an account of its own. In every case, for every seed:
+// Cases that break the loop of hand, device, network and engine. Each case runs the whole server with AOL+, a real
+// client, a virtual clock, a hand that moves about in contact and then rests, and a disturbance. The witness at the
+// device's port keeps its own energy account. In every case, for every seed:
 //
 //     passive   E ≥ −1e-9 J at every step, E = Σ [−F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T] with what was really held and moved,
 //               and the hand has never got back more than it gave (∫ F_hand·dx ≥ 0)
 //     bounded   ‖F‖ ≤ 8 N; in one step no more than 1000 N/s · T is added (the limiter may cut faster)
 //     quiet     ‖v‖ ≤ 5 mm/s for good, a stated time after the disturbance has ended
 //
-// Then the same without the protection that the case is about: something of this must break.
+// Then the same run without the protection that the case tests: at least one of these must break.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -58,13 +58,13 @@ std::string text_of(Duration duration) { return text_of(tendon::seconds(duration
 
 constexpr std::uint64_t kSeeds = 4;
 
-/// How many seeds each case is tried with; sweep.sh sets it.
+/// Number of seeds for each case; sweep.sh sets it.
 std::uint64_t seeds() {
   const char* count = std::getenv("TENDON_HARD_SEEDS");  // NOLINT(concurrency-mt-unsafe): nothing here sets it
   return count == nullptr ? kSeeds : std::strtoull(count, nullptr, 10);
 }
 
-/// An encoder with what may befall it, before the position that is true.
+/// An encoder that can fail in several ways, in front of the true position.
 class Encoder final : public Device {
  public:
   explicit Encoder(Device& truth) : truth_(truth) {}
@@ -93,7 +93,7 @@ class Encoder final : public Device {
   Vec3 last_ = Vec3::Zero();
 };
 
-/// What was felt at the port; of several runs the worst.
+/// What the hand felt at the port; for several runs, the worst of each.
 struct Observed {
   double least_energy = 0;  ///< J
   double least_work = 0;    ///< J, of the hand
@@ -116,7 +116,7 @@ struct Observed {
   }
 };
 
-/// What of it is more than may be; empty when nothing is.
+/// Names the first bound that was exceeded; empty when none was.
 std::string broken(const Observed& seen, Duration quiet_within) {
   std::string text;
   const auto say = [&text](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
@@ -133,13 +133,13 @@ std::string result_of(const Observed& seen) {
   return "least energy " + text_of(1e3 * seen.least_energy, "mJ") + ", ≤ " + text_of(seen.most_force, "N") + ", ≤ " +
          text_of(seen.most_rate, "N/s") + ", quiet after " + text_of(seen.noisy_for);
 }
-/// Of time and force; the slew limit is met exactly wherever the engine asks for more.
+/// Margins of time and force only: the slew limit is met exactly whenever the engine asks for more.
 double margin_of(const Observed& seen, Duration quiet_within) {
   const double time = tendon::seconds(quiet_within) / tendon::seconds(std::max<Duration>(seen.noisy_for, Duration(1)));
   return std::min(time, kMaxForce / seen.most_force);
 }
 
-/// A case for every seed: all promises are kept, and a force is felt.
+/// Runs a case with every seed: all promises are kept, and the hand feels a force.
 template <class Run>
 Observed kept(Duration quiet_within, Run run) {
   Observed worst;
@@ -152,7 +152,7 @@ Observed kept(Duration quiet_within, Run run) {
   return worst;
 }
 
-/// The same without its protection: a promise is broken. Says which.
+/// Runs it without its protection: a promise must break. Returns which one.
 template <class Run>
 std::string without(const std::string& what, Duration quiet_within, Run run) {
   Observed worst;
@@ -162,7 +162,7 @@ std::string without(const std::string& what, Duration quiet_within, Run run) {
   return what + ": " + text;
 }
 
-/// A hand that presses on a wall: what each case begins with, and bends.
+/// A hand that presses on a wall: the common start of all cases, which each case modifies.
 struct Case {
   explicit Case(std::uint64_t seed) : dice(seed), into(dice.direction()), stiffness(dice.within(1000, 2500)) {
     across = into.cross(dice.direction()).normalized();
@@ -196,7 +196,7 @@ struct Case {
   }
   static simulation::Network::Weather fair() { return weather("delay=uniform(1ms,3ms)", "delay=uniform(1ms,3ms)"); }
 
-  /// In and out of the wall and along it, and after so long at rest 12 mm deep.
+  /// The hand moves in, out and along the wall; after this time it rests 12 mm deep.
   ScriptedMotion restless(Duration time) {
     ScriptedMotion::MinimumJerk reach;
     reach.back_and_forth = false;
@@ -227,7 +227,7 @@ struct Case {
   injector::DriftingClock clock;
 };
 
-/// A case under way.
+/// One running case.
 class Bench {
  public:
   explicit Bench(const Case& set)
@@ -241,9 +241,9 @@ class Bench {
   }
 
   void run(Duration duration) { world.run_for(duration); }
-  /// From now on the hand is to become quiet.
+  /// From now on the hand must become quiet.
   void disturbance_is_over() { over_ = world.now(); }
-  /// Besides, every step is to keep what this says is broken.
+  /// An extra check of every step; returns what is broken, or nothing.
   void expect_of_steps(std::function<std::string(const StepRecord&)> promise) { promise_ = std::move(promise); }
   const Observed& seen() const { return seen_; }
   void note(double figure) { seen_.figure = std::max(seen_.figure, figure); }
@@ -271,8 +271,7 @@ class Bench {
       const bool cut = step.reasons.has(Reason::kEnergy) || step.reasons.has(Reason::kUnseen);
       const double change =
           cut ? step.applied.norm() - step.was_applied.norm() : (step.applied - step.was_applied).norm();
-      // In a pause, and where the device's time leaps ahead, the force may have grown for no longer than the longest
-      // hold.
+      // In a pause, or when the device's time leaps ahead, the force may grow only for the longest hold.
       const Duration held = std::min(std::max<Duration>(world.now() - *last_, step.held), longest_hold_);
       seen_.most_rate = std::max(seen_.most_rate, change / tendon::seconds(held));
     }
@@ -289,8 +288,8 @@ class Bench {
   std::function<std::string(const StepRecord&)> promise_;
 };
 
-/// Once an engine is silent for so long there is no force: 500 ms it may be valid, 250 ms later is the safe stop, and
-/// the slew limit needs 8 ms.
+/// An engine that has been silent this long exerts no force: its force is valid for 500 ms, the safe stop follows
+/// 250 ms later, and the slew limit needs 8 ms.
 constexpr Duration kSilence = milliseconds(500 + 250 + 10);
 
 std::function<std::string(const StepRecord&)> no_force_from(LocalTime when) {
@@ -341,7 +340,7 @@ Observed bad_network(std::uint64_t seed, bool limiter, bool decay) {
       bench.world.now());
   bench.run(seconds(2));
   bench.world.network().change(Case::weather("loss=100%", "loss=100%"), bench.world.now());
-  // What is under way still comes, 350 ms later at the latest.
+  // Datagrams already under way still arrive, at most 350 ms later.
   bench.expect_of_steps(no_force_from(bench.world.now() + milliseconds(350) + kSilence));
   bench.run(milliseconds(1800));
   bench.expect_of_steps({});
@@ -375,7 +374,7 @@ Observed restart(std::uint64_t seed, bool ramp) {
   const LocalTime back = bench.world.now();
   set.engine.seed = 2;
   bench.world.restart_controller(bench.engine, set.engine, set.physics);
-  // No more than the wall is at its deepest, over the 100 ms of the ramp; a quarter more for the hand that moves.
+  // At most the wall's deepest force, spread over the 100 ms ramp, plus a quarter for the moving hand.
   const double fastest = 1.25 * set.stiffness * 0.02 / 0.1;
   std::optional<LocalTime> engaged;
   bench.expect_of_steps([=](const StepRecord& step) mutable -> std::string {
@@ -389,7 +388,7 @@ Observed restart(std::uint64_t seed, bool ramp) {
   return bench.seen();
 }
 
-// Oracle: passive, bounded, quiet; the force comes back over 100 ms, though the hand has sunk in meanwhile.
+// Oracle: passive, bounded, quiet; the force returns over 100 ms, although the hand has sunk in meanwhile.
 TEST(HardLoop, AnEngineKilledInContactAndRestartedDoesNotKick) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return restart(seed, true); });
@@ -539,7 +538,7 @@ Observed estimator_blow_up(std::uint64_t seed, bool bounds, bool limiter) {
   estimator.model = OutputEstimator::Model::kOutputError;
   if (!bounds) estimator.max_stiffness = estimator.max_force = 1e9;
   if (!limiter) set.let_all_through();
-  // For two seconds it is of no structure that any model could have, then it is the wall.
+  // For two seconds no model has the environment's structure; then it is the wall.
   set.physics = [wall = set.physics, n = set.into, dice = Dice(seed)](const DeviceState& hand) mutable -> Touch {
     if (hand.tick < 1000 || hand.tick > 3200) return wall(hand);
     return Vec3((dice.within(-8000, 8000) * hand.position.dot(n) + dice.within(-20, 20)) * n + dice.direction());
@@ -618,8 +617,8 @@ TEST(HardLoop, AnEstimatorThatHasLongSeenNothingNewDoesNotWindUp) {
               without("cap of 1e30 in place of 2e8", kWithin, [](std::uint64_t seed) { return wind_up(seed, 1e30); })});
 }
 
-/// J: the least that an adversary with this friction leaves in the account, who moves along the force as much as the
-/// law lets him earn, and an engine that pushes him about.
+/// The lowest account (J) that an adversary with this friction reaches: the adversary moves along the force whenever
+/// the law lets that earn energy, while an engine pushes it about.
 double left_by_adversary(const Case& set, const Friction& friction) {
   AdversaryDevice device({.friction = friction}, set.world.seed);
   WatchedDevice port(device, {.friction = friction});
@@ -680,11 +679,11 @@ Observed wrap(std::uint64_t seed, bool guarded) {
   if (guarded) set.control().max_speed = 10;
   Bench bench(set);
   bench.run(milliseconds(1200));
-  // Its end lies where the hand will come out of the wall: there the position goes from 5 mm to 205 mm.
+  // The encoder's end lies where the hand leaves the wall: there the position jumps from 5 mm to 205 mm.
   bench.encoder.range = 0.2;
   bench.encoder.middle = Vec3(0.105, 0, 0);
   bench.run(milliseconds(2100));
-  // The operator moves the handle to its home, and says that the fault is over.
+  // The operator moves the handle to its home and re-arms.
   bench.encoder.range.reset();
   bench.run(milliseconds(50));
   bench.world.client(bench.engine).rearm();
@@ -734,9 +733,9 @@ Observed stuck(std::uint64_t seed, bool limiter) {
   return bench.seen();
 }
 
-// Oracle: passive but for what nobody can see: what the hand gets while the encoder stands still is at most
-// ‖F‖ · travel = 64 mJ, is booked as debt when it moves again, and paid back within 1.5 s, but for the 5.1 mJ of
-// viscous friction for which the jump passes; bounded, quiet.
+// Oracle: passive except for unseen motion. While the encoder stands still the hand gains at most
+// ‖F‖ · travel = 64 mJ. The ledger books that as debt when the encoder moves again, and it is paid back within 1.5 s,
+// except for 5.1 mJ that the jump passes off as viscous friction. Bounded, quiet.
 TEST(HardLoop, AnEncoderThatSticksOwesWhatItHidAndPaysItBack) {
   constexpr Duration kWithin = seconds(1);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return stuck(seed, true); });
@@ -818,7 +817,7 @@ TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
           .without = without("decay off", kWithin, [](std::uint64_t seed) { return clock_goes_back(seed, false); })});
 }
 
-/// What an active burst of 2 s takes out of the account (J), after so long a dissipation.
+/// Energy (J) that an active burst of 2 s takes out of the account after `dissipation`.
 double burst_after(Duration calm, bool capped, Observed& seen) {
   constexpr double kDrag = 2;  // N·s/m, of the environment
   Case set(1);
@@ -857,8 +856,8 @@ double burst_after(Duration calm, bool capped, Observed& seen) {
   return before - least;
 }
 
-// Oracle: of what a hand has dissipated in an hour of waving through drag a burst that pushes it along gets no more
-// than what the cap leaves, 5 mJ, and what the last contact may have stored.
+// Oracle: a hand dissipates energy for an hour by waving through drag. A burst that then pushes it along gets at most
+// the 5 mJ that the cap leaves, plus what the last contact may have stored.
 TEST(HardLoop, AnHourOfDissipationPaysForNoBurst) {
   constexpr double kMostOut = 0.025;  // J
   Observed seen;

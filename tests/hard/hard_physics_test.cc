@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What breaks the physics of soft bodies: element, solver and time step. Figures of other programs are those of the
+// Cases that break the physics of soft bodies: element, solver and time step. Figures of other programs are for the
 // pressed block B1 (tests/clients/softbody/pressed_block.h).
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ std::string text(double value, int digits = 3) {
   return out.str();
 }
 
-/// What `make` is refused with; empty when it is not.
+/// The message with which `make` is refused; empty when it is accepted.
 template <class Make>
 std::string refusal(Make make) {
   try {
@@ -147,7 +147,7 @@ TEST(HardPhysics, ABlockTurnedInsideOutComesBackRightWayRound) {
                      "ends in NaN"});
 }
 
-// Oracle: the one of the case above must fail here. St. Venant-Kirchhoff's energy is as low in the mirror.
+// Oracle: the oracle of the case above must fail here: St. Venant-Kirchhoff's energy is as low in the mirror image.
 TEST(HardPhysics, FiniteAndAtRestIsNoOracleStVenantKirchhoffEndsSoInsideOut) {
   PressedByNewton pressed(Element::kTet4, 4, Law::kStVenantKirchhoff, 300);
   pressed.model.set_displacements(turned_inside_out(pressed.solid, false, 0));
@@ -283,7 +283,7 @@ TEST(HardPhysics, StiffnessesAMillionTimesApartAreSolvedAsAnotherSolverDoes) {
           .without = "a factor in floats: " + text(float_error, 2)});
 }
 
-/// How far the explicit rule alone has swung out after `steps` from a small disturbance, relative to it.
+/// Amplitude of the explicit rule after `steps`, relative to the small disturbance it started with.
 double swung_out(const Solid& solid, double density, double dt, int steps) {
   SymmetricMatrix stiffness = solid.pattern();
   solid.stiffness(VectorXd::Zero(solid.size()), Elastic::Curvature::kExact, stiffness);
@@ -349,7 +349,7 @@ TEST(HardPhysics, MassesAMillionTimesApartStayBoundedAndOnlyLoseEnergy) {
        .without = "an explicit step of 10 ms, above 2/ω = " + text(1e3 * limit, 2) + " ms: beyond 1e100 in 100 steps"});
 }
 
-// Oracle: the body without time. What a step does is gone when the body is at rest.
+// Oracle: the static solution. The effect of the step size is gone when the body is at rest.
 TEST(HardPhysics, TheRestOfABodyDoesNotDependOnTheStep) {
   double worst = 0;
   for (const ModelKind kind :
@@ -495,7 +495,7 @@ TEST(HardPhysics, ARigidTurnMakesGhostForcesOnlyInTheLinearLaw) {
   }
   EXPECT_GT(ghost, 10);
 
-  // Who presses so deep that the linear law would turn something is told, and from where on.
+  // Pressing so deep that the linear law would rotate material gives a warning that names the depth.
   for (const ModelInfo& model : models()) {
     const Element element = model.tetrahedra ? Element::kTet4 : Element::kHex8Sri;
     const Body body(pressed_body(model.kind, element, 4));

@@ -6,7 +6,7 @@
 
 namespace tendon::hard {
 
-/// What a hard case leaves for the table of README.md.
+/// One row of README.md's table, left by a hard case.
 struct Row {
   std::string hard;                   ///< why it is hard: what a naive program does
   std::string oracle;                 ///< what must hold; the same in every run

@@ -15,7 +15,7 @@
 namespace tendon::soak {
 
 /// Observers that come, see one state, say Bye and come again from another port: `in_all` times, evenly over
-/// `duration`, from `threads` threads. A server that leaks anything for a session loses it so often.
+/// `duration`, from `threads` threads. A server that leaks anything per session leaks it that often.
 class Reconnecting {
  public:
   Reconnecting(const Address& server, std::uint64_t in_all, Duration duration, int threads);
@@ -38,7 +38,7 @@ class Reconnecting {
 };
 
 /// An observer that stays, and holds each state against what a server promises: numbers that are finite, a force within
-/// the limiter's bound, an account that is never below −1 nJ but after an overrun.
+/// the limiter's bound, an account that falls below −1 nJ only after an overrun.
 class Watching {
  public:
   explicit Watching(const Address& server);

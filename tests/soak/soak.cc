@@ -61,15 +61,14 @@ std::vector<std::string> operator+(std::vector<std::string> words, const std::ve
 }
 
 constexpr int kVisitors = 8;
-// What may grow and still be flat.
+// Growth that still counts as flat.
 constexpr VitalSigns kGrowth{.resident = std::size_t{1} << 20};
-/// The proxy keeps a socket and statistics for each of the last engines, of which not the same number falls into each
-/// second.
+/// The proxy keeps a socket and statistics for each recent engine; their number varies from second to second.
 constexpr VitalSigns kProxyGrowth{.resident = std::size_t{4} << 20, .files = 8};
 /// The index of a recording, which its end is to hold: four chunks in a second, of some 200 bytes each.
 constexpr std::size_t kIndexBytesPerSecond = 1024;
 
-/// A program whose words go to a file: see `log`. Its end is noticed, and is its own doing only after `stop`.
+/// A program whose output goes to a file (`log`). Ending before `stop` is noticed as a failure.
 class Program {
  public:
   Program(const std::string& name, const std::vector<std::string>& arguments, const std::filesystem::path& folder,
@@ -115,7 +114,7 @@ class Program {
   std::unique_ptr<e2e::Process> process_;
 };
 
-/// A disk that is soon full; none where nobody may mount one.
+/// A disk that is soon full; none without the right to mount.
 class SmallDisk {
  public:
   explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
@@ -164,7 +163,7 @@ class Hogs {
   std::vector<pid_t> pids_;
 };
 
-/// Cuts a log to nothing under the one who writes it; how long it was.
+/// Truncates a log while its program writes to it; returns its former length.
 std::uint64_t rotate(const std::filesystem::path& log) {
   const std::uint64_t size = std::filesystem::file_size(log);
   std::filesystem::copy_file(log, log.string() + ".1", std::filesystem::copy_options::overwrite_existing);
@@ -172,7 +171,7 @@ std::uint64_t rotate(const std::filesystem::path& log) {
   return size;
 }
 
-/// A program that is to be flat.
+/// A program that must stay flat.
 struct Watched {
   Watched(std::string the_name, std::unique_ptr<Program> the_program, const VitalSigns& the_growth)
       : name(std::move(the_name)), program(std::move(the_program)), growth(the_growth) {}
@@ -183,7 +182,7 @@ struct Watched {
   std::vector<VitalSigns> looks{};
 };
 
-/// One whole run: what is alive in it, and what becomes of it.
+/// One whole run: its programs and its report.
 class Run {
  public:
   explicit Run(const Config& config)
@@ -211,7 +210,7 @@ class Run {
     const LocalTime start = clock::now();
     const LocalTime end = start + config_.duration;
     const Address server = parse_address(address(*server_));
-    // They are done a little before the end: the last look is at a server that has rest.
+    // Visitors finish a little before the end, so that the last sample sees a resting server.
     Reconnecting visitors(server, config_.reconnects, config_.duration * 9 / 10, kVisitors);
     Watching watcher(server);
     LocalTime next_look = start;
@@ -248,7 +247,7 @@ class Run {
   static constexpr Duration kRough = std::chrono::seconds(7);
   static constexpr Duration kLook = std::chrono::seconds(1);
 
-  /// For programs that outlive us: they end by themselves.
+  /// An upper bound of a program's life, should this one be killed.
   std::vector<std::string> own_end() const {
     return {"--duration-s", std::to_string(static_cast<int>(seconds(config_.duration)) + 300)};
   }
@@ -331,7 +330,7 @@ class Run {
                                     .threads = watched.looks.back().threads});
       }
       const int code = watched.program->stop();
-      // 1: on a machine with so many hogs the proxy could not keep the time of its releases, and says so.
+      // Exit code 1: with so many hogs the proxy missed release times, and says so.
       if (code != 0 && !(code == 1 && watched.program.get() == proxy_)) {
         broken(watched.name + ": exit code " + std::to_string(code));
       }

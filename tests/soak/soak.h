@@ -18,14 +18,14 @@ namespace tendon::soak {
 ///     engine       virtual_wall through tendon-inject, killed by SIGKILL after 0.2 to 3 s and started again
 ///     visitors     observers that come, see a state, say Bye and come again from elsewhere, `reconnects` in all
 ///     watcher      an observer that stays and holds every state against the promises (Watching)
-///     recording    a second tendond, alone, that records to /dev/null; its memory may grow by the index of the
-///     recording full disk    a third one that records to a disk of 256 kB, which is soon full (where a tmpfs may be
-///     mounted) wall clock   is set forward or back by up to a day, of all servers (stepped_clock.cc), every 7 s hogs
-///     a process that only burns time on each processor, for a third of the time log          of the server, cut to
-///     nothing while they write, as logrotate's copytruncate does
+///     recording    a second tendond, alone, that records to /dev/null
+///     full disk    a third tendond that records to a tmpfs of 256 kB, which is soon full (skipped without mount rights)
+///     wall clock   of all servers, set forward or back by up to a day every 7 s (stepped_clock.cc)
+///     hogs         one process on each processor that only burns time, for a third of the run
+///     log          of the server, truncated while it writes, as logrotate's copytruncate does
 ///
-/// What is to be flat is (VitalSigns), of the servers and of the proxy; nobody ends before it is told to; the haptic
-/// loop latches no fault; a visitor always sees a state.
+/// Asserts: memory, files and threads of the servers and the proxy are flat (VitalSigns); no program ends before it is
+/// told to; the haptic loop latches no fault; every visitor sees a state.
 struct Config {
   std::filesystem::path folder;  ///< of what it writes; made, or empty
   Duration duration = std::chrono::hours(1);
@@ -33,7 +33,7 @@ struct Config {
   std::uint64_t seed = 1;
 };
 
-/// What became of a program that is to be flat.
+/// The vital signs of one program that must stay flat.
 struct ProgramReport {
   std::string name;
   double mb_first = 0;  ///< resident memory after a fifth of the time …

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// To be preloaded (LD_PRELOAD): the wall clock of a program is wrong by as many nanoseconds as the file that
-// TENDON_CLOCK_STEP names says, as text, at the moment. Setting the machine's own clock would do the same to everybody
-// on it.
+// For LD_PRELOAD: offsets a program's wall clock by the number of nanoseconds (text) in the file that
+// TENDON_CLOCK_STEP names. Setting the machine's own clock would affect every program on it.
 #include <fcntl.h>
 #include <sys/syscall.h>
 #include <unistd.h>

@@ -10,7 +10,7 @@
 
 namespace tendon::soak {
 
-/// What a process has of the machine at one moment, as /proc/PID says.
+/// A process's memory, files and threads at one moment, from /proc/PID.
 struct VitalSigns {
   std::size_t resident = 0;  ///< bytes in memory
   std::size_t files = 0;     ///< open descriptors
@@ -20,11 +20,11 @@ struct VitalSigns {
 /// Empty when there is no such process any more.
 std::optional<VitalSigns> vital_signs(pid_t process);
 
-/// What must stay flat does: looked at over equally long spans of a run, of which the first fifth is for getting warm.
+/// Checks that a process stays flat over equal spans of a run; the first fifth is warm-up.
 ///
 ///     most of the last two fifths ≤ most of the second and third + `growth`
 ///
-/// A sentence when one does not; empty when all do, or when there are fewer than ten looks.
+/// Returns a sentence naming the first that grows; empty when none does or with fewer than ten samples.
 std::optional<std::string> not_flat(const std::string& name, const std::vector<VitalSigns>& looks,
                                     const VitalSigns& growth);
 

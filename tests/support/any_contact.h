@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// What an engine can say of a surface while its tool is at `position`, true of a wall at x = 0 or of nothing at all;
-/// sound (core/remote/answer.h) in any case.
+/// A random but sound (core/remote/answer.h) answer of an engine whose tool is at `position`: true for a wall at x = 0
+/// or for no surface.
 inline Contact any_contact(Dice& dice, const Vec3& position) {
   Contact contact{.normal = -Vec3::UnitX(), .gap = -position.x()};
   if (dice.chance(0.3)) contact = {.normal = dice.direction(), .gap = dice.within(-0.01, 0.01)};

@@ -12,7 +12,7 @@
 
 namespace tendon::testing {
 
-/// One line that a program printed, and the instructions of what it was about.
+/// One line that a program printed, and the instructions counted for it.
 struct Counted {
   std::string line;
   double instructions = 0;  ///< of the longer of two runs, beyond those of the shorter
@@ -47,7 +47,7 @@ inline std::vector<Counted> count_instructions(const std::string& program, const
   return all;
 }
 
-/// For tests that count: without valgrind they are skipped.
+/// For tests that count instructions; they are skipped without valgrind.
 class InstructionTest : public ::testing::Test {
  protected:
   void SetUp() override {

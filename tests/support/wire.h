@@ -19,11 +19,11 @@ struct Datagram {
   Bytes bytes;
 };
 
-/// Everything that is under way, oldest first. It goes nowhere by itself: a test may look at it, change it and put
-/// things in, and delivers it to an inbox.
+/// All datagrams under way, oldest first. Nothing moves by itself: a test may read, change and insert datagrams, and
+/// delivers them to an inbox.
 using Wire = std::deque<Datagram>;
 
-/// One end of it.
+/// One end of the wire.
 class End : public Link {
  public:
   End(Wire& wire, const Address& address) : self(address), wire_(wire) {}

@@ -39,7 +39,7 @@ class FalconStage {
   /// The scene, as tendond reads it.
   Scene scene() const;
 
-  // The user. Without a word the hand rests outside of the wall, and holds no button.
+  // The user. By default the hand rests outside the wall and holds no button.
   /// Takes the grip to x, in m from the centre, at `speed`, in m/s; returns when it is there.
   void go_to(double x, double speed = 0.1);
   /// Pulls the grip through as soon as the device asks for it.
@@ -52,7 +52,7 @@ class FalconStage {
 
   /// Waits until `what` holds of the model. Throws std::runtime_error after kPatience.
   void wait_until(const std::function<bool(const FakeFalcon&)>& what, const std::string& name);
-  /// … until the server has given it `count` more commands.
+  /// Waits until the server has sent `count` more commands.
   void wait_for_commands(int count);
   /// The motors push the hand back out of the wall.
   static bool pushed_out(const FakeFalcon& falcon) { return falcon.force().x() < -0.5; }
@@ -70,10 +70,10 @@ class FalconStage {
   };
   Killed kill_server();
 
-  /// Some thread of ours or of the server's had to wait for so long that watchdogs may have tripped.
+  /// True when a thread (ours or the server's) waited so long that watchdogs may have tripped.
   bool machine_stood_still();
 
-  /// What a hand in the wall, deeper than kDeep, has felt.
+  /// Forces on a hand deeper in the wall than kDeep.
   static constexpr double kDeep = 0.002;  ///< m
   struct Felt {
     std::uint64_t rounds = 0;   ///< times it was looked at, about once in a millisecond

@@ -23,8 +23,7 @@ inline constexpr std::chrono::seconds kPatience{30};
 /// What the program says is read only while one of the two waits below waits: it must not say more than fits into a
 /// pipe (64 kB) in between.
 ///
-/// A wait that takes longer than its patience, or that has become vain, throws std::runtime_error with all that the
-/// program has said.
+/// A wait throws std::runtime_error with the program's whole output when patience runs out or the wait became futile.
 ///
 /// Thread-safe: no.
 class Process {
@@ -47,7 +46,7 @@ class Process {
   /// Waits for the end. Returns the exit code, or −N when signal N has ended it.
   int wait(std::chrono::nanoseconds patience = kPatience);
 
-  /// All that it has said so far.
+  /// All output so far.
   const std::string& out() const noexcept { return out_.text; }
   const std::string& err() const noexcept { return err_.text; }
 

@@ -16,8 +16,8 @@ namespace tendon::e2e {
 
 using Datagram = std::vector<std::byte>;
 
-/// A man in the middle: stands between one client and the server, hands on what both say, keeps what the client said,
-/// and can say more in the client's name.
+/// A man in the middle between one client and the server: forwards both ways, keeps the client's datagrams, and can
+/// send more in the client's name.
 ///
 /// Thread-safe: yes. It has a thread of its own.
 class Relay {
@@ -32,10 +32,10 @@ class Relay {
   /// Where the server believes the client to be.
   Address clients_address() const;
 
-  /// What the client has said so far, and the server has got uncut.
+  /// The client's datagrams so far that reached the server uncut.
   std::vector<Datagram> said() const;
 
-  /// To the server, in the client's name.
+  /// Sends to the server in the client's name.
   void forge(std::span<const std::byte> datagram);
   /// The client's next `count` datagrams lose their last byte.
   void cut_next(int count);

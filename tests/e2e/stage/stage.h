@@ -16,7 +16,7 @@ namespace tendon::e2e {
 /// A built program: tendond, tendon-inject, virtual_wall …
 std::filesystem::path program(const std::string& name);
 
-/// The scene that comes with Tendon, deploy/scenes/demo.toml.
+/// The shipped scene, deploy/scenes/demo.toml.
 std::filesystem::path demo_scene();
 
 /// A hand that goes into the wall and stays there. Forces are held and fade for longer than a machine pauses, so that
@@ -48,7 +48,7 @@ std::string write(const std::filesystem::path& file, std::string_view text);
 /// std::runtime_error when there is none.
 double number_in(std::string_view json, const std::string& key);
 std::uint64_t count_in(std::string_view json, const std::string& key);
-/// The text under `key`. Ours have no escapes.
+/// The text under `key`, without escapes.
 std::string text_in(std::string_view json, const std::string& key);
 
 /// A program of ours that has been started on port 0 and has told its address. It ends by itself after two minutes,
@@ -91,7 +91,7 @@ void watch_force(Process& echo, Enough enough) {
   }
 }
 
-/// A recording, read back.
+/// A recording that has been read back.
 struct Recording {
   std::vector<StepRecord> steps;
   std::vector<DatagramRecord> arrived;  ///< of the datagrams, those that came in
@@ -100,9 +100,9 @@ struct Recording {
 };
 Recording read_recording(const std::filesystem::path& file);
 
-/// What must hold of every recording that was made with the limiter on: each step follows the one before it; no force
-/// is above the limiter's bound; the ledger is never below −1 nJ. Only after an overrun it may be; then it does not
-/// fall except by another overrun, and no force is above the Coulomb friction that the limiter counts on.
+/// Checks every recording made with the limiter on: steps follow each other; no force exceeds the limiter's bound; the
+/// ledger never falls below −1 nJ, except through an overrun. After that only another overrun lets it fall further, and
+/// no force exceeds the Coulomb friction that the limiter assumes.
 void expect_passive(const Recording& recording, const Scene& scene);
 
 }  // namespace tendon::e2e
