@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
       "A recording through the control law again: bit for bit as it was recorded, or with another law or other "
       "settings.",
       "tendon-replay");
-  app.set_version_flag("--version", version_text());
+  app.set_version_flag("--version", tendon::version_text());
   app.add_option("RECORDING", recording, "a recording of tendond, or what its flight recorder left")
       ->type_name("FILE.mcap")
       ->required()
