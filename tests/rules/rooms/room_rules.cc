@@ -75,7 +75,7 @@ const std::vector<Door>& front_doors() {
       {"libsystemd", {"systemd/"}, {"server/machine/service.cc"}},
       {"Spectra", {"Spectra/"}, {"clients/softbody/fem/spectrum.cc"}},
       {"spdlog", {"spdlog/"}, {"server/machine/log.cc"}},
-      {"toml++", {"toml++/"}, {"server/scene/scene.cc", "clients/softbody/scene.cc"}},
+      {"toml++", {"toml++/"}, {"server/scene/", "clients/softbody/scene.cc"}},
       {"umockdev", {"umockdev.h"}, {"tests/devices/usb/mock_usb.cc"}},
       {"zlib", {"zlib.h"}, {"server/recording/mcap_format.cc"}},
   };

@@ -103,7 +103,7 @@ TEST(Rooms, EveryLibraryHasOneFrontDoor) {
                                                       {"sodium.h", "protocol/secrets/crypto.cc"},
                                                       {"sodium.h", "devices/falcon/firmware.cc"},
                                                       {"spdlog/spdlog.h", "server/machine/log.cc"},
-                                                      {"toml++/toml.h", "server/scene/scene.cc"},
+                                                      {"toml++/toml.h", "server/scene/read.cc"},
                                                       {"zlib.h", "server/recording/mcap_format.cc"}}) {
     const auto text = kLicence + "#include <" + header + ">\n";
     EXPECT_EQ(places(door, text), Places{}) << header;

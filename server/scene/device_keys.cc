@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <toml++/toml.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "devices/simulated/profiles.h"
+#include "server/scene/keys.h"
+#include "server/scene/reader.h"
+#include "server/scene/reference.h"
+#include "server/scene/values.h"
+
+namespace tendon::scene_file {
+namespace {
+
+/// Where a USB device is plugged in, in the kernel's words.
+struct UsbPort {
+  static std::string expected(const Unit&) { return "a port as `tendond devices` names it, like \"1-2.3\""; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
+    constexpr std::size_t kLongestPort = 32;  // 7 tiers of hubs are the most there can be
+    const auto* text = node.as_string();
+    const auto in_a_port = [](char c) { return (c >= '0' && c <= '9') || c == '-' || c == '.'; };
+    const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= kLongestPort &&
+                      std::all_of((*text)->begin(), (*text)->end(), in_a_port);
+    if (!good) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
+};
+
+/// An arm of Haptikfabriken's whose kinematics are published.
+struct ArmModel {
+  static std::string expected(const Unit&) {
+    std::string text = "one of ";
+    for (const auto& model : woodenhaptics::models()) {
+      text += (&model == woodenhaptics::models().data() ? "" : ", ") + in_quotes(model.name);
+    }
+    return text;
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, const woodenhaptics::Model*& to) {
+    const auto* text = node.as_string();
+    to = text != nullptr ? woodenhaptics::find_model(**text) : nullptr;
+    if (to != nullptr) return {};
+    const bool closed = text != nullptr && woodenhaptics::has_unpublished_kinematics(**text);
+    return Refusal{&node, expected(unit) + (closed ? " (Polhem v2 and v3 have a closed linkage, whose kinematics their "
+                                                     "makers have not published)"
+                                                   : "")};
+  }
+
+  static std::string shown(const Unit&, const woodenhaptics::Model* model) {
+    return model != nullptr ? in_quotes(model->name) : "none";
+  }
+};
+
+/// A force sensor: there or not, with the size of one count.
+struct Sensor {
+  static std::string expected(const Unit&) {
+    return "the size of one count in N, 0 for an exact one, or false for none";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit,
+                      std::optional<SimulatedDevice::Config::ForceSensor>& to) {
+    std::optional<double> count;
+    if (OrFalse{kZeroOrMore}.take(node, unit, count)) return Refusal{&node, expected(unit)};
+    to.reset();
+    if (!count) return {};
+    to.emplace();
+    if (*count > 0) to->resolution = *count;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::optional<SimulatedDevice::Config::ForceSensor>&) { return "false"; }
+};
+
+struct Column {
+  static std::string expected(const Unit&) { return "a column's name in quotes or its number, from 0"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, RecordedMotionFile::Column& to) {
+    if (const auto* name = node.as_string(); name != nullptr && !(*name)->empty()) {
+      to = **name;
+      return {};
+    }
+    const auto* number = node.as_integer();
+    if (number == nullptr || **number < 0) return Refusal{&node, expected(unit)};
+    to = static_cast<std::size_t>(**number);
+    return {};
+  }
+
+  static std::string shown(const Unit&, const RecordedMotionFile::Column& value) {
+    const auto* name = std::get_if<std::string>(&value);
+    return name != nullptr ? in_quotes(*name) : std::to_string(std::get<std::size_t>(value));
+  }
+};
+
+enum class DeviceKind : std::uint8_t { kSimulated, kFalcon, kReplay, kSpaceMouse, kWoodenHaptics };
+enum class MechanismKind : std::uint8_t { kFalcon, kArm };
+enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
+
+Names<const DeviceProfile*> profile_names() {
+  Names<const DeviceProfile*> names;
+  for (const DeviceProfile& profile : device_profiles()) names.all.emplace_back(profile.name, &profile);
+  return names;
+}
+
+Names<const OperatorProfile*> operator_names() {
+  Names<const OperatorProfile*> names;
+  for (const OperatorProfile& profile : operator_profiles()) names.all.emplace_back(profile.name, &profile);
+  return names;
+}
+
+Names<MotionKind> motion_names() {
+  return {{{"sine", MotionKind::kSine},
+           {"ramp-hold", MotionKind::kRampHold},
+           {"minimum-jerk", MotionKind::kMinimumJerk},
+           {"recorded", MotionKind::kRecorded}}};
+}
+
+Names<ScriptedMotion::Recorded::AtEnd> at_end_names() {
+  using enum ScriptedMotion::Recorded::AtEnd;
+  return {{{"hold", kHold}, {"repeat", kRepeat}}};
+}
+
+template <class Table>
+void declare_joint_friction(Table& friction, Draft& draft, JointFriction::Config& config) {
+  const Names<MechanismKind> kinds{{{"falcon", MechanismKind::kFalcon}, {"arm", MechanismKind::kArm}}};
+  friction.kind(kinds, [&](Table& keys, MechanismKind kind) {
+    if (kind == MechanismKind::kArm) {
+      auto& arm = config.mechanism.emplace<Mechanism::Arm>();
+      keys.key("upper_arm_mm", arm.upper_arm, Number{.least = 10, .most = 1e4}, "of a Phantom's: shoulder to elbow",
+               kRequired);
+      keys.key("forearm_mm", arm.forearm, Number{.least = 10, .most = 1e4}, "elbow to handle", kRequired);
+    }
+    keys.key("coulomb_n_m", draft.joint_coulomb, Vector{}, "Coulomb friction of each joint, in place of the handle's",
+             Absent{.text = "so much that coulomb_friction_n is the least at any place and in any direction"});
+    keys.key("viscous_n_m_s", config.viscous, Vector{}, "viscous friction of each joint, besides the handle's");
+    keys.key("centre_mm", config.centre, Vector{}, "where the middle of the mechanism's workspace lies");
+  });
+}
+
+template <class Table>
+void declare_effects(Table& effects, Draft& draft) {
+  const DeviceProfile* const profile = draft.profile;
+  SimulatedDevice::Config& device = draft.scene.device;
+  constexpr OrFalse kDelay{Number{.least = 0, .most = 100, .without_least = true}};
+  constexpr OrFalse kEffect{kAboveZero};
+  constexpr Absent kProfiles{.text = "the profile's; without a profile there is no such effect"};
+  effects.key("mass_kg", device.mass, kAboveZero, "apparent mass at the handle",
+              Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
+  effects.key("viscous_friction_n_s_per_m", device.viscous_friction, kEffect, "true viscous friction", kProfiles);
+  effects.key("coulomb_friction_n", device.coulomb_friction, kEffect, "true Coulomb friction", kProfiles);
+  effects.key("encoder_step_um", device.encoder_step, kEffect, "one encoder count, on each axis", kProfiles);
+  effects.key("max_force_n", device.max_force, kEffect, "the device clamps the force vector to this length", kProfiles);
+  effects.key("amplifier_bandwidth_hz", device.amplifier_bandwidth, kEffect,
+              "the motors follow the command with this bandwidth (-3 dB, first order)", kProfiles);
+  effects.key("force_sensor", device.force_sensor, Sensor{},
+              "measures the force of the hand: what a device of admittance type has", kProfiles);
+  effects.key("watchdog_ms", device.watchdog, kEffect,
+              "the device drops the force when it gets no command for this long", kProfiles);
+  effects.key("sample_delay_ms", device.sample_delay, kDelay, "positions come so late, and say when they were taken");
+  effects.key("force_delay_ms", device.force_delay, kDelay, "so late do forces reach the motors");
+  effects.part("joint_friction", device.joint_friction, [&draft](Table& friction, JointFriction::Config& config) {
+    declare_joint_friction(friction, draft, config);
+  });
+  effects.part(
+      "structural_mode", device.structural_mode, [](Table& keys, SimulatedDevice::Config::StructuralMode& mode) {
+        keys.key("handle_mass_kg", mode.handle_mass, kAboveZero, "of mass_kg, what is on the hand's side of the spring",
+                 kRequired);
+        keys.key("stiffness_n_per_m", mode.stiffness, kAboveZero, "of the spring between motors and handle", kRequired);
+        keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "beside it");
+      });
+}
+
+template <class Table>
+void declare_csv(Table& keys, RecordedMotionFile& file) {
+  keys.key("file", file.path, Path{}, "CSV file, relative to the scene file", kRequired);
+  keys.key("time_column", file.time, Column{}, "time in s");
+  keys.key("position_column", file.position, Column{}, "position along a line", kRequired);
+  keys.key("scale_m", file.scale, kAnyNumber, "how long one unit of the position is; negative turns it round");
+  keys.key("origin_mm", file.origin, Vector{}, "where position 0 lies");
+  keys.key("direction", file.direction, Vector{}, "of the line; its length does not count");
+}
+
+template <class Table>
+void declare_motion(Table& motion, Draft& draft) {
+  motion.kind(motion_names(), [&draft](Table& keys, MotionKind kind) {
+    switch (kind) {
+      case MotionKind::kSine: {
+        auto& sine = std::get<ScriptedMotion::Sine>(draft.motion = ScriptedMotion::Sine{});
+        keys.key("amplitude_mm", sine.amplitude, kZeroOrMore, "to either side of the centre", kRequired);
+        keys.key("frequency_hz", sine.frequency, kZeroOrMore, "cycles per second", kRequired);
+        keys.key("centre_mm", sine.centre, Vector{}, "where it starts");
+        keys.key("direction", sine.direction, Vector{}, "where it moves first; its length does not count");
+        return;
+      }
+      case MotionKind::kRampHold: {
+        auto& ramp = std::get<ScriptedMotion::RampHold>(draft.motion = ScriptedMotion::RampHold{});
+        keys.key("from_mm", ramp.from, Vector{}, "where it starts", kRequired);
+        keys.key("to_mm", ramp.to, Vector{}, "where it goes at constant speed", kRequired);
+        keys.key("ramp_ms", ramp.ramp, kAboveZero, "for how long it goes", kRequired);
+        keys.key("hold_ms", ramp.hold, kZeroOrMore, "for how long it rests at either end, to and fro for ever",
+                 Absent{.text = "it goes once and stays"});
+        return;
+      }
+      case MotionKind::kMinimumJerk: {
+        auto& reach = std::get<ScriptedMotion::MinimumJerk>(draft.motion = ScriptedMotion::MinimumJerk{});
+        keys.key("points_mm", reach.points, ListOf<Vector>{}, "2 or more points, at rest at each", kRequired);
+        keys.key("durations_ms", reach.durations, ListOf<Number>{kAboveZero}, "of the ways between them", kRequired);
+        keys.key("back_and_forth", reach.back_and_forth, YesNo{}, "for ever; else it stays at the last point");
+        return;
+      }
+      case MotionKind::kRecorded: {
+        auto& file = draft.recorded_motion.emplace();
+        declare_csv(keys, file);
+        keys.key("at_end", file.at_end, at_end_names(), "stay at the last sample, or start again");
+        return;
+      }
+    }
+  });
+}
+
+template <class Table>
+void declare_port(Table& keys, std::string& port) {
+  keys.key("port", port, UsbPort{}, "where it is plugged in, when there are several",
+           Absent{.text = "the first that nobody uses"});
+}
+
+template <class Table>
+void declare_falcon(Table& keys, Draft& draft) {
+  draft.scene.device = find_device_profile("falcon")->device();
+  Scene::Falcon& falcon = draft.scene.falcon.emplace(Scene::Falcon{});
+  declare_port(keys, falcon.port);
+  keys.key("firmware", falcon.firmware, Path{},
+           "the file of your own Novint software, relative to this file; --falcon-firmware overrides it",
+           Absent{.text = "none; only a device that has its firmware already can be used"});
+  keys.key("accept_unknown_firmware", falcon.accept_unknown_firmware, YesNo{},
+           "also a file that is none of the known ones");
+}
+
+template <class Table>
+void declare_replay(Table& keys, Draft& draft) {
+  draft.scene.device = stand_in("replay");
+  ReplayDevice::Config& replay = draft.scene.replay.emplace();
+  keys.key("recording", draft.replayed, Path{},
+           "MCAP recording of tendond, relative to this file: the hand of its (first) device",
+           Absent{.text = "none; then there is a table csv"});
+  keys.key("at_end", replay.at_end, at_end_names(), "stay at the last sample, or start again");
+  keys.key("encoder_step_um", replay.position_resolution, kZeroOrMore,
+           "one count of the device that was recorded; 0: its positions were exact");
+  keys.part("csv", draft.recorded_motion, [](Table& csv, RecordedMotionFile& file) { declare_csv(csv, file); });
+}
+
+template <class Table>
+void declare_spacemouse(Table& keys, Draft& draft) {
+  draft.scene.device = stand_in("spacemouse");
+  Scene::SpaceMouse& mouse = draft.scene.spacemouse.emplace(Scene::SpaceMouse{});
+  declare_port(keys, mouse.port);
+  keys.key("speed_m_per_s", mouse.motion.speed, kAboveZero, "of the position, with the cap at its stop");
+  keys.key("dead_band", mouse.motion.dead_band, Number{.least = 0, .most = 0.9},
+           "share of the way to the stop in which nothing moves");
+  keys.key("reach_mm", mouse.motion.reach, kAboveZero, "the position stays within so much of the origin, on each axis");
+}
+
+template <class Table>
+void declare_woodenhaptics(Table& keys, Draft& draft) {
+  draft.scene.device = stand_in("woodenhaptics");
+  draft.scene.device.watchdog = WoodenHapticsDevice::kWatchdog;
+  Scene::WoodenHaptics& arm = draft.scene.woodenhaptics.emplace(Scene::WoodenHaptics{});
+  declare_port(keys, arm.port);
+  keys.key("model", arm.drive.model, ArmModel{}, "which arm it is", kRequired);
+  keys.key("max_current_ma", arm.drive.max_current, Number{.least = 1, .most = 6000},
+           "of each motor; what the amplifiers can give is the most");
+}
+
+}  // namespace
+
+SimulatedDevice::Config stand_in(const char* name) {
+  SimulatedDevice::Config device;
+  device.name = name;
+  device.mass = 0.1;
+  return device;
+}
+
+template <class Table>
+void declare_device(Table& device, Draft& draft) {
+  const Names<DeviceKind> kinds{{{"simulated", DeviceKind::kSimulated},
+                                 {"falcon", DeviceKind::kFalcon},
+                                 {"replay", DeviceKind::kReplay},
+                                 {"spacemouse", DeviceKind::kSpaceMouse},
+                                 {"woodenhaptics", DeviceKind::kWoodenHaptics}}};
+  device.kind(kinds, [&draft](Table& keys, DeviceKind kind) {
+    keys.key("name", draft.scene.name, Label{}, "what clients call it that want this one of several",
+             Absent{.text = "the name of the scene file"});
+    if (kind == DeviceKind::kFalcon) {
+      declare_falcon(keys, draft);
+      return;
+    }
+    if (kind == DeviceKind::kReplay) {
+      declare_replay(keys, draft);
+      return;
+    }
+    if (kind == DeviceKind::kSpaceMouse) {
+      declare_spacemouse(keys, draft);
+      return;
+    }
+    if (kind == DeviceKind::kWoodenHaptics) {
+      declare_woodenhaptics(keys, draft);
+      return;
+    }
+    SimulatedDevice::Config& config = draft.scene.device;
+    keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
+    if (draft.profile != nullptr) config = draft.profile->device();
+    keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
+             Absent{.text = "where the hand starts, or the origin"});
+    keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
+    draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
+      hand.key("profile", draft.operator_profile, operator_names(),
+               "what holds the handle: the middle of what is known of such; keys below override one number each");
+      const OperatorProfile* const profile = draft.operator_profile;
+      if (profile != nullptr) draft.hand = profile->hand(std::move(draft.hand.motion));
+      constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
+      hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip",
+               Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
+      hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip", kProfiles);
+      hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
+      hand.key("button_after_ms", draft.scene.device.button_after, kZeroOrMore,
+               "after this time it presses button 0, and holds it", Absent{.text = "never"});
+      hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
+    });
+  });
+}
+
+template void declare_device(Reader&, Draft&);
+template void declare_device(Reference&, Draft&);
+
+}  // namespace tendon::scene_file

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/keys.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "protocol/limits.h"
+#include "server/scene/reader.h"
+#include "server/scene/reference.h"
+#include "server/scene/values.h"
+
+namespace tendon::scene_file {
+namespace {
+
+/// Where this server listens.
+struct ListenAddress {
+  static std::string expected(const Unit&) { return "an address like \"127.0.0.1:47100\" or \"[::1]:47100\""; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, Address& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr) return Refusal{&node, expected(unit)};
+    try {
+      to = parse_address(**text);
+      return {};
+    } catch (const std::invalid_argument&) {
+      return Refusal{&node, expected(unit)};
+    }
+  }
+
+  static std::string shown(const Unit&, const Address& value) { return in_quotes(to_string(value)); }
+};
+
+Names<Law> law_names() {
+  Names<Law> names;
+  for (const LawInfo& law : laws()) names.all.emplace_back(law.name, law.law);
+  return names;
+}
+
+enum class WorkspaceShape : std::uint8_t { kSphere, kBox };
+
+template <class Table>
+void declare_workspace(Table& workspace, Workspace::Config& config) {
+  const Names<WorkspaceShape> shapes{{{"sphere", WorkspaceShape::kSphere}, {"box", WorkspaceShape::kBox}}};
+  workspace.kind(shapes, [&config](Table& keys, WorkspaceShape shape) {
+    if (shape == WorkspaceShape::kSphere) {
+      auto& sphere = config.shape.emplace<Workspace::Sphere>();
+      keys.key("radius_mm", sphere.radius, kAboveZero, "of the space in which forces are whole", kRequired);
+    } else {
+      auto& box = config.shape.emplace<Workspace::Box>();
+      keys.key("half_mm", box.half, Vector{}, "half the edges of the space in which forces are whole", kRequired);
+    }
+    keys.key("centre_mm", config.centre, Vector{}, "of that space");
+    keys.key("margin_mm", config.margin, kAboveZero, "so far beyond it nothing pushes outwards any more", kRequired);
+  });
+}
+
+template <class Table>
+void declare_watchdog(Table& keys, Watchdog::Config& dog, std::string_view meaning) {
+  keys.key("timeout_ms", dog.timeout, kAboveZero, meaning, kRequired);
+  keys.key("ramp_ms", dog.ramp, kZeroOrMore, "then what is asked for falls to nothing within this time");
+}
+
+/// The safety layer: there when its table is, as is each part of it.
+template <class Table>
+void declare_safety(Table& safety, SafeDevice::Config& config) {
+  using By = SafeDevice::Arming::By;
+  safety.key(
+      "arm", config.arming.by,
+      Names<By>{{{"by request", By::kRequest}, {"at start", By::kStart}, {"by dead man", By::kDeadMan}}},
+      "what gives forces, at first and after a fault: a guest's request (rearm); the first time nobody, then that; "
+      "or nothing but pressing the dead man's button");
+  safety.key("rest_speed_m_per_s", config.arming.rest_speed, kAboveZero,
+             "armed is only a handle that was no faster for 50 ms");
+  safety.key("rest_force_n", config.arming.rest_force, kAboveZero, "… and of which no more force is asked");
+  safety.key("patience_ms", config.arming.patience, kAboveZero, "a request to arm is open for so long");
+  safety.part("force_limit", config.force_limit, [](Table& keys, ForceLimit::Config& part) {
+    keys.key("max_n", part.max, kAboveZero, "no force is longer; its direction is kept", kRequired);
+  });
+  safety.part("growth_limit", config.growth_limit, [](Table& keys, GrowthLimit::Config& part) {
+    keys.key("rate_n_per_s", part.rate, kAboveZero, "no force grows faster; it falls at once", kRequired);
+  });
+  safety.part("ramp_in", config.ramp_in, [](Table& keys, RampIn::Config& part) {
+    keys.key("time_ms", part.time, kAboveZero, "after arming, from nothing to the whole force", kRequired);
+  });
+  safety.part("heat_limit", config.heat_limit, [](Table& keys, HeatLimit::Config& part) {
+    keys.key("peak_n", part.peak, kAboveZero, "of cool motors", kRequired);
+    keys.key("continuous_n", part.continuous, kAboveZero, "what they bear for ever. Not above peak_n", kRequired);
+    keys.key("time_constant_ms", part.time_constant, kAboveZero, "with which they heat up", kRequired);
+  });
+  safety.part("workspace", config.workspace,
+              [](Table& keys, Workspace::Config& part) { declare_workspace(keys, part); });
+  safety.part("speed_trip", config.speed_trip, [](Table& keys, SpeedTrip::Config& part) {
+    keys.key("max_m_per_s", part.max, kAboveZero, "a handle that is faster gets no force any more", kRequired);
+  });
+  safety.part("step_bound", config.step_bound, [](Table& keys, StepBound::Config& part) {
+    keys.key("max_speed_m_per_s", part.max_speed, kAboveZero,
+             "as in [loop], and unarmed: a position that no hand comes to at this speed", kRequired);
+  });
+  safety.part("command_watchdog", config.command_watchdog, [](Table& keys, Watchdog::Config& part) {
+    declare_watchdog(keys, part, "the loop stood still for longer");
+  });
+  safety.part("link_watchdog", config.link_watchdog, [](Table& keys, Watchdog::Config& part) {
+    declare_watchdog(keys, part, "the newest position is older");
+  });
+  safety.part("dead_man", config.dead_man, [](Table& keys, DeadManSwitch::Config& part) {
+    keys.key("button", part.button, Count{31}, "no force unless it is held", kRequired);
+  });
+}
+
+/// The parts of AOL+: each is there when its table is.
+template <class Table>
+void declare_parts(Table& limiter, Draft& draft) {
+  using Plus = AolPlus<1, 3>;
+  Plus::Parts& parts = draft.scene.loop.control.limiter.parts;
+  limiter.part("energy_cap", parts.energy_cap, [](Table& keys, Plus::EnergyCap& cap) {
+    keys.key("energy_mj", cap.energy, kZeroOrMore, "credit that outlasts the contact in which it was earned");
+    keys.key("most_contact_mj", cap.most_contact, kZeroOrMore, "the most that one contact adds to that");
+  });
+  limiter.part("robust_ledger", parts.robust_ledger, [&draft](Table& keys, Plus::Robust& robust) {
+    keys.key("encoder_step_um", draft.ledger_step, kZeroOrMore, "one encoder count: credit is never due to rounding",
+             Absent{.text = "the device's; required when the device has none"});
+    keys.key("window", robust.window, Count{1000, 1}, "haptic periods for each credit of viscous friction");
+  });
+  limiter.part("knee", parts.knee, [](Table& keys, Plus::Knee& knee) {
+    keys.key("start", knee.start, Number{.least = 0.01, .most = 0.99},
+             "share of the bound from which on forces are compressed instead of clipped");
+  });
+  limiter.part("latency_reserve", parts.latency_reserve, [](Table& keys, Plus::LatencyReserve& reserve) {
+    keys.key("holds", reserve.holds, Count{Plus::kMostHolds, 1},
+             "periods from when a force is chosen to when the device begins to hold it. Not with bounded_acceleration");
+  });
+  limiter.part("bounded_acceleration", parts.bounded_acceleration, [&draft](Table& keys, Plus::BoundedAcceleration&) {
+    keys.key("most_m_per_s2", draft.most_acceleration, kAboveZero,
+             "the handle never accelerates harder: the largest forces of hand and motors, over the apparent mass");
+    keys.key("shaping_viscous_n_s_per_m", draft.shaping_viscous, kAboveZero,
+             "stiffness stays below twice this over the longest hold. Not below the viscous friction");
+  });
+  limiter.part("adaptive_friction", parts.adaptive_friction, [&draft](Table& keys, Plus::AdaptiveFriction& adaptive) {
+    keys.key("rise_ms", adaptive.rise, kAboveZero, "time constant with which the bounds may rise; they fall at once");
+    keys.key("places_mm", draft.places, ListOf<Vector>{}, "where the friction was identified", kRequired);
+    keys.key("coulomb_friction_n", draft.place_coulomb, ListOf<Number>{kZeroOrMore},
+             "lower bound at each of the places", kRequired);
+    keys.key("viscous_friction_n_s_per_m", draft.place_viscous, ListOf<Number>{kZeroOrMore}, "the same", kRequired);
+    keys.key("reach_mm", draft.reach, kZeroOrMore,
+             "in use is the least of the nearest place and of all within this distance of the hand");
+  });
+}
+
+Names<OutputEstimator::Model> estimator_models() {
+  using enum OutputEstimator::Model;
+  return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
+}
+
+/// How the force follows the hand between two arrivals, when not as the engine said. One table or none.
+template <class Table>
+void declare_between(Table& force, HeldForce::Config& hold) {
+  force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
+    keys.key("share", config.share, Number{.least = 0.01, .most = 1},
+             "of the stiffness that the engine sends; below 1 when that is an estimate itself");
+    keys.key("max_blend_ms", config.max_blend, kAboveZero, "a new model is blended in for one engine period, or this");
+  });
+  force.part("output_estimator", hold.output_estimator, [](Table& keys, OutputEstimator::Config& config) {
+    keys.key("model", config.model, estimator_models(), "what the environment is taken for, on each axis");
+    keys.key("origin_mm", config.origin, Vector{}, "where the environment is at rest");
+    keys.key("scale_mm", config.scale, kAboveZero, "about the travel in the environment");
+    keys.key("forgetting", config.forgetting, Number{.least = 0.5, .most = 1}, "what is left of a weight per answer");
+    keys.key("dead_zone_n", config.dead_zone, kZeroOrMore, "smaller errors teach nothing: the noise of the engine");
+    keys.key("reset_error_n", config.reset_error, kAboveZero, "a larger error is another environment");
+    keys.key("reset_cooldown", config.reset_cooldown, Count{1000, 1}, "answers before the next one can be");
+    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "nothing stiffer is believed");
+    keys.key("largest_n", config.max_force, kAboveZero, "no estimate is larger, on each axis");
+    keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: less motion teaches nothing");
+  });
+}
+
+/// What one law wants to know and others do not.
+template <class Table>
+void declare_law(Table& limiter, Draft& draft) {
+  LimiterConfig& config = draft.scene.loop.control.limiter;
+  const auto used_by = [&config](std::initializer_list<Law> users) {
+    return Table::kDocuments || std::find(users.begin(), users.end(), config.law) != users.end();
+  };
+  if (used_by({Law::kClamp})) {
+    limiter.key("clamp_n", config.max_force, kZeroOrMore, "of \"clamp\": no force is longer than this", kRequired);
+  }
+  if (used_by({Law::kReferenceEnergy, Law::kPortHamiltonian, Law::kPassiveSynthesis})) {
+    limiter.key(
+        "environment_stiffness_n_per_m", config.environment_stiffness, kAboveZero,
+        "of \"reference-energy\", \"port-hamiltonian\", \"passive-synthesis\": of an environment that sends no "
+        "stiffness of its own",
+        Absent{.required = info(config.law).needs_stiffness,
+               .text = "required, but for \"passive-synthesis\", which then learns it from forces that bring one"});
+  }
+  if (used_by({Law::kPassiveSynthesis})) {
+    limiter.key("environment_delay_ms", config.environment_delay, kZeroOrMore,
+                "of \"passive-synthesis\": from a position to the force that answers it");
+  }
+  if (used_by({Law::kPassivityController, Law::kPassivityControllerPublished, Law::kReferenceEnergy})) {
+    limiter.key("max_damping_n_s_per_m", config.max_damping, kAboveZero,
+                "of \"tdpa\", \"tdpa-2002\", \"reference-energy\": the most damping that is injected. Far below twice "
+                "the device's mass over the period");
+  }
+  if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
+}
+
+/// 250 Hz to 10 kHz. At 250 Hz the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004); 100 µs is
+/// about what an ordinary kernel wakes a thread too late.
+constexpr Number kPeriod{.least = 100, .most = 4000};
+/// What fits into the kernel's set.
+constexpr Count kProcessor{1023};
+/// The wire tells timeouts in whole ms.
+constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
+/// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
+constexpr Count kObservers{1000};
+
+}  // namespace
+
+template <class Table>
+void declare_scene(Table& scene, Draft& draft) {
+  scene.table("device", [&draft](Table& device) { declare_device(device, draft); });
+
+  scene.table("loop", [&draft](Table& loop) {
+    loop.key("period_us", draft.scene.loop.period, kPeriod, "from one haptic step to the next");
+    loop.key("longest_hold_us", draft.longest_hold, kAboveZero,
+             "T_max of the limiter: a force held for longer is an overrun. Not below the period",
+             Absent{.text = "2 periods"});
+    loop.key("max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
+             "a position that no hand comes to at this speed is a fault: an encoder that wraps or loses count",
+             Absent{.text = "every position is believed"});
+    loop.key("cpu", draft.scene.cpu, kProcessor, "the processor on which the haptic thread stays: an isolated one",
+             Absent{.text = "wherever the kernel puts it"});
+  });
+
+  scene.part("safety", draft.scene.safety,
+             [](Table& safety, SafeDevice::Config& config) { declare_safety(safety, config); });
+
+  scene.table("limiter", [&draft](Table& limiter) {
+    LimiterConfig& config = draft.scene.loop.control.limiter;
+    constexpr Absent kProfiles{.text = "the profile's; required without a profile, unless kind is \"none\""};
+    limiter.key("kind", config.law, law_names(),
+                "keeps the device from giving out energy. \"none\" is for simulated devices only");
+    limiter.key("coulomb_friction_n", draft.coulomb_bound, kZeroOrMore,
+                "lower bound of the device's Coulomb friction (aol-per-axis, aol-box: of each axis by itself)",
+                kProfiles);
+    limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
+                "lower bound of the device's viscous friction", kProfiles);
+    declare_law(limiter, draft);
+  });
+
+  scene.part("admittance", draft.scene.loop.control.admittance, [](Table& keys, AdmittanceLoop<3>::Config& tool) {
+    // The tool is the same in every direction.
+    const auto each = [&keys](const char* name, Vec3& target, const Number& rule, const char* meaning, Absent absent) {
+      double value = target.x();
+      keys.key(name, value, rule, meaning, absent);
+      target.setConstant(value);
+    };
+    tool.mass.setZero();
+    tool.proportional.setZero();
+    each("mass_kg", tool.mass, kAboveZero, "of the tool that the hand is to feel", kRequired);
+    each("damping_n_s_per_m", tool.damping, kZeroOrMore, "of the tool", {});
+    each("stiffness_n_per_m", tool.stiffness, kZeroOrMore, "ties the tool to where it was at the start", {});
+    each("proportional_n_s_per_m", tool.proportional, kZeroOrMore, "gain of the loop that makes the handle follow",
+         kRequired);
+    each("integral_n_per_m", tool.integral, kZeroOrMore, "its integral gain", {});
+  });
+
+  scene.table("force", [&draft](Table& force) {
+    HapticController::Config& control = draft.scene.loop.control;
+    force.key("max_force_n", draft.max_force, kAboveZero, "no force is longer than this",
+              Absent{.text = "the device's; required when the device has none, 10 N when it exerts no forces"});
+    force.key("max_slew_n_per_s", control.max_slew, kAboveZeroOrInf, "no force changes faster than this");
+    force.key("hold_ms", control.hold.hold, kZeroOrMore, "a force is held for this long after its validity ends");
+    force.key("decay_ms", control.hold.decay, kAboveZero, "time constant of its fading after that");
+    force.key("safe_stop_ms", control.hold.safe_stop, kZeroOrMore,
+              "zero force this long after validity ends. Not below hold_ms");
+    force.key("ramp_in_ms", control.hold.ramp_in, kZeroOrMore, "the first force is ramped in for this long");
+    force.key("max_valid_for_ms", control.hold.max_valid_for, kAboveZero,
+              "a force is valid for no longer than this, whatever its sender asks for");
+    force.key("max_stiffness_n_per_m", control.hold.max_stiffness, kAboveZero,
+              "of what an engine sends with its forces, nothing stiffer is followed");
+    declare_between(force, control.hold);
+  });
+
+  scene.tables("channel", draft.scene.channels, limits::kMaxChannels, [](Table& keys, Scene::Channel& channel) {
+    keys.key("name", channel.name, Label{}, "what clients call it that want this one of several", kRequired);
+    keys.key("rule", channel.rule,
+             Names<ChannelRule>{{{"sum", ChannelRule::kSum}, {"priority", ChannelRule::kPriority}}},
+             "its force is added to the others; or it silences those of this rule that come after it, as long as it is "
+             "fresh, and is faded in and out for ramp_in_ms");
+    keys.key("lease_ms", channel.lease, Number{.least = 0, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)},
+             "another client may take it from one that has sent no force for so long; 0: it stays until it leaves");
+  });
+
+  scene.table("network", [&draft](Table& keys) {
+    Scene::Network& network = draft.scene.network;
+    keys.key("listen", network.listen, ListenAddress{},
+             "port 0 lets the system choose one. Without keys a loopback address");
+    keys.key("keys", network.keys, Path{},
+             "folder with a file NAME.key for each client, relative to this file; only they are let in");
+    keys.key("max_observers", network.max_observers, kObservers, "guests besides the controller");
+    keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
+    keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
+    keys.key("adapt_state_rate", network.adapt_state_rate, YesNo{},
+             "whether states leave more rarely where the way to a guest is full, down to 1 in 20");
+    keys.key("takeover", network.takeover, ListOf<Label>{},
+             "names of the keys (without keys: of the clients) that may take a channel from its holder at once");
+  });
+
+  scene.optional_table("recording", [&draft](Table& recording) {
+    recording.key("path", draft.scene.recording, Path{}, "MCAP file, relative to the current directory", kRequired);
+  });
+}
+
+template void declare_scene(Reader&, Draft&);
+template void declare_scene(Reference&, Draft&);
+
+}  // namespace tendon::scene_file

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <toml++/toml.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "server/scene/keys.h"
+#include "server/scene/reader.h"
+#include "server/scene/resolver.h"
+#include "server/scene/scene.h"
+#include "server/scene/values.h"
+
+namespace tendon {
+namespace {
+
+toml::table parse_toml(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw SceneError(name + ':' + std::to_string(error.source().begin.line) +
+                     ": not TOML: " + std::string(error.description()));
+  }
+}
+
+/// "TABLE.KEY=VALUE" → the table's key has that value; "TABLE.KEY=" → it is not there.
+void apply_setting(toml::table& file, const std::string& setting) {
+  const auto refuse = [&setting](const std::string& why) {
+    throw SceneError("setting " + scene_file::in_quotes(setting) + ": " + why);
+  };
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos || equals == 0) refuse("expected TABLE.KEY=VALUE");
+  std::string_view path = std::string_view(setting).substr(0, equals);
+  const std::string value = setting.substr(equals + 1);
+
+  toml::table* table = &file;
+  for (std::size_t dot = path.find('.'); dot != std::string_view::npos; dot = path.find('.')) {
+    const std::string_view name = path.substr(0, dot);
+    path.remove_prefix(dot + 1);
+    if (!table->contains(name)) {
+      if (value.empty()) return;
+      table->insert(name, toml::table{});
+    }
+    table = table->get_as<toml::table>(name);
+    if (table == nullptr) refuse(scene_file::in_quotes(name) + " is not a table");
+  }
+  if (value.empty()) {
+    table->erase(path);
+    return;
+  }
+  try {
+    const toml::table parsed = toml::parse("value = " + value);
+    table->insert_or_assign(path, *parsed.get("value"));
+  } catch (const toml::parse_error&) {
+    table->insert_or_assign(path, value);
+  }
+}
+
+}  // namespace
+
+Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
+                  std::span<const std::string> settings) {
+  if (text.size() > kMaxSceneBytes) {
+    throw SceneError(name + ": expected a scene of at most " + std::to_string(kMaxSceneBytes) + " bytes, found more");
+  }
+  toml::table file = parse_toml(text, name);
+  for (const std::string& setting : settings) apply_setting(file, setting);
+  scene_file::Draft draft;
+  draft.scene.text = text;
+  draft.scene.has_network = file.contains("network");
+  draft.scene.name = scene_file::label_of(std::filesystem::path(name).stem().string());
+  scene_file::SceneProblems problems;
+  scene_file::Reader reader(problems, &file, "", {});
+  scene_file::declare_scene(reader, draft);
+  reader.refuse_unknown();
+  problems.throw_first(name);
+  return scene_file::resolve(std::move(draft), file, name, directory);
+}
+
+Scene read_scene(const std::filesystem::path& file) {
+  struct Close {
+    void operator()(std::FILE* stream) const { std::fclose(stream); }
+  };
+  const auto fail = [&file] {
+    throw SceneError("cannot read " + file.string() + ": " + std::generic_category().message(errno));
+  };
+  const std::unique_ptr<std::FILE, Close> stream(std::fopen(file.c_str(), "rbe"));
+  if (!stream) fail();
+  std::string text(kMaxSceneBytes + 1, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
+  if (std::ferror(stream.get()) != 0) fail();
+  return parse_scene(text, file.string(), file.parent_path());
+}
+
+std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files) {
+  std::vector<Scene> scenes;
+  for (const std::filesystem::path& file : files) {
+    Scene scene = read_scene(file);
+    scene.loop.device = static_cast<std::uint32_t>(scenes.size());
+    for (const Scene& before : scenes) {
+      if (scene.name != before.name) continue;
+      throw SceneError(file.string() + ": device.name: expected a name of its own, found " +
+                       scene_file::in_quotes(scene.name) + " again");
+    }
+    for (const auto& [name, there] :
+         {std::pair("network", scene.has_network), std::pair("recording", scene.recording.has_value())}) {
+      if (!there || scenes.empty()) continue;
+      throw SceneError(file.string() + ": " + name + ": expected in the first scene only, " + files.front().string());
+    }
+    scenes.push_back(std::move(scene));
+  }
+  return scenes;
+}
+
+}  // namespace tendon

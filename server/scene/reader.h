@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "server/scene/keys.h"
+#include "server/scene/values.h"
+
+// Reads a scene file along the declarations of its keys (keys.h). Internal to server/scene.
+
+namespace tendon::scene_file {
+
+/// "a.b" for the table `path` and the key `name`; `name` alone at the top of the file.
+std::string joined(std::string_view path, std::string_view name);
+
+/// Advice to the writer of an unknown key: the key that was probably meant, or all that are known.
+std::string advice(std::string_view unknown, const std::vector<std::string_view>& known);
+
+/// A place in the file that an error can name; line 0 is none.
+struct Place {
+  std::uint32_t line = 0;
+  std::uint32_t column = 0;
+  friend bool operator<(const Place& a, const Place& b) {
+    return std::pair(a.line, a.column) < std::pair(b.line, b.column);
+  }
+};
+
+Place place_of(const toml::node& node);
+
+/// Throws SceneError "FILE:LINE: KEY: SENTENCE".
+[[noreturn]] void fail(const std::string& file, Place at, const std::string& key, const std::string& sentence);
+
+/// Of all that is wrong with a file, what to report.
+class SceneProblems {
+ public:
+  void wrong(Place at, std::string key, std::string sentence) { add({false, at, std::move(key), std::move(sentence)}); }
+  void missing(Place at, std::string key, std::string sentence) {
+    add({true, at, std::move(key), std::move(sentence)});
+  }
+
+  void throw_first(const std::string& file) const {
+    if (first_) fail(file, first_->at, first_->key, first_->sentence);
+  }
+
+ private:
+  struct Problem {
+    bool missing;
+    Place at;
+    std::string key;
+    std::string sentence;
+  };
+
+  void add(Problem problem) {
+    const auto rank = [](const Problem& f) { return std::pair(f.missing, f.at); };
+    if (!first_ || rank(problem) < rank(*first_)) first_ = std::move(problem);
+  }
+
+  std::optional<Problem> first_;
+};
+
+/// Fills the targets of one table's declarations from the file; `table` is null where the file has none.
+class Reader {
+ public:
+  static constexpr bool kDocuments = false;
+
+  Reader(SceneProblems& problems, const toml::table* table, std::string path, Place place)
+      : problems_(problems), table_(table), path_(std::move(path)), place_(place) {}
+
+  template <class T, class Rule>
+  bool key(std::string_view name, T& target, const Rule& rule, std::string_view /*meaning*/,
+           const Absent& absent = {}) {
+    const Unit& unit = unit_of(name);
+    const toml::node* node = look_up(name);
+    if (node == nullptr) {
+      if (absent.required) {
+        problems_.missing(place_, joined(path_, name), "missing, expected " + rule.expected(unit));
+      }
+      return false;
+    }
+    const Verdict refusal = rule.take(*node, unit, target);
+    if (!refusal) return true;
+    problems_.wrong(place_of(*refusal->found), joined(path_, name),
+                    "expected " + refusal->expected + ", found " + found_in(*refusal->found));
+    return false;
+  }
+
+  /// A required key that decides which others there are.
+  template <class T, class Declare>
+  void kind(const Names<T>& names, const Declare& declare) {
+    T value{};
+    kind_known_ = key("kind", value, names, "", kRequired);
+    if (kind_known_) declare(*this, value);
+  }
+
+  template <class Declare>
+  void table(std::string_view name, const Declare& declare) {
+    const toml::node* node = look_up(name);
+    if (node != nullptr && !node->is_table()) {
+      problems_.wrong(place_of(*node), joined(path_, name), "expected a table, found " + found_in(*node));
+      return;
+    }
+    Reader inner(problems_, node != nullptr ? node->as_table() : nullptr, joined(path_, name),
+                 node != nullptr ? place_of(*node) : place_);
+    declare(inner);
+    inner.refuse_unknown();
+  }
+
+  template <class Declare>
+  bool optional_table(std::string_view name, const Declare& declare) {
+    const bool there = look_up(name) != nullptr;
+    if (there) table(name, declare);
+    return there;
+  }
+
+  /// An effect that is there when its table is.
+  template <class T, class Declare>
+  void part(std::string_view name, std::optional<T>& target, const Declare& declare) {
+    optional_table(name, [&](Reader& keys) {
+      // To clang a T whose class around it had no end yet, when it first met the optional, needs an argument.
+      if constexpr (std::is_default_constructible_v<T>) {
+        declare(keys, target.emplace());
+      } else {
+        declare(keys, target.emplace(T{}));
+      }
+    });
+  }
+
+  /// A table written with [[name]], for each of a few of a kind; without one `target` stays as it is.
+  template <class T, class Declare>
+  void tables(std::string_view name, std::vector<T>& target, std::size_t most, const Declare& declare) {
+    const toml::node* node = look_up(name);
+    if (node == nullptr) return;
+    const std::string path = joined(path_, name);
+    if (!node->is_array_of_tables() || node->as_array()->size() > most) {
+      problems_.wrong(place_of(*node), path,
+                      "expected 1 to " + std::to_string(most) + " tables [[" + path + "]], found " + found_in(*node));
+      return;
+    }
+    target.clear();
+    for (const toml::node& one : *node->as_array()) {
+      Reader inner(problems_, one.as_table(), path + "[" + std::to_string(target.size()) + "]", place_of(one));
+      declare(inner, target.emplace_back());
+      inner.refuse_unknown();
+    }
+  }
+
+  void refuse_unknown() const {
+    if (table_ == nullptr || !kind_known_) return;
+    for (const auto& [name, node] : *table_) {
+      if (std::find(known_.begin(), known_.end(), name.str()) != known_.end()) continue;
+      problems_.wrong(place_of(node), joined(path_, name.str()),
+                      (node.is_table() ? "unknown table; " : "unknown key; ") + advice(name.str(), known_));
+    }
+  }
+
+ private:
+  const toml::node* look_up(std::string_view name) {
+    if (std::find(known_.begin(), known_.end(), name) == known_.end()) known_.push_back(name);
+    return table_ != nullptr ? table_->get(name) : nullptr;
+  }
+
+  SceneProblems& problems_;
+  const toml::table* table_;
+  std::string path_;
+  Place place_;
+  std::vector<std::string_view> known_;
+  bool kind_known_ = true;  ///< else the table's keys are not known either
+};
+
+}  // namespace tendon::scene_file

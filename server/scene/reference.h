@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/scene/keys.h"
+#include "server/scene/reader.h"
+#include "server/scene/values.h"
+
+// Writes the declarations of a scene's keys (keys.h) down for people. Internal to server/scene.
+
+namespace tendon::scene_file {
+
+/// Writes the declarations down for people.
+class Reference {
+ public:
+  static constexpr bool kDocuments = true;  ///< declare all there is, whatever depends on what
+
+  explicit Reference(std::string& text, std::string path = {}) : text_(text), path_(std::move(path)) {}
+
+  template <class T, class Rule>
+  bool key(std::string_view name, const T& target, const Rule& rule, std::string_view meaning,
+           const Absent& absent = {}) {
+    const Unit& unit = unit_of(name);
+    std::string without = "Default: ";
+    if (!absent.text.empty()) {
+      without += absent.text;
+    } else if (absent.required) {
+      without = "Required";
+    } else {
+      without += rule.shown(unit, target);
+    }
+    text_.append(indent_).append(name).append("\n");
+    text_.append(indent_).append("    ").append(meaning).append(".\n");
+    text_.append(indent_).append("    ").append(rule.expected(unit)).append(". ").append(without).append(".\n");
+    return false;
+  }
+
+  template <class T, class Declare>
+  void kind(const Names<T>& names, const Declare& declare) {
+    for (const auto& [name, value] : names.all) {
+      text_.append("  kind = ").append(in_quotes(name)).append("\n");
+      Reference inner(text_, path_);
+      inner.indent_ = "    ";
+      declare(inner, value);
+    }
+  }
+
+  template <class Declare>
+  void table(std::string_view name, const Declare& declare) {
+    const std::string path = joined(path_, name);
+    text_.append(text_.empty() ? "[" : "\n[").append(path).append("]\n");
+    Reference inner(text_, path);
+    declare(inner);
+  }
+
+  template <class Declare>
+  bool optional_table(std::string_view name, const Declare& declare) {
+    table(name, declare);
+    return true;
+  }
+
+  template <class T, class Declare>
+  void part(std::string_view name, std::optional<T>&, const Declare& declare) {
+    table(name, [&](Reference& keys) {
+      T defaults;
+      declare(keys, defaults);
+    });
+  }
+
+  template <class T, class Declare>
+  void tables(std::string_view name, std::vector<T>&, std::size_t most, const Declare& declare) {
+    const std::string path = joined(path_, name);
+    text_.append("\n[[").append(path).append("]]  at most ").append(std::to_string(most)).append("\n");
+    Reference inner(text_, path);
+    T defaults;
+    declare(inner, defaults);
+  }
+
+ private:
+  std::string& text_;
+  std::string path_;
+  std::string indent_ = "  ";
+};
+
+}  // namespace tendon::scene_file

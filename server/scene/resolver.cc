@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/resolver.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <iterator>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "devices/simulated/recorded_motion.h"
+#include "server/scene/reader.h"
+#include "server/scene/recorded_hand.h"
+#include "server/scene/values.h"
+
+namespace tendon::scene_file {
+namespace {
+
+/// The four of its grip: right, forward, centre, left.
+constexpr std::uint32_t kFalconButtons = 4;
+/// N: how long the forces of engines may be that nobody feels, so that recordings have them as they came.
+constexpr double kUnfelt = 10;
+/// Readings may fail for so long before it is a fault: what libfranka allows.
+constexpr Duration kMostMissed = std::chrono::milliseconds(20);
+
+/// Turns a draft without mistakes of its own into a scene: what depends on several keys.
+class SceneResolver {
+ public:
+  SceneResolver(Draft draft, const toml::table& file, const std::string& name)
+      : draft_(std::move(draft)), file_(file), name_(name) {}
+
+  Scene scene(const std::filesystem::path& directory) {
+    resolve_motion(directory);
+    resolve_falcon(directory);
+    resolve_woodenhaptics();
+    resolve_network(directory);
+    resolve_structural_mode();
+    resolve_joint_friction();
+    resolve_control();
+    resolve_replay(directory);
+    resolve_channels();
+    // Rules of the constructors that are not among ours yet.
+    Scene& scene = draft_.scene;
+    if (draft_.has_hand) scene.device.hand = draft_.hand;
+    build("device", [&scene] { SimulatedDevice{scene.device}; });
+    build("force", [&scene] { HeldForce{scene.loop.control.hold}; });
+    resolve_safety();
+    build("limiter", [&scene] { Limiter{scene.loop.control.limiter}; });
+    build("loop", [&scene] { HapticController{scene.loop.control}; });
+    return std::move(scene);
+  }
+
+ private:
+  /// Throws. The line is that of the first of `places` that the file has; of the innermost table around the
+  /// key when it has none of them.
+  [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
+                          const std::string& sentence) const {
+    Place place;
+    const auto look = [&](std::string_view path) {
+      if (const auto node = file_.at_path(path); node && place.line == 0) place = place_of(*node.node());
+    };
+    for (const std::string_view path : places) look(path);
+    for (std::string_view path = key;; path = path.substr(0, path.rfind('.'))) {
+      look(path);
+      if (path.find('.') == std::string_view::npos) break;
+    }
+    fail(name_, place, std::string(key), sentence);
+  }
+
+  template <class Build>
+  void build(std::string_view table, const Build& attempt) const {
+    try {
+      attempt();
+    } catch (const std::invalid_argument& refused) {
+      blame(table, {}, refused.what());
+    }
+  }
+
+  void resolve_motion(const std::filesystem::path& directory) {
+    if (!draft_.has_hand) return;
+    build("device.hand.motion", [&] {
+      if (draft_.recorded_motion) {
+        draft_.recorded_motion->path = directory / draft_.recorded_motion->path;
+        try {
+          draft_.motion = load_recorded_motion(*draft_.recorded_motion);
+        } catch (const std::runtime_error& refused) {
+          blame("device.hand.motion.file", {}, refused.what());
+        }
+      }
+      draft_.hand.motion = ScriptedMotion(std::move(draft_.motion));
+    });
+  }
+
+  void resolve_falcon(const std::filesystem::path& directory) {
+    if (!draft_.scene.falcon) return;
+    auto& firmware = draft_.scene.falcon->firmware;
+    if (firmware) firmware = directory / *firmware;
+    expect_a_limiter();
+  }
+
+  void expect_a_limiter() const {
+    if (draft_.scene.loop.control.limiter.law != Law::kNone) return;
+    blame("limiter.kind", {}, "expected a limiter, found \"none\", which is for simulated devices only");
+  }
+
+  void resolve_woodenhaptics() {
+    if (!draft_.scene.woodenhaptics) return;
+    const WoodenHapticsDevice::Config& drive = draft_.scene.woodenhaptics->drive;
+    const Unit& unit = unit_of("max_current_ma");
+    if (drive.max_current > drive.model->full_scale) {
+      blame("device.max_current_ma", {},
+            "expected at most " + with_symbol(Number::shown(unit, drive.model->full_scale), unit) +
+                ", the full scale of its amplifiers, found " + Number::shown(unit, drive.max_current));
+    }
+    draft_.scene.device.max_force = drive.model->max_force;
+    draft_.scene.device.encoder_step = WoodenHapticsDevice::info_of(*drive.model).position_resolution;
+    expect_a_limiter();
+  }
+
+  void resolve_replay(const std::filesystem::path& directory) {
+    if (!draft_.scene.replay) return;
+    ReplayDevice::Config& replay = *draft_.scene.replay;
+    auto& csv = draft_.recorded_motion;
+    if (draft_.replayed.has_value() == csv.has_value()) {
+      blame("device", {}, std::string("expected either recording or a table csv, found ") + (csv ? "both" : "neither"));
+    }
+    const std::string_view source = csv ? "device.csv.file" : "device.recording";
+    build(source, [&] {
+      try {
+        if (csv) csv->path = directory / csv->path;
+        replay.samples = csv ? ReplayDevice::samples_of(load_recorded_motion(*csv))
+                             : read_recorded_hand(directory / *draft_.replayed);
+      } catch (const std::runtime_error& refused) {
+        blame(source, {}, refused.what());
+      }
+      ReplayDevice{replay};
+    });
+    // Between samples the device is not seen.
+    const HapticLoop::Config& loop = draft_.scene.loop;
+    const Duration most = (loop.control.max_missed - 1) * loop.period;
+    const auto gap = std::ranges::adjacent_find(
+        replay.samples, [most](const auto& one, const auto& next) { return next.at - one.at > most; });
+    if (gap != replay.samples.end()) {
+      blame(source, {},
+            "expected samples no further apart than " + digits(seconds(most) * 1e3) +
+                " ms, because a device that is silent for longer is a fault, found " +
+                digits(seconds(std::next(gap)->at - gap->at) * 1e3) + " ms at " +
+                digits(seconds(gap->at - replay.samples.front().at)) + " s");
+    }
+  }
+
+  void resolve_structural_mode() const {
+    const SimulatedDevice::Config& device = draft_.scene.device;
+    if (!device.structural_mode || device.structural_mode->handle_mass < device.mass) return;
+    blame("device.effects.structural_mode.handle_mass_kg", {},
+          "expected less than mass_kg, of which it is a part and which is " + digits(device.mass) + " kg, found " +
+              digits(device.structural_mode->handle_mass));
+  }
+
+  /// Friction is in the joints or at the handle. What is known of a device is that at the handle.
+  void resolve_joint_friction() {
+    SimulatedDevice::Config& device = draft_.scene.device;
+    if (!device.joint_friction) return;
+    const std::string table = "device.effects.joint_friction";
+    const std::string_view handles = "device.effects.coulomb_friction_n";
+    if (draft_.joint_coulomb) {
+      if (const auto node = file_.at_path(handles); node && node.is_number()) {
+        blame(handles, {},
+              "expected false beside coulomb_n_m of [" + table + "], found " + found_in(*node.node()) +
+                  ": this friction is in the joints or at the handle");
+      }
+      device.joint_friction->coulomb = *draft_.joint_coulomb;
+    } else if (device.coulomb_friction) {
+      device.joint_friction->coulomb =
+          JointFriction::torques(device.joint_friction->mechanism, *device.coulomb_friction);
+    }
+    device.coulomb_friction.reset();
+    build(table, [&device] { JointFriction{*device.joint_friction}; });
+  }
+
+  void resolve_channels() {
+    Scene& scene = draft_.scene;
+    scene.loop.control.channels.clear();
+    for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+      scene.loop.control.channels.push_back(scene.channels[i].rule);
+      for (std::size_t before = 0; before < i; ++before) {
+        if (scene.channels[before].name != scene.channels[i].name) continue;
+        blame("channel[" + std::to_string(i) + "].name", {},
+              "expected a name of its own, found " + in_quotes(scene.channels[i].name) + " again");
+      }
+    }
+  }
+
+  void resolve_safety() {
+    Scene& scene = draft_.scene;
+    // What moves a real hand is never without: then each part is there when it is listed, and arming always.
+    if (scene.moves_a_hand() && !scene.safety) scene.safety.emplace();
+    if (!scene.safety) return;
+    if (scene.safety->dead_man) {
+      const std::uint32_t button = scene.safety->dead_man->button;
+      if (scene.falcon && button >= kFalconButtons) {
+        blame("safety.dead_man.button", {}, "expected one of a Falcon's, 0 to 3, found " + std::to_string(button));
+      }
+      if (scene.woodenhaptics && button != 0) {
+        blame("safety.dead_man.button", {}, "expected 0, the switch at its tip, found " + std::to_string(button));
+      }
+      if (!scene.moves_a_hand() && !(scene.device.button_after && button == 0)) {
+        blame("safety.dead_man.button", {},
+              "expected button 0 of a hand with button_after_ms: a simulated device has no others");
+      }
+    }
+    build("safety", [&scene] {
+      SimulatedDevice device{scene.device};
+      SafeDevice{*scene.safety, device};
+    });
+  }
+
+  void resolve_network(const std::filesystem::path& directory) {
+    Scene::Network& network = draft_.scene.network;
+    if (network.keys) network.keys = directory / *network.keys;
+    // UdpLink refuses it too, but has no line to name.
+    if (!network.keys && !is_loopback(network.listen)) {
+      blame("network.listen", {},
+            "expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a folder of keys besides: "
+            "without keys anyone on the network could command forces");
+    }
+  }
+
+  void resolve_control() {
+    const SimulatedDevice::Config& device = draft_.scene.device;
+    HapticLoop::Config& loop = draft_.scene.loop;
+    HapticController::Config& control = loop.control;
+
+    // A loop without real-time priority is late by up to a period now and then; each time is an overrun beyond this.
+    control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
+    control.max_missed = std::max(2U, static_cast<std::uint32_t>(kMostMissed / loop.period));
+    if (control.limiter.longest_hold < loop.period) {
+      blame("loop.longest_hold_us", {}, at_least(loop.period, "the period", control.limiter.longest_hold, "_us"));
+    }
+    if (control.hold.safe_stop < control.hold.hold) {
+      blame("force.safe_stop_ms", {"force.safe_stop_ms", "force.hold_ms"},
+            at_least(control.hold.hold, "hold_ms", control.hold.safe_stop, "_ms"));
+    }
+    control.watchdog = device.watchdog.value_or(Duration::zero());
+    if (control.admittance && !device.force_sensor) {
+      blame("admittance", {},
+            "expected a device with force_sensor among its effects: the tool is driven by the hand's force");
+    }
+
+    const std::optional<double> most = draft_.scene.exerts_force() ? device.max_force : kUnfelt;
+    if (!draft_.max_force && !most) {
+      blame("force.max_force_n", {}, "missing, expected a number above 0 N, because the device has no max_force_n");
+    }
+    control.max_force = draft_.max_force ? *draft_.max_force : *most;
+
+    // Friction that is isotropic as a vector is less on each axis by itself: Σ f |dx_i| ≤ √3 f ‖dx‖ (control.md 1.6
+    // (a)).
+    const bool per_axis = control.limiter.law == Law::kAolPerAxis || control.limiter.law == Law::kAolBox;
+    const DeviceProfile* profile = draft_.profile;
+    const Friction truth = least_friction(device);
+    control.limiter.friction.coulomb =
+        friction_bound("coulomb_friction_n", draft_.coulomb_bound, profile ? &profile->coulomb_bound : nullptr,
+                       truth.coulomb, per_axis ? 1 / std::numbers::sqrt3 : 1);
+    control.limiter.friction.viscous = friction_bound("viscous_friction_n_s_per_m", draft_.viscous_bound,
+                                                      profile ? &profile->viscous_bound : nullptr, truth.viscous, 1);
+    resolve_parts(control.limiter);
+    resolve_places(control);
+  }
+
+  /// The bounds by place may not be above the truth either, and the limiter's own hold wherever they are lower.
+  void resolve_places(HapticController::Config& control) const {
+    if (!control.limiter.parts.adaptive_friction) return;
+    const std::string table = "limiter.adaptive_friction";
+    const std::size_t count = draft_.places.size();
+    if (draft_.place_coulomb.size() != count || draft_.place_viscous.size() != count) {
+      blame(table + ".places_mm", {}, "expected as many places as friction bounds of each kind");
+    }
+    const SimulatedDevice::Config& device = draft_.scene.device;
+    const auto check = [&](const char* key, const std::vector<double>& bounds, double Friction::*kind) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const double most = least_friction_at(device, draft_.places[i]).*kind;
+        if (bounds[i] <= most) continue;
+        blame(table + "." + key, {},
+              "expected at most " + with_symbol(digits(most), unit_of(key)) +
+                  ", the true friction of the simulated device" + (device.joint_friction ? " there" : "") + ", found " +
+                  digits(bounds[i]));
+      }
+    };
+    if (!draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {  // whose true friction nobody knows here
+      check("coulomb_friction_n", draft_.place_coulomb, &Friction::coulomb);
+      check("viscous_friction_n_s_per_m", draft_.place_viscous, &Friction::viscous);
+    }
+    auto& map = control.friction_map.emplace();
+    map.reach = draft_.reach;
+    for (std::size_t i = 0; i < count; ++i) {
+      map.places.push_back(
+          {draft_.places[i], {.coulomb = draft_.place_coulomb[i], .viscous = draft_.place_viscous[i]}});
+    }
+  }
+
+  void resolve_parts(LimiterConfig& limiter) const {
+    if (limiter.parts.robust_ledger) {
+      const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.scene.device.encoder_step;
+      if (!step) {
+        blame("limiter.robust_ledger.encoder_step_um", {},
+              "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
+                  ", because the device has no encoder_step_um");
+      }
+      limiter.parts.robust_ledger->encoder_step = {*step};
+    }
+    if (limiter.parts.bounded_acceleration) {
+      limiter.parts.bounded_acceleration->most = {draft_.most_acceleration};
+      limiter.parts.bounded_acceleration->shaping_viscous = {
+          std::max(draft_.shaping_viscous, limiter.friction.viscous)};
+    }
+  }
+
+  static std::string at_least(Duration least, const std::string& what, Duration found, std::string_view suffix) {
+    const Unit& unit = unit_of(suffix);
+    return "expected " + what + " of " + with_symbol(Number::shown(unit, least), unit) + " or more, found " +
+           Number::shown(unit, found);
+  }
+
+  /// The bound that the limiter may count on. `axis_share`: of the friction, what an axis by itself has.
+  double friction_bound(const std::string& key, std::optional<double> given, const KnownNumber* profiles, double truth,
+                        double axis_share) const {
+    const std::string full = "limiter." + key;
+    const Unit& unit = unit_of(key);
+    if (!given && profiles == nullptr) {
+      if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.exerts_force()) return 0;
+      blame(full, {},
+            "missing, expected " + kZeroOrMore.expected(unit) +
+                (draft_.scene.moves_a_hand() ? ": what tendon-identify finds of this very device, or 0"
+                                             : ", because there is no profile"));
+    }
+    const double bound = given ? *given : profiles->value * axis_share;
+    const double most = truth * axis_share;
+    if (bound > most && !draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {
+      blame(full, {full, "device.effects." + key},
+            "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
+                (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +
+                ", because a higher bound voids the limiter's proof, found " + digits(bound) +
+                (given ? "" : " (the profile's)"));
+    }
+    return bound;
+  }
+
+  Draft draft_;
+  const toml::table& file_;
+  const std::string& name_;
+};
+
+}  // namespace
+
+Scene resolve(Draft draft, const toml::table& file, const std::string& name, const std::filesystem::path& directory) {
+  return SceneResolver(std::move(draft), file, name).scene(directory);
+}
+
+}  // namespace tendon::scene_file

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/base/motion.h"
+#include "core/base/time.h"
+#include "protocol/limits.h"
+
+// How values are written in a scene file: units and rules. Internal to server/scene.
+//
+// A rule says which values a key may have: `expected(unit)` in words, `take(node, unit, to)` converts one to SI and
+// stores it in `to`, or returns why not; `shown(unit, value)` is the way back, for the defaults in the reference.
+
+namespace tendon::scene_file {
+
+/// The end of a key's name tells its unit.
+struct Unit {
+  std::string_view suffix;
+  std::string_view symbol;
+  double per_si;  ///< a whole number: dividing by it rounds once, so 43 µm is the same double as 0.000043
+};
+
+inline constexpr Unit kNoUnit = {"", "", 1};
+
+/// kNoUnit when `key` ends with no unit.
+const Unit& unit_of(std::string_view key);
+
+/// `text`, and the unit's symbol when it has one.
+std::string with_symbol(std::string text, const Unit& unit);
+
+/// The shortest text that reads back as `value`; without an exponent where a person would use none.
+std::string digits(double value);
+
+std::string in_quotes(std::string_view text);
+
+/// What the file has, in the words of an error.
+std::string found_in(const toml::node& node);
+
+/// An integer or a floating-point number.
+std::optional<double> number_in(const toml::node& node);
+
+/// Why a value is not accepted; none when it is.
+struct Refusal {
+  const toml::node* found;
+  std::string expected;
+};
+using Verdict = std::optional<Refusal>;
+
+/// The longest time in a scene. Nothing in a haptic loop is meant to last an hour, and sums of times stay small.
+inline constexpr Duration kLongest = limits::kMaxTimeout;
+
+/// A number in the key's unit.
+struct Number {
+  double least = -limits::kMaxValue;
+  double most = limits::kMaxValue;
+  bool without_least = false;
+  bool or_infinite = false;
+
+  std::string expected(const Unit& unit) const {
+    std::string text;
+    if (least <= -limits::kMaxValue) {
+      text = unit.symbol.empty() ? "a number" : "a number of " + std::string(unit.symbol);
+    } else if (most < limits::kMaxValue) {
+      text =
+          without_least ? "a number above " + digits(least) + " and up to " : "a number from " + digits(least) + " to ";
+      text += with_symbol(digits(most), unit);
+    } else if (without_least) {
+      text = with_symbol("a number above " + digits(least), unit);
+    } else {
+      text = with_symbol("a number of " + digits(least), unit) + " or more";
+    }
+    return or_infinite ? text + ", or inf" : text;
+  }
+
+  Verdict take(const toml::node& node, const Unit& unit, double& to) const {
+    const auto number = number_in(node);
+    if (auto refusal = check(node, unit, number, most)) return refusal;
+    to = *number / unit.per_si;
+    return {};
+  }
+
+  Verdict take(const toml::node& node, const Unit& unit, Duration& to) const {
+    const auto number = number_in(node);
+    if (auto refusal = check(node, unit, number, std::min(most, seconds(kLongest) * unit.per_si))) return refusal;
+    const Duration rounded(std::llround(*number * (1e9 / unit.per_si)));
+    if (without_least && rounded <= Duration::zero()) return Refusal{&node, expected(unit)};
+    to = rounded;
+    return {};
+  }
+
+  template <class T>
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<T>& to) const {
+    T value{};
+    if (auto refusal = take(node, unit, value)) return refusal;
+    to = value;
+    return {};
+  }
+
+  static std::string shown(const Unit& unit, double value) { return digits(value * unit.per_si); }
+  static std::string shown(const Unit& unit, Duration value) {
+    return digits(static_cast<double>(value.count()) / (1e9 / unit.per_si));
+  }
+  template <class T>
+  static std::string shown(const Unit& unit, const std::optional<T>& value) {
+    return value ? shown(unit, *value) : "none";
+  }
+
+ private:
+  Verdict check(const toml::node& node, const Unit& unit, std::optional<double> number, double limit) const {
+    if (number && or_infinite && *number == std::numeric_limits<double>::infinity()) return {};
+    const bool too_small = number && !(without_least ? *number > least : *number >= least);  // a NaN too
+    if (!number || too_small) return Refusal{&node, expected(unit)};
+    if (*number <= limit) return {};
+    return Refusal{&node, limit < most || most >= limits::kMaxValue
+                              ? with_symbol("a number of at most " + digits(limit), unit)
+                              : expected(unit)};
+  }
+};
+
+inline constexpr Number kAnyNumber{};
+inline constexpr Number kZeroOrMore{.least = 0};
+inline constexpr Number kAboveZero{.least = 0, .without_least = true};
+inline constexpr Number kAboveZeroOrInf{.least = 0, .without_least = true, .or_infinite = true};
+/// A number of the device's effects: what is `false` does not exist.
+struct OrFalse {
+  Number number;
+
+  std::string expected(const Unit& unit) const { return number.expected(unit) + ", or false for none"; }
+
+  template <class T>
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<T>& to) const {
+    if (const auto* none = node.as_boolean(); none != nullptr && !**none) {
+      to.reset();
+      return {};
+    }
+    if (auto refusal = number.take(node, unit, to)) return Refusal{&node, expected(unit)};
+    return {};
+  }
+
+  template <class T>
+  static std::string shown(const Unit& unit, const std::optional<T>& value) {
+    return Number::shown(unit, value);
+  }
+};
+
+struct Count {
+  std::int64_t most;
+  std::int64_t least = 0;
+
+  std::string expected(const Unit&) const {
+    return "a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+  }
+
+  template <class Whole>
+  Verdict take(const toml::node& node, const Unit& unit, Whole& to) const {
+    const auto* count = node.as_integer();
+    if (count == nullptr || **count < least || **count > most) return Refusal{&node, expected(unit)};
+    to = static_cast<Whole>(**count);
+    return {};
+  }
+
+  template <class Whole>
+  Verdict take(const toml::node& node, const Unit& unit, std::optional<Whole>& to) const {
+    return take(node, unit, to.emplace());
+  }
+
+  template <class Whole>
+  static std::string shown(const Unit&, Whole value) {
+    return std::to_string(value);
+  }
+  template <class Whole>
+  static std::string shown(const Unit&, const std::optional<Whole>& value) {
+    return value ? std::to_string(*value) : "none";
+  }
+};
+
+/// A point or a direction.
+struct Vector {
+  static std::string expected(const Unit& unit) {
+    return unit.symbol.empty() ? "[x, y, z]" : "[x, y, z] in " + std::string(unit.symbol);
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, Vec3& to) {
+    const auto* array = node.as_array();
+    if (array == nullptr || array->size() != 3) return Refusal{&node, expected(unit)};
+    Vec3 vector;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      if (auto refusal = kAnyNumber.take(*array->get(static_cast<std::size_t>(i)), unit, vector[i])) return refusal;
+    }
+    to = vector;
+    return {};
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::optional<Vec3>& to) {
+    return take(node, unit, to.emplace());
+  }
+
+  static std::string shown(const Unit& unit, const Vec3& value) {
+    return "[" + Number::shown(unit, value.x()) + ", " + Number::shown(unit, value.y()) + ", " +
+           Number::shown(unit, value.z()) + "]";
+  }
+  static std::string shown(const Unit& unit, const std::optional<Vec3>& value) {
+    return value ? shown(unit, *value) : "none";
+  }
+};
+
+template <class Rule>
+struct ListOf {
+  Rule rule;
+
+  std::string expected(const Unit& unit) const { return "[…], of which each is " + rule.expected(unit); }
+
+  template <class T>
+  Verdict take(const toml::node& node, const Unit& unit, std::vector<T>& to) const {
+    const auto* array = node.as_array();
+    if (array == nullptr) return Refusal{&node, expected(unit)};
+    to.clear();
+    for (const toml::node& element : *array) {
+      if (auto refusal = rule.take(element, unit, to.emplace_back())) return refusal;
+    }
+    return {};
+  }
+
+  template <class T>
+  static std::string shown(const Unit&, const std::vector<T>&) {
+    return "[]";
+  }
+};
+
+/// Whether a name of a device or a channel may have this character.
+bool in_a_label(char c);
+
+/// The nearest label to any text.
+std::string label_of(std::string text);
+
+/// The name of a device or a channel.
+struct Label {
+  static std::string expected(const Unit&) {
+    return "a name of 1 to " + std::to_string(limits::kMaxLabel) + " letters, digits, - or _";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
+    const auto* text = node.as_string();
+    const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= limits::kMaxLabel &&
+                      std::all_of((*text)->begin(), (*text)->end(), in_a_label);
+    if (!good) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
+};
+
+struct YesNo {
+  static std::string expected(const Unit&) { return "true or false"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, bool& to) {
+    const auto* truth = node.as_boolean();
+    if (truth == nullptr) return Refusal{&node, expected(unit)};
+    to = **truth;
+    return {};
+  }
+
+  static std::string shown(const Unit&, bool value) { return value ? "true" : "false"; }
+};
+
+struct Path {
+  static std::string expected(const Unit&) { return "a path in quotes"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::filesystem::path& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr || (*text)->empty()) return Refusal{&node, expected(unit)};
+    to = **text;
+    return {};
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::optional<std::filesystem::path>& to) {
+    return take(node, unit, to.emplace());
+  }
+
+  static std::string shown(const Unit&, const std::filesystem::path& value) { return in_quotes(value.string()); }
+  static std::string shown(const Unit&, const std::optional<std::filesystem::path>&) { return "none"; }
+};
+
+/// One of a few names.
+template <class T>
+struct Names {
+  std::vector<std::pair<std::string_view, T>> all;
+
+  std::string expected(const Unit&) const {
+    std::string text = all.size() == 1 ? "" : "one of ";
+    for (const auto& [name, value] : all) text += (name == all.front().first ? "" : ", ") + in_quotes(name);
+    return text;
+  }
+
+  Verdict take(const toml::node& node, const Unit& unit, T& to) const {
+    const auto* text = node.as_string();
+    if (text == nullptr) return Refusal{&node, expected(unit)};
+    for (const auto& [name, value] : all) {
+      if (name != **text) continue;
+      to = value;
+      return {};
+    }
+    return Refusal{&node, expected(unit)};
+  }
+
+  std::string shown(const Unit&, const T& wanted) const {
+    for (const auto& [name, value] : all) {
+      if (value == wanted) return in_quotes(name);
+    }
+    return "none";
+  }
+};
+
+}  // namespace tendon::scene_file
