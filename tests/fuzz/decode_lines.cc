@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "protocol/wire/codec.h"
+#include "protocol/wire/handshake_codec.h"
 
 namespace tendon {
 namespace {

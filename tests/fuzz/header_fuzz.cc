@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "protocol/wire/codec.h"
+#include "protocol/wire/handshake_codec.h"
+#include "protocol/wire/header.h"
 #include "tests/fuzz/target.h"
 
 // The clear header and the layout of the handshake: what is read comes out again as it was.

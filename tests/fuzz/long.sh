@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # long.sh [RUNS [TARGET…]]: runs of each fuzz target of the preset `asan`, one after the other, at the lowest priority, for
 # hours: 10 000 000 unless told otherwise. What they find is in build/asan/long/TARGET/, what they say in TARGET.log there.
-# The corpus that has grown, minimised, replaces the committed one when it reaches more: then it belongs into a commit, and
-# the figures into README.md.
+# Afterwards TARGET/minimised holds the inputs that reach all that was reached. When they reach more than the committed
+# corpus, pack them (the last line printed says how), and commit that with the figures for README.md.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 runs=${1:-10000000}
@@ -20,8 +20,11 @@ export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=1:thread_local_quar
 for target in "${targets[@]}"; do
   folder=build/asan/long/$target
   mkdir -p "$folder/corpus"
-  cp -n tests/fuzz/corpus/"$target"/* "$folder/corpus/"
+  cp -n build/asan/tests/fuzz/corpus/"$target"/* "$folder/corpus/"
   nice -n 19 "build/asan/bin/${target}_fuzz" -entropic=0 -runs="$runs" -seed="${SEED:-1}" -max_len="${longest[$target]}" \
     -timeout=60 -close_fd_mask=3 -print_final_stats=1 -artifact_prefix="$folder/" "$folder/corpus" 2>"$folder.log"
   grep -a 'number_of_executed_units\|DONE ' "$folder.log"
+  rm -rf "$folder/minimised" && mkdir "$folder/minimised"
+  "build/asan/bin/${target}_fuzz" -merge=1 "$folder/minimised" "$folder/corpus" 2>>"$folder.log"
+  echo "tests/fuzz/pack.sh $target $folder/minimised"
 done

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/session.h"
+#include "protocol/wire/bounds.h"
 #include "tests/fuzz/target.h"
 
 // What an honest key says that its holder should not: the input is sealed as the peer would, and a session takes it.

@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 int main(int argc, char** argv) {
   if (argc != 2 || !std::filesystem::is_directory(argv[1])) {
     std::cerr << "Runs every file of a folder through one fuzz target; ends abnormally at the first that breaks it.\n"
-                 "Example: session_replay tests/fuzz/corpus/session\n";
+                 "Example: session_replay build/release/tests/fuzz/corpus/session\n";
     return 2;
   }
   std::vector<std::filesystem::path> files;
