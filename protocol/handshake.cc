@@ -7,17 +7,12 @@
 #include <string_view>
 #include <utility>
 
+#include "core/base/bytes.h"
+
 namespace tendon {
 namespace {
 
 std::span<const std::byte> text(std::string_view text) noexcept { return std::as_bytes(std::span(text)); }
-
-template <class Unsigned>
-std::array<std::byte, sizeof(Unsigned)> little_endian(Unsigned value) noexcept {
-  std::array<std::byte, sizeof(Unsigned)> bytes;
-  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
-  return bytes;
-}
 
 template <std::size_t Size>
 std::array<std::byte, Size> first_of(const Bytes32& bytes) noexcept {

@@ -19,7 +19,7 @@
 #include "protocol/secrets/hello_limit.h"
 #include "protocol/secrets/noise.h"
 #include "protocol/secrets/seal.h"
-#include "protocol/wire/codec.h"
+#include "protocol/wire/handshake_codec.h"
 
 namespace tendon {
 

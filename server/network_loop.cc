@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon {
 

@@ -10,6 +10,7 @@
 
 #include "core/base/arithmetic.h"
 #include "protocol/limits.h"
+#include "protocol/wire/bounds.h"
 
 namespace tendon {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon::dash {
 

@@ -8,7 +8,7 @@
 
 #include "core/base/time.h"
 #include "protocol/limits.h"
-#include "protocol/wire/codec.h"
+#include "protocol/wire/frame.h"
 
 // The reliable part of a session: requests arrive exactly once and in order, and each gets its answer.
 //

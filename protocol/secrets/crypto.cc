@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "core/base/bytes.h"
+
 namespace tendon {
 namespace {
 
@@ -18,7 +20,7 @@ using Nonce = std::array<unsigned char, crypto_aead_chacha20poly1305_IETF_NPUBBY
 
 Nonce nonce(std::uint64_t number) noexcept {
   Nonce nonce{};
-  for (std::size_t i = 0; i < 8; ++i) nonce[4 + i] = static_cast<unsigned char>(number >> (8 * i));
+  put_little_endian(number, reinterpret_cast<std::byte*>(nonce.data() + 4));
   return nonce;
 }
 
@@ -98,16 +100,12 @@ bool equal(std::span<const std::byte> a, std::span<const std::byte> b) noexcept 
 std::uint64_t short_hash(const std::array<std::byte, 16>& key, std::span<const std::byte> message) noexcept {
   std::array<std::byte, sizeof(std::uint64_t)> hash;
   crypto_shorthash(out(hash), in(message), message.size(), in(key));
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < hash.size(); ++i) value |= std::to_integer<std::uint64_t>(hash[i]) << (8 * i);
-  return value;
+  return get_little_endian<std::uint64_t>(hash.data());
 }
 
 }  // namespace crypto
 
-Seed::Seed(std::uint64_t number) noexcept {
-  for (std::size_t i = 0; i < sizeof number; ++i) bytes[i] = static_cast<std::byte>(number >> (8 * i) & 0xFFU);
-}
+Seed::Seed(std::uint64_t number) noexcept { put_little_endian(number, bytes.data()); }
 
 Key Ratchet::next() noexcept {
   std::array<std::byte, 2 * sizeof(Bytes32)> block;

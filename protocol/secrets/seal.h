@@ -9,7 +9,7 @@
 
 #include "core/base/time.h"
 #include "protocol/secrets/crypto.h"
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon {
 

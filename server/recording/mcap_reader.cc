@@ -7,19 +7,14 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/base/bytes.h"
+
 namespace tendon {
 
 using mcap::extend_crc;
 using mcap::Opcode;
 
 namespace {
-
-template <std::unsigned_integral T>
-T little_endian(std::span<const std::byte> bytes) {
-  T value = 0;
-  for (std::size_t i = 0; i < sizeof(T); ++i) value = static_cast<T>(value | (static_cast<T>(bytes[i]) << (8 * i)));
-  return value;
-}
 
 std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -34,7 +29,7 @@ class McapReader::Fields {
 
   template <std::unsigned_integral T>
   T number() {
-    return little_endian<T>(bytes(sizeof(T)));
+    return get_little_endian<T>(bytes(sizeof(T)).data());
   }
 
   std::string_view string() { return text_of(bytes(number<std::uint32_t>())); }
@@ -118,7 +113,7 @@ bool McapReader::next_record() {
   std::array<std::byte, mcap::kRecordHead> head{};
   read(head);
   opcode_ = static_cast<Opcode>(head[0]);
-  const auto length = little_endian<std::uint64_t>(std::span(head).subspan<1>());
+  const auto length = get_little_endian<std::uint64_t>(head.data() + 1);
   if (length > rest - head.size()) return cut_off();
   if (opcode_ == Opcode{}) corrupt(position_, "there is no record with opcode 0");
   if (length > kMaxRecord) corrupt(position_, "a record of " + std::to_string(length) + " bytes is too large to read");

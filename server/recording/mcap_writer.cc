@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/base/bytes.h"
+
 namespace tendon {
 namespace {
 
@@ -15,8 +17,8 @@ using Buffer = std::vector<std::byte>;
 
 template <std::unsigned_integral T>
 void put(Buffer& out, T value) {
-  for (std::size_t i = 0; i < sizeof value; ++i)
-    out.push_back(static_cast<std::byte>(static_cast<std::uint8_t>(value >> (8 * i))));
+  const auto bytes = little_endian(value);
+  out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
 void put(Buffer& out, Opcode opcode) { out.push_back(static_cast<std::byte>(opcode)); }
@@ -35,10 +37,7 @@ void put_string(Buffer& out, std::string_view text) {
   put_bytes(out, bytes_of(text));
 }
 
-void overwrite(Buffer& out, std::size_t at, std::uint64_t value) {
-  for (std::size_t i = 0; i < sizeof value; ++i)
-    out[at + i] = static_cast<std::byte>(static_cast<std::uint8_t>(value >> (8 * i)));
-}
+void overwrite(Buffer& out, std::size_t at, std::uint64_t value) { put_little_endian(value, out.data() + at); }
 
 /// Adds a record whose content `fill` puts.
 template <class Fill>

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "protocol/link.h"
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 #include "recording.pb.h"
 
 namespace tendon::recording {

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 #include "server/machine/udp_link.h"
 #include "tests/e2e/stage/relay.h"
 #include "tests/e2e/stage/stage.h"

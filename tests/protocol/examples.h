@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "protocol/wire/codec.h"
+#include "protocol/wire/handshake_codec.h"
 
 // One example of everything that is said: the golden datagrams of WIRE.md are made of these.
 

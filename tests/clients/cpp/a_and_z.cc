@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon::a_and_z {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon::dash {
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/wire/codec.h"
+#include "protocol/wire/handshake_codec.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

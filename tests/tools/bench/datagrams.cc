@@ -13,6 +13,7 @@
 #include "protocol/secrets/noise.h"
 #include "protocol/secrets/seal.h"
 #include "protocol/wire/codec.h"
+#include "protocol/wire/handshake_codec.h"
 #include "server/machine/udp_link.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/measure.h"

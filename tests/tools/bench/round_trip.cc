@@ -31,7 +31,7 @@
 #include "clients/cpp/force_client.h"
 #include "clients/cpp/udp_transport.h"
 #include "protocol/secrets/crypto.h"
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 #include "server/machine/clock.h"
 #include "server/machine/udp_link.h"
 #include "server/network_loop.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon::simulation {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/worlds/receipts.h"
 
-#include "protocol/wire/codec.h"
+#include "protocol/wire/header.h"
 
 namespace tendon::simulation {
 

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+
+namespace tendon {
+
+/// Unsigned integers as bytes, the lowest byte first: the byte order of the wire, of MCAP and of every hash that takes
+/// a number. The result is the same on every machine.
+///
+/// Realtime-safe.
+
+/// Writes `value` to the `sizeof(T)` bytes at `to`.
+template <std::unsigned_integral T>
+constexpr void put_little_endian(T value, std::byte* to) noexcept {
+  for (std::size_t i = 0; i < sizeof(T); ++i) to[i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
+}
+
+/// Reads the `sizeof(T)` bytes at `from`.
+template <std::unsigned_integral T>
+constexpr T get_little_endian(const std::byte* from) noexcept {
+  T value = 0;
+  for (std::size_t i = 0; i < sizeof(T); ++i) {
+    value = static_cast<T>(value | static_cast<T>(std::to_integer<T>(from[i]) << (8 * i)));
+  }
+  return value;
+}
+
+template <std::unsigned_integral T>
+constexpr std::array<std::byte, sizeof(T)> little_endian(T value) noexcept {
+  std::array<std::byte, sizeof(T)> bytes{};
+  put_little_endian(value, bytes.data());
+  return bytes;
+}
+
+}  // namespace tendon

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+#include "protocol/limits.h"
+#include "protocol/messages.h"
+
+// Whether values are within the bounds of the wire (limits.h).
+//
+// Realtime-safe.
+
+namespace tendon {
+
+/// False for NaN, too.
+inline bool bounded(double value) noexcept { return std::abs(value) <= limits::kMaxValue; }
+
+/// Whether a receiver accepts what `command` says of the force: `force`, `model` and `error` are within their bounds
+/// (WIRE.md).
+bool in_bounds(const ForceCommand& command) noexcept;
+
+}  // namespace tendon

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/wire/fields.h"
+
+#include <google/protobuf/stubs/common.h>
+
+#include <algorithm>
+
+#include "protocol/limits.h"
+#include "protocol/wire/bounds.h"
+#include "protocol/wire/text.h"
+
+// From protobuf 22 (4.22) on, a text that is not UTF-8 is logged through Abseil, once and without its content, and
+// there is nothing to silence.
+#if GOOGLE_PROTOBUF_VERSION < 4022000
+#include <google/protobuf/stubs/logging.h>
+#endif
+
+namespace tendon::wire {
+namespace {
+
+template <class Time>
+bool read_time(std::int64_t ns, Time& to) noexcept {
+  to = Time{Duration{ns}};
+  return in_time(to.time_since_epoch());
+}
+
+/// Our enums have the numbers of the wire: first is 1, all up to `last` are used.
+template <class Enum>
+bool read_enum(int from, Enum last, Enum& to) noexcept {
+  if (from < 1 || from > static_cast<int>(last)) return false;
+  to = static_cast<Enum>(from);
+  return true;
+}
+
+}  // namespace
+
+bool read(const pb::Vec3& from, Vec3& to) noexcept {
+  to = {from.x(), from.y(), from.z()};
+  return bounded(from.x()) && bounded(from.y()) && bounded(from.z());
+}
+
+void write(const Vec3& from, pb::Vec3& to) {
+  to.set_x(from.x());
+  to.set_y(from.y());
+  to.set_z(from.z());
+}
+
+bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }
+
+bool read(std::int64_t ns, LocalTime& to) noexcept { return read_time(ns, to); }
+bool read(std::int64_t ns, PeerTime& to) noexcept { return read_time(ns, to); }
+
+bool read(std::uint64_t ns, Duration& to) noexcept {
+  to = Duration{static_cast<Duration::rep>(ns)};
+  return ns <= static_cast<std::uint64_t>(limits::kMaxTime.count());
+}
+std::uint64_t unsigned_ns(Duration d) noexcept { return static_cast<std::uint64_t>(d.count()); }
+
+bool read(pb::Mode from, Mode& to) noexcept { return read_enum(from, Mode::kFault, to); }
+bool read(pb::Role from, Role& to) noexcept { return read_enum(from, Role::kController, to); }
+bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kReplaced, to); }
+bool read(pb::Safety from, Safety& to) noexcept { return read_enum(from, Safety::kUnguarded, to); }
+bool read(pb::ChannelRule from, ChannelRule& to) noexcept { return read_enum(from, ChannelRule::kPriority, to); }
+
+bool read_device(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxDevices; }
+bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxChannels; }
+
+bool read_ms(std::uint32_t from, Duration& to) noexcept {
+  to = std::chrono::milliseconds(from);
+  return to <= limits::kMaxTimeout;
+}
+std::uint32_t in_ms(Duration from) noexcept {
+  const auto ms = std::chrono::ceil<std::chrono::milliseconds>(std::clamp(from, Duration::zero(), limits::kMaxTimeout));
+  return static_cast<std::uint32_t>(ms.count());
+}
+
+bool read_size(double from, double& to) noexcept { return bounded(to = from) && from >= 0; }
+
+bool read(const std::string& from, std::size_t limit, std::string& to) {
+  if (from.size() > limit) return false;
+  to = from;
+  return true;
+}
+
+bool read_features(const Texts& from, std::vector<std::string>& to) {
+  if (from.size() > limits::kMaxFeatures) return false;
+  to.assign(from.begin(), from.end());
+  return std::all_of(to.begin(), to.end(), [](const auto& text) { return text.size() <= limits::kMaxFeature; });
+}
+
+void write_features(const std::vector<std::string>& from, Texts& to) {
+  for (const std::string& feature : from) {
+    if (to.size() == limits::kMaxFeatures) break;
+    *to.Add() = clip(feature, limits::kMaxFeature);
+  }
+}
+
+bool parse(std::span<const std::byte> from, google::protobuf::MessageLite& to) {
+#if GOOGLE_PROTOBUF_VERSION < 4022000
+  const google::protobuf::LogSilencer silence;
+#endif
+  return to.ParseFromArray(from.data(), static_cast<int>(from.size()));
+}
+
+}  // namespace tendon::wire

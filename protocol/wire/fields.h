@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/time.h"
+#include "protocol/messages.h"
+#include "tendon.pb.h"
+
+// Single fields of protobuf messages and back. Each `read` gives false when the value is out of bounds. For the codecs
+// of this folder only: other code sees no protobuf.
+
+namespace tendon::wire {
+
+namespace pb = tendon::v1;
+
+bool read(const pb::Vec3& from, Vec3& to) noexcept;
+void write(const Vec3& from, pb::Vec3& to);
+
+/// A clock reading.
+bool read(std::int64_t ns, LocalTime& to) noexcept;
+bool read(std::int64_t ns, PeerTime& to) noexcept;
+/// A length of time, which is never below zero.
+bool read(std::uint64_t ns, Duration& to) noexcept;
+std::uint64_t unsigned_ns(Duration d) noexcept;
+bool in_time(Duration d) noexcept;
+bool read_ms(std::uint32_t from, Duration& to) noexcept;
+/// Rounded up: who waits for so long has waited long enough.
+std::uint32_t in_ms(Duration from) noexcept;
+
+bool read(pb::Mode from, Mode& to) noexcept;
+bool read(pb::Role from, Role& to) noexcept;
+bool read(pb::Code from, Code& to) noexcept;
+bool read(pb::Safety from, Safety& to) noexcept;
+bool read(pb::ChannelRule from, ChannelRule& to) noexcept;
+
+bool read_device(std::uint32_t from, std::uint32_t& to) noexcept;
+bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept;
+
+/// A quantity that is not negative; 0 when it is not known.
+bool read_size(double from, double& to) noexcept;
+
+/// A text of at most `limit` bytes.
+bool read(const std::string& from, std::size_t limit, std::string& to);
+
+using Texts = google::protobuf::RepeatedPtrField<std::string>;
+bool read_features(const Texts& from, std::vector<std::string>& to);
+/// Cut to the bounds of the wire.
+void write_features(const std::vector<std::string>& from, Texts& to);
+
+/// Parses without printing: protobuf prints a line for every text that is not UTF-8, and a stranger must not be able to
+/// fill our log.
+bool parse(std::span<const std::byte> from, google::protobuf::MessageLite& to);
+
+inline std::uint8_t* as_bytes(std::byte* p) noexcept { return reinterpret_cast<std::uint8_t*>(p); }
+
+}  // namespace tendon::wire

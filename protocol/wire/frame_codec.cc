@@ -1,0 +1,474 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/wire/frame_codec.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <utility>
+
+#include "protocol/limits.h"
+#include "protocol/wire/bounds.h"
+#include "protocol/wire/text.h"
+
+namespace tendon::wire {
+
+bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
+  to.tick = from.tick();
+  to.energy = from.energy_j();
+  to.permitted_force = from.permitted_force_n();
+  to.reasons = from.reasons();
+  to.force_sequence = from.force_sequence();
+  const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
+  to.force_wanted.reset();
+  if (from.has_force_wanted_n() && !read(from.force_wanted_n(), to.force_wanted.emplace())) return false;
+  return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
+         read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
+         bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
+         read(from.force_age_ns(), to.force_age) && read(from.mode(), to.mode) &&
+         read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
+}
+
+void write(const DeviceState& from, pb::DeviceState& to) {
+  to.set_tick(from.tick);
+  to.set_sampled_ns(from.sampled.time_since_epoch().count());
+  write(from.position, *to.mutable_position_m());
+  write(from.velocity, *to.mutable_velocity_mps());
+  write(from.force_applied, *to.mutable_force_applied_n());
+  to.set_energy_j(from.energy);
+  to.set_permitted_force_n(from.permitted_force);
+  to.set_reasons(from.reasons);
+  to.set_force_sequence(from.force_sequence);
+  to.set_force_age_ns(unsigned_ns(from.force_age));
+  to.set_mode(static_cast<pb::Mode>(from.mode));
+  to.set_device(from.device);
+  to.set_channel(from.channel);
+  if (from.force_wanted) {
+    write(*from.force_wanted, *to.mutable_force_wanted_n());
+  } else {
+    to.clear_force_wanted_n();
+  }
+}
+
+namespace {
+
+using wire::read;
+using wire::write;
+
+/// Whether all of `from` fits; the values are for in_bounds.
+bool read(const pb::ForceTable& from, ForceTable& to) noexcept {
+  to.first = from.first_depth_m();
+  to.step = from.step_m();
+  const auto& force = from.force_n();
+  const auto size = static_cast<std::size_t>(force.size());
+  if (size > ForceTable::kMaxEntries) return false;
+  to.size = static_cast<std::uint32_t>(size);
+  std::copy(force.begin(), force.end(), to.force.begin());
+  return true;
+}
+
+void write(const ForceTable& from, pb::ForceTable& to) {
+  to.set_first_depth_m(from.first);
+  to.set_step_m(from.step);
+  to.clear_force_n();
+  const auto size = std::min<std::size_t>(from.size, ForceTable::kMaxEntries);
+  for (std::size_t i = 0; i < size; ++i) to.add_force_n(from.force[i]);
+}
+
+bool read(const pb::Contact& from, Contact& to) noexcept {
+  read(from.normal(), to.normal);
+  to.gap = from.gap_m();
+  return !from.has_table() || read(from.table(), to.table.emplace());
+}
+
+void write(const Contact& from, pb::Contact& to) {
+  write(from.normal, *to.mutable_normal());
+  to.set_gap_m(from.gap);
+  to.clear_table();
+  if (from.table) write(*from.table, *to.mutable_table());
+}
+
+bool read(const pb::LocalModel& from, LocalModel& to) noexcept {
+  const auto& k = from.stiffness_npm();
+  switch (k.size()) {
+    case 1:
+      to.stiffness = k.Get(0) * Mat3::Identity();
+      break;
+    case 3:
+      to.stiffness = Vec3(k.Get(0), k.Get(1), k.Get(2)).asDiagonal();
+      break;
+    case 9:
+      to.stiffness = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.data());
+      break;
+    default:
+      return false;
+  }
+  read(from.at_m(), to.at);
+  if (from.has_valid_radius_m()) to.valid_radius = from.valid_radius_m();
+  return !from.has_contact() || read(from.contact(), to.contact.emplace());
+}
+
+/// The shortest of the three forms that says the same.
+void write(const LocalModel& from, pb::LocalModel& to) {
+  write(from.at, *to.mutable_at_m());
+  const Mat3& k = from.stiffness;
+  to.clear_valid_radius_m();
+  if (from.valid_radius != std::numeric_limits<double>::infinity()) to.set_valid_radius_m(from.valid_radius);
+  to.clear_contact();
+  if (from.contact) write(*from.contact, *to.mutable_contact());
+  auto& out = *to.mutable_stiffness_npm();
+  out.Clear();
+  const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
+  if (diagonal && k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2)) {
+    out.Add(k(0, 0));
+  } else if (diagonal) {
+    for (int i = 0; i < 3; ++i) out.Add(k(i, i));
+  } else {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) out.Add(k(row, column));
+    }
+  }
+}
+
+}  // namespace
+
+bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept {
+  to.sequence = from.sequence();
+  to.based_on_tick = from.based_on_tick();
+  to.valid_for = std::chrono::microseconds(from.valid_for_us());
+  to.model.reset();
+  if (from.has_model() && !read(from.model(), to.model.emplace())) return false;
+  to.topology_changed = from.topology_changed();
+  to.error.reset();
+  if (from.has_error_n()) to.error = from.error_n();
+  read(from.force_n(), to.force);
+  return to.sequence > 0 && in_bounds(to) && to.valid_for > Duration::zero() && to.valid_for <= limits::kMaxValidFor &&
+         read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
+}
+
+void write(const ForceCommand& from, pb::ForceCommand& to) {
+  to.set_sequence(from.sequence);
+  to.set_based_on_tick(from.based_on_tick);
+  write(from.force, *to.mutable_force_n());
+  if (from.model) {
+    write(*from.model, *to.mutable_model());
+  } else {
+    to.clear_model();
+  }
+  // Out-of-range durations become 0, which the receiver refuses; a cast would make them look valid.
+  const bool possible = from.valid_for > Duration::zero() && from.valid_for <= limits::kMaxValidFor;
+  const auto us = std::chrono::ceil<std::chrono::microseconds>(possible ? from.valid_for : Duration::zero());
+  to.set_valid_for_us(static_cast<std::uint32_t>(us.count()));
+  to.set_device(from.device);
+  to.set_channel(from.channel);
+  to.set_topology_changed(from.topology_changed);
+  to.clear_error_n();
+  if (from.error) to.set_error_n(*from.error);
+}
+
+namespace {
+
+bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
+  to.hz = from.hz();
+  return read_device(from.device(), to.device);
+}
+bool read(const pb::Rearm& from, Rearm& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Disarm& from, Disarm& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Describe& from, Describe& to) noexcept { return read_device(from.device(), to.device); }
+template <class Message, class Lease>
+bool read_lease(const Message& from, Lease& to) noexcept {
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
+}
+bool read(const pb::TakeLease& from, TakeLease& to) noexcept { return read_lease(from, to); }
+bool read(const pb::GiveLease& from, GiveLease& to) noexcept { return read_lease(from, to); }
+bool read(const pb::LeaseLost& from, LeaseLost& to) {
+  return read_lease(from, to) && read(from.to(), limits::kMaxName, to.to);
+}
+
+template <class Value, class Message>
+bool read_request(const Message& from, Control& to) {
+  return read(from, to.request.emplace().emplace<Value>());
+}
+
+void write_request(const SetStateRate& from, pb::Control& to) {
+  to.mutable_set_state_rate()->set_hz(from.hz);
+  to.mutable_set_state_rate()->set_device(from.device);
+}
+void write_request(const Rearm& from, pb::Control& to) { to.mutable_rearm()->set_device(from.device); }
+void write_request(const Disarm& from, pb::Control& to) { to.mutable_disarm()->set_device(from.device); }
+void write_request(const Describe& from, pb::Control& to) { to.mutable_describe()->set_device(from.device); }
+template <class Lease, class Message>
+void write_lease(const Lease& from, Message& to) {
+  to.set_device(from.device);
+  to.set_channel(from.channel);
+}
+void write_request(const TakeLease& from, pb::Control& to) { write_lease(from, *to.mutable_take_lease()); }
+void write_request(const GiveLease& from, pb::Control& to) { write_lease(from, *to.mutable_give_lease()); }
+void write_request(const LeaseLost& from, pb::Control& to) {
+  write_lease(from, *to.mutable_lease_lost());
+  to.mutable_lease_lost()->set_to(clip(from.to, limits::kMaxName));
+}
+void write_request(const SetStateDeadband& from, pb::Control& to) {
+  auto& out = *to.mutable_set_state_deadband();
+  out.set_share(from.share);
+  out.set_floor_mps(from.floor);
+  // What is out of range becomes what the server does not grant; a cast could make it look like something else.
+  const bool possible = from.max_silence >= Duration::zero() && from.max_silence <= limits::kMaxStateSilence;
+  const auto us = std::chrono::ceil<std::chrono::microseconds>(from.max_silence).count();
+  out.set_max_silence_us(possible ? static_cast<std::uint32_t>(us) : std::numeric_limits<std::uint32_t>::max());
+}
+
+}  // namespace
+
+bool read(const pb::Control& from, Control& to) {
+  to.id = from.id();
+  if (to.id == 0) return false;
+  switch (from.op_case()) {
+    case pb::Control::kSetStateRate:
+      return read_request<SetStateRate>(from.set_state_rate(), to);
+    case pb::Control::kRearm:
+      return read_request<Rearm>(from.rearm(), to);
+    case pb::Control::kDisarm:
+      return read_request<Disarm>(from.disarm(), to);
+    case pb::Control::kDescribe:
+      return read_request<Describe>(from.describe(), to);
+    case pb::Control::kTakeLease:
+      return read_request<TakeLease>(from.take_lease(), to);
+    case pb::Control::kGiveLease:
+      return read_request<GiveLease>(from.give_lease(), to);
+    case pb::Control::kLeaseLost:
+      return read_request<LeaseLost>(from.lease_lost(), to);
+    case pb::Control::kSetStateDeadband: {
+      const auto& asked = from.set_state_deadband();
+      to.request = SetStateDeadband{.share = asked.share(),
+                                    .floor = asked.floor_mps(),
+                                    .max_silence = std::chrono::microseconds(asked.max_silence_us())};
+      return to.id > 0 && bounded(asked.share()) && bounded(asked.floor_mps());
+    }
+    case pb::Control::OP_NOT_SET:
+      break;
+  }
+  to.request.reset();
+  return true;
+}
+
+void write(const Control& from, pb::Control& to) {
+  to.set_id(from.id);
+  to.clear_op();
+  if (from.request) std::visit([&](const auto& request) { write_request(request, to); }, *from.request);
+}
+
+namespace {
+
+bool read(const pb::ChannelDescription& from, ChannelDescription& to) {
+  return read(from.name(), limits::kMaxLabel, to.name) && read(from.rule(), to.rule) &&
+         read_ms(from.lease_ms(), to.lease) && read(from.holder(), limits::kMaxLabel, to.holder);
+}
+
+void write(const ChannelDescription& from, pb::ChannelDescription& to) {
+  to.set_name(clip(from.name, limits::kMaxLabel));
+  to.set_rule(static_cast<pb::ChannelRule>(from.rule));
+  to.set_lease_ms(in_ms(from.lease));
+  to.set_holder(clip(from.holder, limits::kMaxLabel));
+}
+
+bool read(const pb::DeviceDescription& from, DeviceDescription& to) {
+  const auto read_dof = [](std::uint32_t dof, std::uint32_t& known) { return (known = dof) >= 1 && dof <= 6; };
+  if (from.has_workspace_min_m() != from.has_workspace_max_m()) return false;
+  if (from.has_workspace_min_m()) {
+    DeviceDescription::Box& box = to.workspace.emplace(DeviceDescription::Box{});
+    if (!read(from.workspace_min_m(), box.min) || !read(from.workspace_max_m(), box.max)) return false;
+    if ((box.min.array() > box.max.array()).any()) return false;
+  }
+  const int channels = from.channels_size();
+  if (channels < 1 || channels > static_cast<int>(limits::kMaxChannels)) return false;
+  for (const auto& channel : from.channels()) {
+    if (!read(channel, to.channels.emplace_back())) return false;
+  }
+  to.loop_hz = from.loop_hz();
+  return read_device(from.device(), to.device) && read(from.name(), limits::kMaxLabel, to.name) &&
+         read(from.model(), limits::kMaxName, to.model) && read_dof(from.position_dof(), to.position_dof) &&
+         read_dof(from.force_dof(), to.force_dof) && read_size(from.max_force_n(), to.max_force) &&
+         read_size(from.continuous_force_n(), to.continuous_force) &&
+         read_size(from.max_stiffness_npm(), to.max_stiffness) &&
+         read_size(from.position_resolution_m(), to.position_resolution) && to.loop_hz >= 1 &&
+         to.loop_hz <= limits::kMaxLoopHz;
+}
+
+void write(const DeviceDescription& from, pb::DeviceDescription& to) {
+  to.set_device(from.device);
+  to.set_name(clip(from.name, limits::kMaxLabel));
+  to.set_model(clip(from.model, limits::kMaxName));
+  to.set_position_dof(from.position_dof);
+  to.set_force_dof(from.force_dof);
+  if (from.workspace) {
+    write(from.workspace->min, *to.mutable_workspace_min_m());
+    write(from.workspace->max, *to.mutable_workspace_max_m());
+  }
+  to.set_max_force_n(from.max_force);
+  to.set_continuous_force_n(from.continuous_force);
+  to.set_max_stiffness_npm(from.max_stiffness);
+  to.set_position_resolution_m(from.position_resolution);
+  to.set_loop_hz(from.loop_hz);
+  for (const ChannelDescription& channel : from.channels) {
+    if (to.channels_size() == static_cast<int>(limits::kMaxChannels)) break;
+    write(channel, *to.add_channels());
+  }
+}
+
+}  // namespace
+
+bool read(const pb::ControlAck& from, ControlAck& to) {
+  to.id = from.id();
+  if (from.has_device() && !read(from.device(), to.device.emplace())) return false;
+  return to.id > 0 && read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail) &&
+         read_ms(from.wait_ms(), to.wait);
+}
+
+void write(const ControlAck& from, pb::ControlAck& to) {
+  to.set_id(from.id);
+  to.set_code(static_cast<pb::Code>(from.code));
+  to.set_detail(clip(from.detail, limits::kMaxDetail));
+  to.set_wait_ms(in_ms(from.wait));
+  to.clear_device();
+  if (from.device) write(*from.device, *to.mutable_device());
+}
+
+namespace {
+
+bool read(const pb::Delays& from, Delays& to) noexcept {
+  to = {.median = Duration{from.median_ns()}, .p99 = Duration{from.p99_ns()}};
+  return in_time(to.median) && in_time(to.p99);
+}
+
+}  // namespace
+
+bool read(const pb::LinkReport& from, LinkReport& to) {
+  const auto delays = [](bool there, const pb::Delays& in, std::optional<Delays>& out) {
+    out.reset();
+    return !there || read(in, out.emplace());
+  };
+  to.number = from.number();
+  to.forces = from.forces();
+  to.late_server = from.late_server();
+  to.late_network = from.late_network();
+  to.late_engine = from.late_engine();
+  to.clock_offset = Duration{from.clock_offset_ns()};
+  to.clock_drift_ppm = from.clock_drift_ppm();
+  to.received = from.received();
+  to.lost = from.lost();
+  to.reordered = from.reordered();
+  to.duplicated = from.duplicated();
+  return to.number > 0 && read(from.until_ns(), to.until) && read(from.span_ns(), to.span) &&
+         read(from.worst_late_ns(), to.worst_late) && read(from.longest_gap_ns(), to.longest_gap) &&
+         delays(from.has_round_trip(), from.round_trip(), to.round_trip) &&
+         delays(from.has_to_server(), from.to_server(), to.to_server) &&
+         delays(from.has_to_client(), from.to_client(), to.to_client) && in_time(to.clock_offset) &&
+         bounded(to.clock_drift_ppm) && read(from.clock_error_ns(), to.clock_error) &&
+         read(from.words(), limits::kMaxDetail, to.words);
+}
+
+void write(const LinkReport& from, pb::LinkReport& to) {
+  const auto delays = [](const Delays& in, pb::Delays& out) {
+    out.set_median_ns(in.median.count());
+    out.set_p99_ns(in.p99.count());
+  };
+  to.Clear();
+  to.set_number(from.number);
+  to.set_until_ns(from.until.time_since_epoch().count());
+  to.set_span_ns(unsigned_ns(from.span));
+  to.set_forces(from.forces);
+  to.set_late_server(from.late_server);
+  to.set_late_network(from.late_network);
+  to.set_late_engine(from.late_engine);
+  to.set_worst_late_ns(unsigned_ns(from.worst_late));
+  to.set_longest_gap_ns(unsigned_ns(from.longest_gap));
+  if (from.round_trip) delays(*from.round_trip, *to.mutable_round_trip());
+  if (from.to_server) delays(*from.to_server, *to.mutable_to_server());
+  if (from.to_client) delays(*from.to_client, *to.mutable_to_client());
+  to.set_clock_offset_ns(from.clock_offset.count());
+  to.set_clock_drift_ppm(from.clock_drift_ppm);
+  to.set_clock_error_ns(unsigned_ns(from.clock_error));
+  to.set_received(from.received);
+  to.set_lost(from.lost);
+  to.set_reordered(from.reordered);
+  to.set_duplicated(from.duplicated);
+  to.set_words(clip(from.words, limits::kMaxDetail));
+}
+
+namespace {
+
+/// Zeros at its end are left out.
+void write(const LatenessHistogram& from, google::protobuf::RepeatedField<std::uint64_t>& to) {
+  to.Clear();
+  const auto last = std::find_if(from.rbegin(), from.rend(), [](std::uint64_t count) { return count > 0; });
+  to.Add(from.begin(), last.base());
+}
+
+/// False when there are too many entries, or they count more than `steps`.
+bool read(const google::protobuf::RepeatedField<std::uint64_t>& from, std::uint64_t steps, LatenessHistogram& to) {
+  if (from.size() > static_cast<int>(to.size())) return false;
+  std::uint64_t uncounted = steps;
+  for (const std::uint64_t count : from) {
+    if (count > uncounted) return false;
+    uncounted -= count;
+  }
+  std::fill(std::copy(from.begin(), from.end(), to.begin()), to.end(), std::uint64_t{0});
+  return true;
+}
+
+}  // namespace
+
+bool read(const pb::DeviceReport& from, DeviceReport& to) {
+  to.number = from.number();
+  to.steps = from.steps();
+  to.missed = from.missed();
+  to.overruns = from.overruns();
+  to.unseen = from.unseen();
+  return to.number > 0 && read(from.until_ns(), to.until) && read(from.span_ns(), to.span) &&
+         read_device(from.device(), to.device) && to.overruns <= to.steps && to.unseen <= to.steps &&
+         read(from.lateness_us_log2(), to.steps, to.lateness) && read(from.safety(), to.safety) &&
+         read(from.fault(), limits::kMaxDetail, to.fault) && read(from.degraded(), limits::kMaxDetail, to.degraded);
+}
+
+void write(const DeviceReport& from, pb::DeviceReport& to) {
+  to.set_number(from.number);
+  to.set_until_ns(from.until.time_since_epoch().count());
+  to.set_span_ns(unsigned_ns(from.span));
+  to.set_device(from.device);
+  to.set_steps(from.steps);
+  to.set_missed(from.missed);
+  to.set_overruns(from.overruns);
+  to.set_unseen(from.unseen);
+  write(from.lateness, *to.mutable_lateness_us_log2());
+  to.set_safety(static_cast<pb::Safety>(from.safety));
+  to.set_fault(clip(from.fault, limits::kMaxDetail));
+  to.set_degraded(clip(from.degraded, limits::kMaxDetail));
+}
+
+bool read(const pb::PeerReport& from, PeerReport& to) {
+  to.state_one_in = from.state_one_in();
+  to.forces_refused = from.forces_refused();
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
+         read(from.name(), limits::kMaxName, to.name) && to.state_one_in >= 1 && to.state_one_in <= limits::kMaxOneIn &&
+         from.has_link() && read(from.link(), to.link);
+}
+
+void write(const PeerReport& from, pb::PeerReport& to) {
+  to.set_device(from.device);
+  to.set_channel(from.channel);
+  to.set_name(clip(from.name, limits::kMaxName));
+  to.set_state_one_in(from.state_one_in);
+  to.set_forces_refused(from.forces_refused);
+  write(from.link, *to.mutable_link());
+}
+
+bool read(const pb::Bye& from, Bye& to) {
+  return read(from.code(), to.code) && read(from.reason(), limits::kMaxDetail, to.reason);
+}
+
+void write(const Bye& from, pb::Bye& to) {
+  to.set_code(static_cast<pb::Code>(from.code));
+  to.set_reason(clip(from.reason, limits::kMaxDetail));
+}
+
+}  // namespace tendon::wire

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+// Texts that strangers send and read. Protobuf parsers refuse a whole datagram for one character that is not UTF-8.
+
+namespace tendon {
+
+/// Bytes of the UTF-8 character at the front of `text`; 0 when there is none. RFC 3629 (table 3-7 of the Unicode
+/// standard): no overlong forms, no surrogates, nothing above U+10FFFF.
+std::size_t utf8_character(std::string_view text) noexcept;
+
+/// The longest front of `text` that is UTF-8 and has at most `limit` bytes.
+std::string clip(std::string_view text, std::size_t limit);
+
+}  // namespace tendon
