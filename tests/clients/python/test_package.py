@@ -25,7 +25,7 @@ def run(*command, **options):
 
 
 def test_the_generated_code_is_that_of_tendon_proto(tmp_path):
-    """After a change of tendon.proto: clients/python/generate."""
+    """After a change of tendon.proto: protocol/generate."""
     if shutil.which("protoc") is None:
         pytest.skip("no protoc: apt-get install protobuf-compiler")
     described = tmp_path / "tendon.bin"
@@ -34,7 +34,7 @@ def test_the_generated_code_is_that_of_tendon_proto(tmp_path):
     for message in file.message_type:
         for field in message.field:
             field.ClearField("json_name")  # protoc writes it down here and leaves it out there
-    assert tendon_pb2.DESCRIPTOR.serialized_pb == file.SerializeToString()
+    assert tendon_pb2.DESCRIPTOR.serialized_pb == file.SerializeToString(), "stale; run protocol/generate"
 
 
 @pytest.mark.parametrize("ours, theirs", [(Code, "Code"), (Mode, "Mode"), (Role, "Role")])

@@ -136,7 +136,7 @@ TEST(Vectors, OurNoiseIsThatOfCacophony) {
 TEST(Vectors, AreWhatTheCodeWrites) {
   for (const auto& [name, ours] : vectors::files()) {
     EXPECT_TRUE(text_of(kFolder / name) == ours)
-        << name << " has changed; was that meant? Then: write_vectors " << kFolder;
+        << name << " has changed; was that meant? Then run: protocol/generate";
   }
 }
 

@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <sstream>
 
 #include "tests/protocol/examples.h"
+#include "tests/protocol/wire/golden.h"
 
 // WIRE.md is the specification that other languages are written from: its golden datagrams are these bytes.
 
@@ -29,20 +31,18 @@ Bytes bytes_of(const std::string& line) {
   return out;
 }
 
-/// The blocks that open with "```golden NAME", by name.
-std::map<std::string, Bytes> golden_datagrams(const std::string& path) {
-  std::ifstream file(path);
-  EXPECT_TRUE(file.is_open()) << path;
+std::string page() {
+  std::ifstream file(TENDON_WIRE_MD);
+  EXPECT_TRUE(file.is_open()) << TENDON_WIRE_MD;
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The bytes of each golden block, by name.
+std::map<std::string, Bytes> golden_datagrams() {
   std::map<std::string, Bytes> out;
-  std::string name;
-  const std::string opening = "```golden ";
-  for (std::string line; std::getline(file, line);) {
-    if (line.rfind(opening, 0) == 0) {
-      name = line.substr(opening.size());
-      out[name];
-    } else if (line.rfind("```", 0) == 0) {
-      name.clear();
-    } else if (!name.empty()) {
+  for (const auto& [name, block] : golden::blocks(page())) {
+    std::istringstream lines(block);
+    for (std::string line; std::getline(lines, line);) {
       const Bytes bytes = bytes_of(line);
       out[name].insert(out[name].end(), bytes.begin(), bytes.end());
     }
@@ -50,29 +50,22 @@ std::map<std::string, Bytes> golden_datagrams(const std::string& path) {
   return out;
 }
 
-std::string hex(const Bytes& bytes) {
-  std::string out;
-  for (const std::byte b : bytes) {
-    constexpr const char* kDigits = "0123456789abcdef";
-    out += kDigits[std::to_integer<unsigned>(b) >> 4U];
-    out += kDigits[std::to_integer<unsigned>(b) & 15U];
-    out += ' ';
-  }
-  return out;
-}
-
 TEST(WireMd, ShowsTheBytesThatTheCodeWrites) {
-  const auto golden = golden_datagrams(TENDON_WIRE_MD);
+  const auto shown = golden::blocks(page());
+  const auto bytes = golden_datagrams();
   const auto ours = examples::datagrams();
-  EXPECT_EQ(golden.size(), ours.size());
-  for (const auto& [name, bytes] : ours) {
-    ASSERT_EQ(golden.count(name), 1U) << "WIRE.md has no golden " << name << ": " << hex(bytes);
-    EXPECT_EQ(hex(golden.at(name)), hex(bytes)) << name;
+  EXPECT_EQ(shown.size(), ours.size());
+  for (const auto& [name, datagram] : ours) {
+    ASSERT_EQ(shown.count(name), 1U) << "WIRE.md has no block \"```golden " << name
+                                     << "\"; write its heading and an empty "
+                                     << "block, then run: protocol/generate";
+    EXPECT_EQ(shown.at(name), golden::block(datagram)) << name << " is stale; run: protocol/generate";
+    EXPECT_EQ(bytes.at(name), datagram) << name << ": golden.cc leaves bytes out";
   }
 }
 
 TEST(WireMd, ShowsBytesThatTheCodeReads) {
-  const auto golden = golden_datagrams(TENDON_WIRE_MD);
+  const auto golden = golden_datagrams();
   const auto hello = decode_hello(golden.at("hello"));
   ASSERT_TRUE(hello.has_value());
   EXPECT_EQ(read_hello(hello->body)->name, "wall");

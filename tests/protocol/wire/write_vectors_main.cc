@@ -3,22 +3,44 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
 
+#include "tests/protocol/wire/golden.h"
 #include "tests/protocol/wire/vectors.h"
 
-// After a change of the wire that was meant: writes protocol/vectors/ anew. The diff is the change.
+// After a change of the wire that was meant: writes protocol/vectors/ and the golden datagrams of WIRE.md anew. The diff
+// is the change. The target `wire` runs it, and protoc for the clients in Python and TypeScript.
+
+namespace {
+
+void write(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  if (!(file << text << std::flush)) throw std::runtime_error("cannot write " + path.string());
+}
+
+std::string read(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (!file) throw std::runtime_error("cannot read " + path.string());
+  return text;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 2 || argv[1][0] == '-') {
-    std::cerr << "usage: write_vectors FOLDER      Example: write_vectors protocol/vectors\n";
+    std::cerr << "usage: write_vectors FOLDER      Example: write_vectors protocol\n";
     return 2;
   }
-  for (const auto& [name, text] : tendon::vectors::files()) {
-    std::ofstream file(std::filesystem::path(argv[1]) / name, std::ios::binary);
-    if (!(file << text << std::flush)) {
-      std::cerr << "cannot write " << name << " in " << argv[1] << '\n';
-      return 1;
-    }
+  const std::filesystem::path protocol = argv[1];
+  try {
+    for (const auto& [name, text] : tendon::vectors::files()) write(protocol / "vectors" / name, text);
+    write(protocol / "WIRE.md", tendon::golden::rewritten(read(protocol / "WIRE.md")));
+  } catch (const std::exception& e) {
+    std::cerr << e.what() << '\n';
+    return 1;
   }
   return 0;
 }
