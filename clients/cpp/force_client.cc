@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -49,16 +48,31 @@ const ForceClient::Config& checked(const ForceClient::Config& config) {
   return config;
 }
 
+ForceClient::Phase phase_after(const Connection::Ended& ended) {
+  switch (ended.cause) {
+    case Connection::Cause::kUnanswered:
+      return ForceClient::Phase::kUnanswered;
+    case Connection::Cause::kRefused:
+      return ForceClient::Phase::kRefused;
+    case Connection::Cause::kLost:
+      break;
+  }
+  return ended.code == Code::kReplaced ? ForceClient::Phase::kStopped : ForceClient::Phase::kLost;
+}
+
 }  // namespace
 
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now)
-    : link_(link),
-      server_(server),
-      config_(checked(config)),
+    : config_(checked(config)),
       role_(role),
       period_(config.rate_hz > 0 ? from_seconds(1 / config.rate_hz) : Duration::zero()),
-      secrets_(config.seed),
-      back_off_(config.retry_min),
+      connection_(link, server,
+                  {.key = config.key,
+                   .seed = config.seed,
+                   .patience = config.patience,
+                   .retry_min = config.retry_min,
+                   .retry_max = config.retry_max,
+                   .max_datagrams = config.max_datagrams}),
       next_call_(now) {
   config_.seed = {};  // from it, whoever reads our memory later could find every key again
   greet(now);
@@ -79,7 +93,8 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
 }
 
 bool ForceClient::give_order(const Request& order) {
-  const auto id = session_ ? session_->request(order) : std::nullopt;
+  Session* const session = connection_.session();
+  const auto id = session != nullptr ? session->request(order) : std::nullopt;
   if (!id) return false;
   order_ = id;
   order_answer_.reset();
@@ -91,13 +106,18 @@ bool ForceClient::rearm() { return give_order(Rearm{.device = place_.device}); }
 bool ForceClient::disarm() { return give_order(Disarm{.device = place_.device}); }
 
 bool ForceClient::take_lease() {
-  if (session_) asked_lease_ = session_->request(TakeLease{.device = place_.device, .channel = place_.channel});
-  return session_ && asked_lease_;
+  Session* const session = connection_.session();
+  if (session == nullptr) return false;
+  asked_lease_ = session->request(TakeLease{.device = place_.device, .channel = place_.channel});
+  return asked_lease_.has_value();
 }
 
 bool ForceClient::give_lease() {
   ask_lease_ = LocalTime::max();
-  if (!session_ || !session_->request(GiveLease{.device = place_.device, .channel = place_.channel})) return false;
+  Session* const session = connection_.session();
+  if (session == nullptr || !session->request(GiveLease{.device = place_.device, .channel = place_.channel})) {
+    return false;
+  }
   asked_lease_.reset();  // what is answered to that is older than this
   holds_ = false;
   return true;
@@ -105,62 +125,48 @@ bool ForceClient::give_lease() {
 
 LocalTime ForceClient::turn(LocalTime now) {
   if (stats_.phase == Phase::kStopped) return LocalTime::max();
-  flush(now);  // the force of the last turn waits for no system call
-  const bool more = drain(now);
-  tick(now);
-  flush(now);
-  return call(now) || more ? now : next_turn();
+  connection_.flush(now);  // the force of the last turn waits for no system call
+  connection_.begin_turn();
+  while (const auto event = connection_.next(now)) take(now, *event);
+  if (connection_.session() != nullptr && now >= ask_lease_ && !asked_lease_ && !take_lease()) {
+    ask_lease_ = now + kAskLeaseAgain;
+  }
+  connection_.flush(now);
+  return call(now) || connection_.more() ? now : next_turn();
 }
 
 void ForceClient::stop(LocalTime now) {
-  if (session_) {
-    session_->close(Code::kOk, config_.name + " stops");
-    flush(now);
-  }
-  end(now, Phase::kStopped, Code::kOk, "stopped");
+  connection_.close(now, config_.name + " stops");
+  end(Phase::kStopped, Code::kOk, "stopped");
 }
 
 ForceClient::Stats ForceClient::stats() const {
   Stats stats = stats_;
-  if (session_) stats.link = session_->stats();
+  stats.link = connection_.link_stats();
+  stats.strangers = connection_.strangers();
   return stats;
 }
 
 void ForceClient::greet(LocalTime now) {
-  ClientHandshake::Config config;
-  config.hello.version_min = kProtocolVersion;
-  config.hello.version_max = kProtocolVersion;
-  config.hello.role = role_;
-  config.hello.name = config_.name;
-  config.hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels)};
-  if (config_.diagnostics) config.hello.features.emplace_back(kFeatureDiagnostics);
-  if (claims()) config.hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
-  const Key random = secrets_.next();
-  std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
-  if (config_.key) config.secret = {.key = *config_.key, .ephemeral = secrets_.next()};
-  handshake_.emplace(config, now);
-  give_up_ = now + config_.patience;
+  Hello hello;
+  hello.role = role_;
+  hello.name = config_.name;
+  hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels)};
+  if (config_.diagnostics) hello.features.emplace_back(kFeatureDiagnostics);
+  if (claims()) hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
+  connection_.greet(now, hello);
   stats_.phase = Phase::kGreeting;
   ++stats_.attempts;
 }
 
-/// Acts on the server's answer, once it is there.
-void ForceClient::settle(LocalTime now) {
-  if (!handshake_->outcome()) return;
-  const ClientHandshake::Outcome outcome = *handshake_->outcome();
-  if (const auto* refused = std::get_if<Refused>(&outcome)) {
-    end(now, Phase::kRefused, refused->code, refused->detail);
-    return;
-  }
-  const auto& accepted = std::get<ClientHandshake::Accepted>(outcome);
-  const auto& grants = accepted.welcome.grants;
+void ForceClient::open(LocalTime now, const Welcome& welcome) {
+  const auto& grants = welcome.grants;
   if (claims() && grants.size() != 1) {
-    end(now, Phase::kRefused, Code::kUnsupported, "that server has one device, with one channel: name none");
-    return;
+    connection_.drop(now);
+    return end(Phase::kRefused, Code::kUnsupported, "that server has one device, with one channel: name none");
   }
-  handshake_.reset();
-  welcome_ = accepted.welcome;
-  place_ = grants.empty() ? Grant{.device = 0, .channel = 0, .role = accepted.welcome.role} : grants.front();
+  welcome_ = welcome;
+  place_ = grants.empty() ? Grant{.device = 0, .channel = 0, .role = welcome.role} : grants.front();
   holds_ = place_.role == Role::kController;
   asked_lease_.reset();
   description_.reset();
@@ -168,79 +174,38 @@ void ForceClient::settle(LocalTime now) {
   order_answer_.reset();
   stats_.lease_lost_to.clear();
   ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
-  Session::Config config;
-  config.connection_id = accepted.connection_id;
-  if (accepted.keys) {
-    session_.emplace(config, *accepted.keys, now);
-  } else {
-    session_.emplace(config, now);
-  }
-  if (claims()) session_->request(Describe{.device = place_.device});
-  deadband_request_ = config_.state_deadband ? session_->request(*config_.state_deadband) : std::nullopt;
+  Session& session = *connection_.session();
+  if (claims()) session.request(Describe{.device = place_.device});
+  deadband_request_ = config_.state_deadband ? session.request(*config_.state_deadband) : std::nullopt;
   foretell_ = false;
   seen_tick_ = 0;
   report_.reset();
   device_report_.reset();
   peer_reports_.clear();
-  if (config_.state_hz > 0) session_->request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
+  if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
   sequence_ = 0;
-  if (config_.deadband) deadband_.emplace(*config_.deadband);  // what another session was sent, this one was not
+  if (config_.deadband) deadband_.emplace(*config_.deadband);  // this session was sent none of the forces before
   stats_.phase = Phase::kOpen;
   ++stats_.sessions;
 }
 
-void ForceClient::end(LocalTime now, Phase phase, Code code, std::string reason) {
-  stats_ = stats();
+void ForceClient::end(Phase phase, Code code, std::string reason) {
   stats_.phase = phase;
   stats_.code = code;
   stats_.reason = std::move(reason);
-  handshake_.reset();
-  session_.reset();
   holds_ = false;
   unseen_.reset();
   newest_.reset();
-  retry_ = now + back_off_;
-  back_off_ = std::min(2 * back_off_, config_.retry_max);
 }
 
-/// True when there may be more in the link. `now` goes on with what it takes.
-bool ForceClient::drain(LocalTime& now) {
-  // One byte more than the largest datagram: one that is too large stays too large after the cut.
-  std::array<std::byte, kMaxDatagram + 1> buffer;
-  for (int i = 0; i < config_.max_datagrams; ++i) {
-    Address from;
-    const std::size_t size = link_.receive(from, buffer);
-    if (size == 0) return false;
-    now = link_.received_by(now);
-    if (from != server_) {
-      ++stats_.strangers;
-      continue;
-    }
-    const auto datagram = std::span<const std::byte>(buffer).first(std::min(size, buffer.size()));
-    if (handshake_) {
-      handshake_->receive(now, datagram);
-      settle(now);
-    } else if (session_) {
-      session_->receive(now, datagram);
-      take_events(now);
-    }
-  }
-  return true;
-}
-
-/// What is due by time.
-void ForceClient::tick(LocalTime now) {
-  if (session_) {
-    session_->tick(now);
-    take_events(now);
-    if (session_ && now >= ask_lease_ && !asked_lease_ && !take_lease()) ask_lease_ = now + kAskLeaseAgain;
-  } else if (handshake_) {
-    if (now >= give_up_) {
-      end(now, Phase::kUnanswered, Code::kTimedOut, "no answer from " + to_string(server_));
-    } else {
-      handshake_->tick(now);
-    }
-  } else if (now >= retry_) {
+void ForceClient::take(LocalTime now, const Connection::Event& event) {
+  if (const auto* of_session = std::get_if<Session::Event>(&event)) {
+    take_event(now, *of_session);
+  } else if (const auto* opened = std::get_if<Connection::Opened>(&event)) {
+    open(now, opened->welcome);
+  } else if (const auto* ended = std::get_if<Connection::Ended>(&event)) {
+    end(phase_after(*ended), ended->code, ended->reason);
+  } else {
     greet(now);
   }
 }
@@ -256,31 +221,22 @@ void ForceClient::take_report(const PeerReport& report) {
   }
 }
 
-void ForceClient::take_events(LocalTime now) {
-  while (session_) {
-    const std::optional<Session::Event> event = session_->next_event();
-    if (!event) return;
-    if (const auto* arrived = std::get_if<Session::StateArrived>(&*event)) {
-      ++stats_.states;
-      if (unseen_) ++stats_.states_skipped;
-      unseen_ = newest_ = arrived->state;
-      newest_arrived_ = now;
-      back_off_ = config_.retry_min;
-    } else if (const auto* report = std::get_if<Session::ReportArrived>(&*event)) {
-      report_ = report->report;
-    } else if (const auto* of_device = std::get_if<Session::DeviceReportArrived>(&*event)) {
-      device_report_ = of_device->report;
-    } else if (const auto* of_peer = std::get_if<Session::PeerReportArrived>(&*event)) {
-      take_report(of_peer->report);
-    } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&*event)) {
-      take_answer(now, *answered);
-    } else if (const auto* asked = std::get_if<Session::RequestArrived>(&*event)) {
-      take_request(now, *asked);
-    } else if (const auto* closed = std::get_if<Session::Closed>(&*event)) {
-      const bool for_good = closed->code == Code::kReplaced;
-      flush(now);  // a Bye of our own
-      end(now, for_good ? Phase::kStopped : Phase::kLost, closed->code, closed->reason);
-    }
+void ForceClient::take_event(LocalTime now, const Session::Event& event) {
+  if (const auto* arrived = std::get_if<Session::StateArrived>(&event)) {
+    ++stats_.states;
+    if (unseen_) ++stats_.states_skipped;
+    unseen_ = newest_ = arrived->state;
+    newest_arrived_ = now;
+  } else if (const auto* report = std::get_if<Session::ReportArrived>(&event)) {
+    report_ = report->report;
+  } else if (const auto* of_device = std::get_if<Session::DeviceReportArrived>(&event)) {
+    device_report_ = of_device->report;
+  } else if (const auto* of_peer = std::get_if<Session::PeerReportArrived>(&event)) {
+    take_report(of_peer->report);
+  } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&event)) {
+    take_answer(now, *answered);
+  } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {
+    take_request(now, *asked);
   }
 }
 
@@ -304,24 +260,15 @@ void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& ans
 
 void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arrived) {
   const auto* lost = std::get_if<LeaseLost>(&arrived.request);
-  if (lost == nullptr) return session_->answer(arrived.id, Code::kUnsupported, "that is a client's to ask");
-  session_->answer(arrived.id, Code::kOk, {});
+  Session& session = *connection_.session();
+  if (lost == nullptr) return session.answer(arrived.id, Code::kUnsupported, "that is a client's to ask");
+  session.answer(arrived.id, Code::kOk, {});
   if (lost->device != place_.device || lost->channel != place_.channel) return;
   holds_ = false;
   stats_.lease_lost_to = lost->to;
-  // What we have asked before may be answered before this or after it; what we ask now, after it.
+  // A request still in flight may cross this message. One sent now is answered after it.
   if (asked_lease_ && take_lease()) return;
   if (config_.take_lease) ask_lease_ = now + kAskLeaseAgain;
-}
-
-void ForceClient::flush(LocalTime now) {
-  std::array<std::byte, kMaxDatagram> buffer;
-  const auto next = [&] {
-    if (session_) return session_->next_datagram(now, buffer);
-    if (handshake_) return handshake_->next_datagram(now, buffer);
-    return std::size_t{0};
-  };
-  while (const std::size_t size = next()) link_.send(server_, std::span<const std::byte>(buffer).first(size));
 }
 
 /// What the callback is to see now; empty when there is nothing new.
@@ -350,7 +297,7 @@ bool ForceClient::call(LocalTime now) {
       return false;
     }
     const Touch touch = physics_(state);
-    if (session_) send(now, touch, state);  // unless the callback has called stop()
+    if (connection_.session() != nullptr) send(now, touch, state);  // unless the callback has called stop()
     return true;
   } catch (...) {
     stop(now);
@@ -385,7 +332,7 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
   command.valid_for = valid_for(answered.tick);
   command.sequence = ++sequence_;
   answered_tick_ = answered.tick;
-  session_->send(command);
+  connection_.session()->send(command);
   ++stats_.forces;
 }
 
@@ -413,13 +360,10 @@ LocalTime ForceClient::next_call() const {
 }
 
 LocalTime ForceClient::next_turn() const {
-  if (session_) {
-    LocalTime next = session_->next_tick();
-    if (!physics_ || holds_) next = std::min(next, next_call());
-    return asked_lease_ ? next : std::min(next, ask_lease_);
-  }
-  if (handshake_) return std::min(give_up_, handshake_->next_tick());
-  return retry_;
+  LocalTime next = connection_.next_turn();
+  if (connection_.session() == nullptr) return next;
+  if (!physics_ || holds_) next = std::min(next, next_call());
+  return asked_lease_ ? next : std::min(next, ask_lease_);
 }
 
 }  // namespace tendon

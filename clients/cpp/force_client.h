@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/handshake.h"
+#include "clients/cpp/connection.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
 #include "protocol/narrow/deadband.h"
@@ -179,6 +179,9 @@ class ForceClient {
   bool take_lease();
   bool give_lease();
 
+  /// The server is found at another address: for the next attempt. To be called while no session is open.
+  void move_to(const Address& server) { connection_.move_to(server); }
+
   /// Says Bye, so that the server need not wait for a timeout, and ends. Any further turn does nothing.
   void stop(LocalTime now);
 
@@ -204,17 +207,15 @@ class ForceClient {
   ForceClient(Link& link, const Address& server, const Config& config, Role role, LocalTime now);
 
   void greet(LocalTime now);
-  void settle(LocalTime now);
-  void end(LocalTime now, Phase phase, Code code, std::string reason);
-  bool drain(LocalTime& now);
+  void open(LocalTime now, const Welcome& welcome);
+  void end(Phase phase, Code code, std::string reason);
+  void take(LocalTime now, const Connection::Event& event);
   bool give_order(const Request& order);
   bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
   void take_report(const PeerReport& report);
-  void take_events(LocalTime now);
+  void take_event(LocalTime now, const Session::Event& event);
   void take_answer(LocalTime now, const Session::RequestAnswered& answered);
   void take_request(LocalTime now, const Session::RequestArrived& arrived);
-  void tick(LocalTime now);
-  void flush(LocalTime now);
   bool call(LocalTime now);
   std::optional<DeviceState> due_state(LocalTime now);
   void send(LocalTime now, const Touch& touch, const DeviceState& answered);
@@ -223,17 +224,13 @@ class ForceClient {
   LocalTime next_call() const;
   LocalTime next_turn() const;
 
-  Link& link_;
-  Address server_;
   Config config_;
   Role role_;
   Physics physics_;  ///< the controller's callback
   Watch watch_;      ///< the observer's callback
   Duration period_;  ///< of the callback; 0 = none
 
-  Ratchet secrets_;
-  std::optional<ClientHandshake> handshake_;
-  std::optional<Session> session_;
+  Connection connection_;
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
   std::optional<std::uint32_t> order_;  ///< the newest rearm or disarm: number of the request
@@ -242,9 +239,6 @@ class ForceClient {
   bool holds_ = false;
   std::optional<std::uint32_t> asked_lease_;  ///< the request that waits for its answer
   LocalTime ask_lease_ = LocalTime::max();    ///< when to ask (again)
-  LocalTime give_up_{};                       ///< end of the present attempt's patience
-  LocalTime retry_{};                         ///< when the next attempt begins
-  Duration back_off_{};                       ///< wait before the attempt after that
 
   std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
   std::optional<DeviceState> newest_;  ///< newest state, seen or not

@@ -11,13 +11,16 @@
 namespace tendon {
 
 ClientKey read_client_key(const std::string& file) {
+  const auto refuse = [&](const std::string& why) {
+    throw std::runtime_error(file + ": cannot read this key: " + why);
+  };
   struct stat status {};
-  std::string text(kMaxKeyFile, '\0');
+  if (::stat(file.c_str(), &status) != 0) refuse(std::generic_category().message(errno));
+  // Before it is opened: a pipe would wait for ever.
+  if (!S_ISREG(status.st_mode)) refuse(S_ISDIR(status.st_mode) ? "it is a folder" : "it is not a regular file");
   std::ifstream stream(file, std::ios::binary);
-  if (!stream || ::stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
-    throw std::runtime_error(
-        file + ": cannot read this key: " + (errno != 0 ? std::generic_category().message(errno) : "not a file"));
-  }
+  if (!stream) refuse(std::generic_category().message(errno));
+  std::string text(kMaxKeyFile, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
   try {

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kMaxDurationS = 1e9;  // 31 years, and far from where Duration ends (292)
 
-std::string check_address(const std::string& text) {
+std::string check_server(const std::string& text) {
   try {
-    parse_address(text);
+    ServerName{text};
     return {};
   } catch (const std::invalid_argument& error) {
     return error.what();
@@ -56,7 +56,7 @@ struct CommandLine::Parser {
   Options& options;
 
   void set_example(const std::string& argument) {
-    app.footer("Example: " + options.client.name + argument + " --server " + to_string(options.server) +
+    app.footer("Example: " + options.client.name + argument + " --server " + options.server.text() +
                " --duration-s 10");
   }
 };
@@ -68,10 +68,11 @@ CommandLine::CommandLine(std::string purpose, Options& options)
   app.set_help_flag("-h,--help", "Print this and leave");
   app.set_version_flag("--version", TENDON_VERSION);
   app.add_option_function<std::string>(
-         "--server", [&](const std::string& text) { options.server = parse_address(text); }, "Where tendond listens")
+         "--server", [&](const std::string& text) { options.server = text; },
+         "Where tendond listens: a host name or an address")
       ->type_name("HOST:PORT")
-      ->default_str(to_string(options.server))
-      ->check(CLI::Validator(check_address, ""));
+      ->default_str(options.server.text())
+      ->check(CLI::Validator(check_server, ""));
   app.add_option_function<std::string>(
          "--key", [&](const std::string& file) { options.client.key = read_client_key(file).key; },
          "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")

@@ -8,7 +8,9 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -16,6 +18,8 @@
 
 namespace tendon {
 namespace {
+
+using Json = nlohmann::ordered_json;  // members in the order in which they are written here
 
 /// Longest sleep: a signal that slips in just before the sleep is noticed after it.
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
@@ -57,13 +61,16 @@ Seed seed_from_system() {
 
 double milliseconds(Duration d) { return 1e3 * seconds(d); }
 
-/// Refusals that another attempt does not change.
-bool final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
+/// One object in one line of stdout.
+void say_json(const Json& json) { std::cout << json << std::endl; }
+
+/// Whether another attempt would be refused too.
+bool is_final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
 
 /// The connection's state in a sentence; empty when there is nothing to say.
-std::string sentence(const ForceClient& client, const Options& options) {
+std::string sentence(const ForceClient& client, const Address& address, const Options& options) {
   const ForceClient::Stats stats = client.stats();
-  const std::string server = to_string(options.server);
+  const std::string server = options.server.at(address);
   switch (stats.phase) {
     case ForceClient::Phase::kOpen:
       return "connected to " + client.welcome()->device_name + " at " + server + " (" + client.welcome()->server +
@@ -72,7 +79,7 @@ std::string sentence(const ForceClient& client, const Options& options) {
       return "no answer from " + server + "; is tendond running there" +
              (options.client.key ? ", and does it have this key" : "") + "? Trying on";
     case ForceClient::Phase::kRefused:
-      return server + " refuses: " + stats.reason + (final(stats.code) ? "" : "; trying on");
+      return server + " refuses: " + stats.reason + (is_final(stats.code) ? "" : "; trying on");
     case ForceClient::Phase::kLost:
       return "lost " + server + ": " + stats.reason + "; trying on";
     case ForceClient::Phase::kStopped:
@@ -87,13 +94,17 @@ void print_summary(const ForceClient::Stats& stats, Duration duration, const Opt
   using ull = unsigned long long;
   const LinkStats& link = stats.link;
   if (options.json) {
-    std::printf(
-        "{\"summary\":{\"duration_s\":%.3f,\"sessions\":%llu,\"states\":%llu,\"states_skipped\":%llu,\"forces\":%llu,"
-        "\"forces_unusable\":%llu,\"lost_incoming\":%llu,\"lost_outgoing\":%llu,\"round_trip_ms\":%.3f,"
-        "\"round_trip_variation_ms\":%.3f}}\n",
-        seconds(duration), ull{stats.sessions}, ull{stats.states}, ull{stats.states_skipped}, ull{stats.forces},
-        ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing}, milliseconds(link.smoothed_round_trip),
-        milliseconds(link.round_trip_variation));
+    say_json({{"summary",
+               {{"duration_s", seconds(duration)},
+                {"sessions", stats.sessions},
+                {"states", stats.states},
+                {"states_skipped", stats.states_skipped},
+                {"forces", stats.forces},
+                {"forces_unusable", stats.forces_unusable},
+                {"lost_incoming", link.lost},
+                {"lost_outgoing", link.lost_outgoing},
+                {"round_trip_ms", milliseconds(link.smoothed_round_trip)},
+                {"round_trip_variation_ms", milliseconds(link.round_trip_variation)}}}});
   } else if (stats.sessions == 0) {
     std::fprintf(stderr, "%s: was not connected\n", options.client.name.c_str());
   } else {
@@ -108,26 +119,44 @@ void print_summary(const ForceClient::Stats& stats, Duration duration, const Opt
 
 /// What the server says of our forces, each time that it says it.
 void print_report(const LinkReport& report, const Options& options) {
-  using ull = unsigned long long;
   if (options.json) {
-    const auto delays = [](const char* name, const std::optional<Delays>& d) {
-      if (d)
-        std::printf(",\"%s_ms\":{\"median\":%.3f,\"p99\":%.3f}", name, milliseconds(d->median), milliseconds(d->p99));
+    Json json = {{"number", report.number},
+                 {"forces", report.forces},
+                 {"late_server", report.late_server},
+                 {"late_network", report.late_network},
+                 {"late_engine", report.late_engine},
+                 {"worst_late_ms", milliseconds(report.worst_late)},
+                 {"longest_gap_ms", milliseconds(report.longest_gap)}};
+    const auto add = [&](const char* name, const std::optional<Delays>& d) {
+      if (d) json[name] = {{"median", milliseconds(d->median)}, {"p99", milliseconds(d->p99)}};
     };
-    std::printf(
-        "{\"report\":{\"number\":%llu,\"forces\":%llu,\"late_server\":%llu,\"late_network\":%llu,\"late_engine\":%llu,"
-        "\"worst_late_ms\":%.3f,\"longest_gap_ms\":%.3f",
-        ull{report.number}, ull{report.forces}, ull{report.late_server}, ull{report.late_network},
-        ull{report.late_engine}, milliseconds(report.worst_late), milliseconds(report.longest_gap));
-    delays("round_trip", report.round_trip);
-    delays("to_server", report.to_server);
-    delays("to_client", report.to_client);
-    std::printf(",\"clock_error_ms\":%.3f,\"received\":%llu,\"lost\":%llu,\"reordered\":%llu,\"duplicated\":%llu}}\n",
-                milliseconds(report.clock_error), ull{report.received}, ull{report.lost}, ull{report.reordered},
-                ull{report.duplicated});
-    std::fflush(stdout);
+    add("round_trip_ms", report.round_trip);
+    add("to_server_ms", report.to_server);
+    add("to_client_ms", report.to_client);
+    json["clock_error_ms"] = milliseconds(report.clock_error);
+    json["received"] = report.received;
+    json["lost"] = report.lost;
+    json["reordered"] = report.reordered;
+    json["duplicated"] = report.duplicated;
+    say_json({{"report", std::move(json)}});
   } else if (!report.words.empty()) {
     std::fprintf(stderr, "%s: the server says: %s\n", options.client.name.c_str(), report.words.c_str());
+  }
+}
+
+/// Whether an attempt or a session is over, and the next attempt not begun.
+bool waits(ForceClient::Phase phase) {
+  return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
+         phase == ForceClient::Phase::kLost;
+}
+
+/// The server may have another address by now. Where nobody answered at one, the next one is tried.
+void look_up_again(UdpTransport& transport, ForceClient& client, const std::function<void(const std::string&)>& say) {
+  try {
+    transport.look_up_again(client.phase() == ForceClient::Phase::kUnanswered);
+    client.move_to(transport.server());
+  } catch (const std::runtime_error& error) {
+    say(error.what());
   }
 }
 
@@ -141,19 +170,24 @@ int run_with(const Options& options, Callback callback) {
     config.seed = seed_from_system();
     const LocalTime start = read_clock();
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
-    ForceClient client(transport, options.server, config, std::move(callback), start);
+    ForceClient client(transport, transport.server(), config, std::move(callback), start);
 
     std::string said;
+    ForceClient::Phase phase = client.phase();
     PeerTime reported{};
     LocalTime now = start;
     while (now < end && stop_asked == 0) {
       const LocalTime next = std::min(client.turn(now), end);
-      if (const std::string text = sentence(client, options); !text.empty() && text != said) say(said = text);
+      const std::string text = sentence(client, transport.server(), options);
+      if (!text.empty() && text != said) say(said = text);
       if (const auto& report = client.report()) {
         if (std::exchange(reported, report->until) != report->until) print_report(*report, options);
       }
-      if (client.phase() == ForceClient::Phase::kRefused && final(client.stats().code)) return 1;
+      if (client.phase() == ForceClient::Phase::kRefused && is_final(client.stats().code)) return 1;
       if (client.phase() == ForceClient::Phase::kStopped) return 1;
+      if (std::exchange(phase, client.phase()) != client.phase() && waits(client.phase())) {
+        look_up_again(transport, client, say);
+      }
       transport.wait(std::min(next - now, kLongestWait));
       now = read_clock();
     }

@@ -2,27 +2,29 @@
 #pragma once
 
 #include "clients/cpp/force_client.h"
+#include "clients/cpp/server_name.h"
 
 namespace tendon {
 
 /// What run() needs to know; CommandLine (options.h) fills it from a command line.
 struct Options {
-  Address server = parse_address("127.0.0.1:47100");
-  ForceClient::Config client;  ///< `seed` is replaced by one from the system
-  Duration duration{};         ///< ends after this time; 0 = at SIGINT or SIGTERM
-  bool json = false;           ///< the closing summary as one JSON object on stdout, not as text on stderr
+  ServerName server = "127.0.0.1:47100";  ///< looked up at the start, and again before each further attempt
+  ForceClient::Config client;             ///< `seed` is replaced by one from the system
+  Duration duration{};                    ///< ends after this time; 0 = at SIGINT or SIGTERM
+  bool json = false;                      ///< the closing summary as one JSON object on stdout, not as text on stderr
 };
 
-/// Runs a guest in real time, on this thread, until it is told to stop (Options::duration, SIGINT or
-/// SIGTERM); then it says Bye. This is all that `main` needs: an exit code comes back.
+/// Runs a guest in real time, on this thread, until it is told to stop (Options::duration, SIGINT or SIGTERM); then it
+/// says Bye. This is all that `main` needs. Returns the exit code:
 ///
 ///     0   it has been connected to the server
-///     1   it could not connect, the server refused it for good, another has its place, or the callback threw
+///     1   it could not connect, there is no such host, the server refused it for good, another has its place, or the
+///         callback threw
 ///
-/// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps
-/// trying. stderr gets one sentence for each change of the connection, stdout nothing but the callback's
-/// own output and, with `json`, what the server says of our forces once a second, {"report":{"number":1, …}}, and the
-/// summary: {"summary":{"duration_s":…, …}}. Without `json` stderr gets the server's sentence when forces were late.
+/// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps trying. stderr
+/// gets one sentence for each change of the connection. stdout gets only the callback's own output and, with `json`, what
+/// the server says of our forces once a second, {"report":{"number":1, …}}, and the summary,
+/// {"summary":{"duration_s":…, …}}. Without `json` stderr gets the server's sentence when forces were late.
 ///
 /// One at a time in a process, because the signal handlers are the process's.
 int run(const Options& options, Physics physics);  ///< a controller

@@ -10,6 +10,8 @@
 #include <chrono>
 #include <ctime>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 namespace tendon {
 namespace {
@@ -33,16 +35,35 @@ struct UdpTransport::Socket {
   udp::socket socket{context};
 };
 
-UdpTransport::UdpTransport(const Address& server) : server_(server), socket_(std::make_unique<Socket>()) {
-  try {
-    socket_->socket.connect(to_endpoint(server));
-    socket_->socket.non_blocking(true);
-  } catch (const std::system_error& error) {
-    throw std::runtime_error("cannot reach " + to_string(server) + ": " + error.code().message());
-  }
-}
+UdpTransport::UdpTransport(const ServerName& server) : name_(server) { connect(name_.look_up(), 0); }
 
 UdpTransport::~UdpTransport() = default;
+
+/// Connects to the first one that the system can reach, in their order, beginning with the one at `first`.
+void UdpTransport::connect(const std::vector<Address>& addresses, std::size_t first) {
+  std::string problem;
+  for (std::size_t i = 0; i < addresses.size(); ++i) {
+    const Address& address = addresses[(first + i) % addresses.size()];
+    try {
+      auto socket = std::make_unique<Socket>();
+      socket->socket.connect(to_endpoint(address));
+      socket->socket.non_blocking(true);
+      socket_ = std::move(socket);
+      server_ = address;
+      return;
+    } catch (const std::system_error& error) {
+      if (problem.empty()) problem = "cannot reach " + name_.at(address) + ": " + error.code().message();
+    }
+  }
+  throw std::runtime_error(problem);
+}
+
+void UdpTransport::look_up_again(bool another) {
+  const std::vector<Address> addresses = name_.look_up();
+  const auto present = std::find(addresses.begin(), addresses.end(), server_);
+  if (present != addresses.end() && (!another || addresses.size() == 1)) return;
+  connect(addresses, present == addresses.end() ? 0 : static_cast<std::size_t>(present - addresses.begin()) + 1);
+}
 
 void UdpTransport::send(const Address& to, std::span<const std::byte> datagram) {
   if (to != server_) return;

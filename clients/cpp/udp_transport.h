@@ -2,23 +2,35 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
+#include "clients/cpp/server_name.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
 
 namespace tendon {
 
-/// The guest's end of the wire: a UDP socket that talks to one server, from a port that the system
-/// chooses. It is connected, so the kernel drops what others send to it.
+/// The guest's end of the wire: a UDP socket that talks to one server, from a port that the system chooses. The socket
+/// is connected, so the kernel drops what others send to it.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UdpTransport : public Link {
  public:
-  /// Throws std::runtime_error when the system refuses: "cannot reach 192.0.2.1:47100: Network is unreachable".
-  explicit UdpTransport(const Address& server);
+  /// Looks the name up (ServerName::look_up, which may wait) and takes the first address that the system can reach.
+  /// Throws std::runtime_error when there is none: "cannot find haptics.lab: Name or service not known",
+  /// "cannot reach 192.0.2.1:47100: Network is unreachable".
+  explicit UdpTransport(const ServerName& server);
   ~UdpTransport() override;
 
-  /// `to` must be the server; a datagram to anybody else, or one that the system does not take, is lost.
+  /// The address in use.
+  const Address& server() const noexcept { return server_; }
+
+  /// Looks the name up again, which may wait: to be called while no session is open. Stays with the present address
+  /// where the name still has it, or, with `another`, goes on to the one after it. Throws as the constructor does; then
+  /// the present address stays in use.
+  void look_up_again(bool another);
+
+  /// `to` must be server(); a datagram to anybody else, or one that the system does not take, is lost.
   void send(const Address& to, std::span<const std::byte> datagram) override;
 
   /// As Link says. Empty datagrams are skipped: they say nothing, and 0 means that none is waiting.
@@ -33,6 +45,9 @@ class UdpTransport : public Link {
 
  private:
   struct Socket;  // keeps Asio out of this header
+  void connect(const std::vector<Address>& addresses, std::size_t first);
+
+  ServerName name_;
   Address server_;
   std::unique_ptr<Socket> socket_;
 };

@@ -2,8 +2,6 @@
 #include "clients/dashboard/observer.h"
 
 #include <algorithm>
-#include <array>
-#include <span>
 #include <utility>
 #include <variant>
 
@@ -12,79 +10,49 @@
 namespace tendon::dash {
 
 Observer::Observer(Link& link, const Address& server, const Config& config, Board& board, LocalTime now)
-    : link_(link), server_(server), config_(config), board_(board), secrets_(config.seed), back_off_(config.retry_min) {
+    : config_(config),
+      board_(board),
+      connection_(link, server,
+                  {.key = config.key,
+                   .seed = config.seed,
+                   .patience = config.patience,
+                   .retry_min = config.retry_min,
+                   .retry_max = config.retry_max,
+                   .max_datagrams = config.max_datagrams}) {
   config_.seed = {};
   greet(now);
 }
 
 LocalTime Observer::turn(LocalTime now) {
   if (stopped_) return LocalTime::max();
-  const bool more = drain(now);
-  if (session_) {
-    session_->tick(now);
-    take_events(now);
-    ask(now);
-  } else if (handshake_) {
-    if (now >= give_up_) {
-      end(now, Contact::kUnanswered,
-          "no answer from " + to_string(server_) + ": is tendond running there" +
-              (config_.key ? ", and does it have this key?" : "?"));
-    } else {
-      handshake_->tick(now);
-    }
-  } else if (now >= retry_) {
-    greet(now);
-  }
-  flush(now);
-  if (more) return now;
-  if (session_) return std::min(session_->next_tick(), describe_at_);
-  if (handshake_) return std::min(give_up_, handshake_->next_tick());
-  return retry_;
+  connection_.begin_turn();
+  while (const auto event = connection_.next(now)) take(now, *event);
+  ask(now);
+  connection_.flush(now);
+  if (const Session* const session = connection_.session()) board_.observe(session->stats());
+  if (connection_.more()) return now;
+  const LocalTime next = connection_.next_turn();
+  return connection_.session() != nullptr ? std::min(next, describe_at_) : next;
 }
 
 void Observer::stop(LocalTime now) {
-  if (session_) {
-    session_->close(Code::kOk, config_.name + " stops");
-    flush(now);
-  }
-  handshake_.reset();
-  session_.reset();
+  connection_.close(now, config_.name + " stops");
   stopped_ = true;
 }
 
 void Observer::greet(LocalTime now) {
-  ClientHandshake::Config config;
-  config.hello.role = Role::kObserver;
-  config.hello.name = config_.name;
-  config.hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics)};
+  Hello hello;
+  hello.role = Role::kObserver;
+  hello.name = config_.name;
+  hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics)};
   claims_ = counted_ && names_.size() > 1;
   if (claims_) {
-    for (const auto& [number, name] : names_) config.hello.claims.push_back({name, "", Role::kObserver});
+    for (const auto& [number, name] : names_) hello.claims.push_back({name, "", Role::kObserver});
   }
-  const Key random = secrets_.next();
-  std::copy_n(random.bytes().begin(), config.random.size(), config.random.begin());
-  if (config_.key) config.secret = {.key = *config_.key, .ephemeral = secrets_.next()};
-  handshake_.emplace(config, now);
-  give_up_ = now + config_.patience;
+  connection_.greet(now, hello);
 }
 
-void Observer::settle(LocalTime now) {
-  if (!handshake_->outcome()) return;
-  const ClientHandshake::Outcome outcome = *handshake_->outcome();
-  if (const auto* refused = std::get_if<Refused>(&outcome)) {
-    // Another server may run there now, with other devices.
-    names_.clear();
-    counted_ = false;
-    return end(now, Contact::kRefused, to_string(server_) + " refuses: " + refused->detail);
-  }
-  const auto& accepted = std::get<ClientHandshake::Accepted>(outcome);
-  Session::Config config;
-  config.connection_id = accepted.connection_id;
-  if (accepted.keys) {
-    session_.emplace(config, *accepted.keys, now);
-  } else {
-    session_.emplace(config, now);
-  }
+void Observer::open(LocalTime now, const Welcome& welcome) {
   asked_.clear();
   rates_.clear();
   next_describe_ = 0;
@@ -93,59 +61,49 @@ void Observer::settle(LocalTime now) {
     names_.clear();
     counted_ = false;
   }
-  board_.welcomed(accepted.welcome);
-  board_.tell(Contact::kOpen, "connected to " + to_string(server_) + ", " + accepted.welcome.server);
-  handshake_.reset();
+  board_.welcomed(welcome);
+  board_.tell(Contact::kOpen, "connected to " + to_string(connection_.server()) + ", " + welcome.server);
 }
 
-void Observer::end(LocalTime now, Contact contact, std::string words) {
-  handshake_.reset();
-  session_.reset();
-  board_.tell(contact, std::move(words));
-  retry_ = now + back_off_;
-  back_off_ = std::min(2 * back_off_, config_.retry_max);
-}
-
-/// True when there may be more in the link. `now` goes on with what it takes.
-bool Observer::drain(LocalTime& now) {
-  std::array<std::byte, kMaxDatagram + 1> buffer;  // one more: what is too large stays too large after the cut
-  for (int i = 0; i < config_.max_datagrams; ++i) {
-    Address from;
-    const std::size_t size = link_.receive(from, buffer);
-    if (size == 0) return false;
-    now = link_.received_by(now);
-    if (from != server_) continue;
-    const auto datagram = std::span<const std::byte>(buffer).first(std::min(size, buffer.size()));
-    if (handshake_) {
-      handshake_->receive(now, datagram);
-      settle(now);
-    } else if (session_) {
-      session_->receive(now, datagram);
-      take_events(now);
-    }
+void Observer::end(const Connection::Ended& ended) {
+  const std::string server = to_string(connection_.server());
+  switch (ended.cause) {
+    case Connection::Cause::kUnanswered:
+      return board_.tell(Contact::kUnanswered, ended.reason + ": is tendond running there" +
+                                                   (config_.key ? ", and does it have this key?" : "?"));
+    case Connection::Cause::kRefused:
+      // Another server may run there now, with other devices.
+      names_.clear();
+      counted_ = false;
+      return board_.tell(Contact::kRefused, server + " refuses: " + ended.reason);
+    case Connection::Cause::kLost:
+      return board_.tell(Contact::kLost, "lost " + server + ": " + ended.reason);
   }
-  return true;
 }
 
-void Observer::take_events(LocalTime now) {
-  while (session_) {
-    const std::optional<Session::Event> event = session_->next_event();
-    if (!event) return;
-    if (const auto* state = std::get_if<Session::StateArrived>(&*event)) {
-      back_off_ = config_.retry_min;
-      board_.observe(state->state);
-    } else if (const auto* loop = std::get_if<Session::DeviceReportArrived>(&*event)) {
-      board_.observe(loop->report);
-    } else if (const auto* peer = std::get_if<Session::PeerReportArrived>(&*event)) {
-      board_.observe(peer->report);
-    } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&*event)) {
-      take_answer(now, *answered);
-    } else if (const auto* asked = std::get_if<Session::RequestArrived>(&*event)) {
-      session_->answer(asked->id, Code::kUnsupported, "an observer does nothing");
-    } else if (const auto* closed = std::get_if<Session::Closed>(&*event)) {
-      flush(now);  // a Bye of our own
-      end(now, Contact::kLost, "lost " + to_string(server_) + ": " + closed->reason);
-    }
+void Observer::take(LocalTime now, const Connection::Event& event) {
+  if (const auto* of_session = std::get_if<Session::Event>(&event)) {
+    take_event(now, *of_session);
+  } else if (const auto* opened = std::get_if<Connection::Opened>(&event)) {
+    open(now, opened->welcome);
+  } else if (const auto* ended = std::get_if<Connection::Ended>(&event)) {
+    end(*ended);
+  } else {
+    greet(now);
+  }
+}
+
+void Observer::take_event(LocalTime now, const Session::Event& event) {
+  if (const auto* state = std::get_if<Session::StateArrived>(&event)) {
+    board_.observe(state->state);
+  } else if (const auto* loop = std::get_if<Session::DeviceReportArrived>(&event)) {
+    board_.observe(loop->report);
+  } else if (const auto* peer = std::get_if<Session::PeerReportArrived>(&event)) {
+    board_.observe(peer->report);
+  } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&event)) {
+    take_answer(now, *answered);
+  } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {
+    connection_.session()->answer(asked->id, Code::kUnsupported, "an observer does nothing");
   }
 }
 
@@ -167,22 +125,21 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
   describe_at_ = now + config_.describe_every;
   if (!counted_) board_.counted(static_cast<std::uint32_t>(names_.size()));
   if (std::exchange(counted_, true) || names_.size() < 2 || claims_) return;
-  session_->close(Code::kOk, config_.name + " comes back for all devices");
-  flush(now);
-  session_.reset();
+  connection_.close(now, config_.name + " comes back for all devices");
   greet(now);
 }
 
 /// Asks what is due to be asked, one thing at a time of each kind.
 void Observer::ask(LocalTime now) {
-  if (!session_) return;
+  Session* const session = connection_.session();
+  if (session == nullptr) return;
   const bool describing = std::ranges::any_of(asked_, [](const auto& asked) { return asked.second.describe; });
   if (!describing && now >= describe_at_) {
     // Once we know how many devices there are, the question after the last one need not be asked.
     if (counted_ && next_describe_ >= names_.size()) {
       next_describe_ = 0;
       describe_at_ = now + config_.describe_every;
-    } else if (const auto id = session_->request(Describe{.device = next_describe_})) {
+    } else if (const auto id = session->request(Describe{.device = next_describe_})) {
       asked_[*id] = {.device = next_describe_, .describe = true};
       describe_at_ = LocalTime::max();
     }
@@ -192,22 +149,11 @@ void Observer::ask(LocalTime now) {
     const std::uint32_t wanted = watched_ ? device.about->loop_hz : std::min(kIdleStateHz, device.about->loop_hz);
     const auto rate = rates_.find(number);
     if (rate == rates_.end() ? watched_ : rate->second == wanted) continue;
-    if (const auto id = session_->request(SetStateRate{.hz = wanted, .device = number})) {
+    if (const auto id = session->request(SetStateRate{.hz = wanted, .device = number})) {
       asked_[*id] = {.device = number, .describe = false};
       rates_[number] = wanted;
     }
   }
-}
-
-void Observer::flush(LocalTime now) {
-  std::array<std::byte, kMaxDatagram> buffer;
-  const auto next = [&] {
-    if (session_) return session_->next_datagram(now, buffer);
-    if (handshake_) return handshake_->next_datagram(now, buffer);
-    return std::size_t{0};
-  };
-  while (const std::size_t size = next()) link_.send(server_, std::span<const std::byte>(buffer).first(size));
-  if (session_) board_.observe(session_->stats());
 }
 
 }  // namespace tendon::dash

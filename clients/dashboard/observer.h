@@ -6,16 +6,16 @@
 #include <optional>
 #include <string>
 
+#include "clients/cpp/connection.h"
 #include "clients/dashboard/board.h"
-#include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/secrets/crypto.h"
 #include "protocol/session.h"
 
 namespace tendon::dash {
 
-/// Watches every device of a Tendon server in one session, and writes what it hears on a Board: an observer, without
-/// socket, clock or thread. It never sends a force.
+/// Watches every device of a Tendon server in one session and writes what it hears on a Board. It is an observer, has no
+/// socket, clock or thread, and never sends a force.
 ///
 ///     Observer observer(link, server, config, board, now);
 ///     for (;;) wait for a datagram, at most until observer.turn(now);
@@ -24,9 +24,7 @@ namespace tendon::dash {
 /// … until there is none. So a server with several is greeted twice: the first session asks, the second one claims them
 /// all.
 ///
-/// * **Reconnection.** However an attempt or a session ends, the next attempt waits retry_min, then twice as long each
-/// time,
-///   at most retry_max, for ever: a server that comes back is found.
+/// * **Reconnection.** As Connection says, for ever: a server that comes back is found.
 /// * **Holders.** Each device is described anew once in `describe_every`, because engines come and go.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -66,21 +64,16 @@ class Observer {
   };
 
   void greet(LocalTime now);
-  void settle(LocalTime now);
-  void end(LocalTime now, Contact contact, std::string words);
-  bool drain(LocalTime& now);
-  void take_events(LocalTime now);
+  void open(LocalTime now, const Welcome& welcome);
+  void end(const Connection::Ended& ended);
+  void take(LocalTime now, const Connection::Event& event);
+  void take_event(LocalTime now, const Session::Event& event);
   void take_answer(LocalTime now, const Session::RequestAnswered& answered);
   void ask(LocalTime now);
-  void flush(LocalTime now);
 
-  Link& link_;
-  Address server_;
   Config config_;
   Board& board_;
-  Ratchet secrets_;
-  std::optional<ClientHandshake> handshake_;
-  std::optional<Session> session_;
+  Connection connection_;
   std::map<std::uint32_t, std::string> names_;  ///< of the devices, as far as they are known
   bool claims_ = false;                         ///< this attempt, or session, has claimed them by name
   bool counted_ = false;                        ///< we know how many there are
@@ -89,9 +82,6 @@ class Observer {
   LocalTime describe_at_{};
   bool watched_ = true;
   std::map<std::uint32_t, std::uint32_t> rates_;  ///< states per second that each device was asked for
-  LocalTime give_up_{};
-  LocalTime retry_{};
-  Duration back_off_;
   bool stopped_ = false;
 };
 

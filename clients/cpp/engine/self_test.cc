@@ -8,6 +8,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
@@ -45,23 +46,6 @@ std::string words(const Vec3& v, const char* unit) {
   std::ostringstream out;
   out << '(' << v.x() << ", " << v.y() << ", " << v.z() << ") " << unit;
   return out.str();
-}
-
-/// As a JSON string.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      constexpr std::string_view kDigits = "0123456789abcdef";
-      out += "\\u00";
-      out += kDigits[static_cast<unsigned char>(c) >> 4];
-      out += kDigits[static_cast<unsigned char>(c) & 15];
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
 }
 
 /// An answer that ends the present claim.
@@ -331,23 +315,18 @@ std::string SelfTest::text() const {
 }
 
 std::string SelfTest::json() const {
-  const auto number = [](double value) {
-    std::ostringstream out;
-    if (std::isfinite(value)) {
-      out << value;
-    } else {
-      out << "null";
-    }
-    return out.str();
-  };
   std::string text;
   for (const Finding& finding : findings) {
     const char* const verdict = finding.verdict == Verdict::kPassed   ? "passed"
                                 : finding.verdict == Verdict::kFailed ? "failed"
                                                                       : "unknown";
-    text += std::string("{\"finding\":{\"verdict\":\"") + verdict + "\",\"what\":" + quoted(finding.what) +
-            ",\"why\":" + quoted(finding.why) + ",\"value\":" + number(finding.value) +
-            ",\"bound\":" + number(finding.bound) + "}}\n";
+    const nlohmann::ordered_json line = {{"finding",
+                                          {{"verdict", verdict},
+                                           {"what", finding.what},
+                                           {"why", finding.why},
+                                           {"value", finding.value},
+                                           {"bound", finding.bound}}}};
+    text += line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
   }
   return text;
 }

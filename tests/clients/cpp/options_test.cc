@@ -2,7 +2,10 @@
 #include "clients/cpp/options.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <string>
 #include <vector>
 
 namespace tendon {
@@ -35,7 +38,7 @@ Parsed parse(std::vector<const char*> words) {
 TEST(CommandLine, NothingGivenLeavesTheDefaults) {
   const Parsed parsed = parse({});
   EXPECT_FALSE(parsed.exit_code);
-  EXPECT_EQ(to_string(parsed.options.server), "127.0.0.1:47100");
+  EXPECT_EQ(parsed.options.server.text(), "127.0.0.1:47100");
   EXPECT_EQ(parsed.options.client.rate_hz, 100);
   EXPECT_EQ(parsed.options.duration, Duration::zero());
   EXPECT_FALSE(parsed.options.json);
@@ -45,7 +48,7 @@ TEST(CommandLine, ReadsWhatIsGiven) {
   const Parsed parsed = parse({"--server", "[::1]:5000", "--rate-hz", "250.5", "--duration-s", "1.5", "--json",
                                "--stiffness-n-per-m", "800", "--local-model"});
   EXPECT_FALSE(parsed.exit_code);
-  EXPECT_EQ(to_string(parsed.options.server), "[::1]:5000");
+  EXPECT_EQ(parsed.options.server.text(), "[::1]:5000");
   EXPECT_EQ(parsed.options.client.rate_hz, 250.5);
   EXPECT_EQ(parsed.options.duration, std::chrono::milliseconds(1500));
   EXPECT_TRUE(parsed.options.json);
@@ -81,6 +84,24 @@ TEST(CommandLine, WrongUsageLeavesWithTwoAndASentence) {
     EXPECT_TRUE(parsed.out.empty());
   }
   EXPECT_NE(parse({"--server", "nowhere"}).err.find("expected HOST:PORT"), std::string::npos);
+}
+
+TEST(CommandLine, AKeyThatIsAPipeOrAFolderIsRefusedAtOnce) {
+  const std::string folder = testing::TempDir() + "tendon_key_" + std::to_string(::getpid());
+  ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
+  const std::string pipe = folder + "/pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const Parsed of_pipe = parse({"--key", pipe.c_str()});
+  const Parsed of_folder = parse({"--key", folder.c_str()});
+  const Parsed of_nothing = parse({"--key", "/nowhere/at/all.key"});
+  ::unlink(pipe.c_str());
+  ::rmdir(folder.c_str());
+  EXPECT_EQ(of_pipe.exit_code, 2);
+  EXPECT_NE(of_pipe.err.find(pipe + ": cannot read this key: it is not a regular file"), std::string::npos);
+  EXPECT_EQ(of_folder.exit_code, 2);
+  EXPECT_NE(of_folder.err.find(folder + ": cannot read this key: it is a folder"), std::string::npos);
+  EXPECT_EQ(of_nothing.exit_code, 2);
+  EXPECT_NE(of_nothing.err.find("No such file or directory"), std::string::npos);
 }
 
 }  // namespace

@@ -119,6 +119,20 @@ TEST(UdpTransport, AServerThatIsNotThereIsSilenceNotAnError) {
   }
 }
 
+TEST(UdpTransport, StaysWithItsAddressAndPortWhileTheNameHasIt) {
+  Z z;
+  UdpTransport a(z.address());
+  a.send(z.address(), kWords);
+  z.receive();
+  const auto port = z.guest().sin_port;
+  a.look_up_again(false);
+  a.look_up_again(true);
+  EXPECT_EQ(a.server(), z.address());
+  a.send(z.address(), kWords);
+  EXPECT_EQ(z.receive(), 8);
+  EXPECT_EQ(z.guest().sin_port, port);
+}
+
 TEST(UdpTransport, HearsNobodyButItsServer) {
   Z z;
   Z stranger;

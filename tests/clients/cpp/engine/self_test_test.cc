@@ -218,9 +218,9 @@ TEST(SelfTest, SaysItAsTextAndAsJson) {
   EXPECT_EQ(result.text(), "passed   is well: all of it\nFAILED   is felt: it threw \"no\"\n\n");
   EXPECT_EQ(
       result.json(),
-      "{\"finding\":{\"verdict\":\"passed\",\"what\":\"is well\",\"why\":\"all of it\",\"value\":0.5,\"bound\":1}}\n"
-      "{\"finding\":{\"verdict\":\"failed\",\"what\":\"is felt\",\"why\":\"it threw \\\"no\\\"\\u000a\",\"value\":0,"
-      "\"bound\":0}}\n");
+      "{\"finding\":{\"verdict\":\"passed\",\"what\":\"is well\",\"why\":\"all of it\",\"value\":0.5,\"bound\":1.0}}\n"
+      "{\"finding\":{\"verdict\":\"failed\",\"what\":\"is felt\",\"why\":\"it threw \\\"no\\\"\\n\",\"value\":0.0,"
+      "\"bound\":0.0}}\n");
 }
 
 TEST(SelfTest, RefusesAnImpossibleScript) {

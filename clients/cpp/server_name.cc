@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/server_name.h"
+
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+namespace tendon {
+namespace {
+
+/// DNS has 253 bytes.
+constexpr std::size_t kMaxHost = 253;
+
+std::optional<Address> numeric(const std::string& text) {
+  try {
+    return parse_address(text);
+  } catch (const std::invalid_argument&) {
+    return std::nullopt;
+  }
+}
+
+struct HostAndPort {
+  std::string host;
+  std::uint16_t port;
+};
+
+/// A host name and a port; empty when `text` is none. The port is read as that of a numeric address.
+std::optional<HostAndPort> split(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0 || colon > kMaxHost) return std::nullopt;
+  const std::string host = text.substr(0, colon);
+  const bool is_name = std::all_of(host.begin(), host.end(), [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '.' || c == '_';
+  });
+  const auto port = numeric("127.0.0.1" + text.substr(colon));
+  if (!is_name || host.front() == '-' || !port) return std::nullopt;
+  return HostAndPort{host, port->port};
+}
+
+Address from_system(const addrinfo& found, std::uint16_t port) {
+  Address address;
+  if (found.ai_family == AF_INET) {
+    sockaddr_in v4{};
+    std::memcpy(&v4, found.ai_addr, sizeof v4);
+    address.ip[10] = address.ip[11] = 0xFF;  // IPv4-mapped
+    std::memcpy(&address.ip[12], &v4.sin_addr, 4);
+  } else {
+    sockaddr_in6 v6{};
+    std::memcpy(&v6, found.ai_addr, sizeof v6);
+    std::memcpy(address.ip.data(), &v6.sin6_addr, address.ip.size());
+  }
+  address.port = port;
+  return address;
+}
+
+}  // namespace
+
+ServerName::ServerName(std::string text) : text_(std::move(text)) {
+  if (!split(text_)) parse_address(text_);  // throws what is wrong
+}
+
+ServerName::ServerName(const Address& address) : text_(to_string(address)) {}
+
+std::vector<Address> ServerName::look_up() const {
+  if (const auto address = numeric(text_)) return {*address};
+  const auto [host, port] = *split(text_);
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found); error != 0) {
+    throw std::runtime_error("cannot find " + host + ": " +
+                             (error == EAI_SYSTEM ? std::generic_category().message(errno) : ::gai_strerror(error)));
+  }
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(found, &::freeaddrinfo);
+  std::vector<Address> addresses;
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+    if (one->ai_family == AF_INET || one->ai_family == AF_INET6) addresses.push_back(from_system(*one, port));
+  }
+  if (addresses.empty()) throw std::runtime_error("cannot find " + host + ": it has no IP address");
+  return addresses;
+}
+
+std::string ServerName::at(const Address& address) const {
+  const auto own = numeric(text_);
+  return own && *own == address ? text_ : text_ + " (" + to_string(address) + ")";
+}
+
+}  // namespace tendon

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/cpp/server_name.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "clients/cpp/udp_transport.h"
+
+namespace tendon {
+namespace {
+
+TEST(ServerName, AnAddressIsItsOwn) {
+  for (const std::string text : {"127.0.0.1:47100", "[::1]:5000", "192.0.2.7:0"}) {
+    const ServerName name(text);
+    ASSERT_EQ(name.look_up().size(), 1U) << text;
+    EXPECT_EQ(to_string(name.look_up().front()), text);
+    EXPECT_EQ(name.at(name.look_up().front()), text);
+  }
+}
+
+TEST(ServerName, LocalhostIsThisMachine) {
+  EXPECT_EQ(to_string(ServerName("localhost:47100").look_up().front()), "127.0.0.1:47100");
+}
+
+TEST(ServerName, TheSystemLooksAHostNameUp) {
+  // Neither numeric nor "localhost" as parse_address() reads them: /etc/hosts answers.
+  const auto addresses = ServerName("LOCALHOST:47100").look_up();
+  ASSERT_FALSE(addresses.empty());
+  for (const Address& address : addresses) {
+    EXPECT_TRUE(is_loopback(address)) << to_string(address);
+    EXPECT_EQ(address.port, 47100);
+  }
+}
+
+TEST(ServerName, AHostThatIsNotThereIsNamed) {
+  try {
+    ServerName("haptics.invalid:47100").look_up();
+    FAIL() << "RFC 6761 knows no such host";
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(std::string(error.what()).starts_with("cannot find haptics.invalid: ")) << error.what();
+  }
+  EXPECT_THROW(UdpTransport("haptics.invalid:47100"), std::runtime_error);
+}
+
+TEST(ServerName, RefusesWhatIsNotAHostAndAPort) {
+  for (const std::string text : {"nowhere", "haptics.lab", "haptics.lab:", "haptics.lab:65536", "haptics.lab:-1",
+                                 ":47100", "::1:47100", "[haptics]:1", "a b:1", "-x:1", "haptics.lab:1:2", "a/b:1"}) {
+    EXPECT_THROW(ServerName{text}, std::invalid_argument) << text;
+  }
+  std::string longer_than_dns_has(254, 'a');
+  longer_than_dns_has.append(":1");
+  EXPECT_THROW(ServerName{longer_than_dns_has}, std::invalid_argument);
+}
+
+TEST(ServerName, TellsTheAddressThatANameHas) {
+  EXPECT_EQ(ServerName("haptics.lab:1").at(parse_address("192.0.2.7:1")), "haptics.lab:1 (192.0.2.7:1)");
+}
+
+}  // namespace
+}  // namespace tendon
