@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from types import TracebackType
@@ -24,11 +25,13 @@ class Client(AnyClient):
             async for hand in client.states():
                 client.send(hand, force)
 
-    The session is kept alive for as long as the event loop turns. One task at a time asks for states.
+    The session is kept alive for as long as the event loop turns. One task at a time asks for states. Making a client
+    looks a host name up, and waits for that.
     """
 
     def __init__(self, server: str, config: Config = Config()) -> None:
         super().__init__(server, config)
+        self._guest.moved = self._watch_another
         self._timer: asyncio.TimerHandle | None = None
         self._waiter: asyncio.Future[None] | None = None
         self._wake_at: Instant = NEVER
@@ -68,6 +71,11 @@ class Client(AnyClient):
         if self._timer is not None:
             self._timer.cancel()
         self._guest.end(time.monotonic_ns())
+
+    def _watch_another(self, old: socket.socket, new: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(old)
+        loop.add_reader(new, self._turn)
 
     def _turn(self) -> None:
         """Whenever something has come in or is due, whoever waits for a state looks for himself."""

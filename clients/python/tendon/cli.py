@@ -63,7 +63,7 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         type=_address,
         default="127.0.0.1:47100",
         metavar="HOST:PORT",
-        help="Where tendond listens [%(default)s]",
+        help="Where tendond listens: a host name or an address [%(default)s]",
     )
     line.add_argument(
         "--key", type=_key, metavar="FILE", help="The key that tendond knows us by; without one only loopback is possible"

@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import logging
+import ipaddress
 import socket
+import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
@@ -47,9 +50,15 @@ class Guest:
     """`turn(now)` does all there is to do. One thread, or one event loop, at a time."""
 
     def __init__(self, server: str, config: Config, now: int, clock: Callable[[], int] = time.monotonic_ns) -> None:
-        """Raises ValueError when `server` is no HOST:PORT, OSError when the system cannot reach it."""
+        """Raises ValueError when `server` is no HOST:PORT, OSError when there is no such host or the system cannot reach
+        it. A host name is looked up here, which may wait, and again, in a thread of its own, before each further attempt."""
         self.server = server
-        self.socket = _connected(server)
+        self._place = _look_up(server)[0]
+        self.socket = _connected(self.server, self._place)
+        self.moved: Callable[[socket.socket, socket.socket], None] = lambda old, new: None
+        """Called when the socket is another one now, before the old one is closed."""
+        self._found: list[Place] = []
+        self._waited = False
         self.core = ForceClient(config, now)
         self.clock = clock
         self._doubt = "is tendond running there" + (", and does it know our key" if config.key else "")
@@ -67,6 +76,7 @@ class Guest:
             self.core.receive(now, datagram)
         self.core.tick(now)
         self.flush(now)
+        self._follow_the_name()
         self._say()
 
     def flush(self, now: int) -> None:
@@ -94,6 +104,40 @@ class Guest:
             raise RefusedForGood(f"{self.server} refuses: {stats.reason}", stats.code)
         if stats.phase is Phase.STOPPED and stats.code is Code.REPLACED:
             raise RefusedForGood(f"{self.server} has ended this: {stats.reason}", stats.code)
+
+    def _follow_the_name(self) -> None:
+        """Between two attempts the name is looked up again: the server may have another address by now. Where nobody
+        answered at one address, the next one of the name is tried."""
+        waits = self.core.phase in (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
+        if waits and not self._waited and not _is_numeric(self.server):
+            threading.Thread(target=self._look_up_again, name="tendon-look-up", daemon=True).start()
+        self._waited = waits
+        if self._found and self.core.phase is not Phase.OPEN:
+            found, self._found = self._found, []
+            self._move_to(found)
+
+    def _look_up_again(self) -> None:
+        try:
+            self._found = _look_up(self.server)
+        except OSError as error:
+            log.warning("%s; trying %s", error, self._place[2][0])
+
+    def _move_to(self, found: list[Place]) -> None:
+        silent = self.core.phase is Phase.UNANSWERED
+        place = self._place
+        if place not in found:
+            place = found[0]
+        elif silent:
+            place = found[(found.index(place) + 1) % len(found)]
+        if place == self._place:
+            return
+        try:
+            new = _connected(self.server, place)
+        except OSError:
+            return  # no way there: the present one stays
+        old, self.socket, self._place = self.socket, new, place
+        self.moved(old, new)
+        old.close()
 
     def _receive(self) -> bytes | None:
         for _ in range(_MAX_ERRORS):
@@ -134,8 +178,8 @@ class AnyClient:
     """What the blocking and the asyncio client have in common: forces and requests out, and what is known of the guest."""
 
     def __init__(self, server: str, config: Config = Config()) -> None:
-        """`server`: HOST:PORT. Raises ValueError or OSError when there is no such address; nobody need listen
-        there yet."""
+        """`server`: HOST:PORT, HOST a name or an address. Raises ValueError or OSError, with the host's name, when there
+        is no such host; nobody need listen there yet."""
         self._guest = Guest(server, config, time.monotonic_ns())
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
@@ -200,15 +244,37 @@ class AnyClient:
         return asked
 
 
-def _connected(server: str) -> socket.socket:
-    """From a port that the system chooses, and connected, so the kernel drops what others send to it."""
+Place = tuple[int, int, Any]
+"""Where a server is, as the system says: family, protocol and address."""
+
+
+def _is_numeric(server: str) -> bool:
+    try:
+        ipaddress.ip_address(parse_address(server)[0])
+    except ValueError:
+        return False
+    return True
+
+
+def _look_up(server: str) -> list[Place]:
+    """The addresses of a server's name, the one to prefer first. Raises OSError with the host's name."""
     host, port = parse_address(server)
-    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-    connected = socket.socket(family, kind, protocol)
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+    except (OSError, UnicodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "that is no host name"
+        raise OSError(f"cannot find {host}: {why}") from None
+    return [(family, protocol, address) for family, _, protocol, _, address in found]
+
+
+def _connected(server: str, place: Place) -> socket.socket:
+    """From a port that the system chooses, and connected, so the kernel drops what others send to it."""
+    family, protocol, address = place
+    connected = socket.socket(family, socket.SOCK_DGRAM, protocol)
     try:
         connected.setblocking(False)
         connected.connect(address)
-    except OSError:
+    except OSError as error:
         connected.close()
-        raise
+        raise OSError(f"cannot reach {server}: {error.strerror}") from None
     return connected

@@ -16,9 +16,11 @@ def read_key(file: Path | str) -> bytes:
     """The 32 bytes in a key file: one line, `controller` or `observer` and 64 hexadecimal digits; empty lines and
     those that begin with # are comments.
 
-    Raises ValueError with a sentence (never with the key) when it is no key file or the key is weak,
-    PermissionError when others may read it.
+    Raises ValueError with a sentence (never with the key) when it is no key file or the key is weak, OSError when it cannot
+    be read or is a folder or a pipe, PermissionError when others may read it.
     """
+    if not stat.S_ISREG(os.stat(file).st_mode):  # before it is opened: a pipe would wait for ever
+        raise OSError(f"{file}: cannot read this key: it is not a regular file")
     with open(file, encoding="utf-8") as text:
         if os.name == "posix" and os.fstat(text.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
             raise PermissionError(f"{file}: others may read this key; chmod 600 {file}")

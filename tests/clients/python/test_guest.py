@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Addresses, and what a socket may report."""
 
+import asyncio
 import errno
+import socket
+import threading
+from types import SimpleNamespace
 
 import pytest
 
@@ -101,3 +105,93 @@ def test_a_client_tells_what_its_core_knows(kind, what):
     known = object()
     setattr(client._guest.core, what, known)
     assert getattr(client, what) is known
+
+
+@pytest.mark.parametrize("kind", [Client, aio.Client])
+def test_a_host_that_is_not_there_is_named(kind):
+    with pytest.raises(OSError, match=r"^cannot find haptics\.invalid: "):
+        kind("haptics.invalid:47100")
+
+
+def test_a_name_is_looked_up():
+    client = Client("localhost:9")
+    assert client._guest.socket.getpeername()[0] in ("127.0.0.1", "::1")
+    client._guest.socket.close()
+
+
+def place(host):
+    return (socket.AF_INET, 0, (host, 9))
+
+
+def looked_up(monkeypatch, *answers):
+    """What the system says to one look-up after the other; an OSError is raised."""
+    answers = list(answers)
+    done = threading.Event()
+
+    def look_up(server):
+        done.set()
+        answer = answers.pop(0)
+        if isinstance(answer, OSError):
+            raise answer
+        return answer
+
+    monkeypatch.setattr("tendon.guest._look_up", look_up)
+    monkeypatch.setattr("tendon.guest.threading.Thread", lambda target, name, daemon: SimpleNamespace(start=target))
+    return done
+
+
+def peer_after_an_attempt(it, now):
+    """Where the guest sends to once the attempt that began at `now` was not answered."""
+    it.turn(now + int(Config().patience_s * 1e9))
+    assert it.core.phase is Phase.UNANSWERED
+    it.turn(now + int(Config().patience_s * 1e9))
+    return it.socket.getpeername()[0]
+
+
+def test_where_nobody_answers_the_next_address_of_the_name_is_tried(monkeypatch):
+    both = [place("127.0.0.1"), place("127.0.0.2")]
+    looked_up(monkeypatch, both, both)
+    it = Guest("haptics.lab:9", Config(), 0, clock=lambda: 0)
+    moves = []
+    it.moved = lambda old, new: moves.append((old.fileno() >= 0, new is it.socket))
+    assert it.socket.getpeername()[0] == "127.0.0.1"
+    assert peer_after_an_attempt(it, 0) == "127.0.0.2"
+    assert moves == [(True, True)], "the old socket is open until it is not watched any more"
+    it.socket.close()
+
+
+def test_a_server_that_has_moved_is_followed(monkeypatch):
+    looked_up(monkeypatch, [place("127.0.0.1")], [place("127.0.0.3")])
+    it = Guest("haptics.lab:9", Config(), 0, clock=lambda: 0)
+    assert peer_after_an_attempt(it, 0) == "127.0.0.3"
+    it.socket.close()
+
+
+def test_a_name_that_is_gone_leaves_the_address_that_it_had(monkeypatch, caplog):
+    looked_up(monkeypatch, [place("127.0.0.1")], OSError("cannot find haptics.lab: gone"))
+    it = Guest("haptics.lab:9", Config(), 0, clock=lambda: 0)
+    assert peer_after_an_attempt(it, 0) == "127.0.0.1"
+    assert "cannot find haptics.lab: gone; trying 127.0.0.1" in caplog.text
+    it.socket.close()
+
+
+def test_an_address_is_never_looked_up_again(monkeypatch):
+    looked = looked_up(monkeypatch, [place("127.0.0.1")])
+    it = Guest("127.0.0.1:9", Config(), 0, clock=lambda: 0)
+    looked.clear()
+    assert peer_after_an_attempt(it, 0) == "127.0.0.1"
+    assert not looked.is_set()
+    it.socket.close()
+
+
+def test_the_event_loop_watches_the_socket_of_the_new_address():
+    async def move():
+        async with aio.Client("127.0.0.1:9") as client:
+            loop, guest_ = asyncio.get_running_loop(), client._guest
+            old = guest_.socket
+            guest_._move_to([place("127.0.0.2")])
+            assert guest_.socket is not old
+            assert loop.remove_reader(guest_.socket), "it was watched"
+            loop.add_reader(guest_.socket, client._turn)
+
+    asyncio.run(move())

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Key files; what they may hold is in test_vectors.py."""
 
+import os
 from hashlib import sha256
 
 import pytest
@@ -32,3 +33,10 @@ def test_a_refused_key_is_not_repeated_in_the_sentence(tmp_path):
 def test_a_key_that_others_may_read_is_refused(tmp_path, mode):
     with pytest.raises(PermissionError, match="chmod 600"):
         read_key(key_file(tmp_path, f"controller {DIGITS}", mode))
+
+
+def test_a_pipe_or_a_folder_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe", 0o600)
+    for file in (tmp_path / "pipe", tmp_path):
+        with pytest.raises(OSError, match="it is not a regular file"):
+            read_key(file)
