@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-import { createSocket, type Socket as UdpSocket } from "node:dgram";
 import { createServer, type IncomingMessage, type Server } from "node:http";
-import { isIPv6, type AddressInfo } from "node:net";
+import type { AddressInfo } from "node:net";
 import type { Duplex } from "node:stream";
 import { WebSocketServer, type WebSocket } from "ws";
 import { CipherSuite, decodeHeader } from "./datagram.js";
 import { kMaxDatagram } from "./limits.js";
-import { addressText, isLoopback, parseAddress } from "./udp.js";
+import { addressText, isLoopback, lookUp, parseAddress, parseServer, udp } from "./udp.js";
 
 export interface BridgeConfig {
   /** HOST:PORT for WebSockets; port 0 lets the system choose. */
   readonly listen: string;
-  /** HOST:PORT of tendond. */
+  /** HOST:PORT of tendond; HOST is a name or an address. */
   readonly to: string;
   /** Pages from there may connect, besides those from this machine: "https://lab.example". */
   readonly origins: readonly string[];
@@ -79,7 +78,7 @@ export class Bridge {
   /** Throws a sentence when an address is none, or the system refuses it. */
   static async open(config: Partial<BridgeConfig> = {}): Promise<Bridge> {
     const bridge = new Bridge({ ...kBridgeDefaults, ...config });
-    parseAddress(bridge.#config.to);
+    await lookUp(parseServer(bridge.#config.to).host);
     const { host, port } = parseAddress(bridge.#config.listen);
     await new Promise<void>((resolve, reject) => {
       const refused = ({ code }: NodeJS.ErrnoException): void => {
@@ -133,14 +132,14 @@ export class Bridge {
     const { counts } = this;
     ++counts.peers;
     ++counts.opened;
-    const udp = this.#openUdp((datagram) => {
+    const way = udp(this.#config.to)((datagram) => {
       if (page.bufferedAmount > kMaxWaitingBytes) {
         ++counts.tooSlow;
       } else {
         ++counts.toPage;
         page.send(datagram, { binary: true });
       }
-    });
+    }, () => page.terminate());
     const rate = new RateLimit(this.#config.maxRateHz);
     const idle = setTimeout(() => page.terminate(), kIdleMs);
     page.on("message", (data, isBinary) => {
@@ -152,30 +151,15 @@ export class Bridge {
       else if (!rate.take(performance.now())) ++counts.tooFast;
       else {
         ++counts.toServer;
-        udp.send(datagram);
+        way.send(datagram);
       }
     });
     page.on("error", () => {}); // "close" follows
     page.on("close", () => {
       clearTimeout(idle);
-      udp.close();
+      way.close();
       --counts.peers;
     });
-  }
-
-  #openUdp(receive: (datagram: Buffer) => void): { send: (datagram: Buffer) => void; close: () => void } {
-    const { host, port } = parseAddress(this.#config.to);
-    const socket: UdpSocket = createSocket(isIPv6(host) ? "udp6" : "udp4");
-    let ready = false;
-    socket.on("message", receive).on("error", () => {}); // nobody listens there (yet)
-    socket.connect(port, host, () => (ready = true));
-    return {
-      send: (datagram) => {
-        if (ready) socket.send(datagram, () => {});
-        else socket.once("connect", () => socket.send(datagram, () => {}));
-      },
-      close: () => socket.close(),
-    };
   }
 }
 

@@ -7,10 +7,15 @@ import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./ti
 export interface Transport {
   /** Sends one datagram, or loses it. */
   send(datagram: Uint8Array): void;
+  /** An attempt or a session is over: the server may have another address by now. `another`: nobody answered at this one. */
+  again?(another: boolean): void;
   close(): void;
 }
-/** Opens a way to one server: udp() of "tendon-client/node", webSocket(), or your own. Never calls back at once. */
-export type OpenTransport = (receive: (datagram: Uint8Array) => void) => Transport;
+/**
+ * Opens a way to one server: udp() of "tendon-client/node", webSocket(), or your own. Never calls back at once. `fail` ends the
+ * guest: there is no way there and there will be none.
+ */
+export type OpenTransport = (receive: (datagram: Uint8Array) => void, fail: (error: Error) => void) => Transport;
 
 export interface ConnectConfig extends ClientConfig {
   /** Told whenever the connection's phase has changed. */
@@ -41,7 +46,7 @@ export interface Guest {
   giveLease(): boolean;
   /** Says Bye and ends. */
   stop(): void;
-  /** Resolves at the end; rejects with what a callback threw. */
+  /** Resolves at the end; rejects with what a callback threw, or when there is no such host. */
   readonly ended: Promise<void>;
 }
 
@@ -95,7 +100,7 @@ class RealTimeGuest implements Guest {
     this.#onReport = config.onReport;
     this.#defer = makeDefer();
     this.#client = new ForceClient(config, callback, (datagram) => this.#transport.send(datagram), readClock());
-    this.#transport = open((datagram) => this.#receive(datagram));
+    this.#transport = open((datagram) => this.#receive(datagram), (error) => this.#fail(error));
     this.#wake();
   }
 
@@ -188,14 +193,21 @@ class RealTimeGuest implements Guest {
       this.#tellPhase();
       this.#tellReport();
     } catch (error) {
-      this.#reject(error);
-      this.#end();
+      this.#fail(error);
     }
+  }
+
+  #fail(error: unknown): void {
+    this.#reject(error);
+    this.#end();
   }
 
   #tellPhase(): void {
     if (this.#phase === this.phase) return;
     this.#phase = this.phase;
+    if (this.phase === "unanswered" || this.phase === "refused" || this.phase === "lost") {
+      this.#transport.again?.(this.phase === "unanswered");
+    }
     this.#onPhase?.(this);
   }
 

@@ -4,4 +4,4 @@ export * from "./index.js";
 export { readClientKey } from "./client_key.js";
 export { commandLine, type Options } from "./options.js";
 export { run } from "./run.js";
-export { udp } from "./udp.js";
+export { NoSuchHost, udp } from "./udp.js";

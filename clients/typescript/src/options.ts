@@ -3,7 +3,7 @@ import { parseArgs, type ParseArgsConfig } from "node:util";
 import { readClientKey } from "./client_key.js";
 import type { ClientConfig } from "./force_client.js";
 import { kMaxLabel } from "./limits.js";
-import { parseAddress } from "./udp.js";
+import { parseServer } from "./udp.js";
 
 /** What run() needs to know; commandLine() fills it. */
 export interface Options extends ClientConfig {
@@ -77,7 +77,7 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
         throw new RangeError(`--${option}: ${(error as Error).message}`);
       }
     };
-    of("server", () => parseAddress(server));
+    of("server", () => parseServer(server));
     const key = typeof values.key === "string" ? of("key", () => readClientKey(text("key")).key) : undefined;
     const options: Options = {
       name: defaults.name,
@@ -102,7 +102,7 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
 function help(purpose: string, { name, rateHz }: Shared, extras: Record<string, Extra>): string {
   const lines: [string, string][] = [
     ["-h, --help", "Print this and leave"],
-    ["--server HOST:PORT", "Where tendond listens [127.0.0.1:47100]"],
+    ["--server HOST:PORT", "Where tendond listens: a host name or an address [127.0.0.1:47100]"],
     ["--key FILE", "Key file (see `tendond keygen`); needed unless the server is here and has no keys"],
     ["--device NAME", "Name of the device, of a server with several"],
     ["--channel NAME", "Name of the device's channel that is to take the forces"],

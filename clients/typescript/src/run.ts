@@ -3,7 +3,7 @@ import { connect, type Guest } from "./connect.js";
 import type { ClientStats, Physics, Watch } from "./force_client.js";
 import { Code, type LinkReport } from "./messages.js";
 import type { Options } from "./options.js";
-import { udp } from "./udp.js";
+import { NoSuchHost, udp } from "./udp.js";
 
 /** Refusals that another attempt does not change. */
 const isFinal = (code: Code): boolean => code !== Code.BUSY && code !== Code.SHUTDOWN;
@@ -70,8 +70,8 @@ function printReport(report: LinkReport, { name, json }: Options): void {
 
 /**
  * Runs a guest over UDP until it is told to stop (durationS, SIGINT or SIGTERM); then it says Bye. The exit code comes
- * back: 0 = it has been connected to the server, 1 = it could not connect, the server refused it for good, or the callback
- * threw. Another controller at the device and a server that goes down are not for good: it keeps trying. stderr gets one
+ * back: 0 = it has been connected to the server, 1 = it could not connect, there is no such host, the server refused it for
+ * good, or the callback threw. Another controller at the device and a server that goes down are not for good: it keeps trying. stderr gets one
  * sentence for each change of the connection and the server's own when forces were late, stdout nothing but the callback's own
  * output and, with `json`, what the server says of our forces once a second, and the summary.
  */
@@ -105,7 +105,7 @@ export async function run(
     printSummary(stats, (performance.now() - start) / 1000, options);
     return stats.sessions > 0 ? 0 : 1;
   } catch (error) {
-    console.error(`${name}:`, error);
+    console.error(`${name}:`, error instanceof NoSuchHost ? error.message : error);
     return 1;
   } finally {
     clearTimeout(timer);

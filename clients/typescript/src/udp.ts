@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-import { createSocket } from "node:dgram";
-import { isIPv4, isIPv6 } from "node:net";
+import { createSocket, type Socket } from "node:dgram";
+import { lookup } from "node:dns/promises";
+import { isIP, isIPv4, isIPv6 } from "node:net";
 import type { OpenTransport } from "./connect.js";
 
 export interface Address {
@@ -30,30 +31,81 @@ export function isLoopback(host: string): boolean {
   return isIPv4(ip) ? ip.startsWith("127.") : ip === "::1";
 }
 
+/** As parseAddress(), and HOST may be a name: "haptics.lab:47100". Looks nothing up. */
+export function parseServer(text: string): Address {
+  const [, host = "", digits] = /^([A-Za-z0-9_][A-Za-z0-9_.-]{0,252}):(\d{1,5})$/.exec(text) ?? [];
+  if (host === "" || host === "localhost" || isIPv4(host) || Number(digits) > 0xffff) return parseAddress(text);
+  return { host, port: Number(digits) };
+}
+
+/** A name that the system does not know; the message has the name. */
+export class NoSuchHost extends Error {}
+
+/** The addresses of a host name, the one to prefer first; a numeric address is its own. Rejects with NoSuchHost. */
+export async function lookUp(host: string): Promise<readonly string[]> {
+  if (isIP(host)) return [host];
+  try {
+    return (await lookup(host, { all: true, verbatim: true })).map(({ address }) => address);
+  } catch (error) {
+    const { code, message } = error as NodeJS.ErrnoException;
+    throw new NoSuchHost(`cannot find ${host}: ${code === "ENOTFOUND" ? "no such host" : message}`);
+  }
+}
+
+/** Datagrams that wait for the socket; of more the newest are kept. */
+const kMostWaiting = 16;
+
 /**
  * A UDP socket that talks to one server, from a port that the system chooses. It is connected, so that the kernel drops
- * what others send to it. What the system does not take is lost.
+ * what others send to it. What the system does not take is lost. A host name is looked up at the start, and again before each
+ * further attempt; a guest whose server's name nobody knows at the start ends with NoSuchHost.
  */
 export function udp(server: string): OpenTransport {
-  const { host, port } = parseAddress(server);
-  return (receive) => {
-    const socket = createSocket(isIPv6(host) ? "udp6" : "udp4");
-    /** Until the socket is connected, which takes a round of the event loop. */
-    let waiting: Uint8Array[] | undefined = [];
-    socket.on("message", receive);
-    socket.on("error", () => {}); // nobody listens there (yet)
-    socket.connect(port, host, () => {
-      const early = waiting ?? [];
-      waiting = undefined;
-      for (const datagram of early) socket.send(datagram, () => {});
-    });
+  const { host, port } = parseServer(server);
+  return (receive, fail) => {
+    let socket: Socket | undefined;
+    let present = "";
+    let closed = false;
+    /** Until a socket is connected, which takes some rounds of the event loop. */
+    const waiting: Uint8Array[] = [];
+    const send = (datagram: Uint8Array): void => {
+      if (socket) socket.send(datagram, () => {});
+      else if (waiting.push(datagram) > kMostWaiting) waiting.shift();
+    };
+    /** Resolves to whether the system has a way there. */
+    const moveTo = (ip: string): Promise<boolean> =>
+      new Promise((resolve) => {
+        const next = createSocket(isIPv6(ip) ? "udp6" : "udp4");
+        next.on("message", receive);
+        next.on("error", () => {}); // nobody listens there (yet)
+        // Node calls back with an error, though its types do not say so.
+        next.connect(port, ip, (...results: unknown[]) => {
+          if (closed || results[0]) {
+            next.close();
+            return resolve(closed);
+          }
+          socket?.close();
+          [socket, present] = [next, ip];
+          waiting.splice(0).forEach(send);
+          resolve(true);
+        });
+      });
+    const find = async (another: boolean): Promise<void> => {
+      const ips = await lookUp(host);
+      const at = ips.indexOf(present);
+      if (at >= 0 && (!another || ips.length === 1)) return;
+      for (let i = 0; i < ips.length; ++i) {
+        const ip = ips[(at + 1 + i) % ips.length]!;
+        if (closed || ip === present || (await moveTo(ip))) return;
+      }
+    };
+    find(false).catch(fail);
     return {
-      send(datagram) {
-        if (waiting) waiting.push(datagram);
-        else socket.send(datagram, () => {});
-      },
+      send,
+      again: (another) => void find(another).catch(() => {}), // the present address stays
       close() {
-        socket.close();
+        closed = true;
+        socket?.close();
       },
     };
   };

@@ -152,7 +152,7 @@ it("says what it is to a browser that asks without WebSocket", async (test) => {
 
 it("webSocket() opens another WebSocket for the next datagram when the bridge was gone", async (test) => {
   const { bridge, url, server, arrived } = await setStage(test);
-  const transport = webSocket(url, WebSocket as unknown as typeof globalThis.WebSocket)(() => {});
+  const transport = webSocket(url, WebSocket as unknown as typeof globalThis.WebSocket)(() => {}, assert.fail);
   test.after(() => transport.close());
   transport.send(datagram(1));
   await until("the first has arrived", () => arrived.length === 1);
