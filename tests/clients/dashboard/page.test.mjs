@@ -75,6 +75,17 @@ it("says in words that nobody answers, and finds the server when it comes", asyn
   await until("states come", async () => (await shown(page)) > 50);
 });
 
+it("says that there is no such page, and shows the pages there are", async (test) => {
+  const { url } = await startDash(test, "127.0.0.1:9");
+  const page = await visit(test, url, { at: `${url}/#/nonsense` });
+  await says(page, "[role=alert]", "There is no page at #/nonsense.");
+  assert.equal(await page.locator("main.live").count(), 0);
+  await page.goto(`${url}/#/recordings/%zz`);
+  await says(page, "[role=alert]", "There is no page at #/recordings/%zz.");
+  await page.click("main a:has-text('Live')");
+  await page.locator("main.live").waitFor();
+});
+
 /** A hand that rests 8 mm deep in a wall, a device that is armed by request, and a channel that is the operator's. */
 const kGuarded = `
 [device]

@@ -77,6 +77,59 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
   await says(page, "[role=alert]", "There is no such recording.");
 });
 
+it("opens a recording at its first instant, and says one number of steps", async (test) => {
+  const folder = scratch(test);
+  const server = await startServer(test, folder, ["demo"], "--record", "off.mcap", "--without-limiter", "--duration-s", "3");
+  const wall = new Program(test, "virtual_wall", ["--server", server.address, "--rate-hz", "20"]);
+  await server.program.ended;
+  await wall.stop();
+  const { url } = await startDash(test, "127.0.0.1:9", "--recordings", folder);
+  const page = await visit(test, url, { at: `${url}/#/recordings/off.mcap` });
+  const tile = (name, part) => page.locator(`[data-tile=${name}] .${part}`).textContent();
+  await says(page, "[data-tile=mode] .name", "Force at 0\u00a0s");
+  assert.equal(await tile("mode", "value"), "Idle", "no engine is there yet, and the end is not told as if it were all");
+  assert.equal(await tile("energy", "name"), "Energy at 0\u00a0s");
+  const steps = (await page.locator(".run .head .quiet").textContent()).match(/([\d\u202f]+) steps/)[1];
+  assert.equal(await tile("state", "note"), `all ${steps} steps are shown`);
+  assert.doesNotMatch(await tile("loss", "note"), /\d{3}/, "no third number of steps");
+
+  // At the end the server has stopped the force, and the account of a device without limiter is overdrawn.
+  const box = await page.locator("[data-chart=force] .u-over").boundingBox();
+  await page.mouse.move(box.x + box.width - 2, box.y + 20);
+  await until("the tiles tell of the end", async () => Number((await tile("energy", "name")).match(/at ([\d.]+)/)?.[1]) > 2.5);
+  assert.equal(await tile("energy", "value"), "0 mJ");
+  assert.match(await tile("energy", "note"), /^may be given out: [\d.]+ mJ more came out than was put in$/);
+});
+
+it("shows the force by its components when the legend is told to", async (test) => {
+  const folder = scratch(test);
+  const server = await startServer(test, folder, ["demo"], "--record", "one.mcap", "--duration-s", "2");
+  const wall = new Program(test, "virtual_wall", ["--server", server.address]);
+  await server.program.ended;
+  await wall.stop();
+  const { url } = await startDash(test, "127.0.0.1:9", "--recordings", folder);
+  const page = await visit(test, url, { at: `${url}/#/recordings/one.mcap` });
+  await says(page, "[data-chart=force] .key", "applied");
+  const keys = () => page.locator("[data-chart=force] .key:visible").count();
+  assert.equal(await keys(), 3);
+  const norms = await picture(page, "[data-chart=force] canvas");
+  await page.click("[data-chart=force] .toggle:has-text('applied x y z')");
+  await until("the picture is another one", async () => (await picture(page, "[data-chart=force] canvas")) !== norms);
+  assert.equal(await keys(), 6);
+  const box = await page.locator("[data-chart=force] .u-over").boundingBox();
+  const value = async (name) => parseFloat((await page.locator("[data-chart=force] .key", { hasText: name }).locator(".value").textContent()).replace("−", "-"));
+  let x = 0;
+  for (let at = 2; at < box.width && !(x < 0); at += 8) {
+    await page.mouse.move(box.x + at, box.y + 20);
+    await new Promise((resolve) => setTimeout(resolve, 30));
+    x = await value("applied x");
+  }
+  assert.ok(x < 0, "the wall pushes the hand towards -x");
+  assert.ok(Math.abs(Math.hypot(x, await value("applied y"), await value("applied z")) - parseFloat(await page.locator("[data-chart=force] .key .value").nth(2).textContent())) < 0.02);
+  await page.click("[data-chart=force] .toggle:has-text('applied x y z')");
+  await until("they are gone again", async () => (await keys()) === 3);
+});
+
 /** A recording of `count` steps, one each millisecond: those of another one, again and again. */
 async function lengthen(from, to, count) {
   const reader = new McapStreamReader();

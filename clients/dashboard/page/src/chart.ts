@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import uPlot from "uplot";
-import { h, say, theme } from "./dom.js";
+import { h, mark, say, theme } from "./dom.js";
 import { thin, type Column, type Track } from "./track.js";
 import { digits } from "./words.js";
 
@@ -13,6 +13,8 @@ export interface Line {
   readonly width?: number;
   /** Fills down to zero. */
   readonly fill?: string;
+  /** Shown only while the button of this name in the legend is pressed. */
+  readonly toggle?: string;
 }
 
 export interface ChartSpec {
@@ -35,23 +37,42 @@ export interface ChartEvents {
   zoom(from: number, to: number): void;
   reset(): void;
   hover(time: number | undefined): void;
+  /** Lines were shown or hidden: draw again. */
+  changed(): void;
 }
 
 /** Of a plot: lower where there is little room. */
 const heightFor = (width: number): number => (width < 500 ? 168 : 196);
 
-/** One plot over time: lines with a unit, a legend that tells their values at the cursor. */
+/** One plot over time: lines with a unit, and a legend that tells their values at the cursor and shows or hides lines. */
 export class Chart {
   readonly element: HTMLElement;
   #plot: uPlot;
   readonly #box: HTMLElement;
   readonly #values: HTMLElement[];
+  readonly #shown: boolean[];
   #width = 0;
   #shared: [number, number] | undefined;
 
   constructor(readonly spec: ChartSpec, events: ChartEvents) {
     this.#values = spec.lines.map(() => h("span", { class: "value" }));
-    const legend = h("div", { class: "legend" }, ...spec.lines.map((line, i) => h("span", { class: "key" }, swatch(line), line.name, " ", this.#values[i]!)));
+    this.#shown = spec.lines.map((line) => line.toggle === undefined);
+    const keys = spec.lines.map((line, i) => h("span", { class: "key", hidden: !this.#shown[i] }, swatch(line), line.name, " ", this.#values[i]!));
+    const toggles = [...new Set(spec.lines.flatMap((line) => line.toggle ?? []))].map((name) => {
+      const button = h("button", { type: "button", class: "toggle", "aria-pressed": "false", click: () => {
+        const pressed = button.getAttribute("aria-pressed") !== "true";
+        mark(button, "aria-pressed", String(pressed));
+        spec.lines.forEach((line, i) => {
+          if (line.toggle !== name) return;
+          this.#shown[i] = pressed;
+          keys[i]!.hidden = !pressed;
+          this.#plot.setSeries(i + 1, { show: pressed });
+        });
+        events.changed();
+      } }, name);
+      return button;
+    });
+    const legend = h("div", { class: "legend" }, ...keys, ...toggles);
     this.#box = h("div", { class: "plot" });
     this.element = h("figure", { class: "chart", "data-chart": spec.id },
       h("figcaption", {}, h("span", { class: "title" }, spec.title, h("span", { class: "unit", text: spec.unit })), legend), this.#box);
@@ -71,6 +92,7 @@ export class Chart {
       ],
       series: [{}, ...spec.lines.map((line): uPlot.Series => ({
         label: line.name,
+        show: line.toggle === undefined,
         stroke: () => theme(line.colour),
         width: line.width ?? 1.5,
         ...(line.dash ? { dash: [...line.dash] } : {}),
@@ -103,7 +125,9 @@ export class Chart {
       this.#width = width;
       this.#plot.setSize({ width, height: heightFor(width) });
     }
-    const data = thin(track, this.spec.lines.map((line) => line.column), from, to, Math.max(width - 60, 50), this.spec.scale);
+    const lines = this.spec.lines.filter((_, k) => this.#shown[k]);
+    const [times, ...values] = thin(track, lines.map((line) => line.column), from, to, Math.max(width - 60, 50), this.spec.scale);
+    const data = [times, ...this.#shown.map((shown) => (shown ? values.shift()! : []))];
     this.#plot.batch(() => {
       this.#plot.setData(data as uPlot.AlignedData, false);
       this.#plot.setScale("x", { min: from, max: to });
@@ -116,11 +140,11 @@ export class Chart {
     });
   }
 
-  /** The least and the most that is drawn, but for the line that may leave. */
+  /** The least and the greatest value that is drawn, without the line that may leave. */
   extent(): [number, number] {
     let [from, to] = [Infinity, -Infinity];
     this.spec.lines.forEach((line, k) => {
-      if (line.column === this.spec.mayLeave) return;
+      if (line.column === this.spec.mayLeave || !this.#shown[k]) return;
       for (const v of this.#plot?.data[k + 1] ?? []) {
         if (v == null) continue;
         if (v < from) from = v;

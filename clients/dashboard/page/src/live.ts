@@ -5,7 +5,7 @@ import { Scrubber } from "./scrubber.js";
 import { Stream, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
 import { Track } from "./track.js";
 import { View, type Facts } from "./view.js";
-import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety } from "./words.js";
+import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety, moment } from "./words.js";
 
 /** Steps that are kept: two minutes at 1 kHz. */
 const kKept = 120_000;
@@ -53,6 +53,9 @@ export class Live {
       reset: () => this.#setStill(undefined),
       hover: (time) => {
         this.#hover = time;
+        this.#dirty = true;
+      },
+      changed: () => {
         this.#dirty = true;
       },
     });
@@ -179,7 +182,7 @@ export class Live {
     say(this.#about, info ? `${info.model}, ${count(info.loop_hz)} steps per second, at most ${digits(info.max_force_n)} N` : "");
     const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
     const facts = this.#facts();
-    this.#view.draw(this.#track, from, to, cursor, facts);
+    this.#view.draw(this.#track, from, to, cursor, this.#still ? moment(cursor) : "", facts);
     this.#arming.draw(this.#open ? this.#server : undefined, this.#watched, facts.state);
     if (this.#still) this.#scrubber.draw([this.#track], from, to);
     mark(this.element, "data-states", String(this.#track.end));

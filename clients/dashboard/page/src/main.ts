@@ -45,17 +45,33 @@ document.body.append(
   h("header", {}, h("a", { href: "#/live", class: "brand" }, mark_ as unknown as HTMLElement, "Tendon"), contact, h("nav", {}, tabs.live, tabs.recordings), themeButton),
   place);
 
+/** The parts of a path after its "#/"; undefined when their % signs encode nothing. */
+function partsOf(path: string): string[] | undefined {
+  try {
+    return path.replace(/^#?\/?/, "").split("/").map(decodeURIComponent);
+  } catch {
+    return undefined;
+  }
+}
+
 function route(): void {
   const [path = "", query] = location.hash.split("?");
-  const [, where = "live", ...names] = path.split("/");
+  const [where = "", ...names] = partsOf(path) ?? ["?"];
   if (where === "operator" && names[0]) return takePass(names[0]);
-  const recordings = where === "recordings";
-  tabs.live.classList.toggle("here", !recordings);
-  tabs.recordings.classList.toggle("here", recordings);
-  place.replaceChildren(recordings ? runs.element : live.element);
+  const here = where === "" ? "live" : where;
+  tabs.live.classList.toggle("here", here === "live");
+  tabs.recordings.classList.toggle("here", here === "recordings");
+  if (here === "live") return place.replaceChildren(live.element);
+  if (here !== "recordings") return place.replaceChildren(unknown(location.hash));
+  place.replaceChildren(runs.element);
   const from = Number(new URLSearchParams(query).get("from"));
-  if (recordings) void runs.show(names.map(decodeURIComponent), from > 0 && Number.isFinite(from) ? from : 0);
+  void runs.show(names, from > 0 && Number.isFinite(from) ? from : 0);
 }
+
+const unknown = (address: string): HTMLElement =>
+  h("main", { class: "recordings" },
+    h("p", { class: "error", role: "alert", text: `There is no page at ${address}. There are two: Live and Recordings.` }),
+    h("a", { href: "#/live" }, "Live"), " ", h("a", { href: "#/recordings" }, "Recordings"));
 window.addEventListener("hashchange", route);
 window.addEventListener("resize", () => (live.repaint(), runs.repaint()));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (live.repaint(), runs.repaint()));

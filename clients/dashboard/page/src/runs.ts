@@ -4,7 +4,7 @@ import { readRecording, type DeviceTrack, type Recording } from "./recording.js"
 import { Scrubber } from "./scrubber.js";
 import { quantiles, type Track } from "./track.js";
 import { View, type Facts } from "./view.js";
-import { bytes, count, duration, moment } from "./words.js";
+import { bytes, count, duration, moment, percent } from "./words.js";
 
 interface Entry {
   readonly name: string;
@@ -71,6 +71,7 @@ export class Runs {
         this.#cursor = time;
         this.#later();
       },
+      changed: () => this.#later(),
     };
     const names = read.map((r) => r.name);
     this.#open = read.map((recording) => new Run(recording, addressOf(names), new View(events), () => this.#later()));
@@ -110,7 +111,8 @@ export class Runs {
   #draw(): void {
     if (!this.#scrubber || this.#open.length === 0) return;
     this.#scrubber.draw(this.#open.map((run) => run.track), this.#from, this.#to);
-    const cursor = this.#cursor ?? this.#to;
+    // Where the reader begins: what a recording ends with would stand for all of it.
+    const cursor = this.#cursor ?? this.#from;
     for (const run of this.#open) run.draw(this.#from, this.#to, cursor);
     if (this.#open.length < 2) return;
     const all = this.#open.map((run) => run.view.extents());
@@ -162,12 +164,12 @@ class Run {
   draw(from: number, to: number, cursor: number): void {
     const key = `${this.#device.name} ${from} ${to}`;
     if (this.#facts?.key !== key) this.#facts = { key, facts: this.#compute(from, to) };
-    this.view.draw(this.track, from, to, cursor, this.#facts.facts);
+    this.view.draw(this.track, from, to, cursor, moment(Math.min(Math.max(cursor, this.track.first), this.track.last)), this.#facts.facts);
   }
 
   #compute(from: number, to: number): Facts {
     const track = this.track;
-    const [first, last] = [track.at(from), track.at(to)];
+    const [first, last] = [track.at(from), track.after(to)];
     const buckets = new Array<number>(24).fill(0);
     const late = track.column("late");
     let faults = 0;
@@ -180,14 +182,14 @@ class Run {
     const missed = countMissed(track, first, last);
     return {
       state: faults > 0
-        ? { level: "bad", name: "Fault", meaning: `in ${count(faults)} of these ${count(last - first)} steps` }
-        : { level: "off", name: "Recorded", meaning: `${count(last - first)} steps are shown` },
+        ? { level: "bad", name: "Fault", meaning: `in ${count(faults)} of the ${count(last - first)} steps shown` }
+        : { level: "off", name: "Recorded", meaning: last - first === track.length ? `all ${count(track.length)} steps are shown` : `${count(last - first)} of ${count(track.length)} steps are shown` },
       engines: [],
       noEngines: "A recording holds no reports of engines: see the age of the force.",
       delay: age! > 0
         ? { name: "Age of the force", value: duration(age!), note: `since the motion that it answers; 99\u00a0%: ${duration(oldest!)}` }
         : { name: "Age of the force", value: "–", note: "no force was in use" },
-      loss: { name: "Missing steps", value: count(missed), note: `of ${count(last - first + missed)} in this time` },
+      loss: { name: "Missing steps", value: count(missed), note: missed > 0 ? `${percent(missed / (last - first + missed))} of this time has no step` : "in this time" },
       lateness: { buckets: last > first ? buckets : [], what: "In this time", more: "" },
       gives: true,
       degraded: "",

@@ -91,6 +91,13 @@ export class Track {
     return low;
   }
 
+  /** Index of the first step after `time`. */
+  after(time: number): number {
+    let i = this.at(time);
+    while (i < this.end && this.t[i]! === time) ++i;
+    return i;
+  }
+
   #makeRoom(): void {
     const columns = [this.t, this.reasons, this.mode, ...Object.values(this.#columns)];
     if (this.begin > this.t.length / 2) {
@@ -169,9 +176,9 @@ export function usualStep(track: Track): number {
   return n < 2 ? 0.001 : (track.t[track.begin + n - 1]! - track.t[track.begin]!) / (n - 1);
 }
 
-/** Of the steps in [from, to): the share with each reason bit, and with any that limits the force. */
+/** The share of the steps in [from, to] that have each reason bit, and of those with any that limits the force. */
 export function shares(track: Track, from: number, to: number, limiting: number): { share: Map<number, number>; any: number; n: number } {
-  const [first, last] = [track.at(from), track.at(to)];
+  const [first, last] = [track.at(from), track.after(to)];
   const counts = new Uint32Array(32);
   let any = 0;
   for (let i = first; i < last; ++i) {
@@ -186,8 +193,8 @@ export function shares(track: Track, from: number, to: number, limiting: number)
   return { share, any: n > 0 ? any / n : 0, n };
 }
 
-/** The numbers of one column in [from, to) at the shares `quantiles` of them; NaN where there is none. */
+/** Quantiles of one column over the steps in [from, to]; NaN where no step has a number. */
 export function quantiles(track: Track, name: Column, from: number, to: number, wanted: readonly number[]): number[] {
-  const values = track.column(name).slice(track.at(from), track.at(to)).filter((v) => Number.isFinite(v)).sort();
+  const values = track.column(name).slice(track.at(from), track.after(to)).filter((v) => Number.isFinite(v)).sort();
   return wanted.map((q) => (values.length === 0 ? NaN : values[Math.min(values.length - 1, Math.floor(q * values.length))]!));
 }

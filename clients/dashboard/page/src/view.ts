@@ -14,6 +14,12 @@ export const kCharts: readonly ChartSpec[] = [
       { column: "permitted", name: "permitted", colour: "permitted", width: 1, fill: "permitted-fill" },
       { column: "wanted", name: "wanted", colour: "wanted", dash: [6, 4] },
       { column: "applied", name: "applied", colour: "applied", width: 2 },
+      { column: "ax", name: "applied x", colour: "x", width: 2, toggle: "applied x y z" },
+      { column: "ay", name: "applied y", colour: "y", dash: [6, 4], toggle: "applied x y z" },
+      { column: "az", name: "applied z", colour: "z", dash: [2, 3], toggle: "applied x y z" },
+      { column: "wx", name: "wanted x", colour: "x", width: 1, toggle: "wanted x y z" },
+      { column: "wy", name: "wanted y", colour: "y", width: 1, dash: [6, 4], toggle: "wanted x y z" },
+      { column: "wz", name: "wanted z", colour: "z", width: 1, dash: [2, 3], toggle: "wanted x y z" },
     ],
   },
   {
@@ -25,7 +31,7 @@ export const kCharts: readonly ChartSpec[] = [
     ],
   },
   {
-    id: "energy", title: "Energy that may still be given out", unit: "mJ", scale: 1e3, positive: true, least: 1,
+    id: "energy", title: "Energy put in and not given back", unit: "mJ", scale: 1e3, positive: true, least: 1,
     lines: [{ column: "energy", name: "energy", colour: "energy", width: 2, fill: "energy-fill" }],
   },
 ];
@@ -76,11 +82,12 @@ export class View {
         h("div", { class: "side" }, this.#lanes.element, engines, this.#histogram.element)));
   }
 
-  draw(track: Track, from: number, to: number, cursor: number, facts: Facts): void {
+  /** Shows [from, to]. The tiles and legends tell what was at `cursor`; `instant` names that, and is empty for "now". */
+  draw(track: Track, from: number, to: number, cursor: number, instant: string, facts: Facts): void {
     for (const chart of this.#charts) chart.draw(track, from, to, cursor);
     this.#lanes.draw(track, from, to);
     this.#histogram.draw(facts.lateness.buckets, facts.lateness.what, facts.lateness.more);
-    this.#drawTiles(track, cursor, facts);
+    this.#drawTiles(track, cursor, instant, facts);
     this.#drawEngines(facts);
   }
 
@@ -104,7 +111,7 @@ export class View {
     for (const chart of this.#charts) chart.destroy();
   }
 
-  #drawTiles(track: Track, cursor: number, facts: Facts): void {
+  #drawTiles(track: Track, cursor: number, instant: string, facts: Facts): void {
     const { state, mode, force, energy, delay, loss } = this.#tiles;
     const show = (t: typeof state, level: Level, value: string, note: string): void => {
       mark(t.element, "data-level", level);
@@ -116,12 +123,19 @@ export class View {
     const i = at < track.end ? at : track.end - 1;
     const known = i >= track.begin;
     const value = (column: "applied" | "wanted" | "permitted" | "energy" | "age"): number => (known ? track.column(column)[i]! : NaN);
+    const suffix = instant === "" ? "" : ` at ${instant}`;
+    say(mode.name, instant === "" ? "Force is" : `Force${suffix}`);
+    say(force.name, `Applied force${suffix}`);
+    say(energy.name, `Energy${suffix}`);
     const words = known ? kModes[track.mode[i]!] : undefined;
     if (words?.level === "good" && !facts.gives) show(mode, "off", words.name, "a fresh force has come, but the device gives none out");
     else show(mode, words?.level ?? "off", words?.name ?? "–", words?.meaning ?? "no state has come");
     const bound = Number.isFinite(value("permitted")) ? `${digits(value("permitted"))} permitted` : "no bound";
     show(force, "off", `${digits(value("applied"))} N`, Number.isFinite(value("wanted")) ? `of ${digits(value("wanted"))} wanted, ${bound}` : bound);
-    show(energy, value("energy") < 0 ? "bad" : "off", `${digits(1e3 * value("energy"))} mJ`, "may still be given out");
+    // Without a limiter the account can be overdrawn: then nothing may be given out, and the debt is told apart.
+    const account = 1e3 * value("energy");
+    if (account < 0) show(energy, "bad", "0 mJ", `may be given out: ${digits(-account)} mJ more came out than was put in`);
+    else show(energy, "off", `${digits(account)} mJ`, "may still be given out");
     say(delay.name, facts.delay.name);
     say(loss.name, facts.loss.name);
     show(delay, "off", facts.delay.value, facts.delay.note);
