@@ -6,6 +6,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
+#include <boost/asio/read.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
@@ -47,6 +48,11 @@ constexpr int kMaxDrained = 64;
 constexpr int kMaxSkips = 64;
 /// Of a file, in one write.
 constexpr std::size_t kPiece = 64 * 1024;
+/// Connections that are being refused; beyond these a new one is closed without a word.
+constexpr std::size_t kMaxRefusals = 64;
+/// A refused connection is read for so long, and so far, before it is closed: a reset would take the answer away.
+constexpr Duration kLinger = std::chrono::seconds(1);
+constexpr std::size_t kMaxLingered = 64 * 1024;
 /// Longest message of a page that looks on: "watch 15".
 constexpr std::size_t kMaxLine = 64;
 
@@ -61,6 +67,13 @@ Address address_of(const Endpoint& endpoint) {
   const asio::ip::address ip = endpoint.address();
   const auto v6 = ip.is_v4() ? asio::ip::make_address_v6(asio::ip::v4_mapped, ip.to_v4()) : ip.to_v6();
   return {v6.to_bytes(), endpoint.port()};
+}
+
+/// What one machine can easily have many of counts as one address: the hosts of an IPv6 network.
+std::array<std::uint8_t, 16> network_of(const Address& address) {
+  auto ip = address.ip;
+  if (!is_ipv4(address)) std::fill(ip.begin() + 8, ip.end(), std::uint8_t{0});
+  return ip;
 }
 
 /// Waits are of a clock of Asio's own.
@@ -138,6 +151,7 @@ class Connection {
       : shared_(shared), stream_(std::move(socket)), request_buffer_(shared.config.max_request) {
     error_code gone;
     const tcp::endpoint peer = stream_.socket().remote_endpoint(gone);
+    if (!gone) network_ = network_of(address_of(peer));
     local_ = !gone && is_loopback(address_of(peer));
     // A batch of states must not wait for the acknowledgement of the one before.
     stream_.socket().set_option(tcp::no_delay(true), gone);
@@ -150,6 +164,16 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
 
   void start() { read_request(); }
+  /// Says that there is no place, and closes.
+  void refuse() {
+    refused_ = true;
+    write_reply(Routes::plain(503, "too many connections"));
+  }
+  bool refused() const noexcept { return refused_; }
+  bool closed() const noexcept { return closed_; }
+  const std::array<std::uint8_t, 16>& network() const noexcept { return network_; }
+  /// Since when it has been waiting for a whole request; LocalTime::max() while it does anything else.
+  LocalTime waits_since() const noexcept { return waits_since_; }
   bool done() const noexcept { return closed_ && pending_ == 0; }
 
   void close() {
@@ -197,12 +221,14 @@ class Connection {
     parser_.emplace();
     parser_->header_limit(static_cast<std::uint32_t>(shared_.config.max_request));
     parser_->body_limit(0);
-    stream_.expires_after(waiting_time(shared_.config.patience));
+    waits_since_ = shared_.clock();
+    stream_.expires_after(waiting_time(shared_.config.request_patience));
     http::async_read(stream_, request_buffer_, *parser_,
                      with([this](error_code error, std::size_t) { take_request(error); }));
   }
 
   void take_request(error_code error) {
+    waits_since_ = LocalTime::max();
     if (error == http::error::end_of_stream || error == beast::error::timeout ||
         error == asio::error::connection_reset) {
       return close();
@@ -288,8 +314,17 @@ class Connection {
                         }
                         reply_.body = std::string();  // closes the file
                         if (keep_alive_) return read_request();
+                        if (refused_) return linger();
                         close();
                       }));
+  }
+
+  void linger() {
+    error_code gone;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, gone);
+    stream_.expires_after(waiting_time(kLinger));
+    text_.resize(kMaxLingered);
+    asio::async_read(stream_, asio::buffer(text_), with([this](error_code, std::size_t) { close(); }));
   }
 
   // ---- WebSockets
@@ -364,6 +399,9 @@ class Connection {
   beast::tcp_stream stream_;
   beast::flat_buffer request_buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
+  std::array<std::uint8_t, 16> network_{};
+  LocalTime waits_since_ = LocalTime::max();
+  bool refused_ = false;
   bool local_ = false;
   bool keep_alive_ = false;
   bool with_body_ = true;
@@ -408,17 +446,55 @@ struct WebServer::State {
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (!error && shared.connections.size() < config.max_connections) {
-        shared.connections.push_back(std::make_unique<Connection>(shared, std::move(socket)));
-        shared.connections.back()->start();
-      } else if (error) {  // out of descriptors: they come back as others leave
+      if (error) {  // out of descriptors: they come back as others leave
         accept_again.expires_after(waiting_time(std::chrono::milliseconds(100)));
         return accept_again.async_wait([this](error_code) { accept(); });
-      } else {
-        ++shared.counts.refused;
       }
+      take(std::make_unique<Connection>(shared, std::move(socket)));
       accept();
     });
+  }
+
+  void take(std::unique_ptr<Connection> connection) {
+    const bool room = make_room(*connection);
+    const auto refusals = static_cast<std::size_t>(
+        std::ranges::count_if(shared.connections, [](const auto& one) { return one->refused(); }));
+    if (!room && refusals >= kMaxRefusals) {
+      ++shared.counts.refused;
+      return;
+    }
+    shared.connections.push_back(std::move(connection));
+    if (room) {
+      shared.connections.back()->start();
+    } else {
+      shared.connections.back()->refuse();
+    }
+  }
+
+  /// Whether there is a place for one more; the connection that has waited longest for a request may lose its own.
+  bool make_room(const Connection& newcomer) {
+    std::size_t all = 0;
+    std::size_t near = 0;  // from the newcomer's address
+    Connection* idlest = nullptr;
+    Connection* idlest_near = nullptr;
+    const auto pick = [](Connection*& longest, Connection& one) {
+      if (one.waits_since() == LocalTime::max()) return;
+      if (longest == nullptr || one.waits_since() < longest->waits_since()) longest = &one;
+    };
+    for (const auto& one : shared.connections) {
+      if (one->closed() || one->refused()) continue;
+      ++all;
+      pick(idlest, *one);
+      if (one->network() != newcomer.network()) continue;
+      ++near;
+      pick(idlest_near, *one);
+    }
+    if (near < config.max_per_address && all < config.max_connections) return true;
+    Connection* const leaves = near >= config.max_per_address ? idlest_near : idlest;
+    if (leaves == nullptr) return false;
+    ++shared.counts.refused;
+    leaves->close();
+    return true;
   }
 
   void wait_for_server() {

@@ -14,27 +14,30 @@
 namespace tendon::dash {
 
 /// The sockets of tendon-dash and its one thread: HTTP and WebSockets for pages, one UDP socket to the server for the
-/// Observer, and one for each page on the bridge. It decides nothing: what is answered is Routes' business, what is
-/// told Feed's, what crosses the bridge BridgeGate's. The only file behind it knows Boost.Beast and Boost.Asio.
+/// Observer, and one for each page on the bridge. Routes decides what is answered, Feed what pages are told, and
+/// BridgeGate what crosses the bridge. Only the source file behind this header knows Boost.Beast and Boost.Asio.
 ///
-/// * A connection that has sent no whole request within `patience`, or reads no answer for so long, is closed. A
-/// WebSocket that is
-///   silent for so long is asked (ping) whether it is there; one of the bridge is not, its page says something every 50
-///   ms.
-/// * Nothing queues without a bound: of what a page does not read the newest is kept (PagePost), the bridge drops
-/// (BridgeGate).
+/// * A connection that has not sent a whole request within `request_patience` is closed, and so is one that reads no
+///   answer for `patience`. A WebSocket that is silent for `patience` is asked (ping) whether it is there; one of the
+///   bridge is not asked, its page says something every 50 ms.
+/// * There are at most `max_connections`, and at most `max_per_address` from one address (one IPv6 network of 64 bits).
+///   When they are used up, a new connection takes the place of the one that has waited longest for a request; when
+///   none is waiting, it is answered 503 at once. So connections that send nothing, or send it slowly, lock nobody out.
+/// * Nothing queues without a bound. PagePost keeps the newest of what a page does not read; BridgeGate drops it.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class WebServer {
  public:
   struct Config {
-    Address listen = parse_address("127.0.0.1:8080");   ///< port 0 lets the system choose
-    Address server = parse_address("127.0.0.1:47100");  ///< tendond
-    std::size_t max_connections = 128;                  ///< of all kinds; more are closed at once
-    std::size_t max_pages = 16;                         ///< that look on: each costs 150 kB/s of JSON
-    std::size_t max_bridges = 32;                       ///< as many as a server takes observers
-    std::size_t max_request = 16 * 1024;                ///< bytes of a request's headers
-    Duration patience = std::chrono::seconds(30);
+    Address listen = parse_address("127.0.0.1:8080");     ///< port 0 lets the system choose
+    Address server = parse_address("127.0.0.1:47100");    ///< tendond
+    std::size_t max_connections = 256;                    ///< of all kinds
+    std::size_t max_per_address = 64;                     ///< all pages and bridges of one machine, and their requests
+    std::size_t max_pages = 16;                           ///< that look on: each costs 150 kB/s of JSON
+    std::size_t max_bridges = 32;                         ///< as many as a server takes observers
+    std::size_t max_request = 16 * 1024;                  ///< bytes of a request's headers
+    Duration request_patience = std::chrono::seconds(5);  ///< for a whole request, counted from when it may begin
+    Duration patience = std::chrono::seconds(30);         ///< for whoever reads, and for WebSockets
     BridgeGate::Config bridge{};
   };
   using Clock = LocalTime (*)();

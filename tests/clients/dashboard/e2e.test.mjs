@@ -3,7 +3,8 @@
 // tendon-dash between a tendond and whoever may come to its door.
 import assert from "node:assert/strict";
 import { once } from "node:events";
-import { writeFileSync } from "node:fs";
+import { truncateSync, writeFileSync } from "node:fs";
+import { connect } from "node:net";
 import { it } from "node:test";
 import { gunzipSync } from "node:zlib";
 import { fakeServer, kRoot, metric, packageOf, Program, raw, scratch, startDash, startServer, until } from "./support.mjs";
@@ -154,17 +155,47 @@ it("refuses who is not what it says, and stays for the others", async (test) => 
   assert.equal((await fetch(`${url}/metrics`)).status, 200);
 });
 
-it("closes connections of which there are too many, and serves again when they have gone", async (test) => {
+/** Connections from one address that have said `words` and read nothing. */
+async function crowd(test, address, count, words) {
+  const [host, port] = address.split(":");
+  const sockets = Array.from({ length: count }, () => connect(Number(port), host).on("error", () => {}));
+  test.after(() => sockets.forEach((socket) => socket.destroy()));
+  await Promise.all(sockets.map((socket) => once(socket, "connect")));
+  for (const socket of sockets) socket.pause().write(words);
+  return sockets;
+}
+
+it("serves others at once while 300 slow connections wait, and ends those after 5 s", async (test) => {
   const { address: nobody } = await fakeServer(test);
   const { url, address } = await startDash(test, nobody);
-  const [host, port] = address.split(":");
-  const { connect } = await import("node:net");
-  const idle = Array.from({ length: 128 }, () => connect(Number(port), host).on("error", () => {}));
-  await Promise.all(idle.map((socket) => once(socket, "connect")));
-  assert.equal(await raw(address, get(address, "/metrics")), "");
-  for (const socket of idle) socket.destroy();
-  await until("it serves again", async () => (await raw(address, get(address, "/metrics"))).startsWith("HTTP/1.1 200"));
-  assert.ok((await metric(url, "tendon_dash_requests_refused_total")) >= 1);
+  const sockets = await crowd(test, address, 300, "GET /metrics HTTP/1.1\r\nHost: ");
+  const began = performance.now();
+  assert.equal(statusOf(await raw(address, get(address, "/metrics"))), 200);
+  assert.ok(performance.now() - began < 2000, "it did not wait for the slow ones to be given up");
+  assert.ok((await metric(url, "tendon_dash_requests_refused_total")) >= 300 - 64);
+  const last = sockets.at(-1).resume();
+  const drip = setInterval(() => last.write("a"), 500);
+  test.after(() => clearInterval(drip));
+  await once(last, "close");
+  const took = performance.now() - began;
+  assert.ok(took > 3000 && took < 15_000, `a request that drips is given up after ${took} ms`);
+});
+
+it("answers 503 at once when an address has no place left, and serves another", async (test) => {
+  const folder = scratch(test);
+  writeFileSync(`${folder}/large.mcap`, "");
+  truncateSync(`${folder}/large.mcap`, 256 << 20);
+  const { address: nobody } = await fakeServer(test);
+  const { address } = await startDash(test, nobody, "--recordings", folder);
+  const sockets = await crowd(test, address, 64, get(address, "/recordings/large.mcap"));
+  const ask = (localAddress) => raw(address, get(address, "/metrics"), localAddress).then(statusOf);
+  await until("all 64 are being answered", async () => (await ask("127.0.0.1")) === 503);
+  const began = performance.now();
+  assert.equal(await ask("127.0.0.1"), 503);
+  assert.ok(performance.now() - began < 2000);
+  assert.equal(await ask("127.0.0.2"), 200);
+  for (const socket of sockets) socket.destroy();
+  await until("it serves again", async () => (await ask("127.0.0.1")) === 200);
 });
 
 it("says how to listen beyond this machine, and which folder is none", async (test) => {
@@ -275,10 +306,10 @@ it("bridge: carries the TypeScript client's session to a tendond and back", asyn
   const folder = scratch(test);
   const server = await startServer(test, folder, ["demo"], "--record", "/dev/null");
   const { address } = await startDash(test, server.address);
-  const { connect } = await import(`${kRoot}/clients/typescript/dist/index.js`);
+  const { connect: join } = await import(`${kRoot}/clients/typescript/dist/index.js`);
   const { webSocket } = await import(`${kRoot}/clients/typescript/dist/websocket.js`);
   let states = 0;
-  const guest = connect(webSocket(`ws://${address}/bridge`, WebSocket), { name: "page", rateHz: 200 }, { physics: ({ position }) => (++states, { x: -100 * position.x, y: 0, z: 0 }) });
+  const guest = join(webSocket(`ws://${address}/bridge`, WebSocket), { name: "page", rateHz: 200 }, { physics: ({ position }) => (++states, { x: -100 * position.x, y: 0, z: 0 }) });
   test.after(() => guest.stop());
   await until("states come and forces go", () => states > 50 && guest.stats().forces > 20);
 });

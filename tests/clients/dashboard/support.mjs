@@ -93,10 +93,10 @@ export async function fakeServer(test) {
   return { socket, arrived, address: `127.0.0.1:${socket.address().port}` };
 }
 
-/** Bytes of a connection of one's own: what comes back until it is closed. */
-export async function raw(address, bytes) {
+/** Bytes of a connection of one's own, from `localAddress`: what comes back until it is closed. */
+export async function raw(address, bytes, localAddress = "127.0.0.1") {
   const [host, port] = address.split(":");
-  const socket = connect(Number(port), host);
+  const socket = connect({ port: Number(port), host, localAddress });
   let answer = "";
   socket.setEncoding("latin1").on("data", (text) => (answer += text));
   socket.on("error", () => {});
