@@ -4,10 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "clients/cpp/key_file.h"
+#include "clients/cpp/server_name.h"
 #include "clients/cpp/udp_transport.h"
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/feed.h"
-#include "clients/dashboard/json.h"
 #include "clients/dashboard/metrics.h"
 #include "clients/dashboard/observer.h"
 #include "clients/dashboard/operator.h"
@@ -54,7 +54,8 @@ std::string new_pass() {
 }
 
 struct Options {
-  WebServer::Config web;
+  ServerName server = "127.0.0.1:47100";
+  WebServer::Config web;  ///< its `server` is what the name is looked up to
   Routes::Config routes;
   std::string key_file;
   std::string arm_channel;
@@ -75,7 +76,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       "then open http://127.0.0.1:8080 in a browser.");
   app.set_help_flag("-h,--help", "Print this and leave");
   app.set_version_flag("--version", TENDON_VERSION);
-  std::string server = to_string(options.web.server);
+  std::string server = options.server.text();
   std::string listen = to_string(options.web.listen);
   const auto address = CLI::Validator(
       [](const std::string& text) -> std::string {
@@ -87,10 +88,20 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
         }
       },
       "");
-  app.add_option("--server", server, "Where tendond listens")
+  const auto name = CLI::Validator(
+      [](const std::string& text) -> std::string {
+        try {
+          ServerName{text};
+          return {};
+        } catch (const std::invalid_argument& error) {
+          return error.what();
+        }
+      },
+      "");
+  app.add_option("--server", server, "Where tendond listens: an address, or a host name, which is looked up once")
       ->type_name("HOST:PORT")
       ->capture_default_str()
-      ->check(address);
+      ->check(name);
   app.add_option(
          "--key", options.key_file,
          "Key file (see `tendond keygen --observer`); needed unless the server is on this machine and has no keys")
@@ -123,7 +134,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;  // prints the help, or what is wrong
   }
-  options.web.server = parse_address(server);
+  options.server = server;
   options.web.listen = parse_address(listen);
   if (!is_loopback(options.web.listen) && options.routes.hosts.empty()) {
     std::cerr << "--listen " << listen
@@ -144,6 +155,9 @@ int run(const Options& options) {
   std::optional<Recordings> recordings;
   if (!options.recordings.empty()) recordings.emplace(options.recordings);
 
+  const std::vector<Address> addresses = options.server.look_up();
+  WebServer::Config web_config = options.web;
+  web_config.server = addresses.front();
   const LocalTime start = read_clock();
   Board board;
   WebCounts counts;
@@ -151,15 +165,15 @@ int run(const Options& options) {
   // The Observer's address is another guest's.
   std::optional<UdpTransport> operator_link;
   std::optional<Operator> operates;
-  Abilities abilities{.server = to_string(options.web.server), .recordings = recordings.has_value()};
+  Abilities abilities{.server = options.server.text(), .recordings = recordings.has_value()};
   std::function<std::string(std::uint32_t, Operator::Order)> press;
   if (arms) {
     if (key->role != Role::kController) {
       throw std::runtime_error(options.key_file + ": an observer's key; --arm wants a controller's");
     }
-    operator_link.emplace(options.web.server);
+    operator_link.emplace(web_config.server);
     abilities.arms = true;
-    operates.emplace(*operator_link, options.web.server,
+    operates.emplace(*operator_link, web_config.server,
                      Operator::Config{.channel = options.arm_channel, .key = key->key, .seed = seed_from_system()},
                      board);
     abilities.arming_objection = [&](std::uint32_t device) { return operates->objection(device); };
@@ -172,20 +186,16 @@ int run(const Options& options) {
                                        .metrics = [&] { return metrics_text(board, counts, bridge); },
                                        .press = press,
                                        .pass = pass});
-  WebServer web(options.web, routes, feed, counts, bridge, read_clock);
-  Observer observer(web.link(), options.web.server,
+  WebServer web(web_config, routes, feed, counts, bridge, read_clock);
+  Observer observer(web.link(), web_config.server,
                     {.key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()}, board, start);
 
   const std::string at = to_string(web.address());
   const std::string operator_url = arms ? "http://" + at + "/#/operator/" + pass : std::string();
   if (options.json) {
-    JsonWriter json;
-    json.begin_object().key("event").value("listening").key("address").value(at);
-    json.key("server").value(to_string(options.web.server));
-    if (arms) json.key("operator_url").value(operator_url);
-    json.end_object();
-    std::puts(json.text().c_str());
-    std::fflush(stdout);
+    nlohmann::ordered_json json = {{"event", "listening"}, {"address", at}, {"server", abilities.server}};
+    if (arms) json["operator_url"] = operator_url;
+    std::cout << json << std::endl;
   } else {
     std::cerr << "tendon-dash: open http://" << at << "/\n";
     if (arms) std::cerr << "tendon-dash: to arm and disarm, open " << operator_url << "\n";
@@ -206,11 +216,12 @@ int run(const Options& options) {
   if (operates) operates->stop(read_clock());
   observer.stop(read_clock());
   if (options.json) {
-    JsonWriter json;
-    json.begin_object().key("event").value("stopped").key("requests").value(counts.requests);
-    json.key("refused").value(counts.refused).key("states_skipped").value(counts.states_skipped);
-    json.key("sessions").value(board.sessions()).end_object();
-    std::puts(json.text().c_str());
+    std::cout << nlohmann::ordered_json{{"event", "stopped"},
+                                        {"requests", counts.requests},
+                                        {"refused", counts.refused},
+                                        {"states_skipped", counts.states_skipped},
+                                        {"sessions", board.sessions()}}
+              << std::endl;
   }
   return board.sessions() > 0 ? 0 : 1;
 }

@@ -2,26 +2,24 @@
 #include "clients/dashboard/page_json.h"
 
 #include <array>
+#include <charconv>
 #include <limits>
-
-#include "clients/dashboard/json.h"
+#include <nlohmann/json.hpp>
+#include <utility>
 
 namespace tendon::dash {
 namespace {
 
+using Json = nlohmann::ordered_json;  // members in the order in which they are written here
+
 double milliseconds(Duration d) { return 1e3 * seconds(d); }
 double nanoseconds(PeerTime t) { return static_cast<double>(t.time_since_epoch().count()); }
 
-void write(JsonWriter& json, const Vec3& v) { json.begin_array().value(v.x()).value(v.y()).value(v.z()).end_array(); }
+Json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-void write(JsonWriter& json, std::string_view name, const std::optional<Delays>& delays) {
-  json.key(name);
-  if (!delays) {
-    json.null();
-    return;
-  }
-  json.begin_object().key("median").value(milliseconds(delays->median));
-  json.key("p99").value(milliseconds(delays->p99)).end_object();
+Json delays(const std::optional<Delays>& delays) {
+  if (!delays) return nullptr;
+  return {{"median", milliseconds(delays->median)}, {"p99", milliseconds(delays->p99)}};
 }
 
 std::string_view state_name(Press::State state) noexcept {
@@ -36,87 +34,102 @@ std::string_view state_name(Press::State state) noexcept {
   return "unknown";
 }
 
-void write(JsonWriter& json, const std::optional<Press>& press) {
-  json.key("press");
-  if (!press) {
-    json.null();
-    return;
-  }
-  json.begin_object().key("device").value(press->device).key("order").value(press->arm ? "arm" : "disarm");
-  json.key("state").value(state_name(press->state)).key("words").value(press->words).end_object();
+Json in_json(const std::optional<Press>& press) {
+  if (!press) return nullptr;
+  return {{"device", press->device},
+          {"order", press->arm ? "arm" : "disarm"},
+          {"state", state_name(press->state)},
+          {"words", press->words}};
 }
 
-void write(JsonWriter& json, const DeviceDescription& about, const std::string& arming_objection) {
-  json.begin_object().key("number").value(about.device).key("name").value(about.name).key("model").value(about.model);
-  json.key("loop_hz").value(about.loop_hz).key("max_force_n").value(about.max_force);
-  json.key("workspace_m");
-  if (about.workspace) {
-    json.begin_array();
-    write(json, about.workspace->min);
-    write(json, about.workspace->max);
-    json.end_array();
-  } else {
-    json.null();
-  }
-  json.key("channels").begin_array();
+Json in_json(const DeviceDescription& about, const std::string& arming_objection) {
+  Json channels = Json::array();
   for (const ChannelDescription& channel : about.channels) {
-    json.begin_object().key("name").value(channel.name);
-    json.key("rule").value(channel.rule == ChannelRule::kSum ? "sum" : "priority");
-    json.key("lease_ms").value(milliseconds(channel.lease)).key("holder").value(channel.holder).end_object();
+    channels.push_back({{"name", channel.name},
+                        {"rule", channel.rule == ChannelRule::kSum ? "sum" : "priority"},
+                        {"lease_ms", milliseconds(channel.lease)},
+                        {"holder", channel.holder}});
   }
-  json.end_array().key("arming_objection").value(arming_objection).end_object();
+  Json workspace;
+  if (about.workspace) workspace = {vector(about.workspace->min), vector(about.workspace->max)};
+  return {{"number", about.device},
+          {"name", about.name},
+          {"model", about.model},
+          {"loop_hz", about.loop_hz},
+          {"max_force_n", about.max_force},
+          {"workspace_m", std::move(workspace)},
+          {"channels", std::move(channels)},
+          {"arming_objection", arming_objection}};
 }
 
-void write(JsonWriter& json, const Board::Device& device) {
+Json loop_json(const Board::Device& device) {
   const DeviceReport& report = *device.report;
-  json.begin_object().key("span_s").value(seconds(report.span));
-  json.key("steps").value(report.steps).key("missed").value(report.missed);
-  json.key("overruns").value(report.overruns).key("unseen").value(report.unseen);
-  json.key("safety").value(name(report.safety));
-  json.key("fault").value(report.fault).key("degraded").value(report.degraded);
-  json.key("lateness_us_log2").begin_array();
-  for (const std::uint64_t count : report.lateness) json.value(count);
-  json.end_array().key("lateness_us_log2_total").begin_array();
-  for (const std::uint64_t count : device.lateness) json.value(count);
-  json.end_array().key("steps_total").value(device.steps).key("missed_total").value(device.missed).end_object();
+  return {{"span_s", seconds(report.span)},
+          {"steps", report.steps},
+          {"missed", report.missed},
+          {"overruns", report.overruns},
+          {"unseen", report.unseen},
+          {"safety", name(report.safety)},
+          {"fault", report.fault},
+          {"degraded", report.degraded},
+          {"lateness_us_log2", report.lateness},
+          {"lateness_us_log2_total", device.lateness},
+          {"steps_total", device.steps},
+          {"missed_total", device.missed}};
 }
 
-void write(JsonWriter& json, std::string_view channel, const PeerReport& peer) {
+Json engine_json(const std::string& channel, const PeerReport& peer) {
   const LinkReport& link = peer.link;
-  json.begin_object().key("channel").value(channel).key("name").value(peer.name).key("span_s").value(
-      seconds(link.span));
-  json.key("forces").value(link.forces).key("late_server").value(link.late_server);
-  json.key("late_network").value(link.late_network).key("late_engine").value(link.late_engine);
-  json.key("worst_late_ms").value(milliseconds(link.worst_late));
-  json.key("longest_gap_ms").value(milliseconds(link.longest_gap));
-  write(json, "round_trip_ms", link.round_trip);
-  write(json, "to_server_ms", link.to_server);
-  write(json, "to_client_ms", link.to_client);
-  json.key("clock_error_ms").value(milliseconds(link.clock_error));
-  json.key("received").value(link.received).key("lost").value(link.lost);
-  json.key("reordered").value(link.reordered).key("duplicated").value(link.duplicated);
-  json.key("state_one_in").value(peer.state_one_in).key("forces_refused").value(peer.forces_refused);
-  json.key("words").value(link.words).end_object();
+  return {{"channel", channel},
+          {"name", peer.name},
+          {"span_s", seconds(link.span)},
+          {"forces", link.forces},
+          {"late_server", link.late_server},
+          {"late_network", link.late_network},
+          {"late_engine", link.late_engine},
+          {"worst_late_ms", milliseconds(link.worst_late)},
+          {"longest_gap_ms", milliseconds(link.longest_gap)},
+          {"round_trip_ms", delays(link.round_trip)},
+          {"to_server_ms", delays(link.to_server)},
+          {"to_client_ms", delays(link.to_client)},
+          {"clock_error_ms", milliseconds(link.clock_error)},
+          {"received", link.received},
+          {"lost", link.lost},
+          {"reordered", link.reordered},
+          {"duplicated", link.duplicated},
+          {"state_one_in", peer.state_one_in},
+          {"forces_refused", peer.forces_refused},
+          {"words", link.words}};
+}
+
+/// The number that is written as `number` with seven digits, which are what a plot shows.
+double plotted(double number) {
+  std::array<char, 32> digits;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), static_cast<float>(number)).ptr;
+  double shown = 0;
+  std::from_chars(digits.data(), end, shown);
+  return shown;
 }
 
 /// One number of each state.
 template <class Of>
-void column(JsonWriter& json, std::string_view name, std::span<const DeviceState> states, Of of) {
-  json.key(name).begin_array();
-  for (const DeviceState& state : states) json.value(of(state));
-  json.end_array();
+Json column(std::span<const DeviceState> states, Of of) {
+  Json numbers = Json::array();
+  for (const DeviceState& state : states) numbers.push_back(of(state));
+  return numbers;
 }
 
 template <class Of>
-void columns(JsonWriter& json, std::string_view name, std::span<const DeviceState> states, Of of) {
-  json.key(name).begin_array();
+Json columns(std::span<const DeviceState> states, Of of) {
+  Json axes = Json::array();
   for (int axis = 0; axis < 3; ++axis) {
-    json.begin_array();
-    for (const DeviceState& state : states) json.value(static_cast<float>(of(state)[axis]));
-    json.end_array();
+    axes.push_back(column(states, [&](const DeviceState& state) { return plotted(of(state)[axis]); }));
   }
-  json.end_array();
+  return axes;
 }
+
+/// Bytes that are no UTF-8 become U+FFFD; what JSON has no number for (NaN, infinities) becomes null.
+std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 }  // namespace
 
@@ -184,78 +197,68 @@ std::string reason_name(std::size_t bit) {
 }
 
 std::string server_json(const Board& board, const Abilities& abilities) {
-  JsonWriter json;
-  json.begin_object().key("type").value("server").key("address").value(abilities.server);
-  json.key("contact").value(name(board.contact())).key("words").value(board.words());
-  json.key("version").value(board.welcome() ? board.welcome()->server : "");
-  json.key("recordings").value(abilities.recordings);
-  json.key("arms").value(abilities.arms);
-  write(json, board.press());
-  json.key("devices").begin_array();
+  Json devices = Json::array();
   for (const auto& [number, device] : board.devices()) {
-    if (device.about) write(json, *device.about, abilities.arming_objection(number));
+    if (device.about) devices.push_back(in_json(*device.about, abilities.arming_objection(number)));
   }
-  json.end_array().end_object();
-  return json.take();
+  return text_of({{"type", "server"},
+                  {"address", abilities.server},
+                  {"contact", name(board.contact())},
+                  {"words", board.words()},
+                  {"version", board.welcome() ? board.welcome()->server : ""},
+                  {"recordings", abilities.recordings},
+                  {"arms", abilities.arms},
+                  {"press", in_json(board.press())},
+                  {"devices", std::move(devices)}});
 }
 
 std::string states_json(std::uint32_t device, std::span<const DeviceState> states) {
-  JsonWriter json;
-  json.begin_object().key("type").value("states").key("device").value(device);
-  column(json, "tick", states, [](const DeviceState& s) { return s.tick; });
-  // µs on the server's clock: a double holds them exactly for as long as a machine runs.
-  column(json, "sampled_us", states, [](const DeviceState& s) { return nanoseconds(s.sampled) / 1e3; });
-  columns(json, "position_m", states, [](const DeviceState& s) { return s.position; });
-  columns(json, "wanted_n", states, [](const DeviceState& s) {
-    const double untold = std::numeric_limits<double>::quiet_NaN();
-    return s.force_wanted.value_or(Vec3(untold, untold, untold));
-  });
-  columns(json, "applied_n", states, [](const DeviceState& s) { return s.force_applied; });
-  column(json, "permitted_n", states, [](const DeviceState& s) { return static_cast<float>(s.permitted_force); });
-  column(json, "energy_j", states, [](const DeviceState& s) { return static_cast<float>(s.energy); });
-  column(json, "reasons", states, [](const DeviceState& s) { return s.reasons; });
-  column(json, "mode", states, [](const DeviceState& s) { return static_cast<unsigned>(s.mode); });
-  column(json, "force_age_ms", states,
-         [](const DeviceState& s) { return static_cast<float>(milliseconds(s.force_age)); });
-  json.end_object();
-  return json.take();
+  static constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
+  const auto wanted = [](const DeviceState& s) { return s.force_wanted.value_or(Vec3(kUntold, kUntold, kUntold)); };
+  return text_of(
+      {{"type", "states"},
+       {"device", device},
+       {"tick", column(states, [](const DeviceState& s) { return s.tick; })},
+       // µs on the server's clock: a double holds them exactly for as long as a machine runs.
+       {"sampled_us", column(states, [](const DeviceState& s) { return nanoseconds(s.sampled) / 1e3; })},
+       {"position_m", columns(states, [](const DeviceState& s) { return s.position; })},
+       {"wanted_n", columns(states, wanted)},
+       {"applied_n", columns(states, [](const DeviceState& s) { return s.force_applied; })},
+       {"permitted_n", column(states, [](const DeviceState& s) { return plotted(s.permitted_force); })},
+       {"energy_j", column(states, [](const DeviceState& s) { return plotted(s.energy); })},
+       {"reasons", column(states, [](const DeviceState& s) { return s.reasons; })},
+       {"mode", column(states, [](const DeviceState& s) { return static_cast<unsigned>(s.mode); })},
+       {"force_age_ms", column(states, [](const DeviceState& s) { return plotted(milliseconds(s.force_age)); })}});
 }
 
 std::string reports_json(std::uint32_t number, const Board& board) {
-  JsonWriter json;
   const LinkStats& link = board.link();
-  json.begin_object().key("type").value("reports").key("device").value(number);
-  json.key("link").begin_object();
-  json.key("round_trip_ms").value(milliseconds(link.smoothed_round_trip));
-  json.key("received").value(link.datagrams_received).key("lost").value(link.lost).end_object();
   const auto found = board.devices().find(number);
   const Board::Device* const device = found != board.devices().end() ? &found->second : nullptr;
-  json.key("loop");
-  if (device != nullptr && device->report) {
-    write(json, *device);
-  } else {
-    json.null();
-  }
-  json.key("engines").begin_array();
+  Json engines = Json::array();
   if (device != nullptr) {
     for (const auto& [channel, engine] : device->engines) {
       const bool named = device->about && channel < device->about->channels.size();
-      write(json, named ? device->about->channels[channel].name : std::to_string(channel), engine.newest);
+      engines.push_back(
+          engine_json(named ? device->about->channels[channel].name : std::to_string(channel), engine.newest));
     }
   }
-  json.end_array().end_object();
-  return json.take();
+  return text_of({{"type", "reports"},
+                  {"device", number},
+                  {"link",
+                   {{"round_trip_ms", milliseconds(link.smoothed_round_trip)},
+                    {"received", link.datagrams_received},
+                    {"lost", link.lost}}},
+                  {"loop", device != nullptr && device->report ? loop_json(*device) : Json()},
+                  {"engines", std::move(engines)}});
 }
 
 std::string recordings_json(std::span<const Recordings::Entry> entries) {
-  JsonWriter json;
-  json.begin_array();
+  Json list = Json::array();
   for (const Recordings::Entry& entry : entries) {
-    json.begin_object().key("name").value(entry.name).key("size_bytes").value(entry.size);
-    json.key("modified_unix_s").value(entry.modified_unix_s).end_object();
+    list.push_back({{"name", entry.name}, {"size_bytes", entry.size}, {"modified_unix_s", entry.modified_unix_s}});
   }
-  json.end_array();
-  return json.take();
+  return text_of(list);
 }
 
 }  // namespace tendon::dash

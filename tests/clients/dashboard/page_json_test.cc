@@ -142,6 +142,22 @@ TEST(PageJson, NamesEveryReasonAsTheCoreDoes) {
   }
 }
 
+TEST(PageJson, WritesSevenDigitsForPlots) {
+  DeviceState state;
+  state.position = Vec3(0.1, 1.0 / 3, 0);
+  const std::string text = states_json(0, std::vector{state});
+  EXPECT_NE(text.find("\"position_m\":[[0.1],[0.33333334],[0.0]]"), std::string::npos) << text;
+}
+
+TEST(PageJson, ReplacesBytesThatAreNoUtf8) {
+  Board board;
+  for (const std::string bad : {"\x80", "\xC0\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xE2\x82"}) {
+    board.tell(Contact::kLost, "a" + bad + "\n\"b");
+    const auto words = json::parse(server_json(board, {}))["words"].get<std::string>();
+    EXPECT_TRUE(words.starts_with("a\xEF\xBF\xBD") && words.ends_with("\n\"b")) << words;
+  }
+}
+
 TEST(PageJson, ListsRecordings) {
   const std::vector<Recordings::Entry> entries = {{"a \"b\".mcap", 5'000'000'000, 1.5}};
   EXPECT_EQ(json::parse(recordings_json(entries)),
