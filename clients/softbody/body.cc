@@ -135,7 +135,25 @@ ModalModel::Config modal_config(const BodyConfig& config, const TouchSurface& su
   return modal;
 }
 
-std::unique_ptr<Model> unchanging_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+template <class Info, std::size_t kCount>
+constexpr bool each_is_at_its_kind(const std::array<Info, kCount>& rows) {
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (static_cast<std::size_t>(rows[i].kind) != i) return false;
+  }
+  return true;
+}
+// info() indexes by the kind.
+static_assert(each_is_at_its_kind(kEffects) && kEffects.back().kind == kSelfCollision);
+static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kModal);
+
+/// A model, and what is known of it where it is of a kind that has more to offer.
+struct Made {
+  std::unique_ptr<Model> model;
+  const CondensedModel* condensed = nullptr;
+  StiffeningModel* stiffening = nullptr;
+};
+
+std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   QuasiStaticModel::Config newton{.max_iterations = config.max_iterations};
   if (config.self_collision) newton.self_collision = config.material.young / *config.self_collision;
   const EffectsConfig& effects = config.effects;
@@ -143,10 +161,6 @@ std::unique_ptr<Model> unchanging_model_of(const BodyConfig& config, const Solid
   switch (config.model) {
     case ModelKind::kLinear:
       return std::make_unique<LinearModel>(solid, surface, effects);
-    case ModelKind::kCondensed:
-      return std::make_unique<CondensedModel>(
-          solid, surface,
-          config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes());
     case ModelKind::kCorotational:
     case ModelKind::kStVenantKirchhoff:
     case ModelKind::kNeoHookean:
@@ -160,16 +174,30 @@ std::unique_ptr<Model> unchanging_model_of(const BodyConfig& config, const Solid
       return std::make_unique<XpbdModel>(solid, surface, config.iterations, effects);
     case ModelKind::kProjective:
       return std::make_unique<ProjectiveModel>(solid, surface, config.iterations, effects);
+    case ModelKind::kCondensed:  // made below
     case ModelKind::kModal:
       break;
   }
   return std::make_unique<ModalModel>(solid, surface, modal_config(config, surface));
 }
 
-std::unique_ptr<Model> model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
-  std::unique_ptr<Model> model = unchanging_model_of(config, solid, surface);
-  if (config.stiffening) return std::make_unique<StiffeningModel>(std::move(model), *config.stiffening);
-  return model;
+Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
+  Made made;
+  if (config.model == ModelKind::kCondensed) {
+    auto condensed = std::make_unique<CondensedModel>(
+        solid, surface,
+        config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes());
+    made.condensed = condensed.get();
+    made.model = std::move(condensed);
+  } else {
+    made.model = plain_model_of(config, solid, surface);
+  }
+  if (config.stiffening) {
+    auto stiffening = std::make_unique<StiffeningModel>(std::move(made.model), *config.stiffening);
+    made.stiffening = stiffening.get();
+    made.model = std::move(stiffening);
+  }
+  return made;
 }
 
 /// No effect may be in a config and be left out silently.
@@ -243,14 +271,13 @@ struct Body::Parts {
   explicit Parts(const BodyConfig& config)
       : solid(solid_of(checked(config))),
         surface(solid.mesh(), config.towards_tool, config.patch_radius),
-        model(model_of(config, solid, surface)),
-        contact(*model, surface, config.tool_radius, config.side, friction_of(config)),
+        made(model_of(config, solid, surface)),
+        model(*made.model),
+        contact(model, surface, config.tool_radius, config.side, friction_of(config)),
         patch(middle_patch(surface, config.middle)),
         knows_turns(info(config.model).always.has(kGeometricNonlinearity)) {
-    if (config.tool == BodyConfig::Tool::kSphere) {
-      sphere.emplace(dynamic_cast<const CondensedModel&>(*model), surface, config.tool_radius);
-    }
-    if (config.stiffening) stiffening = &dynamic_cast<StiffeningModel&>(*model);
+    // checked() has seen to it that a sphere's model is condensed.
+    if (config.tool == BodyConfig::Tool::kSphere) sphere.emplace(*made.condensed, surface, config.tool_radius);
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
 
@@ -267,12 +294,12 @@ struct Body::Parts {
 
   Solid solid;
   TouchSurface surface;
-  std::unique_ptr<Model> model;
+  Made made;
+  Model& model;
   PatchContact contact;
-  std::optional<SphereContact> sphere;    ///< instead of `contact`
-  Patch patch;                            ///< around the middle
-  bool knows_turns;                       ///< simulates large rotations
-  StiffeningModel* stiffening = nullptr;  ///< the model, where it is one
+  std::optional<SphereContact> sphere;  ///< instead of `contact`
+  Patch patch;                          ///< around the middle
+  bool knows_turns;                     ///< simulates large rotations
   std::unique_ptr<Planned> cutting;
 };
 
@@ -302,7 +329,7 @@ void Body::Parts::cut(PlannedCut::When when, double value) {
     solid = Solid(division.mesh, solid.element(), solid.material(), solid.law(), division.fixed);
     surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
     patch = middle_patch(surface, cutting->middle);
-    model->cut(division, cutting->effects);
+    model.cut(division, cutting->effects);
     if (when == PlannedCut::When::kForce) return;  // the force on what is left is not known yet
   }
 }
@@ -324,16 +351,16 @@ Feel Body::touch(const Vec3& tool) {
 }
 
 void Body::tick(double time) {
-  if (parts_->stiffening) parts_->stiffening->tick(time);
+  if (parts_->made.stiffening != nullptr) parts_->made.stiffening->tick(time);
   if (parts_->cutting) parts_->cut(PlannedCut::When::kTime, time);
 }
 
-bool Body::has_clock() const noexcept { return parts_->stiffening || parts_->cutting; }
+bool Body::has_clock() const noexcept { return parts_->made.stiffening != nullptr || parts_->cutting; }
 
-Reaction Body::press(Given given, double value) { return parts_->model->press(parts_->patch, given, value); }
+Reaction Body::press(Given given, double value) { return parts_->model.press(parts_->patch, given, value); }
 
 Reaction Body::settle(Given given, double value) {
-  return softbody::settle(*parts_->model, parts_->patch, given, value);
+  return softbody::settle(parts_->model, parts_->patch, given, value);
 }
 
 double Body::linear_up_to() const {
@@ -348,7 +375,7 @@ double Body::linear_up_to() const {
   return depth * kLargestTurn / solid.largest_turn(u);
 }
 
-double Body::step() const noexcept { return parts_->model->step(); }
+double Body::step() const noexcept { return parts_->model.step(); }
 
 Vec3 Body::touch_point() const {
   Vec3 point = Vec3::Zero();
@@ -364,7 +391,7 @@ const Vec3& Body::normal() const { return parts_->surface.normal(); }
 Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
-          parts_->model->bytes() + parts_->contact.bytes() + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+          parts_->model.bytes() + parts_->contact.bytes() + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
 }
 
 }  // namespace tendon::softbody

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 
@@ -155,31 +156,25 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
 }
 
 std::string in_json(const Scene& scene, const Explanation& explanation) {
-  std::ostringstream text;
-  text << std::setprecision(9) << R"({"model":")" << info(scene.body.model).name << R"(","element":")"
-       << info(scene.body.element).name << R"(","nodes":)" << explanation.size.nodes << R"(,"elements":)"
-       << explanation.size.elements << R"(,"unknowns":)" << explanation.size.free << R"(,"touchable_nodes":)"
-       << explanation.size.touchable << R"(,"bytes":)" << explanation.size.bytes << R"(,"step_s":)" << explanation.step
-       << R"(,"k_n_per_m":)" << explanation.stiffness << R"(,"linear_up_to_m":)";
-  if (std::isfinite(explanation.linear_up_to)) {
-    text << explanation.linear_up_to;
-  } else {
-    text << "null";
-  }
-  text << R"(,"answer_s":)" << explanation.all.answer_s << R"(,"resolution_s":)" << explanation.resolution_s
-       << R"(,"effects":[)";
-  const char* comma = "";
+  using Json = nlohmann::ordered_json;
+  Json parts = Json::array();
   for (const auto& [kind, simulated, adds] : explanation.parts) {
-    text << std::exchange(comma, ",") << R"({"name":")" << info(kind).name << R"(","simulated":)"
-         << (simulated ? "true" : "false");
-    if (adds) text << R"(,"adds_s":)" << adds->answer_s << R"(,"adds_bytes":)" << adds->bytes;
-    text << '}';
+    Json part = {{"name", info(kind).name}, {"simulated", simulated}};
+    if (adds) {
+      part["adds_s"] = adds->answer_s;
+      part["adds_bytes"] = adds->bytes;
+    }
+    parts.push_back(std::move(part));
   }
-  text << R"(],"warnings":[)";
-  comma = "";
-  for (const std::string& warning : warnings(scene.body)) text << std::exchange(comma, ",") << std::quoted(warning);
-  text << "]}\n";
-  return text.str();
+  const Json json = {
+      {"model", info(scene.body.model).name}, {"element", info(scene.body.element).name},
+      {"nodes", explanation.size.nodes},      {"elements", explanation.size.elements},
+      {"unknowns", explanation.size.free},    {"touchable_nodes", explanation.size.touchable},
+      {"bytes", explanation.size.bytes},      {"step_s", explanation.step},
+      {"k_n_per_m", explanation.stiffness},   {"linear_up_to_m", explanation.linear_up_to},  // infinite: null
+      {"answer_s", explanation.all.answer_s}, {"resolution_s", explanation.resolution_s},
+      {"effects", std::move(parts)},          {"warnings", warnings(scene.body)}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 }  // namespace tendon::softbody

@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <iomanip>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <sstream>
-#include <system_error>
+#include <stdexcept>
 #include <vector>
+
+#include "clients/softbody/fem/file_text.h"
 
 namespace tendon::softbody {
 namespace {
@@ -402,13 +402,12 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
 }
 
 Scene read_scene(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto bytes = std::filesystem::file_size(file, error);
-  if (error) throw SceneError("cannot read " + file.string() + ": " + error.message());
-  if (bytes > kMaxSceneBytes) throw SceneError(file.string() + ": larger than 16 KiB: is this a scene?");
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
-  if (!stream) throw SceneError("cannot read " + file.string());
+  std::string text;
+  try {
+    text = read_file(file, kMaxSceneBytes);
+  } catch (const std::invalid_argument& refused) {
+    throw SceneError(refused.what());
+  }
   return parse_scene(text, file.string(), file.parent_path());
 }
 

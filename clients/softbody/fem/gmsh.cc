@@ -6,15 +6,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <unordered_map>
 #include <vector>
+
+#include "clients/softbody/fem/file_text.h"
 
 namespace tendon::softbody {
 namespace {
@@ -276,14 +275,7 @@ Mesh parse_gmsh(std::string_view text, std::string_view name, double scale) {
 }
 
 Mesh read_gmsh(const std::filesystem::path& file, double scale) {
-  std::error_code error;
-  const auto bytes = std::filesystem::file_size(file, error);
-  if (error) throw std::invalid_argument("cannot read " + file.string() + ": " + error.message());
-  if (bytes > kMaxMeshBytes) throw std::invalid_argument(file.string() + ": larger than 256 MiB");
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
-  if (!stream) throw std::invalid_argument("cannot read " + file.string());
-  return parse_gmsh(text, file.string(), scale);
+  return parse_gmsh(read_file(file, kMaxMeshBytes), file.string(), scale);
 }
 
 }  // namespace tendon::softbody

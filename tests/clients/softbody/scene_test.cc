@@ -2,9 +2,14 @@
 #include "clients/softbody/scene.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <exception>
 #include <string>
+#include <utility>
 
+#include "clients/softbody/fem/gmsh.h"
 #include "tests/clients/softbody/scene_text.h"
 
 namespace tendon::softbody {
@@ -201,6 +206,29 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
             "s.toml:14: place.towards_hand: expected a direction, not [0, 0, 0]");
   EXPECT_EQ(refusal("x = "), "s.toml:1: Error while parsing key-value pair: encountered end-of-file");
   EXPECT_THROW(read_scene("/nowhere/s.toml"), SceneError);
+}
+
+TEST(SoftbodyScene, APipeOrAFolderIsNoSceneAndNoMesh) {
+  const std::string folder = ::testing::TempDir() + "tendon_softbody_" + std::to_string(::getpid());
+  ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
+  const std::string pipe = folder + "/pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const auto refusal = [](const auto& read) -> std::string {
+    try {
+      read();
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  for (const auto& [file, why] : {std::pair(pipe, "it is not a regular file"), std::pair(folder, "it is a folder"),
+                                  std::pair(folder + "/none", "there is no such file")}) {
+    const std::string expected = "cannot read " + file + ": " + why;
+    EXPECT_EQ(refusal([&, &path = file] { read_scene(path); }), expected);
+    EXPECT_EQ(refusal([&, &path = file] { read_gmsh(path, 1); }), expected);
+  }
+  ::unlink(pipe.c_str());
+  ::rmdir(folder.c_str());
 }
 
 }  // namespace
