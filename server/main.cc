@@ -7,10 +7,12 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "devices/falcon/firmware.h"
@@ -24,6 +26,7 @@
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
 #include "server/machine/randomness.h"
+#include "server/machine/regular_file.h"
 #include "server/machine/service.h"
 #include "server/scene/key_folder.h"
 #include "server/scene/scene.h"
@@ -33,7 +36,14 @@ namespace {
 
 using namespace tendon;
 
-/// A year: what is longer was not meant.
+using Json = nlohmann::ordered_json;
+
+/// A line on stdout.
+void print(const Json& object) {
+  std::cout << object.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
+}
+
+/// A year. Longer is a typo.
 constexpr double kLongestRun_s = 365.0 * 86400;
 
 sigset_t signals_to_end() {
@@ -76,38 +86,41 @@ HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   return sum;
 }
 
-/// JSON: a list of the devices, each with its channels. Their names need no escapes; a holder's does not appear.
-std::string by_device(const Server::Summary& summary) {
-  std::ostringstream out;
+/// Of each device, with its channels.
+Json by_device(const Server::Summary& summary) {
+  Json devices = Json::array();
   for (const auto& [name, haptic, safety] : summary.devices) {
-    out << (out.tellp() > 0 ? ",{" : "{") << "\"name\":\"" << name << "\",\"steps\":" << haptic.steps
-        << ",\"overruns\":" << haptic.overruns << ",\"unseen\":" << haptic.unseen
-        << ",\"longest_interval_us\":" << seconds(haptic.longest_interval) * 1e6
-        << ",\"fault\":" << static_cast<int>(haptic.fault) << ",\"force_n\":" << haptic.force << ",\"safety\":";
+    Json device = {{"name", name},
+                   {"steps", haptic.steps},
+                   {"overruns", haptic.overruns},
+                   {"unseen", haptic.unseen},
+                   {"longest_interval_us", seconds(haptic.longest_interval) * 1e6},
+                   {"fault", static_cast<int>(haptic.fault)},
+                   {"force_n", haptic.force},
+                   {"safety", nullptr},
+                   {"channels", Json::array()}};
     if (safety) {
-      out << "{\"state\":\"" << to_string(safety->state) << "\",\"faults\":" << safety->faults << ",\"last_fault\":\""
-          << to_string(safety->last_fault) << "\"}";
-    } else {
-      out << "null";
+      device["safety"] = {{"state", to_string(safety->state)},
+                          {"faults", safety->faults},
+                          {"last_fault", to_string(safety->last_fault)}};
     }
-    out << ",\"channels\":[";
-    bool first = true;
     for (const auto& channel : summary.network.channels) {
       if (channel.device != name) continue;
-      out << (first ? "{" : ",{") << "\"name\":\"" << channel.channel << "\",\"forces\":" << channel.forces
-          << ",\"late\":" << channel.late << ",\"handovers\":" << channel.handovers << "}";
-      first = false;
+      device["channels"].push_back({{"name", channel.channel},
+                                    {"forces", channel.forces},
+                                    {"late", channel.late},
+                                    {"handovers", channel.handovers}});
     }
-    out << "]}";
+    devices.push_back(std::move(device));
   }
-  return "[" + out.str() + "]";
+  return devices;
 }
 
 void print_json(const Server::Summary& summary) {
   const HapticLoop::Stats haptic = total(summary.devices);
   const auto& [devices, network, recording, uptime] = summary;
-  std::ostringstream out;
-  const auto add = [&out](const char* name, auto value) { out << ",\"" << name << "\":" << value; };
+  Json out = {{"event", "stopped"}};
+  const auto add = [&out](const char* name, Json value) { out[name] = std::move(value); };
   add("uptime_s", seconds(uptime));
   add("steps", haptic.steps);
   add("overruns", haptic.overruns);
@@ -154,10 +167,10 @@ void print_json(const Server::Summary& summary) {
     add("recorded_steps", recording->steps);
     add("lost_steps", recording->lost_steps);
     add("lost_datagrams", recording->lost_datagrams);
-    add("recording_ended_early", recording->error.empty() ? "false" : "true");
+    add("recording_ended_early", !recording->error.empty());
   }
   add("devices", by_device(summary));
-  std::cout << "{\"event\":\"stopped\"" << out.str() << "}" << std::endl;
+  print(out);
 }
 
 int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
@@ -169,12 +182,11 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   std::signal(SIGPIPE, SIG_IGN);
 
   Server server(scenes);
-  server.start();
-  log::info("tendond " + version_text() + " listens on " +
-            to_string(server.address()));
+  server.start(duration_s > 0 ? std::optional(from_seconds(duration_s)) : std::nullopt);
+  log::info("tendond " + version_text() + " listens on " + to_string(server.address()));
   if (const auto& recording = scenes.front().recording) log::info("recording to " + recording->string());
   if (json) {
-    std::cout << "{\"event\":\"listening\",\"address\":\"" << to_string(server.address()) << "\"}" << std::endl;
+    print({{"event", "listening"}, {"address", to_string(server.address())}});
   }
   service::ready();
   const std::string why = wait_for_the_end(signals, duration_s, server);
@@ -201,8 +213,10 @@ int list_devices(const OptionalPath& firmware, bool accept_unknown_firmware, boo
   std::optional<std::string> problem;
   if (firmware) {
     try {
+      std::ifstream file = open_regular_file(*firmware);
       falcon::read_firmware(
-          *firmware, accept_unknown_firmware ? falcon::UnknownFirmware::kAccept : falcon::UnknownFirmware::kRefuse);
+          file, firmware->string(),
+          accept_unknown_firmware ? falcon::UnknownFirmware::kAccept : falcon::UnknownFirmware::kRefuse);
       problem = "";
     } catch (const std::runtime_error& refused) {
       problem = refused.what();
@@ -284,7 +298,8 @@ int main(int argc, char** argv) {
   scene_option->expected(1, static_cast<int>(limits::kMaxDevices));
   app.add_option("--record", record, "Record to this MCAP file, whatever the scene says");
   app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
-  app.add_option("--duration-s", duration_s, "Stop after so many seconds; 0 = at SIGINT or SIGTERM");
+  app.add_option("--duration-s", duration_s,
+                 "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM");
   app.add_flag("--without-limiter", without_limiter, "Switch the output limiter off. Simulated devices only");
   std::string firmware;
   bool accept_unknown_firmware = false;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <span>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "server/machine/log.h"
 #include "server/machine/randomness.h"
 #include "server/machine/realtime.h"
+#include "server/machine/regular_file.h"
 #include "server/recording/flight_file.h"
 #include "server/scene/key_folder.h"
 
@@ -135,9 +137,10 @@ std::unique_ptr<Device> make_falcon(const Scene& scene, Guardian& guardian) {
   const Scene::Falcon& falcon = *scene.falcon;
   FalconDevice::Config config;
   if (falcon.firmware) {
-    config.firmware =
-        falcon::read_firmware(*falcon.firmware, falcon.accept_unknown_firmware ? falcon::UnknownFirmware::kAccept
-                                                                               : falcon::UnknownFirmware::kRefuse);
+    std::ifstream file = open_regular_file(*falcon.firmware);
+    config.firmware = falcon::read_firmware(
+        file, falcon.firmware->string(),
+        falcon.accept_unknown_firmware ? falcon::UnknownFirmware::kAccept : falcon::UnknownFirmware::kRefuse);
   }
   usb::PipeConfig pipe = pipe_for(scene, falcon.port);
   pipe.ids = {FalconDevice::kId};
@@ -238,7 +241,8 @@ Server::~Server() {
   if (network_thread_.joinable()) stop();
 }
 
-void Server::start() {
+void Server::start(std::optional<Duration> run_for) {
+  run_for_ = run_for;
   if (const auto& refused = wakeful_.emplace().refused()) log::warn(*refused);
   log_thread_ = std::thread([this] { run_log(); });
   network_thread_ = std::thread([this] { run_network(); });
@@ -286,7 +290,8 @@ void Server::run_haptic(Lane& lane) {
     if (const auto refused = stay_on(*lane.scene.cpu)) log::warn(prefix(lane) + *refused);
   }
   LocalTime due = clock::now();
-  while (!stop_haptic_.load(std::memory_order_acquire)) {
+  const LocalTime end = run_for_ ? due + *run_for_ : LocalTime::max();
+  while (!stop_haptic_.load(std::memory_order_acquire) && due < end) {
     due = lane.haptic.step(clock::now());
     stepped_.ring();
     clock::sleep_until(due);

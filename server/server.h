@@ -56,7 +56,9 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  void start();
+  /// Starts the threads. With `run_for` each haptic thread ends by itself, with zero force, so long after its first
+  /// step: it takes run_for / period steps, or fewer when some came too late.
+  void start(std::optional<Duration> run_for = std::nullopt);
 
   /// Zero force first; then goodbye to the guests; then the end of the recording.
   Summary stop();
@@ -117,6 +119,7 @@ class Server {
   bool told_recording_ended_ = false;
   LocalTime tell_next_{};
 
+  std::optional<Duration> run_for_;  ///< set before the threads start
   std::atomic<bool> stop_haptic_{false};
   std::atomic<bool> stop_network_{false};
   std::atomic<bool> stop_log_{false};

@@ -4,11 +4,8 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 namespace tendon::falcon {
@@ -81,16 +78,12 @@ std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const 
   return bytes;
 }
 
-std::vector<std::uint8_t> read_firmware(const std::filesystem::path& file, UnknownFirmware unknown) {
-  std::ifstream stream(file, std::ios::binary);
+std::vector<std::uint8_t> read_firmware(std::istream& file, const std::string& name, UnknownFirmware unknown) {
   std::vector<std::uint8_t> bytes(kMostBytes + 1);
-  if (stream) stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!stream && !stream.eof()) {
-    throw std::runtime_error(
-        file.string() + ": expected the Falcon's firmware, cannot read it: " + std::generic_category().message(errno));
-  }
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return check_firmware(std::move(bytes), file.string(), unknown);
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (file.bad()) throw std::runtime_error(name + ": expected the Falcon's firmware, the file cannot be read on");
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return check_firmware(std::move(bytes), name, unknown);
 }
 
 void FirmwareLoader::enter(Stage stage) noexcept {

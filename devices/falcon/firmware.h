@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
+#include <istream>
 #include <span>
 #include <string>
 #include <string_view>
@@ -27,8 +27,8 @@ enum class UnknownFirmware : std::uint8_t { kRefuse, kAccept };
 std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const std::string& name,
                                          UnknownFirmware unknown);
 
-/// The same for a file. Throws std::runtime_error, too, when it cannot be read.
-std::vector<std::uint8_t> read_firmware(const std::filesystem::path& file, UnknownFirmware unknown);
+/// The same for the content of a file, of which no more than is needed is read.
+std::vector<std::uint8_t> read_firmware(std::istream& file, const std::string& name, UnknownFirmware unknown);
 
 /// Gives a Falcon its firmware without ever waiting. The device's processor starts its boot loader, which echoes what
 /// it gets; each echo is compared with what was sent. Source: libnifalcon, FalconCommLibUSB.cpp (setFirmwareMode) and

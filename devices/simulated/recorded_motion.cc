@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "devices/simulated/recorded_motion.h"
 
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
+#include <vector>
 
 #include "core/base/expect.h"
 
@@ -40,14 +38,7 @@ std::optional<double> finite_number(std::string_view text) {
 
 class Reader {
  public:
-  explicit Reader(const RecordedMotionFile& file) : file_(file), stream_(file.path) {
-    if (!stream_) {
-      throw std::runtime_error(file.path.string() + ": expected a CSV file of a recorded motion, cannot open it: " +
-                               std::error_code(errno, std::generic_category()).message());
-    }
-    if (std::filesystem::is_directory(file.path)) {
-      throw std::runtime_error(file.path.string() + ": expected a CSV file of a recorded motion, found a directory");
-    }
+  Reader(std::istream& csv, const RecordedMotionFile& file) : file_(file), stream_(csv) {
     const bool named =
         std::holds_alternative<std::string>(file.time) || std::holds_alternative<std::string>(file.position);
     if (named && !next_line()) fail("expected a header line, found an empty file");
@@ -80,9 +71,14 @@ class Reader {
 
   /// Blank lines are passed over: many programs end a file with one.
   bool next_line() {
-    while (std::getline(stream_, line_)) {
+    while (stream_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()))) {
       ++line_number_;
+      line_ = std::string_view(buffer_.data(), static_cast<std::size_t>(stream_.gcount()) - (stream_.eof() ? 0 : 1));
       if (!trimmed(line_).empty()) return true;
+    }
+    if (stream_.gcount() + 1 == static_cast<std::streamsize>(buffer_.size())) {
+      ++line_number_;
+      fail("expected lines of at most " + std::to_string(kMaxRecordedLine) + " bytes, found a longer one");
     }
     if (stream_.bad()) fail("expected more lines, the file cannot be read on");
     return false;
@@ -109,8 +105,9 @@ class Reader {
   }
 
   const RecordedMotionFile& file_;
-  std::ifstream stream_;
-  std::string line_;
+  std::istream& stream_;
+  std::vector<char> buffer_ = std::vector<char>(kMaxRecordedLine + 1);  ///< with the end of the string
+  std::string_view line_;                                               ///< in it
   std::size_t line_number_ = 0;
   std::size_t time_ = 0;
   std::size_t position_ = 0;
@@ -118,9 +115,9 @@ class Reader {
 
 }  // namespace
 
-ScriptedMotion::Recorded load_recorded_motion(const RecordedMotionFile& file) {
+ScriptedMotion::Recorded load_recorded_motion(std::istream& csv, const RecordedMotionFile& file) {
   expect(std::isfinite(file.scale) && file.scale != 0, "recorded.scale", file.scale, "a number that is not 0");
-  return Reader(file).samples();
+  return Reader(csv, file).samples();
 }
 
 }  // namespace tendon

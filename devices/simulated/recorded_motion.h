@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <istream>
 #include <string>
 #include <variant>
 
@@ -17,7 +18,7 @@ struct RecordedMotionFile {
   /// are given by number has no header line.
   using Column = std::variant<std::string, std::size_t>;
 
-  std::filesystem::path path;
+  std::filesystem::path path;        ///< where it is; errors begin with it
   Column time = std::string("t_s");  ///< s, strictly increasing
   Column position;                   ///< in the file's own unit
   double scale = 1;                  ///< m per unit of `position`; not 0. Negative turns the motion round
@@ -30,9 +31,12 @@ struct RecordedMotionFile {
 /// path may lead to anything.
 inline constexpr std::size_t kMaxRecordedSamples = 4'000'000;
 
-/// Reads the whole file, before the loop runs. Throws std::runtime_error "file:line: what was expected,
-/// what was found" for a file that cannot be opened, a missing column, a cell that is not a finite
-/// number, time that does not increase, or fewer than 2 samples.
-ScriptedMotion::Recorded load_recorded_motion(const RecordedMotionFile& file);
+/// No line of a recorded motion is longer, in bytes.
+inline constexpr std::size_t kMaxRecordedLine = 65'536;
+
+/// Reads a whole recorded motion from `csv`, the content of `file.path`, before the loop runs. Memory: the samples and
+/// one line. Throws std::runtime_error "PATH:LINE: expected …, found …" for a missing column, a cell that is not a
+/// finite number, time that does not increase, a line or a recording that is too long, or fewer than 2 samples.
+ScriptedMotion::Recorded load_recorded_motion(std::istream& csv, const RecordedMotionFile& file);
 
 }  // namespace tendon

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <iomanip>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "devices/falcon/falcon_device.h"
@@ -31,23 +32,6 @@ std::optional<Known> driver_for(const usb::Id& id) {
   if (id == WoodenHapticsDevice::kId) return Known{"WoodenHaptics, or another HID gadget of mbed", "woodenhaptics"};
   if (std::ranges::find(SpaceMouseDevice::kIds, id) == SpaceMouseDevice::kIds.end()) return std::nullopt;
   return Known{"3Dconnexion SpaceMouse", "spacemouse"};
-}
-
-/// A string of JSON: sentences may have a path with anything in it.
-std::string quoted(const std::string& text) {
-  std::ostringstream out;
-  out << '"';
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out << '\\' << c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out << "\\u" << std::hex << std::setfill('0') << std::setw(4) << static_cast<int>(c) << std::dec;
-    } else {
-      out << c;
-    }
-  }
-  out << '"';
-  return out.str();
 }
 
 }  // namespace
@@ -98,19 +82,16 @@ std::string in_words(std::span<const PluggedDevice> devices) {
 }
 
 std::string in_json(std::span<const PluggedDevice> devices) {
-  std::ostringstream text;
+  using Json = nlohmann::ordered_json;
+  std::string text;
   for (const PluggedDevice& device : devices) {
-    text << "{\"name\":" << quoted(device.name) << ",\"kind\":" << quoted(device.kind)
-         << ",\"id\":" << quoted(id_of(device.plugged)) << ",\"port\":" << quoted(device.plugged.port)
-         << ",\"node\":" << quoted(device.plugged.node)
-         << ",\"may_open\":" << (device.plugged.may_open ? "true" : "false") << ",\"missing\":[";
-    for (const auto& [what, mend] : device.lacks) {
-      text << (&what == &device.lacks.front().what ? "" : ",") << "{\"what\":" << quoted(what)
-           << ",\"mend\":" << quoted(mend) << '}';
-    }
-    text << "]}\n";
+    Json out = {{"name", device.name},         {"kind", device.kind},         {"id", id_of(device.plugged)},
+                {"port", device.plugged.port}, {"node", device.plugged.node}, {"may_open", device.plugged.may_open},
+                {"missing", Json::array()}};
+    for (const auto& [what, mend] : device.lacks) out["missing"].push_back({{"what", what}, {"mend", mend}});
+    text += out.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
   }
-  return text.str();
+  return text;
 }
 
 }  // namespace tendon

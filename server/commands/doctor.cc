@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iomanip>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -173,9 +174,8 @@ Finding machine(const fs::path& root) {
 
 double us(Duration time) { return seconds(time) * 1e6; }
 
-void add_json(std::ostringstream& out, std::string_view name, const Diagnosis::WakeUps& wakes) {
-  out << std::quoted(name) << ":{\"n\":" << wakes.count << ",\"p50_us\":" << us(wakes.median)
-      << ",\"p99_us\":" << us(wakes.p99) << ",\"max_us\":" << us(wakes.longest) << '}';
+nlohmann::ordered_json as_json(const Diagnosis::WakeUps& wakes) {
+  return {{"n", wakes.count}, {"p50_us", us(wakes.median)}, {"p99_us", us(wakes.p99)}, {"max_us", us(wakes.longest)}};
 }
 
 void add_words(std::ostringstream& out, std::string_view name, const Diagnosis::WakeUps& wakes) {
@@ -231,27 +231,15 @@ std::string in_words(const Diagnosis& diagnosis) {
 }
 
 std::string in_json(const Diagnosis& diagnosis) {
-  std::ostringstream out;
-  out << "{\"wake_ups\":{";
-  add_json(out, "ordinary", diagnosis.ordinary);
-  out << ',';
-  add_json(out, "realtime", diagnosis.realtime);
-  out << "},\"refused\":[";
-  for (const std::string& refused : diagnosis.refused) {
-    out << (&refused == diagnosis.refused.data() ? "" : ",") << std::quoted(refused);
+  using Json = nlohmann::ordered_json;
+  Json out = {{"wake_ups", {{"ordinary", as_json(diagnosis.ordinary)}, {"realtime", as_json(diagnosis.realtime)}}},
+              {"refused", diagnosis.refused},
+              {"findings", Json::array()}};
+  for (const auto& [key, found, advice] : diagnosis.findings) {
+    out["findings"].push_back(
+        {{"key", key}, {"found", found}, {"advice", advice.empty() ? Json(nullptr) : Json(advice)}});
   }
-  out << "],\"findings\":[";
-  for (const Finding& finding : diagnosis.findings) {
-    out << (&finding == diagnosis.findings.data() ? "" : ",") << "{\"key\":" << std::quoted(finding.key)
-        << ",\"found\":" << std::quoted(finding.found) << ",\"advice\":";
-    if (finding.advice.empty()) {
-      out << "null}";
-    } else {
-      out << std::quoted(finding.advice) << '}';
-    }
-  }
-  out << "]}";
-  return out.str();
+  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace tendon

@@ -2,142 +2,155 @@
 #include "server/commands/explain.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstddef>
 #include <iomanip>
 #include <limits>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
+
+#include "core/control/aol_parts.h"
+#include "devices/simulated/simulated_device.h"
 
 namespace tendon {
 namespace {
 
-constexpr int kSteps = 200;  ///< of a round
+constexpr int kSteps = 200;     ///< of a round
+constexpr int kSamples = 2000;  ///< that stand in for the device
 
 /// Something that a scene lists or does not.
 struct Listable {
-  std::string_view key;
+  std::string key;
   std::string_view what;
-  bool (*listed)(const Scene&);
-  void (*drop)(Scene&);
+  std::function<bool(Scene&)> drop;  ///< takes it out of the scene; whether it was there
 };
 
-constexpr std::array kListables = {
-    Listable{"device.hand", "the operator: a spring, a damper and a mass",
-             [](const Scene& scene) { return scene.device.hand.has_value(); },
-             [](Scene& scene) { scene.device.hand.reset(); }},
-    Listable{"device.effects.viscous_friction_n_s_per_m", "true viscous friction",
-             [](const Scene& scene) { return scene.device.viscous_friction.has_value(); },
-             [](Scene& scene) { scene.device.viscous_friction.reset(); }},
-    Listable{"device.effects.coulomb_friction_n", "true Coulomb friction",
-             [](const Scene& scene) { return scene.device.coulomb_friction.has_value(); },
-             [](Scene& scene) { scene.device.coulomb_friction.reset(); }},
-    Listable{"device.effects.joint_friction", "friction of each joint, by the pose",
-             [](const Scene& scene) { return scene.device.joint_friction.has_value(); },
-             [](Scene& scene) { scene.device.joint_friction.reset(); }},
-    Listable{"device.effects.structural_mode", "the handle on a spring",
-             [](const Scene& scene) { return scene.device.structural_mode.has_value(); },
-             [](Scene& scene) { scene.device.structural_mode.reset(); }},
-    Listable{"device.effects.sample_delay_ms", "positions come late",
-             [](const Scene& scene) { return scene.device.sample_delay.has_value(); },
-             [](Scene& scene) { scene.device.sample_delay.reset(); }},
-    Listable{"device.effects.force_delay_ms", "forces reach the motors late",
-             [](const Scene& scene) { return scene.device.force_delay.has_value(); },
-             [](Scene& scene) { scene.device.force_delay.reset(); }},
-    Listable{"device.effects.encoder_step_um", "positions in counts",
-             [](const Scene& scene) { return scene.device.encoder_step.has_value(); },
-             [](Scene& scene) { scene.device.encoder_step.reset(); }},
-    Listable{"device.effects.max_force_n", "the device's own saturation",
-             [](const Scene& scene) { return scene.device.max_force.has_value(); },
-             [](Scene& scene) { scene.device.max_force.reset(); }},
-    Listable{"device.effects.amplifier_bandwidth_hz", "motors that lag behind the command",
-             [](const Scene& scene) { return scene.device.amplifier_bandwidth.has_value(); },
-             [](Scene& scene) { scene.device.amplifier_bandwidth.reset(); }},
-    Listable{"device.effects.force_sensor", "measures the hand's force; what admittance needs",
-             [](const Scene& scene) { return scene.device.force_sensor.has_value(); },
-             [](Scene& scene) { scene.device.force_sensor.reset(); }},
-    Listable{"device.effects.watchdog_ms", "lets go when no command comes",
-             [](const Scene& scene) { return scene.device.watchdog.has_value(); },
-             [](Scene& scene) { scene.device.watchdog.reset(); }},
-    Listable{"loop.max_speed_m_per_s", "a position that no hand comes to is a fault",
-             [](const Scene& scene) { return scene.loop.control.max_speed.has_value(); },
-             [](Scene& scene) { scene.loop.control.max_speed.reset(); }},
-    Listable{"safety", "no force unless armed, and none after a fault",
-             [](const Scene& scene) { return scene.safety.has_value(); }, [](Scene& scene) { scene.safety.reset(); }},
-    Listable{"safety.force_limit", "no force is longer",
-             [](const Scene& scene) { return scene.safety && scene.safety->force_limit.has_value(); },
-             [](Scene& scene) { scene.safety->force_limit.reset(); }},
-    Listable{"safety.growth_limit", "no force grows faster",
-             [](const Scene& scene) { return scene.safety && scene.safety->growth_limit.has_value(); },
-             [](Scene& scene) { scene.safety->growth_limit.reset(); }},
-    Listable{"safety.ramp_in", "forces begin slowly after arming",
-             [](const Scene& scene) { return scene.safety && scene.safety->ramp_in.has_value(); },
-             [](Scene& scene) { scene.safety->ramp_in.reset(); }},
-    Listable{"safety.heat_limit", "motors do not burn",
-             [](const Scene& scene) { return scene.safety && scene.safety->heat_limit.has_value(); },
-             [](Scene& scene) { scene.safety->heat_limit.reset(); }},
-    Listable{"safety.workspace", "nothing pushes the hand out of it",
-             [](const Scene& scene) { return scene.safety && scene.safety->workspace.has_value(); },
-             [](Scene& scene) { scene.safety->workspace.reset(); }},
-    Listable{"safety.speed_trip", "a handle that flies gets no force",
-             [](const Scene& scene) { return scene.safety && scene.safety->speed_trip.has_value(); },
-             [](Scene& scene) { scene.safety->speed_trip.reset(); }},
-    Listable{"safety.step_bound", "encoders that wrap or lose count unarm",
-             [](const Scene& scene) { return scene.safety && scene.safety->step_bound.has_value(); },
-             [](Scene& scene) { scene.safety->step_bound.reset(); }},
-    Listable{"safety.command_watchdog", "a loop that stood still is not gone on with",
-             [](const Scene& scene) { return scene.safety && scene.safety->command_watchdog.has_value(); },
-             [](Scene& scene) { scene.safety->command_watchdog.reset(); }},
-    Listable{"safety.link_watchdog", "nor a device that was silent",
-             [](const Scene& scene) { return scene.safety && scene.safety->link_watchdog.has_value(); },
-             [](Scene& scene) { scene.safety->link_watchdog.reset(); }},
-    Listable{"safety.dead_man", "no force unless the button is held",
-             [](const Scene& scene) { return scene.safety && scene.safety->dead_man.has_value(); },
-             [](Scene& scene) { scene.safety->dead_man.reset(); }},
-    Listable{"limiter", "keeps the device from giving out energy",
-             [](const Scene& scene) { return scene.loop.control.limiter.law != Law::kNone; },
-             [](Scene& scene) { scene.loop.control.limiter.law = Law::kNone; }},
-    Listable{"limiter.energy_cap", "credit is capped",
-             [](const Scene& scene) { return scene.loop.control.limiter.parts.energy_cap.has_value(); },
-             [](Scene& scene) { scene.loop.control.limiter.parts.energy_cap.reset(); }},
-    Listable{"limiter.robust_ledger", "rounding of positions earns nothing",
-             [](const Scene& scene) { return scene.loop.control.limiter.parts.robust_ledger.has_value(); },
-             [](Scene& scene) { scene.loop.control.limiter.parts.robust_ledger.reset(); }},
-    Listable{"limiter.knee", "no hard edge where the limiter begins",
-             [](const Scene& scene) { return scene.loop.control.limiter.parts.knee.has_value(); },
-             [](Scene& scene) { scene.loop.control.limiter.parts.knee.reset(); }},
-    Listable{"limiter.latency_reserve", "forces under way are paid for",
-             [](const Scene& scene) { return scene.loop.control.limiter.parts.latency_reserve.has_value(); },
-             [](Scene& scene) { scene.loop.control.limiter.parts.latency_reserve.reset(); }},
-    Listable{"limiter.bounded_acceleration", "for devices with next to no damping",
-             [](const Scene& scene) { return scene.loop.control.limiter.parts.bounded_acceleration.has_value(); },
-             [](Scene& scene) { scene.loop.control.limiter.parts.bounded_acceleration.reset(); }},
-    Listable{"limiter.adaptive_friction", "friction bounds by place",
-             [](const Scene& scene) { return scene.loop.control.limiter.parts.adaptive_friction.has_value(); },
-             [](Scene& scene) {
-               scene.loop.control.limiter.parts.adaptive_friction.reset();
-               scene.loop.control.friction_map.reset();
-             }},
-    Listable{"admittance", "the handle follows a tool of another mass",
-             [](const Scene& scene) { return scene.loop.control.admittance.has_value(); },
-             [](Scene& scene) { scene.loop.control.admittance.reset(); }},
-    Listable{"force.adaptive_local_model", "models of the engine are blended and capped",
-             [](const Scene& scene) { return scene.loop.control.hold.adaptive_local_model.has_value(); },
-             [](Scene& scene) { scene.loop.control.hold.adaptive_local_model.reset(); }},
-    Listable{"force.output_estimator", "the environment is learnt from its answers",
-             [](const Scene& scene) { return scene.loop.control.hold.output_estimator.has_value(); },
-             [](Scene& scene) { scene.loop.control.hold.output_estimator.reset(); }},
+template <class T>
+bool drop(std::optional<T>& part) {
+  const bool there = part.has_value();
+  part.reset();
+  return there;
+}
+
+/// A test holds this list against the scenes' reference: a part that is declared there and not here is found.
+std::vector<Listable> make_listables() {
+  std::vector<Listable> list;
+  const auto add = [&list](std::string key, std::string_view what, std::function<bool(Scene&)> drop_it) {
+    list.push_back({std::move(key), what, std::move(drop_it)});
+  };
+  const auto effect = [&add](const char* key, std::string_view what, auto SimulatedDevice::Config::*part) {
+    add(std::string("device.effects.") + key, what, [part](Scene& scene) { return drop(scene.device.*part); });
+  };
+  const auto guard = [&add](const char* key, std::string_view what, auto SafeDevice::Config::*part) {
+    add(std::string("safety.") + key, what, [part](Scene& scene) { return scene.safety && drop(*scene.safety.*part); });
+  };
+  const auto control = [&add](const char* key, std::string_view what, auto HapticController::Config::*part) {
+    add(key, what, [part](Scene& scene) { return drop(scene.loop.control.*part); });
+  };
+  const auto between = [&add](const char* key, std::string_view what, auto HeldForce::Config::*part) {
+    add(std::string("force.") + key, what, [part](Scene& scene) { return drop(scene.loop.control.hold.*part); });
+  };
+  using Device = SimulatedDevice::Config;
+  add("device.hand", "the operator: a spring, a damper and a mass",
+      [](Scene& scene) { return drop(scene.device.hand); });
+  effect("viscous_friction_n_s_per_m", "true viscous friction", &Device::viscous_friction);
+  effect("coulomb_friction_n", "true Coulomb friction", &Device::coulomb_friction);
+  effect("joint_friction", "friction of each joint, by the pose", &Device::joint_friction);
+  effect("structural_mode", "the handle on a spring", &Device::structural_mode);
+  effect("sample_delay_ms", "positions come late", &Device::sample_delay);
+  effect("force_delay_ms", "forces reach the motors late", &Device::force_delay);
+  effect("encoder_step_um", "positions in counts", &Device::encoder_step);
+  effect("max_force_n", "the device's own saturation", &Device::max_force);
+  effect("amplifier_bandwidth_hz", "motors that lag behind the command", &Device::amplifier_bandwidth);
+  effect("force_sensor", "measures the hand's force; admittance needs it", &Device::force_sensor);
+  effect("watchdog_ms", "lets go when no command comes", &Device::watchdog);
+  control("loop.max_speed_m_per_s", "a position that no hand can reach is a fault",
+          &HapticController::Config::max_speed);
+  add("safety", "no force unless armed, and none after a fault", [](Scene& scene) { return drop(scene.safety); });
+  using Safety = SafeDevice::Config;
+  guard("force_limit", "no force is longer", &Safety::force_limit);
+  guard("growth_limit", "no force grows faster", &Safety::growth_limit);
+  guard("ramp_in", "forces begin slowly after arming", &Safety::ramp_in);
+  guard("heat_limit", "motors do not burn", &Safety::heat_limit);
+  guard("workspace", "nothing pushes the hand out of it", &Safety::workspace);
+  guard("speed_trip", "a handle that flies gets no force", &Safety::speed_trip);
+  guard("step_bound", "encoders that wrap or lose count disarm it", &Safety::step_bound);
+  guard("command_watchdog", "a loop that stood still gets no force", &Safety::command_watchdog);
+  guard("link_watchdog", "a device that was silent gets no force", &Safety::link_watchdog);
+  guard("dead_man", "no force unless the button is held", &Safety::dead_man);
+  add("limiter", "keeps the device from giving out energy",
+      [](Scene& scene) { return std::exchange(scene.loop.control.limiter.law, Law::kNone) != Law::kNone; });
+  for_each_aol_part([&add](const auto& part) {
+    add("limiter." + std::string(part.name), part.what, [config = part.config](Scene& scene) {
+      HapticController::Config& loop = scene.loop.control;
+      const bool there = drop(loop.limiter.parts.*config);
+      if (!loop.limiter.parts.adaptive_friction) loop.friction_map.reset();
+      return there;
+    });
+  });
+  control("admittance", "the handle follows a tool of another mass", &HapticController::Config::admittance);
+  between("adaptive_local_model", "models of the engine are blended and capped",
+          &HeldForce::Config::adaptive_local_model);
+  between("output_estimator", "the environment is learnt from its answers", &HeldForce::Config::output_estimator);
+  return list;
+}
+
+const std::vector<Listable>& listables() {
+  static const std::vector<Listable> kList = make_listables();
+  return kList;
+}
+
+/// Keeps what another device gives.
+class Tape final : public Device {
+ public:
+  Tape(const SimulatedDevice::Config& config, std::vector<PositionSample>& samples)
+      : device_(config), samples_(samples) {}
+
+  const DeviceInfo& info() const noexcept override { return device_.info(); }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    auto sample = device_.read(now);
+    if (sample) samples_.push_back(*sample);
+    return sample;
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return device_.apply(force); }
+
+ private:
+  SimulatedDevice device_;
+  std::vector<PositionSample>& samples_;
+};
+
+/// A device that costs next to nothing: gives what another one has given, to and fro for ever, and takes every force.
+class Playback final : public Device {
+ public:
+  Playback(DeviceInfo info, std::vector<PositionSample> samples)
+      : info_(std::move(info)), samples_(std::move(samples)) {}
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    const std::size_t turn = next_++ % (2 * samples_.size());
+    PositionSample sample = samples_[turn < samples_.size() ? turn : 2 * samples_.size() - 1 - turn];
+    sample.at = now;
+    return sample;
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return force; }
+
+ private:
+  DeviceInfo info_;
+  std::vector<PositionSample> samples_;
+  std::size_t next_ = 0;
 };
 
 /// A scene that runs, without a thread and without a network.
 class Trial {
  public:
-  explicit Trial(const Scene& scene)
-      : device_(scene.device),
-        safe_(made_safe(scene, device_)),
-        loop_(scene.loop, safe_ ? static_cast<Device&>(*safe_) : device_, *mail_),
+  Trial(const Scene& scene, std::unique_ptr<Device> device)
+      : device_(std::move(device)),
+        safe_(made_safe(scene, *device_)),
+        loop_(scene.loop, safe_ ? static_cast<Device&>(*safe_) : *device_, *mail_),
         period_(scene.loop.period) {}
+  explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.device)) {}
 
   /// ns of a step, mean of kSteps.
   double steps(const std::function<Duration()>& processor_time) {
@@ -146,17 +159,6 @@ class Trial {
       loop_.step(now_);
       mail_->steps.pop();
       if (++step_ % 10 == 0) answer();
-      now_ += period_;
-    }
-    return per_step(processor_time() - before);
-  }
-
-  /// The same of the device alone.
-  double device(const std::function<Duration()>& processor_time) {
-    const Duration before = processor_time();
-    for (int i = 0; i < kSteps; ++i) {
-      const auto sample = device_.read(now_);
-      device_.apply(sample ? Vec3(kStiffness * sample->position) : Vec3(Vec3::Zero()));
       now_ += period_;
     }
     return per_step(processor_time() - before);
@@ -188,7 +190,7 @@ class Trial {
     mail_->forces[0].put(force);
   }
 
-  SimulatedDevice device_;
+  std::unique_ptr<Device> device_;
   std::unique_ptr<SafeDevice> safe_;  ///< null when the scene lists none
   std::unique_ptr<Mailboxes> mail_ =
       std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 2, .flight = 2, .datagrams = 1});
@@ -197,6 +199,16 @@ class Trial {
   LocalTime now_{std::chrono::seconds(1)};
   std::uint64_t step_ = 0;
 };
+
+/// Plays back what the device of this scene gives in its first steps.
+std::unique_ptr<Device> playback_of(const Scene& scene) {
+  std::vector<PositionSample> samples;
+  samples.reserve(kSamples);
+  Trial trial(scene, std::make_unique<Tape>(scene.device, samples));
+  for (int i = 0; i < kSamples / kSteps; ++i) trial.steps([] { return Duration::zero(); });
+  if (samples.empty()) samples.emplace_back();
+  return std::make_unique<Playback>(SimulatedDevice(scene.device).info(), std::move(samples));
+}
 
 /// The least of several measurements, and how far it can be trusted: what the odd ones and the even ones differ by.
 class Least {
@@ -228,31 +240,30 @@ std::string rounded(double ns, double resolution) {
 
 Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time, int rounds) {
   Explanation out;
-  std::vector<std::unique_ptr<Trial>> trials;  // the whole scene, the same again, and one for each part that it lists
+  // The whole scene, the same again, the same with a device that costs nothing, and one without each part it lists.
+  std::vector<std::unique_ptr<Trial>> trials;
   trials.push_back(std::make_unique<Trial>(scene));
   trials.push_back(std::make_unique<Trial>(scene));
-  std::vector<std::size_t> part_of;
-  for (const Listable& each : kListables) {
+  trials.push_back(std::make_unique<Trial>(scene, playback_of(scene)));
+  constexpr std::size_t kWithoutDevice = 2;
+  std::vector<std::size_t> part_of(trials.size());
+  for (const Listable& each : listables()) {
     out.parts.push_back({each.key, each.what, {}});
-    if (!each.listed(scene)) continue;
     Scene less = scene;
-    each.drop(less);
+    if (!each.drop(less)) continue;
     trials.push_back(std::make_unique<Trial>(less));
     part_of.push_back(out.parts.size() - 1);
   }
-  Trial device(scene);
-  Least device_alone;
   std::vector<Least> least(trials.size());
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < trials.size(); ++i) least[i].add(trials[i]->steps(processor_time));
-    device_alone.add(device.device(processor_time));
   }
   out.step_ns = least[0].value();
-  out.device_ns = device_alone.value();
+  out.device_ns = std::clamp(out.step_ns - least[kWithoutDevice].value(), 0.0, out.step_ns);
   out.resolution_ns = std::abs(least[0].value() - least[1].value());
   for (const Least& one : least) out.resolution_ns = std::max(out.resolution_ns, one.doubt());
-  for (std::size_t i = 0; i < part_of.size(); ++i) {
-    out.parts[part_of[i]].cost_ns = out.step_ns - least[i + 2].value();
+  for (std::size_t i = kWithoutDevice + 1; i < trials.size(); ++i) {
+    out.parts[part_of[i]].cost_ns = out.step_ns - least[i].value();
   }
   return out;
 }
@@ -286,21 +297,19 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
 }
 
 std::string in_json(const Scene& scene, const Explanation& explanation) {
-  std::ostringstream text;
-  text << "{\"device\":\"" << scene.name << "\",\"period_us\":" << seconds(scene.loop.period) * 1e6
-       << ",\"step_ns\":" << explanation.step_ns << ",\"device_ns\":" << explanation.device_ns
-       << ",\"resolution_ns\":" << explanation.resolution_ns << ",\"parts\":[";
+  using Json = nlohmann::ordered_json;
+  Json out = {{"device", scene.name},
+              {"period_us", seconds(scene.loop.period) * 1e6},
+              {"step_ns", explanation.step_ns},
+              {"device_ns", explanation.device_ns},
+              {"resolution_ns", explanation.resolution_ns},
+              {"parts", Json::array()}};
   for (const auto& part : explanation.parts) {
-    text << (&part == explanation.parts.data() ? "" : ",") << "{\"key\":\"" << part.key
-         << "\",\"listed\":" << (part.cost_ns ? "true" : "false") << ",\"cost_ns\":";
-    if (part.cost_ns) {
-      text << *part.cost_ns << '}';
-    } else {
-      text << "null}";
-    }
+    out["parts"].push_back({{"key", part.key},
+                            {"listed", part.cost_ns.has_value()},
+                            {"cost_ns", part.cost_ns ? Json(*part.cost_ns) : Json(nullptr)}});
   }
-  text << "]}";
-  return text.str();
+  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace tendon

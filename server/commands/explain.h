@@ -12,13 +12,14 @@
 
 namespace tendon {
 
-/// What a scene runs in its haptic thread, what not, and what each part costs there: `tendond explain SCENE`.
+/// What a scene runs in its haptic thread, what it does not, and what each part costs there: `tendond explain SCENE`.
 ///
 /// Costs are measured, here and now: processor time of HapticLoop::step with the scene's device, which feels a spring
-/// of 500 N/m that answers every tenth step. A part's cost is the difference to the same scene without it, below 0
-/// where others have more to do then. Each is the least of 80 rounds of 200 steps, in which all take turns.
-/// `resolution_ns`: the most that two measurements of the same thing differed by; smaller costs are not to be told from
-/// none.
+/// of 500 N/m that answers every tenth step. The cost of a part is the difference to the same scene without it. It is
+/// below 0 where other parts have more to do then. The cost of the device is the difference to the same scene with its
+/// first 2000 positions played back, so it is never more than the step. Each cost is the least of 80 rounds of 200
+/// steps, in which all take turns. `resolution_ns` is the most by which two measurements of the same thing differed;
+/// a smaller cost cannot be told from none.
 struct Explanation {
   struct Part {
     std::string_view key;           ///< of the scene
@@ -27,7 +28,7 @@ struct Explanation {
   };
   std::vector<Part> parts;
   double step_ns = 0;    ///< a whole step
-  double device_ns = 0;  ///< of that, the simulated device with its hand
+  double device_ns = 0;  ///< the share of the simulated device with its hand in that, from 0 to step_ns
   double resolution_ns = 0;
 };
 

@@ -3,25 +3,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <fstream>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
+
+#include "server/machine/regular_file.h"
 
 namespace tendon {
 namespace {
-
-std::unique_ptr<std::istream> open(const std::filesystem::path& path) {
-  const auto refuse = [&](const std::string& why) {
-    throw std::runtime_error("cannot read recording " + path.string() + ": " + why);
-  };
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) refuse(std::generic_category().message(EISDIR));
-  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*file) refuse(std::generic_category().message(errno));
-  return file;
-}
 
 bool is(const McapReader::Channel& channel, const recording::Channel& kind) {
   return channel.schema_name == kind.schema && channel.message_encoding == recording::kEncoding;
@@ -29,7 +18,8 @@ bool is(const McapReader::Channel& channel, const recording::Channel& kind) {
 
 }  // namespace
 
-RecordingReader::RecordingReader(const std::filesystem::path& path) : RecordingReader(open(path), path.string()) {}
+RecordingReader::RecordingReader(const std::filesystem::path& path)
+    : RecordingReader(std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string()) {}
 
 RecordingReader::RecordingReader(std::unique_ptr<std::istream> input, std::string name)
     : name_(name), mcap_(std::move(input), std::move(name)) {}

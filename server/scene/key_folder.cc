@@ -7,9 +7,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
+
+#include "server/machine/regular_file.h"
 
 namespace tendon {
 namespace {
@@ -33,12 +38,34 @@ ClientKey read_one(const std::filesystem::path& path) {
   std::string text(kMaxKeyFile, '\0');
   const ssize_t size = file.fd < 0 || ::fstat(file.fd, &status) != 0 ? -1 : ::read(file.fd, text.data(), text.size());
   if (size < 0) throw std::runtime_error(path.string() + ": cannot read it: " + system_message());
+  if (const auto reason = why_not_regular(status.st_mode)) {
+    throw std::runtime_error(path.string() + ": cannot read it: " + *reason);
+  }
   text.resize(static_cast<std::size_t>(size));
   try {
     return read_key_file(text, status.st_mode, path.stem().string());
   } catch (const std::invalid_argument& refused) {
     throw std::runtime_error(path.string() + ": " + refused.what());
   }
+}
+
+/// False, with errno, when not all of `text` could be written.
+bool write_whole(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Calls the file `from` by the name `to`; false, with errno, when that name exists. Not every file system can rename
+/// without overwriting (NFS), and not every one can link (FAT).
+bool give_name(const std::string& from, const std::filesystem::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
+  if (errno != EINVAL || ::link(from.c_str(), to.c_str()) != 0) return false;
+  ::unlink(from.c_str());
+  return true;
 }
 
 }  // namespace
@@ -63,13 +90,14 @@ std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder) {
 }
 
 void write_key_file(const std::filesystem::path& path, const ClientKey& key) {
-  constexpr mode_t kOwnerOnly = 0600;
-  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly));
-  const std::string text = key_file_text(key);
-  if (file.fd < 0 || ::write(file.fd, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
-      ::fsync(file.fd) != 0) {
-    throw std::runtime_error(path.string() + ": cannot write this key: " + system_message());
-  }
+  std::string unfinished = path.string() + ".new-XXXXXX";
+  const Descriptor file(::mkostemp(unfinished.data(), O_CLOEXEC));  // for its owner only
+  const bool made =
+      file.fd >= 0 && write_whole(file.fd, key_file_text(key)) && ::fsync(file.fd) == 0 && give_name(unfinished, path);
+  if (made) return;
+  const std::string reason = system_message();
+  if (file.fd >= 0) ::unlink(unfinished.c_str());
+  throw std::runtime_error(path.string() + ": cannot write this key: " + reason);
 }
 
 }  // namespace tendon

@@ -8,13 +8,13 @@
 
 namespace tendon {
 
-/// The keys of a folder, one for each file NAME.key, by name. Other files are left alone.
-/// Throws std::runtime_error, "FILE: what is wrong": the folder cannot be read or has no key, or one of its
-/// keys is readable by others, is no key file, or is weak.
+/// The keys of a folder, one for each file NAME.key, by name. Other files are left alone. Throws std::runtime_error,
+/// "FILE: what is wrong": the folder cannot be read or has no key, or one of its keys is readable by others, is no
+/// regular file, is no key file, or is weak.
 std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder);
 
-/// Writes a new key file that only its owner may read. Throws std::runtime_error when it cannot, or when
-/// there is such a file already.
+/// Writes a new key file that only its owner may read. Throws std::runtime_error when it cannot, or when there is such
+/// a file already; nothing is left behind then: the key is written under another name first.
 void write_key_file(const std::filesystem::path& file, const ClientKey& key);
 
 }  // namespace tendon

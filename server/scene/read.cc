@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <toml++/toml.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <memory>
+#include <cstddef>
+#include <fstream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
+#include "server/machine/regular_file.h"
 #include "server/scene/keys.h"
 #include "server/scene/reader.h"
 #include "server/scene/resolver.h"
@@ -82,17 +82,14 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
 }
 
 Scene read_scene(const std::filesystem::path& file) {
-  struct Close {
-    void operator()(std::FILE* stream) const { std::fclose(stream); }
-  };
-  const auto fail = [&file] {
-    throw SceneError("cannot read " + file.string() + ": " + std::generic_category().message(errno));
-  };
-  const std::unique_ptr<std::FILE, Close> stream(std::fopen(file.c_str(), "rbe"));
-  if (!stream) fail();
   std::string text(kMaxSceneBytes + 1, '\0');
-  text.resize(std::fread(text.data(), 1, text.size(), stream.get()));
-  if (std::ferror(stream.get()) != 0) fail();
+  try {
+    std::ifstream stream = open_regular_file(file);
+    stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(stream.gcount()));
+  } catch (const std::runtime_error& refused) {
+    throw SceneError(refused.what());
+  }
   return parse_scene(text, file.string(), file.parent_path());
 }
 

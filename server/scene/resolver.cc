@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <fstream>
 #include <initializer_list>
 #include <iterator>
 #include <numbers>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "devices/simulated/recorded_motion.h"
+#include "server/machine/regular_file.h"
 #include "server/scene/reader.h"
 #include "server/scene/recorded_hand.h"
 #include "server/scene/values.h"
@@ -82,13 +84,19 @@ class SceneResolver {
     }
   }
 
+  ScriptedMotion::Recorded read_motion(const std::filesystem::path& directory) {
+    RecordedMotionFile& file = *draft_.recorded_motion;
+    file.path = directory / file.path;
+    std::ifstream csv = open_regular_file(file.path);
+    return load_recorded_motion(csv, file);
+  }
+
   void resolve_motion(const std::filesystem::path& directory) {
     if (!draft_.has_hand) return;
     build("device.hand.motion", [&] {
       if (draft_.recorded_motion) {
-        draft_.recorded_motion->path = directory / draft_.recorded_motion->path;
         try {
-          draft_.motion = load_recorded_motion(*draft_.recorded_motion);
+          draft_.motion = read_motion(directory);
         } catch (const std::runtime_error& refused) {
           blame("device.hand.motion.file", {}, refused.what());
         }
@@ -133,9 +141,8 @@ class SceneResolver {
     const std::string_view source = csv ? "device.csv.file" : "device.recording";
     build(source, [&] {
       try {
-        if (csv) csv->path = directory / csv->path;
-        replay.samples = csv ? ReplayDevice::samples_of(load_recorded_motion(*csv))
-                             : read_recorded_hand(directory / *draft_.replayed);
+        replay.samples =
+            csv ? ReplayDevice::samples_of(read_motion(directory)) : read_recorded_hand(directory / *draft_.replayed);
       } catch (const std::runtime_error& refused) {
         blame(source, {}, refused.what());
       }

@@ -2,6 +2,7 @@
 //
 // Bad input of an operator is answered by a sentence that says what to do, on stderr, and exit code 2.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cctype>
@@ -47,11 +48,14 @@ TEST(BadInput, OfTendondIsAnsweredWithWhatIsWrongAndExitCode2) {
   const std::string negative =
       write(path("negative.toml"), std::string(kFalcon) + "[device.effects]\nmass_kg = -0.2\n");
   const std::string syntax = write(path("syntax.toml"), "[device\n");
+  const std::string pipe = path("pipe.toml");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   expect_refusals(
       folder.path(),
       {
           {"no scene named", "tendond", {}, {"scene", "required"}},
           {"missing scene file", "tendond", {path("none.toml")}, {"cannot read", "none.toml", "No such file"}},
+          {"a named pipe as scene", "tendond", {pipe}, {"cannot read", "named pipe, expected a regular file"}},
           {"a folder as scene", "tendond", {path("")}, {"cannot read", "Is a directory"}},
           {"not TOML", "tendond", {syntax}, {syntax + ":1"}},
           {"key in the wrong unit", "tendond", {unit}, {unit + ":5: loop.period_ms: unknown key", "period_us"}},

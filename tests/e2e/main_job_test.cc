@@ -171,5 +171,16 @@ TEST(MainJob, ASignalEndsTheServerCleanlyAndItsGuestsAreTold) {
   }
 }
 
+TEST(MainJob, ADurationIsThatOfTheHapticStepsToAPeriod) {
+  const ScratchFolder folder;
+  Process server(program("tendond"), {demo_scene(), "--listen", "127.0.0.1:0", "--duration-s", "0.3", "--json"},
+                 folder.path());
+  EXPECT_EQ(server.wait(), 0);
+  const std::string out = server.out();
+  const double steps = number_in(out.substr(out.find("stopped")), "steps");
+  EXPECT_LE(steps, 300) << "each of them 1 ms";
+  EXPECT_GE(steps, 1);
+}
+
 }  // namespace
 }  // namespace tendon::e2e

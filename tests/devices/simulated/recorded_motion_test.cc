@@ -2,12 +2,12 @@
 #include "devices/simulated/recorded_motion.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include "devices/simulated/simulated_device.h"
@@ -18,25 +18,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A file that is gone with its test.
-class CsvFile {
- public:
-  explicit CsvFile(const std::string& text)
-      : path_(std::filesystem::temp_directory_path() / ("tendon_motion_" + std::to_string(getpid()) + ".csv")) {
-    std::ofstream(path_, std::ios::binary) << text;
-  }
-  ~CsvFile() { std::filesystem::remove(path_); }
-  CsvFile(const CsvFile&) = delete;
-  CsvFile& operator=(const CsvFile&) = delete;
-  const std::filesystem::path& path() const { return path_; }
+ScriptedMotion::Recorded load(const std::string& text, const RecordedMotionFile& file) {
+  std::istringstream csv(text);
+  return load_recorded_motion(csv, file);
+}
 
- private:
-  std::filesystem::path path_;
-};
-
-std::string complaint(const RecordedMotionFile& file) {
+/// Of a recording hand.csv with a header, whose positions are in the column x.
+std::string complaint(const std::string& text) {
   try {
-    load_recorded_motion(file);
+    load(text, {.path = "hand.csv", .position = "x"});
   } catch (const std::runtime_error& error) {
     return error.what();
   }
@@ -44,8 +34,8 @@ std::string complaint(const RecordedMotionFile& file) {
 }
 
 TEST(RecordedMotion, ReadsColumnsByTheirNamesAndScalesThePosition) {
-  const CsvFile csv("t_s,other, angle_rad \n10,9,1\n10.5,9,-2\r\n\n11,9,4e-1\n");
-  const auto motion = load_recorded_motion({.path = csv.path(), .position = "angle_rad", .scale = 0.075});
+  const auto motion = load("t_s,other, angle_rad \n10,9,1\n10.5,9,-2\r\n\n11,9,4e-1\n",
+                           {.path = "hand.csv", .position = "angle_rad", .scale = 0.075});
   ASSERT_EQ(motion.samples.size(), 3U);
   EXPECT_EQ(motion.samples[1].t, 10.5);
   EXPECT_EQ(motion.samples[1].x, -0.15);
@@ -53,8 +43,7 @@ TEST(RecordedMotion, ReadsColumnsByTheirNamesAndScalesThePosition) {
 }
 
 TEST(RecordedMotion, ReadsColumnsByTheirNumbersFromAFileWithoutAHeader) {
-  const CsvFile csv("7,0,1\n8,0.5,2\n9,1,3");
-  const auto motion = load_recorded_motion({.path = csv.path(), .time = 1U, .position = 0U});
+  const auto motion = load("7,0,1\n8,0.5,2\n9,1,3", {.path = "hand.csv", .time = 1U, .position = 0U});
   ASSERT_EQ(motion.samples.size(), 3U);
   EXPECT_EQ(motion.samples[2].t, 1);
   EXPECT_EQ(motion.samples[2].x, 9);
@@ -76,22 +65,20 @@ TEST(RecordedMotion, NamesFileAndLineAndWhatWasExpectedWhenAFileIsWrong) {
       {"", ":0: expected a header line, found an empty file"},
       {"t_s,x\n0,1\n", ":2: expected 2 samples or more, found 1"},
   };
-  for (const auto& bad : cases) {
-    const CsvFile csv(bad.text);
-    EXPECT_EQ(complaint({.path = csv.path(), .position = "x"}), csv.path().string() + bad.says);
-  }
+  for (const auto& bad : cases) EXPECT_EQ(complaint(bad.text), std::string("hand.csv") + bad.says);
 }
 
-TEST(RecordedMotion, SaysWhyAFileCannotBeOpened) {
-  EXPECT_EQ(complaint({.path = "no/such/file.csv", .position = "x"}),
-            "no/such/file.csv: expected a CSV file of a recorded motion, cannot open it: No such file or directory");
-  EXPECT_EQ(complaint({.path = std::filesystem::temp_directory_path(), .position = "x"}),
-            std::filesystem::temp_directory_path().string() +
-                ": expected a CSV file of a recorded motion, found a directory");
+TEST(RecordedMotion, ALineThatNeverEndsIsRefusedAfter64KiB) {
+  std::string line = "t_s,x\n0,1";
+  line.resize(line.size() + kMaxRecordedLine - 3, ' ');
+  EXPECT_EQ(complaint(line + "\n1,2\n"), "none") << "65 536 bytes are a line";
+  EXPECT_EQ(complaint(line + " \n1,2\n"), "hand.csv:2: expected lines of at most 65536 bytes, found a longer one");
+  EXPECT_EQ(complaint(std::string(1'000'000, '\0')),
+            "hand.csv:1: expected lines of at most 65536 bytes, found a longer one");
 }
 
 TEST(RecordedMotion, RefusesAScaleThatWouldMakeThePositionVanish) {
-  EXPECT_THROW(load_recorded_motion({.path = "any.csv", .position = "x", .scale = 0}), std::invalid_argument);
+  EXPECT_THROW(load("", {.path = "any.csv", .position = "x", .scale = 0}), std::invalid_argument);
 }
 
 TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
@@ -99,10 +86,9 @@ TEST(RecordedMotion, AHumanHandOnAFoamDrivesTheDevice) {
   const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: the recorded human motion is not there";
 
-  const auto recorded =
-      load_recorded_motion({.path = std::filesystem::path(data) / "tue-1dof-teleop" / "m2_question1d_foam.csv",
-                            .position = "master_pos_rad",
-                            .scale = 0.075});
+  const auto path = std::filesystem::path(data) / "tue-1dof-teleop" / "m2_question1d_foam.csv";
+  std::ifstream csv(path);
+  const auto recorded = load_recorded_motion(csv, {.path = path, .position = "master_pos_rad", .scale = 0.075});
   ASSERT_EQ(recorded.samples.size(), 8813U);
   EXPECT_EQ(recorded.samples.front().x, 0.00638790506 * 0.075);
   const double length = recorded.samples.back().t - recorded.samples.front().t;

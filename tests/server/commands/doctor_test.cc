@@ -138,6 +138,12 @@ TEST(Doctor, AfterAPauseDoesNotCountThePeriodsThatItMissed) {
   EXPECT_EQ(wakes.median, 0ms);
 }
 
+TEST(Doctor, AControlCharacterInAKernelFileIsStillJson) {
+  Diagnosis diagnosis;
+  diagnosis.findings = {{"kernel", "6.1\x01\t\"rt\"", ""}};
+  EXPECT_EQ(nlohmann::json::parse(in_json(diagnosis))["findings"][0]["found"], "6.1\x01\t\"rt\"");
+}
+
 TEST(Doctor, JsonAndWordsSayTheSame) {
   Diagnosis diagnosis;
   diagnosis.ordinary = {.count = 1000, .median = 90us, .p99 = 199us, .longest = 6ms};

@@ -2,11 +2,14 @@
 #include "server/scene/key_folder.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <string>
 
 #include "tests/server/scratch_folder.h"
 
@@ -50,6 +53,52 @@ TEST(KeyFolder, AKeyIsWrittenForItsOwnerOnlyAndNeverOverAnother) {
   EXPECT_EQ(std::filesystem::status(file).permissions(), std::filesystem::perms(0600));
   EXPECT_THROW(write_key_file(file, some_key("wall", 2)), std::runtime_error);
   EXPECT_EQ(read_key_folder(folder.path())[0].key.bytes(), some_key("wall", 1).key.bytes());
+}
+
+/// No file of this process can grow beyond `bytes` while this lives: a disk that is full.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit less{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    signal_ = std::signal(SIGXFSZ, SIG_IGN);
+    setrlimit(RLIMIT_FSIZE, &less);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, signal_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*signal_)(int) = nullptr;
+};
+
+TEST(KeyFolder, AFullDiskLeavesNothingBehindAndTheRetryWorks) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "wall.key";
+  std::string refusal;
+  {
+    const FullDisk full(10);
+    try {
+      write_key_file(file, some_key("wall", 1));
+    } catch (const std::runtime_error& error) {
+      refusal = error.what();
+    }
+  }
+  EXPECT_EQ(refusal, file.string() + ": cannot write this key: File too large");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  write_key_file(file, some_key("wall", 1));
+  EXPECT_EQ(read_key_folder(folder.path())[0].key.bytes(), some_key("wall", 1).key.bytes());
+}
+
+TEST(KeyFolder, ANamedPipeIsRefusedAndNotWaitedFor) {
+  const ScratchFolder folder;
+  const std::string pipe = (folder.path() / "wall.key").string();
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(complaint_about(folder.path()), pipe + ": cannot read it: it is a named pipe, expected a regular file");
 }
 
 TEST(KeyFolder, SaysWhichFileIsWrongAndWhy) {

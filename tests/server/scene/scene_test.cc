@@ -2,6 +2,7 @@
 #include "server/scene/scene.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -777,7 +778,10 @@ TEST(SceneError, NamesTheFileThatCannotBeRead) {
   const std::string missing = (folder.path() / "missing.toml").string();
   EXPECT_EQ(error(missing), "cannot read " + missing + ": No such file or directory");
   EXPECT_EQ(error(folder.path()), "cannot read " + folder.path().string() + ": Is a directory");
-  EXPECT_EQ(error("/dev/zero"), "/dev/zero: expected a scene of at most 16384 bytes, found more");
+  EXPECT_EQ(error("/dev/zero"), "cannot read /dev/zero: it is a device, expected a regular file");
+  const std::string long_one = (folder.path() / "long.toml").string();
+  write(long_one, std::string(kMaxSceneBytes + 1, '#'));
+  EXPECT_EQ(error(long_one), long_one + ": expected a scene of at most 16384 bytes, found more");
 }
 
 struct Broken {
@@ -1108,9 +1112,11 @@ TEST(SceneError, PassesOnWhatIsWrongWithARecordedMotion) {
   const ScratchFolder folder;
   const std::string csv = (folder.path() / "hand.csv").string();
   const std::string scene = std::string(kHand) + "kind = \"recorded\"\nfile = \"hand.csv\"\nposition_column = \"x\"\n";
-  EXPECT_EQ(error_of(scene, folder.path()), "s.toml:11: device.hand.motion.file: " + csv +
-                                                ": expected a CSV file of a recorded motion, cannot open it: No such "
-                                                "file or directory");
+  const std::string where = "s.toml:11: device.hand.motion.file: cannot read ";
+  EXPECT_EQ(error_of(scene, folder.path()), where + csv + ": No such file or directory");
+  ASSERT_EQ(mkfifo(csv.c_str(), 0600), 0);
+  EXPECT_EQ(error_of(scene, folder.path()), where + csv + ": it is a named pipe, expected a regular file");
+  std::filesystem::remove(csv);
   write(csv, "t_s,y\n0,0\n1,1\n");
   EXPECT_EQ(error_of(scene, folder.path()),
             "s.toml:11: device.hand.motion.file: " + csv + ":1: expected a column 'x', found 't_s,y'");

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <limits>
 #include <ostream>
@@ -42,8 +43,10 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, co
   const std::string recording = std::string(hand.recording) + ".csv";
   const DeviceProfile& falcon = *find_device_profile("falcon");
   SimulatedDevice::Config config = falcon.device();
-  ScriptedMotion::Recorded motion = load_recorded_motion(
-      {.path = data / "tue-1dof-teleop" / recording, .position = "master_pos_rad", .scale = 0.075});
+  const std::filesystem::path path = data / "tue-1dof-teleop" / recording;
+  std::ifstream csv(path);
+  ScriptedMotion::Recorded motion =
+      load_recorded_motion(csv, {.path = path, .position = "master_pos_rad", .scale = 0.075});
   const double length = motion.samples.back().t - motion.samples.front().t;
   config.hand =
       OperatorHand::Config{.stiffness = 300, .damping = 3, .mass = 0.05, .motion = ScriptedMotion(std::move(motion))};
