@@ -18,7 +18,7 @@ from .keys import read_key
 from .messages import Delays, DeviceReport, DeviceState, LinkReport, LinkStats, PeerReport, Role
 
 Watch = Callable[[DeviceState, LinkStats], None]
-"""An onlooker: device state and the state of the link in, nothing out."""
+"""An observer as a function: device state and the state of the link in, nothing out."""
 
 
 def number(least: float = 0, most: float = math.inf) -> Callable[[str], float]:
@@ -97,10 +97,11 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
         0   it has been connected to the server
         1   it could not connect, or the server refused it for good
 
-    stderr gets one sentence for each change of the connection, and the server's when forces were late; stdout nothing but the
-    callback's own output and, with --json, once a second what the server says of our forces, {"report":{"number":1, …}}, or to an
-    observer of the device's loop and its engines, {"device":{"number":1, …}} and {"peer":{"name":"wall", …}}, and the summary:
-    {"summary":{"duration_s":…, …}}. What the callback raises passes through, after a Bye.
+    stderr gets one sentence for each change of the connection, and the server's sentence when forces were late. stdout
+    gets only the callback's own output and, with --json, once a second the server's report on our forces,
+    {"report":{"number":1, …}}, or to an observer those on the device's loop and its engines, {"device":{"number":1, …}}
+    and {"peer":{"name":"wall", …}}, and the summary, {"summary":{"duration_s":…, …}}. Exceptions of the callback pass
+    through, after a Bye.
     """
     if (physics is None) == (watch is None):
         raise TypeError("run: expected physics or watch")

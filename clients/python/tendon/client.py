@@ -13,7 +13,7 @@ from .guest import AnyClient
 from .messages import NEVER, DeviceState, Touch
 
 Physics = Callable[[DeviceState], Union[Touch, Sequence[float]]]
-"""The physics engine, seen from here: device state in, force (and stiffness) out."""
+"""The physics engine as a function: device state in, force (and stiffness) out."""
 
 
 class Client(AnyClient):

@@ -77,12 +77,12 @@ class Config:
     role: Role = Role.CONTROLLER
     """A controller sees states and sends forces, one per channel; an observer looks on."""
     device: str = ""
-    """Of several devices of a server, by its name; empty: the first one. At most 24 bytes."""
+    """Name of the device, on a server with several; empty: the first one. At most 24 bytes."""
     channel: str = ""
-    """Of several channels of the device, likewise."""
+    """Name of the device's channel, likewise."""
     take_lease: bool = False
-    """Where another controller holds the channel's lease: ask for it until we have it. It is asked again when the server says
-    that the lease may be over."""
+    """When another controller holds the channel's lease: keep asking until we have it. We ask again when the server
+    says that the lease may be over."""
     key: bytes | None = field(default=None, repr=False)
     """32 bytes that the server knows too (`read_key`): suite 1. None: plain, which servers accept on loopback only."""
     rate_hz: float = 0
@@ -99,16 +99,17 @@ class Config:
         valid_for = max(3 T, 0.02)                           with a deadband: T ≥ its longest silence
     """
     deadband: ForceDeadband | None = None
-    """Forces that a hand cannot tell from the last one sent are not sent. None: every force is."""
+    """A force that a hand cannot tell from the last one sent is not sent. None: every force is sent."""
     state_deadband: SetStateDeadband | None = None
-    """States that we can foretell are not sent to us. With rate_hz = r, states are then handed out at multiples of 1/r as they
-    are foretold for that instant, their tick and time of sampling included; never a tick twice, never an older one, and nothing
-    is foretold for longer than max_silence_us. With rate_hz = 0, only those that come. None: every state is asked for."""
+    """The server leaves out states that we can predict. With rate_hz = r, states are handed out at multiples of 1/r as
+    predicted for that instant, tick and sampling time included. No tick comes twice, none is older than the one before,
+    and nothing is predicted for longer than max_silence_us. With rate_hz = 0, only the states that come are handed out.
+    None: we ask for every state."""
     diagnostics: bool = False
-    """Of an observer: ask for what the engines want (`DeviceState.force_wanted`), and once a second for how the device's loop and
-    its engines do. A server that knows nothing of this leaves it out."""
+    """For an observer: ask for the forces that the engines want (`DeviceState.force_wanted`), and once a second for
+    reports on the device's loop and its engines. A server that does not know this feature leaves them out."""
     patience_s: float = 2.0
-    """Hellos of one attempt go unanswered for so long before it is given up."""
+    """How long one attempt waits for an answer to its Hellos."""
     retry_min_s: float = 0.1
     """First wait before the next attempt; then twice as long each time …"""
     retry_max_s: float = 2.0
@@ -176,7 +177,7 @@ class ForceClient:
         self.welcome: Welcome | None = None
         """What the server said of itself and its device when the newest session opened."""
         self.description: DeviceDescription | None = None
-        """What the device is and can do, when we have named a device or a channel and the server has answered."""
+        """Description of the device, once we have named a device or a channel and the server has answered."""
         self.holds = False
         """Whether the channel takes our forces. While it does not, a controller is handed no states."""
         self.report: LinkReport | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the blocking and the asyncio client share: a ForceClient, its socket, and a log of what happens to it."""
+"""Shared by the blocking and the asyncio client: a ForceClient, its socket, and a log of what happens to it."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .messages import Code, DeviceDescription, DeviceReport, DeviceState, LinkRe
 log = logging.getLogger("tendon")
 
 MAX_DATAGRAMS = 256
-"""Taken from the socket in one turn: a flood must not keep us from sending. A 1 kHz server sends so many in a
-quarter of a second, the longest silence before it stops the device."""
+"""Most datagrams taken from the socket in one turn: a flood must not keep us from sending. A 1 kHz server sends this
+many in a quarter of a second, the longest silence before it stops the device."""
 
 _MAX_ERRORS = 64
-"""Passed over in search of one datagram: a flood of reports must not keep us from sending either."""
+"""Most error reports passed over in search of one datagram: a flood of them must not keep us from sending either."""
 
 _KEEP_TRYING = (Code.BUSY, Code.SHUTDOWN)
 
@@ -50,8 +50,9 @@ class Guest:
     """`turn(now)` does all there is to do. One thread, or one event loop, at a time."""
 
     def __init__(self, server: str, config: Config, now: int, clock: Callable[[], int] = time.monotonic_ns) -> None:
-        """Raises ValueError when `server` is no HOST:PORT, OSError when there is no such host or the system cannot reach
-        it. A host name is looked up here, which may wait, and again, in a thread of its own, before each further attempt."""
+        """Raises ValueError when `server` is no HOST:PORT, OSError when there is no such host or the system cannot
+        reach it. A host name is looked up here, which may wait, and again, in a thread of its own, before each further
+        attempt."""
         self.server = server
         self._place = _look_up(server)[0]
         self.socket = _connected(self.server, self._place)
@@ -175,11 +176,11 @@ class Guest:
 
 
 class AnyClient:
-    """What the blocking and the asyncio client have in common: forces and requests out, and what is known of the guest."""
+    """Base of the blocking and the asyncio client: sends forces and requests, and tells what is known of the guest."""
 
     def __init__(self, server: str, config: Config = Config()) -> None:
-        """`server`: HOST:PORT, HOST a name or an address. Raises ValueError or OSError, with the host's name, when there
-        is no such host; nobody need listen there yet."""
+        """`server`: HOST:PORT, HOST a name or an address. Raises ValueError or OSError, with the host's name, when
+        there is no such host; nobody need listen there yet."""
         self._guest = Guest(server, config, time.monotonic_ns())
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
@@ -196,12 +197,12 @@ class AnyClient:
         return self._ask(self._guest.core.disarm)
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, once more when it is lost before the answer; what became of it `holds` says. False when
-        there is no session to ask in."""
+        """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result. False
+        when there is no session to ask in."""
         return self._ask(self._guest.core.take_lease)
 
     def give_lease(self) -> bool:
-        """Gives it up, and asks for it no more. False when there is no session to do it in."""
+        """Gives the lease up, and stops asking for it. False when there is no session."""
         return self._ask(self._guest.core.give_lease)
 
     @property
@@ -215,7 +216,7 @@ class AnyClient:
 
     @property
     def description(self) -> DeviceDescription | None:
-        """What the device is and can do, when we have named a device or a channel and the server has answered."""
+        """Description of the device, once we have named a device or a channel and the server has answered."""
         return self._guest.core.description
 
     @property
@@ -225,17 +226,17 @@ class AnyClient:
 
     @property
     def report(self) -> LinkReport | None:
-        """The server's newest word on how our forces fare, once a second while they come; None before the first."""
+        """The server's newest report on our forces, once a second while they come; None before the first."""
         return self._guest.core.report
 
     @property
     def device_report(self) -> DeviceReport | None:
-        """With Config.diagnostics, how the device's loop does, once a second; None before the first."""
+        """With Config.diagnostics, the newest report on the device's loop, once a second; None before the first."""
         return self._guest.core.device_report
 
     @property
     def peer_reports(self) -> dict[int, PeerReport]:
-        """With Config.diagnostics, how the engine of each channel does, or did last."""
+        """With Config.diagnostics, the newest report on the engine of each channel; the last one stays when it has gone."""
         return self._guest.core.peer_reports
 
     def _ask(self, request: Callable[[], bool]) -> bool:

@@ -231,7 +231,7 @@ class ChannelDescription:
 
 @dataclass(frozen=True, slots=True)
 class DeviceDescription:
-    """What a device is and can do. 0 = not known, where a value cannot be 0."""
+    """Description of a device. 0 = not known, where a value cannot be 0."""
 
     device: int
     name: str  # as the server calls it
@@ -420,7 +420,7 @@ Stiffness = Union[float, Sequence[float], Sequence[Sequence[float]]]
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What the physics answers to one device state: what the hand is to feel there.
+    """The physics engine's answer to one device state.
 
     `stiffness` is −∂force/∂position at the state's position, in N/m, a spring is positive: one number k
     for k·I, three for the diagonal, or the 3 × 3 matrix. With it the device loop follows the hand until

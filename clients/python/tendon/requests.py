@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from .limits import REQUEST_WINDOW
 from .messages import NEVER, Code, Control, ControlAck, Instant, Request
 
-_MAX_WAIT = 1_000_000_000  # ns; waits double up to this, also where the round trip is longer
+_MAX_WAIT = 1_000_000_000  # ns; waits double up to this, even where the round trip is longer
 
 
 @dataclass(slots=True)

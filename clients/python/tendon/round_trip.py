@@ -6,7 +6,7 @@ class RoundTrip:
     """All times are nanoseconds."""
 
     FIRST_TIMEOUT = 100_000_000
-    """What to wait before the first sample: a handshake has just gone through, so the peer is there."""
+    """How long to wait before the first sample: a handshake has just succeeded, so the peer is there."""
 
     def __init__(self) -> None:
         self.newest = 0

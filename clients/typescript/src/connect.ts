@@ -28,15 +28,15 @@ export interface ConnectConfig extends ClientConfig {
 export interface Guest {
   readonly phase: Phase;
   readonly welcome: Welcome | undefined;
-  /** What the device is and can do, when `device` or `channel` was named and the server has answered. */
+  /** Description of the device, once `device` or `channel` was named and the server has answered. */
   readonly description: DeviceDescription | undefined;
   /** The channel takes our forces; while it does not, the physics is not called. */
   readonly holds: boolean;
-  /** The server's newest word on how our forces fare, once a second while they come. */
+  /** The server's newest report on our forces, once a second while they come. */
   readonly report: LinkReport | undefined;
-  /** With `diagnostics`, the newest word on how the device's loop does, once a second … */
+  /** With `diagnostics`, the newest report on the device's loop, once a second. */
   readonly deviceReport: DeviceReport | undefined;
-  /** … and by channel on the engine that it has, or had last. */
+  /** With `diagnostics`, the newest report on the engine of each channel; the last one stays when it has gone. */
   readonly peerReports: ReadonlyMap<number, PeerReport>;
   stats(): ClientStats;
   rearm(): boolean;
@@ -66,7 +66,7 @@ export function connect(
 
 /** Rounds of the event loop that wait for a backlog to be read, before the callback must have its turn. */
 const kMaxRounds = 16;
-/** Longer ones overflow in some runtimes; it is only a reason to look again. */
+/** Longer timers overflow in some runtimes; this one only makes us look again. */
 const kLongestTimerMs = 1000;
 
 const readClock = (): Nanoseconds => fromMilliseconds(performance.now());

@@ -13,7 +13,7 @@ import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
-/** What the physics answers to one device state: what the hand is to feel there. */
+/** The physics engine's answer to one device state. */
 export interface Touch {
   /** N, on the hand: a wall that resists motion along +x sends −x. */
   readonly force: Vec3;
@@ -41,7 +41,7 @@ export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
 export interface ClientConfig {
   /** For the server's log; at most 64 bytes. */
   readonly name?: string;
-  /** Of several devices and channels of a server, by their names, at most 24 bytes each; empty: the first one. */
+  /** Names of the device and its channel, on a server with several, at most 24 bytes each; empty: the first one. */
   readonly device?: string;
   readonly channel?: string;
   /**
@@ -323,7 +323,7 @@ export class ForceClient {
   get welcome(): Welcome | undefined {
     return this.#welcome;
   }
-  /** What the device is and can do, when we have named a device or a channel and the server has answered. */
+  /** Description of the device, once we have named a device or a channel and the server has answered. */
   get description(): DeviceDescription | undefined {
     return this.#description;
   }

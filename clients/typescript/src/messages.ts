@@ -142,7 +142,7 @@ export interface ChannelDescription {
   readonly holder: string;
 }
 
-/** What a device is and can do. 0 = not known, where a value cannot be 0. */
+/** Description of a device. 0 = not known, where a value cannot be 0. */
 export interface DeviceDescription {
   readonly device: number;
   /** As the server calls it, and what it is. */

@@ -72,8 +72,8 @@ function printReport(report: LinkReport, { name, json }: Options): void {
  * Runs a guest over UDP until it is told to stop (durationS, SIGINT or SIGTERM); then it says Bye. The exit code comes
  * back: 0 = it has been connected to the server, 1 = it could not connect, there is no such host, the server refused it for
  * good, or the callback threw. Another controller at the device and a server that goes down are not for good: it keeps trying. stderr gets one
- * sentence for each change of the connection and the server's own when forces were late, stdout nothing but the callback's own
- * output and, with `json`, what the server says of our forces once a second, and the summary.
+ * sentence for each change of the connection, and the server's sentence when forces were late. stdout gets only the callback's own
+ * output and, with `json`, the server's report on our forces once a second, and the summary.
  */
 export async function run(
   options: Options,

@@ -47,7 +47,7 @@ export interface LinkStats {
   roundTripVariationMs: number;
 }
 
-/** What an observer is told that asks for diagnostics. */
+/** Told to an observer that asks for diagnostics. */
 export type Diagnosis =
   | { readonly kind: "deviceReport"; readonly value: DeviceReport }
   | { readonly kind: "peerReport"; readonly value: PeerReport };

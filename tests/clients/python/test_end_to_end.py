@@ -99,7 +99,7 @@ def test_an_observer_looks_on_beside_a_controller(tmp_path):
                 client.send(next(client.states(30)), Touch())
 
 
-def test_a_second_controller_is_told_that_there_is_one_and_takes_over_when_it_leaves(tmp_path):
+def test_a_second_controller_waits_and_takes_over_when_the_first_leaves(tmp_path):
     with Server(tmp_path) as server, example(tmp_path, "virtual_wall", "--server", server.address) as first:
         first.wait_for_line("connected")
         with example(tmp_path, "virtual_wall", "--server", server.address) as second:
@@ -179,7 +179,7 @@ def test_a_device_that_is_not_there_is_refused_for_good(tmp_path):
             assert engine.wait() == 1
 
 
-def test_a_lease_is_taken_from_an_engine_that_hangs_which_is_told_so_and_takes_it_back(tmp_path):
+def test_a_hanging_engine_loses_its_lease_is_told_and_takes_it_back(tmp_path):
     def waits_until(client, has_come_true):
         """Lets it live until then."""
         for _ in range(300):
@@ -209,7 +209,7 @@ def test_a_lease_is_taken_from_an_engine_that_hangs_which_is_told_so_and_takes_i
         assert (end["devices"][0]["channels"][0]["handovers"], end["replaced"], end["welcomed"]) == (1, 0, 2)
 
 
-def test_an_example_takes_the_lease_of_the_channel_that_its_command_line_names(tmp_path):
+def test_an_example_takes_the_lease_of_the_channel_it_is_told(tmp_path):
     with Server(tmp_path, scenes={"device": scene("left") + LEASED}) as server:
         with Client(server.address, Config(channel="tissue")) as first:
             assert next(first.states(30))
@@ -286,7 +286,7 @@ def test_an_observers_key_does_not_control(tmp_path, keys):
                 next(client.states(30))
 
 
-def test_another_program_with_the_same_key_takes_the_place_and_the_first_does_not_come_back(tmp_path, keys):
+def test_another_program_with_the_same_key_takes_the_place_for_good(tmp_path, keys):
     config = Config(key=read_key(keys / "wall.key"))
     with Server(tmp_path, keys=keys) as server:
         with Client(server.address, config) as first, Client(server.address, config) as second:

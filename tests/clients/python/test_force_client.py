@@ -172,7 +172,7 @@ def test_a_server_with_another_key_is_one_that_does_not_answer(key):
     assert stage.client.stats.sessions == 0
 
 
-def test_hellos_go_out_every_100_ms_and_one_attempt_has_one_random_and_one_noise_message():
+def test_an_attempt_says_hello_every_100_ms_with_one_random():
     stage = Stage(Config(key=KEY), StandIn(KEY))
     stage.server.deaf = True
     stage.run(1 * SECOND)
@@ -181,7 +181,7 @@ def test_hellos_go_out_every_100_ms_and_one_attempt_has_one_random_and_one_noise
     assert len({hello.random for hello in hellos}) == len({hello.body for hello in hellos}) == 1
 
 
-def test_only_the_first_retry_is_answered_at_once_and_the_last_cookie_is_used():
+def test_only_the_first_retry_is_answered_at_once_with_the_last_cookie():
     handshake = ClientHandshake(Hello(Role.OBSERVER), bytes(16), 0)
     assert decode_hello(handshake.next_datagram(0)).cookie == bytes(16)
     for cookie in (b"a" * 16, b"b" * 16):
@@ -212,7 +212,7 @@ def test_attempts_are_given_up_after_2_s_and_wait_twice_as_long_each_time():
     assert stage.client.stats.attempts == 10
 
 
-def test_a_server_that_restarts_is_found_again_and_the_sequence_begins_anew():
+def test_a_restarted_server_is_found_and_the_sequence_begins_anew():
     stage = Stage(Config(rate_hz=100))
     stage.run(1 * SECOND)
     stage.server.session.close(Code.SHUTDOWN, "SIGTERM")
@@ -234,7 +234,7 @@ def test_whose_place_another_program_has_taken_does_not_come_back():
     assert (stats.phase, stats.code, stats.attempts) == (Phase.STOPPED, Code.REPLACED, 1)
 
 
-def test_a_sealed_session_that_is_a_day_old_says_bye_and_shakes_hands_again(monkeypatch):
+def test_a_sealed_session_of_a_day_says_bye_and_shakes_hands_again(monkeypatch):
     monkeypatch.setattr("tendon.limits.LIFE_NS", 3 * SECOND)
     stage = Stage(Config(key=KEY), StandIn(KEY))
     stage.run(1 * SECOND)
@@ -274,7 +274,7 @@ def test_an_answer_with_a_version_that_was_not_offered_is_ignored():
     assert stage.client.phase is Phase.GREETING
 
 
-def test_states_are_handed_out_on_the_grid_of_the_rate_and_the_others_skipped():
+def test_states_are_handed_out_on_the_grid_of_the_rate():
     stage = Stage(Config(rate_hz=100))
     stage.run(2 * SECOND)
     stats = stage.client.stats
@@ -397,7 +397,7 @@ def test_a_force_of_a_wrong_shape_is_an_error_in_the_callers_program(touch):
         stage.run(1 * SECOND)
 
 
-def test_an_observer_that_asks_for_diagnostics_has_the_newest_reports_and_they_go_with_the_session():
+def test_diagnostics_are_the_newest_reports_of_the_session():
     stage = Stage(Config(role=Role.OBSERVER, diagnostics=True))
     stage.touch = None
     stage.run(100 * MS)
@@ -520,7 +520,7 @@ def test_nothing_is_foretold_beyond_the_longest_silence():
     assert 5 * 8 < len(stage.seen) < 5 * 12 + 2  # 20 ms of every 200
 
 
-def test_a_server_that_does_not_know_of_deadbands_sends_every_state_and_none_is_foretold():
+def test_no_state_is_predicted_for_a_server_without_deadbands():
     stage = Stage(Config(rate_hz=500, state_deadband=KEPT))
     stage.grant = Code.UNSUPPORTED
     stage.run(1 * SECOND)
@@ -544,7 +544,7 @@ def test_a_deadband_that_no_server_grants_is_refused_here(asked, wrong):
         Config(state_deadband=asked)
 
 
-def test_forces_that_feel_alike_are_left_out_but_not_for_longer_than_the_silence():
+def test_forces_that_feel_alike_are_left_out_up_to_the_silence():
     stage = Stage(Config(deadband=ForceDeadband()))
     stage.touch = lambda hand: Touch((1.0, 0.0, 0.0) if hand.tick < 500 else (1.2, 0.0, 0.0))
     stage.run(1 * SECOND)
@@ -556,7 +556,7 @@ def test_forces_that_feel_alike_are_left_out_but_not_for_longer_than_the_silence
     assert {force.valid_for_us for force in stage.forces[1:]} == {60_000}
 
 
-def test_what_the_server_says_of_our_forces_is_there_for_the_asking_and_goes_with_the_session():
+def test_the_report_on_our_forces_is_that_of_the_session():
     stage = Stage(Config())
     stage.run(100 * MS)
     assert stage.client.report is None
@@ -596,7 +596,7 @@ def leases(stage: Stage) -> list[int]:
         ({"device": "right", "role": Role.OBSERVER}, (Claim(Role.OBSERVER, "right", ""),)),
     ],
 )
-def test_what_is_named_is_claimed_and_every_hello_says_that_a_lease_may_be_lost(names, claims):
+def test_named_places_are_claimed_in_every_hello(names, claims):
     stage = Stage(Config(**names))
     stage.run(100 * MS)
     (hello,) = stage.server.hellos
@@ -604,7 +604,7 @@ def test_what_is_named_is_claimed_and_every_hello_says_that_a_lease_may_be_lost(
     assert hello.features == ("local-model", "channels")
 
 
-def test_forces_orders_leases_and_the_state_rate_are_of_the_place_that_was_granted():
+def test_forces_orders_leases_and_rates_name_the_granted_place():
     stage = named(state_hz=250)
     stage.run(100 * MS)
     for ask in (stage.client.rearm, stage.client.disarm, stage.client.take_lease, stage.client.give_lease):
@@ -615,7 +615,7 @@ def test_forces_orders_leases_and_the_state_rate_are_of_the_place_that_was_grant
     assert {(force.device, force.channel) for force in stage.forces} == {(1, 2)}
 
 
-def test_without_a_name_it_is_the_first_channel_of_the_first_device_and_nothing_is_asked():
+def test_without_a_name_it_is_the_first_channel_of_the_first_device():
     stage = Stage(Config(take_lease=True))
     stage.run(100 * MS)
     assert stage.client.holds, "the Welcome says so by its role"
@@ -643,7 +643,7 @@ def test_a_server_that_does_not_grant_what_was_named_is_left(grants):
     assert stage.seen == []
 
 
-def test_what_a_named_device_is_is_there_for_the_asking_and_goes_with_the_session():
+def test_the_description_of_a_named_device_is_that_of_the_session():
     stage = named()
     assert stage.client.description is None
     stage.run(100 * MS)
@@ -655,7 +655,7 @@ def test_what_a_named_device_is_is_there_for_the_asking_and_goes_with_the_sessio
     assert stage.client.description is None
 
 
-def test_while_another_one_holds_the_channel_no_state_is_handed_out_and_the_lease_is_taken_when_asked_for():
+def test_no_state_is_handed_out_while_another_holds_the_channel():
     stage = named(ANOTHERS)
     stage.run(1 * SECOND)
     stats = stage.client.stats
@@ -684,7 +684,7 @@ def test_an_observer_has_no_use_for_a_lease():
 
 
 @pytest.mark.parametrize("wait_ms, apart", [(200, 200 * MS), (0, 50 * MS)])
-def test_a_lease_that_another_one_holds_is_asked_for_again_when_it_may_be_over_until_it_is_ours(wait_ms, apart):
+def test_a_held_lease_is_asked_for_until_it_is_ours(wait_ms, apart):
     stage = named(ANOTHERS, take_lease=True)
     stage.grant, stage.wait_ms = Code.BUSY, wait_ms
     stage.run(1 * SECOND)
@@ -699,7 +699,7 @@ def test_a_lease_that_another_one_holds_is_asked_for_again_when_it_may_be_over_u
     assert len(leases(stage)) == len(asked) + 1
 
 
-def test_a_lease_is_asked_for_once_unless_the_config_says_otherwise_and_not_again_where_it_is_denied():
+def test_a_lease_is_asked_for_once_unless_the_config_says_otherwise():
     once = named(ANOTHERS)
     once.grant = Code.BUSY
     once.run(100 * MS)
@@ -742,7 +742,7 @@ def test_who_has_lost_the_lease_is_told_to_whom_and_sends_nothing_more():
     assert leases(stage) == []
 
 
-def test_a_lease_that_was_lost_is_asked_for_again_and_its_loss_is_forgotten_when_it_is_ours():
+def test_a_lost_lease_is_asked_for_again_and_then_its_loss_forgotten():
     stage = named(take_lease=True)
     stage.run(100 * MS)
     lost_at = stage.world.now
@@ -774,7 +774,7 @@ def test_what_a_server_cannot_ask_is_answered_so():
     assert (answer.code, answer.detail) == (Code.UNSUPPORTED, "that is a client's to ask")
 
 
-def test_a_lease_that_was_given_up_is_not_asked_for_again_and_an_older_answer_does_not_bring_it_back():
+def test_a_lease_given_up_does_not_come_back_by_an_older_answer():
     stage = named(take_lease=True)
     stage.run(100 * MS)
     assert stage.client.take_lease(), "ours already: the server says OK"
@@ -787,7 +787,7 @@ def test_a_lease_that_was_given_up_is_not_asked_for_again_and_an_older_answer_do
 
 
 @pytest.mark.parametrize("once_more", [Code.BUSY, Code.OK])
-def test_a_lease_that_it_has_had_and_lost_before_it_hears_of_either_is_lost_unless_it_is_given_once_more(once_more):
+def test_a_lease_won_and_lost_before_either_is_heard_is_lost(once_more):
     stage = named(ANOTHERS)
     stage.run(100 * MS)
     stage.lease_answers, stage.snatches = [Code.OK, once_more], 1
@@ -827,7 +827,7 @@ def test_a_turn_is_due_when_the_lease_is_to_be_asked_for_again():
     assert stage.client.next_turn() == asked + 51 * MS, "50 ms after the answer, which was on its way for 1 ms"
 
 
-def test_a_lease_whose_answer_the_end_of_a_session_has_swallowed_is_asked_for_in_the_next_one():
+def test_a_lease_unanswered_in_one_session_is_asked_for_in_the_next():
     stage = named(ANOTHERS, take_lease=True)
     stage.grant = Code.BUSY
     stage.run(100 * MS)
@@ -839,7 +839,7 @@ def test_a_lease_whose_answer_the_end_of_a_session_has_swallowed_is_asked_for_in
     assert stage.client.stats.sessions == 2
 
 
-def test_a_new_session_has_a_place_of_its_own_and_nothing_of_the_one_before():
+def test_a_new_session_has_its_own_place_and_nothing_of_the_old_one():
     stage = named(take_lease=True)
     stage.grant = Code.BUSY
     stage.run(100 * MS)
@@ -856,7 +856,7 @@ def test_a_new_session_has_a_place_of_its_own_and_nothing_of_the_one_before():
     assert len(stage.requests) == asked
 
 
-def test_without_a_session_nothing_is_held_and_no_lease_is_asked_for_or_given():
+def test_without_a_session_no_lease_is_held_asked_for_or_given():
     stage = named()
     assert not (stage.client.holds or stage.client.take_lease() or stage.client.give_lease())
     stage.run(100 * MS)

@@ -73,7 +73,7 @@ def test_a_flood_of_reports_does_not_keep_it_from_sending():
     assert len(it.socket.sent) == 1
 
 
-def test_what_a_turn_finds_late_it_does_not_take_for_as_old_as_its_beginning(monkeypatch):
+def test_a_datagram_found_late_in_a_turn_is_not_taken_for_older(monkeypatch):
     """A process that loses its processor in the middle of a turn: the round trip would look short by as much."""
     it = guest(b"one", b"two")
     times = iter([2, 9])

@@ -49,7 +49,7 @@ def drain(session: Session) -> list:
 
 @pytest.mark.parametrize("suite", ["plain", "sealed"])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_over_a_bad_network_states_only_get_newer_and_every_request_is_answered_once_in_order(seed, suite):
+def test_a_bad_network_keeps_states_newer_and_requests_in_order(seed, suite):
     dice = random.Random(seed)
     weather = Weather(dice.randrange(60 * MS), dice.randrange(50 * MS), dice.random() * 0.4, dice.random() * 0.3)
     it = world(weather, seed, suite)
@@ -327,7 +327,7 @@ def test_a_request_is_repeated_at_doubling_intervals_up_to_1_s():
     assert intervals == [100, 200, 400, 800, 1000, 1000]
 
 
-def test_requests_are_handed_out_in_order_and_unknown_ones_answered_as_unsupported():
+def test_requests_come_in_order_and_unknown_ones_are_unsupported():
     requests = IncomingRequests()
     assert requests.take(Control(3, Rearm())) and requests.next() is None
     assert requests.take(Control(2, None)) and requests.take(Control(1, Rearm()))

@@ -33,7 +33,7 @@ describe("the name of a server", () => {
     await assert.rejects(lookUp("haptics.invalid"), (error: Error) => error instanceof NoSuchHost && error.message.startsWith("cannot find haptics.invalid: "));
   });
 
-  it("leads there: what is sent before the socket is connected arrives too, the newest of it", async (test) => {
+  it("leads there, and datagrams sent before it is connected arrive too", async (test) => {
     const port = await echo(test);
     const came: number[] = [];
     const way = udp(`LOCALHOST:${port}`)((datagram) => came.push(datagram[0]!), assert.fail);

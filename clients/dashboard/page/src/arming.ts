@@ -50,7 +50,7 @@ export class Arming {
     const told = server ? JSON.stringify(server.press) : this.#told;
     if (told !== this.#told) {
       this.#refused = undefined;
-      // What had been done before this page came is no news.
+      // The result of an order given before this page opened is not shown.
       this.#toldAt = this.#told === undefined ? -Infinity : performance.now();
       this.#told = told;
     }

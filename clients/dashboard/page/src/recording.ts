@@ -24,7 +24,7 @@ export interface Recording {
   readonly scene: { readonly text: string; readonly version: string; readonly commit: string } | undefined;
   /** ns since 1970 of the first step. */
   readonly began: bigint;
-  /** What the person should know: that it is cut short. */
+  /** Warnings: that the recording is cut short. */
   readonly remarks: readonly string[];
   /** Where the part begins that was read, and the one after it, s after the recording's beginning. */
   readonly from: number;

@@ -36,18 +36,18 @@ export const kCharts: readonly ChartSpec[] = [
   },
 ];
 
-/** What a view shows beside the track: of a live server what it reports, of a recording what can be computed from it. */
+/** What a view shows beside the track: a live server's reports, or figures computed from a recording. */
 export interface Facts {
   readonly state: { readonly level: Level; readonly name: string; readonly meaning: string };
   readonly engines: readonly EngineReport[];
-  /** … in place of cards, where there is none. */
+  /** Shown in place of the cards when there is no engine. */
   readonly noEngines: string;
   readonly delay: { readonly name: string; readonly value: string; readonly note: string };
   readonly loss: { readonly name: string; readonly value: string; readonly note: string };
   readonly lateness: { readonly buckets: readonly number[]; readonly what: string; readonly more: string };
   /** The device gives out what it is told to. */
   readonly gives: boolean;
-  /** What the server does less of; empty: nothing. */
+  /** In what the server is degraded, in words; empty: in nothing. */
   readonly degraded: string;
 }
 
@@ -128,7 +128,7 @@ export class View {
     say(force.name, `Applied force${suffix}`);
     say(energy.name, `Energy${suffix}`);
     const words = known ? kModes[track.mode[i]!] : undefined;
-    if (words?.level === "good" && !facts.gives) show(mode, "off", words.name, "a fresh force has come, but the device gives none out");
+    if (words?.level === "good" && !facts.gives) show(mode, "off", words.name, "a fresh force has come, and the device gives none");
     else show(mode, words?.level ?? "off", words?.name ?? "–", words?.meaning ?? "no state has come");
     const bound = Number.isFinite(value("permitted")) ? `${digits(value("permitted"))} permitted` : "no bound";
     show(force, "off", `${digits(value("applied"))} N`, Number.isFinite(value("wanted")) ? `of ${digits(value("wanted"))} wanted, ${bound}` : bound);

@@ -26,7 +26,7 @@ export const kReasons: readonly ReasonWords[] = [
   { bit: 9, name: "Device clamp", meaning: "the device gave out less than it was told to", limits: true },
   { bit: 12, name: "Unseen", meaning: "the device gave no position, so it gives no force", limits: true },
   { bit: 10, name: "Overrun", meaning: "a step came later than the control law reckons with", limits: false },
-  { bit: 11, name: "Watchdog", meaning: "… so late that the device's own watchdog let go", limits: false },
+  { bit: 11, name: "Watchdog", meaning: "a step came so late that the device's own watchdog let go", limits: false },
 ];
 
 interface StateWords {
