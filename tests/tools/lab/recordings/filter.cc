@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/tools/lab/recordings/filter.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/scene/scene.h"
 #include "tests/tools/lab/pictures/json.h"
 
 namespace tendon::lab {
@@ -90,6 +92,21 @@ bool read_line(std::istream& in, std::ostream& out, std::string& line) {
 }
 
 }  // namespace
+
+LimiterConfig limiter_of(const FilterLaw& law) {
+  // The motion is recorded, so the device does not matter. A scene's device has at least the limiter's friction.
+  constexpr std::string_view kScene =
+      "[device]\nkind = \"simulated\"\n"
+      "[device.effects]\nmass_kg = 0.1\nviscous_friction_n_s_per_m = 1e9\ncoulomb_friction_n = 1e9\n"
+      "[limiter]\n[force]\nmax_force_n = 8.0\n";
+  std::vector<std::string> settings = {"limiter.kind=" + law.name,
+                                       "limiter.coulomb_friction_n=" + JsonLine::number(law.coulomb),
+                                       "limiter.viscous_friction_n_s_per_m=" + JsonLine::number(law.viscous),
+                                       "loop.period_us=" + JsonLine::number(std::min(law.period_us, 1000.0)),
+                                       "loop.longest_hold_us=" + JsonLine::number(law.period_us)};
+  settings.insert(settings.end(), law.settings.begin(), law.settings.end());
+  return parse_scene(kScene, "the law's scene", ".", settings).loop.control.limiter;
+}
 
 int filter(const FilterOptions& options, std::istream& in, std::ostream& out, std::ostream& errors) {
   std::string line;

@@ -3,10 +3,27 @@
 
 #include <istream>
 #include <ostream>
+#include <string>
+#include <vector>
 
 #include "core/control/limiter.h"
 
 namespace tendon::lab {
+
+/// Which law, as the command line says it.
+struct FilterLaw {
+  std::string name = "aol+";  ///< of core/control/limiter.h
+  double viscous = 0;         ///< N·s/m, lower bound of the device's friction
+  double coulomb = 0;         ///< N, lower bound of the device's friction
+  double period_us = 1000;    ///< the longest that a force is held
+  /// "TABLE.KEY=VALUE", as `parse_scene` takes them and as tendon-replay does: parts of AOL+ and whatever else a
+  /// scene's limiter may have. They come after the four above.
+  std::vector<std::string> settings = {};
+};
+
+/// The limiter of a scene that has this law and nothing else. Throws SceneError, naming the key, when a value is
+/// impossible.
+LimiterConfig limiter_of(const FilterLaw& law);
 
 struct FilterOptions {
   LimiterConfig limiter;  ///< longest_hold: the period that the law may count on

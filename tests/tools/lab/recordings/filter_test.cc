@@ -5,6 +5,8 @@
 
 #include <sstream>
 
+#include "server/scene/scene.h"
+
 namespace tendon::lab {
 namespace {
 
@@ -70,6 +72,34 @@ TEST(Filter, WorksForEveryLawOfTheCatalogue) {
     options.limiter.max_force = 8;
     options.limiter.environment_stiffness = 500;
     EXPECT_EQ(filtered("t_s,x_m,wanted_n\n0,0,0\n0.001,0.0001,-1\n0.002,0.0002,-1\n", options).bad, 0) << law.name;
+  }
+}
+
+TEST(Filter, TakesTheSettingsThatAReplayTakes) {
+  const LimiterConfig config = limiter_of({.name = "aol+",
+                                           .viscous = 0.26,
+                                           .coulomb = 0.005,
+                                           .period_us = 2000,
+                                           .settings = {"limiter.knee.start=0.7", "limiter.energy_cap.energy_mj=3",
+                                                        "limiter.robust_ledger.encoder_step_um=30"}});
+  EXPECT_EQ(config.law, Law::kAolPlus);
+  EXPECT_EQ(config.friction.viscous, 0.26);
+  EXPECT_EQ(config.friction.coulomb, 0.005);
+  EXPECT_EQ(config.longest_hold, std::chrono::milliseconds(2));
+  ASSERT_TRUE(config.parts.knee);
+  EXPECT_EQ(config.parts.knee->start, 0.7);
+  EXPECT_TRUE(config.parts.energy_cap);
+  EXPECT_TRUE(config.parts.robust_ledger);
+  EXPECT_FALSE(config.parts.latency_reserve);
+}
+
+TEST(Filter, NamesTheSettingThatIsWrong) {
+  const FilterLaw law{.viscous = 0.26, .coulomb = 0.005, .settings = {"limiter.knee.begin=0.7"}};
+  try {
+    limiter_of(law);
+    FAIL() << "it was taken";
+  } catch (const SceneError& error) {
+    EXPECT_NE(std::string(error.what()).find("limiter.knee.begin"), std::string::npos) << error.what();
   }
 }
 

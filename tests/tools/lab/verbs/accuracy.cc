@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-lab accuracy: its command line.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdint>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+#include <vector>
+
+#include "tests/tools/injector/profile/named_profiles.h"
+
+#include "tests/tools/lab/experiments/accuracy.h"
+#include "tests/tools/lab/verbs/verb.h"
+
+namespace tendon::lab {
+namespace {
+
+struct AccuracyArguments {
+  AccuracyOptions options;
+  std::vector<std::string> models;
+  std::vector<std::string> elements;
+  std::string block_mm = "100x100x50";
+  double young_pa = 10000;
+  double poisson = 0.45;
+  double patch_radius_mm = 20;
+  std::vector<double> patch_centre_mm = {0, 0};
+  std::vector<double> loads_n = {0.3, 1};
+  std::string network;
+  std::uint64_t seed = 1;
+};
+
+/// "100x100x50", mm → m.
+softbody::Vec3 lengths(const std::string& text) {
+  softbody::Vec3 size;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    double mm = 0;
+    const auto [next, error] = std::from_chars(at, end, mm);
+    const bool last = axis == 2;
+    if (error != std::errc() || (last ? next != end : next == end || *next != 'x')) {
+      throw std::invalid_argument("--block-mm " + text + ": expected three lengths, as in 100x100x50");
+    }
+    size[axis] = 1e-3 * mm;
+    at = next + (last ? 0 : 1);
+  }
+  return size;
+}
+
+/// What the catalogue calls `names`; `find` is its look-up, `all` every name.
+template <class Find>
+auto named(const std::vector<std::string>& names, Find find, const std::string& all) {
+  std::vector<std::remove_cvref_t<decltype(*find(std::string_view()))>> found;
+  for (const std::string& name : names) {
+    const auto one = find(name);
+    if (!one) throw std::invalid_argument(name + ": expected " + all);
+    found.push_back(*one);
+  }
+  return found;
+}
+
+void add(CLI::App& verb, int& /*exit*/) {
+  static AccuracyArguments arguments;
+  AccuracyOptions& options = arguments.options;
+  const std::string models = names_of(softbody::models());
+  const std::string elements = names_of(softbody::elements());
+  verb.add_option("--block-mm", arguments.block_mm, "lengths of a block that is clamped below")
+      ->type_name("XxYxZ")
+      ->capture_default_str();
+  verb.add_option("--young-pa", arguments.young_pa, "its Young's modulus")->capture_default_str();
+  verb.add_option("--poisson", arguments.poisson, "its Poisson's ratio, 0 to below 0.5")->capture_default_str();
+  verb.add_option("--patch-radius-mm", arguments.patch_radius_mm, "of what presses on its top")->capture_default_str();
+  verb.add_option("--patch-center-mm", arguments.patch_centre_mm, "… and its place, from the middle of the top")
+      ->type_name("X,Y")
+      ->delimiter(',')
+      ->expected(2)
+      ->capture_default_str();
+  verb.add_option("--loads-n", arguments.loads_n, "a gentle press and a hard one")
+      ->type_name("N,N")
+      ->delimiter(',')
+      ->expected(2)
+      ->capture_default_str();
+  verb.add_option("--n", options.resolutions, "cells along x, coarse to fine")
+      ->type_name("N,...")
+      ->delimiter(',')
+      ->capture_default_str();
+  verb.add_option("--models", arguments.models, models + "; left out: all")->type_name("NAME,...")->delimiter(',');
+  verb.add_option("--elements", arguments.elements, elements + "; left out: all")
+      ->type_name("NAME,...")
+      ->delimiter(',');
+  verb.add_option("--slowest-ms", options.slowest_ms, "a model is refined no further than this for an update")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb.add_option("--longest-setup-s", options.longest_setup_s,
+                   "… and this for its set-up; left out: 30, with a budget 5")
+      ->check(CLI::PositiveNumber);
+  verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb.add_option("--network", arguments.network,
+                   "what is left at the hand behind it: " + injector::names_of_profiles())
+      ->type_name("NAME|LINE");
+  verb.add_option("--seed", arguments.seed, "of the network")->capture_default_str();
+  verb.add_option("--budget-ms", options.budget_ms,
+                   "only say what is best at the hand in so long an update, "
+                   "of what is not there for comparison")
+      ->check(CLI::PositiveNumber);
+  verb.add_option("--truth-cells", options.truth.cells, "of the mesh of the truth, to the patch's radius")
+      ->check(CLI::Range(2.0, 8.0))
+      ->capture_default_str();
+  verb.add_option("--out", options.out, "write accuracy.csv and a figure there, SVG and PNG (needs gnuplot)")
+      ->type_name("DIR");
+  verb.add_flag("--json", options.json, "one JSON object for each model and mesh instead of the table");
+  verb.footer(
+      "\nExample: which element, quickly\n"
+      "  tendon-lab accuracy --models condensed --n 4,8,16 --longest-setup-s 5\n"
+      "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
+      "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
+      "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
+  verb.callback([&options, models, elements] {
+    options.models = named(arguments.models, softbody::model_named, models);
+    options.elements = named(arguments.elements, softbody::element_named, elements);
+    options.block = {.size = lengths(arguments.block_mm),
+                     .material = {.young = arguments.young_pa, .poisson = arguments.poisson},
+                     .patch_radius = 1e-3 * arguments.patch_radius_mm,
+                     .patch_centre = {1e-3 * arguments.patch_centre_mm.at(0), 1e-3 * arguments.patch_centre_mm.at(1)},
+                     .loads = {arguments.loads_n.at(0), arguments.loads_n.at(1)}};
+    if (!arguments.network.empty()) options.network = {.name = arguments.network, .seed = arguments.seed};
+    if (options.budget_ms) options.slowest_ms = *options.budget_ms;
+    options.progress = isatty(STDERR_FILENO) != 0;
+    accuracy(options, std::cout);
+  });
+}
+
+const Verb kVerb("accuracy", "What the accuracy of a soft body costs in time", add);
+
+}  // namespace
+}  // namespace tendon::lab

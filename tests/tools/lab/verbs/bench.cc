@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-lab bench: its command line.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <string>
+
+#include "tests/tools/bench/bench.h"
+#include "tests/tools/lab/verbs/verb.h"
+
+namespace tendon::lab {
+namespace {
+
+void add(CLI::App& verb, int& /*exit*/) {
+  static bench::BenchOptions options;
+  const std::string names = names_of(bench::sections());
+  verb.add_option("--only", options.only, names + "; any number of times")->type_name("NAME")->allow_extra_args(false);
+  verb.add_option(
+          "--fifo", options.priority,
+          "real-time priority of what is measured, on a machine with other work; it takes both cores from that")
+      ->type_name("PRIORITY")
+      ->check(CLI::Range(1, 60));
+  verb.add_option("--seed", options.seed, "of worlds, keys and networks")->capture_default_str();
+  verb.add_option("--write", options.write, "write the table as a page in Markdown, too")->type_name("FILE.md");
+  verb.add_flag("--quick", options.quick, "only that it runs: seconds, and the figures mean nothing");
+  verb.add_flag("--json", options.json, "one JSON object for each line of the table, and one for its circumstances");
+  verb.footer(
+      "\nExample: all of it, some minutes, with its page\n"
+      "  tendon-lab bench --fifo 50 --write tests/tools/bench/RESULTS.md\n"
+      "one part\n  tendon-lab bench --only steps --json\n"
+      "\nTimes are those of this machine, now. Exit: 0 measured, whatever the figures; 1 it could not be; 2 wrong "
+      "usage.");
+  verb.callback([] {
+    options.progress = isatty(STDERR_FILENO) != 0;
+    bench::bench(options, std::cout);
+  });
+}
+
+const Verb kVerb("bench", "What things cost, each beside the machine's own floor", add);
+
+}  // namespace
+}  // namespace tendon::lab
