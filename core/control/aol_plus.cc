@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "core/base/portable_math.h"
+
 namespace tendon {
 
 namespace {
@@ -240,7 +242,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     const double start = parts_.knee->start;
     if (size > 0 && scale * start < 1) {
       const double excess = (1 / scale - start) / (1 - start);  // ∞ when nothing is permitted: tanh is 1
-      result.force = force * (scale * (start + (1 - start) * std::tanh(excess)));
+      result.force = force * (scale * (start + (1 - start) * portable::tanh(excess)));
       result.reasons = Reason::kEnergy;
     }
   } else if (size > permitted) {

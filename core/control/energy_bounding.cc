@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/control/energy_bounding.h"
 
+#include "core/base/portable_math.h"
 #include "core/control/law_support.h"
 
 namespace tendon {
@@ -37,7 +38,7 @@ LimitedForce<N> EnergyBounding<N>::limit(const Demand<N>& demand) noexcept {
   // (ii) is a ball around c₂Δx, (i) a half-space whose boundary is at right angles to Δx.
   const double travel = dx_.norm();
   const double middle = c2_ * travel;  // of the ball, along Δx
-  const double radius = std::hypot(middle, before_.norm());
+  const double radius = portable::hypot(middle, before_.norm());
   const double permitted = middle + radius;
   if (!law_support::finite(demand)) return law_support::refused<N>(permitted);
 

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/base/portable_math.h"
+
 namespace tendon {
 namespace {
 
@@ -147,7 +149,7 @@ bool QrLeastSquares<M, Scalar>::observe(const Vector& regressor, Scalar y) noexc
   Vector z = z_ * root;
   Vector row = regressor;
   for (int i = 0; i < M; ++i) {
-    const Scalar length = std::hypot(r(i, i), row[i]);
+    const Scalar length = portable::hypot(r(i, i), row[i]);
     const Scalar c = r(i, i) / length;
     const Scalar s = row[i] / length;
     for (int j = i; j < M; ++j) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/base/portable_math.h"
 #include "core/remote/answer.h"
 
 namespace tendon {
@@ -86,7 +87,7 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   } else {
     mode_ = Mode::kDecaying;
     result.reasons |= Reason::kDecaying;
-    gain = std::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
+    gain = portable::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
   }
   const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
   Vec3 rest = Vec3::Zero();

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "core/base/expect.h"
+#include "core/base/portable_math.h"
 
 namespace tendon {
 
@@ -50,7 +51,7 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
   const double along = model_.normal.dot(position);
 
   // Means and moments about them, with weights that fade: nothing cancels however far from the origin.
-  weight_ = weight_ * std::exp(-1 / config_.memory) + 1;
+  weight_ = weight_ * portable::exp(-1 / config_.memory) + 1;
   const double share = 1 / weight_;
   const double from_mean = along - mean_along_;
   const double force_from_mean = size - mean_force_;

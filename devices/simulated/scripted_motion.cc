@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/expect.h"
+#include "core/base/portable_math.h"
 
 namespace tendon {
 namespace {
@@ -64,8 +65,8 @@ struct Prepare {
 
 Point point_at(const ScriptedMotion::Sine& s, double t) {
   const double omega = 2 * std::numbers::pi * s.frequency;
-  return {s.centre + s.direction * (s.amplitude * std::sin(omega * t)),
-          s.direction * (s.amplitude * omega * std::cos(omega * t))};
+  return {s.centre + s.direction * (s.amplitude * portable::sin(omega * t)),
+          s.direction * (s.amplitude * omega * portable::cos(omega * t))};
 }
 
 Point point_at(const ScriptedMotion::RampHold& s, double t) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/base/expect.h"
+#include "core/base/portable_math.h"
 
 namespace tendon {
 namespace {
@@ -233,7 +234,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
   Lag lag;
   if constexpr (kEffects.lag) {
     lag.h_over_tau = h * 2 * std::numbers::pi * *config_.amplifier_bandwidth;
-    lag.reached = -std::expm1(-lag.h_over_tau);
+    lag.reached = -portable::expm1(-lag.h_over_tau);
   }
   for (Duration::rep i = 0; i < count; ++i) {
     const Vec3 v0 = truth_.velocity;

@@ -2,18 +2,12 @@
 #include "tests/tools/injector/models/exact_math.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <span>
 
 namespace tendon::injector::exact {
 namespace {
-
-// ln 2 in two parts: the first has 32 bits, so that k · kLn2High is exact for every exponent k.
-constexpr double kLn2High = 0x1.62e42fee00000p-1;
-constexpr double kLn2Low = 0x1.a39ef35793c76p-33;
 
 constexpr double kHalfLogTwoPi = 0.91893853320467274178;  // ln √(2π)
 constexpr double kInverseSqrtTwoPi = 0.39894228040143267794;
@@ -105,40 +99,6 @@ Shares gamma_shares(double a, double x, double log_gamma_a) noexcept {
 }
 
 }  // namespace
-
-std::int64_t round(double x) noexcept {
-  const auto whole = static_cast<std::int64_t>(x);
-  const double rest = x - static_cast<double>(whole);
-  return whole + (rest >= 0.5 ? 1 : rest <= -0.5 ? -1 : 0);
-}
-
-// ln(2ᵏm) = k ln 2 + 2 artanh(s), s = (m − 1)/(m + 1), m in √½…√2, so |s| ≤ 0.1716.
-double log(double x) noexcept {
-  const auto bits = std::bit_cast<std::uint64_t>(x);
-  auto k = static_cast<std::int64_t>(bits >> 52) - 1023;
-  double m = std::bit_cast<double>((bits & 0x000fffffffffffffU) | 0x3ff0000000000000U);
-  if (m > std::numbers::sqrt2) {
-    m /= 2;
-    ++k;
-  }
-  constexpr double kArtanh[] = {1.0 / 3,  1.0 / 5,  1.0 / 7,  1.0 / 9,  1.0 / 11,
-                                1.0 / 13, 1.0 / 15, 1.0 / 17, 1.0 / 19, 1.0 / 21};
-  const double s = (m - 1) / (m + 1);
-  const double s2 = s * s;
-  const double tail = 2 * s * s2 * polynomial(s2, kArtanh);
-  const auto exponent = static_cast<double>(k);
-  return exponent * kLn2High + (2 * s + (tail + exponent * kLn2Low));
-}
-
-// eˣ = 2ᵏ eʳ, |r| ≤ ½ ln 2.
-double exp(double x) noexcept {
-  const std::int64_t k = round(x / std::numbers::ln2);
-  const auto exponent = static_cast<double>(k);
-  const double r = (x - exponent * kLn2High) - exponent * kLn2Low;
-  double sum = 1;
-  for (double n = 14; n > 0; --n) sum = 1 + sum * r / n;  // Taylor's series, from its small end
-  return sum * std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
-}
 
 double normal_quantile(double p) noexcept {
   const double q = p - 0.5;

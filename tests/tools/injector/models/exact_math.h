@@ -1,24 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
+#include "core/base/portable_math.h"
 
-/// Functions of doubles that give the same bits with every compiler and C library. libm may differ in the last bit from
-/// one version to the next; these use only + − · ÷ and √, which IEEE 754 rounds correctly, in a fixed order. Compile
-/// with -ffp-contract=off: a fused multiply-add would round once less.
-///
-/// They are for building tables, not for decisions. Errors are a few 1e-16 relative, unless stated. Arguments outside
-/// the stated range are a mistake of the caller.
+/// Distributions that give the same bits with every compiler and C library, for building tables, not for decisions.
+/// They use portable functions only, in a fixed order. Errors are a few 1e-16 relative, unless stated. Arguments
+/// outside the stated range are a mistake of the caller.
 namespace tendon::injector::exact {
 
-/// The nearest whole number, halves away from zero; |x| below 2⁶².
-std::int64_t round(double x) noexcept;
-
-/// Natural logarithm; x above zero, normal and finite.
-double log(double x) noexcept;
-
-/// eˣ for x in −700…700.
-double exp(double x) noexcept;
+using portable::exp;
+using portable::log;
+using portable::round;
 
 /// Φ⁻¹(p): the standard normal deviation below which the share p lies; p in (0, 1). Wichura, "Algorithm AS 241: the
 /// percentage points of the normal distribution", Applied Statistics 37 (1988).

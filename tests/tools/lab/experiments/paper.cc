@@ -8,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "core/base/portable_math.h"
 #include "server/build_info.h"
 #include "tests/tools/lab/experiments/friction_tables.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
@@ -182,7 +183,7 @@ AolPlus<1, 3>::Parts low_friction_parts(double encoder_step) {
 PrescribedMotion paper_motion(const Friction& friction, double encoder_step, const Vec3& direction) {
   return {.position =
               [direction](double t) {
-                return Vec3(kAmplitude * std::sin(2 * std::numbers::pi * kFrequency * t) * direction);
+                return Vec3(kAmplitude * portable::sin(2 * std::numbers::pi * kFrequency * t) * direction);
               },
           .friction = friction,
           .encoder_step = encoder_step};

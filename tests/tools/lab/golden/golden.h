@@ -25,7 +25,8 @@ struct GoldenTable {
 /// Every law in twelve situations, which are each 209th of comparison_grid() and in which every value of every axis
 /// occurs; and the experiments of the paper, on the prescribed motion and with the free hand. Takes some seconds.
 ///
-/// The same bytes on every processor for which the C library chooses the same variants of sin, exp and tanh.
+/// The same bytes on every x86-64 processor, with every C library: nothing on the way to it calls libm for more than
+/// what IEEE 754 rounds correctly (core/base/portable_math.h).
 GoldenTable golden_laws();
 
 /// CSV: `law,situation,` and the columns. No cell has a comma or a quote.

@@ -6,6 +6,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "core/base/portable_math.h"
+
 namespace tendon::lab {
 namespace {
 
@@ -14,8 +16,8 @@ class Noise {
  public:
   explicit Noise(std::uint64_t seed) : random_(seed) {}
   double operator()() {
-    const double radius = std::sqrt(-2 * std::log(1 - uniform()));
-    return radius * std::cos(2 * std::numbers::pi * uniform());
+    const double radius = std::sqrt(-2 * portable::log(1 - uniform()));
+    return radius * portable::cos(2 * std::numbers::pi * uniform());
   }
 
  private:

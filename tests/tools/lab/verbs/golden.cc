@@ -18,7 +18,7 @@ void add(CLI::App& verb, int& exit) {
       "\nExamples\n"
       "  tendon-lab golden            which figures of which law has my change moved?\n"
       "  tendon-lab golden --write    take them as they are now\n"
-      "\nNothing in it is random.\n"
+      "\nNothing in it is random, and no figure depends on the processor or the C library.\n"
       "Exit: 0 all figures are the same bit for bit, or were written; 1 some differ (they are listed), or the table\n"
       "cannot be read or written; 2 wrong usage.");
   verb.callback([&exit] {
