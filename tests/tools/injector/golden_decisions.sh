@@ -18,10 +18,14 @@ if [ "$program" = --with ]; then
   fi
   program=$scratch/golden_decisions
   cd "$source"
-  for file in bottleneck delay_model draws exact_math golden_decisions_main injector loss_model named_profiles profile \
-    quantile_table timeline units; do
-    "$compiler" -std=c++20 -O2 -ffp-contract=off -I. -c "tests/tools/injector/$file.cc" -o "$scratch/$file.o"
-    set -- "$@" "$scratch/$file.o"
+  tool=tests/tools/injector
+  for file in core/base/portable_math \
+    $tool/models/bottleneck $tool/models/delay_model $tool/models/draws $tool/models/exact_math \
+    $tool/models/loss_model $tool/models/quantile_table $tool/golden_decisions_main $tool/injector \
+    $tool/profile/named_profiles $tool/profile/profile $tool/profile/timeline $tool/profile/units; do
+    object=$scratch/$(basename "$file").o
+    "$compiler" -std=c++20 -O2 -ffp-contract=off -I. -c "$file.cc" -o "$object"
+    set -- "$@" "$object"
   done
   shift 4
   "$compiler" "$@" -o "$program"
