@@ -250,6 +250,15 @@ std::optional<NetworkLoop::Refusal> NetworkLoop::reason_to_refuse(const Address&
   if (!controls && observers >= config_.max_observers) {
     return Refusal{Code::kBusy, "there are " + std::to_string(observers) + " observers already"};
   }
+  if (!controls && config_.keys.size() > 1) {
+    const auto of_key = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
+      return !g.gone && g.role == Role::kObserver && g.key == key && !takes_the_place_of(g, from, key, seats);
+    }));
+    // Half of the places, at least one: no key can keep all the others out.
+    if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {
+      return Refusal{Code::kBusy, "the key \"" + key->name + "\" has " + std::to_string(of_key) + " observers already"};
+    }
+  }
   if (guests >= config_.max_observers + channels) {
     return Refusal{Code::kBusy, "there are " + std::to_string(guests) + " guests already"};
   }

@@ -50,7 +50,8 @@ class NetworkLoop {
     std::vector<DeviceDescription> devices{};
     /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
     std::vector<std::string> takeover{};
-    /// Each costs a state datagram of some 250 bytes per haptic step.
+    /// Each costs a state datagram of some 250 bytes per haptic step. Where there are several keys, one key has at most
+    /// half of these places, rounded up.
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
     Duration observer_timeout = std::chrono::seconds(10);
