@@ -271,12 +271,12 @@ void ForceClient::take_request(LocalTime now, const Session::RequestArrived& arr
   if (config_.take_lease) ask_lease_ = now + kAskLeaseAgain;
 }
 
-/// What the callback is to see now; empty when there is nothing new.
+/// The state that the callback is due to see; empty when there is nothing new.
 std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
   if (!foretell_) return std::exchange(unseen_, std::nullopt);
   if (!newest_ || now - newest_arrived_ > config_.state_deadband->max_silence) return {};
   const DeviceState state = foretell(*newest_, now - newest_arrived_, haptic_period());
-  if (state.tick <= seen_tick_) return {};  // the one before was on its way for less time
+  if (state.tick <= seen_tick_) return {};  // the previous state took less time to arrive
   unseen_.reset();
   stats_.states_foretold += state.tick > newest_->tick ? 1 : 0;
   return state;
@@ -349,7 +349,7 @@ Duration ForceClient::valid_for(std::uint64_t tick) const {
 
 Duration ForceClient::haptic_period() const { return from_seconds(1.0 / welcome_->loop_hz); }
 
-/// When the callback is due next; LocalTime::max() while there is nothing that it has not seen.
+/// When the callback is due next; LocalTime::max() while it has seen everything.
 LocalTime ForceClient::next_call() const {
   if (!foretell_) return unseen_ ? next_call_ : LocalTime::max();
   if (!newest_) return LocalTime::max();

@@ -19,39 +19,39 @@
 
 namespace tendon {
 
-/// What the physics answers to one device state: what the hand is to feel there.
+/// The physics engine's answer to one device state.
 struct Touch {
   Touch() = default;
   /// Implicit, so that a callback may simply return a Vec3.
   Touch(const Vec3& f) : force(f) {}  // NOLINT(google-explicit-constructor)
 
   Vec3 force = Vec3::Zero();  ///< N, on the hand: a wall that resists motion along +x sends −x
-  // What lets the device loop follow the hand until the next answer (core/remote/answer.h), as much of it as the
-  // engine knows; used when the server has agreed to `kFeatureLocalModel`.
+  // The rest lets the device loop follow the hand until the next answer (core/remote/answer.h). The engine gives as
+  // much of it as it knows; the server uses it when both have agreed to `kFeatureLocalModel`.
   std::optional<Mat3> stiffness{};  ///< N/m, −∂force/∂position at the state's position; a wall with normal n: k·n·nᵀ
   double valid_radius = std::numeric_limits<double>::infinity();  ///< m, how far from there the stiffness holds
   std::optional<Contact> contact{};  ///< the surface, with the force at other depths in a table where that is known
-  /// The body has been cut or torn since the answer before: neither's stiffness and table are relied on.
+  /// The body has been cut or torn since the previous answer: the server then uses neither answer's stiffness or table.
   bool topology_changed = false;
-  std::optional<double> error{};  ///< N, what the engine thinks that `force` may be wrong by; recorded with it
+  std::optional<double> error{};  ///< N, the engine's own estimate of the error of `force`; recorded with it
 };
 
-/// The physics engine, seen from here: device state in, force out. It may take its time: while it
-/// computes, newer states replace older ones. What it throws comes out of ForceClient::turn.
+/// The physics engine as a function: device state in, force out. It may take its time: while it computes, newer states
+/// replace older ones. Its exceptions pass through ForceClient::turn.
 using Physics = std::function<Touch(const DeviceState& hand)>;
 
 /// An onlooker: device state and the state of the link in, nothing out.
 using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)>;
 
-/// A guest at a Tendon server, without socket, clock or thread: it says Hello, keeps the session
-/// alive, hands the newest device state to one callback, sends the force that comes back, and begins
-/// again when the server is gone.
+/// A guest at a Tendon server. It says Hello, keeps the session alive, hands the newest device state to one callback,
+/// sends the force that the callback returns, and starts again when the server is gone. It has no socket, clock or
+/// thread.
 ///
 ///     ForceClient client(link, server, config, physics, now);
 ///     for (;;) wait for a datagram, at most until client.turn(now);
 ///
-/// * **Newest wins.** A turn drains the link; of the states that came in, the callback sees the newest
-///   one, once, and the others are counted as skipped.
+/// * **Newest wins.** A turn drains the link. The callback sees the newest of the states that came in, once; the others
+///   are counted as skipped.
 /// * **Rate.** With rate_hz = r the callback is called at multiples of 1/r, or as soon after as there
 ///   is a state it has not seen; after a delay of a whole period the grid starts anew, it never
 ///   catches up. With rate_hz = 0 it is called once for every new state.
@@ -60,8 +60,8 @@ using Watch = std::function<void(const DeviceState& hand, const LinkStats& link)
 ///   which is due at once: the datagram's time stamp must not be older than the physics' work.
 ///   An answer with a number that is not finite or out of its bounds (WIRE.md) is counted and not sent;
 ///   the server then treats this client as one that is late.
-/// * **Taken over.** Where a program with the same key has taken our place we do not come back: the two would
-///   take turns for ever.
+/// * **Taken over.** When a program with the same key has taken our place, we do not come back: the two would replace
+///   each other for ever.
 /// * **Reconnection.** However an attempt or a session ends (no answer, refused, Bye, silence), the next
 ///   attempt waits retry_min, then twice as long each time, at most retry_max. The first state of a
 ///   new session resets that. Each attempt has a new random.
@@ -71,11 +71,11 @@ class ForceClient {
  public:
   struct Config {
     std::string name = "guest";  ///< for the server's log; at most limits::kMaxName bytes
-    /// Of several devices and channels of a server, by their names; empty: the first one.
+    /// Names of the device and its channel, on a server with several; empty: the first one.
     std::string device{};
     std::string channel{};
-    /// Where another controller holds the channel's lease: ask for it until we have it. It is asked again when the
-    /// server says that the lease may be over.
+    /// When another controller holds the channel's lease: keep asking until we have it. We ask again when the server
+    /// says that the lease may be over.
     bool take_lease = false;
     double rate_hz = 0;  ///< calls per second, kMinRateHz … kMaxRateHz; 0 = one for every new state
     /// States per second to ask the server for, 0 … limits::kMaxLoopHz; 0 = what the server gives by itself.
@@ -91,27 +91,27 @@ class ForceClient {
     /// would otherwise be late by a delay variation of 3 ms. 100 ms: a gap is not a period; an engine
     /// slower than 10 Hz says so by rate_hz.
     Duration valid_for{};
-    /// Forces that a hand cannot tell from the last one sent are not sent (Weber's law): a tenth of the datagrams at 1
-    /// kHz, where those are dear. Compares forces; a stiffness that alone has changed waits for the next one, at most
-    /// for the longest silence, a changed topology does not. Empty: every force is sent.
+    /// For links where datagrams are dear: a force that a hand cannot tell from the last one sent is not sent (Weber's
+    /// law), which leaves a tenth of the datagrams at 1 kHz. Only forces are compared: a changed stiffness waits for
+    /// the next force, at most for the longest silence. A changed topology is sent at once. Empty: every force is sent.
     std::optional<Deadband::Config> deadband{};
-    /// States that we can foretell are not sent to us: most of them, where they are dear. With rate_hz = r the callback
-    /// is then called at multiples of 1/r with the state as it is foretold for that instant, its tick and time of
-    /// sampling included; it never sees a tick twice, nor an older one. Nothing is foretold for longer than
-    /// max_silence: where states are lost the callback waits for the next one. With rate_hz = 0 it is called for each
-    /// state that comes. Empty: every state is asked for. A server that knows nothing of this sends every state.
+    /// For links where datagrams are dear: the server leaves out states that we can predict, which are most of them.
+    /// With rate_hz = r the callback is called at multiples of 1/r with the state predicted for that instant, tick and
+    /// sampling time included. It never sees a tick twice, nor an older one. Nothing is predicted for longer than
+    /// max_silence: when states are lost, the callback waits for the next one. With rate_hz = 0 it is called for each
+    /// state that comes. Empty: we ask for every state. A server that does not know this feature sends every state.
     std::optional<SetStateDeadband> state_deadband{};
-    /// Of an observer: ask for what the engines want (DeviceState::force_wanted), and once a second for how the
-    /// device's loop and its engines do. A server that knows nothing of this leaves it out.
+    /// For an observer: ask for the forces that the engines want (DeviceState::force_wanted), and once a second for
+    /// reports on the device's loop and its engines. A server that does not know this feature leaves them out.
     bool diagnostics = false;
-    /// With a Watch: come as a controller all the same, one that sends no force. It may rearm, disarm and hold a
+    /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;
     /// Shared with the server: suite 1, and nothing else. Without one the server must be on this machine.
     std::optional<Key> key{};
     Seed seed{};  ///< of the randoms and keys of the handshakes; 32 bytes from the system at each start
-    /// Hellos of one attempt go unanswered for so long before it is given up: 20 of them at the
-    /// handshake's 100 ms, enough for a round trip of 1 s at 50 % loss.
+    /// How long one attempt waits for an answer: 20 Hellos at the handshake's 100 ms, enough for a round
+    /// trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(2);
     Duration retry_min = std::chrono::milliseconds(100);  ///< first wait before the next attempt; > 0
     /// Longest wait before the next attempt: a server that restarts is found again within it, and one
@@ -142,13 +142,13 @@ class ForceClient {
     std::uint64_t attempts = 0;
     std::uint64_t sessions = 0;         ///< of these, answered with a Welcome
     std::uint64_t states = 0;           ///< states that came in
-    std::uint64_t states_foretold = 0;  ///< states that the callback saw without that they came
+    std::uint64_t states_foretold = 0;  ///< predicted states that the callback saw; they never came
     std::uint64_t states_skipped = 0;   ///< of these, replaced by a newer one before a callback was due
     std::uint64_t forces = 0;           ///< forces sent
     std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
-    std::uint64_t forces_alike = 0;     ///< forces not sent: a hand could not have told them from the one before
+    std::uint64_t forces_alike = 0;     ///< forces not sent: a hand cannot tell them from the previous one
     std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
-    std::string lease_lost_to;          ///< name of the one that has taken the channel from us; empty: nobody
+    std::string lease_lost_to;          ///< name of the client that took the channel from us; empty: nobody
   };
 
   /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves
@@ -158,8 +158,8 @@ class ForceClient {
   /// force.
   ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now);
 
-  /// Does all there is to do at `now` and returns when it wants to be called again at the latest; a
-  /// datagram is a reason to call it earlier. What the callback throws passes through, after a Bye
+  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a
+  /// datagram arrives. The callback's exceptions pass through, after a Bye
   /// to the server.
   LocalTime turn(LocalTime now);
 
@@ -193,13 +193,13 @@ class ForceClient {
   /// What the device is and can do, when we have named a device or a channel and the server has answered; empty before.
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
 
-  /// The server's newest word on how our forces fare, once a second while they come: late ones by cause, delays,
-  /// losses. Of the present session; empty before the first.
+  /// The server's newest report on our forces, once a second while they come: late ones by cause, delays, losses.
+  /// From the present session; empty before the first.
   const std::optional<LinkReport>& report() const noexcept { return report_; }
 
-  /// With Config::diagnostics: the newest word on our device's loop, and on the engine of each of its channels that has
-  /// one, in the order of their first reports. Of the present session; empty before the first. An engine that has gone
-  /// leaves its last one.
+  /// With Config::diagnostics: the newest reports on our device's loop, and on the engine of each channel that has one,
+  /// in the order of their first reports. From the present session; empty before the first. The last report on an
+  /// engine stays when the engine has gone.
   const std::optional<DeviceReport>& device_report() const noexcept { return device_report_; }
   const std::vector<PeerReport>& peer_reports() const noexcept { return peer_reports_; }
 

@@ -9,8 +9,8 @@
 
 namespace tendon {
 
-/// The command line that all guests share, --server, --rate-hz, --duration-s, --json and --help, and
-/// what a program adds to it.
+/// The command line that all guests share (--server, --rate-hz, --duration-s, --json, --help …), with the options that
+/// a program adds.
 class CommandLine {
  public:
   /// `purpose` heads the --help; `options` holds the defaults and receives what is given. The options
@@ -20,15 +20,15 @@ class CommandLine {
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
 
-  /// What must be given, without a name before it: "SCENE".
+  /// A required argument without a name before it: "SCENE".
   void add_argument(const std::string& name, std::string& value, const std::string& meaning);
   /// A number ≥ 0: "--stiffness-n-per-m".
   void add(const std::string& name, double& value, const std::string& meaning);
   /// A switch: "--local-model".
   void add(const std::string& name, bool& value, const std::string& meaning);
 
-  /// Empty: go on. Otherwise the exit code to leave with: 0 after --help, 2 after a wrong usage, which
-  /// stderr has been told about.
+  /// Empty: go on. Otherwise the exit code to leave with: 0 after --help, 2 after a wrong usage, which has
+  /// been explained on stderr.
   std::optional<int> parse(int argc, const char* const* argv);
 
  private:

@@ -59,7 +59,7 @@ Seed seed_from_system() {
   return seed;
 }
 
-double milliseconds(Duration d) { return 1e3 * seconds(d); }
+double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 
 /// One object in one line of stdout.
 void say_json(const Json& json) { std::cout << json << std::endl; }

@@ -22,8 +22,8 @@ struct Options {
 ///         callback threw
 ///
 /// Another controller at the device (Code::kBusy) and a server that goes down are not for good: it keeps trying. stderr
-/// gets one sentence for each change of the connection. stdout gets only the callback's own output and, with `json`, what
-/// the server says of our forces once a second, {"report":{"number":1, …}}, and the summary,
+/// gets one sentence for each change of the connection. stdout gets only the callback's own output and, with `json`,
+/// what the server says of our forces once a second, {"report":{"number":1, …}}, and the summary,
 /// {"summary":{"duration_s":…, …}}. Without `json` stderr gets the server's sentence when forces were late.
 ///
 /// One at a time in a process, because the signal handlers are the process's.

@@ -13,7 +13,7 @@
 
 namespace tendon::dash {
 
-/// How the way to the server is.
+/// State of the connection to the server.
 enum class Contact : std::uint8_t {
   kGreeting,    ///< an attempt is under way
   kOpen,        ///< states come in
@@ -42,7 +42,7 @@ class Board {
   static constexpr std::size_t kMaxWaiting = 500;
   static constexpr std::size_t kReasons = 32;
 
-  /// The engine at one channel of a device, as the server's newest word of it was.
+  /// The engine at one channel of a device, as the server last reported it.
   struct Engine {
     PeerReport newest;
     // Sums over all reports.
@@ -75,7 +75,7 @@ class Board {
   void tell(Press press);
   void welcomed(const Welcome& welcome);
   void described(const DeviceDescription& about);
-  /// There are so many devices: those beyond were another server's.
+  /// The number of devices is known: any beyond it belonged to another server.
   void counted(std::uint32_t devices);
   void observe(const DeviceState& state);
   void observe(const DeviceReport& report);

@@ -28,9 +28,9 @@ struct BridgeCounts {
 
 /// One page's place on the bridge from WebSocket to UDP, without either: one binary message is one datagram, as it is.
 ///
-/// To tendond all that crosses comes from this machine, and there it believes datagrams in the clear (suite 0). So
-/// those pass from pages of this machine only, and of others only what is sealed. The gate has no key and reads the
-/// clear header alone.
+/// To tendond everything that crosses comes from this machine, whose datagrams in the clear (suite 0) it accepts. So
+/// only pages of this machine may send those; from other pages only sealed datagrams pass. The gate has no key and
+/// reads only the header, which is in the clear.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class BridgeGate {

@@ -41,7 +41,7 @@ class Feed {
   void leave(PageId page);
   std::size_t pages() const noexcept { return pages_.size(); }
 
-  /// What a page says. False: it speaks another language, or too fast; it is best sent away.
+  /// Takes a line that a page has said. False: it is not understood, or came too fast; the page should be closed.
   bool hear(LocalTime now, PageId page, std::string_view line);
   /// Takes what is new on the board.
   void tick(LocalTime now);

@@ -14,8 +14,8 @@
 
 namespace tendon::dash {
 
-/// Watches every device of a Tendon server in one session and writes what it hears on a Board. It is an observer, has no
-/// socket, clock or thread, and never sends a force.
+/// Watches every device of a Tendon server in one session and writes what it hears on a Board. It is an observer, has
+/// no socket, clock or thread, and never sends a force.
 ///
 ///     Observer observer(link, server, config, board, now);
 ///     for (;;) wait for a datagram, at most until observer.turn(now);

@@ -16,8 +16,9 @@ namespace tendon::dash {
 ///
 /// Each press is a session of its own, beside the Observer's: a controller with the operator's key that claims one
 /// channel of the device, holds it, sends Rearm or Disarm and never a force, and leaves at the answer. Between two
-/// presses there is no controller. What became of a press is written on the Board in words, and is not what the server
-/// answered but what the device then did: its states have the reason "disarmed" and no force, its report says "armed".
+/// presses there is no controller. The result of a press is written on the Board in words. It tells what the device
+/// then did, not what the server answered: its states have the reason "disarmed" and no force, or its report says
+/// "armed".
 ///
 /// * **An engine is never disturbed.** While another client holds the channel nothing is sent at all (`objection`), and
 ///   a lease is never taken from anybody, not even by a key that the scene lets take over. Best is a channel of the

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -12,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;  // members in the order in which they are written here
 
-double milliseconds(Duration d) { return 1e3 * seconds(d); }
+double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 double nanoseconds(PeerTime t) { return static_cast<double>(t.time_since_epoch().count()); }
 
 Json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }

@@ -11,8 +11,8 @@
 
 namespace tendon::dash {
 
-/// What waits to be sent to one page, for the time that it is busy: newest wins. A page that does not read costs this
-/// and no more, however long it sleeps: one text of each kind, and a handful of batches of states.
+/// The messages that wait for one page while it is busy; newest wins. A page that does not read costs no more than
+/// this, however long it sleeps: one text of each kind, and a handful of batches of states.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PagePost {
@@ -21,7 +21,7 @@ class PagePost {
     kServer,   ///< the newest of these two replaces the one before
     kReports,  //
   };
-  /// An eighth of a second: what a page makes up for without that a hand on the screen looks late.
+  /// An eighth of a second: a page can catch up with that, and the hand on the screen does not look late.
   static constexpr std::size_t kMaxBatches = 8;
 
   void put(Kind kind, std::string text) { newest_[static_cast<std::size_t>(kind)] = std::move(text); }
@@ -48,7 +48,7 @@ class PagePost {
     return text;
   }
 
-  /// The page looks at another device: what waits of the one before is of no use.
+  /// The page looks at another device: the waiting states of the previous one are of no use.
   void forget_states() {
     batches_.clear();
     newest_[static_cast<std::size_t>(Kind::kReports)].reset();

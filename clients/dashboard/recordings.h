@@ -39,7 +39,7 @@ class Recordings {
     std::uint64_t size = 0;      ///< bytes
     double modified_unix_s = 0;  ///< s since 1970
   };
-  /// Of a folder with more, the newest ones are listed: a page is no file manager.
+  /// Only the newest ones of a folder with more are listed: a page is no file manager.
   static constexpr std::size_t kMaxListed = 1000;
 
   /// Throws std::runtime_error when `folder` is none: "runs: not a folder".
@@ -68,8 +68,8 @@ struct Unsatisfiable {
   bool operator==(const Unsatisfiable&) const = default;
 };
 
-/// What the value of a Range header (RFC 9110, 14.2) asks of a file of `size` bytes. More than one range, another unit,
-/// or what cannot be read, is ignored as the RFC allows: the whole file.
+/// The bytes that a Range header (RFC 9110, 14.2) asks for, of a file of `size` bytes. A header with several ranges,
+/// with another unit, or that cannot be read is ignored, as the RFC allows: the whole file.
 std::variant<WholeFile, ByteRange, Unsatisfiable> parse_range(std::string_view header, std::uint64_t size);
 
 }  // namespace tendon::dash

@@ -17,7 +17,7 @@
 
 namespace tendon::dash {
 
-/// What of an HTTP request matters here. The texts belong to whoever has read it.
+/// The parts of an HTTP request that matter here. The texts belong to the caller.
 struct Request {
   std::string_view method;
   std::string_view target;                 ///< path and query, as it came
@@ -28,7 +28,7 @@ struct Request {
   std::string_view accept_encoding{};
   bool upgrade = false;  ///< asks for a WebSocket
   bool local = false;    ///< from an address of this machine …
-  bool proxied = false;  ///< … but passed on for another: Forwarded, X-Forwarded-For, X-Real-IP or Via
+  bool proxied = false;  ///< … but passed on by a proxy: Forwarded, X-Forwarded-For, X-Real-IP or Via
 };
 
 /// An answer: everything but Date and Connection.
@@ -54,31 +54,28 @@ struct BridgeSocket {
 
 using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 
-/// Says what a request gets, without a socket: all there is to be known about who may have what.
+/// Answers requests, without a socket. All rules about who may see or do what are here.
 ///
 ///     GET /                    the page, GET /assets/… its parts
 ///     GET /live                WebSocket: what the server does now
 ///     GET /bridge              WebSocket: datagrams
 ///     GET /metrics             for Prometheus
-///     GET /api/recordings      which there are
+///     GET /api/recordings      the list of recordings
 ///     GET /recordings/NAME     the bytes of one; Range is understood
-///     POST /api/arm?device=N, POST /api/disarm?device=N     begins it; what becomes of it /live says
+///     POST /api/arm?device=N, POST /api/disarm?device=N     begins it; /live tells what becomes of it
 ///
-/// A page that happens to be open in a browser on this machine could ask for all of it. So
-/// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts; a name of somebody else's
-/// that has
-///   been made to point here (DNS rebinding) is refused, 421.
-/// * **Origin** of a WebSocket must be that very host for /live, and a page of this machine or one of Config::origins
-/// for
-///   /bridge, 403. A program that is no browser sends none. Nothing else may be read by other origins: no CORS header
-///   is ever sent.
-/// * **Arming** moves a machine, so it is for the page itself in a browser on this machine and for nobody else, 403:
-/// not from another machine or through a proxy, not for another Origin, nor for a program that names none. A form or a
-/// script of another page cannot name ours. Others may use this machine too: `Authorization: Bearer PASS` must be the
-/// pass that whoever has started the program was told. 202: begun; 409: not now, and why.
-/// * For all else only GET and HEAD exist, 405. What is no path of the above is 404: nothing is looked up in a file
-/// system but the plain name
-///   of a recording.
+/// Any page that is open in a browser on this machine could send these requests. Therefore:
+/// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts. Another name that has been
+///   made to point here (DNS rebinding) is refused: 421.
+/// * **Origin** of a WebSocket must be that very host for /live, and for /bridge a page of this machine or one of
+///   Config::origins; otherwise 403. A program that is no browser sends none. Other origins can read nothing else: no
+///   CORS header is ever sent.
+/// * **Arming** moves a machine, so it is for this page in a browser on this machine alone; otherwise 403. It is
+///   refused from another machine, through a proxy, with another Origin, and from a program that sends no Origin. A
+///   form or a script of another page cannot send ours. Other people may use this machine too: `Authorization: Bearer
+///   PASS` must be the pass that was told to the person who started the program. 202: begun; 409: not now, and why.
+/// * Everything else takes GET and HEAD only: 405. A path that is not listed above is 404. The only name that is looked
+///   up in a file system is the plain name of a recording.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Routes {
@@ -87,7 +84,7 @@ class Routes {
     std::vector<std::string> hosts{};    ///< other names of this machine, with ":PORT" or without
     std::vector<std::string> origins{};  ///< pages from there may use the bridge: "https://lab.example"
   };
-  /// What they are made from. All must outlive the routes; `recordings` may be null.
+  /// Where the answers come from. All must outlive the routes; `recordings` may be null.
   struct Sources {
     std::span<const PageFile> page;
     const Recordings* recordings = nullptr;
@@ -101,7 +98,7 @@ class Routes {
 
   Answer answer(const Request& request) const;
 
-  /// An answer in plain words, for whatever is no answer to a request.
+  /// An answer in plain words: a refusal or an error.
   static Reply plain(unsigned status, std::string words, std::string_view allowed = "GET, HEAD");
 
  private:
@@ -115,7 +112,7 @@ class Routes {
   Sources sources_;
 };
 
-/// The bytes that a percent-encoded text stands for; empty when it is none, or holds a zero byte.
+/// The bytes that a percent-encoded text stands for; empty when the encoding is wrong or holds a zero byte.
 std::optional<std::string> percent_decoded(std::string_view text);
 
 }  // namespace tendon::dash

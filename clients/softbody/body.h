@@ -23,7 +23,7 @@
 
 namespace tendon::softbody {
 
-/// What a scene can list under `effects`; what it does not list is not simulated.
+/// The effects that a scene can list under `effects`. An effect that is not listed is not simulated.
 enum class EffectKind : std::uint8_t {
   kContact,
   kGeometricNonlinearity,
@@ -86,7 +86,7 @@ struct ModelInfo {
   EffectSet may;          ///< simulates these when they are listed
   bool tetrahedra;        ///< wants a mesh of tet4
 
-  bool has_time() const noexcept { return always.has(EffectKind::kInertia); }  ///< also when nothing is listed
+  bool has_time() const noexcept { return always.has(EffectKind::kInertia); }  ///< even when nothing is listed
 };
 
 /// Every model, in the order in which tables list them.
@@ -153,8 +153,8 @@ class Body {
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// What a tool there feels. A body with time goes on by one step. A cut that waits for this answer's force is made
-  /// after it: the next answer is that of the cut body, and says so.
+  /// The force on a tool there. A body with time goes on by one step. A cut that waits for this answer's force is made
+  /// after the answer: the next one is that of the cut body, and says so.
   Feel touch(const Vec3& tool);
 
   /// `time` s have gone by since the scene began: Young's modulus becomes that of then, and cuts that are due are made.

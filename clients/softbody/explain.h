@@ -12,7 +12,7 @@
 
 namespace tendon::softbody {
 
-/// What a scene simulates, what not, and what each part costs: `tendon-softbody explain SCENE`.
+/// Which effects a scene simulates, which it leaves out, and the cost of each: `tendon-softbody explain SCENE`.
 ///
 /// Costs are measured, here and now: processor time of an answer, the mean over a tool that presses 3 mm into the
 /// middle and comes back, of bodies that take turns; each is the least of up to 4 rounds. What an effect adds is the

@@ -15,7 +15,7 @@ class PlacedBody {
   /// Throws std::invalid_argument when the scene makes no body.
   explicit PlacedBody(const Scene& scene);
 
-  /// What the hand is to feel at `position` (m, device frame); all vectors in the device frame. A body with time goes
+  /// The force on the hand at `position` (m, device frame); all vectors in the device frame. A body with time goes
   /// on by one step.
   Feel touch(const Vec3& position);
 

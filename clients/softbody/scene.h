@@ -11,7 +11,7 @@
 
 namespace tendon::softbody {
 
-/// What tendon-softbody is to simulate, and where it lies in front of the device.
+/// The body that tendon-softbody simulates, and where it lies in front of the device.
 struct Scene {
   BodyConfig body;
   Vec3 at = Vec3::Zero();             ///< m, device frame: where the touch point of the body at rest is
@@ -19,7 +19,7 @@ struct Scene {
   double table = 0;                   ///< m, the depths that an answer's table of forces covers; 0: it has none
 };
 
-/// What is wrong with a scene: "FILE:LINE: KEY: expected …, found …".
+/// An error in a scene: "FILE:LINE: KEY: expected …, found …".
 class SceneError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -36,7 +36,7 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
 /// Every key that a scene may have, and every name that a value may have.
 std::string scene_reference();
 
-/// What a person should know before believing this body.
+/// Warnings that a person should read before trusting this body.
 std::vector<std::string> warnings(const BodyConfig& body);
 
 /// The same, once the tool is deeper than Body::linear_up_to(), m.

@@ -8,9 +8,9 @@
 
 #include "clients/cpp/force_client.h"
 
-// An engine's side of a conversation in a file: each state that its callback was given, and what it answered. With it a
-// bug that a hand has found happens again without the hand, the device and the network, and a change of an engine that
-// was to change nothing is shown to have changed nothing, bit for bit.
+// An engine's side of a conversation in a file: each state that its callback was given, and its answer. A bug that a
+// hand has found can then be repeated without the hand, the device and the network. And a change of an engine that is
+// meant to change no answer can be shown to change none, bit for bit.
 //
 // Text: a first line `tendon conversation 1`, then a line for each answer, of words with a space between: tick, sampled
 // (ns, server clock), position, velocity, force_applied (three each), energy, permitted_force, reasons, force_sequence,
@@ -25,11 +25,11 @@
 
 namespace tendon {
 
-/// `engine`, of whose every answer a line goes to `to`, which must outlive it. What `engine` throws passes through, and
-/// leaves no line. A stream that takes no more (a full disk) stops the recording, not the engine: see its state.
+/// Wraps `engine` and writes a line for each answer to `to`, which must outlive the result. An exception of `engine`
+/// passes through and leaves no line. A stream that fails (a full disk) ends the recording, not the engine: check it.
 Physics recorded(Physics engine, std::ostream& to);
 
-/// What a replay found.
+/// Result of a replay.
 struct Replay {
   struct Difference {
     std::uint64_t line = 0;  ///< of the file
@@ -45,8 +45,8 @@ struct Replay {
   std::string text() const;
 };
 
-/// Gives the recorded states to `engine`, in their order, and compares its answers with the recorded ones. Throws
-/// std::runtime_error, "line 7: …", when that is no whole recording; what `engine` throws passes through.
+/// Gives the recorded states to `engine` in order, and compares its answers with the recorded ones. Throws
+/// std::runtime_error, "line 7: …", when the recording is damaged or incomplete; exceptions of `engine` pass through.
 Replay replay(std::istream& from, const Physics& engine);
 
 }  // namespace tendon

@@ -8,21 +8,21 @@
 
 namespace tendon {
 
-/// How an engine that goes on in time is put back to where it was. Both empty: it has no state, its force is a function
-/// of the position alone.
+/// How to put an engine with state back to where it was. Both empty: it has no state, its force is a function of the
+/// position alone.
 struct SavedState {
   std::function<void()> save{};
   std::function<void()> restore{};  ///< to what was saved last, as often as it is called
 };
 
-/// A stiffness found by differences, and how far it can be believed.
+/// A stiffness found by differences, and two measures of its error.
 struct FdStiffness {
   Mat3 stiffness = Mat3::Zero();  ///< N/m, symmetric: (D + Dᵀ)/2, as the server takes it
-  /// N/m, the largest |D_ij − D_ji|/2: what the symmetric part leaves out. Not 0 where the force is no gradient
-  /// (friction, an engine's asymmetry) or is noisy.
+  /// N/m, the largest |D_ij − D_ji|/2, which the symmetric part leaves out. Not 0 where the force is not a gradient
+  /// (friction, an asymmetric engine) or is noisy.
   double asymmetry = 0;
-  /// N/m, the largest |F_i(x + h·e_j) + F_i(x − h·e_j) − 2·F_i(x)|/2h: half of what the stiffness ahead and the
-  /// stiffness behind differ by. A surface within h shows here: a wall's edge has K/2.
+  /// N/m, the largest |F_i(x + h·e_j) + F_i(x − h·e_j) − 2·F_i(x)|/2h: half the difference between
+  /// the stiffness ahead and the stiffness behind. A surface within h shows here: a wall's edge has K/2.
   double kink = 0;
 };
 

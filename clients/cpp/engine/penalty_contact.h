@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// A body's surface as seen from one point: what a distance query answers.
+/// A body's surface as seen from one point: the answer of a distance query.
 struct SurfacePoint {
   double distance = 0;            ///< d, m, signed: < 0 inside the body
   Vec3 normal = Vec3::UnitX();    ///< n = ∇d, out of the body; its length is not used
@@ -16,8 +16,8 @@ struct SurfacePoint {
 /// stiffness; for engines whose own contact gives no force, and for shapes that are given by a distance alone:
 ///
 ///     F = max(0, −k·d − b·v·n)·n  where d < 0, else 0                  N, on the hand
-///     K = k·n·nᵀ + k·d·∇∇d        where F is not 0, else 0             N/m, for the hand at rest: what b makes is not
-///     in it
+///     K = k·n·nᵀ + k·d·∇∇d        where F is not 0, else 0             N/m, for a hand at rest: without the share
+///                                                                      of b
 ///
 /// k N/m and b N·s/m. With b the force begins at b times the speed of the touch, and no sooner.
 /// A distance, normal or velocity that is not finite, or a normal of length 0, makes a force that is not finite, which
@@ -32,7 +32,7 @@ class PenaltyContact {
   /// Throws std::invalid_argument naming the field when `config` is impossible.
   explicit PenaltyContact(const Config& config);
 
-  /// What a hand with this velocity (m/s) feels where it is.
+  /// The answer to a hand at that point with this velocity (m/s).
   Touch touch(const SurfacePoint& surface, const Vec3& velocity) const noexcept;
 
  private:

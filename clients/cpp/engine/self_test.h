@@ -9,19 +9,19 @@
 
 namespace tendon {
 
-/// What a scripted hand found in an engine.
+/// Findings of a scripted hand about an engine.
 struct SelfTest {
   enum class Verdict {
     kPassed = 1,
     kFailed = 2,
-    kNotJudged = 3,  ///< the engine does not do that, or it cannot be told
+    kNotJudged = 3,  ///< the engine does not do that, or the test cannot tell
   };
   struct Finding {
     Verdict verdict = Verdict::kNotJudged;
     std::string what;  ///< the claim: "gives out no more than it was given: press and release"
     std::string why;   ///< with its numbers
-    double value = 0;  ///< what was measured, …
-    double bound = 0;  ///< … and how much of it was allowed, in the unit that `why` names; both 0 where there is none
+    double value = 0;  ///< measured, in the unit that `why` names; 0 where there is none
+    double bound = 0;  ///< allowed, in the same unit; 0 where there is none
   };
   std::vector<Finding> findings;
 
@@ -50,23 +50,22 @@ struct SelfTestScript {
   SavedState state{};
 };
 
-/// Presses an engine's callback by a script, without a server, a device or a network, and says what of its answers
-/// would be felt as wrong:
+/// Presses an engine's callback by a script, without a server, a device or a network, and says which of its answers a
+/// hand would feel as wrong:
 ///
 /// * **It gives out no more than it was given.** On closed ways (press and release, and around loops with a slide in
 ///   three planes; each in either direction, slowly and fast) the work Σ ½(F(k) + F(k+1))·(x(k+1) − x(k)) that it has
-///   done on the hand is at no time more than `work_tolerance` of the work that the way costs the hand, and what every
-///   second state alone would make of it otherwise: three times what the trapezoids are wrong by. A force that lags,
-///   that grows with the speed, or that has a curl does not pass. The limiter would take care of it; it would be soft.
+///   done on the hand never exceeds `work_tolerance` of the work that the way costs the hand, plus the difference that
+///   using every second state alone would make, which is three times the error of the trapezoids. A force that lags,
+///   grows with the speed, or has a curl does not pass. The limiter would contain it, and the body would feel soft.
 /// * **Its stiffness is −∂F/∂x**, by fd_stiffness at rest at four depths, where no surface is within a step.
-/// * **Odd states do it no harm.** A hand at NaN, at infinity, 1 km away, at a denormal; the same tick twice, a
-/// second's
-///   pause, a jump: it throws nothing, to what is finite it answers what is finite (at most limits::kMaxValue), and
-///   back at `start` it is well.
+/// * **Odd states do it no harm.** A hand at NaN, at infinity, 1 km away, at a denormal; the same tick twice; a pause
+///   of a second; a jump. The engine throws nothing, its answers to finite states are finite (at most
+///   limits::kMaxValue), and back at `start` it answers as before.
 ///
-/// Every state is a tick later than the one before and 1/rate_hz s on, but where a claim says otherwise. The engine is
-/// left where this ends: at `start`. Half a minute of the hand's time passes; the engine's own pace decides how long
-/// that takes. Throws std::invalid_argument naming the field when `script` is impossible; nothing that `engine` throws.
+/// Every state is a tick and 1/rate_hz s after the previous one, except where a claim says otherwise. The hand ends at
+/// `start`. Half a minute of the hand's time passes; the engine's own pace decides how long that takes. Throws
+/// std::invalid_argument naming the field when `script` is impossible; nothing that `engine` throws.
 SelfTest self_test(const Physics& engine, const SelfTestScript& script = {});
 
 }  // namespace tendon

@@ -16,15 +16,15 @@ namespace tendon {
 /// for any k, b and T. At rest f = k·(x_h − x_t)/[1 + (b + k·T)·T/m]; against a wall of stiffness K the hand feels this
 /// coupling's stiffness and K in series.
 ///
-/// Thread-safe: yes, it has no state. Realtime-safe: yes, all but the constructor.
+/// Thread-safe: yes, it has no state. Realtime-safe: yes, except the constructor.
 class ToolCoupling {
  public:
   struct Config {
-    double stiffness = 500;   ///< k, N/m, > 0: harder than this nothing can feel
+    double stiffness = 500;   ///< k, N/m, > 0: nothing can feel harder than this
     double damping = 2;       ///< b, N·s/m, ≥ 0
     double tool_mass = 0.05;  ///< m, kg, > 0: the engine's. Heavier is calmer, and is felt in free space
     double step_s = 0.001;    ///< T, s, > 0: the engine's
-    /// N, > 0: a longer stretch is no more force, so that a hand that is suddenly elsewhere does not throw the tool.
+    /// N, > 0: a longer stretch gives no more force, so that a hand that jumps does not throw the tool.
     double max_force = 10;
   };
   struct Forces {
@@ -35,11 +35,11 @@ class ToolCoupling {
   /// Throws std::invalid_argument naming the field when `config` is impossible.
   explicit ToolCoupling(const Config& config);
 
-  /// For one step of the engine, before it. Of positions (m) and velocities (m/s) that are not finite comes a force
-  /// that is not: ForceClient does not send it; do not give it to the engine.
+  /// To be called before each step of the engine. Positions (m) and velocities (m/s) that are not finite make a force
+  /// that is not finite: ForceClient does not send it; do not give it to the engine.
   Forces couple(const DeviceState& hand, const Vec3& tool_position, const Vec3& tool_velocity) const noexcept;
 
-  /// N/m, what the hand feels at most: k/[1 + (b + k·T)·T/m], when the tool cannot move.
+  /// N/m, the most that the hand feels, when the tool cannot move: k/[1 + (b + k·T)·T/m].
   double felt_stiffness() const noexcept { return share_ * config_.stiffness; }
 
  private:

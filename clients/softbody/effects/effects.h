@@ -23,7 +23,7 @@ class Effect {
   Effect(const Effect&) = delete;
   Effect& operator=(const Effect&) = delete;
 
-  virtual double energy(const VectorXd& u) const = 0;                    ///< J, but for a constant
+  virtual double energy(const VectorXd& u) const = 0;                    ///< J, up to a constant
   virtual void add_force(const VectorXd& u, VectorXd& force) const = 0;  ///< N, −∂energy/∂u
   virtual void add_stiffness(SymmetricMatrix& to) const = 0;             ///< N/m, ∂²energy/∂u², which is constant
   virtual void advance(const VectorXd& u) = 0;                           ///< a step ends at u; the next begins there

@@ -151,7 +151,7 @@ std::vector<SelfCollision::Flat> SelfCollision::lie(const VectorXd& u) const {
   return flats;
 }
 
-/// Of all nodes of the mesh; 0 within the body.
+/// For every node of the mesh; 0 within the body.
 std::vector<Vec3> SelfCollision::node_normals(const std::vector<Flat>& flats) const {
   std::vector<Vec3> normals(elastic_.mesh().nodes.size(), Vec3::Zero());
   for (const Side& side : sides_) {

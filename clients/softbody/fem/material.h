@@ -59,7 +59,7 @@ Mat9 tangent(Law law, const Mat3& f, double mu, double lambda);
 /// The nearest matrix without negative eigenvalues: a Newton step with it always goes downhill.
 Mat9 without_negative(const Mat9& symmetric);
 
-/// The rotation R that is nearest to F (polar decomposition); a rotation also where F is turned inside out.
+/// The rotation R that is nearest to F (polar decomposition); a rotation even where F is turned inside out.
 Mat3 nearest_rotation(const Mat3& f);
 
 }  // namespace tendon::softbody

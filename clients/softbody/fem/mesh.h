@@ -56,7 +56,7 @@ struct Facet {
 /// are none.
 std::vector<Facet> surface(const Mesh& mesh);
 
-/// Those of one element alone: the surface, and the two sides of a cut also where they lie on each other.
+/// The faces that belong to one element only: the surface, and both sides of a cut, even where they touch.
 std::vector<Facet> sides(const Mesh& mesh);
 
 /// Those that two elements share.

@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// A shape that is one of the others but for so much is none: 1e-6 of its elastic energy.
+/// A shape counts as a combination of the others when at most this share of its elastic energy is left over.
 constexpr double kNew = 1e-6;
 
 }  // namespace

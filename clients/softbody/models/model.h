@@ -11,14 +11,14 @@ namespace tendon::softbody {
 struct Division;
 struct EffectsConfig;
 
-/// What is given, and what is asked for.
+/// Which of depth and force is given; the other is asked for.
 enum class Given : std::uint8_t {
   kDepth,       ///< m, how deep the mean of the patch is held; the force is asked for, and may pull
   kLeastDepth,  ///< m, how deep it is at least: the tool pushes, but does not pull
   kForce,       ///< N, on the body; the depth is asked for
 };
 
-/// What a body does under a patch that presses into it, against the surface's normal.
+/// A body's answer to a patch that presses into it, against the surface's normal.
 struct Reaction {
   double force = 0;  ///< N, of the body on the tool, along the normal
   double depth = 0;  ///< m, mean over the patch, from where the mesh has its surface
@@ -50,18 +50,18 @@ class Model {
   /// time if it has time. A patch without nodes is a tool that is elsewhere.
   virtual Reaction press(const Patch& patch, Given given, double value) = 0;
 
-  /// The body has been cut: what this was made of is there, in its old place, as the cut has left it. Goes on from the
-  /// shape that it had, with the system that it had as far as that serves. Throws std::logic_error where
-  /// ModelInfo::may does not have kCutting.
+  /// To be called after the solid has been cut in place. Continues from the current displacements, and reuses the
+  /// factor of the system where it can. Throws std::logic_error where ModelInfo::may does not have
+  /// kCutting.
   virtual void cut(const Division& division, const EffectsConfig& effects);
 
   /// s, how long a press lasts. 0: the body is at rest at every instant.
   virtual double step() const noexcept { return 0; }
 
-  /// Whether it lies as its mesh does when nothing touches it; then it need not be asked.
+  /// Whether the body has the shape of its mesh when nothing touches it; then it need not be asked.
   virtual bool still() const noexcept { return true; }
 
-  /// What it keeps, matrices and state.
+  /// Bytes of its matrices and its state.
   virtual std::size_t bytes() const noexcept = 0;
 };
 

@@ -31,8 +31,8 @@ constexpr double kNudge = 1e-7;
 constexpr int kLooks = 10;
 constexpr double kParted = 1e-3;
 
-/// m: errors of the force that so much more depth would explain are none, also where there is no force to compare them
-/// with.
+/// m: an error of the force that so small a change of depth would explain counts as none, even where there is no force
+/// to compare it with.
 constexpr double kUnseen = 1e-12;
 
 }  // namespace
@@ -134,9 +134,9 @@ bool QuasiStaticModel::go(const VectorXd& step, const VectorXd& load, double for
   return false;
 }
 
-/// ∂force/∂depth of the present shape, with a factor of an older one. Of all displacements with 1 m of depth the body's
-/// own are the least stiff: theirs are wrong by as much as the factor is old, the stiffness by the square, and every
-/// round takes off the same share of what is left.
+/// ∂force/∂depth of the present shape, by the factor of an older one. Rayleigh quotient: the body's own shape minimises
+/// the stiffness over all shapes with unit depth, so a first-order error of the shape (the factor is old) is only a
+/// second-order error of the stiffness. Every round removes the same share of the rest.
 double QuasiStaticModel::tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now) {
   const double compliance = load.dot(by_tool);
   const VectorXd start = u_;

@@ -10,19 +10,19 @@
 
 namespace tendon::softbody {
 
-/// What the hand is to feel at one place of the tool.
+/// The answer to one place of the tool.
 struct Feel {
   Vec3 force = Vec3::Zero();      ///< N, on the hand
   Mat3 stiffness = Mat3::Zero();  ///< N/m, −∂force/∂position, symmetric, not negative
   /// m, from the tool to the body along the normal: as it lies, and where it touches as it would lie at rest; below 0:
   /// inside.
   double gap = 0;
-  /// m, how far the tool may move before `force` and `stiffness` are another's, but for the surface that it may leave
-  /// on the way: that is what `gap` says.
+  /// m, how far the tool may move before `force` and `stiffness` no longer hold. It does not count that the tool may
+  /// leave the surface on the way: see `gap`.
   double valid_radius = 0;
   double error = 0;  ///< N, the solver's estimate of its own
   bool touching = false;
-  bool topology_changed = false;  ///< it is the first since the body was cut: what was felt before was another body
+  bool topology_changed = false;  ///< the first answer since the body was cut: earlier ones were of another body
 };
 
 /// A tool that a patch of a body gives way to.

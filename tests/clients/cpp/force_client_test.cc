@@ -229,7 +229,7 @@ TEST(ForceClient, AllThatTheEngineKnowsTravels) {
   EXPECT_EQ(command.error, 0.02);
 }
 
-TEST(ForceClient, KeepsTheStiffnessToItselfWhenTheServerDoesNotKnowLocalModels) {
+TEST(ForceClient, SendsNoStiffnessToAServerWithoutLocalModels) {
   World world(11);
   world.z->features = false;
   world.connect({.rate_hz = 100}, [](const DeviceState& hand) {
@@ -276,7 +276,7 @@ TEST(ForceClient, DoesNotSendAForceThatIsNoForce) {
   EXPECT_EQ(world.z->forces.back().second.sequence, world.z->forces.size()) << "what is not sent takes no number";
 }
 
-TEST(ForceClient, WithADeadbandForcesThatFeelAlikeAreNotSentAndTheServerNeverWaitsLongerThanTheyAreValid) {
+TEST(ForceClient, ADeadbandLeavesOutForcesThatFeelAlikeInTime) {
   World world(29, kFineWeather);
   std::uint64_t calls = 0;
   world.connect({.deadband = Deadband::force()}, [&](const DeviceState&) {
@@ -309,7 +309,7 @@ TEST(ForceClient, AnObserverSeesTheHandAndTheLinkAndSendsNoForce) {
   EXPECT_EQ(world.a->phase(), Phase::kOpen) << "keep-alives hold the session";
 }
 
-TEST(ForceClient, AnOperatorComesAsAControllerSendsNoForceAndHearsWhatBecameOfItsOrder) {
+TEST(ForceClient, AnOperatorSendsNoForceAndHearsTheAnswerToItsOrder) {
   World world(13, kFineWeather);
   int calls = 0;
   world.connect({.operates = true}, [&](const DeviceState&, const LinkStats&) { ++calls; });
@@ -366,7 +366,7 @@ TEST(ForceClient, ReportsARefusalAndAsksAgainEverMoreSeldom) {
   EXPECT_TRUE(world.run_until(Phase::kOpen, 3 * kSecond)) << "let in as soon as the place is free";
 }
 
-TEST(ForceClient, ALeaseThatItHasHadAndLostBeforeItHearsOfEitherIsLostUnlessItIsGivenOnceMore) {
+TEST(ForceClient, ALeaseWonAndLostBeforeEitherIsHeardIsLost) {
   for (const Code once_more : {Code::kBusy, Code::kOk}) {
     World world(21, kFineWeather);
     world.connect({}, answer);
@@ -495,7 +495,7 @@ TEST(ForceClient, HearsNobodyButItsServer) {
   EXPECT_EQ(world.a->stats().link.malformed, before.malformed);
 }
 
-TEST(ForceClient, CountsADatagramThatIsTooLargeAsMalformedThoughItsBeginningIsGood) {
+TEST(ForceClient, CountsATooLargeDatagramWithAGoodBeginningAsMalformed) {
   World world(23, kFineWeather);
   world.connect({.rate_hz = 100}, answer);
   world.run(kSecond);

@@ -165,7 +165,7 @@ async function crowd(test, address, count, words) {
   return sockets;
 }
 
-it("serves others at once while 300 slow connections wait, and ends those after 5 s", async (test) => {
+it("serves others while 300 slow connections wait, and ends those after 5 s", async (test) => {
   const { address: nobody } = await fakeServer(test);
   const { url, address } = await startDash(test, nobody);
   const sockets = await crowd(test, address, 300, "GET /metrics HTTP/1.1\r\nHost: ");
@@ -181,7 +181,7 @@ it("serves others at once while 300 slow connections wait, and ends those after 
   assert.ok(took > 3000 && took < 15_000, `a request that drips is given up after ${took} ms`);
 });
 
-it("answers 503 at once when an address has no place left, and serves another", async (test) => {
+it("answers 503 at once when an address has no place left", async (test) => {
   const folder = scratch(test);
   writeFileSync(`${folder}/large.mcap`, "");
   truncateSync(`${folder}/large.mcap`, 256 << 20);

@@ -145,7 +145,7 @@ class OperatorTest : public testing::Test {
   std::optional<Operator> operator_;
 };
 
-TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineThatGoesOnAndLeavesNobodyBehind) {
+TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineAndLeaves) {
   Operator& person = with(operator_key_, "operator");
   start_engine(engine_key_, "main");
   run(seconds(3));
@@ -174,7 +174,7 @@ TEST_F(OperatorTest, ArmsAndDisarmsBesideAnEngineThatGoesOnAndLeavesNobodyBehind
   EXPECT_EQ(board_.sessions(), 1U) << "the observer was not taken for it";
 }
 
-TEST_F(OperatorTest, TakesNothingFromAnEngineThatHoldsTheChannelAndSaysWhoAndForHowLong) {
+TEST_F(OperatorTest, TakesNothingFromTheHolderAndSaysWhoThatIs) {
   serve(true, {"operator"});  // one that need not wait for a lease
   Operator& person = with(operator_key_, "main");
   start_engine(engine_key_, "main");
@@ -190,7 +190,7 @@ TEST_F(OperatorTest, TakesNothingFromAnEngineThatHoldsTheChannelAndSaysWhoAndFor
   EXPECT_EQ(holder(0), "wall");
 }
 
-TEST_F(OperatorTest, AnEngineThatHasComeSinceTheBoardWasToldIsNotDisturbedEither) {
+TEST_F(OperatorTest, AnEngineThatHasJustComeIsNotDisturbedEither) {
   serve(true, {"operator"});
   Operator& person = with(operator_key_, "main");
   run(seconds(3));
@@ -292,7 +292,7 @@ TEST_F(OperatorTest, ADeviceThatIsGoneWhenTheAnswerComesShowsNothing) {
   EXPECT_NE(board_.press()->words.find("does not show it"), std::string::npos) << board_.press()->words;
 }
 
-TEST_F(OperatorTest, AnOrderThatTheServerHasTakenIsNotDoneBeforeTheDeviceShowsIt) {
+TEST_F(OperatorTest, AnOrderIsNotDoneBeforeTheDeviceShowsIt) {
   Operator& person = with(operator_key_, "operator");
   run(seconds(2));
   blind_ = true;

@@ -173,7 +173,7 @@ TEST_F(RoutesTest, KnowsNoOtherMethodAndNoOtherPath) {
   }
 }
 
-TEST_F(RoutesTest, AnOrderToArmIsForItsOwnPageOnThisMachineByPostAndForNobodyElse) {
+TEST_F(RoutesTest, OnlyItsOwnPageOnThisMachineMayArmByPost) {
   std::vector<std::pair<std::uint32_t, Operator::Order>> pressed;
   std::string objection;
   const Routes routes({.hosts = {"dash.lab"}, .origins = {"https://lab.example"}},

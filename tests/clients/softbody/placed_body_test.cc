@@ -136,7 +136,7 @@ TEST(PlacedBody, WhatIsPlannedOverTimeCountsFromTheFirstAnswersSample) {
   EXPECT_NEAR(force(60'000) / cut, 1, 1e-9);  // set back: the modulus of before, but no cut heals
 }
 
-TEST(PlacedBody, ABodyWithTimeGoesOnByTheTimeBetweenTheSamplesHoweverOftenItIsAsked) {
+TEST(PlacedBody, ABodyWithTimeAdvancesByTheTimeBetweenSamples) {
   const Scene scene = parse_scene(scene_of(info(ModelKind::kTensorMass)), "s.toml", ".");
   PlacedBody often(scene);
   PlacedBody seldom(scene);

@@ -153,7 +153,7 @@ TEST(Damping, TakesTheEnergyThatASwingHas) {
   }
 }
 
-TEST(Viscosity, ABodyCreepsUnderAConstantForceWithTheRelaxationTimeOfItsMaterial) {
+TEST(Viscosity, ABodyCreepsWithTheRelaxationTimeOfItsMaterial) {
   // K (u + τ u̇) = f: by implicit Euler u after n steps is u∞ (1 − (1 + dt/τ)⁻ⁿ), for every shape alike.
   for (const ModelKind model : kImplicit) {
     BodyConfig config = pressed_body(model, Element::kTet4, 4);

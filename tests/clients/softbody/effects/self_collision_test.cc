@@ -170,7 +170,7 @@ TEST(SelfCollision, TheForcesOfTheTwoSidesAreEqualAndOppositeAndHaveNoMoment) {
   }
 }
 
-TEST(SelfCollision, ForcesAreTheSlopeOfTheEnergyAlsoWhereWhatIsNearIsLookedUpAnew) {
+TEST(SelfCollision, ForcesAreTheSlopeOfTheEnergyEvenAfterANewLookUp) {
   constexpr double kStep = 1e-9;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Solid solid = Jaws::solid_of(Law::kCorotational, Element::kHex8Sri);
@@ -247,7 +247,7 @@ struct SlitBar {
   Patch patch;
 };
 
-TEST(SelfCollision, ASlitThatIsPressedShutIsAsIfItWereNotThereAndOneThatIsDrawnGapes) {
+TEST(SelfCollision, ASlitPressedShutIsAsNoneAndADrawnOneGapes) {
   const double force = 0.1;     // N
   const double pressure = 250;  // Pa: 2.5 % strain
   const double bed = kYoung / 1e-6;

@@ -94,7 +94,7 @@ double pressed_cylinder(double mu, double compression, bool oiled) {
   return round * sum;
 }
 
-TEST(Silicone, ACylinderBetweenOiledPlatesIsWhatTheNeoHookeanLawSaysInClosedForm) {
+TEST(Silicone, ACylinderBetweenOiledPlatesFollowsTheClosedForm) {
   for (const double compression : kCompressions) {
     EXPECT_NEAR(pressed_cylinder(22e3, compression, true) / yeoh({11}, compression), 1, 2e-3) << compression;
   }

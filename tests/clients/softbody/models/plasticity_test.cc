@@ -227,7 +227,7 @@ BodyConfig soft_body(ModelKind model) {
   return config;
 }
 
-TEST(Plasticity, ADentedBodyIsMetLowerAndHasTheShapeOfItsDentWhenNothingTouchesIt) {
+TEST(Plasticity, ADentedBodyIsMetLowerAndKeepsItsDentUntouched) {
   for (const ModelKind model : {ModelKind::kLinear, ModelKind::kCorotational}) {
     Body body(soft_body(model));
     Body elastic(pressed_body(model, Element::kHex8Sri, 4));

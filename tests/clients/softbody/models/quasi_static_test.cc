@@ -49,7 +49,7 @@ TEST(QuasiStatic, ForceIsTheSlopeOfTheEnergyAndStiffnessThatOfTheForce) {
   }
 }
 
-TEST(QuasiStatic, TheSameForceComesFromDepthAsFromForceAndFromOneStepAsFromMany) {
+TEST(QuasiStatic, DepthAndForceOneStepAndManyGiveTheSameForce) {
   for (const Law law : {Law::kCorotational, Law::kNeoHookean}) {
     PressedByNewton at_once(Element::kHex8Sri, 4, law);
     const Reaction deep = at_once.model.press(at_once.patch, Given::kDepth, 0.01);
@@ -81,7 +81,7 @@ TEST(QuasiStatic, AFactorServesManyAnswersOfAHandThatMovesAsHandsDo) {
   }
 }
 
-TEST(QuasiStatic, OneIterationAtEachAnswerFollowsAMovingToolAndSaysHowFarItIsOff) {
+TEST(QuasiStatic, OneIterationPerAnswerFollowsTheToolAndTellsItsError) {
   PressedByNewton exact(Element::kHex8Sri, 4, Law::kNeoHookean);
   PressedByNewton hasty(Element::kHex8Sri, 4, Law::kNeoHookean, 1);
   for (int i = 1; i <= 20; ++i) {

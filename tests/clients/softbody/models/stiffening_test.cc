@@ -63,7 +63,7 @@ TEST(Stiffening, AViscousBodyCreepsAsOneOfThatModulusAndTheSameRelaxation) {
   }
 }
 
-TEST(Stiffening, ABodyThatIsTensedUnderTheToolGivesOutWhatTheTensingPutInAndNoMore) {
+TEST(Stiffening, ATensedBodyGivesOutWhatTensingPutInAndNoMore) {
   // Down 2 mm, twice as stiff there, and up again: the hand gets back ½ k δ² more than it gave.
   BodyConfig config = pressed_body(ModelKind::kCondensed, Element::kHex8Sri, 4);
   config.stiffening = StiffnessOverTime{.at = {0, 1}, .factor = {1, 2}};
