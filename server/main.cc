@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "devices/falcon/firmware.h"
@@ -236,19 +237,20 @@ int list_devices(const OptionalPath& firmware, bool accept_unknown_firmware, boo
 void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool accept_unknown_firmware) {
   bool any = false;
   for (Scene& scene : scenes) {
-    if (!scene.falcon) continue;
+    auto* falcon = std::get_if<falcon::Config>(&scene.device);
+    if (falcon == nullptr) continue;
     any = true;
-    if (firmware) scene.falcon->firmware = firmware;
-    if (accept_unknown_firmware) scene.falcon->accept_unknown_firmware = true;
+    if (firmware) falcon->firmware = firmware;
+    if (accept_unknown_firmware) falcon->accept_unknown_firmware = true;
   }
   if (firmware && !any) throw std::runtime_error("--falcon-firmware: no scene has [device] kind = \"falcon\"");
 }
 
 void switch_limiter_off(std::vector<Scene>& scenes) {
   for (Scene& scene : scenes) {
-    if (scene.moves_a_hand()) {
-      throw std::runtime_error(std::string("--without-limiter: expected simulated devices only, found a ") +
-                               (scene.falcon ? "Falcon" : "WoodenHaptics") + ", " + scene.name);
+    if (scene.driver().moves_a_hand) {
+      throw std::runtime_error("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
+                               std::string(scene.driver().name));
     }
     scene.loop.control.limiter.law = Law::kNone;
   }

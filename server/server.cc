@@ -4,25 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <functional>
 #include <span>
 #include <utility>
+#include <variant>
 
-#include "devices/falcon/falcon_device.h"
-#include "devices/falcon/firmware.h"
-#include "devices/falcon/packet.h"
-#include "devices/replay/replay_device.h"
-#include "devices/simulated/simulated_device.h"
-#include "devices/spacemouse/spacemouse_device.h"
-#include "devices/usb/usb.h"
-#include "devices/woodenhaptics/woodenhaptics_device.h"
 #include "server/build_info.h"
+#include "server/device_factory.h"
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
 #include "server/machine/randomness.h"
 #include "server/machine/realtime.h"
-#include "server/machine/regular_file.h"
 #include "server/recording/flight_file.h"
 #include "server/scene/key_folder.h"
 
@@ -30,8 +21,6 @@ namespace tendon {
 
 namespace {
 
-/// Above the haptic thread, which waits for it.
-constexpr int kUsbPriority = kHapticPriority + 5;
 constexpr auto kLogPeriod = std::chrono::milliseconds(20);
 /// Trouble is told at most this often, with how much of it there was.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
@@ -41,7 +30,7 @@ DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
   about.name = scene.name;
   about.model = device.name;
   about.max_force = scene.loop.control.max_force;
-  if (!scene.exerts_force()) about.max_force = 0;
+  if (!scene.driver().exerts_force) about.max_force = 0;
   if (scene.safety && device.max_force > 0) about.max_force = std::min(about.max_force, device.max_force);
   about.position_resolution = device.position_resolution;
   about.loop_hz = static_cast<std::uint32_t>(std::lround(1 / seconds(scene.loop.period)));
@@ -79,91 +68,18 @@ std::string describe(Device::State state, const Scene& scene) {
       return "the device is not plugged in";
     case Device::State::kOpening:
       return "the device is being opened";
-    case Device::State::kFirmware:
-      return scene.falcon && !scene.falcon->firmware
+    case Device::State::kFirmware: {
+      const auto* falcon = std::get_if<falcon::Config>(&scene.device);
+      return falcon != nullptr && !falcon->firmware
                  ? "the device has no firmware, and no file was named to give it: --falcon-firmware FILE"
                  : "the device is being given its firmware";
+    }
     case Device::State::kUnhomed:
-      return scene.woodenhaptics
-                 ? "the device has to be calibrated: hold the arm in its calibration pose (devices/woodenhaptics) and "
-                   "press the board's button"
-                 : "the device has to be homed: pull the grip all the way out, then push it all the way in";
+      return "the device has to be " + std::string(scene.driver().homing);
     case Device::State::kHomed:
-      return scene.moves_a_hand() ? "the device is homed" : "the device is there";
+      return scene.driver().moves_a_hand ? "the device is homed" : "the device is there";
   }
   return "unknown";
-}
-
-/// Tells the guardian when there is a device to guard, whose last word is `bytes` to `endpoint`, and when there is none
-/// any more.
-std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, std::uint8_t endpoint,
-                                       std::span<const std::uint8_t> bytes) {
-  static_assert(limits::kMaxDevices <= Guardian::kDevices);
-  const ZeroPacket zero = ZeroPacket::usb(endpoint, std::as_bytes(bytes));
-  return [&guardian, zero, device = scene.loop.device, name = scene.name](int node) {
-    const bool heard = node >= 0 ? guardian.guard(device, node, zero) : guardian.forget(device);
-    if (!heard) log::error(name + ": the guardian process is dead: should this one be killed, forces stay on");
-  };
-}
-
-std::unique_ptr<Guardian> guardian_of(const std::vector<Scene>& scenes) {
-  const bool any = std::any_of(scenes.begin(), scenes.end(), [](const Scene& scene) { return scene.moves_a_hand(); });
-  // The haptic thread says what is refused.
-  const auto on_start = [] {
-    name_thread("guardian-parent");
-    enter_realtime(kHapticPriority);
-  };
-  return any ? std::make_unique<Guardian>(on_start) : nullptr;
-}
-
-usb::PipeConfig pipe_for(const Scene& scene, const std::string& port) {
-  usb::PipeConfig pipe{.port = port};
-  pipe.on_start = [device = scene.loop.device] {
-    name_thread("usb-" + std::to_string(device));
-    enter_realtime(kUsbPriority);  // the haptic thread says what is refused
-  };
-  pipe.tell = [name = scene.name](const std::string& why) { log::warn(name + ": " + why); };
-  return pipe;
-}
-
-std::unique_ptr<Device> make_spacemouse(const Scene& scene) {
-  usb::PipeConfig pipe = pipe_for(scene, scene.spacemouse->port);
-  pipe.ids.assign(SpaceMouseDevice::kIds.begin(), SpaceMouseDevice::kIds.end());
-  pipe.transfers = usb::PipeConfig::Transfers::kInterrupt;
-  return std::make_unique<SpaceMouseDevice>(scene.spacemouse->motion, usb::open_pipe(pipe));
-}
-
-std::unique_ptr<Device> make_falcon(const Scene& scene, Guardian& guardian) {
-  const Scene::Falcon& falcon = *scene.falcon;
-  FalconDevice::Config config;
-  if (falcon.firmware) {
-    std::ifstream file = open_regular_file(*falcon.firmware);
-    config.firmware = falcon::read_firmware(
-        file, falcon.firmware->string(),
-        falcon.accept_unknown_firmware ? falcon::UnknownFirmware::kAccept : falcon::UnknownFirmware::kRefuse);
-  }
-  usb::PipeConfig pipe = pipe_for(scene, falcon.port);
-  pipe.ids = {FalconDevice::kId};
-  pipe.opened = tell_guardian(guardian, scene, pipe.out, falcon::encode(falcon::kLastCommand));
-  return std::make_unique<FalconDevice>(std::move(config), usb::open_pipe(pipe));
-}
-
-std::unique_ptr<Device> make_woodenhaptics(const Scene& scene, Guardian& guardian) {
-  usb::PipeConfig pipe = pipe_for(scene, scene.woodenhaptics->port);
-  pipe.ids = {WoodenHapticsDevice::kId};
-  pipe.in = WoodenHapticsDevice::kIn;
-  pipe.out = WoodenHapticsDevice::kOut;
-  pipe.transfers = usb::PipeConfig::Transfers::kInterrupt;
-  pipe.opened = tell_guardian(guardian, scene, pipe.out, woodenhaptics::encode({}));
-  return std::make_unique<WoodenHapticsDevice>(scene.woodenhaptics->drive, usb::open_pipe(pipe));
-}
-
-std::unique_ptr<Device> make_device(const Scene& scene, Guardian* guardian) {
-  if (scene.falcon) return make_falcon(scene, *guardian);
-  if (scene.replay) return std::make_unique<ReplayDevice>(*scene.replay);
-  if (scene.spacemouse) return make_spacemouse(scene);
-  if (scene.woodenhaptics) return make_woodenhaptics(scene, *guardian);
-  return std::make_unique<SimulatedDevice>(scene.device);
 }
 
 }  // namespace
@@ -213,7 +129,7 @@ NetworkLoop::Config Server::network_config(const Lanes& lanes) {
 
 Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
-      guardian_(guardian_of(scenes)),
+      guardian_(make_guardian(scenes)),
       lanes_(lanes_of(scenes, guardian_.get())),
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       network_(network_config(lanes_), link_, mail_of(lanes_)),

@@ -7,6 +7,8 @@
 #include <span>
 #include <utility>
 
+#include "devices/simulated/profiles.h"
+
 namespace tendon {
 namespace {
 
@@ -248,5 +250,38 @@ FalconDevice::Stats FalconDevice::stats() const noexcept {
           .lost_counts = lost_counts_.value(),
           .failed_loads = failed_loads_.value()};
 }
+
+namespace falcon {
+
+const Driver& driver(const Config& /*config*/) {
+  static constexpr std::array kIds{FalconDevice::kId};
+  static const Driver kRow = [] {
+    const auto zero = encode(kLastCommand);
+    return Driver{.kind = "falcon",
+                  .name = "Novint Falcon",
+                  .moves_a_hand = true,
+                  .buttons = 4,  // of its grip: right, forward, centre, left
+                  .buttons_in_words = "one of a Falcon's, 0 to 3",
+                  .homing = "homed: pull the grip all the way out, then push it all the way in",
+                  .ids = kIds,
+                  .zero_packet = {zero.begin(), zero.end()}};
+  }();
+  return kRow;
+}
+
+SimulatedDevice::Config stand_in(const Config& /*config*/) { return find_device_profile("falcon")->device(); }
+
+std::unique_ptr<Device> make(const Config& config, FromOutside outside) {
+  FalconDevice::Config device;
+  if (config.firmware) {
+    std::ifstream file = outside.open_file(*config.firmware);
+    device.firmware =
+        read_firmware(file, config.firmware->string(),
+                      config.accept_unknown_firmware ? UnknownFirmware::kAccept : UnknownFirmware::kRefuse);
+  }
+  return std::make_unique<FalconDevice>(std::move(device), std::move(outside.pipe));
+}
+
+}  // namespace falcon
 
 }  // namespace tendon

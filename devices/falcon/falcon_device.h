@@ -4,15 +4,19 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/exchange/counter.h"
 #include "devices/device.h"
+#include "devices/driver.h"
 #include "devices/falcon/firmware.h"
 #include "devices/falcon/kinematics.h"
 #include "devices/falcon/packet.h"
+#include "devices/simulated/simulated_device.h"
 #include "devices/usb/pipe.h"
 
 namespace tendon {
@@ -116,5 +120,21 @@ class FalconDevice final : public Device {
   Counter lost_counts_;
   Counter failed_loads_;
 };
+
+namespace falcon {
+
+/// A Falcon in a scene.
+struct Config {
+  std::string port{};                               ///< as `tendond devices` names it; empty: the first free one
+  std::optional<std::filesystem::path> firmware{};  ///< empty: one that has its firmware already
+  bool accept_unknown_firmware = false;
+};
+
+// The row of this driver: see driver.h. `make` throws what `read_firmware` throws.
+const Driver& driver(const Config& config);
+SimulatedDevice::Config stand_in(const Config& config);
+std::unique_ptr<Device> make(const Config& config, FromOutside outside);
+
+}  // namespace falcon
 
 }  // namespace tendon

@@ -80,4 +80,15 @@ std::optional<PositionSample> ReplayDevice::read(LocalTime now) noexcept {
 
 Vec3 ReplayDevice::apply(const Vec3& /*force*/) noexcept { return Vec3::Zero(); }
 
+const Driver& driver(const ReplayDevice::Config& /*config*/) {
+  static const Driver kRow{.kind = "replay", .name = "recorded hand", .exerts_force = false};
+  return kRow;
+}
+
+SimulatedDevice::Config stand_in(const ReplayDevice::Config& /*config*/) { return plain_stand_in("replay"); }
+
+std::unique_ptr<Device> make(const ReplayDevice::Config& config, FromOutside /*outside*/) {
+  return std::make_unique<ReplayDevice>(config);
+}
+
 }  // namespace tendon

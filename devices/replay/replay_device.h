@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "devices/device.h"
+#include "devices/driver.h"
 #include "devices/simulated/scripted_motion.h"
+#include "devices/simulated/simulated_device.h"
 
 namespace tendon {
 
@@ -60,5 +62,10 @@ class ReplayDevice final : public Device {
   std::uint64_t next_ = 0;        ///< the first that has not been given, or left out
   std::uint64_t due_before_ = 0;  ///< how many were due at the last read
 };
+
+// The row of this driver: see driver.h.
+const Driver& driver(const ReplayDevice::Config& config);
+SimulatedDevice::Config stand_in(const ReplayDevice::Config& config);
+std::unique_ptr<Device> make(const ReplayDevice::Config& config, FromOutside outside);
 
 }  // namespace tendon

@@ -309,4 +309,22 @@ Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& po
   return {.coulomb = joints.coulomb, .viscous = config.viscous_friction.value_or(0) + joints.viscous};
 }
 
+const Driver& driver(const SimulatedDevice::Config& /*config*/) {
+  static const Driver kRow{.kind = "simulated", .name = "simulated device"};
+  return kRow;
+}
+
+SimulatedDevice::Config stand_in(const SimulatedDevice::Config& config) { return config; }
+
+std::unique_ptr<Device> make(const SimulatedDevice::Config& config, FromOutside /*outside*/) {
+  return std::make_unique<SimulatedDevice>(config);
+}
+
+SimulatedDevice::Config plain_stand_in(std::string name) {
+  SimulatedDevice::Config device;
+  device.name = std::move(name);
+  device.mass = 0.1;
+  return device;
+}
+
 }  // namespace tendon

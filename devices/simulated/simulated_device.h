@@ -3,12 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "core/base/motion.h"
 #include "core/ledger/friction.h"
 #include "devices/device.h"
+#include "devices/driver.h"
 #include "devices/simulated/forces_under_way.h"
 #include "devices/simulated/joint_friction.h"
 #include "devices/simulated/operator_hand.h"
@@ -219,5 +221,13 @@ class SimulatedDevice final : public Device {
 Friction least_friction(const SimulatedDevice::Config& config);
 /// … at `position` (m) in any direction.
 Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& position);
+
+// The row of this driver: see driver.h.
+const Driver& driver(const SimulatedDevice::Config& config);
+SimulatedDevice::Config stand_in(const SimulatedDevice::Config& config);
+std::unique_ptr<Device> make(const SimulatedDevice::Config& config, FromOutside outside);
+
+/// A handle of 0.1 kg without any effect: stands in for a device of which nothing else is known.
+SimulatedDevice::Config plain_stand_in(std::string name);
 
 }  // namespace tendon

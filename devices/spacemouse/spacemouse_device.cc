@@ -82,4 +82,23 @@ SpaceMouseDevice::Stats SpaceMouseDevice::stats() const noexcept {
   return stats;
 }
 
+namespace spacemouse {
+
+const Driver& driver(const Config& /*config*/) {
+  static const Driver kRow{.kind = "spacemouse",
+                           .name = "3Dconnexion SpaceMouse",
+                           .exerts_force = false,
+                           .ids = SpaceMouseDevice::kIds,
+                           .transfers = usb::PipeConfig::Transfers::kInterrupt};
+  return kRow;
+}
+
+SimulatedDevice::Config stand_in(const Config& /*config*/) { return plain_stand_in("spacemouse"); }
+
+std::unique_ptr<Device> make(const Config& config, FromOutside outside) {
+  return std::make_unique<SpaceMouseDevice>(config.motion, std::move(outside.pipe));
+}
+
+}  // namespace spacemouse
+
 }  // namespace tendon

@@ -6,9 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "core/exchange/counter.h"
 #include "devices/device.h"
+#include "devices/driver.h"
+#include "devices/simulated/simulated_device.h"
 #include "devices/spacemouse/report.h"
 #include "devices/usb/pipe.h"
 
@@ -82,5 +85,20 @@ class SpaceMouseDevice final : public Device {
   Counter unknown_;
   std::atomic<std::int16_t> battery_percent_{-1};
 };
+
+namespace spacemouse {
+
+/// A SpaceMouse in a scene.
+struct Config {
+  std::string port{};  ///< as `tendond devices` names it; empty: the first free one
+  SpaceMouseDevice::Config motion{};
+};
+
+// The row of this driver: see driver.h.
+const Driver& driver(const Config& config);
+SimulatedDevice::Config stand_in(const Config& config);
+std::unique_ptr<Device> make(const Config& config, FromOutside outside);
+
+}  // namespace spacemouse
 
 }  // namespace tendon

@@ -278,4 +278,42 @@ WoodenHapticsDevice::Stats WoodenHapticsDevice::stats() const noexcept {
           .failed_calibrations = failed_calibrations_.value()};
 }
 
+namespace woodenhaptics {
+
+const Driver& driver(const Config& /*config*/) {
+  static constexpr std::array kIds{WoodenHapticsDevice::kId};
+  static const Driver kRow = [] {
+    const auto zero = encode({});
+    return Driver{.kind = "woodenhaptics",
+                  .name = "WoodenHaptics, or another HID gadget of mbed",
+                  .moves_a_hand = true,
+                  .buttons = 1,
+                  .buttons_in_words = "0, the switch at its tip",
+                  .homing =
+                      "calibrated: hold the arm in its calibration pose (devices/woodenhaptics) and press the "
+                      "board's button",
+                  .ids = kIds,
+                  .in = WoodenHapticsDevice::kIn,
+                  .out = WoodenHapticsDevice::kOut,
+                  .transfers = usb::PipeConfig::Transfers::kInterrupt,
+                  .zero_packet = {zero.begin(), zero.end()}};
+  }();
+  return kRow;
+}
+
+SimulatedDevice::Config stand_in(const Config& config) {
+  SimulatedDevice::Config device = plain_stand_in("woodenhaptics");
+  const DeviceInfo info = WoodenHapticsDevice::info_of(checked(config.drive.model));
+  device.watchdog = info.watchdog;
+  device.max_force = info.max_force;
+  device.encoder_step = info.position_resolution;
+  return device;
+}
+
+std::unique_ptr<Device> make(const Config& config, FromOutside outside) {
+  return std::make_unique<WoodenHapticsDevice>(config.drive, std::move(outside.pipe));
+}
+
+}  // namespace woodenhaptics
+
 }  // namespace tendon

@@ -6,9 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "core/exchange/counter.h"
 #include "devices/device.h"
+#include "devices/driver.h"
+#include "devices/simulated/simulated_device.h"
 #include "devices/usb/pipe.h"
 #include "devices/woodenhaptics/kinematics.h"
 #include "devices/woodenhaptics/report.h"
@@ -129,5 +132,20 @@ class WoodenHapticsDevice final : public Device {
   Counter lost_counts_;
   Counter failed_calibrations_;
 };
+
+namespace woodenhaptics {
+
+/// A WoodenHaptics, or a relative, in a scene.
+struct Config {
+  std::string port{};  ///< as `tendond devices` names it; empty: the first free one
+  WoodenHapticsDevice::Config drive{};
+};
+
+// The row of this driver: see driver.h. `stand_in` and `make` want a model.
+const Driver& driver(const Config& config);
+SimulatedDevice::Config stand_in(const Config& config);
+std::unique_ptr<Device> make(const Config& config, FromOutside outside);
+
+}  // namespace woodenhaptics
 
 }  // namespace tendon

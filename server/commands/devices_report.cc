@@ -9,8 +9,7 @@
 #include <sstream>
 
 #include "devices/falcon/falcon_device.h"
-#include "devices/spacemouse/spacemouse_device.h"
-#include "devices/woodenhaptics/woodenhaptics_device.h"
+#include "server/scene/scene.h"
 
 namespace tendon {
 namespace {
@@ -22,16 +21,11 @@ std::string id_of(const usb::PluggedIn& plugged) {
   return text.str();
 }
 
-struct Known {
-  const char* name;
-  const char* kind;
-};
-
-std::optional<Known> driver_for(const usb::Id& id) {
-  if (id == FalconDevice::kId) return Known{"Novint Falcon", "falcon"};
-  if (id == WoodenHapticsDevice::kId) return Known{"WoodenHaptics, or another HID gadget of mbed", "woodenhaptics"};
-  if (std::ranges::find(SpaceMouseDevice::kIds, id) == SpaceMouseDevice::kIds.end()) return std::nullopt;
-  return Known{"3Dconnexion SpaceMouse", "spacemouse"};
+/// Null when Tendon has none.
+const Driver* driver_for(const usb::Id& id) {
+  const auto found = std::ranges::find_if(
+      drivers(), [&id](const Driver* driver) { return std::ranges::find(driver->ids, id) != driver->ids.end(); });
+  return found == drivers().end() ? nullptr : *found;
 }
 
 }  // namespace
@@ -40,10 +34,11 @@ std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugge
                                           const std::optional<std::string>& firmware_problem) {
   std::vector<PluggedDevice> reports;
   for (const usb::PluggedIn& one : plugged) {
-    const auto known = driver_for(one.id);
-    if (!known) continue;
+    const Driver* driver = driver_for(one.id);
+    if (driver == nullptr) continue;
     const bool falcon = one.id == FalconDevice::kId;
-    PluggedDevice report{.name = known->name, .kind = known->kind, .plugged = one, .lacks = {}};
+    PluggedDevice report{
+        .name = std::string(driver->name), .kind = std::string(driver->kind), .plugged = one, .lacks = {}};
     if (!one.has_node) {
       report.lacks.push_back({"there is no " + one.node + " here, although the kernel has the device",
                               "give it to this container: docker run -v /dev/bus/usb:/dev/bus/usb "

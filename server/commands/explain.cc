@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
+#include <variant>
 
 #include "core/control/aol_parts.h"
 #include "devices/simulated/simulated_device.h"
@@ -41,7 +42,8 @@ std::vector<Listable> make_listables() {
     list.push_back({std::move(key), what, std::move(drop_it)});
   };
   const auto effect = [&add](const char* key, std::string_view what, auto SimulatedDevice::Config::*part) {
-    add(std::string("device.effects.") + key, what, [part](Scene& scene) { return drop(scene.device.*part); });
+    add(std::string("device.effects.") + key, what,
+        [part](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).*part); });
   };
   const auto guard = [&add](const char* key, std::string_view what, auto SafeDevice::Config::*part) {
     add(std::string("safety.") + key, what, [part](Scene& scene) { return scene.safety && drop(*scene.safety.*part); });
@@ -54,7 +56,7 @@ std::vector<Listable> make_listables() {
   };
   using Device = SimulatedDevice::Config;
   add("device.hand", "the operator: a spring, a damper and a mass",
-      [](Scene& scene) { return drop(scene.device.hand); });
+      [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).hand); });
   effect("viscous_friction_n_s_per_m", "true viscous friction", &Device::viscous_friction);
   effect("coulomb_friction_n", "true Coulomb friction", &Device::coulomb_friction);
   effect("joint_friction", "friction of each joint, by the pose", &Device::joint_friction);
@@ -150,7 +152,7 @@ class Trial {
         safe_(made_safe(scene, *device_)),
         loop_(scene.loop, safe_ ? static_cast<Device&>(*safe_) : *device_, *mail_),
         period_(scene.loop.period) {}
-  explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.device)) {}
+  explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.simulated())) {}
 
   /// ns of a step, mean of kSteps.
   double steps(const std::function<Duration()>& processor_time) {
@@ -204,10 +206,10 @@ class Trial {
 std::unique_ptr<Device> playback_of(const Scene& scene) {
   std::vector<PositionSample> samples;
   samples.reserve(kSamples);
-  Trial trial(scene, std::make_unique<Tape>(scene.device, samples));
+  Trial trial(scene, std::make_unique<Tape>(scene.simulated(), samples));
   for (int i = 0; i < kSamples / kSteps; ++i) trial.steps([] { return Duration::zero(); });
   if (samples.empty()) samples.emplace_back();
-  return std::make_unique<Playback>(SimulatedDevice(scene.device).info(), std::move(samples));
+  return std::make_unique<Playback>(SimulatedDevice(scene.simulated()).info(), std::move(samples));
 }
 
 /// The least of several measurements, and how far it can be trusted: what the odd ones and the even ones differ by.
@@ -238,8 +240,10 @@ std::string rounded(double ns, double resolution) {
 
 }  // namespace
 
-Explanation explain(const Scene& scene, const std::function<Duration()>& processor_time, int rounds) {
+Explanation explain(const Scene& listed, const std::function<Duration()>& processor_time, int rounds) {
   Explanation out;
+  Scene scene = listed;
+  scene.device = listed.simulated();
   // The whole scene, the same again, the same with a device that costs nothing, and one without each part it lists.
   std::vector<std::unique_ptr<Trial>> trials;
   trials.push_back(std::make_unique<Trial>(scene));
@@ -288,7 +292,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   }
   text << "a whole step: " << std::llround(step_ns) << " ns of processor time, of which " << std::llround(device_ns)
        << " ns are the simulated device"
-       << (scene.moves_a_hand() || !scene.exerts_force() ? ", which stands in for the real one" : "")
+       << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? ", which stands in for the real one" : "")
        << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n"
        << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <toml++/toml.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -100,7 +101,6 @@ struct Column {
   }
 };
 
-enum class DeviceKind : std::uint8_t { kSimulated, kFalcon, kReplay, kSpaceMouse, kWoodenHaptics };
 enum class MechanismKind : std::uint8_t { kFalcon, kArm };
 enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
 
@@ -148,7 +148,7 @@ void declare_joint_friction(Table& friction, Draft& draft, JointFriction::Config
 template <class Table>
 void declare_effects(Table& effects, Draft& draft) {
   const DeviceProfile* const profile = draft.profile;
-  SimulatedDevice::Config& device = draft.scene.device;
+  SimulatedDevice::Config& device = draft.simulated;
   constexpr OrFalse kDelay{Number{.least = 0, .most = 100, .without_least = true}};
   constexpr OrFalse kEffect{kAboveZero};
   constexpr Absent kProfiles{.text = "the profile's; without a profile there is no such effect"};
@@ -232,108 +232,90 @@ void declare_port(Table& keys, std::string& port) {
            Absent{.text = "the first that nobody uses"});
 }
 
+// The keys of each kind of device.
+
 template <class Table>
-void declare_falcon(Table& keys, Draft& draft) {
-  draft.scene.device = find_device_profile("falcon")->device();
-  Scene::Falcon& falcon = draft.scene.falcon.emplace(Scene::Falcon{});
-  declare_port(keys, falcon.port);
-  keys.key("firmware", falcon.firmware, Path{},
-           "the file of your own Novint software, relative to this file; --falcon-firmware overrides it",
-           Absent{.text = "none; only a device that has its firmware already can be used"});
-  keys.key("accept_unknown_firmware", falcon.accept_unknown_firmware, YesNo{},
-           "also a file that is none of the known ones");
+void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
+  SimulatedDevice::Config& config = draft.simulated;
+  keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
+  if (draft.profile != nullptr) config = draft.profile->device();
+  keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
+           Absent{.text = "where the hand starts, or the origin"});
+  keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
+  draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
+    hand.key("profile", draft.operator_profile, operator_names(),
+             "what holds the handle: the middle of what is known of such; keys below override one number each");
+    const OperatorProfile* const profile = draft.operator_profile;
+    if (profile != nullptr) draft.hand = profile->hand(std::move(draft.hand.motion));
+    constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
+    hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip",
+             Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
+    hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip", kProfiles);
+    hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
+    hand.key("button_after_ms", draft.simulated.button_after, kZeroOrMore,
+             "after this time it presses button 0, and holds it", Absent{.text = "never"});
+    hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
+  });
 }
 
 template <class Table>
-void declare_replay(Table& keys, Draft& draft) {
-  draft.scene.device = stand_in("replay");
-  ReplayDevice::Config& replay = draft.scene.replay.emplace();
+void declare(Table& keys, falcon::Config& device, Draft& /*draft*/) {
+  declare_port(keys, device.port);
+  keys.key("firmware", device.firmware, Path{},
+           "the file of your own Novint software, relative to this file; --falcon-firmware overrides it",
+           Absent{.text = "none; only a device that has its firmware already can be used"});
+  keys.key("accept_unknown_firmware", device.accept_unknown_firmware, YesNo{},
+           "even a file that is none of the known ones");
+}
+
+template <class Table>
+void declare(Table& keys, ReplayDevice::Config& device, Draft& draft) {
   keys.key("recording", draft.replayed, Path{},
            "MCAP recording of tendond, relative to this file: the hand of its (first) device",
            Absent{.text = "none; then there is a table csv"});
-  keys.key("at_end", replay.at_end, at_end_names(), "stay at the last sample, or start again");
-  keys.key("encoder_step_um", replay.position_resolution, kZeroOrMore,
+  keys.key("at_end", device.at_end, at_end_names(), "stay at the last sample, or start again");
+  keys.key("encoder_step_um", device.position_resolution, kZeroOrMore,
            "one count of the device that was recorded; 0: its positions were exact");
   keys.part("csv", draft.recorded_motion, [](Table& csv, RecordedMotionFile& file) { declare_csv(csv, file); });
 }
 
 template <class Table>
-void declare_spacemouse(Table& keys, Draft& draft) {
-  draft.scene.device = stand_in("spacemouse");
-  Scene::SpaceMouse& mouse = draft.scene.spacemouse.emplace(Scene::SpaceMouse{});
-  declare_port(keys, mouse.port);
-  keys.key("speed_m_per_s", mouse.motion.speed, kAboveZero, "of the position, with the cap at its stop");
-  keys.key("dead_band", mouse.motion.dead_band, Number{.least = 0, .most = 0.9},
+void declare(Table& keys, spacemouse::Config& device, Draft& /*draft*/) {
+  declare_port(keys, device.port);
+  keys.key("speed_m_per_s", device.motion.speed, kAboveZero, "of the position, with the cap at its stop");
+  keys.key("dead_band", device.motion.dead_band, Number{.least = 0, .most = 0.9},
            "share of the way to the stop in which nothing moves");
-  keys.key("reach_mm", mouse.motion.reach, kAboveZero, "the position stays within so much of the origin, on each axis");
+  keys.key("reach_mm", device.motion.reach, kAboveZero,
+           "the position stays within this distance of the origin, on each axis");
 }
 
 template <class Table>
-void declare_woodenhaptics(Table& keys, Draft& draft) {
-  draft.scene.device = stand_in("woodenhaptics");
-  draft.scene.device.watchdog = WoodenHapticsDevice::kWatchdog;
-  Scene::WoodenHaptics& arm = draft.scene.woodenhaptics.emplace(Scene::WoodenHaptics{});
-  declare_port(keys, arm.port);
-  keys.key("model", arm.drive.model, ArmModel{}, "which arm it is", kRequired);
-  keys.key("max_current_ma", arm.drive.max_current, Number{.least = 1, .most = 6000},
-           "of each motor; what the amplifiers can give is the most");
+void declare(Table& keys, woodenhaptics::Config& device, Draft& /*draft*/) {
+  declare_port(keys, device.port);
+  keys.key("model", device.drive.model, ArmModel{}, "which arm it is", kRequired);
+  keys.key("max_current_ma", device.drive.max_current, Number{.least = 1, .most = 6000},
+           "of each motor; at most the full scale of the amplifiers");
+}
+
+/// Makes the alternative of that number, and declares its keys.
+template <std::size_t index = 0, class Table>
+void declare_kind(std::size_t kind, Table& keys, Draft& draft) {
+  if constexpr (index < std::variant_size_v<Scene::AnyDevice>) {
+    if (kind != index) return declare_kind<index + 1>(kind, keys, draft);
+    declare(keys, draft.scene.device.emplace<index>(), draft);
+  }
 }
 
 }  // namespace
 
-SimulatedDevice::Config stand_in(const char* name) {
-  SimulatedDevice::Config device;
-  device.name = name;
-  device.mass = 0.1;
-  return device;
-}
-
 template <class Table>
 void declare_device(Table& device, Draft& draft) {
-  const Names<DeviceKind> kinds{{{"simulated", DeviceKind::kSimulated},
-                                 {"falcon", DeviceKind::kFalcon},
-                                 {"replay", DeviceKind::kReplay},
-                                 {"spacemouse", DeviceKind::kSpaceMouse},
-                                 {"woodenhaptics", DeviceKind::kWoodenHaptics}}};
-  device.kind(kinds, [&draft](Table& keys, DeviceKind kind) {
-    keys.key("name", draft.scene.name, Label{}, "what clients call it that want this one of several",
+  Names<std::size_t> kinds;
+  for (const Driver* driver : drivers()) kinds.all.emplace_back(driver->kind, kinds.all.size());
+  device.kind(kinds, [&draft](Table& keys, std::size_t kind) {
+    keys.key("name", draft.scene.name, Label{}, "the name by which clients ask for this device, of several",
              Absent{.text = "the name of the scene file"});
-    if (kind == DeviceKind::kFalcon) {
-      declare_falcon(keys, draft);
-      return;
-    }
-    if (kind == DeviceKind::kReplay) {
-      declare_replay(keys, draft);
-      return;
-    }
-    if (kind == DeviceKind::kSpaceMouse) {
-      declare_spacemouse(keys, draft);
-      return;
-    }
-    if (kind == DeviceKind::kWoodenHaptics) {
-      declare_woodenhaptics(keys, draft);
-      return;
-    }
-    SimulatedDevice::Config& config = draft.scene.device;
-    keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
-    if (draft.profile != nullptr) config = draft.profile->device();
-    keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
-             Absent{.text = "where the hand starts, or the origin"});
-    keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
-    draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
-      hand.key("profile", draft.operator_profile, operator_names(),
-               "what holds the handle: the middle of what is known of such; keys below override one number each");
-      const OperatorProfile* const profile = draft.operator_profile;
-      if (profile != nullptr) draft.hand = profile->hand(std::move(draft.hand.motion));
-      constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
-      hand.key("stiffness_n_per_m", draft.hand.stiffness, kAboveZero, "of the grip",
-               Absent{.required = profile == nullptr, .text = "the profile's; required without a profile"});
-      hand.key("damping_n_s_per_m", draft.hand.damping, kZeroOrMore, "of the grip", kProfiles);
-      hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
-      hand.key("button_after_ms", draft.scene.device.button_after, kZeroOrMore,
-               "after this time it presses button 0, and holds it", Absent{.text = "never"});
-      hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
-    });
+    declare_kind(kind, keys, draft);
   });
 }
 

@@ -26,6 +26,7 @@ struct Draft {
   }
 
   Scene scene;
+  SimulatedDevice::Config simulated;  ///< the device, or what stands in for a real one
   const DeviceProfile* profile = nullptr;
   const OperatorProfile* operator_profile = nullptr;
   std::optional<Vec3> joint_coulomb;
@@ -63,8 +64,5 @@ void declare_scene(Table& scene, Draft& draft);
 /// [device]. Defined for Reader and Reference.
 template <class Table>
 void declare_device(Table& device, Draft& draft);
-
-/// What stands in for a real device where the cost of a step is measured.
-SimulatedDevice::Config stand_in(const char* name);
 
 }  // namespace tendon::scene_file

@@ -43,19 +43,28 @@ class Reference {
 
   template <class T, class Declare>
   void kind(const Names<T>& names, const Declare& declare) {
+    std::string tables;
     for (const auto& [name, value] : names.all) {
       text_.append("  kind = ").append(in_quotes(name)).append("\n");
       Reference inner(text_, path_);
       inner.indent_ = "    ";
+      inner.tables_ = &tables;
+      inner.of_kind_ = "  of kind = " + in_quotes(name);
       declare(inner, value);
     }
+    (tables_ != nullptr ? *tables_ : text_).append(tables);
   }
 
   template <class Declare>
   void table(std::string_view name, const Declare& declare) {
     const std::string path = joined(path_, name);
-    text_.append(text_.empty() ? "[" : "\n[").append(path).append("]\n");
-    Reference inner(text_, path);
+    std::string& text = tables_ != nullptr ? *tables_ : text_;
+    text.append(text.empty() && tables_ == nullptr ? "[" : "\n[")
+        .append(path)
+        .append("]")
+        .append(of_kind_)
+        .append("\n");
+    Reference inner(text, path);
     declare(inner);
   }
 
@@ -86,6 +95,8 @@ class Reference {
   std::string& text_;
   std::string path_;
   std::string indent_ = "  ";
+  std::string* tables_ = nullptr;  ///< of a kind: where its tables are written, which come after the keys of all kinds
+  std::string of_kind_;            ///< that kind, in the heading of such a table
 };
 
 }  // namespace tendon::scene_file

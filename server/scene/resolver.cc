@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "devices/simulated/recorded_motion.h"
@@ -24,8 +25,6 @@
 namespace tendon::scene_file {
 namespace {
 
-/// The four of its grip: right, forward, centre, left.
-constexpr std::uint32_t kFalconButtons = 4;
 /// N: how long the forces of engines may be that nobody feels, so that recordings have them as they came.
 constexpr double kUnfelt = 10;
 /// Readings may fail for so long before it is a fault: what libfranka allows.
@@ -38,9 +37,12 @@ class SceneResolver {
       : draft_(std::move(draft)), file_(file), name_(name) {}
 
   Scene scene(const std::filesystem::path& directory) {
+    if (!std::holds_alternative<SimulatedDevice::Config>(draft_.scene.device))
+      draft_.simulated = draft_.scene.simulated();
     resolve_motion(directory);
     resolve_falcon(directory);
     resolve_woodenhaptics();
+    if (draft_.scene.driver().moves_a_hand) expect_a_limiter();
     resolve_network(directory);
     resolve_structural_mode();
     resolve_joint_friction();
@@ -49,8 +51,10 @@ class SceneResolver {
     resolve_channels();
     // Rules of the constructors that are not among ours yet.
     Scene& scene = draft_.scene;
-    if (draft_.has_hand) scene.device.hand = draft_.hand;
-    build("device", [&scene] { SimulatedDevice{scene.device}; });
+    SimulatedDevice::Config& simulated = draft_.simulated;
+    if (draft_.has_hand) simulated.hand = draft_.hand;
+    build("device", [&simulated] { SimulatedDevice{simulated}; });
+    if (auto* device = std::get_if<SimulatedDevice::Config>(&scene.device)) *device = simulated;
     build("force", [&scene] { HeldForce{scene.loop.control.hold}; });
     resolve_safety();
     build("limiter", [&scene] { Limiter{scene.loop.control.limiter}; });
@@ -106,10 +110,8 @@ class SceneResolver {
   }
 
   void resolve_falcon(const std::filesystem::path& directory) {
-    if (!draft_.scene.falcon) return;
-    auto& firmware = draft_.scene.falcon->firmware;
-    if (firmware) firmware = directory / *firmware;
-    expect_a_limiter();
+    auto* falcon = std::get_if<falcon::Config>(&draft_.scene.device);
+    if (falcon != nullptr && falcon->firmware) falcon->firmware = directory / *falcon->firmware;
   }
 
   void expect_a_limiter() const {
@@ -118,22 +120,21 @@ class SceneResolver {
   }
 
   void resolve_woodenhaptics() {
-    if (!draft_.scene.woodenhaptics) return;
-    const WoodenHapticsDevice::Config& drive = draft_.scene.woodenhaptics->drive;
+    const auto* device = std::get_if<woodenhaptics::Config>(&draft_.scene.device);
+    if (device == nullptr) return;
+    const WoodenHapticsDevice::Config& drive = device->drive;
     const Unit& unit = unit_of("max_current_ma");
     if (drive.max_current > drive.model->full_scale) {
       blame("device.max_current_ma", {},
             "expected at most " + with_symbol(Number::shown(unit, drive.model->full_scale), unit) +
                 ", the full scale of its amplifiers, found " + Number::shown(unit, drive.max_current));
     }
-    draft_.scene.device.max_force = drive.model->max_force;
-    draft_.scene.device.encoder_step = WoodenHapticsDevice::info_of(*drive.model).position_resolution;
-    expect_a_limiter();
   }
 
   void resolve_replay(const std::filesystem::path& directory) {
-    if (!draft_.scene.replay) return;
-    ReplayDevice::Config& replay = *draft_.scene.replay;
+    auto* device = std::get_if<ReplayDevice::Config>(&draft_.scene.device);
+    if (device == nullptr) return;
+    ReplayDevice::Config& replay = *device;
     auto& csv = draft_.recorded_motion;
     if (draft_.replayed.has_value() == csv.has_value()) {
       blame("device", {}, std::string("expected either recording or a table csv, found ") + (csv ? "both" : "neither"));
@@ -163,7 +164,7 @@ class SceneResolver {
   }
 
   void resolve_structural_mode() const {
-    const SimulatedDevice::Config& device = draft_.scene.device;
+    const SimulatedDevice::Config& device = draft_.simulated;
     if (!device.structural_mode || device.structural_mode->handle_mass < device.mass) return;
     blame("device.effects.structural_mode.handle_mass_kg", {},
           "expected less than mass_kg, of which it is a part and which is " + digits(device.mass) + " kg, found " +
@@ -172,7 +173,7 @@ class SceneResolver {
 
   /// Friction is in the joints or at the handle. What is known of a device is that at the handle.
   void resolve_joint_friction() {
-    SimulatedDevice::Config& device = draft_.scene.device;
+    SimulatedDevice::Config& device = draft_.simulated;
     if (!device.joint_friction) return;
     const std::string table = "device.effects.joint_friction";
     const std::string_view handles = "device.effects.coulomb_friction_n";
@@ -207,23 +208,22 @@ class SceneResolver {
   void resolve_safety() {
     Scene& scene = draft_.scene;
     // What moves a real hand is never without: then each part is there when it is listed, and arming always.
-    if (scene.moves_a_hand() && !scene.safety) scene.safety.emplace();
+    if (scene.driver().moves_a_hand && !scene.safety) scene.safety.emplace();
     if (!scene.safety) return;
     if (scene.safety->dead_man) {
       const std::uint32_t button = scene.safety->dead_man->button;
-      if (scene.falcon && button >= kFalconButtons) {
-        blame("safety.dead_man.button", {}, "expected one of a Falcon's, 0 to 3, found " + std::to_string(button));
+      const Driver& driver = scene.driver();
+      if (driver.moves_a_hand && button >= driver.buttons) {
+        blame("safety.dead_man.button", {},
+              "expected " + std::string(driver.buttons_in_words) + ", found " + std::to_string(button));
       }
-      if (scene.woodenhaptics && button != 0) {
-        blame("safety.dead_man.button", {}, "expected 0, the switch at its tip, found " + std::to_string(button));
-      }
-      if (!scene.moves_a_hand() && !(scene.device.button_after && button == 0)) {
+      if (!driver.moves_a_hand && !(draft_.simulated.button_after && button == 0)) {
         blame("safety.dead_man.button", {},
               "expected button 0 of a hand with button_after_ms: a simulated device has no others");
       }
     }
-    build("safety", [&scene] {
-      SimulatedDevice device{scene.device};
+    build("safety", [&scene, this] {
+      SimulatedDevice device{draft_.simulated};
       SafeDevice{*scene.safety, device};
     });
   }
@@ -240,7 +240,7 @@ class SceneResolver {
   }
 
   void resolve_control() {
-    const SimulatedDevice::Config& device = draft_.scene.device;
+    const SimulatedDevice::Config& device = draft_.simulated;
     HapticLoop::Config& loop = draft_.scene.loop;
     HapticController::Config& control = loop.control;
 
@@ -260,7 +260,7 @@ class SceneResolver {
             "expected a device with force_sensor among its effects: the tool is driven by the hand's force");
     }
 
-    const std::optional<double> most = draft_.scene.exerts_force() ? device.max_force : kUnfelt;
+    const std::optional<double> most = draft_.scene.driver().exerts_force ? device.max_force : kUnfelt;
     if (!draft_.max_force && !most) {
       blame("force.max_force_n", {}, "missing, expected a number above 0 N, because the device has no max_force_n");
     }
@@ -288,7 +288,7 @@ class SceneResolver {
     if (draft_.place_coulomb.size() != count || draft_.place_viscous.size() != count) {
       blame(table + ".places_mm", {}, "expected as many places as friction bounds of each kind");
     }
-    const SimulatedDevice::Config& device = draft_.scene.device;
+    const SimulatedDevice::Config& device = draft_.simulated;
     const auto check = [&](const char* key, const std::vector<double>& bounds, double Friction::*kind) {
       for (std::size_t i = 0; i < count; ++i) {
         const double most = least_friction_at(device, draft_.places[i]).*kind;
@@ -299,7 +299,8 @@ class SceneResolver {
                   digits(bounds[i]));
       }
     };
-    if (!draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {  // whose true friction nobody knows here
+    if (!draft_.scene.driver().moves_a_hand &&
+        draft_.scene.driver().exerts_force) {  // whose true friction nobody knows here
       check("coulomb_friction_n", draft_.place_coulomb, &Friction::coulomb);
       check("viscous_friction_n_s_per_m", draft_.place_viscous, &Friction::viscous);
     }
@@ -313,7 +314,7 @@ class SceneResolver {
 
   void resolve_parts(LimiterConfig& limiter) const {
     if (limiter.parts.robust_ledger) {
-      const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.scene.device.encoder_step;
+      const std::optional<double> step = draft_.ledger_step ? draft_.ledger_step : draft_.simulated.encoder_step;
       if (!step) {
         blame("limiter.robust_ledger.encoder_step_um", {},
               "missing, expected " + kZeroOrMore.expected(unit_of("_um")) +
@@ -340,15 +341,15 @@ class SceneResolver {
     const std::string full = "limiter." + key;
     const Unit& unit = unit_of(key);
     if (!given && profiles == nullptr) {
-      if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.exerts_force()) return 0;
+      if (draft_.scene.loop.control.limiter.law == Law::kNone || !draft_.scene.driver().exerts_force) return 0;
       blame(full, {},
             "missing, expected " + kZeroOrMore.expected(unit) +
-                (draft_.scene.moves_a_hand() ? ": what tendon-identify finds of this very device, or 0"
-                                             : ", because there is no profile"));
+                (draft_.scene.driver().moves_a_hand ? ": what tendon-identify finds of this very device, or 0"
+                                                    : ", because there is no profile"));
     }
     const double bound = given ? *given : profiles->value * axis_share;
     const double most = truth * axis_share;
-    if (bound > most && !draft_.scene.moves_a_hand() && draft_.scene.exerts_force()) {
+    if (bound > most && !draft_.scene.driver().moves_a_hand && draft_.scene.driver().exerts_force) {
       blame(full, {full, "device.effects." + key},
             "expected at most " + with_symbol(digits(most), unit) + ", the true friction of the simulated device" +
                 (axis_share < 1 ? " (an axis by itself has 1/√3 of it)" : "") +

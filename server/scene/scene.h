@@ -9,9 +9,12 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "core/base/time.h"
+#include "devices/driver.h"
+#include "devices/falcon/falcon_device.h"
 #include "devices/replay/replay_device.h"
 #include "devices/safety/safe_device.h"
 #include "devices/simulated/simulated_device.h"
@@ -41,32 +44,12 @@ struct Scene {
     Duration lease{};  ///< 0: its holder stays until it leaves
   };
 
-  /// A Novint Falcon.
-  struct Falcon {
-    std::string port{};                               ///< as `tendond devices` names it; empty: the first free one
-    std::optional<std::filesystem::path> firmware{};  ///< empty: one that has its firmware already
-    bool accept_unknown_firmware = false;
-  };
-
-  struct SpaceMouse {
-    std::string port{};  ///< like a Falcon's
-    SpaceMouseDevice::Config motion{};
-  };
-
-  /// A WoodenHaptics, or a relative.
-  struct WoodenHaptics {
-    std::string port{};  ///< like a Falcon's
-    WoodenHapticsDevice::Config drive{};
-  };
+  /// Every kind of device. A new one needs the overloads of devices/driver.h, and its keys in device_keys.cc.
+  using AnyDevice = std::variant<SimulatedDevice::Config, falcon::Config, ReplayDevice::Config, spacemouse::Config,
+                                 woodenhaptics::Config>;
 
   std::string name;  ///< of the device, as clients claim it
-  // At most one of these; without one the device is simulated.
-  std::optional<Falcon> falcon;
-  std::optional<ReplayDevice::Config> replay;
-  std::optional<SpaceMouse> spacemouse;
-  std::optional<WoodenHaptics> woodenhaptics;
-  SimulatedDevice::Config
-      device;  ///< of a real device: what is known of it, and what stands in where costs are measured
+  AnyDevice device;
   std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
   HapticLoop::Config loop;
   std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere
@@ -76,11 +59,14 @@ struct Scene {
   std::optional<std::filesystem::path> recording;  ///< relative to the current directory; empty: nothing is recorded
   std::string text;                                ///< the file, whole, for the recording
 
-  /// Else it is an input only: whatever engines send, nobody feels it.
-  bool exerts_force() const noexcept { return !replay && !spacemouse; }
-  /// It is a real device with motors.
-  bool moves_a_hand() const noexcept { return falcon || woodenhaptics; }
+  /// The row of its device.
+  const Driver& driver() const;
+  /// The simulated device itself; of another one, what simulates it where the cost of a step is measured.
+  SimulatedDevice::Config simulated() const;
 };
+
+/// The rows of all kinds of devices, in the order of Scene::AnyDevice.
+const std::vector<const Driver*>& drivers();
 
 /// What is wrong with a scene, for the operator to act on:
 /// "FILE:LINE: KEY: expected …, found …". The line is left out where nothing in the file is to blame

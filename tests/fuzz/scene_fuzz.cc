@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const Scene scene = parse_scene(text, "scene", "/nowhere");
     static Mailboxes mail({.steps = 2, .flight = 2, .datagrams = 2});
-    SimulatedDevice device(scene.device);
+    SimulatedDevice device(scene.simulated());
     const HapticLoop loop(scene.loop, device, mail);
     fuzz::require(loop.stats().steps == 0 && scene.text == text);
   } catch (const SceneError& refused) {

@@ -3,13 +3,19 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <sstream>
 #include <string>
 #include <vector>
+
+#include "devices/driver.h"
+#include "server/scene/scene.h"
 
 namespace tendon {
 namespace {
@@ -90,12 +96,44 @@ TEST(DevicesReport, IsOneJsonObjectForEachDevice) {
   EXPECT_EQ(json["missing"][1]["what"], "a\\b\"\n: no");
 }
 
-// The rule that `tendond devices` speaks of is there, and is about this device.
-TEST(DevicesReport, TheUdevRuleNamesTheDevice) {
-  std::ifstream file(std::filesystem::path(TENDON_SCENES).parent_path() / "udev" / "60-tendon.rules");
-  const std::string rules(std::istreambuf_iterator<char>(file), {});
-  EXPECT_NE(rules.find("ATTR{idVendor}==\"0403\", ATTR{idProduct}==\"cb48\", MODE=\"0660\""), std::string::npos);
-  EXPECT_NE(rules.find("ATTR{idVendor}==\"1234\", ATTR{idProduct}==\"0006\", MODE=\"0660\""), std::string::npos);
+std::string hex4(std::uint16_t number) {
+  std::ostringstream text;
+  text << std::hex << std::setfill('0') << std::setw(4) << number;
+  return text.str();
+}
+
+// The rule that `tendond devices` speaks of is there, and is about each device that has a driver.
+TEST(DevicesReport, TheUdevRulesNameEveryIdOfEveryDriver) {
+  std::size_t ids = 0;
+  for (const Driver* driver : drivers()) {
+    for (const usb::Id& id : driver->ids) {
+      ++ids;
+      std::ifstream file(std::filesystem::path(TENDON_SCENES).parent_path() / "udev" / "60-tendon.rules");
+      const std::string start = "ATTR{idVendor}==\"" + hex4(id.vendor) + "\", ATTR{idProduct}==\"";
+      bool opens = false;
+      bool stays_awake = false;
+      for (std::string line; std::getline(file, line);) {
+        const std::size_t at = line.find(start);
+        if (at == std::string::npos) continue;
+        const std::size_t from = at + start.size();
+        const std::string products = '|' + line.substr(from, line.find('"', from) - from) + '|';
+        if (products.find('|' + hex4(id.product) + '|') == std::string::npos) continue;
+        opens = opens || line.find("MODE=\"0660\", GROUP=\"plugdev\", TAG+=\"uaccess\"") != std::string::npos;
+        stays_awake = stays_awake || line.find("ATTR{power/control}=\"on\"") != std::string::npos;
+      }
+      EXPECT_TRUE(opens) << driver->kind << ' ' << hex4(id.vendor) << ':' << hex4(id.product);
+      EXPECT_EQ(stays_awake, driver->moves_a_hand) << "the kernel must not put motors to sleep: " << driver->kind;
+    }
+  }
+  EXPECT_GT(ids, 20U);
+}
+
+TEST(DevicesReport, EveryDriverWithMotorsHasALastWordAndAWayHome) {
+  for (const Driver* driver : drivers()) {
+    EXPECT_EQ(driver->zero_packet.empty(), !driver->moves_a_hand) << driver->kind;
+    EXPECT_EQ(driver->homing.empty(), !driver->moves_a_hand) << driver->kind;
+    EXPECT_EQ(driver->buttons_in_words.empty(), driver->buttons == 0) << driver->kind;
+  }
 }
 
 }  // namespace

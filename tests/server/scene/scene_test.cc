@@ -72,7 +72,7 @@ std::string error_of_minimal_and(const std::string& more) { return error_of(std:
 
 void write(const std::filesystem::path& file, std::string_view text) { std::ofstream(file) << text; }
 
-ScriptedMotion::Point target(const Scene& scene, double t) { return scene.device.hand->motion.at(t); }
+ScriptedMotion::Point target(const Scene& scene, double t) { return scene.simulated().hand->motion.at(t); }
 
 // --- Good scenes --------------------------------------------------------------------------------------
 
@@ -80,16 +80,16 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   const Scene scene = parse(std::string(kMinimal));
   const DeviceProfile& falcon = *find_device_profile("falcon");
 
-  EXPECT_EQ(scene.device.name, "falcon");
-  EXPECT_EQ(scene.device.mass, falcon.mass.value);
-  EXPECT_EQ(scene.device.viscous_friction, falcon.viscous_friction.value);
-  EXPECT_EQ(scene.device.coulomb_friction, falcon.coulomb_friction.value);
-  EXPECT_EQ(scene.device.encoder_step, falcon.encoder_step.value);
-  EXPECT_EQ(scene.device.max_force, falcon.max_force.value);
-  EXPECT_EQ(scene.device.amplifier_bandwidth, falcon.amplifier_bandwidth.value);
-  EXPECT_FALSE(scene.device.watchdog);
-  EXPECT_FALSE(scene.device.start_position);
-  EXPECT_FALSE(scene.device.hand);
+  EXPECT_EQ(scene.simulated().name, "falcon");
+  EXPECT_EQ(scene.simulated().mass, falcon.mass.value);
+  EXPECT_EQ(scene.simulated().viscous_friction, falcon.viscous_friction.value);
+  EXPECT_EQ(scene.simulated().coulomb_friction, falcon.coulomb_friction.value);
+  EXPECT_EQ(scene.simulated().encoder_step, falcon.encoder_step.value);
+  EXPECT_EQ(scene.simulated().max_force, falcon.max_force.value);
+  EXPECT_EQ(scene.simulated().amplifier_bandwidth, falcon.amplifier_bandwidth.value);
+  EXPECT_FALSE(scene.simulated().watchdog);
+  EXPECT_FALSE(scene.simulated().start_position);
+  EXPECT_FALSE(scene.simulated().hand);
 
   const HapticController::Config& control = scene.loop.control;
   EXPECT_EQ(scene.loop.period, HapticLoop::Config{}.period);
@@ -164,18 +164,18 @@ adapt_state_rate = true
 [recording]
 path = "run.mcap"
 )");
-  EXPECT_EQ(scene.device.start_position, Vec3(0.001, -0.0025, 0.003));
-  EXPECT_EQ(scene.device.mass, 0.1);
-  EXPECT_EQ(scene.device.viscous_friction, 0.2);
-  EXPECT_EQ(scene.device.coulomb_friction, 0.3);
-  EXPECT_EQ(scene.device.encoder_step, 43e-6);
-  EXPECT_EQ(scene.device.max_force, 9);
-  EXPECT_EQ(scene.device.amplifier_bandwidth, 250);
-  EXPECT_EQ(scene.device.watchdog, 5500us);
-  ASSERT_TRUE(scene.device.hand);
-  EXPECT_EQ(scene.device.hand->stiffness, 300);
-  EXPECT_EQ(scene.device.hand->damping, 3);
-  EXPECT_EQ(scene.device.hand->mass, 0.05);
+  EXPECT_EQ(scene.simulated().start_position, Vec3(0.001, -0.0025, 0.003));
+  EXPECT_EQ(scene.simulated().mass, 0.1);
+  EXPECT_EQ(scene.simulated().viscous_friction, 0.2);
+  EXPECT_EQ(scene.simulated().coulomb_friction, 0.3);
+  EXPECT_EQ(scene.simulated().encoder_step, 43e-6);
+  EXPECT_EQ(scene.simulated().max_force, 9);
+  EXPECT_EQ(scene.simulated().amplifier_bandwidth, 250);
+  EXPECT_EQ(scene.simulated().watchdog, 5500us);
+  ASSERT_TRUE(scene.simulated().hand);
+  EXPECT_EQ(scene.simulated().hand->stiffness, 300);
+  EXPECT_EQ(scene.simulated().hand->damping, 3);
+  EXPECT_EQ(scene.simulated().hand->mass, 0.05);
   EXPECT_EQ(target(scene, 0).position, Vec3(0, 0.01, 0));
   EXPECT_EQ(target(scene, 0.5).position, Vec3(0, 0.01, 0.015));  // a quarter of the cycle
 
@@ -248,9 +248,9 @@ TEST(Scene, ConvertsUnitsWithoutAnErrorInTheLastDigit) {
       "[device.effects]\nencoder_step_um = 43\nwatchdog_ms = 4.35\n"
       "[loop]\nperiod_us = 100.001\nlongest_hold_us = 1000.001\n"
       "[force]\nhold_ms = 0.1\ndecay_ms = 0.29\n");
-  EXPECT_EQ(scene.device.start_position, Vec3(0.0001, 0.015, 0.0007));
-  EXPECT_EQ(scene.device.encoder_step, 0.000043);
-  EXPECT_EQ(scene.device.watchdog, 4'350'000ns);
+  EXPECT_EQ(scene.simulated().start_position, Vec3(0.0001, 0.015, 0.0007));
+  EXPECT_EQ(scene.simulated().encoder_step, 0.000043);
+  EXPECT_EQ(scene.simulated().watchdog, 4'350'000ns);
   EXPECT_EQ(scene.loop.period, 100'001ns);
   EXPECT_EQ(scene.loop.control.limiter.longest_hold, 1'000'001ns);
   EXPECT_EQ(scene.loop.control.hold.hold, 100'000ns);
@@ -348,7 +348,7 @@ coulomb_n_m = [0.1, 0.2, 0.3]
 viscous_n_m_s = [0.001, 0.002, 0.003]
 centre_mm = [0, 10, 0]
 )")
-                                             .device;
+                                             .simulated();
   EXPECT_EQ(device.sample_delay, 1500us);
   EXPECT_EQ(device.force_delay, 250us);
   EXPECT_EQ(device.structural_mode->handle_mass, 0.05);
@@ -362,18 +362,18 @@ centre_mm = [0, 10, 0]
   EXPECT_EQ(device.joint_friction->viscous, Vec3(0.001, 0.002, 0.003));
   EXPECT_EQ(device.joint_friction->centre, Vec3(0, 0.01, 0));
   EXPECT_FALSE(device.coulomb_friction);
-  EXPECT_FALSE(minimal_and("").device.structural_mode);
-  EXPECT_FALSE(minimal_and("").device.joint_friction);
-  EXPECT_FALSE(minimal_and("").device.sample_delay);
+  EXPECT_FALSE(minimal_and("").simulated().structural_mode);
+  EXPECT_FALSE(minimal_and("").simulated().joint_friction);
+  EXPECT_FALSE(minimal_and("").simulated().sample_delay);
 }
 
 TEST(Scene, AProfilesFrictionGoesIntoTheJointsWithoutBecomingLessThanTheLimiterCountsOn) {
   const DeviceProfile& falcon = *find_device_profile("falcon");
   const Scene scene = minimal_and("[device.effects.joint_friction]\nkind = \"falcon\"\n");
-  EXPECT_FALSE(scene.device.coulomb_friction) << "it is in the joints";
-  EXPECT_GE(least_friction(scene.device).coulomb, falcon.coulomb_friction.value);
-  EXPECT_NEAR(least_friction(scene.device).coulomb, falcon.coulomb_friction.value, 1e-12);
-  EXPECT_EQ(least_friction(scene.device).viscous, falcon.viscous_friction.value);
+  EXPECT_FALSE(scene.simulated().coulomb_friction) << "it is in the joints";
+  EXPECT_GE(least_friction(scene.simulated()).coulomb, falcon.coulomb_friction.value);
+  EXPECT_NEAR(least_friction(scene.simulated()).coulomb, falcon.coulomb_friction.value, 1e-12);
+  EXPECT_EQ(least_friction(scene.simulated()).viscous, falcon.viscous_friction.value);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, falcon.coulomb_bound.value);
   // What an operator has identified may be as much as there is, and no more.
   const std::string joints = "[device.effects.joint_friction]\nkind = \"falcon\"\n";
@@ -406,34 +406,34 @@ TEST(Scene, AHandMayBeThatOfAnOperatorsProfile) {
   for (const OperatorProfile& profile : operator_profiles()) {
     const std::string hand = "[device.hand]\nprofile = \"" + std::string(profile.name) + "\"\n";
     const Scene scene = minimal_and(hand + motion);
-    ASSERT_TRUE(scene.device.hand);
-    EXPECT_EQ(scene.device.hand->stiffness, profile.stiffness.middle());
-    EXPECT_EQ(scene.device.hand->damping, profile.damping.middle());
-    EXPECT_EQ(scene.device.hand->mass, profile.mass.middle());
+    ASSERT_TRUE(scene.simulated().hand);
+    EXPECT_EQ(scene.simulated().hand->stiffness, profile.stiffness.middle());
+    EXPECT_EQ(scene.simulated().hand->damping, profile.damping.middle());
+    EXPECT_EQ(scene.simulated().hand->mass, profile.mass.middle());
     EXPECT_NEAR(target(scene, 0.25).position.norm(), 0.005, 1e-12);
     const Scene firmer = minimal_and(hand + "stiffness_n_per_m = 900\n" + motion);
-    EXPECT_EQ(firmer.device.hand->stiffness, 900);
-    EXPECT_EQ(firmer.device.hand->mass, profile.mass.middle());
+    EXPECT_EQ(firmer.simulated().hand->stiffness, 900);
+    EXPECT_EQ(firmer.simulated().hand->mass, profile.mass.middle());
   }
 }
 
 TEST(Scene, AnEffectThatIsFalseDoesNotExist) {
   const Scene scene = minimal_and("[device.effects]\nencoder_step_um = false\namplifier_bandwidth_hz = false\n");
-  EXPECT_FALSE(scene.device.encoder_step);
-  EXPECT_FALSE(scene.device.amplifier_bandwidth);
-  EXPECT_TRUE(scene.device.coulomb_friction) << "the other effects of the profile stay";
+  EXPECT_FALSE(scene.simulated().encoder_step);
+  EXPECT_FALSE(scene.simulated().amplifier_bandwidth);
+  EXPECT_TRUE(scene.simulated().coulomb_friction) << "the other effects of the profile stay";
 }
 
 TEST(Scene, WithoutAProfileOnlyTheListedEffectsExist) {
   const Scene scene = parse(std::string(kWithoutProfile) + "[limiter]\nkind = \"none\"\n[force]\nmax_force_n = 5\n");
-  EXPECT_EQ(scene.device.name, "simulated");
-  EXPECT_EQ(scene.device.mass, 0.2);
-  EXPECT_FALSE(scene.device.viscous_friction);
-  EXPECT_FALSE(scene.device.coulomb_friction);
-  EXPECT_FALSE(scene.device.encoder_step);
-  EXPECT_FALSE(scene.device.max_force);
-  EXPECT_FALSE(scene.device.amplifier_bandwidth);
-  EXPECT_FALSE(scene.device.watchdog);
+  EXPECT_EQ(scene.simulated().name, "simulated");
+  EXPECT_EQ(scene.simulated().mass, 0.2);
+  EXPECT_FALSE(scene.simulated().viscous_friction);
+  EXPECT_FALSE(scene.simulated().coulomb_friction);
+  EXPECT_FALSE(scene.simulated().encoder_step);
+  EXPECT_FALSE(scene.simulated().max_force);
+  EXPECT_FALSE(scene.simulated().amplifier_bandwidth);
+  EXPECT_FALSE(scene.simulated().watchdog);
   EXPECT_EQ(scene.loop.control.limiter.law, Law::kNone);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0);
   EXPECT_EQ(scene.loop.control.limiter.friction.viscous, 0);
@@ -449,23 +449,25 @@ constexpr std::string_view kFalcon =
 
 TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
   const Scene scene = parse(std::string(kFalcon), "/scenes");
-  ASSERT_TRUE(scene.falcon);
-  EXPECT_EQ(scene.falcon->port, "");
-  EXPECT_FALSE(scene.falcon->firmware || scene.falcon->accept_unknown_firmware);
+  ASSERT_TRUE(std::holds_alternative<falcon::Config>(scene.device));
+  EXPECT_EQ(std::get<falcon::Config>(scene.device).port, "");
+  EXPECT_FALSE(std::get<falcon::Config>(scene.device).firmware ||
+               std::get<falcon::Config>(scene.device).accept_unknown_firmware);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0.9) << "nobody here knows that it has less";
   EXPECT_EQ(scene.loop.control.max_force, 8);
   EXPECT_EQ(scene.loop.control.watchdog, 0ns);
-  EXPECT_FALSE(parse(std::string(kMinimal)).falcon);
+  EXPECT_FALSE(std::holds_alternative<falcon::Config>(parse(std::string(kMinimal)).device));
 
   const std::string keys =
       "port = \"1-2.3\"\nfirmware = \"mine.bin\"\naccept_unknown_firmware = true\nname = \"left\"\n";
   const Scene told =
       parse("[device]\nkind = \"falcon\"\n" + keys + std::string(kFalcon.substr(kFalcon.find("[l"))), "/scenes");
-  EXPECT_EQ(told.falcon->port, "1-2.3");
-  EXPECT_EQ(told.falcon->firmware, "/scenes/mine.bin");
-  EXPECT_TRUE(told.falcon->accept_unknown_firmware);
+  EXPECT_EQ(std::get<falcon::Config>(told.device).port, "1-2.3");
+  EXPECT_EQ(std::get<falcon::Config>(told.device).firmware, "/scenes/mine.bin");
+  EXPECT_TRUE(std::get<falcon::Config>(told.device).accept_unknown_firmware);
   EXPECT_EQ(told.name, "left");
-  EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "falcon.toml").falcon);
+  EXPECT_TRUE(
+      std::holds_alternative<falcon::Config>(read_scene(std::filesystem::path(TENDON_SCENES) / "falcon.toml").device));
 }
 
 TEST(Scene, AFalconHasNoKeysOfTheSimulatedDeviceAndIsNotWithoutALimiter) {
@@ -502,15 +504,17 @@ TEST(Scene, AReplayedCsvFileNeedsNothingElseBecauseNobodyFeelsAForce) {
                                 "at_end = \"repeat\"\nencoder_step_um = 30\n[device.csv]\nfile = \"hand.csv\"\n"
                                 "position_column = \"angle\"\nscale_m = 0.5\ndirection = [0, 3, 0]\n",
                             folder.path());
-  ASSERT_TRUE(scene.replay);
-  EXPECT_FALSE(scene.exerts_force());
-  ASSERT_EQ(scene.replay->samples.size(), 3U);
-  EXPECT_EQ(scene.replay->samples[2].position, Vec3(0, 2, 0));
-  EXPECT_EQ(scene.replay->samples[2].at - scene.replay->samples[0].at, 15ms);
-  EXPECT_EQ(scene.replay->at_end, ReplayDevice::AtEnd::kRepeat);
-  EXPECT_EQ(scene.replay->position_resolution, 3e-5);
+  ASSERT_TRUE(std::holds_alternative<ReplayDevice::Config>(scene.device));
+  EXPECT_FALSE(scene.driver().exerts_force);
+  ASSERT_EQ(std::get<ReplayDevice::Config>(scene.device).samples.size(), 3U);
+  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[2].position, Vec3(0, 2, 0));
+  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[2].at -
+                std::get<ReplayDevice::Config>(scene.device).samples[0].at,
+            15ms);
+  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).at_end, ReplayDevice::AtEnd::kRepeat);
+  EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).position_resolution, 3e-5);
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0);
-  EXPECT_TRUE(parse(std::string(kMinimal)).exerts_force());
+  EXPECT_TRUE(parse(std::string(kMinimal)).driver().exerts_force);
 }
 
 TEST(Scene, AReplayedRecordingIsTheHandThatWasSeenBitForBit) {
@@ -530,10 +534,10 @@ TEST(Scene, AReplayedRecordingIsTheHandThatWasSeenBitForBit) {
   }
   const Scene scene = parse(std::string(kReplay) + "recording = \"run.mcap\"\n", folder.path());
   std::erase_if(steps, [](const StepRecord& step) { return step.reasons.has(Reason::kUnseen); });
-  ASSERT_EQ(scene.replay->samples.size(), steps.size());
+  ASSERT_EQ(std::get<ReplayDevice::Config>(scene.device).samples.size(), steps.size());
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    EXPECT_EQ(scene.replay->samples[i].position, steps[i].hand.position);
-    EXPECT_EQ(scene.replay->samples[i].at, steps[i].hand.at.time_since_epoch());
+    EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[i].position, steps[i].hand.position);
+    EXPECT_EQ(std::get<ReplayDevice::Config>(scene.device).samples[i].at, steps[i].hand.at.time_since_epoch());
   }
 }
 
@@ -567,7 +571,7 @@ TEST(Scene, AReplayRunsTheLoopAsTheHandDidAndAFieldOfForceChangesNothing) {
   write(folder.path() / "hand.csv", "t_s,x\n0,0\n0.002,0.001\n0.004,0.002\n0.006,0.003\n");
   const Scene scene =
       parse(std::string(kReplay) + "[device.csv]\nfile = \"hand.csv\"\nposition_column = \"x\"\n", folder.path());
-  ReplayDevice device(*scene.replay);
+  ReplayDevice device(std::get<ReplayDevice::Config>(scene.device));
   Mailboxes mail({.steps = 64, .flight = 2, .datagrams = 1});
   HapticLoop loop(scene.loop, device, mail);
   LocalTime now{1s};
@@ -584,7 +588,8 @@ TEST(Scene, AReplayRunsTheLoopAsTheHandDidAndAFieldOfForceChangesNothing) {
     EXPECT_EQ(step->applied, Vec3::Zero());
     asked = std::max(asked, step->wanted.norm());
     if (i % 2 == 0 && i <= 6) {
-      EXPECT_EQ(step->hand.position, scene.replay->samples[static_cast<std::size_t>(i / 2)].position);
+      EXPECT_EQ(step->hand.position,
+                std::get<ReplayDevice::Config>(scene.device).samples[static_cast<std::size_t>(i / 2)].position);
     }
     mail.steps.pop();
   }
@@ -595,16 +600,17 @@ TEST(Scene, AReplayRunsTheLoopAsTheHandDidAndAFieldOfForceChangesNothing) {
 TEST(Scene, ASpaceMouseNeedsNothingElseEither) {
   const std::string mouse = "[device]\nkind = \"spacemouse\"\n";
   const Scene plain = parse(mouse);
-  ASSERT_TRUE(plain.spacemouse);
-  EXPECT_FALSE(plain.exerts_force());
+  ASSERT_TRUE(std::holds_alternative<spacemouse::Config>(plain.device));
+  EXPECT_FALSE(plain.driver().exerts_force);
   const Scene told = parse(mouse + "port = \"1-2.3\"\nspeed_m_per_s = 0.3\ndead_band = 0.2\nreach_mm = 70\n");
-  EXPECT_EQ(told.spacemouse->port, "1-2.3");
-  EXPECT_EQ(told.spacemouse->motion.speed, 0.3);
-  EXPECT_EQ(told.spacemouse->motion.dead_band, 0.2);
-  EXPECT_EQ(told.spacemouse->motion.reach, 0.07);
+  EXPECT_EQ(std::get<spacemouse::Config>(told.device).port, "1-2.3");
+  EXPECT_EQ(std::get<spacemouse::Config>(told.device).motion.speed, 0.3);
+  EXPECT_EQ(std::get<spacemouse::Config>(told.device).motion.dead_band, 0.2);
+  EXPECT_EQ(std::get<spacemouse::Config>(told.device).motion.reach, 0.07);
   EXPECT_EQ(error_of(mouse + "dead_band = 1\n"),
             "s.toml:3: device.dead_band: expected a number from 0 to 0.9, found 1");
-  EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "spacemouse.toml").spacemouse);
+  EXPECT_TRUE(std::holds_alternative<spacemouse::Config>(
+      read_scene(std::filesystem::path(TENDON_SCENES) / "spacemouse.toml").device));
 }
 
 constexpr std::string_view kArm =
@@ -618,25 +624,27 @@ constexpr std::string_view kArmsFriction =
 
 TEST(Scene, AWoodenHapticsIsARealDeviceOfAModelWhoseWatchdogIsCountedOn) {
   const Scene scene = parse(std::string(kArm) + std::string(kArmsFriction));
-  ASSERT_TRUE(scene.woodenhaptics);
-  EXPECT_TRUE(scene.moves_a_hand());
-  EXPECT_TRUE(scene.exerts_force());
-  EXPECT_EQ(scene.woodenhaptics->drive.model, woodenhaptics::find_model("polhem_v1"));
-  EXPECT_EQ(scene.woodenhaptics->drive.max_current, 2);
-  EXPECT_EQ(scene.woodenhaptics->port, "");
+  ASSERT_TRUE(std::holds_alternative<woodenhaptics::Config>(scene.device));
+  EXPECT_TRUE(scene.driver().moves_a_hand);
+  EXPECT_TRUE(scene.driver().exerts_force);
+  EXPECT_EQ(std::get<woodenhaptics::Config>(scene.device).drive.model, woodenhaptics::find_model("polhem_v1"));
+  EXPECT_EQ(std::get<woodenhaptics::Config>(scene.device).drive.max_current, 2);
+  EXPECT_EQ(std::get<woodenhaptics::Config>(scene.device).port, "");
   EXPECT_EQ(scene.loop.control.limiter.friction.coulomb, 0.9) << "nobody here knows that it has less";
   EXPECT_EQ(scene.loop.control.max_force, 5);
   EXPECT_EQ(scene.loop.control.watchdog, 500ms);
-  EXPECT_EQ(scene.device.encoder_step,
-            WoodenHapticsDevice::info_of(*scene.woodenhaptics->drive.model).position_resolution);
+  EXPECT_EQ(
+      scene.simulated().encoder_step,
+      WoodenHapticsDevice::info_of(*std::get<woodenhaptics::Config>(scene.device).drive.model).position_resolution);
   ASSERT_TRUE(scene.safety) << "it always has to be armed";
   EXPECT_EQ(scene.safety->arming.by, SafeDevice::Arming::By::kRequest);
 
   const Scene told = parse(std::string(kArm) + "port = \"1-2.3\"\nmax_current_ma = 700\n" + std::string(kArmsFriction));
-  EXPECT_EQ(told.woodenhaptics->port, "1-2.3");
-  EXPECT_EQ(told.woodenhaptics->drive.max_current, 0.7);
-  EXPECT_FALSE(parse(std::string(kFalcon)).woodenhaptics);
-  EXPECT_TRUE(read_scene(std::filesystem::path(TENDON_SCENES) / "woodenhaptics.toml").woodenhaptics);
+  EXPECT_EQ(std::get<woodenhaptics::Config>(told.device).port, "1-2.3");
+  EXPECT_EQ(std::get<woodenhaptics::Config>(told.device).drive.max_current, 0.7);
+  EXPECT_FALSE(std::holds_alternative<woodenhaptics::Config>(parse(std::string(kFalcon)).device));
+  EXPECT_TRUE(std::holds_alternative<woodenhaptics::Config>(
+      read_scene(std::filesystem::path(TENDON_SCENES) / "woodenhaptics.toml").device));
 }
 
 TEST(Scene, AWoodenHapticsSaysWhichModelsCanBeDrivenAndWhyTwoCannot) {
@@ -719,7 +727,7 @@ TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {
   const Scene scene = minimal_and("[device.effects]\nforce_sensor = 0.1\n" + tool);
   ASSERT_TRUE(scene.loop.control.admittance);
   EXPECT_EQ(scene.loop.control.admittance->mass, Vec3(3, 3, 3));
-  EXPECT_EQ(scene.device.force_sensor->resolution, 0.1);
+  EXPECT_EQ(scene.simulated().force_sensor->resolution, 0.1);
   EXPECT_EQ(error_of_minimal_and(tool),
             "s.toml:4: admittance: expected a device with force_sensor among its effects: the tool is driven by the "
             "hand's force");
@@ -1161,11 +1169,11 @@ TEST(SceneError, SurvivesTheDeepestNestingThatFits) {
 
 TEST(ShippedScenes, DemoIsAHandAtAWallWithTheLimiterOn) {
   const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "demo.toml");
-  EXPECT_EQ(scene.device.name, "falcon");
-  ASSERT_TRUE(scene.device.hand);
-  EXPECT_EQ(scene.device.hand->stiffness, 300);
-  EXPECT_EQ(scene.device.hand->damping, 3);
-  EXPECT_EQ(scene.device.hand->mass, 0.05);
+  EXPECT_EQ(scene.simulated().name, "falcon");
+  ASSERT_TRUE(scene.simulated().hand);
+  EXPECT_EQ(scene.simulated().hand->stiffness, 300);
+  EXPECT_EQ(scene.simulated().hand->damping, 3);
+  EXPECT_EQ(scene.simulated().hand->mass, 0.05);
   EXPECT_EQ(target(scene, 0.5).position, Vec3(0.015, 0, 0));
   EXPECT_EQ(scene.loop.control.limiter.law, Law::kAolPlus);
   EXPECT_EQ(scene.recording, "demo.mcap");
@@ -1173,7 +1181,7 @@ TEST(ShippedScenes, DemoIsAHandAtAWallWithTheLimiterOn) {
 
 TEST(ShippedScenes, AdmittanceIsAHeavyDeviceThatMovesAsATool) {
   const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "admittance.toml");
-  EXPECT_TRUE(scene.device.force_sensor);
+  EXPECT_TRUE(scene.simulated().force_sensor);
   EXPECT_TRUE(scene.loop.control.admittance);
 }
 
@@ -1247,14 +1255,14 @@ TEST(ShippedScenes, SafeListsEveryPartOfTheSafetyLayer) {
 
 TEST(ShippedScenes, MechanismHasWhatARealOneAdds) {
   const Scene scene = read_scene(std::filesystem::path(TENDON_SCENES) / "mechanism.toml");
-  EXPECT_TRUE(scene.device.joint_friction && scene.device.structural_mode);
-  EXPECT_EQ(scene.device.sample_delay, 1ms);
-  EXPECT_EQ(scene.device.force_delay, 500us);
-  EXPECT_EQ(scene.device.hand->mass, find_operator_profile("stylus")->mass.middle());
+  EXPECT_TRUE(scene.simulated().joint_friction && scene.simulated().structural_mode);
+  EXPECT_EQ(scene.simulated().sample_delay, 1ms);
+  EXPECT_EQ(scene.simulated().force_delay, 500us);
+  EXPECT_EQ(scene.simulated().hand->mass, find_operator_profile("stylus")->mass.middle());
 }
 
 TEST(ShippedScenes, MinimalIsAcceptedAsItIs) {
-  EXPECT_EQ(read_scene(std::filesystem::path(TENDON_SCENES) / "minimal.toml").device.name, "falcon");
+  EXPECT_EQ(read_scene(std::filesystem::path(TENDON_SCENES) / "minimal.toml").simulated().name, "falcon");
 }
 
 TEST(ShippedScenes, RecordedHandFollowsTheRecordingBesideIt) {
@@ -1262,6 +1270,18 @@ TEST(ShippedScenes, RecordedHandFollowsTheRecordingBesideIt) {
   std::filesystem::copy(std::filesystem::path(TENDON_SCENES) / "recorded-hand.toml", folder.path() / "scene.toml");
   write(folder.path() / "hand.csv", "t_s,master_pos_rad\n15,0\n16,0.5\n17,1\n");
   EXPECT_EQ(target(read_scene(folder.path() / "scene.toml"), 1).position, Vec3(0.0375, 0, 0));
+}
+
+TEST(SceneReference, TheKindsOfATableStandUnderItsOwnHeading) {
+  const std::string text = scene_reference();
+  const std::size_t device = text.find("[device]\n");
+  const std::size_t next = text.find("\n[", device);
+  for (const Driver* driver : drivers()) {
+    const std::size_t kind = text.find("  kind = \"" + std::string(driver->kind) + "\"\n", device);
+    EXPECT_LT(kind, next) << driver->kind;
+  }
+  EXPECT_NE(text.find("\n[device.hand]  of kind = \"simulated\"\n"), std::string::npos);
+  EXPECT_NE(text.find("\n[device.csv]  of kind = \"replay\"\n"), std::string::npos);
 }
 
 TEST(SceneReference, ListsEveryKeyWithUnitMeaningAndDefault) {

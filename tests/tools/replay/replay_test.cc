@@ -32,7 +32,7 @@ constexpr std::uint64_t kSteps = 2000;
 /// Two seconds of a remote wall over a bad network, as a server records them.
 std::vector<StepRecord> tapping() {
   const Scene scene = parse_scene(kScene, "scene", ".");
-  SimulatedDevice device(scene.device);
+  SimulatedDevice device(scene.simulated());
   simulation::World::Config config;
   config.loop = scene.loop;
   simulation::World world(config, device);

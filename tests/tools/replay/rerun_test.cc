@@ -28,7 +28,7 @@ Scene scene_with(const std::vector<std::string>& settings) {
 
 /// What a server recorded while a remote wall of 2000 N/m answered over a bad network.
 std::vector<StepRecord> recorded(const Scene& scene) {
-  SimulatedDevice device(scene.device);
+  SimulatedDevice device(scene.simulated());
   simulation::World::Config config;
   config.loop = scene.loop;
   config.latest_wake = std::chrono::microseconds(300);

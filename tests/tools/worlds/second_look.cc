@@ -38,7 +38,7 @@ Duration length_of(const injector::Trace& trace) {
 
 lab::Run run(const Scene& scene, const injector::Trace& trace, Law law, Duration length,
              const SecondLookOptions& options) {
-  SimulatedDevice device(scene.device);
+  SimulatedDevice device(scene.simulated());
   World::Config config;
   config.seed = trace.seed;
   config.loop = scene.loop;
