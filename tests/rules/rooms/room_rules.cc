@@ -70,6 +70,11 @@ const std::vector<Door>& front_doors() {
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},
       {"libusb", {"libusb.h", "libusb-1.0/"}, {"devices/usb/with_libusb.cc", "tests/devices/usb/far_usbfs.cc"}},
+      // What programs and their libraries print and pages read: no haptic thread writes JSON.
+      {"nlohmann's JSON",
+       {"nlohmann/"},
+       {"server/commands/", "server/main.cc", "clients/cpp/engine/self_test.cc", "clients/cpp/run.cc",
+        "clients/dashboard/page_json.cc", "clients/softbody/explain.cc", "*_main.cc"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
        {"google/protobuf/", "*.pb.h", "protocol/wire/fields.h", "protocol/wire/frame_codec.h"},
@@ -298,7 +303,7 @@ void check_first_lines(const File& file, std::vector<Finding>& findings) {
   const auto lines = lines_of(file.text);
   const std::size_t first = file.text.starts_with("#!") ? 1 : 0;
   const std::string_view mark =
-      one_of(file.path, {"*.h", "*.cc", "*.proto", "*.mjs", "*.js", "*.ts", "*.h.in"}) ? "//" : "#";
+      one_of(file.path, {"*.h", "*.cc", "*.proto", "*.mjs", "*.js", "*.ts", "*.h.in", "*.cc.in"}) ? "//" : "#";
   const std::string licence = join({mark, " SPDX-License-", "Identifier: Apache-2.0"});
   if (lines.size() <= first || lines[first] != licence) {
     findings.push_back({file.path, static_cast<int>(first) + 1, join({"a source file begins with ", licence})});

@@ -100,6 +100,7 @@ TEST(Rooms, EveryLibraryHasOneFrontDoor) {
                                                       {"tendon.pb.h", "protocol/wire/codec.cc"},
                                                       {"recording.pb.h", "server/recording/recording_codec.cc"},
                                                       {"libusb.h", "devices/usb/with_libusb.cc"},
+                                                      {"nlohmann/json.hpp", "clients/cpp/run.cc"},
                                                       {"sodium.h", "protocol/secrets/crypto.cc"},
                                                       {"sodium.h", "devices/falcon/firmware.cc"},
                                                       {"spdlog/spdlog.h", "server/machine/log.cc"},
