@@ -12,7 +12,7 @@
 
 namespace tendon {
 
-/// How a device is told that it is to give no force: the bytes, and the way they go.
+/// The packet that ends the force of a device, and the system call that sends it.
 class ZeroPacket {
  public:
   static constexpr std::size_t kMost = 64;  ///< bytes: one full-speed bulk transfer, one HID report
@@ -23,7 +23,8 @@ class ZeroPacket {
   /// Through anything that write(2) writes to: a serial line, hidraw, a socket.
   static ZeroPacket written(std::span<const std::byte> bytes);
 
-  /// Writes it to `fd`. Tries a few times, for some 50 ms, when the device is busy; false when it did not take it.
+  /// Writes the packet to `fd`. While the device is busy it tries again, for up to about 50 ms. False when the device
+  /// did not take it.
   bool send(int fd) const noexcept;
 
  private:
@@ -36,20 +37,20 @@ class ZeroPacket {
   bool usb_ = false;
 };
 
-/// A process of its own that ends the forces when this one dies, however it dies: also by SIGKILL, the kernel's
-/// out-of-memory killer or a crash, of which no handler is told. Worth having because motors hold their last command:
-/// the Novint Falcon documents no watchdog.
+/// A separate process that ends the forces when this process dies, however it dies: even by SIGKILL, by the kernel's
+/// out-of-memory killer or by a crash, which no handler sees. It is needed because motors hold their last command: the
+/// Novint Falcon documents no watchdog.
 ///
-/// It shares with this process the open files of the devices, and one end of a socket. Its parent is a thread that does
-/// nothing but wait for its end; when that thread dies, which takes no more than that the kernel runs it once more, the
-/// kernel tells the guardian (PR_SET_PDEATHSIG, prctl(2)), and it writes each device's zero packet; and again for each
-/// thread that inherits it and dies. When the last thread is dead and the memory given back, which under load takes
-/// tens of milliseconds, the other end of the socket closes: then it writes them once more, after anything that a dying
-/// thread may still have sent, and is gone. It does the same when this process ends well: one zero more hurts nobody,
-/// and what only happens in disasters is never tried.
+/// The guardian shares with this process the open files of the devices, and one end of a socket. Its parent is a thread
+/// that only waits. When that thread dies, the kernel signals the guardian (PR_SET_PDEATHSIG, prctl(2)), and the
+/// guardian writes the zero packet of each device. The kernel may deliver this once per dying parent thread; the
+/// packets are written each time. When the last thread is dead and the memory is freed, which takes tens of
+/// milliseconds under load, the other end of the socket closes. Then the guardian writes the packets once more, after
+/// anything that a dying thread may still have sent, and exits. It also does this on a clean exit: an extra zero is
+/// harmless, and a path that runs only in a disaster is a path that nobody has tested.
 ///
-/// It blocks all signals and has a session of its own, so that what is sent to the process group of the server does not
-/// reach it. What ends it too: SIGKILL to itself (as systemd does to a whole unit, after TimeoutStopSec), and power.
+/// The guardian blocks all signals and has its own session, so signals to the process group of the server do not reach
+/// it. It cannot survive SIGKILL to itself (systemd sends it to a whole unit after TimeoutStopSec), or a power cut.
 ///
 /// Measured with a real kernel's usbfs, in an emulated machine (deploy/test-usb-kernel, commit 916cd72, n = 20): the
 /// device had the zero packet 2.9 ms (p50), 5.5 ms (p90), at most 7.4 ms after the SIGKILL, where a bare packet and its
@@ -61,19 +62,19 @@ class Guardian {
  public:
   static constexpr std::size_t kDevices = 16;
 
-  /// Forks; the new process calls nothing that threads of the old one could stand in the way of. `on_start` is called
-  /// first, by the thread that is to be the parent: the priority it asks for is the guardian's too, and decides how
-  /// soon both run on a busy machine. Throws std::system_error when the system refuses.
+  /// Forks. After the fork the child calls only async-signal-safe functions. The parent thread calls `on_start` first:
+  /// the guardian inherits the priority that it asks for, which decides how soon both run on a busy machine. Throws
+  /// std::system_error when the system refuses.
   explicit Guardian(const std::function<void()>& on_start = {});
-  /// Waits until it has written and is gone.
+  /// Waits until the guardian has written the packets and exited.
   ~Guardian();
   Guardian(const Guardian&) = delete;
   Guardian& operator=(const Guardian&) = delete;
 
-  /// From now on `device` (below kDevices) is `fd`, and `zero` what ends its force; until the next call for it. The
-  /// guardian gets a descriptor of its own. False when it is dead.
+  /// From now on, until the next call for the same `device` (below kDevices): `fd` is the device, and `zero` ends its
+  /// force. The guardian gets its own descriptor. False when the guardian is dead.
   bool guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept;
-  /// `device` is gone: nothing is written to it any more.
+  /// `device` is gone: nothing more is written to it.
   bool forget(std::size_t device) noexcept;
 
   pid_t pid() const noexcept { return pid_; }

@@ -13,7 +13,7 @@ namespace {
 
 /// So long a handle must have been still before it is said to rest: longer than a tremor (8 to 12 Hz) turns round.
 constexpr Duration kRest = std::chrono::milliseconds(50);
-/// A reading that is late by so much is no end of rest: a device's answers come when they come.
+/// Missing samples for up to 10 ms do not reset the rest timer; USB replies jitter.
 constexpr Duration kBlind = std::chrono::milliseconds(10);
 /// After a pause the force may not have grown for as long as the pause lasted.
 constexpr Duration kLongestStep = std::chrono::milliseconds(10);

@@ -7,7 +7,7 @@
 
 namespace tendon::usb {
 
-/// A vendor request to the device, without data (bmRequestType 0x40): what sets up serial chips.
+/// A vendor request to the device, without data (bmRequestType 0x40); serial chips are set up by these.
 struct Request {
   std::uint8_t request = 0;
   std::uint16_t value = 0;
@@ -15,7 +15,7 @@ struct Request {
   friend bool operator==(const Request&, const Request&) = default;
 };
 
-/// What a device says it is: its maker's number and the maker's for it.
+/// The identity of a USB device: the number of its maker, and the maker's number for it.
 struct Id {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
@@ -26,35 +26,35 @@ struct Id {
 /// and one `write` takes.
 inline constexpr std::size_t kPacketSize = 64;
 
-/// One USB device with an endpoint each way, of which nothing ever waits: what a device driver of ours runs over.
-/// Behind it is libusb (`usb.h`), or a model in memory.
+/// One USB device with an endpoint each way. No call ever waits. The drivers run over it; behind it is libusb (`usb.h`)
+/// or a model in memory.
 ///
-/// A transfer that fails ends the connection, and whatever is plugged in next is another one. There is no other error
-/// to handle: unplugging, a stall, a device that babbles all look the same.
+/// A transfer that fails ends the connection; the next device that is plugged in is a new connection. A driver has no
+/// other error to handle: unplugging, a stall and a device that babbles all look the same.
 ///
 /// Thread-safe: no; one thread uses it. Realtime-safe: every function.
 class Pipe {
  public:
   virtual ~Pipe() = default;
 
-  /// 0 while there is no device; else a number that no two openings share. What was accepted for another connection
-  /// than the one this function told last is thrown away: a force never reaches a device it was not meant for.
+  /// 0 while there is no device; otherwise a number that is different for each opening. A packet accepted for any
+  /// connection but the one that this function returned last is dropped: a force never reaches the wrong device.
   virtual std::uint32_t connection() noexcept = 0;
 
-  /// Sends `request` after all that was accepted before. False, and nothing is sent, while there is no room or no
+  /// Sends `request` after everything accepted before it. False, and nothing is sent, when there is no room or no
   /// device.
   virtual bool request(const Request& request) noexcept = 0;
 
-  /// The same for at most `kPacketSize` bytes to the OUT endpoint; more are refused.
+  /// Sends at most `kPacketSize` bytes to the OUT endpoint, likewise; more are refused.
   virtual bool write(std::span<const std::uint8_t> bytes) noexcept = 0;
 
-  /// All that was accepted has reached the device.
+  /// Whether everything accepted has reached the device.
   virtual bool settled() const noexcept = 0;
 
-  /// The next packet of the IN endpoint, as it came: its size, 0 when there is none.
+  /// Copies the next packet of the IN endpoint, unchanged. Returns its size, 0 when there is none.
   virtual std::size_t read(std::span<std::uint8_t, kPacketSize> packet) noexcept = 0;
 
-  /// Ends this connection from our side: the device is closed, and opened anew when it is still there.
+  /// Ends this connection from our side: the device is closed, and opened again if it is still plugged in.
   virtual void reopen() noexcept = 0;
 };
 

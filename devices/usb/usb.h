@@ -9,7 +9,7 @@
 
 #include "devices/usb/pipe.h"
 
-/// Real USB devices, by libusb. A build without libusb has these functions too; they say what it lacks.
+/// Real USB devices, by libusb. A build without libusb has these functions too; they throw a sentence that says so.
 namespace tendon::usb {
 
 /// Something that is plugged in.
@@ -26,34 +26,35 @@ struct PluggedIn {
 std::vector<PluggedIn> plugged_in();
 
 struct PipeConfig {
-  std::vector<Id> ids{};   ///< of these one is opened
-  std::string port{};      ///< that of `PluggedIn`; empty: the first of these that nobody uses
+  std::vector<Id> ids{};   ///< a device with any of these ids is opened
+  std::string port{};      ///< as in `PluggedIn`; empty: the first matching device that nobody uses
   std::uint8_t in = 0x81;  ///< endpoints, of interface 0
   std::uint8_t out = 0x02;
   enum class Transfers : std::uint8_t { kBulk, kInterrupt };
   Transfers transfers = Transfers::kBulk;  ///< of both endpoints
 
-  /// What the pipe's own thread does first: ask for a real-time priority above that of the thread that uses the pipe.
+  /// The pipe's own thread calls this first: it asks for a real-time priority above that of the thread that uses the
+  /// pipe.
   std::function<void()> on_start{};
-  /// Hears, from that thread, a sentence each time when there is a new reason why no device is open.
+  /// Called from that thread with a sentence, each time there is a new reason why no device is open.
   std::function<void(const std::string&)> tell{};
-  /// Hears, from that thread, the descriptor of the node once its interface is claimed, and -1 before it is given back:
-  /// who guards the device is told so.
+  /// Called from that thread with the descriptor of the node once its interface is claimed, and with -1 before the
+  /// interface is released. The server forwards this to the guardian.
   std::function<void(int)> opened{};
-  /// Instead of looking at the plugs, whose ids then do not count: gives the descriptor of an open usbfs
-  /// node, which stays the caller's; below 0 while there is none. Called from that thread, five times a second.
+  /// If set, replaces enumeration (`ids` is ignored): returns an open usbfs descriptor owned by the caller, or -1 if
+  /// there is none yet. Called from that thread, five times a second.
   std::function<int()> node{};
 };
 
-/// A pipe that opens the device as soon as it is there, and again when it comes back. Throws std::runtime_error like
-/// `plugged_in`.
+/// A pipe that opens the device as soon as it is plugged in, and again when it comes back. Throws std::runtime_error
+/// like `plugged_in`.
 ///
-/// A thread of its own does all that libusb is needed for; it wakes for each transfer. 4 IN transfers are always
-/// queued, 4 OUT transfers take turns, each fails after 100 ms. What passes between it and the user of the pipe are two
-/// rings and a wake-up (one `write` to an eventfd): no lock, no heap.
+/// A separate thread makes all calls to libusb; it wakes for each transfer. 4 IN transfers are always queued, 4 OUT
+/// transfers take turns, and each fails after 100 ms. That thread and the user of the pipe share two rings and a wake-up
+/// (one `write` to an eventfd): no lock, no heap.
 ///
-/// Its end sends what was accepted, waits until the device has it or the transfers have failed, cancels the others,
-/// waits for each, and closes the device.
+/// The destructor sends all packets that were accepted, waits until the device has them or the transfers have failed,
+/// cancels and awaits the other transfers, and closes the device.
 std::unique_ptr<Pipe> open_pipe(const PipeConfig& config);
 
 }  // namespace tendon::usb

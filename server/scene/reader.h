@@ -122,11 +122,11 @@ class Reader {
     return there;
   }
 
-  /// An effect that is there when its table is.
+  /// A part that exists when its table does.
   template <class T, class Declare>
   void part(std::string_view name, std::optional<T>& target, const Declare& declare) {
     optional_table(name, [&](Reader& keys) {
-      // To clang a T whose class around it had no end yet, when it first met the optional, needs an argument.
+      // clang 14 rejects optional<T>::emplace() when T was incomplete where the optional was declared; pass a value.
       if constexpr (std::is_default_constructible_v<T>) {
         declare(keys, target.emplace());
       } else {
@@ -135,7 +135,7 @@ class Reader {
     });
   }
 
-  /// A table written with [[name]], for each of a few of a kind; without one `target` stays as it is.
+  /// Tables written [[name]], one for each element of `target`; without any, `target` stays as it is.
   template <class T, class Declare>
   void tables(std::string_view name, std::vector<T>& target, std::size_t most, const Declare& declare) {
     const toml::node* node = look_up(name);

@@ -26,8 +26,8 @@
 
 namespace tendon {
 
-/// All that a server is to run, as plain values in SI units, checked: what the constructors of the
-/// device and of the loops take without a complaint.
+/// Everything that a server runs for one device, as plain values in SI units. They are checked: the constructors of the
+/// device and of the loops accept them.
 struct Scene {
   struct Network {
     Address listen = parse_address("127.0.0.1:47100");
@@ -68,27 +68,27 @@ struct Scene {
 /// The rows of all kinds of devices, in the order of Scene::AnyDevice.
 const std::vector<const Driver*>& drivers();
 
-/// What is wrong with a scene, for the operator to act on:
-/// "FILE:LINE: KEY: expected …, found …". The line is left out where nothing in the file is to blame
-/// (a table that is not there), the key where there is none (a syntax error).
+/// A sentence for the operator about a scene: "FILE:LINE: KEY: expected …, found …". The line is left out when no line
+/// of the file is to blame (a table is missing), the key when there is none (a syntax error).
 class SceneError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// No scene that a person writes comes near it, and a wrong path may lead to anything. Every second byte can
-/// nest one table deeper, and toml++ recurses: 4 times as much overflows a stack of 8 MiB.
+/// No scene that a person writes comes near this size, and a wrong path may lead to any file. Every second byte can
+/// nest one table deeper, and toml++ recurses: a file of 4 times this size overflows a stack of 8 MiB.
 inline constexpr std::size_t kMaxSceneBytes = 16'384;
 
-/// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys.
-/// Throws SceneError; "cannot read FILE: No such file or directory" when there is no such file.
+/// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys. Throws SceneError:
+/// "cannot read FILE: No such file or directory" when there is no such file, likewise for a directory, a named pipe or a
+/// device.
 ///
-/// Of several mistakes the first in the file is reported; a key that is missing only when all that is
-/// there is right, because a misspelt key is both.
+/// Of several mistakes, the first in the file is reported. A missing key is reported only when every key in the file is
+/// right, because a misspelt key is both unknown and missing.
 Scene read_scene(const std::filesystem::path& file);
 
-/// The scenes of several devices that one server runs. Network and recording are the first one's; a later one that has
-/// such a table is refused, as are two devices of one name.
+/// The scenes of the devices that one server runs. Only the first may have [network] and [recording]; a later scene
+/// with such a table is refused, and so are two devices with one name.
 std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files);
 
 /// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for

@@ -278,7 +278,7 @@ TEST(FalconDevice, ALoopThatWasStoppedTakesUpWhereItWas) {
   EXPECT_EQ(bench.device.stats().silences, 0U);
 }
 
-TEST(FalconDevice, AnEncoderThatJumpsForAMomentCostsSamplesAndNothingElse) {
+TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   Bench bench({.has_firmware = true, .is_homed = true});
   ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
   bench.run(20ms, kForce);
@@ -297,7 +297,7 @@ TEST(FalconDevice, AnEncoderThatJumpsForAMomentCostsSamplesAndNothingElse) {
 
 // It still says that it is homed, but its origin is not where it was: whatever we took for the hand's place would be
 // wrong.
-TEST(FalconDevice, AnOriginThatHasMovedIsNotBelievedUntilTheDeviceIsHomedAnew) {
+TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
   for (const bool with_firmware : {false, true}) {
     Bench bench({.has_firmware = true, .is_homed = true, .firmware_bytes = 4096, .own_supply = true},
                 with_firmware ? fake_firmware(4096) : std::vector<std::uint8_t>{});
@@ -328,7 +328,7 @@ TEST(FalconDevice, AnOriginThatHasMovedIsNotBelievedUntilTheDeviceIsHomedAnew) {
   }
 }
 
-TEST(FalconDevice, InsideTheSafetyLayerAReplugHasToBeHomedAndArmedAgain) {
+TEST(FalconDevice, ASafeDeviceIsHomedAndArmedAgainAfterAReplug) {
   Bench bench({.has_firmware = true, .firmware_bytes = 4096});
   SafeDevice safe({}, bench.device);
   const auto run = [&](Duration time, const Vec3& force) {

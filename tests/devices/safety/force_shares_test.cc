@@ -54,7 +54,7 @@ TEST(GrowthLimit, LetsAForceFallAtOnce) {
   EXPECT_EQ(limit.share(Vec3::Zero(), {8, 0, 0}, 1ms), 1);
 }
 
-TEST(GrowthLimit, AForceThatTurnsRoundBeginsAtZeroAndOneThatTurnsKeepsWhatPointsItsWay) {
+TEST(GrowthLimit, AReversedForceBeginsAtZeroATurnedOneKeepsItsShare) {
   const GrowthLimit limit({.rate = 100});
   EXPECT_NEAR(limit.share({-5, 0, 0}, {5, 0, 0}, 1ms) * 5, 0.1, 1e-12);
   EXPECT_NEAR(limit.share({0, 5, 0}, {5, 0, 0}, 1ms) * 5, 0.1, 1e-12);
@@ -94,7 +94,7 @@ TEST(HeatLimit, HeatsAsAFirstOrderSystemHoweverTheTimeIsCut) {
   EXPECT_EQ(fine.bound(), 3.3) << "cool motors have all their force";
 }
 
-TEST(HeatLimit, FallsTowardsTheContinuousForceWhileWarmByAThousandthOfTheRestEachMillisecond) {
+TEST(HeatLimit, FallsByAThousandthOfTheRestEachMillisecondWhileWarm) {
   HeatLimit limit(kTouch);
   while (limit.heat() <= 0.7) limit.observe(3.3, 1ms);
   double bound = limit.bound();

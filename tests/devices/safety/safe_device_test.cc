@@ -584,7 +584,7 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
 
 // --- The operator disarms ----------------------------------------------------------------------------------
 
-TEST(SafeDevice, DisarmedInEveryStateItGivesNoForceFromTheNextStepOnAndOnlyTheOperatorEndsThat) {
+TEST(SafeDevice, DisarmedInAnyStateItGivesNoForceUntilTheOperatorArms) {
   for (const Situation& situation : kSituations) {
     for (const int times : {1, 3}) {
       SCOPED_TRACE(std::string(situation.name) + ", disarmed " + std::to_string(times) + " times");
@@ -636,7 +636,7 @@ TEST(SafeDevice, WhatIsToBeArmedAtTheStartIsNotWhenDisarmedBefore) {
   EXPECT_EQ(rig.state(), SafetyState::kArmed);
 }
 
-TEST(DeadMan, WhatTheOperatorHasDisarmedTheButtonArmsOnlyAfterHeHasSaidSoAndPressedAnew) {
+TEST(DeadMan, AfterADisarmTheButtonArmsOnlyOnceArmedAndPressedAnew) {
   Rig rig(by_button());
   rig.steps(60);
   const auto press = [&rig] {
@@ -736,7 +736,7 @@ void live(std::uint64_t seed, Seen& seen) {
   }
 }
 
-TEST(SafeDevice, WhateverHappensNoForceIsRaisedOrTurnedAndThereIsNoneOutsideArmed) {
+TEST(SafeDevice, NoForceIsEverRaisedOrTurnedAndNoneIsOutsideArmed) {
   Seen seen;
   for (std::uint64_t seed = 1; seed <= 500; ++seed) {
     SCOPED_TRACE(seed);

@@ -16,7 +16,7 @@ constexpr double kSteps = 1000 - 500;  // between the two run lengths of device-
 
 using DeviceEffectsProof = testing::InstructionTest;
 
-TEST_F(DeviceEffectsProof, WhatIsNotListedCostsABranchAStepAndNothingInASubstep) {
+TEST_F(DeviceEffectsProof, AnEffectNotListedCostsABranchAStepNoneASubstep) {
   const auto whole = testing::count_instructions(TENDON_PROOF_WHOLE, "none", "live_in_turn");
   const auto bare = testing::count_instructions(TENDON_PROOF_BARE, "none", "live_in_turn");
   ASSERT_EQ(whole.size(), 1U);

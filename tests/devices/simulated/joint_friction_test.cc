@@ -36,7 +36,7 @@ Vec3 way_of(const Mechanism::Kind& kind, const Vec3& at, Eigen::Index joint) {
   return Mechanism(kind).jacobian(at).inverse().col(joint);
 }
 
-TEST(JointFriction, OfAJointThatTurnsByItselfIsItsTorqueOverItsLeverWhereTheHandleIs) {
+TEST(JointFriction, OfOneTurningJointIsItsTorqueOverItsLever) {
   // Pushed along the way of one joint, just below and just above what that joint's friction holds there.
   const Vec3 torques(0.02, 0.03, 0.04);
   for (const Mechanism::Kind& kind : all_kinds()) {
@@ -63,7 +63,7 @@ TEST(JointFriction, OfAJointThatTurnsByItselfIsItsTorqueOverItsLeverWhereTheHand
   }
 }
 
-TEST(JointFriction, AJointSticksWhileTheOthersTurnSoThatTheHandleGivesWayAside) {
+TEST(JointFriction, AStuckJointLetsTheHandleGiveWayAside) {
   // A force that only the first joint's friction cannot hold: the other two stay where they are.
   for (const Mechanism::Kind& kind : all_kinds()) {
     auto config = rubbing(kind, Vec3(1e-4, 1, 1));

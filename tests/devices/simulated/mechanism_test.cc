@@ -35,7 +35,7 @@ Vec3 handle_of(const Mechanism::Arm& arm, const Vec3& q) {
           r * std::cos(q[0]) - arm.upper_arm};
 }
 
-TEST(Mechanism, OfAnArmTheJacobianIsTheInverseOfTheDerivativeOfWhereItsHandleIs) {
+TEST(Mechanism, AnArmsJacobianInvertsTheDerivativeOfItsHandle) {
   for (const Mechanism::Arm& arm : {kPhantom, kUneven}) {
     const Mechanism mechanism(arm);
     Dice dice(1);
@@ -66,7 +66,7 @@ TEST(Mechanism, TheFalconsJacobianIsThatOfItsKinematics) {
   }
 }
 
-TEST(Mechanism, NowhereInTheWorkspaceDoesAJointMoveTheHandleFurtherThanItsLever) {
+TEST(Mechanism, NoJointMovesTheHandleFurtherThanItsLever) {
   for (const Mechanism::Kind& kind : all_kinds()) {
     const Mechanism mechanism(kind);
     Vec3 longest = Vec3::Zero();

@@ -39,7 +39,7 @@ TEST(OperatorHand, RingsDownAsTheDampedOscillatorOfTheClosedForm) {
   }
 }
 
-TEST(OperatorHand, DragsTheDeviceWithTheAmplitudeAndPhaseOfItsFrequencyResponse) {
+TEST(OperatorHand, DragsTheDeviceByItsFrequencyResponse) {
   const double k = 400;
   const double c = 2;
   const double b = 1;

@@ -153,7 +153,7 @@ TEST(Recorded, FollowsASmoothMotionThatWasSampledWell) {
   }
 }
 
-TEST(ScriptedMotion, RefusesImpossibleScriptsNamingFieldValueAndWhatWasExpected) {
+TEST(ScriptedMotion, RefusesImpossibleScriptsAndNamesTheField) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::pair<ScriptedMotion::Script, std::string> cases[] = {
       {ScriptedMotion::Sine{.amplitude = -1, .frequency = 1}, "sine.amplitude = -1: expected 0 m or more"},

@@ -78,7 +78,7 @@ struct World {
   }
 };
 
-TEST(SimulatedDeviceEnergy, WorkOfTheHandIsNeverLessThanEquation5SaysItMustBe) {
+TEST(SimulatedDeviceEnergy, WorkOfTheHandIsNeverLessThanEquation5Demands) {
   // 2000 worlds with random devices, hands, forces and intervals; exact position sensing.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

@@ -122,7 +122,7 @@ TEST(QuantisedSpring, KeepsALimitCycleAboveThatThatGrowsWithTheStiffness) {
   }
 }
 
-TEST(SampledSpring, BeyondTheViscousBoundaryIsStableOnlyBelowTheSpeedThatCoulombFrictionCanBrake) {
+TEST(SampledSpring, BeyondTheViscousBoundOnlySlowMotionIsStable) {
   // v_lim = (4/π) f_c/(K T/2 − b): Diolaiti et al., IEEE T-RO 22(2), 2006, with the describing function of
   // the friction.
   const double b = 0.05;

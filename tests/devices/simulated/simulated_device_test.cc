@@ -124,7 +124,7 @@ TEST(CoulombFriction, LetsOnlyWhatIsAboveItAccelerate) {
   EXPECT_LT((bench.truth().position - direction * acceleration * 0.125).norm(), 1e-12);
 }
 
-TEST(CoulombFriction, StopsAfterTheSlidingDistanceOfTheClosedFormAndThenRestsForGood) {
+TEST(CoulombFriction, StopsAfterTheClosedFormsSlidingDistanceAndRests) {
   const double m = 0.075;
   const double f_c = 0.04;
   const Vec3 direction = Vec3(2, -1, 2) / 3;
@@ -541,7 +541,7 @@ TEST(SimulatedDevice, StartsWhereTheHandStartsUnlessToldOtherwise) {
   EXPECT_EQ(Bench(config).truth().position, Vec3(1, 0, 0));
 }
 
-TEST(SimulatedDevice, RefusesImpossibleValuesNamingFieldValueAndWhatWasExpected) {
+TEST(SimulatedDevice, RefusesImpossibleValuesAndNamesTheField) {
   using Config = SimulatedDevice::Config;
   struct Case {
     std::function<void(Config&)> spoil;

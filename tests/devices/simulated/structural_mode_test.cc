@@ -62,7 +62,7 @@ TEST(StructuralMode, RingsWithTheFrequencyAndDampingOfTheClosedForm) {
   }
 }
 
-TEST(StructuralMode, WithoutDampingRingsForEverAtJustTheFrequencyThatTheHeaderSays) {
+TEST(StructuralMode, WithoutDampingRingsForEverAtTheHeadersFrequency) {
   const double omega = 2 * std::numbers::pi * 200;
   auto config = ringing(200, 0);
   Bench bench(config);
@@ -219,7 +219,7 @@ double growth(const SimulatedDevice::Config& config, double stiffness, double da
   return late / early;
 }
 
-TEST(StructuralMode, TheDampingThatCanBeRenderedEndsWhereTheTwoMassesHaveTheirEigenvalueOnTheUnitCircle) {
+TEST(StructuralMode, RenderableDampingEndsWhereAnEigenvalueIsOne) {
   // Without the mode 2 m/T = 150 N·s/m; with it some 2 (m − m_h)/T = 90, and less the nearer the mode is to the rate.
   double before = 2 * kMotor / 1e-3;
   for (const double hz : {60.0, 100.0, 200.0}) {
@@ -235,7 +235,7 @@ TEST(StructuralMode, TheDampingThatCanBeRenderedEndsWhereTheTwoMassesHaveTheirEi
   }
 }
 
-TEST(StructuralMode, TheStiffestSampledSpringIsThatOfTheEigenvaluesAndNotSofterThanWithoutTheMode) {
+TEST(StructuralMode, TheStiffestSampledSpringIsThatOfTheEigenvalues) {
   for (const double hz : {60.0, 100.0}) {
     auto config = ringing(hz, 0.02);
     config.viscous_friction = 2;

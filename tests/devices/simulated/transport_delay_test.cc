@@ -41,7 +41,7 @@ TEST(TransportDelay, ASampleIsThatOfTheInstantThatItSays) {
   }
 }
 
-TEST(TransportDelay, AForceActsFromItsDelayAfterItWasAppliedUntilThatAfterTheNext) {
+TEST(TransportDelay, AForceActsFromItsDelayUntilTheDelayOfTheNext) {
   // 2 N for one period of 1 ms, then none: whatever the delay, the impulse is 2 mN·s, and the position tells when.
   for (const Duration delay : {Duration(1ns), Duration(999'999ns), Duration(300us), Duration(1ms), Duration(1'700us),
                                Duration(2ms), Duration(12'345'678ns)}) {
@@ -104,7 +104,7 @@ TEST(TransportDelay, WithoutAForceNothingIsDifferentToTheLastBitButTheStamps) {
   }
 }
 
-TEST(TransportDelay, ShiftsTheStabilityBoundaryOfASampledSpringToThatOfTheClosedForm) {
+TEST(TransportDelay, ShiftsASampledSpringsStabilityAsTheClosedForm) {
   // Whole periods, of either kind: core/stability has the exact boundary for forces that are so many samples late.
   for (const int late : {1, 2, 5}) {
     SampledSpring spring{.mass = 0.075, .viscous = 0.26, .period = 1ms, .delay_samples = late};
@@ -134,7 +134,7 @@ TEST(TransportDelay, ShiftsTheStabilityBoundaryOfASampledSpringToThatOfTheClosed
   }
 }
 
-TEST(TransportDelay, EnergyIsBalancedByTheForcesThatHaveArrivedAndNotByThoseReturned) {
+TEST(TransportDelay, EnergyIsBalancedByForcesThatHaveArrived) {
   // A spring, two periods late, on a handle without friction: it gives out energy, which the account of what was
   // returned does not see where it ought to.
   auto config = free_mass(1ms, 1ms);

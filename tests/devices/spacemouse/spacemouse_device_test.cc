@@ -92,7 +92,7 @@ TEST(SpaceMouseDevice, RightIsXLiftedIsYTowardsTheUserIsZ) {
   EXPECT_EQ(SpaceMouseDevice::velocity_for(config, {0, 0, -350}), Vec3::UnitY());
 }
 
-TEST(SpaceMouseDevice, SpeedGrowsFromZeroAtTheEdgeOfTheDeadBandInTheDirectionOfThePush) {
+TEST(SpaceMouseDevice, SpeedGrowsFromZeroAtTheDeadBandsEdge) {
   Dice dice(1);
   const SpaceMouseDevice::Config config{.speed = 0.2, .dead_band = 0.1, .reach = 1};
   for (int i = 0; i < 20'000; ++i) {

@@ -72,7 +72,7 @@ TEST(LibusbPipe, ItsEndIsZeroForceTakenByTheDeviceAndNothingLeftOpen) {
   EXPECT_FALSE(shim.counts().claimed);
 }
 
-TEST(LibusbPipe, TellsWhoGuardsTheDeviceItsNodeAndThatNodeTakesTheZeroPacketOfADeadDriver) {
+TEST(LibusbPipe, TheGuardiansNodeTakesTheZeroPacketOfADeadDriver) {
   UsbfsShim shim(kReady);
   std::vector<int> told;
   {
@@ -221,7 +221,7 @@ TEST(LibusbPipe, OrdersForAnOlderConnectionAreThrownAway) {
   EXPECT_FALSE(pipe->write(kPacket));
 }
 
-TEST(LibusbPipe, RequestsAndDataReachTheDeviceInTheOrderInWhichTheyWereAccepted) {
+TEST(LibusbPipe, RequestsAndDataReachTheDeviceInOrder) {
   UsbfsShim shim({.has_firmware = false, .firmware_bytes = 4096});
   const auto pipe = pipe_to(shim);
   ASSERT_TRUE(comes_true([&] { return pipe->connection() != 0; }));

@@ -73,7 +73,7 @@ TEST_F(MockUsbTest, DevicesAreListedWhereTheyArePluggedInAndNotWhenTheyAreOut) {
 }
 
 // As seen by who is not root, which a container's first user is, and who may open whatever there is.
-TEST_F(MockUsbTest, ADeviceThatMayNotBeOpenedIsToldFromOneThatIsNotPluggedInAndFromANodeThatIsNotHere) {
+TEST_F(MockUsbTest, AForbiddenAnUnpluggedAndAMissingNodeAreToldApart) {
   const auto look = [] {
     const auto lacks = [] {
       const auto reports = report_devices(usb::plugged_in(), "");
@@ -130,7 +130,7 @@ TEST_F(MockUsbTest, OfTwoFalconsThatAtThePortIsOpened) {
   }
 }
 
-TEST_F(MockUsbTest, PluggedInUnderARunningDriverItComesToPushAndUnpluggedItIsAFaultWithoutForce) {
+TEST_F(MockUsbTest, PluggedInLateItPushesUnpluggedItIsAFault) {
   falcon = FakeFalcon({.has_firmware = true, .is_homed = true, .own_supply = true});
   FalconDriver driver(usb::open_pipe(to_falcon()));
   SafeDevice safe({}, driver.device);

@@ -81,7 +81,7 @@ TEST(WoodenHapticsKinematics, TheTipIsWhereTheTurnedLinksEnd) {
 }
 
 // (0, 0, 6000) or (0, 0, -5000): the upper link upright, the lower one level, straight ahead.
-TEST(WoodenHapticsKinematics, InTheCalibrationPoseTheUpperLinkIsUprightAndTheLowerLevel) {
+TEST(WoodenHapticsKinematics, CalibratedTheUpperLinkIsUprightTheLowerLevel) {
   for (const char* name : {"woodenhaptics_v2019", "woodenhaptics_v2015", "polhem_v1"}) {
     const Model& model = *find_model(name);
     const auto& [a, b, c] = model.joints;
@@ -92,7 +92,7 @@ TEST(WoodenHapticsKinematics, InTheCalibrationPoseTheUpperLinkIsUprightAndTheLow
   }
 }
 
-TEST(WoodenHapticsKinematics, ForwardUndoesInverseWithinANanometreAtAHundredThousandPlaces) {
+TEST(WoodenHapticsKinematics, ForwardUndoesInverseWithinANanometre) {
   Dice dice(2);
   for (const Model& model : models()) {
     const Arm arm(model.name);
@@ -111,7 +111,7 @@ TEST(WoodenHapticsKinematics, ForwardUndoesInverseWithinANanometreAtAHundredThou
   }
 }
 
-TEST(WoodenHapticsKinematics, InverseUndoesForwardWhereTheElbowIsBentOutwards) {
+TEST(WoodenHapticsKinematics, InverseUndoesForwardWithTheElbowOutwards) {
   Dice dice(3);
   for (const Model& model : models()) {
     for (int i = 0; i < 20'000; ++i) {
@@ -139,7 +139,7 @@ TEST(WoodenHapticsKinematics, TheJacobianIsTheDerivativeOfThePosition) {
   }
 }
 
-TEST(WoodenHapticsKinematics, TheWorkspaceOfTheWoodenArmsCanBeReachedWithAllOfTheForce) {
+TEST(WoodenHapticsKinematics, TheWholeWorkspaceCanBeReachedWithAllForce) {
   Dice dice(5);
   for (const char* name : {"woodenhaptics_v2019", "woodenhaptics_v2015"}) {
     const Model& model = *find_model(name);
@@ -182,7 +182,7 @@ TEST(WoodenHapticsKinematics, CurrentsDoTheWorkOfTheForce) {
 }
 
 // Published: torque constant, capstan and lengths; the arithmetic here is by hand.
-TEST(WoodenHapticsKinematics, ANewtonUpwardsAtTheCentreTakesTheCurrentsThatTheDrawingsSay) {
+TEST(WoodenHapticsKinematics, ANewtonUpwardsTakesTheCurrentsOfTheDrawings) {
   const Model& model = *find_model("woodenhaptics_v2019");
   const auto pose = pose_at(model, Vec3::Zero());
   ASSERT_TRUE(pose);
@@ -235,7 +235,7 @@ TEST(WoodenHapticsKinematics, RoundingNeverMakesATorqueLarger) {
   }
 }
 
-TEST(WoodenHapticsKinematics, TowardsASingularPoseTheForceFadesAndInItThereIsNone) {
+TEST(WoodenHapticsKinematics, TheForceFadesToNoneAtASingularPose) {
   Dice dice(9);
   for (const Model& model : models()) {
     const Vec3 force(1, -1, 1);

@@ -19,7 +19,7 @@ TEST(WoodenHapticsReport, CurrentsAreMilliamperesLeastByteFirstAndNoCommand) {
   EXPECT_EQ(bytes_of(encode({})), Bytes(14, 0)) << "what the guardian writes";
 }
 
-TEST(WoodenHapticsReport, CalibratingIsCommand1WithTheCountersAsAttributesAndWithoutACurrent) {
+TEST(WoodenHapticsReport, CalibratingIsCommand1WithCountersAndNoCurrent) {
   EXPECT_EQ(bytes_of(encode_calibration({0, -5000, 6000})),
             (Bytes{0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0x78, 0xEC, 0x70, 0x17}));
 }

@@ -154,7 +154,7 @@ TEST(WoodenHapticsDevice, SaysWhatItIsAndWhenItsFirmwareLetsGo) {
   EXPECT_LT(info.force_resolution, 0.05);
 }
 
-TEST(WoodenHapticsDevice, RefusesCurrentsThatTheAmplifiersDoNotHaveAndNoModel) {
+TEST(WoodenHapticsDevice, RefusesTooHighCurrentsAndAMissingModel) {
   LocalTime now{};
   FakeWoodenHaptics arm({});
   const auto refuses = [&](const WoodenHapticsDevice::Config& config) {
@@ -304,7 +304,7 @@ TEST(WoodenHapticsDevice, WithoutTheButtonItIsNeverHomed) {
   EXPECT_GT(bench.arm.obeyed(), 4900) << "and its watchdog is fed with zeros";
 }
 
-TEST(WoodenHapticsDevice, OneReportThatSaysThatTheButtonWasPressedIsNotEnough) {
+TEST(WoodenHapticsDevice, OneReportOfAPressedButtonIsNotEnough) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
   bench.run(10ms, kForce);
@@ -319,7 +319,7 @@ TEST(WoodenHapticsDevice, OneReportThatSaysThatTheButtonWasPressedIsNotEnough) {
   EXPECT_EQ(bench.arm.calibrations(), 1);
 }
 
-TEST(WoodenHapticsDevice, TheButtonPressedWhileItPushesEndsTheForceAtOnceAndCalibratesAnew) {
+TEST(WoodenHapticsDevice, TheButtonEndsTheForceAtOnceAndCalibratesAnew) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
   bench.run(20ms, kForce);
@@ -332,7 +332,7 @@ TEST(WoodenHapticsDevice, TheButtonPressedWhileItPushesEndsTheForceAtOnceAndCali
   EXPECT_LE(bench.most_lawless, 3) << "a frame for the report, one for the answer";
 }
 
-TEST(WoodenHapticsDevice, CountersThatAreNotSetAsTheyWereToldAreNoCalibration) {
+TEST(WoodenHapticsDevice, CountersNotSetAsToldAreNoCalibration) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms));
   bench.arm.press_calibrate();
@@ -407,7 +407,7 @@ TEST(WoodenHapticsDevice, WhenTheHostIsDeadTheFirmwareLetsGoHalfASecondLater) {
   EXPECT_FALSE(bench.arm.amplifiers_on());
 }
 
-TEST(WoodenHapticsDevice, WithTheCableOutABoardWithItsOwnSupplyLetsGoTheSameWay) {
+TEST(WoodenHapticsDevice, WithTheCableOutASelfPoweredBoardLetsGo) {
   Bench bench({.own_supply = true});
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
   bench.run(20ms, kForce);
@@ -428,7 +428,7 @@ TEST(WoodenHapticsDevice, ItsAmplifiersAreOffUntilTheFirstReport) {
   EXPECT_FALSE(bench.arm.pushes());
 }
 
-TEST(WoodenHapticsDevice, ReportsOfAnotherLengthDoNotKeepTheFirmwareFromLettingGo) {
+TEST(WoodenHapticsDevice, ReportsOfAnotherLengthDoNotFeedTheWatchdog) {
   LocalTime now{};
   FakeWoodenHaptics arm({});
   arm.advance(now);
@@ -444,7 +444,7 @@ TEST(WoodenHapticsDevice, ReportsOfAnotherLengthDoNotKeepTheFirmwareFromLettingG
 }
 
 // What `apply` returns is what the ledger counts.
-TEST(WoodenHapticsDevice, ALoopThatStoodStillLongerThanTheWatchdogDoesNotCountOnTheOldForce) {
+TEST(WoodenHapticsDevice, AfterAPauseBeyondTheWatchdogTheOldForceIsOver) {
   for (const Duration pause : {Duration(300ms), Duration(700ms)}) {
     Bench bench;
     ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
@@ -472,7 +472,7 @@ TEST(WoodenHapticsDevice, ALoopThatStoodStillTakesUpWhereItWas) {
   EXPECT_EQ(bench.device.stats().silences, 0U);
 }
 
-TEST(WoodenHapticsDevice, AnEncoderThatJumpsForAMomentCostsSamplesAndNothingElse) {
+TEST(WoodenHapticsDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   Bench bench;
   ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
   bench.run(20ms, kForce);
@@ -490,7 +490,7 @@ TEST(WoodenHapticsDevice, AnEncoderThatJumpsForAMomentCostsSamplesAndNothingElse
   EXPECT_TRUE(bench.arm.pushes());
 }
 
-TEST(WoodenHapticsDevice, InsideTheSafetyLayerAReplugHasToBeHomedAndArmedAgain) {
+TEST(WoodenHapticsDevice, ASafeDeviceIsHomedAndArmedAgainAfterAReplug) {
   Bench bench;
   SafeDevice safe({}, bench.device);
   const auto run = [&](Duration time, const Vec3& force) {
@@ -614,7 +614,7 @@ std::string name_of(const testing::TestParamInfo<Fault>& info) {
 
 INSTANTIATE_TEST_SUITE_P(Each, WoodenHapticsFault, testing::ValuesIn(FakeWoodenHaptics::kFaults), name_of);
 
-TEST(WoodenHapticsDevice, UnpluggedAtAnyStateItIsAbsentAtOnceAndAForceThatIsNoNumberChangesNothing) {
+TEST(WoodenHapticsDevice, UnpluggedItIsAbsentAtOnceAndNanChangesNothing) {
   for (const Place place : kPlaces) {
     for (const Vec3& force : {kForce, Vec3(kNan, 0, 0)}) {
       SCOPED_TRACE(static_cast<int>(place));

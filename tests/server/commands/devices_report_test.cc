@@ -51,7 +51,7 @@ TEST(DevicesReport, ASpaceMouseWantsNoFirmwareButTheRightToBeOpened) {
   EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
 }
 
-TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubtBecauseOtherGadgetsHaveItsNumber) {
+TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubt) {
   std::vector<usb::PluggedIn> plugged = {falcon(true)};
   plugged[0].id = {0x1234, 0x0006};
   const auto devices = report_devices(plugged, std::nullopt);
@@ -63,7 +63,7 @@ TEST(DevicesReport, AWoodenHapticsIsNamedWithADoubtBecauseOtherGadgetsHaveItsNum
   EXPECT_EQ(report_devices(plugged, std::nullopt)[0].lacks.size(), 1U);
 }
 
-TEST(DevicesReport, ANodeThatIsNotHereIsMendedByTheContainerAndNotByTheRightToOpenIt) {
+TEST(DevicesReport, AMissingNodeIsMendedByTheContainerNotByRights) {
   std::vector<usb::PluggedIn> plugged = {falcon(false)};
   plugged[0].has_node = false;
   const auto devices = report_devices(plugged, "");

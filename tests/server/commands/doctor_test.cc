@@ -102,7 +102,7 @@ TEST(Doctor, OfWhatTheKernelDoesNotSayItClaimsNothing) {
   }
 }
 
-TEST(Doctor, MeasuresHowLateAThreadWakesAgainstTheScheduleAndNotAgainstTheWakeUpBefore) {
+TEST(Doctor, MeasuresLatenessAgainstTheScheduleNotTheLastWakeUp) {
   // Each wake-up is as many µs late as its number, from 0 to 99; the last one by a pause.
   LocalTime now{5s};
   int sleeps = 0;

@@ -367,7 +367,7 @@ centre_mm = [0, 10, 0]
   EXPECT_FALSE(minimal_and("").simulated().sample_delay);
 }
 
-TEST(Scene, AProfilesFrictionGoesIntoTheJointsWithoutBecomingLessThanTheLimiterCountsOn) {
+TEST(Scene, AProfilesJointFrictionIsNoLessThanTheLimitersBound) {
   const DeviceProfile& falcon = *find_device_profile("falcon");
   const Scene scene = minimal_and("[device.effects.joint_friction]\nkind = \"falcon\"\n");
   EXPECT_FALSE(scene.simulated().coulomb_friction) << "it is in the joints";
