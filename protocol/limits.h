@@ -6,9 +6,9 @@
 
 #include "core/base/time.h"
 
-// Every bound that the wire has, each with its reason. Both ends must agree on them: they are part of
-// the protocol (WIRE.md lists them), not settings. What is beyond a bound is refused by the receiver
-// and counted; the sender cuts texts and lists to size.
+// Every bound of the wire, each with its reason. Both ends must agree on them: they are part of the protocol (WIRE.md
+// lists them), not settings. A receiver refuses a value beyond its bound, and counts it; a sender cuts texts and lists
+// to size. The comments in tendon.proto hold the same bounds, and protocol/vectors/bounds.json tests them.
 
 namespace tendon::limits {
 
@@ -32,9 +32,8 @@ inline constexpr int kMaxFrames = 64;
 /// survive loss (see requests.h). A request is a human act; 16 are a burst of clicks.
 inline constexpr std::uint32_t kRequestWindow = 16;
 
-/// What a server leaves out of the states when it is asked to. Half the speed is beyond every threshold of touch
-/// (7 … 15 %). 20 ms of silence at 1 m/s are 20 mm of foretold way, five lost keep-alives fit into a safe stop, and
-/// below 1 ms there is nothing to leave out.
+/// The widest deadband of states that a server grants. Half the speed is beyond every threshold of touch (7 … 15 %).
+/// In 20 ms of silence a hand at 1 m/s moves 20 mm as predicted. A shorter silence than 1 ms would leave nothing out.
 inline constexpr double kMaxDeadbandShare = 0.5;
 inline constexpr double kMaxDeadbandFloor = 0.1;  ///< m/s
 inline constexpr Duration kMinStateSilence = std::chrono::milliseconds(1);

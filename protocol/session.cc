@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "core/base/expect.h"
 #include "protocol/limits.h"
 #include "protocol/reliable/replay_window.h"
 #include "protocol/reliable/requests.h"
@@ -165,15 +165,12 @@ struct Session::State {
 Session::Session(const Config& config, LocalTime opened) : Session(config, nullptr, opened) {}
 Session::Session(const Config& config, const SessionKeys& keys, LocalTime opened) : Session(config, &keys, opened) {}
 Session::Session(const Config& config, const SessionKeys* keys, LocalTime opened) {
-  const auto positive = [](Duration d, const char* message) {
-    if (d <= Duration::zero()) throw std::invalid_argument(message);
-  };
-  positive(config.keep_alive, "session: keep_alive must be positive");
-  positive(config.timeout, "session: timeout must be positive");
-  positive(config.min_resend, "session: min_resend must be positive");
-  positive(config.life, "session: life must be positive");
-  positive(config.rekey.age, "session: rekey.age must be positive");
-  positive(config.rekey.overlap, "session: rekey.overlap must be positive");
+  expect_above_zero(seconds(config.keep_alive), "keep_alive_s");
+  expect_above_zero(seconds(config.timeout), "timeout_s");
+  expect_above_zero(seconds(config.min_resend), "min_resend_s");
+  expect_above_zero(seconds(config.life), "life_s");
+  expect_above_zero(seconds(config.rekey.age), "rekey.age_s");
+  expect_above_zero(seconds(config.rekey.overlap), "rekey.overlap_s");
   state_ = std::make_unique<State>(config, keys, opened);
 }
 Session::~Session() = default;

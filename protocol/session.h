@@ -126,7 +126,7 @@ class Session {
                              RequestArrived, RequestAnswered, Closed>;
 
   // In.
-  /// Takes any bytes. What is not a good datagram of this conversation is counted and dropped. True when
+  /// Takes any bytes. A datagram that is not a good one of this conversation is counted and dropped. True when
   /// it was good and the newest so far: where it came from is where the peer is now. That is proved in
   /// suite 1 only.
   bool receive(LocalTime now, std::span<const std::byte> datagram);
@@ -142,7 +142,7 @@ class Session {
   void answer(std::uint32_t id, Code code, std::string detail, Duration wait = {});
   /// … a Describe.
   void answer(std::uint32_t id, DeviceDescription device);
-  /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. What was not sent yet is
+  /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. Whatever was not sent yet is
   /// dropped. No Closed comes: the owner knows.
   void close(Code code, std::string reason);
   /// Notices the silence of the peer, and our age.

@@ -2,7 +2,9 @@
 #include "protocol/narrow/rate_adaptation.h"
 
 #include <algorithm>
-#include <stdexcept>
+#include <string_view>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -22,13 +24,14 @@ RateAdaptation::RateAdaptation(const Config& config, LocalTime now)
       trouble_at_(now),
       window_start_(now),
       bearable_at_(now) {
-  const auto share = [](double p) { return p >= 0 && p <= 1; };
-  const auto positive = [](Duration d) { return d > Duration::zero(); };
-  if (!positive(config.queueing) || !positive(config.patience) || !positive(config.clean) ||
-      config.longest_clean < config.clean || !positive(config.hopeless_after) || !share(config.loss) ||
-      !share(config.hopeless_loss)) {
-    throw std::invalid_argument("rate adaptation: durations must be positive, shares within 0 to 1");
-  }
+  const auto expect_share = [](double p, std::string_view field) { expect(p >= 0 && p <= 1, field, p, "0 to 1"); };
+  expect_above_zero(seconds(config.queueing), "queueing_s");
+  expect_above_zero(seconds(config.patience), "patience_s");
+  expect_above_zero(seconds(config.clean), "clean_s");
+  expect(config.longest_clean >= config.clean, "longest_clean_s", seconds(config.longest_clean), "at least clean_s");
+  expect_above_zero(seconds(config.hopeless_after), "hopeless_after_s");
+  expect_share(config.loss, "loss");
+  expect_share(config.hopeless_loss, "hopeless_loss");
   clean_.fill(config.clean);
 }
 

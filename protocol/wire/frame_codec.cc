@@ -211,7 +211,7 @@ void write_request(const SetStateDeadband& from, pb::Control& to) {
   auto& out = *to.mutable_set_state_deadband();
   out.set_share(from.share);
   out.set_floor_mps(from.floor);
-  // What is out of range becomes what the server does not grant; a cast could make it look like something else.
+  // A value out of range becomes one that no server grants; a cast could make it look valid.
   const bool possible = from.max_silence >= Duration::zero() && from.max_silence <= limits::kMaxStateSilence;
   const auto us = std::chrono::ceil<std::chrono::microseconds>(from.max_silence).count();
   out.set_max_silence_us(possible ? static_cast<std::uint32_t>(us) : std::numeric_limits<std::uint32_t>::max());

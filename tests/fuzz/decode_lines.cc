@@ -4,7 +4,7 @@
 // two is wrong.
 //
 // Numbers are in decimal, floating-point ones as the 16 hexadecimal digits of their bits, texts and bytes in
-// hexadecimal digits; vectors and matrices row by row. What is refused is a "-".
+// hexadecimal digits; vectors and matrices row by row. A "-" stands for a refused one.
 #include <bit>
 #include <cstddef>
 #include <cstdint>

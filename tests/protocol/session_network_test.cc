@@ -123,7 +123,7 @@ TEST(SessionOverABadNetwork, TheTwoEndsAgreeOnTheLossOfEachDirection) {
   EXPECT_GT(world.z.stats().lost, 5 * world.a.stats().lost);
 }
 
-TEST(SessionOverAPerfectNetwork, TheRoundTripIsTheTruthToTheNanosecondWhateverTheClocks) {
+TEST(SessionOverAPerfectNetwork, TheRoundTripIsExactWhateverTheClocks) {
   const Duration there = milliseconds(7) + Duration{123};
   const Duration back = milliseconds(11) + Duration{456};
   World world(perfect(there), perfect(back), 1, {});
@@ -135,14 +135,14 @@ TEST(SessionOverAPerfectNetwork, TheRoundTripIsTheTruthToTheNanosecondWhateverTh
   EXPECT_EQ(world.a.stats().lost, 0U);
 }
 
-TEST(SessionOverAPerfectNetwork, TheTwoEndsKeepEachOtherAliveAtTheKeepAliveRate) {
+TEST(SessionOverAPerfectNetwork, BothEndsSendKeepAlivesAtTheirRate) {
   World world(perfect(milliseconds(10)));
   world.run(seconds(10));
   EXPECT_TRUE(world.a.open() && world.z.open());
   EXPECT_EQ(world.a.stats().datagrams_sent, 201U);  // at 0, 50 … 10 000 ms
 }
 
-TEST(SessionOverAPerfectNetwork, ARequestIsNotSentTwiceWhenItsAnswerComesInTime) {
+TEST(SessionOverAPerfectNetwork, ARequestAnsweredInTimeIsSentOnce) {
   World world(perfect(milliseconds(40)));
   world.run(seconds(3));  // long enough to know the round trip
   bool answered = false;

@@ -367,7 +367,7 @@ TEST_F(TwoEnds, RequestsThatOvertakeEachOtherAreDeliveredInOrder) {
   EXPECT_EQ(std::get<Session::RequestArrived>(at_z[1]).id, 2U);
 }
 
-TEST_F(TwoEnds, AnswersAreToldInTheOrderOfTheRequestsWhateverTheOrderOfAnswering) {
+TEST_F(TwoEnds, AnswersAreToldInTheOrderOfTheRequests) {
   a_.request(Rearm{});
   a_.request(Rearm{});
   deliver(z_, now_, pull(a_, now_));

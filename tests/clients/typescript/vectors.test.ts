@@ -4,7 +4,9 @@
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 import { fromJson, toBinary, type JsonValue } from "@bufbuild/protobuf";
-import { decodeData, decodeHelloMessage, encodeFrame, encodeHead } from "../../../clients/typescript/src/codec.js";
+import {
+  decodeAnswerMessage, decodeData, decodeHelloMessage, encodeFrame, encodeHead,
+} from "../../../clients/typescript/src/codec.js";
 import {
   concat, decodeHeader, decodeHello, encodeAnswer, encodeHello, encodeRetry,
 } from "../../../clients/typescript/src/datagram.js";
@@ -167,4 +169,21 @@ describe("key_files.json", () => {
       }
     });
   }
+});
+
+describe("bounds.json", () => {
+  /** Whether the codec takes a body with every value that is in it. */
+  const isTaken = ({ message, body }: { readonly message: string; readonly body: string }): boolean => {
+    const bytes = fromHex(body);
+    if (message === "Hello") return decodeHelloMessage(bytes) !== undefined;
+    if (message === "Answer") return decodeAnswerMessage(bytes) !== undefined;
+    return decodeData(bytes)?.invalid === 0;
+  };
+
+  it("the bounds of tendon.proto are those of the codec", () => {
+    const { bounds } = readVectors("bounds.json");
+    assert.ok(bounds.length > 300);
+    const wrong = bounds.filter((vector: any) => isTaken(vector) !== vector.accepted);
+    assert.deepEqual(wrong.map((vector: any) => `${vector.field} ${vector.value}`), []);
+  });
 });

@@ -107,7 +107,7 @@ TEST(RateAdaptation, TriesAHigherRateMoreAndMoreRarelyWhenThatKeepsFailing) {
   EXPECT_LT(link.take_times()[1], seconds(6));  // of 300: a try of a few 100 ms every 80 s
 }
 
-TEST(RateAdaptation, LossAloneLowersTheRateAndATenthOfItBreaksTheCircuitOnlyAtTheLowest) {
+TEST(RateAdaptation, LossLowersTheRateAndATenthBreaksTheCircuitAtTheLowest) {
   NarrowLink lossy;
   lossy.run(seconds(10), 5000, 0.08);
   EXPECT_EQ(lossy.adaptation().one_in(), 20U);

@@ -161,7 +161,7 @@ TEST_F(SealedHandshake, NothingSpokenInTheClearMovesAClientWithAKey) {
   EXPECT_EQ(said_by(a_).size(), 0U);
 }
 
-TEST_F(SealedHandshake, AnAnswerThatWasTamperedWithIsIgnoredAndTheTrueOneStillCounts) {
+TEST_F(SealedHandshake, ATamperedAnswerIsIgnoredAndTheTrueOneStillCounts) {
   const auto reply = knock(hello_with_cookie(a_));
   const Bytes good = first(answer_, z_.refuse(*reply.guest, examples::refused(), answer_).size);
   for (std::size_t at = 16; at < good.size(); ++at) {
@@ -182,7 +182,7 @@ TEST_F(SealedHandshake, AReplayedHelloIsWorthNothingFromAnotherAddress) {
   EXPECT_EQ(reply.size, 48U);
 }
 
-TEST_F(SealedHandshake, TooManyHellosOfOneSourceAreDroppedAndAnotherSourceIsNot) {
+TEST_F(SealedHandshake, TooManyHellosOfOneSourceAreDroppedNotThoseOfAnother) {
   const Bytes hello = hello_with_cookie();
   for (int i = 0; i < 100; ++i) knock(hello);
   EXPECT_EQ(z_.stats().limited, 100U - HelloLimit::kBurst);

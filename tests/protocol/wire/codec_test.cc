@@ -619,7 +619,7 @@ TEST(Codec, AReportOnAnEngineOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   EXPECT_EQ(read_raw(8, RawProtobuf().varint(4, 1)), 0U) << "no link";
 }
 
-TEST(Codec, ADeadbandThatIsNoNumberIsLeftOutAndOneThatMakesNoSenseIsForTheServerToRefuse) {
+TEST(Codec, ADeadbandOfNaNIsLeftOutAndASenselessOneIsForTheServer) {
   const auto read_back = [](const SetStateDeadband& asked) -> std::optional<SetStateDeadband> {
     DataReader reader;
     const auto* content = read(reader, data(1, {}, Control{.id = 1, .request = asked}));

@@ -3,6 +3,8 @@
 
 #include <google/protobuf/util/json_util.h>
 
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -17,6 +19,7 @@
 #include "protocol/secrets/seal.h"
 #include "tendon.pb.h"
 #include "tests/protocol/examples.h"
+#include "tests/protocol/wire/bounds.h"
 
 namespace tendon::vectors {
 namespace {
@@ -471,10 +474,24 @@ std::string key_files() {
   return Object().json("files", list(out)).str() + "\n";
 }
 
+std::string bounds_file() {
+  std::ifstream proto(TENDON_PROTO);
+  const std::string text(std::istreambuf_iterator<char>(proto), {});
+  std::vector<std::string> out;
+  for (const bounds::Case& one : bounds::cases(text)) {
+    out.push_back(R"({"message": )" + quoted(std::string_view(one.message)) + R"(, "field": )" +
+                  quoted(std::string_view(one.field)) + R"(, "value": )" + quoted(std::string_view(one.value)) +
+                  R"(, "accepted": )" + (one.accepted ? "true" : "false") + R"(, "body": )" +
+                  quoted(std::string_view(hex(one.body))) + "}");
+  }
+  return Object().json("bounds", list(out)).str() + "\n";
+}
+
 }  // namespace
 
 std::map<std::string, std::string> files() {
-  return {{"plain.json", plain_file()},
+  return {{"bounds.json", bounds_file()},
+          {"plain.json", plain_file()},
           {"sealed.json", sealed_file()},
           {"replay.json", replay_file()},
           {"key_files.json", key_files()}};

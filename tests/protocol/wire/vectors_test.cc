@@ -135,8 +135,7 @@ TEST(Vectors, OurNoiseIsThatOfCacophony) {
 
 TEST(Vectors, AreWhatTheCodeWrites) {
   for (const auto& [name, ours] : vectors::files()) {
-    EXPECT_TRUE(text_of(kFolder / name) == ours)
-        << name << " has changed; was that meant? Then run: protocol/generate";
+    EXPECT_TRUE(text_of(kFolder / name) == ours) << name << " has changed; was that meant? Then run: protocol/generate";
   }
 }
 
@@ -147,6 +146,24 @@ TEST(Vectors, AreAllTested) {
     EXPECT_EQ(names.erase(entry.path().filename().string()), 1U) << entry.path();
   }
   EXPECT_TRUE(names.empty());
+}
+
+/// Whether the codec takes a body with every value that is in it.
+bool is_taken(const Json& vector) {
+  const Bytes body = bytes(vector, "body");
+  if (vector.at("message") == "Hello") return read_hello(body).has_value();
+  if (vector.at("message") == "Answer") return read_answer(body).has_value();
+  DataReader reader;
+  const DataContent* const content = reader.read(body);
+  return content != nullptr && content->invalid == 0;
+}
+
+TEST(Vectors, BoundsOfTheProtoFileAreThoseOfTheCodec) {
+  const Json file = read("bounds.json");
+  for (const Json& vector : file.at("bounds")) {
+    EXPECT_EQ(is_taken(vector), vector.at("accepted").get<bool>()) << vector.at("field") << ' ' << vector.at("value");
+  }
+  EXPECT_GT(file.at("bounds").size(), 300U);
 }
 
 /// A client and a session as the file describes them: nothing here is computed from the code that wrote it.

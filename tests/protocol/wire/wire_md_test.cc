@@ -4,8 +4,10 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <regex>
 #include <sstream>
 
+#include "core/base/reason.h"
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/golden.h"
 
@@ -61,6 +63,22 @@ TEST(WireMd, ShowsTheBytesThatTheCodeWrites) {
                                      << "block, then run: protocol/generate";
     EXPECT_EQ(shown.at(name), golden::block(datagram)) << name << " is stale; run: protocol/generate";
     EXPECT_EQ(bytes.at(name), datagram) << name << ": golden.cc leaves bytes out";
+  }
+}
+
+TEST(WireMd, ListsEveryReasonThatTheCodeHas) {
+  std::map<int, std::string> listed;
+  std::istringstream lines(page());
+  const std::regex row(R"(\| bit (\d+) \| (\d+) ([^|]+) \| [^|]+ \|)");
+  std::smatch cells;
+  for (std::string line; std::getline(lines, line);) {
+    if (!std::regex_match(line, cells, row)) continue;
+    const int bit = std::stoi(cells[1]);
+    EXPECT_EQ(std::stoul(cells[2]), 1UL << bit) << line;
+    listed[bit] = cells[3];
+  }
+  for (int bit = 0; bit < 32; ++bit) {
+    EXPECT_EQ(listed[bit], to_string(Reasons::from_bits(1U << bit))) << "bit " << bit;
   }
 }
 

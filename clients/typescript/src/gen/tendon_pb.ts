@@ -19,7 +19,7 @@ export const file_tendon: GenFile = /*@__PURE__*/
  */
 export type Datagram = Message<"tendon.v1.Datagram"> & {
   /**
-   * when the datagram was written; |t| ≤ 2⁶⁰
+   * [-2^60, 2^60]: when the datagram was written
    *
    * @generated from field: sfixed64 tx_time_ns = 1;
    */
@@ -33,7 +33,7 @@ export type Datagram = Message<"tendon.v1.Datagram"> & {
   echo?: Echo | undefined;
 
   /**
-   * at most 64; none = keep-alive
+   * [0, 64] entries: none = keep-alive
    *
    * @generated from field: repeated tendon.v1.Frame frames = 3;
    */
@@ -55,14 +55,14 @@ export const DatagramSchema: GenMessage<Datagram> = /*@__PURE__*/
  */
 export type Echo = Message<"tendon.v1.Echo"> & {
   /**
-   * T1, its tx_time_ns: the RECEIVER's clock
+   * [-2^60, 2^60]: T1, its tx_time_ns: the RECEIVER's clock
    *
    * @generated from field: sfixed64 peer_tx_time_ns = 1;
    */
   peerTxTimeNs: bigint;
 
   /**
-   * T2, when it arrived
+   * [-2^60, 2^60]: T2, when it arrived
    *
    * @generated from field: sfixed64 rx_time_ns = 2;
    */
@@ -176,16 +176,22 @@ export const FrameSchema: GenMessage<Frame> = /*@__PURE__*/
  */
 export type Vec3 = Message<"tendon.v1.Vec3"> & {
   /**
+   * [-1e12, 1e12]
+   *
    * @generated from field: double x = 1;
    */
   x: number;
 
   /**
+   * [-1e12, 1e12]
+   *
    * @generated from field: double y = 2;
    */
   y: number;
 
   /**
+   * [-1e12, 1e12]
+   *
    * @generated from field: double z = 3;
    */
   z: number;
@@ -212,7 +218,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   tick: bigint;
 
   /**
-   * when the position was sampled
+   * [-2^60, 2^60]: when the position was sampled
    *
    * @generated from field: sfixed64 sampled_ns = 2;
    */
@@ -236,14 +242,14 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   forceAppliedN?: Vec3 | undefined;
 
   /**
-   * the energy ledger: what the device may still give out
+   * [-1e12, 1e12]: the energy ledger: what the device may still give out
    *
    * @generated from field: double energy_j = 6;
    */
   energyJ: number;
 
   /**
-   * the limiter's bound on the norm, ≥ 0; +infinity = no bound
+   * [0, 1e12] or +infinity: the limiter's bound on the norm; +infinity: no bound
    *
    * @generated from field: double permitted_force_n = 7;
    */
@@ -264,7 +270,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   forceSequence: bigint;
 
   /**
-   * its age since it arrived
+   * [0, 2^60]: its age since it arrived
    *
    * @generated from field: uint64 force_age_ns = 10;
    */
@@ -276,14 +282,14 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   mode: Mode;
 
   /**
-   * ≤ 15
+   * [0, 15]
    *
    * @generated from field: uint32 device = 12;
    */
   device: number;
 
   /**
-   * ≤ 7; of the force that force_sequence, force_age_ns and mode are about
+   * [0, 7]: of the force that force_sequence, force_age_ns and mode are about
    *
    * @generated from field: uint32 channel = 13;
    */
@@ -312,7 +318,7 @@ export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
  */
 export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   /**
-   * 1, 2, 3 … per session, device and channel; 0 is refused
+   * [1, …]: 1, 2, 3 … per session, device and channel
    *
    * @generated from field: uint64 sequence = 1;
    */
@@ -340,21 +346,21 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   model?: LocalModel | undefined;
 
   /**
-   * counted from arrival; 1 … 10 000 000
+   * [1, 10000000]: counted from arrival
    *
    * @generated from field: uint32 valid_for_us = 5;
    */
   validForUs: number;
 
   /**
-   * ≤ 15
+   * [0, 15]
    *
    * @generated from field: uint32 device = 6;
    */
   device: number;
 
   /**
-   * ≤ 7
+   * [0, 7]
    *
    * @generated from field: uint32 channel = 7;
    */
@@ -368,7 +374,7 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
   topologyChanged: boolean;
 
   /**
-   * what the engine thinks that force_n may be wrong by, ≥ 0; absent: it does not say
+   * [0, 1e12]: how wrong the engine thinks force_n may be; absent: not said
    *
    * @generated from field: optional double error_n = 9;
    */
@@ -399,12 +405,14 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
    * −∂F/∂x; a spring is positive. 1 entry k: k·I. 3 entries: the diagonal. 9: the matrix, row by row.
    * Any other number is refused.
    *
+   * [-1e12, 1e12], {1, 3, 9} entries
+   *
    * @generated from field: repeated double stiffness_npm = 2 [packed = true];
    */
   stiffnessNpm: number[];
 
   /**
-   * ≥ 0, how far from at_m the stiffness holds; absent: nobody says
+   * [0, 1e12] or +infinity: how far from at_m it holds; absent: not said
    *
    * @generated from field: optional double valid_radius_m = 3;
    */
@@ -439,7 +447,7 @@ export type Contact = Message<"tendon.v1.Contact"> & {
   normal?: Vec3 | undefined;
 
   /**
-   * from the surface to the tool along the normal; below 0: so deep is it pressed in
+   * [-1e12, 1e12]: from the surface to the tool along the normal; below 0: so deep is it pressed in
    *
    * @generated from field: double gap_m = 2;
    */
@@ -467,21 +475,21 @@ export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
  */
 export type ForceTable = Message<"tendon.v1.ForceTable"> & {
   /**
-   * below 0: nearer to the hand
+   * [-1e12, 1e12]: below 0: nearer to the hand
    *
    * @generated from field: double first_depth_m = 1;
    */
   firstDepthM: number;
 
   /**
-   * > 0
+   * (0, 1e12]
    *
    * @generated from field: double step_m = 2;
    */
   stepM: number;
 
   /**
-   * along +normal; 2 … 16 entries
+   * [-1e12, 1e12], [2, 16] entries: along +normal
    *
    * @generated from field: repeated double force_n = 3 [packed = true];
    */
@@ -500,7 +508,7 @@ export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
  */
 export type Control = Message<"tendon.v1.Control"> & {
   /**
-   * 1, 2, 3 … per session and direction; at most 16 unanswered
+   * [1, …]: 1, 2, 3 … per session and direction; at most 16 unanswered
    *
    * @generated from field: uint32 id = 1;
    */
@@ -585,6 +593,8 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
   hz: number;
 
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 2;
    */
   device: number;
@@ -606,21 +616,21 @@ export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
  */
 export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
   /**
-   * Weber's: 0 … 0.5
+   * [-1e12, 1e12]: Weber's; a server grants 0 … 0.5
    *
    * @generated from field: double share = 1;
    */
   share: number;
 
   /**
-   * 0 … 0.1
+   * [-1e12, 1e12]: a server grants 0 … 0.1
    *
    * @generated from field: double floor_mps = 2;
    */
   floorMps: number;
 
   /**
-   * 1000 … 20 000; 0 = every state is sent, as before this was asked
+   * a server grants 1000 … 20 000; 0 = every state is sent, as before this was asked
    *
    * @generated from field: uint32 max_silence_us = 3;
    */
@@ -642,6 +652,8 @@ export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*
  */
 export type Rearm = Message<"tendon.v1.Rearm"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
@@ -656,14 +668,16 @@ export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
 
 /**
  * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
- * nor a new session ends it, nor the dead man's button by itself. Safety goes from armed to homed; a request to arm that
- * was not granted yet is withdrawn. It is no fault, and clears none. Asking twice is asking once. Only from a controller of
- * the device, the holder of its channel or not. CODE_OK: the order is given to the device's loop, ahead of its next step.
+ * nor a new session ends it, nor the dead man's button by itself. Safety goes from armed to homed, and a pending
+ * request to arm is withdrawn. It is no fault, and clears none. Asking twice is asking once. Only from a controller of
+ * the device, whether it holds the channel or not. CODE_OK: the device's loop has the order before its next step.
  *
  * @generated from message tendon.v1.Disarm
  */
 export type Disarm = Message<"tendon.v1.Disarm"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
@@ -683,6 +697,8 @@ export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
  */
 export type Describe = Message<"tendon.v1.Describe"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
@@ -703,11 +719,15 @@ export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
  */
 export type TakeLease = Message<"tendon.v1.TakeLease"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
+   * [0, 7]
+   *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
@@ -727,11 +747,15 @@ export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
  */
 export type GiveLease = Message<"tendon.v1.GiveLease"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
+   * [0, 7]
+   *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
@@ -751,17 +775,21 @@ export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
  */
 export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
+   * [0, 7]
+   *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * name of the one that is; at most 64 bytes
+   * [0, 64] bytes: name of the one that is
    *
    * @generated from field: string to = 3;
    */
@@ -780,7 +808,7 @@ export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
  */
 export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   /**
-   * of the Control that is answered
+   * [1, …]: of the Control that is answered
    *
    * @generated from field: uint32 id = 1;
    */
@@ -792,14 +820,14 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
   code: Code;
 
   /**
-   * at most 128 bytes
+   * [0, 128] bytes
    *
    * @generated from field: string detail = 3;
    */
   detail: string;
 
   /**
-   * with CODE_BUSY of TakeLease: ms; 0 = nobody knows. At most 3 600 000
+   * [0, 3600000]: with CODE_BUSY of TakeLease: ms; 0 = nobody knows
    *
    * @generated from field: uint32 wait_ms = 4;
    */
@@ -827,33 +855,35 @@ export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
  */
 export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
   /**
+   * [0, 15]
+   *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * as the server calls it; at most 24 bytes
+   * [0, 24] bytes: as the server calls it
    *
    * @generated from field: string name = 2;
    */
   name: string;
 
   /**
-   * what it is; at most 64 bytes
+   * [0, 64] bytes: what it is
    *
    * @generated from field: string model = 3;
    */
   model: string;
 
   /**
-   * axes that are measured …
+   * [1, 6]: axes that are measured …
    *
    * @generated from field: uint32 position_dof = 4;
    */
   positionDof: number;
 
   /**
-   * … and those with a motor; 1 … 6 each
+   * [1, 6]: … and those with a motor
    *
    * @generated from field: uint32 force_dof = 5;
    */
@@ -872,42 +902,42 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
   workspaceMaxM?: Vec3 | undefined;
 
   /**
-   * norm of the force the device can give out
+   * [0, 1e12]: norm of the force the device can give out
    *
    * @generated from field: double max_force_n = 8;
    */
   maxForceN: number;
 
   /**
-   * … for ever; 0 = not known
+   * [0, 1e12]: … for ever; 0 = not known
    *
    * @generated from field: double continuous_force_n = 9;
    */
   continuousForceN: number;
 
   /**
-   * what it can render stably; 0 = not known
+   * [0, 1e12]: what it can render stably; 0 = not known
    *
    * @generated from field: double max_stiffness_npm = 10;
    */
   maxStiffnessNpm: number;
 
   /**
-   * one encoder count at the handle; 0 = exact
+   * [0, 1e12]: one encoder count at the handle; 0 = exact
    *
    * @generated from field: double position_resolution_m = 11;
    */
   positionResolutionM: number;
 
   /**
-   * haptic steps per second; 1 … 1 000 000
+   * [1, 1000000]: haptic steps per second
    *
    * @generated from field: uint32 loop_hz = 12;
    */
   loopHz: number;
 
   /**
-   * 1 … 8, by number
+   * [1, 8] entries: by number
    *
    * @generated from field: repeated tendon.v1.ChannelDescription channels = 13;
    */
@@ -926,7 +956,7 @@ export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE_
  */
 export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   /**
-   * at most 24 bytes
+   * [0, 24] bytes
    *
    * @generated from field: string name = 1;
    */
@@ -940,12 +970,14 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
   /**
    * A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves. ≤ 3 600 000
    *
+   * [0, 3600000]
+   *
    * @generated from field: uint32 lease_ms = 3;
    */
   leaseMs: number;
 
   /**
-   * name of the client whose forces it takes, its first 24 bytes; empty = nobody's
+   * [0, 24] bytes: name of the client whose forces it takes, its first 24 bytes; empty = nobody's
    *
    * @generated from field: string holder = 4;
    */
@@ -969,7 +1001,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
   code: Code;
 
   /**
-   * at most 128 bytes
+   * [0, 128] bytes
    *
    * @generated from field: string reason = 2;
    */
@@ -991,21 +1023,21 @@ export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
  */
 export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   /**
-   * 1, 2, 3 … per session; 0 is refused
+   * [1, …]: 1, 2, 3 … per session
    *
    * @generated from field: uint64 number = 1;
    */
   number: bigint;
 
   /**
-   * end of the time it tells of
+   * [-2^60, 2^60]: end of the time it tells of
    *
    * @generated from field: sfixed64 until_ns = 2;
    */
   untilNs: bigint;
 
   /**
-   * … and its length
+   * [0, 2^60]: … and its length
    *
    * @generated from field: uint64 span_ns = 3;
    */
@@ -1042,14 +1074,14 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   lateEngine: bigint;
 
   /**
-   * longest time that the device was without a valid force
+   * [0, 2^60]: longest time that the device was without a valid force
    *
    * @generated from field: uint64 worst_late_ns = 8;
    */
   worstLateNs: bigint;
 
   /**
-   * longest time that nothing was heard of the client
+   * [0, 2^60]: longest time that nothing was heard of the client
    *
    * @generated from field: uint64 longest_gap_ns = 9;
    */
@@ -1071,21 +1103,21 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   toClient?: Delays | undefined;
 
   /**
-   * the client's clock less the server's
+   * [-2^60, 2^60]: the client's clock less the server's
    *
    * @generated from field: sint64 clock_offset_ns = 13;
    */
   clockOffsetNs: bigint;
 
   /**
-   * how fast that grows
+   * [-1e12, 1e12]: how fast that grows
    *
    * @generated from field: double clock_drift_ppm = 14;
    */
   clockDriftPpm: number;
 
   /**
-   * |true offset − clock_offset_ns| is at most this
+   * [0, 2^60]: |true offset − clock_offset_ns| is at most this
    *
    * @generated from field: uint64 clock_error_ns = 15;
    */
@@ -1114,7 +1146,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
   duplicated: bigint;
 
   /**
-   * why forces were late, for people; empty when none was. At most 128 bytes
+   * [0, 128] bytes: why forces were late, for people; empty when none was
    *
    * @generated from field: string words = 20;
    */
@@ -1133,11 +1165,15 @@ export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
  */
 export type Delays = Message<"tendon.v1.Delays"> & {
   /**
+   * [-2^60, 2^60]
+   *
    * @generated from field: sint64 median_ns = 1;
    */
   medianNs: bigint;
 
   /**
+   * [-2^60, 2^60]
+   *
    * @generated from field: sint64 p99_ns = 2;
    */
   p99Ns: bigint;
@@ -1157,28 +1193,28 @@ export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
  */
 export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   /**
-   * 1, 2, 3 … of the device; 0 is refused
+   * [1, …]: 1, 2, 3 … of the device
    *
    * @generated from field: uint64 number = 1;
    */
   number: bigint;
 
   /**
-   * end of the time it tells of
+   * [-2^60, 2^60]: end of the time it tells of
    *
    * @generated from field: sfixed64 until_ns = 2;
    */
   untilNs: bigint;
 
   /**
-   * … and its length
+   * [0, 2^60]: … and its length
    *
    * @generated from field: uint64 span_ns = 3;
    */
   spanNs: bigint;
 
   /**
-   * ≤ 15
+   * [0, 15]
    *
    * @generated from field: uint32 device = 4;
    */
@@ -1217,6 +1253,8 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
    * most 2^i µs, entry 23 all that were later than 2^22 µs. Zeros at the end are left out; together at most `steps`,
    * and fewer only where the server lost count of some.
    *
+   * [0, 24] entries
+   *
    * @generated from field: repeated uint64 lateness_us_log2 = 9 [packed = true];
    */
   latenessUsLog2: bigint[];
@@ -1227,14 +1265,14 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
   safety: Safety;
 
   /**
-   * why it gives no force until it is armed or rearmed, for people; empty: no fault. At most 128 bytes
+   * [0, 128] bytes: why it gives no force until it is armed or rearmed, for people; empty: no fault
    *
    * @generated from field: string fault = 11;
    */
   fault: string;
 
   /**
-   * what the server does less of at present, for people; empty: nothing. At most 128 bytes
+   * [0, 128] bytes: what the server does less of at present, for people; empty: nothing
    *
    * @generated from field: string degraded = 12;
    */
@@ -1255,28 +1293,28 @@ export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
  */
 export type PeerReport = Message<"tendon.v1.PeerReport"> & {
   /**
-   * ≤ 15
+   * [0, 15]
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
-   * ≤ 7
+   * [0, 7]
    *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
 
   /**
-   * of the engine; at most 64 bytes
+   * [0, 64] bytes: of the engine
    *
    * @generated from field: string name = 3;
    */
   name: string;
 
   /**
-   * of the states that it wants, it is sent one in so many: its way is full; 1 … 1000
+   * [1, 1000]: of the states that it wants, it is sent one in so many: its way is full
    *
    * @generated from field: uint32 state_one_in = 4;
    */
@@ -1309,7 +1347,7 @@ export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
  */
 export type Hello = Message<"tendon.v1.Hello"> & {
   /**
-   * 1 ≤ version_min ≤ version_max; the highest common version is used
+   * [1, …]: 1 ≤ version_min ≤ version_max; the highest common version is used
    *
    * @generated from field: uint32 version_min = 1;
    */
@@ -1326,21 +1364,21 @@ export type Hello = Message<"tendon.v1.Hello"> & {
   role: Role;
 
   /**
-   * for logs; at most 64 bytes
+   * [0, 64] bytes: for logs
    *
    * @generated from field: string name = 4;
    */
   name: string;
 
   /**
-   * offered; the intersection is used. At most 16 of at most 32 bytes
+   * [0, 16] entries of [0, 32] bytes: offered; the intersection is used
    *
    * @generated from field: repeated string features = 5;
    */
   features: string[];
 
   /**
-   * what is wanted, each once; at most 16. None: device 0, its channel 0, and `role`
+   * [0, 16] entries: what is wanted, each once. None: device 0, its channel 0, and `role`
    *
    * @generated from field: repeated tendon.v1.Claim claims = 6;
    */
@@ -1361,14 +1399,14 @@ export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
  */
 export type Claim = Message<"tendon.v1.Claim"> & {
   /**
-   * its name; empty: device 0. At most 24 bytes
+   * [0, 24] bytes: its name; empty: device 0
    *
    * @generated from field: string device = 1;
    */
   device: string;
 
   /**
-   * of a controller: its name; empty: channel 0. At most 24 bytes
+   * [0, 24] bytes: of a controller: its name; empty: channel 0
    *
    * @generated from field: string channel = 2;
    */
@@ -1421,14 +1459,14 @@ export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
  */
 export type Welcome = Message<"tendon.v1.Welcome"> & {
   /**
-   * within the range of the Hello
+   * [1, …]: within the range of the Hello
    *
    * @generated from field: uint32 version = 1;
    */
   version: number;
 
   /**
-   * those both ends know
+   * [0, 16] entries of [0, 32] bytes: those both ends know
    *
    * @generated from field: repeated string features = 2;
    */
@@ -1440,49 +1478,49 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
   role: Role;
 
   /**
-   * at most 64 bytes
+   * [0, 64] bytes
    *
    * @generated from field: string device_name = 4;
    */
   deviceName: string;
 
   /**
-   * norm of the force the device can give out
+   * [0, 1e12]: norm of the force the device can give out
    *
    * @generated from field: double max_force_n = 5;
    */
   maxForceN: number;
 
   /**
-   * one encoder count at the handle; 0 = exact
+   * [0, 1e12]: one encoder count at the handle; 0 = exact
    *
    * @generated from field: double position_resolution_m = 6;
    */
   positionResolutionM: number;
 
   /**
-   * haptic steps per second; 1 … 1 000 000
+   * [1, 1000000]: haptic steps per second
    *
    * @generated from field: uint32 loop_hz = 7;
    */
   loopHz: number;
 
   /**
-   * silence after which the server forgets this client; 1 ms … 1 h
+   * [1, 3600000]: silence after which the server forgets this client
    *
    * @generated from field: uint32 timeout_ms = 8;
    */
   timeoutMs: number;
 
   /**
-   * name and version; at most 64 bytes
+   * [0, 64] bytes: name and version
    *
    * @generated from field: string server = 9;
    */
   server: string;
 
   /**
-   * one for each Claim, in their order; fields 4 … 7 are of the first one's device
+   * [0, 16] entries: one for each Claim, in order; fields 4 … 7 are about the first
    *
    * @generated from field: repeated tendon.v1.Grant grants = 10;
    */
@@ -1501,13 +1539,15 @@ export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
  */
 export type Grant = Message<"tendon.v1.Grant"> & {
   /**
-   * the numbers that stand for the names of the claim from now on
+   * [0, 15]: the numbers that stand for the names of the claim from now on
    *
    * @generated from field: uint32 device = 1;
    */
   device: number;
 
   /**
+   * [0, 7]
+   *
    * @generated from field: uint32 channel = 2;
    */
   channel: number;
@@ -1537,7 +1577,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
   code: Code;
 
   /**
-   * at most 128 bytes
+   * [0, 128] bytes
    *
    * @generated from field: string detail = 2;
    */

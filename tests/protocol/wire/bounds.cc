@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/protocol/wire/bounds.h"
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "tendon.pb.h"
+#include "tests/protocol/examples.h"
+
+namespace tendon::bounds {
+namespace {
+
+namespace pb = tendon::v1;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+
+// ---- The grammar ----
+
+struct Range {
+  std::string least;      ///< as it is written
+  std::string most;       ///< empty: none
+  bool beyond = false;    ///< `least` itself is out of bounds
+  bool infinity = false;  ///< +infinity is within bounds
+};
+
+struct Bound {
+  std::optional<Range> value;
+  std::optional<Range> bytes;
+  std::set<int> entries;  ///< allowed numbers near the bounds
+  std::set<int> too_few_or_many;
+};
+
+/// "[0, 16]" or "{1, 3, 9}" entries: the numbers at the bounds, and those next to them.
+void take_entries(const std::string& text, Bound& to) {
+  static const std::regex kInterval(R"(\[(\d+), (\d+)\])");
+  std::smatch found;
+  if (std::regex_match(text, found, kInterval)) {
+    to.entries = {std::stoi(found[1]), std::stoi(found[2])};
+  } else {
+    static const std::regex kNumber(R"(\d+)");
+    for (std::sregex_iterator at(text.begin(), text.end(), kNumber), end; at != end; ++at) {
+      to.entries.insert(std::stoi(at->str()));
+    }
+  }
+  for (const int entries : to.entries) {
+    const bool inner = text.front() == '[';
+    if (!inner || entries == *to.entries.begin()) to.too_few_or_many.insert(entries - 1);
+    if (!inner || entries == *to.entries.rbegin()) to.too_few_or_many.insert(entries + 1);
+  }
+  for (const int entries : to.entries) to.too_few_or_many.erase(entries);
+  to.too_few_or_many.erase(-1);
+}
+
+Range range(const std::string& open, const std::string& least, const std::string& most, bool infinity) {
+  return {.least = least, .most = most == "…" ? "" : most, .beyond = open == "(", .infinity = infinity};
+}
+
+/// The bound at the front of a comment; empty when there is none.
+std::optional<Bound> bound_of(const std::string& comment) {
+  if (comment.empty() || std::string("[({").find(comment.front()) == std::string::npos) return {};
+  static const std::string kRange = R"(([\[(])([^,\]]+), ([^\]]+)\])";
+  static const std::string kEntries = R"((\[\d+, \d+\]|\{\d+(?:, \d+)*\}) entries)";
+  static const std::regex kForms("(?:" + kRange + "( bytes| or \\+infinity)?(?:, " + kEntries + ")?|" + kEntries +
+                                 "(?: of " + kRange + " bytes)?)(?::.*)?");
+  std::smatch found;
+  if (!std::regex_match(comment, found, kForms)) throw std::invalid_argument("no bound: " + comment);
+  Bound out;
+  if (found[1].matched && !(found[4] == "" && found[6].matched)) {
+    const Range read = range(found[1], found[2], found[3], found[4] == " or +infinity");
+    (found[4] == " bytes" ? out.bytes : out.value) = read;
+  }
+  if (found[5].matched) take_entries(found[5], out);
+  if (found[6].matched) take_entries(found[6], out);
+  if (found[7].matched) out.bytes = range(found[7], found[8], found[9], false);
+  return out;
+}
+
+/// By "Message.field".
+std::map<std::string, Bound> bounds_of(std::string_view proto) {
+  static const std::regex kMessage(R"(message (\w+) \{)");
+  static const std::regex kField(R"(\s+(?:optional |repeated )?[\w.]+ (\w+) = \d+(?: \[packed = true\])?;\s*// (.*))");
+  std::map<std::string, Bound> out;
+  std::string message;
+  std::istringstream lines{std::string(proto)};
+  std::smatch found;
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_match(line, found, kMessage)) {
+      message = found[1];
+    } else if (std::regex_match(line, found, kField)) {
+      const std::string name = message + '.' + found[1].str();
+      if (auto bound = bound_of(found[2])) out[name] = *std::move(bound);
+    }
+  }
+  return out;
+}
+
+double number(const std::string& text) { return text.find('^') == std::string::npos ? std::stod(text) : std::exp2(60); }
+
+std::int64_t whole(const std::string& text) {
+  if (text == "2^60") return std::int64_t{1} << 60;
+  if (text == "-2^60") return -(std::int64_t{1} << 60);
+  return std::stoll(text);
+}
+
+// ---- The cases ----
+
+/// What depends on another field too: what is right beyond the bound is refused all the same.
+bool is_bound_to_others(const std::string& path) {
+  static const std::regex kOthers(R"(.*\.(normal|workspace_min_m|workspace_max_m)\..*)");
+  return std::regex_match(path, kOthers);
+}
+
+class Maker {
+ public:
+  Maker(const std::map<std::string, Bound>& bounds, std::vector<Case>& out) : bounds_(bounds), out_(out) {}
+
+  /// All fields of `root`, and of the messages in it.
+  void make(Message& root) {
+    root_ = &root;
+    visit(root, "");
+  }
+
+  const std::set<std::string>& seen() const { return seen_; }
+
+ private:
+  void visit(Message& message, const std::string& path) {
+    const auto& type = *message.GetDescriptor();
+    const auto& reflection = *message.GetReflection();
+    for (int i = 0; i < type.field_count(); ++i) {
+      const FieldDescriptor& field = *type.field(i);
+      const std::string name = (path.empty() ? type.name() : path) + '.' + field.name();
+      if (field.is_repeated() && reflection.FieldSize(message, &field) == 0) continue;  // a later example has some
+      if (fresh(name)) mutate(message, field, name);
+      if (field.cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
+      const std::string& inner_type = field.message_type()->name();
+      const bool is_choice = type.name() == "Frame" || type.name() == "Answer" || type.name() == "Control";
+      const bool once = is_choice || field.is_repeated() || inner_type == "LinkReport" || inner_type == "Delays";
+      const std::string inner = once ? inner_type : name;
+      if (field.is_repeated()) {
+        const int size = reflection.FieldSize(message, &field);
+        for (int k = 0; k < size; ++k) visit(*reflection.MutableRepeatedMessage(&message, &field, k), inner);
+      } else if (reflection.HasField(message, &field)) {
+        visit(*reflection.MutableMessage(&message, &field), inner);
+      }
+    }
+  }
+
+  bool fresh(const std::string& path) { return paths_.insert(path).second; }
+
+  void mutate(Message& message, const FieldDescriptor& field, const std::string& path) {
+    const auto found = bounds_.find(field.containing_type()->name() + '.' + field.name());
+    const bool is_enum = field.cpp_type() == FieldDescriptor::CPPTYPE_ENUM;
+    if (found == bounds_.end() && !is_enum) return;
+    const std::string original = message.SerializeAsString();
+    const auto& reflection = *message.GetReflection();
+    const auto add = [&](const std::string& value, bool accepted, const std::function<void()>& change) {
+      if (accepted && is_bound_to_others(path)) return;
+      change();
+      const std::string bytes = root_->SerializeAsString();
+      const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());
+      out_.push_back({root_->GetDescriptor()->name(), path, value, accepted, {begin, begin + bytes.size()}});
+      message.ParseFromString(original);
+    };
+    if (is_enum) {
+      const auto& type = *field.enum_type();
+      const int last = type.value(type.value_count() - 1)->number();
+      for (const int value : {0, 1, last, last + 1}) {
+        add(std::to_string(value), value >= 1 && value <= last,
+            [&] { reflection.SetEnumValue(&message, &field, value); });
+      }
+      return;
+    }
+    seen_.insert(found->first);
+    const Bound& bound = found->second;
+    if (bound.value && field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
+      const auto set = [&](double value, bool accepted) {
+        std::ostringstream words;
+        words.precision(17);
+        words << value;
+        add(words.str(), accepted, [&] {
+          if (field.is_repeated()) return reflection.SetRepeatedDouble(&message, &field, 0, value);
+          reflection.SetDouble(&message, &field, value);
+        });
+      };
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      const double least = number(bound.value->least);
+      const double most = number(bound.value->most);
+      set(least, !bound.value->beyond);
+      set(std::nextafter(least, bound.value->beyond ? kInfinity : -kInfinity), bound.value->beyond);
+      set(most, true);
+      set(std::nextafter(most, kInfinity), false);
+      set(kInfinity, bound.value->infinity);
+      set(-kInfinity, false);
+      set(std::numeric_limits<double>::quiet_NaN(), false);
+    } else if (bound.value) {
+      const auto set = [&](std::int64_t value, bool accepted) {
+        add(std::to_string(value), accepted, [&] {
+          switch (field.cpp_type()) {
+            case FieldDescriptor::CPPTYPE_INT64:
+              return reflection.SetInt64(&message, &field, value);
+            case FieldDescriptor::CPPTYPE_UINT64:
+              return reflection.SetUInt64(&message, &field, static_cast<std::uint64_t>(value));
+            case FieldDescriptor::CPPTYPE_UINT32:
+              return reflection.SetUInt32(&message, &field, static_cast<std::uint32_t>(value));
+            default:
+              throw std::invalid_argument(path + ": bounds.cc does not set its type yet");
+          }
+        });
+      };
+      const std::int64_t least = whole(bound.value->least);
+      set(least, true);
+      if (least > 0 || field.cpp_type() == FieldDescriptor::CPPTYPE_INT64) set(least - 1, false);
+      if (!bound.value->most.empty()) {
+        set(whole(bound.value->most), true);
+        set(whole(bound.value->most) + 1, false);
+      }
+    }
+    if (bound.bytes) {
+      for (const std::int64_t size : {whole(bound.bytes->most), whole(bound.bytes->most) + 1}) {
+        add(std::to_string(size) + " bytes", size <= whole(bound.bytes->most), [&] {
+          const std::string text(static_cast<std::size_t>(size), 'x');
+          if (field.is_repeated()) return reflection.SetRepeatedString(&message, &field, 0, text);
+          reflection.SetString(&message, &field, text);
+        });
+      }
+    }
+    const auto resized = [&](int size, bool accepted) {
+      add(std::to_string(size) + " entries", accepted, [&] { resize(message, field, size); });
+    };
+    for (const int size : bound.entries) resized(size, true);
+    for (const int size : bound.too_few_or_many) resized(size, false);
+  }
+
+  /// New entries are zeros, letters, or copies of the last one (claims and grants of other devices, which are to be
+  /// there once each); a frame is an empty one, as a newer peer may send it.
+  static void resize(Message& message, const FieldDescriptor& field, int size) {
+    const auto& reflection = *message.GetReflection();
+    while (reflection.FieldSize(message, &field) > size) reflection.RemoveLast(&message, &field);
+    while (reflection.FieldSize(message, &field) < size) {
+      const int last = reflection.FieldSize(message, &field) - 1;
+      switch (field.cpp_type()) {
+        case FieldDescriptor::CPPTYPE_DOUBLE:
+          reflection.AddDouble(&message, &field, 0);
+          break;
+        case FieldDescriptor::CPPTYPE_UINT64:
+          reflection.AddUInt64(&message, &field, 0);
+          break;
+        case FieldDescriptor::CPPTYPE_STRING:
+          reflection.AddString(&message, &field, "x");
+          break;
+        default: {
+          Message& entry = *reflection.AddMessage(&message, &field);
+          if (last >= 0 && field.name() != "frames") {
+            entry.CopyFrom(reflection.GetRepeatedMessage(message, &field, last));
+          }
+          if (auto* const claim = dynamic_cast<pb::Claim*>(&entry)) claim->set_device("d" + std::to_string(last));
+          if (auto* const grant = dynamic_cast<pb::Grant*>(&entry)) {  // two for each device, none twice
+            grant->set_device(static_cast<std::uint32_t>(last / 2));
+            grant->set_channel(static_cast<std::uint32_t>(2 + last % 2));
+          }
+        }
+      }
+    }
+  }
+
+  const std::map<std::string, Bound>& bounds_;
+  std::vector<Case>& out_;
+  Message* root_ = nullptr;
+  std::set<std::string> paths_;
+  std::set<std::string> seen_;
+};
+
+bool needs_a_bound(const FieldDescriptor& field) {
+  switch (field.type()) {
+    case FieldDescriptor::TYPE_DOUBLE:
+    case FieldDescriptor::TYPE_SFIXED64:
+    case FieldDescriptor::TYPE_SINT64:
+    case FieldDescriptor::TYPE_STRING:
+      return true;
+    default:
+      return field.is_repeated();
+  }
+}
+
+}  // namespace
+
+std::vector<Case> cases(std::string_view proto) {
+  const auto bounds = bounds_of(proto);
+  const auto& file = *pb::Datagram::descriptor()->file();
+  for (int i = 0; i < file.message_type_count(); ++i) {
+    for (int k = 0; k < file.message_type(i)->field_count(); ++k) {
+      const FieldDescriptor& field = *file.message_type(i)->field(k);
+      const std::string name = file.message_type(i)->name() + '.' + field.name();
+      if (needs_a_bound(field) && !bounds.contains(name)) throw std::invalid_argument(name + " has no bound");
+    }
+  }
+  std::vector<Case> out;
+  Maker maker(bounds, out);
+  for (const auto& [name, datagram] : examples::datagrams()) {
+    const auto body = [&](std::size_t at) { return std::span(datagram).subspan(at); };
+    const auto parse = [](Message& message, std::span<const std::byte> bytes) {
+      if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+        throw std::invalid_argument("an example");
+    };
+    if (const auto hello = decode_hello(datagram)) {
+      pb::Hello message;
+      parse(message, hello->body);
+      maker.make(message);
+    } else if (const auto answer = decode_answer(datagram)) {
+      pb::Answer message;
+      parse(message, answer->body);
+      maker.make(message);
+    } else if (!decode_retry(datagram)) {
+      pb::Datagram message;
+      parse(message, body(kHeaderSize));
+      maker.make(message);
+    }
+  }
+  for (const auto& [name, bound] : bounds) {
+    if (!maker.seen().contains(name)) throw std::invalid_argument("no example holds " + name);
+  }
+  return out;
+}
+
+}  // namespace tendon::bounds

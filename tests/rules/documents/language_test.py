@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rules of language that a machine can hold, over all files of the tree:
+
+    columns   prose of Markdown pages has at most 120 columns (wrap.py wraps it)
+    name      a test's name, suite and dot included, has at most 70 characters
+    cleft     no sentence of a page or a comment begins with "Of what", or is of the form "What … is …."
+
+remaining.txt lists what still breaks a rule, as "RULE COUNT PATH". Its counts only shrink: the test fails when a file has
+more than is listed there. `language_test.py ROOT --write` writes the list anew.
+"""
+
+import collections
+import pathlib
+import re
+import subprocess
+import sys
+
+sys.dont_write_bytecode = True
+import wrap  # noqa: E402
+
+REMAINING = pathlib.Path(__file__).with_name("remaining.txt")
+NOT_PROSE = ("CHANGELOG.md", "tests/tools/bench/RESULTS.md")  # what was said then; written by a program
+TEST = re.compile(r"^\s*(?:TEST|TEST_F|TEST_P|TYPED_TEST|TYPED_TEST_P|RC_GTEST_PROP)\(\s*(\w+),\s*(\w+)", re.M)
+COMMENT = {
+    **dict.fromkeys((".h", ".cc", ".ts", ".js", ".mjs", ".proto"), re.compile(r"^\s*(?://[/<!]*|/?\*+/?)\s?(.*)|//[/<]*\s(.*)")),
+    **dict.fromkeys((".py", ".sh", ".cmake", ".toml", ".txt"), re.compile(r"^\s*#+\s?(.*)")),
+}
+# A clause of its own, which may have its verb: "What follows the header; empty when it is not authentic."
+_PLAIN = r"(?:(?!\b(?:when|as|if|that|who|which|where|whether|has|have)\b)[^.?!:;|])*?"
+_BE = r"(?:is|are|was|were)"
+CLEFT = re.compile(
+    r"(?:^|(?<=[.!?:] ))(?:Of what\b|What (?![^.?!]*\?)"
+    rf"(?:{_BE}\b{_PLAIN}\b(?:{_BE}|has|does|may|must|can|cannot|goes|comes|says|becomes|needs)\b|(?!{_BE}){_PLAIN}\b{_BE}\b)"
+    r"(?! and\b|[,;.])[^.?!:|]*\.)"
+)
+
+
+def paragraphs(path, text):
+    """(line, words) of each paragraph of a page, or of each comment of a source."""
+    lines = text.split("\n")
+    if path.endswith(".md"):
+        at = 1
+        for prose, block in wrap.blocks(text):
+            if prose:
+                yield at, " ".join(line.strip().lstrip("*->0123456789. ") for line in block)
+            at += len(block)
+        return
+    comment = COMMENT.get(pathlib.PurePath(path).suffix)
+    if comment is None:
+        return
+    begun, words = 0, []
+    for number, line in enumerate([*lines, ""], 1):
+        found = comment.search(line)
+        said = next((group for group in found.groups() if group), "") if found else ""
+        whole = found is not None and found.start() == 0 and line.strip()[:2] != "" and found.groups()[0] is not None
+        if words and not (whole and said):
+            yield begun, " ".join(words)
+            words = []
+        if said and whole:
+            begun = begun if words else number
+            words.append(said.strip())
+        elif said:
+            yield number, said.strip()
+
+
+def broken(path, text):
+    """(rule, line, words) of all that breaks a rule in one file."""
+    if path.endswith(".md") and path not in NOT_PROSE:
+        for number in wrap.too_long(text):
+            yield "columns", number, "more than 120 columns; run tests/rules/documents/wrap.py " + path
+    if path.endswith(".cc"):
+        for found in TEST.finditer(text):
+            name = f"{found[1]}.{found[2]}"
+            if len(name) > 70:
+                yield "name", text.count("\n", 0, found.start(2)) + 1, f"{name} has {len(name)} characters"
+    if path not in NOT_PROSE and not path.startswith("tests/rules/documents/"):
+        for number, words in paragraphs(path, text):
+            for found in CLEFT.finditer(words):
+                yield "cleft", number, "subject, verb, object: " + found[0]
+
+
+def check_the_rules():
+    """The rules find what they are for, and let other sentences be."""
+
+    def rules(path, text):
+        return [rule for rule, _, _ in broken(path, text)]
+
+    assert rules("a.md", "a " * 70) == ["columns"]
+    assert rules("a.md", "| " + "a " * 70 + "|") == []
+    assert rules("a.md", "```\n" + "a " * 70 + "\n```") == []
+    assert rules("a_test.cc", f"TEST(A, {'B' * 69})") == ["name"]
+    assert rules("a_test.cc", f"TEST(A, {'B' * 68})") == []
+    assert rules("a.h", "/// Of what was sent that is followed.") == ["cleft"]
+    assert rules("a.h", "/// It ends. What is empty is\n/// not there.") == ["cleft"]
+    assert rules("a.h", "int a;  ///< What is empty is not there.") == ["cleft"]
+    assert rules("a.py", "# What is empty is not there.") == ["cleft"]
+    assert rules("a.md", "* What is empty is not there.") == ["cleft"]
+    assert rules("a.md", "What is it? It is a hand. Nobody knows what is there.") == []
+    assert rules("a.md", "## What is here") == []
+    assert rules("a.h", "/// What is wanted at `hand`.") == []
+    assert rules("a.h", "/// What a device is and can do.") == []
+    assert rules("a.h", "/// What follows the header; empty when it is not there.") == []
+    assert rules("a.h", "/// What the server drops before there is a session: junk.") == []
+
+
+def main():
+    check_the_rules()
+    root = pathlib.Path(sys.argv[1])
+    listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout.split("\n")
+    found = collections.defaultdict(list)
+    for path in listed:
+        if pathlib.PurePath(path).suffix not in (".md", *COMMENT) or not (root / path).is_file():
+            continue
+        for rule, line, words in broken(path, (root / path).read_text(encoding="utf-8")):
+            found[rule, path].append(f"{path}:{line}: {words}")
+    if "--write" in sys.argv:
+        rows = [f"{rule} {len(lines)} {path}\n" for (rule, path), lines in sorted(found.items())]
+        REMAINING.write_text("".join(rows), encoding="utf-8")
+    allowed = {}
+    for row in REMAINING.read_text(encoding="utf-8").splitlines():
+        rule, count, path = row.split(" ", 2)
+        allowed[rule, path] = int(count)
+    bad = [line for key, lines in found.items() if len(lines) > allowed.get(key, 0) for line in lines]
+    print("\n".join(bad))
+    left, now = sum(allowed.values()), sum(map(len, found.values()))
+    print(f"{now} breaks of the rules are left; remaining.txt allows {left}" + ("; shrink it" if now < left else ""))
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
