@@ -218,7 +218,7 @@ describe("the programs", () => {
     const wrong: [string, string[], RegExp][] = [
       ["examples/virtual_wall", ["--server", "there"], /--server: expected HOST:PORT .* got "there"/],
       ["examples/virtual_wall", ["--server", "127.0.0.1:70000"], /--server.*127.0.0.1:70000/],
-      ["examples/virtual_wall", ["--server", "127.0.0.1.evil.example:1"], /--server/],
+      ["examples/virtual_wall", ["--server", "[evil.example]:1"], /--server/],
       ["examples/virtual_wall", ["--stiffness-n-per-m", "nan"], /--stiffness-n-per-m: expected 0 to .* got "nan"/],
       ["examples/virtual_wall", ["--key", join(folder, "none")], /--key: .*none: .*no such file/],
       ["examples/virtual_wall", ["--key", open], /--key: .*others may read this key/],
