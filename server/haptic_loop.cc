@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/haptic_loop.h"
 
+#include <array>
 #include <stdexcept>
 #include <utility>
 
@@ -43,10 +44,15 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
 }
 
 void HapticLoop::take_mail(LocalTime now) noexcept {
-  while (const HapticOrder* order = mail_.orders.front()) {
+  std::array<HapticOrder, Mailboxes::kOrders> released;
+  std::size_t releases = 0;
+  for (std::size_t i = 0; i < Mailboxes::kOrders; ++i) {
+    const HapticOrder* const order = mail_.orders.front();
+    if (order == nullptr) break;
     switch (order->kind) {
       case HapticOrder::Kind::kRelease:
         controller_.release(now, order->source, order->channel);
+        released[releases++] = *order;
         break;
       case HapticOrder::Kind::kDisarm:
         disarmed_ = true;
@@ -64,6 +70,9 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
     if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
   }
+  // The last force of a source that has gone may have lain in its box until now: it must not count as fresh. Releasing
+  // twice does no harm, because a source's number is never given again.
+  for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
 }
 
 LocalTime HapticLoop::step(LocalTime now) noexcept {

@@ -49,12 +49,15 @@ struct Mailboxes {
     std::size_t datagrams = 4096;
   };
 
+  /// Orders that can wait: more than guests come and go within a haptic step.
+  static constexpr std::size_t kOrders = 16;
+
   explicit Mailboxes(const Capacities& capacities)
       : steps(capacities.steps), flight(capacities.flight), datagrams(capacities.datagrams) {}
   Mailboxes() : Mailboxes(Capacities{}) {}
 
   std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
-  SpscRing<HapticOrder> orders{16};
+  SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -15,10 +14,6 @@ namespace tendon {
 namespace {
 
 constexpr std::size_t kMaxNotices = 64;
-
-/// How often a controller is told how its forces fare, and an observer how loops and engines do: often enough to look
-/// at, and nothing beside 1000 states.
-constexpr Duration kReportPeriod = std::chrono::seconds(1);
 
 /// What this server can do beyond the version's minimum.
 constexpr std::array<std::string_view, 3> kFeatures = {kFeatureLocalModel, kFeatureChannels, kFeatureDiagnostics};
@@ -52,56 +47,22 @@ void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
   sum.stale += link.stale;
 }
 
-/// What a key lets its holder do.
-bool may(const ClientKey* key, Role role) {
-  return key == nullptr || key->role == Role::kController || role == Role::kObserver;
-}
-
-/// The place of the one of that name; the first, when none is named.
-template <class Named>
-std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
-  if (name.empty()) return 0;
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
-  if (found == all.end()) return std::nullopt;
-  return static_cast<std::uint32_t>(found - all.begin());
-}
-
-template <class Named>
-std::string names_of(const std::vector<Named>& all) {
-  std::string names;
-  for (const Named& one : all) names += (names.empty() ? "\"" : ", \"") + one.name + "\"";
-  return names;
-}
-
-template <class Named>
-void check_names(const std::vector<Named>& all, std::size_t most, const std::string& what) {
-  if (all.empty() || all.size() > most) {
-    throw std::invalid_argument("expected 1 to " + std::to_string(most) + " " + what + "s, got " +
-                                std::to_string(all.size()));
-  }
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (place_of(all, all[i].name) != i) throw std::invalid_argument("two " + what + "s have one name: " + all[i].name);
-  }
-}
-
 }  // namespace
 
 NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes*> mail)
     : config_(config),
       link_(link),
       doorman_({.secret = config.secret, .keys = config.keys}),
+      admission_({.keys = config.keys.size(), .max_observers = config.max_observers}, devices_, guests_),
+      leases_(devices_, config.takeover),
+      reports_(devices_, guests_),
       next_connection_id_(config.first_connection_id) {
   half_open_.reserve(config.max_half_open);
   config_.secret = {};  // the doorman has what it needs of it
-  check_names(config.devices, limits::kMaxDevices, "device");
+  check_devices(config.devices);
   if (mail.size() != config.devices.size()) throw std::invalid_argument("expected mailboxes for each device");
   for (std::size_t i = 0; i < mail.size(); ++i) {
-    Device& device = devices_.emplace_back(Device{.about = config.devices[i],
-                                                  .mail = mail[i],
-                                                  .sampled = std::vector<Sampled>(kRemembered),
-                                                  .channels = {},
-                                                  .told = {}});
-    check_names(device.about.channels, limits::kMaxChannels, "channel");
+    ServedDevice& device = devices_.emplace_back(ServedDevice{.about = config.devices[i], .mail = mail[i]});
     device.about.device = static_cast<std::uint32_t>(i);
     device.channels.resize(device.about.channels.size());
   }
@@ -113,7 +74,7 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   const bool more = drain(now);
   report(now);
   for (Guest& guest : guests_) {
-    guest.session.tick(now);
+    if (!guest.gone) guest.session.tick(now);
     take_events(now, guest);
     if (guest.role == Role::kController) stats_.controller = guest.session.stats();
     send_all(now, guest);
@@ -154,7 +115,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
     return;
   }
   const auto is_meant = [&](const Guest& guest) {
-    return guest.session.connection_id() == header->connection_id && (guest.key != nullptr || guest.address == from);
+    return !guest.gone && guest.id() == header->connection_id && (guest.key != nullptr || guest.address == from);
   };
   if (const auto guest = std::find_if(guests_.begin(), guests_.end(), is_meant); guest != guests_.end()) {
     const bool newest = guest->session.receive(now, datagram);
@@ -183,88 +144,6 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   if (reply.size > 0) send(now, from, std::span(answer).first(reply.size));
 }
 
-/// The numbers of what it claims.
-std::variant<std::vector<NetworkLoop::Seat>, NetworkLoop::Refusal> NetworkLoop::seats_of(const Hello& hello) const {
-  if (hello.claims.empty()) return std::vector<Seat>{{.device = 0, .channel = 0, .role = hello.role}};
-  std::vector<Seat> seats;
-  Role highest = Role::kObserver;
-  for (const Claim& claim : hello.claims) {
-    const auto device = place_of(config_.devices, claim.device);
-    if (!device) {
-      return Refusal{Code::kInvalid, "there is no device \"" + claim.device + "\", but " + names_of(config_.devices)};
-    }
-    const auto& channels = config_.devices[*device].channels;
-    const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
-    if (!channel) {
-      return Refusal{Code::kInvalid, "there is no channel \"" + claim.channel + "\", but " + names_of(channels)};
-    }
-    const bool twice = std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-      return seat.device == *device && seat.channel == *channel && seat.role == claim.role;
-    });
-    if (twice) return Refusal{Code::kInvalid, "the same is claimed twice"};
-    highest = std::max(highest, claim.role);
-    seats.push_back({.device = *device, .channel = *channel, .role = claim.role, .by_name = true});
-  }
-  if (highest != hello.role) return Refusal{Code::kInvalid, "the role is not the highest of the claims'"};
-  return seats;
-}
-
-/// The same program, started again.
-bool NetworkLoop::takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
-                                     const std::vector<Seat>& seats) {
-  if (key != present.key) return false;
-  if (present.address == from) return true;
-  return key != nullptr && std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-           return seat.role == Role::kController && sits_on(present, seat.device, seat.channel);
-         });
-}
-
-std::optional<NetworkLoop::Refusal> NetworkLoop::reason_to_refuse(const Address& from, const ClientKey* key,
-                                                                  const std::vector<Seat>& seats) const {
-  if (key == nullptr && !config_.keys.empty()) {
-    return Refusal{Code::kDenied, "this server lets in those who have a key: --key FILE"};
-  }
-  const bool controls =
-      std::any_of(seats.begin(), seats.end(), [](const Seat& s) { return s.role == Role::kController; });
-  if (!may(key, controls ? Role::kController : Role::kObserver)) {
-    return Refusal{Code::kDenied, "the key \"" + key->name + "\" is an observer's"};
-  }
-  for (const Seat& seat : seats) {
-    const Device& device = devices_[seat.device];
-    const bool can_wait = seat.by_name && device.about.channels[seat.channel].lease > Duration::zero();
-    const Guest* const holder = holder_of(device.channels[seat.channel]);
-    if (seat.role != Role::kController || holder == nullptr || can_wait) continue;
-    if (takes_the_place_of(*holder, from, key, seats)) continue;
-    return Refusal{Code::kBusy, "the device is controlled by \"" + holder->name + "\" at " +
-                                    to_string(holder->address) + "; observers are welcome"};
-  }
-  const auto observers = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
-    return !g.gone && g.role == Role::kObserver && !takes_the_place_of(g, from, key, seats);
-  }));
-  // Whoever waits for a lease is no observer, but one more who gets states.
-  const auto guests = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
-    return !g.gone && !takes_the_place_of(g, from, key, seats);
-  }));
-  std::size_t channels = 0;
-  for (const Device& device : devices_) channels += device.channels.size();
-  if (!controls && observers >= config_.max_observers) {
-    return Refusal{Code::kBusy, "there are " + std::to_string(observers) + " observers already"};
-  }
-  if (!controls && config_.keys.size() > 1) {
-    const auto of_key = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
-      return !g.gone && g.role == Role::kObserver && g.key == key && !takes_the_place_of(g, from, key, seats);
-    }));
-    // Half of the places, at least one: no key can keep all the others out.
-    if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {
-      return Refusal{Code::kBusy, "the key \"" + key->name + "\" has " + std::to_string(of_key) + " observers already"};
-    }
-  }
-  if (guests >= config_.max_observers + channels) {
-    return Refusal{Code::kBusy, "there are " + std::to_string(guests) + " guests already"};
-  }
-  return std::nullopt;
-}
-
 /// Our answer was lost and the guest asks again: the same answer. In suite 1 it may come from anywhere, it is of
 /// use to one who holds the ephemeral key only.
 bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest) {
@@ -284,14 +163,14 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
 
   std::array<std::byte, kMaxDatagram> answer;
   const Role role = guest.hello.role;
-  auto claimed = seats_of(guest.hello);
+  auto claimed = admission_.seats_of(guest.hello);
   std::optional<Refusal> refusal;
   if (guest.version == 0) {
     refusal = Refusal{Code::kUnsupported, "no protocol version in common"};
   } else if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) {
     refusal = std::move(*cannot_be);
   } else {
-    refusal = reason_to_refuse(from, guest.key, std::get<std::vector<Seat>>(claimed));
+    refusal = admission_.reason_to_refuse(from, guest.key, std::get<std::vector<Seat>>(claimed));
   }
   if (refusal) {
     ++stats_.refused;
@@ -318,11 +197,9 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   welcome.loop_hz = first.loop_hz;
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
+  welcome.grants = admission_.grants_of(from, guest.key, seats);
   std::vector<View> views;
   for (const Seat& seat : seats) {
-    const Guest* const holder = holder_of(devices_[seat.device].channels[seat.channel]);
-    const bool free = holder == nullptr || takes_the_place_of(*holder, from, guest.key, seats);
-    if (seat.by_name) welcome.grants.push_back({seat.device, seat.channel, free ? seat.role : Role::kObserver});
     const bool seen =
         std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == seat.device; });
     if (!seen) views.push_back({.device = seat.device});
@@ -354,14 +231,14 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
 /// From here on the guest is one of ours.
 void NetworkLoop::open(LocalTime now, Guest guest) {
   // While it was half-open somebody else may have come.
-  if (const auto refusal = reason_to_refuse(guest.address, guest.key, guest.seats)) {
+  if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats)) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
     guest.session.close(refusal->code, refusal->reason);
     return send_all(now, guest);
   }
   for (Guest& present : guests_) {
-    if (present.gone || !takes_the_place_of(present, guest.address, guest.key, guest.seats)) continue;
+    if (present.gone || !Admission::takes_the_place_of(present, guest.address, guest.key, guest.seats)) continue;
     if (present.address == guest.address) {
       leave(present, "started again");
     } else {
@@ -382,84 +259,37 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   Guest& arrived = guests_.back();
   for (const Seat& seat : arrived.seats) {
     if (seat.role != Role::kController) continue;
-    const Guest* const holder = holder_of(devices_[seat.device].channels[seat.channel]);
+    const Guest* const holder = holder_of(guests_, devices_[seat.device].channels[seat.channel]);
     if (holder == nullptr) {
-      hold(now, arrived, seat.device, seat.channel);
+      leases_.hold(now, arrived, seat.device, seat.channel);
     } else if (arrived.can_lose) {  // to one that was half-open for a while, this may be news
       arrived.session.request(LeaseLost{.device = seat.device, .channel = seat.channel, .to = holder->name});
     }
   }
 }
 
-const NetworkLoop::Guest* NetworkLoop::holder_of(const Channel& channel) const {
-  if (channel.holder == 0) return nullptr;
-  const auto found = std::find_if(guests_.begin(), guests_.end(), [&](const Guest& guest) {
-    return !guest.gone && guest.session.connection_id() == channel.holder;
-  });
-  return found == guests_.end() ? nullptr : &*found;
-}
-
-bool NetworkLoop::sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel) {
-  return std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
-    return seat.device == device && seat.channel == channel && seat.role == Role::kController;
-  });
-}
-
-bool NetworkLoop::may_take_over(const Guest& guest) const {
-  const std::string& name = guest.key != nullptr ? guest.key->name : guest.name;
-  return std::find(config_.takeover.begin(), config_.takeover.end(), name) != config_.takeover.end();
-}
-
-void NetworkLoop::hold(LocalTime now, Guest& guest, std::uint32_t device, std::uint32_t channel) {
-  Channel& held = devices_[device].channels[channel];
-  held.holder = guest.session.connection_id();
-  held.renewed = now;
-  held.lateness.begin(now);
-}
-
-void NetworkLoop::free(std::uint32_t device, std::uint32_t channel) {
-  Channel& held = devices_[device].channels[channel];
-  // A full ring means 16 orders wait: the haptic thread stands still, and age will do the same a little later.
-  devices_[device].mail->orders.try_push({HapticOrder::Kind::kRelease, channel, held.holder});
-  held.holder = 0;
-  held.lateness.end();
-}
-
-/// The holder loses the channel to the guest of the name `to`.
-void NetworkLoop::dispossess(LocalTime now, std::uint32_t device, std::uint32_t channel, const std::string& to) {
-  const std::uint32_t id = devices_[device].channels[channel].holder;
-  free(device, channel);
-  const auto loser = std::find_if(guests_.begin(), guests_.end(), [&](const Guest& guest) {
-    return !guest.gone && guest.session.connection_id() == id;
-  });
-  if (loser == guests_.end()) return;
-  notice(false, "\"" + to + "\" takes " + devices_[device].about.name + "/" +
-                    devices_[device].about.channels[channel].name + " from \"" + loser->name + "\"");
-  if (loser->can_lose && loser->session.request(LeaseLost{.device = device, .channel = channel, .to = to})) return;
+/// The guest with the connection id `loser` has lost a channel to the guest of the name `to`.
+void NetworkLoop::dispossess(LocalTime now, std::uint32_t loser, const TakeLease& lost, const std::string& to) {
+  const auto guest =
+      std::find_if(guests_.begin(), guests_.end(), [&](const Guest& one) { return !one.gone && one.id() == loser; });
+  if (guest == guests_.end()) return;
+  const DeviceDescription& about = devices_[lost.device].about;
+  notice(false, "\"" + to + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
+                    guest->name + "\"");
+  const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = to};
+  if (guest->can_lose && guest->session.request(news)) return;
   // It cannot be told otherwise, or does not answer.
-  loser->session.close(Code::kReplaced, "\"" + to + "\" has taken this place");
-  send_all(now, *loser);
+  guest->session.close(Code::kReplaced, "\"" + to + "\" has taken this place");
+  send_all(now, *guest);
   ++stats_.replaced;
-  leave(*loser, "replaced by \"" + to + "\"");
+  leave(*guest, "replaced by \"" + to + "\"");
 }
 
 void NetworkLoop::take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted) {
-  Device& device = devices_[wanted.device];
-  Channel& channel = device.channels[wanted.channel];
-  const Duration lease = device.about.channels[wanted.channel].lease;
-  const Guest* const holder = holder_of(channel);
-  if (holder != nullptr && holder != &guest) {
-    const Duration left = channel.renewed + lease - now;
-    const bool over = lease > Duration::zero() && left <= Duration::zero();
-    if (!over && (lease == Duration::zero() || !may_take_over(guest))) {
-      return guest.session.answer(id, Code::kBusy, "\"" + holder->name + "\" holds it",
-                                  lease > Duration::zero() ? left : Duration::zero());
-    }
-    ++channel.handovers;
-    dispossess(now, wanted.device, wanted.channel, guest.name);
-  }
-  if (holder != &guest) hold(now, guest, wanted.device, wanted.channel);
-  guest.session.answer(id, Code::kOk, {});
+  const Guest* const holder = holder_of(guests_, devices_[wanted.device].channels[wanted.channel]);
+  const Leases::Answer answer = leases_.take(now, guest, holder, wanted);
+  if (answer.loser != 0) dispossess(now, answer.loser, wanted, guest.name);
+  guest.session.answer(id, answer.code, answer.reason, answer.wait);
 }
 
 void NetworkLoop::adapt(LocalTime now, Guest& guest) {
@@ -481,8 +311,8 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
 
 void NetworkLoop::measure(LocalTime now, Guest& guest) {
   for (const Seat& seat : guest.seats) {
-    Channel& channel = devices_[seat.device].channels[seat.channel];
-    if (channel.holder == guest.session.connection_id()) channel.lateness.heard(now);
+    ServedChannel& channel = devices_[seat.device].channels[seat.channel];
+    if (channel.holder == guest.id()) channel.lateness.heard(now);
   }
   if (guest.meter) {
     guest.meter->heard(now);
@@ -494,131 +324,19 @@ void NetworkLoop::measure(LocalTime now, Guest& guest) {
   adapt(now, guest);
 }
 
-/// To the operator, channel by channel; to each holder, of all its channels together; to observers that ask, of each
-/// device and each channel.
 void NetworkLoop::report(LocalTime now) {
-  if (now - reported_ < kReportPeriod) return;
-  std::map<std::uint32_t, Lateness::Report> told;  // by connection id
-  for (Device& device : devices_) {
-    for (std::size_t i = 0; i < device.channels.size(); ++i) {
-      Channel& channel = device.channels[i];
-      const Lateness::Report& report = channel.newest = channel.lateness.report(now);
-      stats_.late_ours += report.late_ours;
-      stats_.late_network += report.late_network;
-      stats_.late_engine += report.late_engine;
-      channel.late += report.late();
-      if (channel.holder != 0) told[channel.holder].add(report);
-      if (report.text.empty()) continue;
-      const bool only_one = devices_.size() == 1 && device.channels.size() == 1;
-      notice(true, (only_one ? "" : device.about.name + "/" + device.about.channels[i].name + ": ") + report.text);
-    }
-  }
-  for (Guest& guest : guests_) {
-    if (!guest.meter) continue;
-    const LinkMeter::Report link = guest.meter->report(now);
-    tell_of_engine(now, guest, link);
-    const Lateness::Report& forces = told[guest.session.connection_id()];
-    if (forces.forces == 0 && forces.late() == 0) continue;
-    LinkReport report = link_report(now, guest, link, forces);
-    report.number = ++guest.reports;
-    guest.session.send(report);
-  }
-  tell_of_devices();
-  reported_ = now;
-}
-
-template <class Report>
-void NetworkLoop::tell_observers(std::uint32_t device, const Report& report) {
-  for (Guest& guest : guests_) {
-    const bool watches =
-        std::any_of(guest.views.begin(), guest.views.end(), [&](const View& view) { return view.device == device; });
-    if (guest.diagnoses && watches) guest.session.send(report);
-  }
-}
-
-/// Where the log thread has said nothing since, there is nothing to tell.
-void NetworkLoop::tell_of_devices() {
-  for (std::uint32_t number = 0; number < devices_.size(); ++number) {
-    Device& device = devices_[number];
-    const Health* const health = device.mail->health.take();
-    if (health == nullptr) continue;
-    if (device.told) {
-      DeviceReport report = tendon::report(*device.told, *health);
-      report.number = ++device.reports;
-      report.device = number;
-      tell_observers(number, report);
-    }
-    device.told = *health;
-  }
-}
-
-void NetworkLoop::tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter::Report& link) {
-  for (const Seat& seat : engine.seats) {
-    Channel& channel = devices_[seat.device].channels[seat.channel];
-    if (seat.role != Role::kController || channel.holder != engine.session.connection_id()) continue;
-    PeerReport report;
-    report.device = seat.device;
-    report.channel = seat.channel;
-    report.name = engine.name;
-    report.state_one_in = engine.adaptation ? engine.adaptation->one_in() : 1;
-    report.forces_refused = engine.adaptation && engine.adaptation->hopeless();
-    report.link = link_report(now, engine, link, channel.newest);
-    report.link.number = ++channel.reports;
-    tell_observers(seat.device, report);
-  }
-}
-
-LinkReport NetworkLoop::link_report(LocalTime now, const Guest& guest, const LinkMeter::Report& link,
-                                    const Lateness::Report& forces) const {
-  const LinkStats& counted = guest.session.stats();
-  LinkReport report;
-  report.until = PeerTime(now.time_since_epoch());
-  report.span = now - std::max(reported_, guest.arrived);
-  report.forces = forces.forces;
-  report.late_server = forces.late_ours;
-  report.late_network = forces.late_network;
-  report.late_engine = forces.late_engine;
-  report.worst_late = forces.worst;
-  report.longest_gap = link.longest_gap;
-  report.round_trip = link.round_trip;
-  report.to_server = link.from_peer;
-  report.to_client = link.to_peer;
-  if (const auto clock = guest.session.peer_clock()) {
-    report.clock_offset = clock->offset;
-    report.clock_drift_ppm = 1e6 * clock->drift;
-    report.clock_error = clock->error_bound;
-  }
-  report.received = counted.datagrams_received;
-  report.lost = counted.lost;
-  report.reordered = counted.reordered;
-  report.duplicated = counted.duplicated;
-  report.words = forces.text;
-  return report;
-}
-
-/// A client may answer a step that it has foretold, also one that we were too late to see: those between the last state
-/// and this one were evenly spaced, as far as we know.
-void NetworkLoop::remember(LocalTime now, Device& device, const DeviceState& state) {
-  const LocalTime at(state.sampled.time_since_epoch());
-  const std::uint64_t newest = std::exchange(device.newest_tick, state.tick);
-  const std::uint64_t since = state.tick - newest;
-  // What nobody needs is not looked at: of many devices it is no longer in the cache.
-  if (newest > 0 && since > 1 && since < kRemembered) {
-    const Sampled last = device.sampled[newest % kRemembered];
-    const Duration apart = (at - last.at) / static_cast<Duration::rep>(since);
-    for (std::uint64_t i = 1; i < since; ++i) {
-      const std::uint64_t tick = last.tick + i;
-      device.sampled[tick % kRemembered] = {tick, last.at + static_cast<Duration::rep>(i) * apart, now};
-    }
-  }
-  device.sampled[state.tick % kRemembered] = {state.tick, at, now};
+  Reports::News news = reports_.turn(now);
+  stats_.late_ours += news.late_ours;
+  stats_.late_network += news.late_network;
+  stats_.late_engine += news.late_engine;
+  for (std::string& warning : news.warnings) notice(true, std::move(warning));
 }
 
 void NetworkLoop::publish(LocalTime now) {
   for (std::uint32_t number = 0; number < devices_.size(); ++number) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
-    remember(now, devices_[number], *state);
+    devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
     // What an engine asks for is bounded, what a device's loop makes of it need not be: no frame is lost for that.
     DeviceState diagnosed = *state;
     if (diagnosed.force_wanted && !(diagnosed.force_wanted->array().abs() <= limits::kMaxValue).all()) {
@@ -644,7 +362,9 @@ void NetworkLoop::publish(LocalTime now) {
 }
 
 void NetworkLoop::take_events(LocalTime now, Guest& guest) {
-  while (const auto event = guest.session.next_event()) {
+  while (!guest.gone) {
+    const auto event = guest.session.next_event();
+    if (!event) return;
     std::visit(Overloaded{
                    [&](const Session::ForceArrived& arrived) { take_force(now, guest, arrived.command); },
                    [&](const Session::RequestArrived& arrived) { answer(now, guest, arrived.id, arrived.request); },
@@ -667,26 +387,30 @@ void NetworkLoop::send_all(LocalTime now, Guest& guest) {
 
 void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& command) {
   const bool there = command.device < devices_.size() && command.channel < devices_[command.device].channels.size();
-  if (!there || devices_[command.device].channels[command.channel].holder != guest.session.connection_id()) {
+  if (!there || devices_[command.device].channels[command.channel].holder != guest.id()) {
     ++stats_.denied;
     return;
   }
-  Device& device = devices_[command.device];
-  Channel& channel = device.channels[command.channel];
-  channel.renewed = now;
-  const Sampled& answered = device.sampled[command.based_on_tick % kRemembered];
-  if (answered.tick != command.based_on_tick || command.based_on_tick == 0) {
+  ServedDevice& device = devices_[command.device];
+  ServedChannel& channel = device.channels[command.channel];
+  const auto answered = device.sampled.find(command.based_on_tick);
+  if (!answered) {
     ++stats_.unanswerable;
+    channel.lateness.refuse(Lateness::Refused::kTick);
     return;
   }
   if (guest.adaptation && guest.adaptation->hopeless()) {
     ++stats_.hopeless;
     return;
   }
+  // Only a force that the hand can feel keeps the lease.
+  channel.renewed = now;
+  const double bound = device.about.max_force;  // N; 0: the device has not said it
+  if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = guest.session.stats();
   const std::uint64_t lost = link.lost + link.lost_outgoing;
-  channel.lateness.observe({.sampled = answered.at,
-                            .sent = answered.sent,
+  channel.lateness.observe({.sampled = answered->at,
+                            .sent = answered->sent,
                             .received = now,
                             .round_trip = link.round_trip,
                             .valid_for = command.valid_for,
@@ -694,7 +418,7 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   RemoteForce force;
   force.sequence = command.sequence;
   force.answers_tick = command.based_on_tick;
-  force.answers = answered.at;
+  force.answers = answered->at;
   force.received = now;
   force.force = command.force;
   force.model = command.model;
@@ -750,27 +474,26 @@ void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Re
                  [&](const Disarm& disarm) { order(guest, id, disarm.device, HapticOrder::Kind::kDisarm); },
                  [&](const Describe& describe) {
                    if (describe.device >= devices_.size()) return no_such_device();
-                   const Device& device = devices_[describe.device];
+                   const ServedDevice& device = devices_[describe.device];
                    DeviceDescription about = device.about;
                    for (std::size_t i = 0; i < device.channels.size(); ++i) {
-                     const Guest* const holder = holder_of(device.channels[i]);
+                     const Guest* const holder = holder_of(guests_, device.channels[i]);
                      about.channels[i].holder = holder != nullptr ? holder->name : std::string();
                    }
                    guest.session.answer(id, std::move(about));
                  },
                  [&](const TakeLease& wanted) {
-                   if (sits_on(guest, wanted.device, wanted.channel)) return take_lease(now, guest, id, wanted);
+                   if (guest.sits_on(wanted.device, wanted.channel)) return take_lease(now, guest, id, wanted);
                    ++stats_.denied;
                    guest.session.answer(id, Code::kDenied, "only for one that has claimed it as a controller");
                  },
                  [&](const GiveLease& given) {
-                   if (!sits_on(guest, given.device, given.channel)) {
+                   if (!guest.sits_on(given.device, given.channel)) {
                      ++stats_.denied;
                      return guest.session.answer(id, Code::kDenied, "only for one that has claimed it as a controller");
                    }
-                   const bool holds =
-                       devices_[given.device].channels[given.channel].holder == guest.session.connection_id();
-                   if (holds) free(given.device, given.channel);
+                   const bool holds = devices_[given.device].channels[given.channel].holder == guest.id();
+                   if (holds) leases_.free(given.device, given.channel);
                    guest.session.answer(id, Code::kOk, {});
                  },
                  [&](const LeaseLost&) { guest.session.answer(id, Code::kUnsupported, "that is the server's to say"); },
@@ -783,10 +506,7 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
   add(stats_.dropped, guest.session.stats());
   notice(guest.role == Role::kController,
          "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how);
-  for (const Seat& seat : guest.seats) {
-    const bool holds = devices_[seat.device].channels[seat.channel].holder == guest.session.connection_id();
-    if (holds) free(seat.device, seat.channel);
-  }
+  leases_.free_all(guest);
   if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
 }
 
@@ -804,10 +524,10 @@ void NetworkLoop::close(LocalTime now) {
 NetworkLoop::Stats NetworkLoop::stats() const {
   Stats stats = stats_;
   stats.hellos = doorman_.stats();
-  for (const Device& device : devices_) {
+  for (const ServedDevice& device : devices_) {
     for (std::size_t i = 0; i < device.channels.size(); ++i) {
-      const Channel& channel = device.channels[i];
-      const Guest* const holder = holder_of(channel);
+      const ServedChannel& channel = device.channels[i];
+      const Guest* const holder = holder_of(guests_, channel);
       stats.channels.push_back({.device = device.about.name,
                                 .channel = device.about.channels[i].name,
                                 .holder = holder != nullptr ? holder->name : std::string(),

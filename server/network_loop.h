@@ -6,17 +6,16 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "protocol/handshake.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
-#include "protocol/narrow/deadband.h"
-#include "protocol/narrow/link_meter.h"
-#include "protocol/narrow/rate_adaptation.h"
 #include "protocol/session.h"
-#include "server/guests/lateness.h"
+#include "server/guests/admission.h"
+#include "server/guests/guest.h"
+#include "server/guests/leases.h"
+#include "server/guests/reports.h"
 #include "server/mailboxes.h"
 
 namespace tendon {
@@ -132,106 +131,24 @@ class NetworkLoop {
   std::vector<Notice> take_notices();
 
  private:
-  /// What a guest has claimed.
-  struct Seat {
-    std::uint32_t device = 0;
-    std::uint32_t channel = 0;
-    Role role = Role::kObserver;
-    bool by_name = false;  ///< it may wait for the lease
-  };
-  /// A device that a guest sees.
-  struct View {
-    std::uint32_t device = 0;
-    std::uint64_t state_every = 1;  ///< haptic steps
-    std::uint64_t last_state = 0;   ///< tick
-    std::optional<StateDeadband> deadband{};
-  };
-  struct Guest {
-    Address address;
-    ClientRandom random;   ///< of its Hello: the same one again is the same attempt
-    const ClientKey* key;  ///< null in suite 0
-    std::string name;
-    Role role;
-    bool can_lose;            ///< it can be told that it has lost a lease
-    bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
-    std::vector<Seat> seats;  ///< `role` is what its Welcome says
-    std::vector<View> views;
-    std::vector<std::byte> answer;  ///< for when it was lost
-    Session session;
-    LocalTime arrived;
-    std::optional<RateAdaptation> adaptation{};
-    std::optional<LinkMeter> meter{};  ///< of a controller
-    std::uint64_t reports = 0;         ///< sent to it
-    std::uint64_t lost = 0;            ///< datagrams, either way, as of the newest force
-    bool hopeless = false;             ///< as it was told to the operator
-    bool gone = false;
-  };
-  struct Refusal {
-    Code code;
-    std::string reason;
-  };
-  struct Channel {
-    std::uint32_t holder = 0;  ///< connection id; 0 = nobody
-    LocalTime renewed{};       ///< by its newest force, or when it came
-    std::uint64_t forces = 0;
-    std::uint64_t handovers = 0;
-    std::uint64_t late = 0;
-    Lateness lateness;
-    Lateness::Report newest;    ///< of it
-    std::uint64_t reports = 0;  ///< of its engine, to observers
-  };
-  /// When the newest haptic steps were sampled, by tick: a force names the tick it answers.
-  struct Sampled {
-    std::uint64_t tick = 0;
-    LocalTime at{};
-    LocalTime sent{};  ///< when the state left
-  };
-  static constexpr std::size_t kRemembered = 4096;  ///< 4 s at 1 kHz, longer than any loop worth rendering
-  struct Device {
-    DeviceDescription about;
-    Mailboxes* mail;
-    std::vector<Sampled> sampled;
-    std::uint64_t newest_tick = 0;
-    std::vector<Channel> channels;
-    std::optional<Health> told;  ///< to observers, last; empty before there was any
-    std::uint64_t reports = 0;   ///< told so far
-  };
-
   bool drain(LocalTime& now);  ///< `now` goes on with what it takes
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);
   bool answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest);
-  std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello) const;
-  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key,
-                                          const std::vector<Seat>& seats) const;
-  static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
-                                 const std::vector<Seat>& seats);
   void open(LocalTime now, Guest guest);
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
   void order(Guest& guest, std::uint32_t id, std::uint32_t device, HapticOrder::Kind kind);
   void take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted);
-  void hold(LocalTime now, Guest& guest, std::uint32_t device, std::uint32_t channel);
-  void free(std::uint32_t device, std::uint32_t channel);
-  void dispossess(LocalTime now, std::uint32_t device, std::uint32_t channel, const std::string& to);
-  const Guest* holder_of(const Channel& channel) const;
-  static bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel);
-  bool may_take_over(const Guest& guest) const;
+  void dispossess(LocalTime now, std::uint32_t loser, const TakeLease& lost, const std::string& to);
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
-  void remember(LocalTime now, Device& device, const DeviceState& state);
   void report(LocalTime now);
-  LinkReport link_report(LocalTime now, const Guest& guest, const LinkMeter::Report& link,
-                         const Lateness::Report& forces) const;
-  void tell_of_devices();
-  void tell_of_engine(LocalTime now, const Guest& engine, const LinkMeter::Report& link);
-  template <class Report>
-  void tell_observers(std::uint32_t device, const Report& report);
   void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
   void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
            std::size_t size);
@@ -239,12 +156,14 @@ class NetworkLoop {
 
   Config config_;
   Link& link_;
-  std::vector<Device> devices_;
+  std::vector<ServedDevice> devices_;
   Doorman doorman_;
   std::vector<Guest> guests_;
+  Admission admission_;
+  Leases leases_;
+  Reports reports_;
   std::vector<Guest> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
-  LocalTime reported_{};
 
   Stats stats_;
   std::vector<Notice> notices_;

@@ -7,8 +7,8 @@
 namespace tendon {
 namespace {
 
-/// A sixteenth of the difference's direction in each step: settles within some hundred forces, and one late force moves
-/// it no more than any other (what a mean cannot say).
+/// Moves the median by at most 1/16 of itself towards each sample: it settles in about a hundred forces and, unlike a
+/// mean, is not dragged by one outlier.
 void track_median(Duration& median, Duration sample) noexcept {
   const Duration step = std::max<Duration>(median / 16, std::chrono::microseconds(20));
   if (sample > median) median += std::min(step, sample - median);
@@ -22,31 +22,56 @@ std::string milliseconds_text(Duration d) {
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ms";
 }
 
-std::string describe(const Lateness::Report& report) {
-  if (report.late() == 0) return {};
-  std::string text = "forces were late " +
-                     (report.late() == 1 ? std::string("once") : std::to_string(report.late()) + " times") +
-                     ", by up to " + milliseconds_text(report.worst) + ": ";
+std::string times(std::uint64_t n) { return n == 1 ? "once" : std::to_string(n) + " times"; }
+std::string forces(std::uint64_t n) { return n == 1 ? "1 force was" : std::to_string(n) + " forces were"; }
+
+std::string to_blame(const Lateness::Report& report) {
   const auto part = [](Duration now, Duration usual) {
     return milliseconds_text(now) + ", usually " + milliseconds_text(usual) + ")";
   };
   switch (report.cause) {
     case Lateness::Cause::kStateWaited:
-      return text + "the server's threads (a state waited " + part(report.ours, report.usual_ours);
+      return "the server's threads (a state waited " + part(report.ours, report.usual_ours);
     case Lateness::Cause::kRoundTrip:
-      return text + "the network (round trip " + part(report.network, report.usual_network);
+      return "the network (round trip " + part(report.network, report.usual_network);
     case Lateness::Cause::kLost:
-      return text + "the network (datagrams were lost)";
+      return "the network (datagrams were lost)";
     case Lateness::Cause::kUnheard:
-      return text + "the network (nothing is heard of the engine's machine)";
+      return "the network (nothing is heard of the engine's machine)";
     case Lateness::Cause::kEngineTook:
-      return text + "the engine (it took " + part(report.engine, report.usual_engine);
+      return "the engine (it took " + part(report.engine, report.usual_engine);
     case Lateness::Cause::kEngineMissing:
-      return text + "the engine (it is heard, but sends no force)";
+      return "the engine (it is heard, but sends no force)";
+    case Lateness::Cause::kEngineSilent:
+      return "the engine (it is on this machine and sends nothing: it blocks, sleeps or has died)";
+    case Lateness::Cause::kEngineRefused:
+      return "the engine (its forces are refused)";
     case Lateness::Cause::kNone:
       break;
   }
-  return text + "not known why";
+  return "not known why";
+}
+
+std::string describe(const Lateness::Report& report) {
+  std::string text;
+  const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; };
+  if (report.late() > 0) {
+    add("forces were late " + times(report.late()) + ", by up to " + milliseconds_text(report.worst) + ": " +
+        to_blame(report));
+  }
+  if (report.refused_values > 0) {
+    add(forces(report.refused_values) + " refused: not finite, or out of bounds");
+  }
+  if (report.refused_ticks > 0) {
+    add(forces(report.refused_ticks) + " refused: the tick answered never was, or is too old");
+  }
+  return text;
+}
+
+std::string advise(const Lateness::Report& report) {
+  if (report.cut == 0) return report.text;
+  return report.text + (report.text.empty() ? "" : "; ") + forces(report.cut) +
+         " above the device's bound, and cut to it";
 }
 
 }  // namespace
@@ -68,6 +93,8 @@ Lateness::Part Lateness::part(Cause cause) noexcept {
       return Part::kNetwork;
     case Cause::kEngineTook:
     case Cause::kEngineMissing:
+    case Cause::kEngineSilent:
+    case Cause::kEngineRefused:
       return Part::kEngine;
     case Cause::kNone:
       break;
@@ -117,26 +144,42 @@ void Lateness::observe(const Way& way) noexcept {
   valid_until_ = way.received + way.valid_for;
 }
 
+void Lateness::refuse(Refused why, std::uint64_t forces) noexcept {
+  (why == Refused::kValue ? report_.refused_values : report_.refused_ticks) += forces;
+}
+
 void Lateness::Report::add(const Report& other) {
   Report sum = other.worst > worst ? other : *this;
   sum.forces = forces + other.forces;
   sum.late_ours = late_ours + other.late_ours;
   sum.late_network = late_network + other.late_network;
   sum.late_engine = late_engine + other.late_engine;
+  sum.refused_values = refused_values + other.refused_values;
+  sum.refused_ticks = refused_ticks + other.refused_ticks;
+  sum.cut = cut + other.cut;
+  sum.text = describe(sum);
+  sum.advice = advise(sum);
   *this = std::move(sum);
 }
 
-Lateness::Report Lateness::report(LocalTime now) {
+Lateness::Report Lateness::report(LocalTime now, bool same_machine) {
   if (attending_ && now > valid_until_) {
     // Five keep-alives have not come: see SESSION.md.
     const bool silent = now - heard_ > std::chrono::milliseconds(250);
-    blame(now - valid_until_, silent ? Cause::kUnheard : Cause::kEngineMissing, {});
+    const bool refused = report_.refused_values + report_.refused_ticks > 0;
+    blame(now - valid_until_,
+          refused                  ? Cause::kEngineRefused
+          : silent && same_machine ? Cause::kEngineSilent
+          : silent                 ? Cause::kUnheard
+                                   : Cause::kEngineMissing,
+          {});
   }
   Report report = std::exchange(report_, {});
   report.usual_ours = usual_.ours;
   report.usual_network = usual_.network;
   report.usual_engine = usual_.engine;
   report.text = describe(report);
+  report.advice = advise(report);
   return report;
 }
 

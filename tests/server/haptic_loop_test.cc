@@ -29,7 +29,7 @@ class Handle final : public Device {
   DeviceInfo info_{.name = "handle", .max_force = 8};
 };
 
-TEST(HapticLoop, AFaultOfTheSafetyLayerFreezesTheFlightRecorderAtTheStepThatTookTheForceAway) {
+TEST(HapticLoop, ASafetyFaultFreezesTheFlightRecorderAtItsStep) {
   Handle handle;
   SafeDevice::Config safety;
   safety.arming.by = SafeDevice::Arming::By::kStart;
@@ -168,6 +168,39 @@ TEST(HapticLoop, OfTwoOrdersTheLaterOneCounts) {
   world.order(Kind::kDisarm);
   world.order(Kind::kRearm);
   EXPECT_EQ(world.steps(400).applied, Vec3(-2, 0, 0));
+}
+
+/// What a loop applies whose engine, number 7, pushes with 2 N; then its last force and its release come in one period.
+Vec3 applied_after_release(bool again) {
+  Handle handle;
+  Pushed pushed(handle);
+  LocalTime now(milliseconds(1));
+  std::uint64_t sequence = 0;
+  const auto push = [&] {
+    RemoteForce force;
+    force.sequence = ++sequence;
+    force.source = 7;
+    force.received = force.answers = now;
+    force.force = Vec3(-2, 0, 0);
+    force.valid_for = milliseconds(500);
+    pushed.mail->forces[0].put(force);
+  };
+  for (int i = 0; i < 300; ++i) {
+    push();
+    now = pushed.loop.step(now);
+  }
+  if (again) push();
+  pushed.mail->orders.try_push({HapticOrder::Kind::kRelease, 0, 7});
+  Vec3 applied = Vec3::Zero();
+  for (int i = 0; i < 450; ++i) now = pushed.loop.step(now);
+  const DeviceState* const state = pushed.mail->state.take();
+  if (state != nullptr) applied = state->force_applied;
+  return applied;
+}
+
+TEST(HapticLoop, AForceThatComesWithTheReleaseOfItsSourceIsNotFresh) {
+  EXPECT_EQ(applied_after_release(false), Vec3(0, 0, 0)) << "held for a moment, faded, stopped";
+  EXPECT_EQ(applied_after_release(true), Vec3(0, 0, 0)) << "and not valid for another 500 ms";
 }
 
 }  // namespace

@@ -412,10 +412,10 @@ TEST_F(TwoDevices, RefusesWhatIsNotThereAndSaysWhatIs) {
   Client a = controller_of(wall_, "192.0.2.1:4000", "middle", "");
   run(milliseconds(50), {&a});
   EXPECT_EQ(a.client->stats().code, Code::kInvalid);
-  EXPECT_EQ(a.client->stats().reason, "there is no device \"middle\", but \"left\", \"right\"");
+  EXPECT_EQ(a.client->stats().reason, "there is no device \"middle\", only \"left\", \"right\"");
   Client b = controller_of(wall_, "192.0.2.2:4000", "right", "bone");
   run(milliseconds(50), {&b});
-  EXPECT_EQ(b.client->stats().reason, "there is no channel \"bone\", but \"guidance\", \"tissue\"");
+  EXPECT_EQ(b.client->stats().reason, "there is no channel \"bone\", only \"guidance\", \"tissue\"");
 }
 
 TEST_F(TwoDevices, ALeaseIsTakenFromAHolderThatHasFallenSilentAndNotBefore) {
