@@ -28,9 +28,10 @@ COMMENT = {
 # A clause of its own, which may have its verb: "What follows the header; empty when it is not authentic."
 _PLAIN = r"(?:(?!\b(?:when|as|if|that|who|which|where|whether|has|have)\b)[^.?!:;|])*?"
 _BE = r"(?:is|are|was|were)"
+_NOUN = r"(?:an?|the|in|no|not|what|that|to|on|at|as|there)\b"
 CLEFT = re.compile(
     r"(?:^|(?<=[.!?:] ))(?:Of what\b|What (?![^.?!]*\?)"
-    rf"(?:{_BE}\b{_PLAIN}\b(?:{_BE}|has|does|may|must|can|cannot|goes|comes|says|becomes|needs)\b|(?!{_BE}){_PLAIN}\b{_BE}\b)"
+    rf"(?:{_BE}\b{_PLAIN}\b(?:{_BE}|has|does|may|must|can|cannot|goes|comes|says|becomes|needs)\b|(?!{_BE}){_PLAIN}\b{_BE} {_NOUN})"
     r"(?! and\b|[,;.])[^.?!:|]*\.)"
 )
 
@@ -98,7 +99,9 @@ def check_the_rules():
     assert rules("a.md", "What is it? It is a hand. Nobody knows what is there.") == []
     assert rules("a.md", "## What is here") == []
     assert rules("a.h", "/// What is wanted at `hand`.") == []
+    assert rules("a.h", "/// What the peers do is in another page.") == ["cleft"]
     assert rules("a.h", "/// What a device is and can do.") == []
+    assert rules("a.h", "/// What a controller is told about its forces.") == []
     assert rules("a.h", "/// What follows the header; empty when it is not there.") == []
     assert rules("a.h", "/// What the server drops before there is a session: junk.") == []
 
