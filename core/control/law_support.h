@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -63,20 +62,19 @@ LimitedForce<N> bounded(const Vec<N>& wanted, double bound, Reason reason) noexc
   return {shortened<N>(wanted, bound), bound, reason};
 }
 
-/// Eigenvalues (ascending) and eigenvectors of the symmetric part of a stiffness: its potential energy has no other.
+/// A symmetric matrix along its own axes.
 template <int N>
-Eigen::SelfAdjointEigenSolver<Mat<N>> principal_stiffness(const Mat<N>& stiffness) noexcept {
-  return Eigen::SelfAdjointEigenSolver<Mat<N>>(Mat<N>((stiffness + stiffness.transpose()) / 2));
-}
+struct Principal {
+  Vec<N> values;   ///< eigenvalues, ascending
+  Mat<N> vectors;  ///< column i belongs to values[i]; orthonormal
+};
 
-/// The largest singular value of a stiffness, N/m: no displacement changes the force faster.
+/// The symmetric part of a stiffness, N/m, along its own axes: its potential energy has no other. N = 1, 3, 6.
 template <int N>
-double spectral_norm(const Mat<N>& stiffness) noexcept {
-  const double scale = stiffness.cwiseAbs().maxCoeff();
-  if (!(scale > 0)) return 0;
-  const Mat<N> unit = stiffness / scale;
-  const Eigen::SelfAdjointEigenSolver<Mat<N>> squares(Mat<N>(unit.transpose() * unit), Eigen::EigenvaluesOnly);
-  return scale * std::sqrt(std::max(squares.eigenvalues()[N - 1], 0.0));
-}
+Principal<N> principal_stiffness(const Mat<N>& stiffness) noexcept;
+
+/// The largest singular value of a stiffness, N/m: no displacement changes the force faster. N = 1, 3, 6.
+template <int N>
+double spectral_norm(const Mat<N>& stiffness) noexcept;
 
 }  // namespace tendon::law_support

@@ -38,12 +38,12 @@ template <int N>
 double ReferenceEnergyController<N>::reference(const Demand<N>& demand) const noexcept {
   if (demand.stiffness == Mat<N>::Zero()) return demand.force.squaredNorm() / (2 * config_.stiffness);
   const auto principal = law_support::principal_stiffness<N>(demand.stiffness);
-  const double least = 1e-9 * principal.eigenvalues()[N - 1];  // below, a direction has no stiffness but rounding
+  const double least = 1e-9 * principal.values[N - 1];  // below, a direction has no stiffness but rounding
   double energy = 0;
   for (int i = 0; i < N; ++i) {
-    const double stiffness = principal.eigenvalues()[i];
+    const double stiffness = principal.values[i];
     if (stiffness <= least || stiffness <= 0) continue;
-    const double force = principal.eigenvectors().col(i).dot(demand.force);
+    const double force = principal.vectors.col(i).dot(demand.force);
     energy += force * force / (2 * stiffness);
   }
   return energy;

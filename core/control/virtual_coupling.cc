@@ -37,10 +37,10 @@ LimitedForce<N> VirtualCoupling<N>::limit(const Demand<N>& demand) noexcept {
     return law_support::refused<N>(kNoBound);
   }
   const auto principal = law_support::principal_stiffness<N>(demand.stiffness);
-  const Vec<N> total = principal.eigenvalues().cwiseMax(0) + Vec<N>::Constant(stiffness_ + damping_per_hold_);
+  const Vec<N> total = principal.values.cwiseMax(0) + Vec<N>::Constant(stiffness_ + damping_per_hold_);
   const Vec<N> push = damping_per_hold_ * stretch_ - demand.force;
-  const Vec<N> along = principal.eigenvectors().transpose() * push;
-  const Vec<N> stretch = principal.eigenvectors() * along.cwiseQuotient(total);
+  const Vec<N> along = principal.vectors.transpose() * push;
+  const Vec<N> stretch = principal.vectors * along.cwiseQuotient(total);
   const Vec<N> force = -(stiffness_ * stretch + damping_per_hold_ * (stretch - stretch_));
   if (!force.allFinite()) {
     stretch_.setZero();

@@ -4,8 +4,8 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(programs tendond tendon-inject tendon-softbody tendon-lab tendon-identify tendon-replay tendon-conformance)
-install(TARGETS tendond tendon-softbody tendon-lab tendon-identify tendon-replay COMPONENT programs)
+set(programs tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance)
+install(TARGETS tendond tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay COMPONENT programs)
 install(DIRECTORY deploy/scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon/scenes COMPONENT programs
         FILES_MATCHING PATTERN "*.toml" PATTERN "*.msh")
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
@@ -46,7 +46,7 @@ else()
 endif()
 
 # The client's library. Headers keep the names that they have here: #include "clients/cpp/run.h".
-set(libraries tendon_client tendon_protocol tendon_address tendon_proto tendon_core)
+set(libraries tendon_client tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
 foreach(library ${libraries})
   string(REPLACE tendon_ "" name ${library})
   set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})

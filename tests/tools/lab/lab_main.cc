@@ -17,8 +17,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", tendon::version_text());
   app.require_subcommand(1);
   app.footer(
-      "\nExample: the same motion without and with the limiter, as a table and a picture\n"
-      "  tendon-lab report off.mcap on.mcap --out runs.png\n"
+      "\nExample: every stability controller in every situation, as tables and pictures\n"
+      "  tendon-lab compare --out comparison\n"
       "\ntendon-lab VERB --help tells more.\n\nExit: 0 done; 1 failed; 2 wrong usage.");
   int exit = 0;
   for (const tendon::lab::Verb& verb : tendon::lab::verbs()) verb.add(*app.add_subcommand(verb.name, verb.what), exit);

@@ -4,7 +4,7 @@
 // the handle, and the network is a 5G mid-band link whose one-way delays were measured (DETERMINISTIC6G). The device is
 // the UE: its states take the uplink, the forces that answer them the downlink.
 //
-// Reads $TENDON_DATA; leaves its recordings beside the test for `tendon-lab report`.
+// Reads $TENDON_DATA; leaves its recordings beside the test for `tendon-report`.
 #include <gtest/gtest.h>
 
 #include <algorithm>

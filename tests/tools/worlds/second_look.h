@@ -21,7 +21,7 @@ struct SecondLookOptions {
 
 /// `tendon-worlds replay`: what would another law have felt on that same network? The device, the hand and the loop of
 /// a scene, the wall of `tendon_virtual_wall` behind the network of a trace, and one law after the other, all else
-/// equal; summarised as `tendon-lab report` does it.
+/// equal; summarised as `tendon-report` does it.
 ///
 /// The first link of the trace is played by time: a datagram meets the fate of the newest one recorded before it, so
 /// the network is bad at the same times, whatever the session sends.

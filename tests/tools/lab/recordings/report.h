@@ -9,7 +9,7 @@
 
 namespace tendon::lab {
 
-/// `tendon-lab report`: what some recorded runs come down to, side by side.
+/// `tendon-report`: what some recorded runs come down to, side by side.
 struct ReportOptions {
   std::vector<std::filesystem::path> recordings = {};  ///< one or more
   /// One for each recording. Left out: "limiter on" or "limiter off", as the recorded steps show.
