@@ -5,27 +5,22 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string>
 
+#include "core/base/expect.h"
 #include "core/control/force_limits.h"
 
 namespace tendon {
 
 HapticController::HapticController(const Config& config)
     : config_(config), limiter_(config.limiter), held_({.hold = config.hold, .rules = config.channels}) {
-  const auto positive = [](double value, const char* name) {
-    if (!(value > 0))
-      throw std::invalid_argument(std::string(name) + " must be above zero, got " + std::to_string(value));
-  };
-  positive(config.max_force, "max_force");
-  positive(config.max_slew, "max_slew");
-  if (!std::isfinite(config.max_force)) throw std::invalid_argument("max_force must be finite");
-  if (config.max_speed) positive(*config.max_speed, "max_speed");
-  if (config.watchdog < Duration::zero()) throw std::invalid_argument("watchdog must not be negative");
+  expect_above_zero(config.max_force, "max_force");
+  expect(config.max_slew > 0, "max_slew", config.max_slew, "a number above 0 N/s, or infinity");
+  if (config.max_speed) expect(*config.max_speed > 0, "max_speed", *config.max_speed, "a number above 0 m/s");
+  expect_not_negative(seconds(config.watchdog), "watchdog");
   if (config.admittance) admittance_.emplace(*config.admittance);
   if (config.friction_map) {
     if (!config.limiter.parts.adaptive_friction) {
-      throw std::invalid_argument("friction_map is of use only to a limiter with adaptive_friction");
+      throw std::invalid_argument("friction_map: expected a limiter with adaptive_friction, which is the only user");
     }
     friction_map_.emplace(*config.friction_map);
   }
@@ -46,10 +41,16 @@ void HapticController::book(const Motion& hand, const Vec3& applied, Step& step)
     book_unseen(applied, step.held);
   } else if (last_) {
     const Interval<3> interval{.applied = applied, .dx = hand.position - last_->position, .held = step.held};
+    const std::uint64_t broken = limiter_.broken_assumptions();
     limiter_.observe(interval);
+    step.assumption_broken = limiter_.broken_assumptions() != broken;
     if (admittance_) admittance_->observe(interval);
+  } else if (started_) {
+    // The position before was not seen, and the device may hold a force although it was told zero.
+    book_unseen(applied, step.held);
   }
   step.energy = limiter_.energy();
+  step.longest_hold = limiter_.longest_hold();
 }
 
 void HapticController::follow_tool(Step& step) noexcept {
@@ -127,11 +128,11 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
   }
   if (disarmed_) step.force.setZero();
   const Limited saturated = saturate(step.force, config_.max_force);
-  // After a pause the force may not have grown for as long as the pause lasted.
+  // After a pause the force may grow by what one longest hold allows, not by what the whole pause would.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(hand.position));
-  // What bounds a force bends the environment: how it goes on from there is not known any more.
+  // A limit changes the environment as the hand feels it, so its stiffness is known only for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
   const LimitedForce<3> limited =
@@ -139,7 +140,7 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
   step.force = limited.force;
   step.permitted = limited.permitted;
   step.reasons |= limited.reasons;
-  // The tightest bound is the reason: one that was met before the limiter cut further did not matter.
+  // Only the tightest bound is a reason: when the limiter cut further, the bounds before it made no difference.
   if (!step.reasons.has(Reason::kEnergy)) {
     step.reasons |= saturated.reasons;
     step.reasons |= slewed.reasons;
@@ -166,6 +167,7 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied) noexcept 
   if (++missed_ >= config_.max_missed && fault_ == Fault::kNone) fault_ = Fault::kDeviceSilent;
 
   step.energy = limiter_.energy();
+  step.longest_hold = limiter_.longest_hold();
   step.permitted = limiter_.limit({.force = Vec3::Zero()}).permitted;
   step.mode = fault_ == Fault::kNone ? Mode::kHolding : Mode::kFault;
   step.reasons |= Reason::kUnseen;

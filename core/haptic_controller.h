@@ -16,7 +16,7 @@
 
 namespace tendon {
 
-/// What one haptic step found and decided. Enough to take the step again (tests/tools/replay).
+/// One haptic step: its input and its result. It holds enough to take the step again (tests/tools/replay).
 struct Step {
   Motion hand;                       ///< the motion it saw; hand.at = when
   Duration held{};                   ///< T_act: length of the interval that this step ended; 0 in the first
@@ -25,9 +25,11 @@ struct Step {
   Vec3 wanted = Vec3::Zero();        ///< N, what the remote environment asks for, after hold or local model
   Mat3 stiffness = Mat3::Zero();     ///< N/m, −∂wanted/∂x, as the remote environment says; zero when it does not
   double permitted = 0;  ///< N, the limiter's bound on ‖force‖ (per axis: on the largest component); ∞ when off
-  Vec3 force = Vec3::Zero();  ///< N, to be applied now
-  double energy = 0;          ///< J, the limiter's account after the interval (per axis: the least)
-  Reasons reasons;            ///< why `force` is not `wanted`
+  Vec3 force = Vec3::Zero();       ///< N, to be applied now
+  double energy = 0;               ///< J, the limiter's account after the interval (per axis: the least)
+  Duration longest_hold{};         ///< T that `permitted` counts on: `force` may be held for so long and E stays ≥ 0
+  bool assumption_broken = false;  ///< in the interval the hand accelerated by more than bounded_acceleration allows
+  Reasons reasons;                 ///< why `force` is not `wanted`
   Mode mode = Mode::kIdle;
   std::uint32_t channel = 0;            ///< `mode`, `force_sequence` and the ages are of this channel's force
   std::uint64_t force_sequence = 0;     ///< the remote force in use; 0 = none
@@ -46,17 +48,22 @@ struct Step {
 ///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
 ///
 /// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
-/// faster than the slew limit allows, because energy is a matter of safety and smoothness is not.
+/// faster than the slew limit allows: energy is a matter of safety, smoothness is not.
 ///
-/// Overruns: an interval longer than longest_hold is booked as it was, and flagged; the ledger may then
-/// be negative, and recovers by itself. When it was longer than the device's own watchdog, nobody knows
-/// for how long the force was held: the worst is booked. (Set longest_hold = watchdog and the theorem
-/// holds through any pause, at the price of a lower bound: K_op → 2b / T_max.)
+/// The promise: E ≥ −1 nJ at every step, as long as no force is held for longer than the `longest_hold` of the step
+/// that chose it. A hold of T_act beyond that T takes at most (T_act − T)(‖F‖ − f_c)₊²/(4b) from below zero; until the
+/// ledger has recovered, which it does by itself, forces are at most f_c.
+///
+/// Overruns: an interval longer than the scene's longest_hold is booked with its measured length, and flagged. The
+/// limiter then counts on such holds (HoldBound). When the interval was longer than the device's own watchdog, nobody
+/// knows for how long the force was held, and the worst is booked. (Set longest_hold = watchdog and the promise has no
+/// condition, at the price of a lower bound: K_op → 2b / T_max.) An interval of which one end was not seen is booked at
+/// its worst, too.
 ///
 /// Faults are latched: force zero (through the slew limit while the hand can be seen) until `rearm`.
 ///
-/// `disarm` is the operator's: force zero from the next step on, through nothing, until `rearm`. It is no fault, and
-/// clears none.
+/// `disarm` is for the operator: zero force from the next step on, without a ramp, until `rearm`. It is not a fault,
+/// and does not clear one.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class HapticController {
@@ -78,21 +85,21 @@ class HapticController {
     double max_force = 0;  ///< N; > 0
     double max_slew = 0;   ///< N/s; > 0, may be infinite
     HeldForce::Config hold;
-    /// Of the channels that remote forces come in by; each has a HeldForce of its own.
+    /// The rules of the channels by which remote forces come in; each channel has a HeldForce of its own.
     std::vector<ChannelRule> channels = {ChannelRule::kSum};
     /// Readings that may fail in a row before it is a fault: 20 ms at 1 kHz, what libfranka allows.
     std::uint32_t max_missed = 20;
-    /// m/s; > 0. What seems to move faster is no hand but an encoder that has wrapped or lost count: a fault, and no
-    /// motion to the account, which would take 0.2 m in a millisecond for 32 J of friction at 0.8 N·s/m. Empty: every
-    /// position is believed.
+    /// m/s; > 0. A faster motion is not a hand but an encoder that has wrapped or lost count. It is a fault, and is not
+    /// booked: the account would credit 0.2 m in a millisecond with 32 J of friction at 0.8 N·s/m. Empty: every position
+    /// is believed.
     std::optional<double> max_speed{};
   };
 
   /// Throws std::invalid_argument naming the field when a value is impossible.
   explicit HapticController(const Config& config);
 
-  /// A newer remote force has come, for a channel below their number. Returns false when it was refused because it is
-  /// not sound (HeldForce).
+  /// A newer remote force has come for `channel`, an index into `channels`. Returns false when it was refused because
+  /// it is not sound (HeldForce).
   bool observe(const RemoteForce& force, std::size_t channel = 0) noexcept { return held_.observe(channel, force); }
 
   /// The remote environment `source` has left a channel.
@@ -105,8 +112,7 @@ class HapticController {
   /// force.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {}) noexcept;
 
-  /// The same with what the remote environments want told, instead of held from what they sent: how a step that was
-  /// recorded is taken again.
+  /// The same, but `wanted` is given instead of derived from the remote forces observed. Replays recorded steps.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted) noexcept;
 

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-/// What all numbers of Tendon rest on: IEEE 754 arithmetic as it is written, at the same speed for every value.
-/// Included where NaN is caught and where rounding is made good.
+/// All numbers of Tendon rest on IEEE 754 arithmetic as it is written, at the same speed for every value. Included
+/// where NaN is caught and where rounding errors are corrected.
 
 // With -ffast-math std::isfinite(NaN) is true, a clamp of NaN to ±5 N gives −5 N, and a compensated sum is a plain one.
 // GCC says so by __GCC_IEC_559 for any part of it (-fassociative-math …), Clang for -ffast-math and -ffinite-math-only.
@@ -16,10 +16,10 @@
 
 namespace tendon {
 
-/// While one lives, its thread takes numbers below 2.2e-308 for 0, as operands and as results. A decaying force or
-/// velocity ends there, and arithmetic on such numbers is slow: some hundred times on x86-64. Set anew for each step
-/// rather than once for each thread: the mode belongs to the thread, and a driver or a library that is loaded late may
-/// change it. The end puts back what was there.
+/// While one lives, its thread treats numbers below 2.2e-308 as 0, as operands and as results. A decaying force or
+/// velocity ends there, and arithmetic on such numbers is slow: about a hundred times slower on x86-64. Create one in
+/// each step rather than one for each thread: the mode belongs to the thread, and a driver or a library that is loaded
+/// late may change it. The destructor restores the mode that was there.
 ///
 /// x86-64 and AArch64; elsewhere it does nothing. Realtime-safe: yes.
 class [[nodiscard]] DenormalsOff {

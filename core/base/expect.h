@@ -16,7 +16,7 @@ void expect(bool holds, std::string_view field, double value, std::string_view e
 /// The same for a vector whose three components must be finite.
 void expect_finite(const Vec3& value, std::string_view field);
 
-/// The same for what must be finite and above zero, or not below it.
+/// The same for a value that must be finite and above zero, or finite and not below zero.
 void expect_above_zero(double value, std::string_view field);
 void expect_not_negative(double value, std::string_view field);
 

@@ -5,14 +5,14 @@
 
 namespace tendon {
 
-/// What the force rendered now is made of, from the age policy's point of view (see HeldForce). The
-/// values are part of the wire and of recordings: never renumber.
+/// How fresh the remote force is that is rendered now (see HeldForce). The values are part of the wire and of
+/// recordings: never renumber.
 enum class Mode : std::uint8_t {
   kIdle = 1,      ///< no force has come yet
   kActive = 2,    ///< a fresh force is rendered
   kHolding = 3,   ///< the force has outlived its validity and is held a little longer
-  kDecaying = 4,  ///< … and now fades
-  kSafeStop = 5,  ///< … and is now zero; only a fresh force re-engages, ramped in
+  kDecaying = 4,  ///< after that it fades
+  kSafeStop = 5,  ///< after that it is zero; only a fresh force re-engages, ramped in
   kFault = 6,     ///< latched: zero force until an explicit re-arm
 };
 

@@ -15,13 +15,13 @@ enum class Reason : std::uint32_t {
   kSlew = 1U << 2,         ///< the force may not grow that fast
   kRampIn = 1U << 3,       ///< forces have just (re-)engaged
   kHeld = 1U << 4,         ///< the remote force has outlived its validity and is held
-  kDecaying = 1U << 5,     ///< … and fades
-  kSafeStop = 1U << 6,     ///< … and is zero until a fresh one comes
+  kDecaying = 1U << 5,     ///< the remote force fades
+  kSafeStop = 1U << 6,     ///< the remote force is zero until a fresh one comes
   kNotFinite = 1U << 7,    ///< NaN or infinity was asked for or measured
   kFault = 1U << 8,        ///< a latched fault holds the force at zero
   kDeviceClamp = 1U << 9,  ///< the device wrote less than it was told to
-  kOverrun = 1U << 10,     ///< not a limit: the step before this one was held longer than the bound assumed
-  kWatchdog = 1U << 11,    ///< not a limit: … and so long that the device's own watchdog ended it
+  kOverrun = 1U << 10,     ///< not a limit: the force before was held for longer than the scene's longest_hold
+  kWatchdog = 1U << 11,    ///< not a limit: and for so long that the device's own watchdog ended it
   kUnseen = 1U << 12,      ///< the device gave no position this time, so no force is given out
   kDisarmed = 1U << 13,    ///< the operator has disarmed the device: no force until it is rearmed
 };

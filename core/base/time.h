@@ -9,8 +9,8 @@ namespace tendon {
 /// A length of time in whole nanoseconds. Every interval in Tendon is one of these.
 using Duration = std::chrono::nanoseconds;
 
-/// The monotonic clock of this machine, as a type only: it has no `now()`, so nothing that merely
-/// handles times can read one. Times are passed in by whoever owns a real or a simulated clock.
+/// The monotonic clock of this machine, as a type only. It has no `now()`, so code that merely handles times cannot
+/// read a clock. The owner of a real or a simulated clock passes times in.
 struct LocalClock {
   using duration = Duration;
   using rep = Duration::rep;
@@ -38,7 +38,7 @@ constexpr double seconds(Duration d) noexcept { return std::chrono::duration<dou
 /// The nearest whole number of nanoseconds at or below `s` seconds. `s` must be finite and within
 /// ±292 years.
 constexpr Duration from_seconds(double s) noexcept {
-  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s));
+  return std::chrono::floor<Duration>(std::chrono::duration<double, std::nano>(s * 1e9));
 }
 
 }  // namespace tendon

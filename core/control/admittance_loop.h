@@ -15,31 +15,30 @@ namespace tendon {
 /// handle's velocity, Δx and T displacement and measured length of the last interval. M, D, S, K_p and K_i are
 /// diagonal. The tool is integrated by the implicit Euler rule, stable for any T.
 ///
-/// F_wanted takes the place of the reflective force: hand it to a stability controller as any other demand, and
-/// show both of them the same intervals,
+/// F_wanted takes the place of the reflective force. Hand it to a stability controller like any other demand, and
+/// show both of them the same intervals:
 ///
 ///     law.observe(interval);                                 loop.observe(interval);
 ///     force = law.limit(loop.command({hand_force, environment, velocity})).force;
 ///
-/// and the port is passive for the reason it is with any demand, whatever the gains.
+/// Then the port is passive as it is with any demand, whatever the gains.
 ///
-/// Anti-windup. `observe` tells what was really applied. Where it fell short of the command, the last step of the
-/// integral is not taken in the direction of what is missing (conditional integration), and the integral's share
-/// in that direction is cut down to what was applied: so that the force leaves its bound as soon as the velocity
-/// error turns, also when the bound has shrunk meanwhile. A force output that rounds leaves an error of velocity
-/// that is worth up to one of its counts.
+/// Anti-windup. `observe` gets the force that was really applied. Where it fell short of the command, the last step of
+/// the integral is not taken in the direction of the shortfall (conditional integration), and the integral's share in
+/// that direction is cut to the applied force. So the force leaves its bound as soon as the velocity error changes
+/// sign, even when the bound has shrunk meanwhile. A force output that rounds leaves a velocity error worth up to one
+/// of its counts.
 ///
-/// What it cannot do: the limiter's account has the device's friction in it but not its kinetic energy. To speed up a
+/// Limitation: the limiter's account contains the device's friction but not its kinetic energy. To speed up a
 /// handle of mass m like a lighter tool, the motors must put in ½ (m − M) v² ahead of the hand. While the tool's
 /// damping has not earned that, the excess is clipped and the hand feels the device's own mass; with D = 0 that is
-/// always. The credit ½ m (|v| − a_max T)₊² that control.md 1.5 proposes for this is not passive, because the hand can
-/// take the kinetic energy back after the limiter has lent on it (admittance_loop_test.cc has the motion); so there is
-/// none.
+/// always. The credit ½ m (|v| − a_max T)₊² that control.md 1.5 proposes for this is not passive, and not here: the
+/// hand can take the kinetic energy back after the limiter has lent on it (admittance_loop_test.cc has the motion).
 ///
 /// Source: Lee & Lee, IEEE TCST 17(4), 2009, section II-A; control.md 1.5.
 ///
 /// A measurement that is not finite resets tool and integral to rest, and the demand is not finite: the law answers
-/// it with zero force and the reason. An interval that is not finite or not longer than zero is passed over.
+/// it with zero force and the reason. An interval that is not finite or not longer than zero is ignored.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>

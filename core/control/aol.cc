@@ -29,11 +29,16 @@ std::array<Friction, N> repeated(const Friction& friction) {
 }  // namespace
 
 template <int Blocks, int Size>
-Aol<Blocks, Size>::Aol(const Config& config) : ledgers_(ledgers_of(config.friction)) {
-  check_longest_hold(config.longest_hold);
-  for (std::size_t i = 0; i < losses_.size(); ++i) {
-    losses_[i] = {.coulomb = config.friction[i].coulomb,
-                  .viscous_per_hold = config.friction[i].viscous / seconds(config.longest_hold)};
+Aol<Blocks, Size>::Aol(const Config& config) : friction_(config.friction), ledgers_(ledgers_of(config.friction)) {
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    bounds_[i] = OutputBound::of(config.friction[i], config.longest_hold);
+  }
+}
+
+template <int Blocks, int Size>
+void Aol<Blocks, Size>::hold_at_most(Duration longest_hold) noexcept {
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    bounds_[i].viscous_per_hold = friction_[i].viscous / seconds(longest_hold);
   }
 }
 
@@ -56,19 +61,16 @@ void Aol<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration at_mo
 
 template <int Blocks, int Size>
 auto Aol<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> LimitedForce<kSize> {
-  const double size = wanted.force.norm();
-  std::array<double, Blocks> sizes{};
-  for (int i = 0; i < Blocks; ++i) {
-    sizes[static_cast<std::size_t>(i)] = wanted.force.template segment<Size>(i * Size).norm();
-  }
   if constexpr (Blocks == 1) {
-    const double permitted = losses_[0].largest(energy());
-    if (!wanted.force.allFinite()) return {Vec<kSize>::Zero(), permitted, Reason::kNotFinite};
-    if (size <= permitted) return {wanted.force, permitted, {}};
-    return {wanted.force * (permitted / size), permitted, Reason::kEnergy};
+    return bounds_[0].template limit<kSize>(wanted.force, energy());
   } else {
     if (!wanted.force.allFinite()) return {Vec<kSize>::Zero(), 0, Reason::kNotFinite};
-    const double scale = largest_scale(losses_, sizes, energy());
+    const double size = wanted.force.norm();
+    std::array<double, Blocks> sizes{};
+    for (int i = 0; i < Blocks; ++i) {
+      sizes[static_cast<std::size_t>(i)] = wanted.force.template segment<Size>(i * Size).norm();
+    }
+    const double scale = largest_scale(bounds_, sizes, energy());
     const double permitted = size > 0 ? scale * size : 0;
     if (scale >= 1) return {wanted.force, permitted, {}};
     return {wanted.force * scale, permitted, Reason::kEnergy};
@@ -90,7 +92,14 @@ template class Aol<2, 3>;
 
 template <int N>
 PerAxisAol<N>::PerAxisAol(const Config& config)
-    : limiter_({config.friction, config.longest_hold}), ledgers_(ledgers_of(repeated<N>(config.friction))) {}
+    : friction_(config.friction),
+      ledgers_(ledgers_of(repeated<N>(config.friction))),
+      bound_(OutputBound::of(config.friction, config.longest_hold)) {}
+
+template <int N>
+void PerAxisAol<N>::hold_at_most(Duration longest_hold) noexcept {
+  bound_.viscous_per_hold = friction_.viscous / seconds(longest_hold);
+}
 
 template <int N>
 void PerAxisAol<N>::observe(const Interval<N>& interval) noexcept {
@@ -111,7 +120,7 @@ template <int N>
 LimitedForce<N> PerAxisAol<N>::limit(const Demand<N>& wanted) noexcept {
   LimitedForce<N> result{wanted.force, 0, {}};
   for (int i = 0; i < N; ++i) {
-    const auto axis = limiter_.limit(Vec<1>(wanted.force[i]), ledgers_[static_cast<std::size_t>(i)].energy());
+    const auto axis = bound_.limit<1>(Vec<1>(wanted.force[i]), ledgers_[static_cast<std::size_t>(i)].energy());
     result.force[i] = axis.force[0];
     result.permitted = std::max(result.permitted, axis.permitted);
     result.reasons |= axis.reasons;

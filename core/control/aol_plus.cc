@@ -7,15 +7,12 @@
 #include <string>
 #include <utility>
 
+#include "core/base/expect.h"
 #include "core/base/portable_math.h"
 
 namespace tendon {
 
 namespace {
-
-void demand(bool met, const char* name, const std::string& expected, double found) {
-  if (!met) throw std::invalid_argument(std::string(name) + " must be " + expected + ", got " + std::to_string(found));
-}
 
 template <class Ledger, std::size_t Count, class Make, std::size_t... I>
 std::array<Ledger, Count> each(const Make& make, std::index_sequence<I...>) {
@@ -24,24 +21,25 @@ std::array<Ledger, Count> each(const Make& make, std::index_sequence<I...>) {
 
 template <int Blocks, int Size>
 void check(const typename AolPlus<Blocks, Size>::Config& config) {
-  check_longest_hold(config.longest_hold);
+  expect_above_zero(seconds(config.longest_hold), "longest_hold");
   if (const auto& cap = config.parts.energy_cap) {
-    demand(cap->energy >= 0, "energy_cap.energy", "0 J or more", cap->energy);
-    demand(cap->most_contact >= 0, "energy_cap.most_contact", "0 J or more", cap->most_contact);
+    expect(cap->energy >= 0, "energy_cap.energy", cap->energy, "0 J or more");
+    expect(cap->most_contact >= 0, "energy_cap.most_contact", cap->most_contact, "0 J or more");
   }
   if (const auto& knee = config.parts.knee) {
-    demand(knee->start > 0 && knee->start < 1, "knee.start", "between 0 and 1", knee->start);
+    expect(knee->start > 0 && knee->start < 1, "knee.start", knee->start, "a number between 0 and 1");
   }
   if (const auto& reserve = config.parts.latency_reserve) {
     constexpr int kMost = AolPlus<Blocks, Size>::kMostHolds;
-    demand(reserve->holds >= 1 && reserve->holds <= kMost, "latency_reserve.holds", "1 to " + std::to_string(kMost),
-           reserve->holds);
+    expect(reserve->holds >= 1 && reserve->holds <= kMost, "latency_reserve.holds", reserve->holds,
+           "1 to " + std::to_string(kMost));
   }
   if (const auto& bounded = config.parts.bounded_acceleration) {
     for (std::size_t i = 0; i < Blocks; ++i) {
-      demand(bounded->most[i] > 0, "bounded_acceleration.most", "above 0", bounded->most[i]);
-      demand(bounded->shaping_viscous[i] >= config.friction[i].viscous, "bounded_acceleration.shaping_viscous",
-             "the viscous friction or more", bounded->shaping_viscous[i]);
+      expect(bounded->most[i] > 0, "bounded_acceleration.most", bounded->most[i], "a number above 0");
+      expect(bounded->shaping_viscous[i] >= config.friction[i].viscous, "bounded_acceleration.shaping_viscous",
+             bounded->shaping_viscous[i],
+             "the viscous friction of " + shortest(config.friction[i].viscous) + " N·s/m or more");
     }
     if (config.parts.latency_reserve) {
       throw std::invalid_argument(
@@ -49,7 +47,7 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
     }
   }
   if (const auto& adaptive = config.parts.adaptive_friction) {
-    demand(adaptive->rise > Duration::zero(), "adaptive_friction.rise", "above 0 s", seconds(adaptive->rise));
+    expect_above_zero(seconds(adaptive->rise), "adaptive_friction.rise");
   }
 }
 
@@ -73,16 +71,29 @@ AolPlus<Blocks, Size>::AolPlus(const Config& config)
         },
         kEach);
   }
-  for (std::size_t i = 0; i < losses_.size(); ++i) use(i, config.friction[i]);
+  for (std::size_t i = 0; i < bounds_.size(); ++i) use(i, config.friction[i]);
 }
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::use(std::size_t block, const Friction& friction) noexcept {
   friction_[block] = friction;
-  losses_[block].coulomb = friction.coulomb;
-  losses_[block].viscous_per_hold = friction.viscous / seconds(longest_hold_);
+  bounds_[block].coulomb = friction.coulomb;
+  bounds_[block].viscous_per_hold = friction.viscous / seconds(longest_hold_);
   ledgers_[block].adapt(friction);
   if (robust_) (*robust_)[block].adapt(friction);
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::hold_at_most(Duration longest_hold) noexcept {
+  // Forces under way may be held longer, too. When T falls, their reserve stays: it was enough.
+  const double longer = seconds(longest_hold) / seconds(longest_hold_);
+  if (longer > 1) {
+    for (double& loss : under_way_) loss *= longer;
+  }
+  longest_hold_ = longest_hold;
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    bounds_[i].viscous_per_hold = friction_[i].viscous / seconds(longest_hold);
+  }
 }
 
 template <int Blocks, int Size>
@@ -115,17 +126,23 @@ double AolPlus<Blocks, Size>::reserved() const noexcept {
 }
 
 template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::forget_velocity() noexcept {
+  velocity_.reset();
+  acceleration_holds_ = false;
+}
+
+template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) noexcept {
   const double held = seconds(interval.held);
-  acceleration_holds_ = false;
   if (held <= 0) {
-    velocity_.reset();
+    forget_velocity();
     return;
   }
+  acceleration_holds_ = false;
   const Vec<kSize> velocity = interval.dx / held;
   if (velocity_) {
-    // The mean velocities of neighbouring intervals cannot differ by more than a times the distance of their middles,
-    // but for the counts that three positions may be off.
+    // The mean velocities of neighbouring intervals differ by at most a times the time between their middles, plus the
+    // counts by which the three positions may be wrong.
     acceleration_holds_ = true;
     const double before = seconds(last_held_);
     for (int i = 0; i < Blocks; ++i) {
@@ -133,7 +150,7 @@ void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) 
       const double count = parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
       const double change = (velocity - *velocity_).template segment<Size>(i * Size).norm();
       const double most = parts_.bounded_acceleration->most[block] * (held + before) / 2;
-      // Rounding must not call a hand at the very limit a liar.
+      // 1e-9: a hand exactly at the limit must not be flagged because of rounding.
       if (!(change <= most * (1 + 1e-9) + count * (1 / held + 1 / before))) acceleration_holds_ = false;
     }
     if (!acceleration_holds_) ++broken_;
@@ -144,7 +161,10 @@ void AolPlus<Blocks, Size>::watch_acceleration(const Interval<kSize>& interval) 
 
 template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
-  if (!interval.applied.allFinite() || !interval.dx.allFinite()) return;
+  if (!interval.applied.allFinite() || !interval.dx.allFinite()) {
+    forget_velocity();
+    return;
+  }
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
     const Vec<Size> applied = interval.applied.template segment<Size>(i * Size);
@@ -159,7 +179,7 @@ void AolPlus<Blocks, Size>::observe(const Interval<kSize>& interval) noexcept {
   if (parts_.bounded_acceleration) watch_acceleration(interval);
   if (parts_.adaptive_friction) {
     const double step = std::min(1.0, std::max(0.0, seconds(interval.held) / seconds(parts_.adaptive_friction->rise)));
-    for (std::size_t i = 0; i < losses_.size(); ++i) {
+    for (std::size_t i = 0; i < bounds_.size(); ++i) {
       Friction now = friction_[i];
       now.coulomb += (target_[i].coulomb - now.coulomb) * step;
       now.viscous += (target_[i].viscous - now.viscous) * step;
@@ -178,8 +198,7 @@ void AolPlus<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duration a
   }
   contact_ = 0;
   travel_.setZero();
-  velocity_.reset();
-  acceleration_holds_ = false;
+  forget_velocity();
 }
 
 template <int Blocks, int Size>
@@ -208,8 +227,8 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   const double budget = spendable() - reserved();
 
   std::array<double, Blocks> sizes{};
-  std::array<WorstLoss, Blocks> losses = losses_;
-  std::array<WorstLoss, Blocks> shaping = losses_;
+  std::array<OutputBound, Blocks> bounds = bounds_;
+  std::array<OutputBound, Blocks> shaping = bounds_;
   for (int i = 0; i < Blocks; ++i) {
     const auto block = static_cast<std::size_t>(i);
     const Vec<Size> part = force.template segment<Size>(i * Size);
@@ -219,18 +238,18 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     const double hold = seconds(longest_hold_);
     const double towards = velocity_->template segment<Size>(i * Size).dot(part) / sizes[block];
     const double count = parts_.robust_ledger ? parts_.robust_ledger->encoder_step[block] * std::sqrt(Size) : 0.0;
-    losses[block].reach =
+    bounds[block].reach =
         hold * (towards + bounded.most[block] * (seconds(last_held_) + hold) / 2) + count * hold / seconds(last_held_);
     shaping[block].viscous_per_hold = bounded.shaping_viscous[block] / hold;
   }
   double scale = 0;
   double permitted = 0;
   if constexpr (Blocks == 1) {
-    permitted = losses[0].largest(budget);
+    permitted = bounds[0].largest(budget);
     if (acceleration_holds_) permitted = std::min(permitted, shaping[0].largest(budget));
     scale = size > 0 ? permitted / size : 1;
   } else {
-    scale = largest_scale(losses, sizes, budget);
+    scale = largest_scale(bounds, sizes, budget);
     if (acceleration_holds_) scale = std::min(scale, largest_scale(shaping, sizes, budget));
     permitted = size > 0 ? scale * size : 0;
   }
@@ -253,7 +272,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   if (parts_.latency_reserve) {
     double loss = 0;
     for (int i = 0; i < Blocks; ++i) {
-      loss += losses_[static_cast<std::size_t>(i)].at(result.force.template segment<Size>(i * Size).norm());
+      loss += bounds_[static_cast<std::size_t>(i)].at(result.force.template segment<Size>(i * Size).norm());
     }
     under_way_[next_under_way_] = loss;
     next_under_way_ = (next_under_way_ + 1) % static_cast<std::size_t>(parts_.latency_reserve->holds);
@@ -265,7 +284,7 @@ template <int Blocks, int Size>
 void AolPlus<Blocks, Size>::adapt(const std::array<Friction, Blocks>& friction) noexcept {
   if (!parts_.adaptive_friction) return;
   target_ = friction;
-  for (std::size_t i = 0; i < losses_.size(); ++i) {
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
     const Friction now{.coulomb = std::min(friction_[i].coulomb, friction[i].coulomb),
                        .viscous = std::min(friction_[i].viscous, friction[i].viscous)};
     use(i, now);

@@ -6,16 +6,14 @@
 
 namespace tendon {
 
-using law_support::require;
-
 template <int N>
 EnergyBounding<N>::EnergyBounding(const Config& config) : port_(config.friction) {
   const double most =
       law_support::checked_viscous(config.friction.viscous) / law_support::checked_hold(config.longest_hold);
   c1_ = config.c1.value_or(most);
-  require(c1_ > 0 && c1_ <= most, "c1", c1_, "above 0 and at most b/T = " + std::to_string(most) + " N/m");
+  expect(c1_ > 0 && c1_ <= most, "c1", c1_, "a number above 0 and at most b/T = " + shortest(most) + " N/m");
   c2_ = config.c2.value_or(c1_);
-  require(c2_ > 0 && c2_ <= c1_, "c2", c2_, "above 0 and at most c1 = " + std::to_string(c1_) + " N/m");
+  expect(c2_ > 0 && c2_ <= c1_, "c2", c2_, "a number above 0 and at most c1 = " + shortest(c1_) + " N/m");
 }
 
 template <int N>

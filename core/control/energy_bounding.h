@@ -8,7 +8,7 @@
 
 namespace tendon {
 
-/// Keeps a force that depends on nothing but its own past passive: the energy-bounding algorithm.
+/// The energy-bounding algorithm: bounds a force by the force before it and the motion since.
 ///
 /// With f = −F the reflective force, f_e the wanted one and Δx the displacement in the interval that has ended,
 /// f(n) is the force nearest to f_e that obeys
@@ -25,8 +25,8 @@ namespace tendon {
 /// E(n) ≥ ‖f(n)‖²/(2c₂), and that bound on its size is all that the next interval needs. When c₂ > c₁ the two
 /// conditions can contradict each other, hence the check.
 ///
-/// Holds are at most `longest_hold` long, or nothing is promised. An interval that was not seen, or is not finite,
-/// starts it anew from zero force.
+/// The proof ends with the first hold longer than `longest_hold` (what Limiter then does is written there). An interval
+/// that was not seen, or is not finite, starts it again from zero force.
 ///
 /// Source: Kim & Ryu, IROS 2004; Int. J. Robotics Research 29(6), 2010 (recalled: the exact published form of (ii) is
 /// unchecked; proof and feasibility: control.md 5.3). The vector form is ours, with the proof above: a ball cut by a

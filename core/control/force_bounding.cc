@@ -7,8 +7,8 @@ namespace tendon {
 
 template <int N>
 ForceBounding<N>::ForceBounding(const Config& config)
-    : viscous_per_hold_(law_support::checked_viscous(config.friction.viscous) /
-                        law_support::checked_hold(config.longest_hold)),
+    : viscous_(law_support::checked_viscous(config.friction.viscous)),
+      viscous_per_hold_(viscous_ / law_support::checked_hold(config.longest_hold)),
       port_(config.friction),
       empty_({.coulomb = 0, .viscous = config.friction.viscous}),
       budget_(empty_) {}

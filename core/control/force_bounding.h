@@ -15,8 +15,8 @@ namespace tendon {
 /// Output-Limiter; with it, it does not claim that part of the credit. Forgetting E between contacts costs the first
 /// millimetres of each contact and keeps energy won in free motion from feeding a buzz (control.md 8.1).
 ///
-/// Passive for every demand: its E never is above the port's ledger, and only credit is thrown away (control.md 8,
-/// Theorem A); a debt is never forgotten. Holds are at most `longest_hold` long.
+/// Passive for every demand while no hold is longer than T_max: its E is never above the port's ledger, and only credit
+/// is thrown away (control.md 8, Theorem A); a debt is never forgotten.
 ///
 /// Source: Kim, Baek, Ryu, 2015 (recalled; form as in published code, control.md 5.3), B = b/T · I.
 ///
@@ -37,20 +37,24 @@ class ForceBounding {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
+  /// From the next `limit` on, T_max is this (> 0).
+  void hold_at_most(Duration longest_hold) noexcept { viscous_per_hold_ = viscous_ / seconds(longest_hold); }
+
  private:
+  double viscous_;           ///< b, N·s/m
   double viscous_per_hold_;  ///< b/T_max, N/m
   EnergyLedger port_;
   EnergyLedger empty_;   ///< without Coulomb friction
   EnergyLedger budget_;  ///< E
 };
 
-/// Bounds a force by the one before it and the motion since: force bounding without any memory but that.
+/// Bounds a force by the one before it and the motion since. It remembers nothing else.
 ///
 ///     ‖F(n)‖ ≤ ‖F(n−1) − 2b Δx/T‖
 ///
-/// F in N on the hand, F(n−1) the force really held, T the longest hold. It shows a wall as a spring of 2b/T. What a
-/// step does not use to the full is lost: a force appears only as the hand moves into it, and a held one loses what
-/// the hand has come back since it was deepest, times 2b/T.
+/// F in N on the hand, F(n−1) the force really held, T the longest hold. It shows a wall as a spring of 2b/T. A step
+/// that does not use its bound loses the rest: a force appears only as the hand moves into the wall, and a held force
+/// shrinks by 2b/T times the way that the hand has come back from its deepest place.
 ///
 /// Passive for every demand: E(n) ≥ T ‖F(n)‖²/(4b) holds at every step, since
 ///

@@ -7,7 +7,7 @@ namespace tendon {
 
 template <int N>
 HardClamp<N>::HardClamp(const Config& config) : max_force_(config.max_force), port_(config.friction) {
-  law_support::require(std::isfinite(max_force_) && max_force_ >= 0, "max_force", max_force_, "finite and 0 N or more");
+  expect(std::isfinite(max_force_) && max_force_ >= 0, "max_force", max_force_, "a finite number of 0 N or more");
 }
 
 template <int N>

@@ -6,7 +6,7 @@
 
 namespace tendon {
 
-/// Bounds the size of a force and nothing else: what a device's own limit does.
+/// Bounds the size of a force and nothing else, as a device's own limit does.
 ///
 ///     F(n) = F_wanted(n) · min(1, F_max / ‖F_wanted(n)‖)
 ///

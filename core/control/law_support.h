@@ -3,31 +3,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
-#include <string_view>
 
+#include "core/base/expect.h"
 #include "core/control/stability_controller.h"
 
 /// What the laws of core/control do in the same way. A part of their implementation, not of their interface.
 namespace tendon::law_support {
 
-/// Throws std::invalid_argument "<field> must be <expected>, got <value>" unless `ok`.
-inline void require(bool ok, std::string_view field, double value, std::string_view expected) {
-  if (ok) return;
-  throw std::invalid_argument(std::string(field) + " must be " + std::string(expected) + ", got " +
-                              std::to_string(value));
-}
-
-/// T_max in seconds, if it is above zero.
+/// T_max in seconds. Throws std::invalid_argument unless it is above zero.
 inline double checked_hold(Duration longest_hold) {
-  require(longest_hold > Duration::zero(), "longest_hold", seconds(longest_hold), "above 0 s");
+  expect_above_zero(seconds(longest_hold), "longest_hold");
   return seconds(longest_hold);
 }
 
-/// b, if it is above zero: what a law that lives on viscous friction alone needs.
+/// b. Throws std::invalid_argument unless it is above zero: for a law that lives on viscous friction alone.
 inline double checked_viscous(double viscous) {
-  require(std::isfinite(viscous) && viscous > 0, "friction.viscous", viscous, "above 0 N·s/m for this law");
+  expect_above_zero(viscous, "friction.viscous");
   return viscous;
 }
 

@@ -10,8 +10,8 @@ NonlinearCoupling<N>::NonlinearCoupling(const Config& config) : port_(config.fri
   const double most =
       2 * law_support::checked_viscous(config.friction.viscous) / law_support::checked_hold(config.longest_hold);
   max_slope_ = config.max_slope.value_or(most);
-  law_support::require(max_slope_ > 0 && max_slope_ <= most, "max_slope", max_slope_,
-                       "above 0 and at most 2b/T = " + std::to_string(most) + " N/m");
+  expect(max_slope_ > 0 && max_slope_ <= most, "max_slope", max_slope_,
+         "a number above 0 and at most 2b/T = " + shortest(most) + " N/m");
 }
 
 template <int N>

@@ -8,11 +8,11 @@
 
 namespace tendon {
 
-/// Lets every law through that is static and no steeper than the device's friction affords, and ties all others to the
-/// hand by a spring of that slope: virtual coupling by its slope condition.
+/// Passes every static force law that is no steeper than the device's friction affords, and ties all others to the hand
+/// by a spring of that slope: virtual coupling by its slope condition.
 ///
-/// The hand hangs on a proxy by a spring K_max. While the proxy stays, the reflective force f = −F becomes g; it
-/// becomes f(n) when the proxy gives way by (g − f(n))/K_max. What the proxy has taken in so far is P:
+/// A spring K_max ties the hand to a proxy. While the proxy stays, the reflective force f = −F becomes g; it becomes
+/// f(n) when the proxy gives way by (g − f(n))/K_max. The proxy has taken in the energy P so far:
 ///
 ///     g    = f(n−1) + K_max Δx(n)
 ///     f(n) = the force nearest to f_e with  P(n) = P(n−1) + f(n)·(g − f(n))/K_max ≥ 0
@@ -51,7 +51,7 @@ class NonlinearCoupling {
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }
 
-  /// P, J: what the proxy has taken in and can give back.
+  /// P, J: the energy that the proxy has taken in and can give back.
   double account() const noexcept { return account_; }
 
  private:

@@ -13,10 +13,9 @@ PassiveSynthesis<N>::PassiveSynthesis(const Config& config)
                   (law_support::checked_hold(config.longest_hold) / 2 + seconds(config.delay))),
       steepest_(config.stiffness.value_or(0)),
       port_(config.friction) {
-  using law_support::require;
-  require(config.delay >= Duration::zero(), "delay", seconds(config.delay), "0 s or more");
+  expect(config.delay >= Duration::zero(), "delay", seconds(config.delay), "0 s or more");
   if (config.stiffness) {
-    require(std::isfinite(steepest_) && steepest_ > 0, "stiffness", steepest_, "finite and above 0 N/m");
+    expect(std::isfinite(steepest_) && steepest_ > 0, "stiffness", steepest_, "a finite number above 0 N/m");
   }
 }
 

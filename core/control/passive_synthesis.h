@@ -8,18 +8,18 @@
 
 namespace tendon {
 
-/// Makes a force field so soft, everywhere by the same factor, that the device's friction pays for sampling and delay.
+/// Softens a whole force field by one factor, so far that the device's friction pays for sampling and delay.
 ///
 ///     F = γ F_wanted,    γ = min(1, b / (K_max (T/2 + t_d)))
 ///
 /// K_max (N/m) is the steepest slope of the field: `stiffness`, or the spectral norm of the stiffest demand so far,
-/// whichever is larger. It never forgets, so γ only falls. As long as no slope is known at all (a demand without
-/// stiffness, and none configured) the force is zero: nothing could be promised.
+/// whichever is larger. It never forgets, so γ only falls. While no slope is known (demands without stiffness, and none
+/// configured) the force is zero, because nothing could be promised.
 ///
 /// Passive for a static field with a convex potential whose slope K_max really bounds, sampled in every period and
 /// delivered t_d late (a multiple of the period), when what is returned is what is held: the force differs from the
 /// field's own by at most K_max times the way since it was sampled, whose mean age is T/2 + t_d. A field that changes
-/// with time is scaled and no more; and everything is softened, even what was soft.
+/// with time is scaled, without any promise. Even the soft parts of the field are softened.
 ///
 /// Source: Mahvash & Hayward, IEEE Trans. Robotics 21(1), 2005 (recalled; proof: control.md 5.6). Learning K_max from
 /// the demand is ours: a slope that is met for the first time is paid only from then on.

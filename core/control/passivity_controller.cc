@@ -27,9 +27,9 @@ double series_damping(double missing, double squared_motion, Duration held, doub
 
 template <int N>
 PassivityController<N>::PassivityController(const Config& config) : config_(config), port_(config.friction) {
-  law_support::require(config.max_damping > 0, "max_damping", config.max_damping, "above 0 N·s/m");
-  law_support::require(std::isfinite(config.min_speed) && config.min_speed >= 0, "min_speed", config.min_speed,
-                       "finite and 0 m/s or more");
+  expect(config.max_damping > 0, "max_damping", config.max_damping, "a number above 0 N·s/m");
+  expect(std::isfinite(config.min_speed) && config.min_speed >= 0, "min_speed", config.min_speed,
+         "a finite number of 0 m/s or more");
 }
 
 template <int N>
@@ -70,9 +70,9 @@ LimitedForce<N> PassivityController<N>::limit(const Demand<N>& demand) noexcept 
 template <int N>
 ParallelPassivityController<N>::ParallelPassivityController(const Config& config)
     : config_(config), port_(config.friction) {
-  law_support::require(config.max_mobility > 0, "max_mobility", config.max_mobility, "above 0 m/(N·s)");
-  law_support::require(std::isfinite(config.min_force) && config.min_force >= 0, "min_force", config.min_force,
-                       "finite and 0 N or more");
+  expect(config.max_mobility > 0, "max_mobility", config.max_mobility, "a number above 0 m/(N·s)");
+  expect(std::isfinite(config.min_force) && config.min_force >= 0, "min_force", config.min_force,
+         "a finite number of 0 N or more");
 }
 
 template <int N>

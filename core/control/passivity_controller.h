@@ -10,9 +10,9 @@ namespace tendon {
 
 /// How the energy E that has gone into the environment is observed; f = −F is the reflective force.
 enum class PassivityObserver : std::uint8_t {
-  /// As published in 2002: Σ f(n)·Δx(n) of the environment's own force, and what the controller has dissipated. It
-  /// pairs
-  /// the motion of an interval with the force that **follows** it, so it never sees the leak of a sampled spring:
+  /// As published in 2002: Σ f(n)·Δx(n) of the environment's own force, plus the energy that the controller has
+  /// dissipated. It pairs the motion of an interval with the force that **follows** it, so it never sees the leak of a
+  /// sampled spring:
   ///     Σ K x(n) Δx(n) = K x²/2 + K/2 Σ Δx² ≥ 0 for every motion
   kSameSample,
   /// Σ f(n−1)·Δx(n) of the force really held, exact for a zero-order hold: a spring gives K x²/2 − K/2 Σ Δx². The
@@ -31,7 +31,7 @@ double series_damping(double missing, double squared_motion, Duration held, doub
 ///     α(n) = −E(n) / (T ‖v(n)‖²)  when E(n) < 0, within [0, max_damping]       v = Δx/T, m/s
 ///     F(n) = F_wanted(n) − α(n) v(n)
 ///
-/// Keeps no promise about the hand's port: the correction acts one interval late, and on a motion that may not come
+/// It promises nothing about the hand's port: the correction acts one interval late, and on a motion that may not come
 /// (see the tests). It needs no model and no friction; it chatters in stiff contact. A digital damper is itself
 /// unstable above 2m/T (m: the device's mass), so max_damping must stay well below.
 ///
@@ -76,12 +76,12 @@ class PassivityController {
 ///     1/α(n) = −E(n) / (T ‖f(n)‖²)  when E(n) < 0, within [0, max_mobility]
 ///     v₁ = v₂ + f/α           hand v₁, environment v₂ (m/s), f = −F (N)
 ///
-/// The velocity is what is modified, so the environment comes to be at x − δ, δ = Σ T f/α, and its force there is taken
-/// from the demand's stiffness: F = F_wanted + K δ. Without a stiffness in the demand it changes nothing. δ is the
-/// known weakness: environment and hand drift apart. It is forgotten when the environment demands nothing, here and as
-/// stiff as nothing: out of contact. Where the true environment would be left at x − δ, this affine one pulls.
+/// The controller modifies the velocity, so the environment is at x − δ, δ = Σ T f/α; the demand's stiffness gives its
+/// force there: F = F_wanted + K δ. Without a stiffness in the demand it changes nothing. δ is the known weakness:
+/// environment and hand drift apart. δ is reset out of contact, when both force and stiffness of the demand are zero.
+/// Where the true environment would let go at x − δ, this affine one pulls.
 ///
-/// Keeps no promise about the hand's port (see PassivityController); observers and sources as there.
+/// It promises nothing about the hand's port (see PassivityController); observers and sources as there.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>

@@ -7,7 +7,7 @@ namespace tendon {
 
 template <int N>
 PortHamiltonian<N>::PortHamiltonian(const Config& config) : stiffness_(config.stiffness), port_(config.friction) {
-  law_support::require(std::isfinite(stiffness_) && stiffness_ > 0, "stiffness", stiffness_, "finite and above 0 N/m");
+  expect(std::isfinite(stiffness_) && stiffness_ > 0, "stiffness", stiffness_, "a finite number above 0 N/m");
 }
 
 template <int N>

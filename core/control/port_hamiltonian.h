@@ -6,8 +6,8 @@
 
 namespace tendon {
 
-/// A spring whose state is the energy that has really gone into it: the energy-consistent sampled-data
-/// port-Hamiltonian system.
+/// A spring whose state is the energy that has really gone into it: an energy-consistent sampled-data port-Hamiltonian
+/// system.
 ///
 ///     H(n) = H(n−1) + f(n−1)·Δx(n)                  J, f = −F really held: exact for a zero-order hold
 ///     q(n) = √(2 H(n)/K)                            m, the state that belongs to it
@@ -15,8 +15,8 @@ namespace tendon {
 ///
 /// K (N/m) is the demand's stiffness along its force where that is above zero, else `stiffness`. The plain spring would
 /// hold ½ K x² while only ½ K x² − Σ ½ K Δx² has gone in: the energy leaps. Here the storage pays for them, and the
-/// state lags behind the position. Two things the storage cannot pay are booked as debt and dissipated later, from half
-/// of all income:
+/// state lags behind the position. The storage cannot pay for two things; they are booked as debt and dissipated later,
+/// from half of all income:
 ///
 ///     leap       while moving into the force, q is at least the motion of the last interval (from q = 0 nothing would
 ///                ever load): ½ K ‖Δx‖² − H
@@ -45,7 +45,7 @@ class PortHamiltonian {
   explicit PortHamiltonian(const Config& config);
 
   void observe(const Interval<N>& interval) noexcept;
-  /// Nothing is known of the energy: the storage is emptied.
+  /// The energy that went in or out is unknown: the storage is emptied.
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
   LimitedForce<N> limit(const Demand<N>& demand) noexcept;
   double energy() const noexcept { return port_.energy(); }

@@ -10,12 +10,11 @@ namespace tendon {
 template <int N>
 ReferenceEnergyController<N>::ReferenceEnergyController(const Config& config)
     : config_(config), port_(config.friction) {
-  using law_support::require;
-  require(std::isfinite(config.stiffness) && config.stiffness > 0, "stiffness", config.stiffness,
-          "finite and above 0 N/m");
-  require(config.max_damping > 0, "max_damping", config.max_damping, "above 0 N·s/m");
-  require(std::isfinite(config.min_speed) && config.min_speed >= 0, "min_speed", config.min_speed,
-          "finite and 0 m/s or more");
+  expect(std::isfinite(config.stiffness) && config.stiffness > 0, "stiffness", config.stiffness,
+         "a finite number above 0 N/m");
+  expect(config.max_damping > 0, "max_damping", config.max_damping, "a number above 0 N·s/m");
+  expect(std::isfinite(config.min_speed) && config.min_speed >= 0, "min_speed", config.min_speed,
+         "a finite number of 0 m/s or more");
 }
 
 template <int N>

@@ -8,7 +8,7 @@
 namespace tendon {
 
 /// Adds damping as soon as the environment holds less energy than an ideal one would: passivity control that follows a
-/// reference energy, instead of waiting until everything is lost.
+/// reference energy, instead of waiting until all energy is lost.
 ///
 ///     E(n)     = Σ f(n−1)·Δx(n)                        what has gone in (J), f = −F really held
 ///     E_ref(n) = ½ F_wanted(n)ᵀ K⁻¹ F_wanted(n)        what a spring of stiffness K holds at that force (J)
@@ -17,8 +17,8 @@ namespace tendon {
 ///
 /// K is the demand's stiffness where it sends one (its symmetric part; directions without stiffness hold nothing), else
 /// `stiffness`. Quiet on stiff walls **if** the environment is that spring and its force is fresh in every period; with
-/// a reference that is not the environment's own, it brakes for nothing or too late. Keeps no promise about the hand's
-/// port (see PassivityController).
+/// a reference that is not the environment's own, it brakes without need or too late. It promises nothing about the
+/// hand's port (see PassivityController).
 ///
 /// Source: Ryu, Preusche, Hannaford, Hirzinger, IEEE TCST 13(5), 2005 (recalled); the trigger uses the predicted energy
 /// as PassivityObserver::kZohExact does. control.md 5.2.

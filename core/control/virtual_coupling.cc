@@ -7,16 +7,14 @@
 
 namespace tendon {
 
-using law_support::require;
-
 template <int N>
 VirtualCoupling<N>::VirtualCoupling(const Config& config)
     : stiffness_(config.stiffness),
       damping_per_hold_(config.damping / law_support::checked_hold(config.longest_hold)),
       port_(config.friction) {
-  require(std::isfinite(stiffness_) && stiffness_ > 0, "stiffness", stiffness_, "finite and above 0 N/m");
-  require(std::isfinite(config.damping) && config.damping >= 0, "damping", config.damping,
-          "finite and 0 N·s/m or more");
+  expect(std::isfinite(stiffness_) && stiffness_ > 0, "stiffness", stiffness_, "a finite number above 0 N/m");
+  expect(std::isfinite(config.damping) && config.damping >= 0, "damping", config.damping,
+         "a finite number of 0 N·s/m or more");
 }
 
 template <int N>
@@ -53,8 +51,8 @@ LimitedForce<N> VirtualCoupling<N>::limit(const Demand<N>& demand) noexcept {
 namespace {
 
 void check_design(double viscous, Duration longest_hold, double damping) {
-  require(std::isfinite(viscous) && viscous >= 0, "viscous", viscous, "finite and 0 N·s/m or more");
-  require(std::isfinite(damping), "damping", damping, "finite");
+  expect(std::isfinite(viscous) && viscous >= 0, "viscous", viscous, "a finite number of 0 N·s/m or more");
+  expect(std::isfinite(damping), "damping", damping, "a finite number");
   law_support::checked_hold(longest_hold);
 }
 
@@ -79,7 +77,7 @@ double colgate_coupling(double viscous, Duration longest_hold, double damping) {
 
 double two_port_coupling(double viscous, Duration longest_hold, double damping) {
   check_design(viscous, longest_hold, damping);
-  require(damping >= 0, "damping", damping, "0 N·s/m or more");
+  expect(damping >= 0, "damping", damping, "0 N·s/m or more");
   // The margin is concave in κ; at κ = 0 it is negative, and falling, when B_c > 8b. So there is one change of sign.
   if (viscous == 0 || damping > 8 * viscous) return 0;
   double low = 0;

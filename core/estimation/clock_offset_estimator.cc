@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -17,9 +18,7 @@ double ns_between(LocalTime from, LocalTime to) noexcept { return static_cast<do
 }  // namespace
 
 ClockOffsetEstimator::ClockOffsetEstimator(double fastest_drift) : fastest_drift_(fastest_drift) {
-  if (!(fastest_drift >= 0 && fastest_drift <= 0.01)) {
-    throw std::invalid_argument("clock offset: fastest_drift must be within 0 to 0.01 s/s");
-  }
+  expect(fastest_drift >= 0 && fastest_drift <= 0.01, "fastest_drift", fastest_drift, "0 to 0.01 s/s");
 }
 
 std::optional<ClockOffsetEstimator::Sample> ClockOffsetEstimator::sample_of(const ClockExchange& e) const noexcept {

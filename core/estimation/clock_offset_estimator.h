@@ -20,20 +20,20 @@ struct ClockExchange {
 
 /// How far the peer's clock is ahead of ours, how fast it drifts, and how wrong that can be at most.
 ///
-/// An exchange says of the offset θ (peer − ours) at its middle, with both delays unknown but not negative, when θ
-/// drifts by at most ρ:
+/// Both one-way delays of an exchange are unknown but not negative, and the offset θ (peer − ours) drifts by at most ρ.
+/// So an exchange bounds θ at its middle:
 ///
 ///     θᵢ = ((T2 − T1) + (T3 − T4)) / 2,   δᵢ = (T4 − T1) − (T3 − T2),   |θ(tᵢ) − θᵢ| ≤ (δᵢ + ρ (T4 − T1)) / 2 = eᵢ
 ///
-/// so those with a short round trip δ say most, unless the peer has held its answer for long: all that time the clocks
-/// drift, and with a fast one δ even looks short. Time is cut into blocks; of each only the exchange with the least e
-/// is kept, and a line is laid through them with weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into what
-/// all of them permit at time t:
+/// Exchanges with a short round trip δ say most, unless the peer has held its answer for long: the clocks drift all
+/// that time, and with a fast peer δ even looks short. Time is cut into blocks; each keeps only its exchange with the
+/// least e, and a line is fitted to them with weights 1 / (δ₀ + 2 eᵢ − 2 e_min). The line is then moved into the range
+/// that all of them permit at time t:
 ///
 ///     maxᵢ (θᵢ − eᵢ − ρ|t − tᵢ|) ≤ θ(t) ≤ minᵢ (θᵢ + eᵢ + ρ|t − tᵢ|)
 ///
-/// and its distance from the farther end is the error bound: not a guess, a proof (given ρ). When nothing is permitted
-/// the peer's clock has been set: the past is forgotten and counted in `steps`.
+/// Its distance from the farther end is the error bound, which is proved, given ρ. An empty range means that the peer's
+/// clock has been set: the past is forgotten, and that is counted in `steps`.
 ///
 /// Blocks of 16 exchanges at 5 Hz, eight of them, were the best of six estimators on three real host pairs
 /// (network.md). Here a block is also at least 3.2 s long, so that exchanges at 1 kHz see as much weather.
@@ -68,7 +68,7 @@ class ClockOffsetEstimator {
   /// At `at`, past or future; empty before the first exchange.
   std::optional<Estimate> estimate(LocalTime at) const noexcept;
 
-  /// How often the peer's clock has been set to another time, as far as we saw.
+  /// How often the peer's clock was seen to be set to another time.
   std::uint64_t steps() const noexcept { return steps_; }
 
  private:

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "core/base/expect.h"
 
 #include "core/base/portable_math.h"
 
@@ -12,16 +12,10 @@ namespace tendon {
 namespace {
 
 const LeastSquaresConfig& checked(const LeastSquaresConfig& config) {
-  const auto refuse = [](const char* field, double value, const char* expected) {
-    throw std::invalid_argument(std::string(field) + " must be " + expected + ", got " + std::to_string(value));
-  };
-  if (!(config.forgetting > 0 && config.forgetting <= 1)) refuse("forgetting", config.forgetting, "in (0, 1]");
-  if (!(std::isfinite(config.prior_variance) && config.prior_variance > 0)) {
-    refuse("prior_variance", config.prior_variance, "finite and positive");
-  }
-  if (!(std::isfinite(config.dead_zone) && config.dead_zone >= 0)) {
-    refuse("dead_zone", config.dead_zone, "finite and not negative");
-  }
+  expect(config.forgetting > 0 && config.forgetting <= 1, "forgetting", config.forgetting,
+         "a number above 0 and at most 1");
+  expect_above_zero(config.prior_variance, "prior_variance");
+  expect_not_negative(config.dead_zone, "dead_zone");
   return config;
 }
 

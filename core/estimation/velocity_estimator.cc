@@ -4,14 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 VelocityEstimator::VelocityEstimator(double resolution) : resolution_(resolution) {
-  if (!(std::isfinite(resolution) && resolution >= 0)) {
-    throw std::invalid_argument("resolution must be finite and not negative, got " + std::to_string(resolution));
-  }
+  expect_not_negative(resolution, "resolution");
 }
 
 Vec3 VelocityEstimator::observe(LocalTime at, const Vec3& position) noexcept {

@@ -6,12 +6,12 @@
 
 namespace tendon {
 
-/// A count that one thread makes and any thread may read.
+/// A count that one thread keeps and any thread may read.
 ///
 /// Thread-safe: `value` from any thread, the rest from one. Realtime-safe.
 class Counter {
  public:
-  /// One writer: a load and a store are enough, which no other core's cache has to be asked for.
+  /// There is one writer, so a load and a store are enough: no read-modify-write, no cache line to wait for.
   void add() noexcept { set(value() + 1); }
   void set(std::uint64_t count) noexcept { count_.store(count, std::memory_order_relaxed); }
   std::uint64_t value() const noexcept { return count_.load(std::memory_order_relaxed); }

@@ -9,9 +9,8 @@
 
 namespace tendon {
 
-/// Keeps the last values of a loop that must not stop to write anything down. A fault freezes it;
-/// then another thread can read what led to the fault, at leisure, and thaw it. Memory is taken when it is made,
-/// and never again.
+/// Keeps the last values of a loop that must not stop to write to a file. A fault freezes it; then another thread can
+/// read what led to the fault, at leisure, and thaw it. It allocates only when it is made.
 ///
 /// Thread-safe: one thread records and freezes; another reads and thaws, only while it is frozen.
 /// Realtime-safe when copying T is.
@@ -37,7 +36,7 @@ class FlightRecorder {
 
   bool frozen() const noexcept { return frozen_.load(std::memory_order_acquire); }
 
-  /// Reading thread: starts anew. Only while frozen.
+  /// Reading thread: empties it and records again. Only while frozen.
   void thaw() noexcept {
     count_ = 0;
     frozen_.store(false, std::memory_order_release);

@@ -7,9 +7,9 @@
 
 namespace tendon {
 
-/// Hands the newest value from one thread to another, wait-free on both sides; older values that were
-/// not taken in time are forgotten. For what is only worth something while it is new: the remote force,
-/// the state of the device.
+/// Hands the newest value from one thread to another, wait-free on both sides. Older values that were not taken in time
+/// are forgotten. For values that are worth something only while they are new: the remote force, the state of the
+/// device.
 ///
 /// Three slots: the writer's, the reader's and the one in between, exchanged by one atomic byte.
 ///

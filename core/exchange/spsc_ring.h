@@ -9,11 +9,11 @@
 
 namespace tendon {
 
-/// Hands every value from one thread to another in order, wait-free on both sides; when the reader is
-/// too slow, `try_push` says so and the value is not taken. For what must not be lost unnoticed: steps
-/// and datagrams on their way to the recording, commands to the haptic thread.
+/// Hands every value from one thread to another in order, wait-free on both sides. When the reader is too slow,
+/// `try_push` returns false and does not take the value. For values that must not be lost unnoticed: steps and
+/// datagrams on their way to the recording, commands to the haptic thread.
 ///
-/// Memory is taken when it is made, and never again.
+/// It allocates only when it is made.
 ///
 /// Thread-safe: one writer thread, one reader thread. Realtime-safe when copying T is.
 template <typename T>

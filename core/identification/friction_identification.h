@@ -14,7 +14,7 @@
 
 namespace tendon {
 
-/// What one run says.
+/// The result of one run.
 struct RunEstimate {
   std::string place;
   double direction = 0;  ///< +1 or −1
@@ -24,7 +24,7 @@ struct RunEstimate {
   Friction integral_error;  ///< one standard deviation of `integral.friction`, N and N·s/m
 };
 
-/// What all runs of one place say.
+/// The result of all runs of one place.
 struct PlaceEstimate {
   std::string place;
   bool both_directions = false;  ///< else a constant force (gravity, bias) is in f_c, by its full size
@@ -52,14 +52,14 @@ struct Identification {
   std::vector<PlaceEstimate> places;  ///< in the order of their first run
   double force_noise = 0;             ///< N, one standard deviation of a sample, from all runs
   double mass = 0;                    ///< kg, given or the mean of the fitted ones
-  Friction estimate;                  ///< least of the places: what the device has, as far as is known
-  /// What a limiter may count on: the least of the places of the integral's estimate − 3 standard deviations and, where
+  Friction estimate;                  ///< least of the places: the best estimate of the device's friction
+  /// Bounds for a limiter: the least of the places of the integral's estimate − 3 standard deviations and, where
   /// it is valid, of Kelly's estimate; never negative. A mass 30 % too small makes the integral's b 9 % too large at
   /// 0.26 N·s/m: Kelly's b, which needs no mass, stands against that.
   Friction lower_bound;
   Trust trust = Trust::kIntegral;
   std::string reason;                 ///< for `trust`: a sentence for people
-  std::vector<std::string> warnings;  ///< what is missing for bounds that deserve the name
+  std::vector<std::string> warnings;  ///< what is missing before these are lower bounds
 };
 
 /// Viscous and Coulomb friction of a device from runs of the ramp experiment (RampRun), by Kelly's procedure and by the
@@ -77,8 +77,8 @@ struct IdentificationConfig {
   double encoder_step = 0;     ///< m, one count
 };
 
-/// Throws std::invalid_argument: no runs; or "run i: …" (counted from 1) with what slide_of, kelly_fit or integral_fit
-/// has to say against one.
+/// Throws std::invalid_argument when there are no runs, or "run i: …" (counted from 1) with the message of slide_of,
+/// kelly_fit or integral_fit.
 /// Thread-safe: yes. Realtime-safe: no.
 Identification identify_friction(std::span<const RampRun> runs, const IdentificationConfig& config);
 

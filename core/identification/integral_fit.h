@@ -18,9 +18,9 @@ namespace tendon {
 /// linear in b, f_c (and m, when it is not known) and the unknown momentum c at t_a. Solved by least squares with
 /// Huber's weights, so that single wrong samples do not count.
 ///
-/// **Its covariance** takes the disturbance for white noise of the force, ε with ∬ε dt² in the equation: residuals are
-/// then the integral of a random walk. The textbook's σ²(AᵀA)⁻¹ takes them for independent and states errors 35 to 70
-/// times too small (0.005 and 0.26 N·s/m, 0.1 N/s): bounds published from it would be none.
+/// **Its covariance** models the disturbance as white noise ε of the force, which enters the equation as ∬ε dt²:
+/// residuals are then the integral of a random walk. The textbook's σ²(AᵀA)⁻¹ assumes that they are independent and
+/// states errors 35 to 70 times too small (0.005 and 0.26 N·s/m, 0.1 N/s): bounds published from it would be wrong.
 ///
 /// Source: control.md 2 (derived), covariance here.
 struct IntegralFit {
@@ -29,7 +29,7 @@ struct IntegralFit {
   /// Covariance of (b, f_c) per N² of force noise: multiply by the variance of one sample's noise.
   Eigen::Matrix2d unit_covariance = Eigen::Matrix2d::Zero();
   double residual_squares = 0;  ///< Σ residual², (N·s²)²
-  double unit_residual = 0;     ///< what that is expected to be per N² of force noise
+  double unit_residual = 0;     ///< the expected value of that per N² of force noise
 
   /// Force noise that explains the residuals, N (standard deviation of one sample). Of one run: a rough figure.
   double force_noise() const noexcept;

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 
@@ -15,14 +15,8 @@ bool possible(double friction) noexcept { return std::isfinite(friction) && fric
 }  // namespace
 
 EnergyLedger::EnergyLedger(const Friction& friction) : friction_(friction) {
-  const auto check = [](double value, const char* name) {
-    if (!possible(value)) {
-      throw std::invalid_argument(std::string(name) + " friction must be finite and not negative, got " +
-                                  std::to_string(value));
-    }
-  };
-  check(friction.coulomb, "Coulomb");
-  check(friction.viscous, "viscous");
+  expect_not_negative(friction.coulomb, "friction.coulomb");
+  expect_not_negative(friction.viscous, "friction.viscous");
 }
 
 void EnergyLedger::adapt(const Friction& friction) noexcept {

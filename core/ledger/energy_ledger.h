@@ -7,15 +7,14 @@
 
 namespace tendon {
 
-/// Keeps the account of what the device owes: a lower bound of the energy that the hand has put into
-/// it and not got back.
+/// Keeps the account of the device: a lower bound of the energy that the hand has put into it and not got back.
 ///
 ///     E(n) = Σₖ [ f(k−1)·Δx(k) + f_c ‖Δx(k)‖ + b ‖Δx(k)‖² / T(k) ],   E(0) = 0
 ///
 /// with f = −F the reflective force that was **really held** during interval k (F is on the hand), Δx
 /// the displacement in it and T(k) its **measured** length. The work W of the hand satisfies
 /// W(n) + KE(0) ≥ E(n) for every motion: the device's friction dissipates at least b ‖Δx‖²/T
-/// (Cauchy–Schwarz) and f_c ‖Δx‖ in an interval. So the port is passive as long as E never is negative.
+/// (Cauchy–Schwarz) and f_c ‖Δx‖ in an interval. So the port is passive as long as E is never negative.
 ///
 /// Source: Lee & Lee 2009, eqs (5), (6) (one degree of freedom); the vector form with Euclidean norms
 /// for isotropic friction is derived in control.md 8.5. Exact for exact position sensing; an encoder
@@ -47,15 +46,16 @@ class EnergyLedger {
   ///
   ///     ΔE = −at_most · (‖F‖ − f_c)₊² / (4b)
   ///
-  /// No credit is given for whatever motion there was. With b = 0 a force above f_c has no such bound;
-  /// then nothing is booked (the limiter never lets it be above f_c).
+  /// No motion earns credit in it. With b = 0 a force above f_c has no such bound; then nothing is booked (the limiter
+  /// keeps such forces at f_c).
   double observe_unseen(double applied, Duration at_most) noexcept;
 
   /// From the next interval on friction has these lower bounds. Throws nothing: values that are not finite
   /// or negative change nothing.
   void adapt(const Friction& friction) noexcept;
 
-  /// E, J. Negative only after an interval longer than the limiter was told to expect.
+  /// E, J. Negative only after a hold longer than the limiter's bound counted on (OutputBound), or in a force that no
+  /// limiter bounds.
   double energy() const noexcept { return energy_.value(); }
 
  private:

@@ -2,25 +2,22 @@
 #include "core/ledger/friction_map.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 
 FrictionMap::FrictionMap(Config config) : config_(std::move(config)) {
-  if (config_.places.empty() || config_.places.size() > kMostPlaces) {
-    throw std::invalid_argument("friction places = " + std::to_string(config_.places.size()) + ": expected 1 to " +
-                                std::to_string(kMostPlaces));
-  }
-  const auto possible = [](double value) { return std::isfinite(value) && value >= 0; };
-  if (!possible(config_.reach)) throw std::invalid_argument("reach: expected a number of 0 m or more");
+  expect(!config_.places.empty() && config_.places.size() <= kMostPlaces, "places",
+         static_cast<double>(config_.places.size()), "1 to " + std::to_string(kMostPlaces));
+  expect_not_negative(config_.reach, "reach");
   for (const Place& place : config_.places) {
-    if (!place.position.allFinite() || !possible(place.friction.coulomb) || !possible(place.friction.viscous)) {
-      throw std::invalid_argument("a friction place: expected finite numbers, friction of 0 or more");
-    }
+    expect_finite(place.position, "places.position");
+    expect_not_negative(place.friction.coulomb, "places.friction.coulomb");
+    expect_not_negative(place.friction.viscous, "places.friction.viscous");
   }
 }
 

@@ -8,10 +8,10 @@
 
 namespace tendon {
 
-/// Lower bounds of friction that differ over the workspace, from an identification at several places: cables and
-/// gears do not slide everywhere alike, and one bound for all of it would have to be the worst.
+/// Lower bounds of friction that differ over the workspace, from an identification at several places. Cables and gears
+/// do not slide alike everywhere, and one bound for the whole workspace would have to be the least.
 ///
-/// In use at x is the least, of each bound by itself, of the place nearest to x and of all places within `reach` of x.
+/// At x, each bound is the least of the place nearest to x and of all places within `reach` of x.
 ///
 /// Thread-safe: yes, it never changes. Realtime-safe: `at` is; it looks at every place.
 class FrictionMap {
@@ -27,7 +27,7 @@ class FrictionMap {
   /// 4 to each edge of a cube: some 0.2 µs per haptic step.
   static constexpr std::size_t kMostPlaces = 64;
 
-  /// Throws std::invalid_argument naming the field when there is no place, or too many, or a value is impossible.
+  /// Throws std::invalid_argument naming the field when there is no place, or too many, or an impossible value.
   explicit FrictionMap(Config config);
 
   Friction at(const Vec3& position) const noexcept;

@@ -3,23 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 
 template <int N>
 RobustLedger<N>::RobustLedger(const Config& config)
     : config_(config), least_coulomb_(config.friction.coulomb), least_viscous_(config.friction.viscous) {
-  const auto check = [](double value, const char* name) {
-    if (!(std::isfinite(value) && value >= 0)) {
-      throw std::invalid_argument(std::string(name) + " must be finite and not negative, got " + std::to_string(value));
-    }
-  };
-  check(config.friction.coulomb, "Coulomb friction");
-  check(config.friction.viscous, "viscous friction");
-  check(config.encoder_step, "encoder_step");
-  if (config.window < 1) throw std::invalid_argument("window must be 1 or more, got " + std::to_string(config.window));
+  expect_not_negative(config.friction.coulomb, "friction.coulomb");
+  expect_not_negative(config.friction.viscous, "friction.viscous");
+  expect_not_negative(config.encoder_step, "encoder_step");
+  expect(config.window >= 1, "window", config.window, "1 or more");
 }
 
 template <int N>
@@ -55,7 +50,7 @@ void RobustLedger<N>::observe(const Interval<N>& interval) noexcept {
     credited_ = travel;
     to_peak_ = from_turn_;
   } else if (const Vec<N> back = from_turn_ - to_peak_; travel_beyond_count(back) > 0) {
-    // It has turned, by more than the encoder can imagine: from the peak on it is a new path.
+    // The hand has turned back by more than a count can hide: a new path begins at the peak.
     from_turn_ = back;
     to_peak_ = back;
     least_coulomb_ = config_.friction.coulomb;
@@ -81,7 +76,7 @@ void RobustLedger<N>::observe_unseen(const Vec<N>& applied, Duration at_most) no
   if (config_.friction.viscous > 0 && std::isfinite(excess)) {
     energy_ -= seconds(at_most) * excess * excess / (4 * config_.friction.viscous);
   }
-  // The force of the intervals before is settled where it ended; the next one starts from none.
+  // Settle the margin of the force held so far; the next interval starts from no force.
   energy_ -= margin_;
   margin_ = 0;
   last_applied_.setZero();

@@ -2,19 +2,19 @@
 #pragma once
 
 #include "core/base/compensated_sum.h"
-#include "core/control/stability_controller.h"
 #include "core/ledger/friction.h"
+#include "core/ledger/port.h"
 
 namespace tendon {
 
 /// The energy ledger for a position that an encoder has rounded: a lower bound of EnergyLedger's E as exact
 /// sensing would have found it, whatever the true motion between the counts.
 ///
-/// With counts of Δ the plain ledger is wrong three ways, each of which has its remedy here (measured positions
-/// are centres of counts, so each component is off by at most Δ/2):
+/// With counts of Δ the plain ledger is wrong in three ways, and each has its remedy here (measured positions are the
+/// centres of counts, so each component is off by at most Δ/2):
 ///
 ///     work       Σ f·dx measured ≤ Σ f·dx true + (Δ/2) Σ ‖f(k) − f(k−1)‖₁ + (Δ/2) ‖f(n)‖₁      (Abel summation)
-///     Coulomb    a hand that rests on the edge of a count earns nothing: credited is f_c times the net travel
+///     Coulomb    a hand that rests on the edge of a count earns nothing: the credit is f_c times the net travel
 ///                since the last turning point, each component less Δ. The path is never shorter than that
 ///     viscous    once per `window` of N intervals: b ‖D‖² / (T₁ + … + T_N), each component of the net travel D
 ///                less Δ (Cauchy–Schwarz over the window). A single count at 1 kHz would pass for 30 mm/s
@@ -39,7 +39,7 @@ class RobustLedger {
   /// Books one interval. When anything is not finite nothing is booked.
   void observe(const Interval<N>& interval) noexcept;
 
-  /// As EnergyLedger::observe_unseen. Nothing is known of where the hand is now: travel starts anew.
+  /// As EnergyLedger::observe_unseen. Where the hand is now is unknown: travel starts again from zero.
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
 
   /// As EnergyLedger::adapt.

@@ -2,20 +2,14 @@
 #include "core/remote/adaptive_local_model.h"
 
 #include <algorithm>
-#include <stdexcept>
-#include <string>
 
+#include "core/base/expect.h"
 #include "core/remote/answer.h"
 
 namespace tendon {
 AdaptiveLocalModel::AdaptiveLocalModel(const Config& config) : config_(config) {
-  if (!(config.share > 0 && config.share <= 1)) {
-    throw std::invalid_argument("share must be in (0, 1], got " + std::to_string(config.share));
-  }
-  if (config.max_blend < Duration::zero()) {
-    throw std::invalid_argument("max_blend must not be negative, got " + std::to_string(config.max_blend.count()) +
-                                " ns");
-  }
+  expect(config.share > 0 && config.share <= 1, "share", config.share, "a number above 0 and at most 1");
+  expect_not_negative(seconds(config.max_blend), "max_blend");
 }
 
 bool AdaptiveLocalModel::observe(const RemoteForce& force) noexcept {

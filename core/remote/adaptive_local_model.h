@@ -9,33 +9,32 @@
 
 namespace tendon {
 
-/// Follows the hand between two remote forces with the stiffness that the engine sent along, and goes
-/// from one model to the next without a kick.
+/// Follows the hand between two remote forces with the stiffness that the engine sent along, and changes from one model
+/// to the next without a kick.
 ///
-/// The model of answer j, and what is said at time t after the next one was received at t_r:
+/// The model of answer j, and the prediction at time t after the next answer was received at t_r:
 ///
 ///     F_j(x) = f_j − share · K_j (x′ − x_j),   x′ the position nearest to x in the model's valid radius of x_j
 ///     F(x, t) = (1 − s) F_{j−1}(x) + s F_j(x),   s = clamp((t − t_r)/slow period, 0, 1)
 ///
 /// so a new answer that differs by ΔF at the same x adds ΔF · dt/period per step instead of ΔF at once;
-/// swapped at once it would hand out |ΔF · dx| on the next motion. (It is spread, not abolished: what
-/// energy it still brings, the limiter downstream accounts for.) When the environment has not changed,
-/// old and new model are the same line and nothing lags. The slow period is the time between the motions
-/// that two answers belong to, at most `max_blend`.
+/// a sudden change would give out |ΔF · dx| on the next motion. (Blending spreads that energy, and the limiter
+/// downstream accounts for the rest.) When the environment has not changed, old and new model are the same line and
+/// nothing lags. The slow period is the time between the motions that two answers belong to, at most `max_blend`.
 ///
 /// A force without a model is the model with K = 0: it is held, and blended in like any other. Contact and table of an
 /// answer are not read: they cannot be blended.
 ///
-/// Source: Barbagli et al., IJRR 24(9), 2005 (recalled): stable when share · K ≤ the true stiffness. K is expected to
-/// be one that can be believed (answer.h).
+/// Source: Barbagli et al., IJRR 24(9), 2005 (recalled): stable when share · K ≤ the true stiffness. K must be one
+/// that can be believed (answer.h).
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class AdaptiveLocalModel {
  public:
   struct Config {
-    /// Of the stiffness that was sent, (0, 1]; below 1 when the engine's is itself an estimate.
+    /// Share of the stiffness sent that is used, (0, 1]; below 1 when the engine's stiffness is itself an estimate.
     double share = 1;
-    /// The longest blend; a slower engine is believed after this.
+    /// The longest blend; the model of a slower engine is in full use after this time.
     Duration max_blend = std::chrono::milliseconds(100);
   };
 
@@ -46,7 +45,7 @@ class AdaptiveLocalModel {
   /// or equal, or not finite. The first one is not blended: there is nothing to blend it with.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// What the environment says at `hand.position` at `hand.at`; empty before the first answer, or for a
+  /// The environment's force at `hand.position` at `hand.at`; empty before the first answer, or for a
   /// position that is not finite.
   std::optional<Prediction> predict(const Motion& hand) const noexcept;
 

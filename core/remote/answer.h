@@ -5,15 +5,15 @@
 #include "core/remote/prediction.h"
 #include "core/remote/remote_force.h"
 
-// What the device loop makes of one answer of a remote engine until the next one comes: what of it is taken as good,
-// and what force it means where the hand is by then.
+// How the device loop uses one answer of a remote engine until the next one comes: which part of it is believed, and
+// which force it means where the hand is by then.
 
 namespace tendon {
 
 /// Whether every number is finite and in its range (remote_force.h).
 bool is_sound(const RemoteForce& answer) noexcept;
 
-/// What of a sound answer is followed:
+/// The part of a sound answer that is followed:
 ///
 ///     topology_changed   nothing but the force: its model is dropped
 ///     stiffness          the nearest one that stores energy and loses none, no stiffer than max_stiffness:
@@ -22,15 +22,15 @@ bool is_sound(const RemoteForce& answer) noexcept;
 ///                        max_stiffness · step
 ///     normal             of unit length
 ///
-/// The antisymmetric part of K is dropped because following it round a circle makes energy, and negative stiffness
-/// because it can only come from an environment that is not passive. A table may fall: the force along one line has a
-/// potential whatever it is. `max_stiffness` in N/m.
+/// The antisymmetric part of K is dropped because following it round a circle makes energy; negative stiffness is
+/// dropped because it can only come from an environment that is not passive. A table may fall: any force along one line
+/// has a potential. `max_stiffness` in N/m.
 ///
 /// Realtime-safe: yes.
 RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept;
 
-/// The position nearest to `position` that a model is valid for: what lies beyond its radius is taken for its edge,
-/// where the force stays what it is there. A jump back to the answered force would be felt as a kick.
+/// The position nearest to `position` for which a model is valid. Beyond the model's radius the force stays what it is
+/// at the edge; a jump back to the answered force would be felt as a kick.
 Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 
 /// The force that an answer means at `position`. With x′ = within(model, x), the depth d = −n·(x − at) since the
@@ -42,12 +42,12 @@ Vec3 within(const LocalModel& model, const Vec3& position) noexcept;
 ///                                              max(0, gap): a surface does not pull, and is not felt beyond itself
 ///     table       the same with N = table(d), which holds beyond the radius too
 ///
-/// s = N / (n·force), clamped to [0, 1], lets what rubs across fade with what it is pressed by. The stiffness is −∂F/∂x
-/// with s held; it is zero beyond the radius and at the ends of the table, and a table that falls counts as none.
+/// s = N / (n·force), clamped to [0, 1]: the tangential force fades with the normal force. The stiffness is −∂F/∂x with
+/// s held; it is zero beyond the radius and at the ends of the table, and where a table falls it counts as zero.
 ///
 /// Source: measured against hold, extrapolation in time and secants, the table is the best below 50 answers per second
-/// and the stiffness above (tests/tools/lab/experiments/reconstruction_test.cc). That engines send the model that they have, for the
-/// device's loop to follow: James and Pai, "A unified treatment of elastostatic contact simulation for real-time
+/// and the stiffness above (tests/tools/lab/experiments/reconstruction_test.cc). The idea that engines send the model
+/// they have: James and Pai, "A unified treatment of elastostatic contact simulation for real-time
 /// haptics", Haptics-e 2(1), 2001; Mahvash and Hayward, IEEE CG&A 24(2), 2004 (curves of force against depth).
 ///
 /// Realtime-safe: yes.

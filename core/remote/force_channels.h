@@ -10,17 +10,17 @@
 
 namespace tendon {
 
-/// Makes one wanted force of those of several engines, each of which has a channel with a reconstruction of its own
-/// (HeldForce: what it held, how it ages, what its estimator has learned):
+/// Combines the forces of several engines into one wanted force. Each engine has a channel with its own HeldForce (the
+/// force it holds, its age, what its estimator has learned):
 ///
 ///     F  =  Σ Fᵢ  over the channels of rule kSum  +  Σ wⱼ Fⱼ  over those of rule kPriority
 ///
-/// Among the latter the first in order whose force is fresh (the freshest, when none is) draws all the weight to
-/// itself: its w goes to 1, at the rate of 1 per `ramp_in`, and the others' keep their proportions, so that Σ w = 1 and
-/// one engine fades over into the next. The stiffness is made of the channels' in the same way.
+/// Among the channels of rule kPriority, the first in order whose force is fresh (the freshest, when none is) takes all
+/// the weight: its w goes to 1 at the rate of 1 per `ramp_in`, and the others keep their proportions, so that Σ w = 1
+/// and one engine fades over into the next. The stiffnesses are combined in the same way.
 ///
-/// It decides what is *wanted*. Engines that fight each other are held in check where one that is wrong is: by the
-/// limiter downstream, which sees their sum only.
+/// ForceChannels decides which force is *wanted*. The limiter after it sees only the sum, and keeps engines that fight
+/// each other in check as it does a single wrong one.
 ///
 /// Thread-safe: no. Realtime-safe: yes, but for the constructor.
 class ForceChannels {
@@ -31,7 +31,7 @@ class ForceChannels {
   };
 
   struct Wanted : HeldForce::Wanted {
-    /// The freshest force, of equally fresh ones the first channel's: `mode` and `age` are its.
+    /// The channel of the freshest force, the first of equally fresh ones: `mode` and `age` are its.
     std::size_t channel = 0;
   };
 
@@ -51,7 +51,7 @@ class ForceChannels {
   /// Forgets all forces.
   void disengage() noexcept;
 
-  /// What is wanted at `hand.position` at `hand.at`; once in each haptic step.
+  /// The force wanted at `hand.position` at `hand.at`. Call it once in each haptic step.
   Wanted wanted(const Motion& hand) noexcept;
 
   /// The force that a channel holds; empty when idle.

@@ -4,30 +4,23 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 
+#include "core/base/expect.h"
 #include "core/base/portable_math.h"
 #include "core/remote/answer.h"
 
 namespace tendon {
 
 HeldForce::HeldForce(const Config& config) : config_(config) {
-  const auto at_least = [](Duration value, Duration least, const char* name) {
-    if (value < least) {
-      throw std::invalid_argument(std::string(name) + " must be at least " + std::to_string(seconds(least)) +
-                                  " s, got " + std::to_string(seconds(value)) + " s");
-    }
-  };
-  at_least(config.hold, Duration::zero(), "hold");
-  at_least(config.decay, Duration(1), "decay");
-  at_least(config.safe_stop, config.hold, "safe_stop");
-  at_least(config.ramp_in, Duration::zero(), "ramp_in");
-  at_least(config.max_valid_for, Duration(1), "max_valid_for");
-  if (!(config.max_stiffness > 0)) {
-    throw std::invalid_argument("max_stiffness must be above zero, got " + std::to_string(config.max_stiffness));
-  }
+  expect_not_negative(seconds(config.hold), "hold");
+  expect_above_zero(seconds(config.decay), "decay");
+  expect(config.safe_stop >= config.hold, "safe_stop", seconds(config.safe_stop),
+         "hold of " + shortest(seconds(config.hold)) + " s or more");
+  expect_not_negative(seconds(config.ramp_in), "ramp_in");
+  expect_above_zero(seconds(config.max_valid_for), "max_valid_for");
+  expect(config.max_stiffness > 0, "max_stiffness", config.max_stiffness, "a number above 0 N/m");
   if (config.adaptive_local_model && config.output_estimator) {
-    throw std::invalid_argument("adaptive_local_model and output_estimator both say what lies between two forces");
+    throw std::invalid_argument("adaptive_local_model and output_estimator: expected one of them, not both");
   }
   if (config.adaptive_local_model) local_model_.emplace(*config.adaptive_local_model);
   if (config.output_estimator) estimator_ = std::make_unique<OutputEstimator>(*config.output_estimator);
@@ -35,11 +28,14 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
 
 bool HeldForce::observe(const RemoteForce& force) noexcept {
   if (!is_sound(force)) return false;
-  if (mode_ == Mode::kIdle || mode_ == Mode::kSafeStop || newest_->source != force.source) {
+  const bool anew = mode_ == Mode::kIdle || mode_ == Mode::kSafeStop || newest_->source != force.source;
+  if (anew || mode_ == Mode::kDecaying) {
     engaged_ = force.received;
     from_ = rendered_;
-    if (local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
+    const double lost = anew ? 1.0 : 1 - presence_;
+    ramp_ = Duration(static_cast<Duration::rep>(lost * static_cast<double>(config_.ramp_in.count())));
   }
+  if (anew && local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
   newest_ = believed(force, config_.max_stiffness);
   if (local_model_) local_model_->observe(*newest_);
   if (estimator_) estimator_->correct(*newest_);
@@ -65,11 +61,10 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   if (estimator_) estimator_->observe(hand);
   if (!newest_) return {};
   Wanted result;
-  // A force may come after the device took the sample that this step is about; an age below zero has no place on the
-  // wire.
+  // A force may arrive after the device took this step's sample; the wire has no ages below zero.
   result.age = std::max(Duration::zero(), hand.at - newest_->received);
   const Duration overdue = result.age - validity();
-  // A safe stop is only left by `observe`: a clock that stands still must not revive a force.
+  // Only `observe` ends a safe stop: a clock that goes back must not revive a force.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
     mode_ = Mode::kSafeStop;
     rendered_.setZero();
@@ -91,12 +86,14 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   }
   const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
   Vec3 rest = Vec3::Zero();
-  if (since_engaged < config_.ramp_in) {
+  if (since_engaged < ramp_) {
     result.reasons |= Reason::kRampIn;
-    const double ramp = seconds(since_engaged) / seconds(config_.ramp_in);
+    const double ramp = seconds(since_engaged) / seconds(ramp_);
     rest = from_ * (gain * (1 - ramp));
     gain *= ramp;
   }
+
+  presence_ = gain;
 
   result.mode = mode_;
   const Prediction environment = follow(hand);

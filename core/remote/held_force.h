@@ -29,14 +29,16 @@ namespace tendon {
 ///     adaptive_local_model   its stiffness, but a new one is blended in          (AdaptiveLocalModel)
 ///     output_estimator       a model of the environment, learned on the way      (OutputEstimator)
 ///
-/// Of what was sent that is followed which can be believed (answer.h): no stiffness above `max_stiffness`, no model
-/// when the answer says that the body is another one now.
+/// Only the trustworthy part of an answer is used (answer.h): stiffness is capped at `max_stiffness`, and the model is
+/// dropped when the answer says that the topology of the body has changed.
 ///
-/// The first force ever, the first one after a safe stop, and the first one of another source are ramped in linearly
-/// over `ramp_in`, from what is rendered at that moment: the hand is never kicked by an engine that comes back, or by
-/// one that takes over. An answer that is not sound (answer.h) is refused, and the one before it ages on.
+/// The first force ever, the first one after a safe stop, and the first one from another source are ramped in linearly
+/// over `ramp_in`, from the force rendered at that moment. A fresh force that arrives while the one before decays is
+/// ramped in over the share of `ramp_in` that the decay has taken: (1 − gain) · ramp_in. So an engine that comes back,
+/// stutters or takes over never kicks the hand. An answer that is not sound (answer.h) is refused, and the one before
+/// it ages on.
 ///
-/// It decides what is *wanted*; that it cannot hurt is the business of the limiter downstream.
+/// HeldForce decides which force is *wanted*. The limiter after it keeps that force from doing harm.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class HeldForce {
@@ -51,9 +53,9 @@ class HeldForce {
     Duration ramp_in = std::chrono::milliseconds(100);
     /// No engine can ask to be believed for longer.
     Duration max_valid_for = std::chrono::milliseconds(500);
-    /// N/m, > 0: the stiffest that is followed between two forces. Above what grounded devices render stably at 1 kHz.
+    /// N/m, > 0: the stiffest model that is followed between two forces. Grounded devices render less stably at 1 kHz.
     double max_stiffness = 5000;
-    /// At most one of these. What is empty is not there and costs nothing.
+    /// At most one of these two. Empty: not used, costs nothing.
     std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
     std::optional<OutputEstimator::Config> output_estimator{};
   };
@@ -66,14 +68,14 @@ class HeldForce {
     Duration age{};  ///< since it was received; 0 when idle
   };
 
-  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive,
-  /// safe_stop is shorter than hold, max_stiffness is not above zero, a part cannot be, or both are there.
+  /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive, safe_stop is
+  /// shorter than hold, max_stiffness is not above zero, a part refuses its configuration, or both parts are listed.
   explicit HeldForce(const Config& config);
 
   /// Takes a newer force. Returns false, and changes nothing, when it is not sound.
   bool observe(const RemoteForce& force) noexcept;
 
-  /// The remote environment `source` has left: its force, when it is the one that is held, is no longer fresh from now
+  /// The remote environment `source` has left: if its force is the one held, that force is no longer fresh from `now`
   /// on.
   void release(std::uint32_t source, LocalTime now) noexcept;
 
@@ -84,7 +86,7 @@ class HeldForce {
     rendered_.setZero();
   }
 
-  /// What is wanted at `hand.position` at `hand.at`. Once in each haptic step: an estimator learns from it.
+  /// The force wanted at `hand.position` at `hand.at`. Call it once in each haptic step: an estimator learns from it.
   Wanted wanted(const Motion& hand) noexcept;
 
   /// The force that is held, as it is believed; empty when idle.
@@ -97,11 +99,13 @@ class HeldForce {
   Config config_;
   std::optional<RemoteForce> newest_;
   Mode mode_ = Mode::kIdle;
-  LocalTime engaged_{};       ///< start of the ramp …
-  Vec3 from_ = Vec3::Zero();  ///< … and the force it starts from
+  LocalTime engaged_{};       ///< start of the ramp
+  Duration ramp_{};           ///< its length
+  Vec3 from_ = Vec3::Zero();  ///< N, the force it starts from
+  double presence_ = 0;       ///< the share of the environment's force in `rendered_`, 0 to 1
   Vec3 rendered_ = Vec3::Zero();
   std::optional<AdaptiveLocalModel> local_model_;
-  std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB that only those pay who list it
+  std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB, only when listed
 };
 
 }  // namespace tendon

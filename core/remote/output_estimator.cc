@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -14,22 +14,13 @@ namespace {
 constexpr double kPoleScale = 1e-3;
 
 LeastSquaresConfig checked(const OutputEstimator::Config& config) {
-  const auto positive = [](const char* field, double value) {
-    if (!(std::isfinite(value) && value > 0)) {
-      throw std::invalid_argument(std::string(field) + " must be finite and positive, got " + std::to_string(value));
-    }
-  };
-  if (!config.origin.allFinite()) throw std::invalid_argument("origin must be finite");
-  positive("scale", config.scale);
-  positive("reset_error", config.reset_error);
-  positive("max_stiffness", config.max_stiffness);
-  positive("max_force", config.max_force);
-  if (config.reset_cooldown < 1) {
-    throw std::invalid_argument("reset_cooldown must be at least 1, got " + std::to_string(config.reset_cooldown));
-  }
-  if (!(std::isfinite(config.resolution) && config.resolution >= 0)) {
-    throw std::invalid_argument("resolution must be finite and not negative, got " + std::to_string(config.resolution));
-  }
+  expect_finite(config.origin, "origin");
+  expect_above_zero(config.scale, "scale");
+  expect_above_zero(config.reset_error, "reset_error");
+  expect_above_zero(config.max_stiffness, "max_stiffness");
+  expect_above_zero(config.max_force, "max_force");
+  expect(config.reset_cooldown >= 1, "reset_cooldown", config.reset_cooldown, "1 or more");
+  expect_not_negative(config.resolution, "resolution");
   return {.forgetting = config.forgetting, .prior_variance = config.prior_variance, .dead_zone = config.dead_zone};
 }
 

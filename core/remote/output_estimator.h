@@ -13,8 +13,8 @@
 
 namespace tendon {
 
-/// Learns the remote environment from its rare and late forces, and says at every haptic step what it
-/// would answer to the position of now.
+/// Learns the remote environment from its rare and late forces, and predicts at every haptic step what it would answer
+/// to the present position.
 ///
 /// Each axis is a model of its own with two parameters θ in N/m, of the displacement x = position −
 /// origin along that axis. Parameters are physical: a spring that pushes the hand back has θ₁ > 0 and
@@ -24,8 +24,8 @@ namespace tendon {
 ///     kSpringAndBias  F = −(θ₁ x + θ₂ ℓ) − off                −∂F/∂x = θ₁
 ///     kOutputError    F(k) = a F(k−1) − θ₂ x(k)               −∂F/∂x = θ₂, of this step
 ///
-/// A force that answers the motion of time t is compared with what the parameters say about that motion,
-/// kept in a ring; **when it arrives, and in what order, does not matter.** Then:
+/// A force that answers the motion at time t is compared with the model's force for that motion, which is kept in a
+/// ring. **The time and the order in which answers arrive do not matter.** Then:
 ///
 ///     e = −F − φᵀθ
 ///     if |e| > reset_error, and reset_cooldown answers since the last one:  P ← p0 I  (θ stays)
@@ -37,10 +37,10 @@ namespace tendon {
 /// it is re-anchored but learns nothing from quantisation. Before it has learned, the prediction is the
 /// force held. The pole is bounded because a pole fitted to 25 Hz data and run at 1 kHz is unstable as
 /// often as not; a prediction is bounded because even so it can be wrong by newtons for a round trip
-/// after the environment changes. It decides what is *wanted*: a limiter comes after it, always.
+/// after the environment changes. The estimator decides which force is *wanted*; a limiter always comes after it.
 ///
-/// Coupling between axes is not modelled: a wall at an angle to the axes is seen as three springs, right
-/// along the direction in which it was pressed last. An engine that knows better sends a LocalModel
+/// Coupling between axes is not modelled: a wall at an angle to the axes is seen as three springs, which are right
+/// only along the direction in which it was pressed last. An engine that knows better sends a LocalModel
 /// (see AdaptiveLocalModel).
 ///
 /// Source: Lee and Lee, "Multirate output estimation for real-time haptic rendering" (abstract only: the
@@ -59,7 +59,7 @@ class OutputEstimator {
 
   struct Config {
     Model model = Model::kPolynomial;
-    /// m; where the environment is at rest.
+    /// m; the position at which the environment is at rest.
     Vec3 origin = Vec3::Zero();
     /// ℓ, m; about the travel, so that both parameters are of one size.
     double scale = 0.01;

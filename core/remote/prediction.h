@@ -5,7 +5,7 @@
 
 namespace tendon {
 
-/// What a model of the remote environment says at one position, and close to it:
+/// The force that a model of the remote environment predicts at one position, and close to it:
 ///
 ///     F(x + ξ) ≈ force − stiffness · ξ          N, on the hand; stiffness = −∂F/∂x, N/m
 struct Prediction {

@@ -31,13 +31,13 @@ struct Contact {
   std::optional<ForceTable> table{};
 };
 
-/// The remote environment near one position, so that the device loop can follow the hand between two remote forces;
-/// linearised:
+/// The remote environment near one position, linearised, so that the device loop can follow the hand between two remote
+/// forces:
 ///
 ///     F(x) = force − stiffness · (x − at)          N, with stiffness = −∂F/∂x in N/m
 ///
-/// A spring has a positive stiffness; a wall with normal n has k·n·nᵀ. What the loop makes of the rest is in
-/// core/remote/answer.h.
+/// A spring has a positive stiffness; a wall with normal n has k·n·nᵀ. core/remote/answer.h says how the loop uses the
+/// rest.
 struct LocalModel {
   Vec3 at = Vec3::Zero();         ///< m, the position the force was computed for
   Mat3 stiffness = Mat3::Zero();  ///< N/m
@@ -46,7 +46,7 @@ struct LocalModel {
   std::optional<Contact> contact{};
 };
 
-/// What a remote physics engine wants the hand to feel.
+/// The force that a remote physics engine wants the hand to feel.
 ///
 /// **Sign, everywhere in Tendon:** a force is what the device exerts *on the hand*, so a wall that
 /// resists motion along +x sends −x. (The reflective force f of Lee & Lee 2009 is its negative.)
@@ -59,7 +59,7 @@ struct RemoteForce {
   std::optional<LocalModel> model{};
   Duration valid_for{};      ///< counted from `received`; older than this it is no longer fresh
   std::uint32_t source = 0;  ///< who sent it: the forces of another engine are ramped in
-  /// The body has been cut or torn since the answer before this one: the model, of either, is not to be relied on.
+  /// The body has been cut or torn since the answer before this one: neither answer's model can be relied on.
   bool topology_changed = false;
   std::optional<double> error{};  ///< N, ≥ 0: what the engine itself thinks `force` may be wrong by
 };

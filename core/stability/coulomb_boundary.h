@@ -7,14 +7,14 @@
 
 namespace tendon {
 
-/// What Coulomb friction and the encoder's step make of a sampled spring. Laws without virtual damper: B ≠ 0 throws.
+/// Boundaries of a sampled spring with Coulomb friction and an encoder. Laws without virtual damper: B ≠ 0 throws.
 ///
 /// The largest K (N/m) at which a held count can be paid for by friction: min(2b/T, 2 f_c/Δ); 2b/T with Δ = 0.
-/// Throws for d ≠ 0, which it does not know. Source: Abbott and Okamura, IEEE T-RO 21(5):952, 2005.
+/// Throws for d ≠ 0, for which the law does not hold. Source: Abbott and Okamura, IEEE T-RO 21(5):952, 2005.
 /// Thread-safe: yes. Realtime-safe: no.
 double abbott_okamura_stiffness(const SampledSpring& spring);
 
-/// What a sampled spring does, by Diolaiti's three numbers.
+/// The behaviour of a sampled spring, by Diolaiti's three numbers.
 enum class DiolaitiRegion {
   kPassive,          ///< comes to rest, from any speed
   kLimitCycle,       ///< slows down, but about one count of motion may remain

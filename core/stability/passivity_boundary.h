@@ -29,8 +29,8 @@ double passive_viscous_friction(const SampledSpring& spring);
 double passive_viscous_friction(const std::function<std::complex<double>(std::complex<double> z)>& environment,
                                 Duration period, int points = 10'000);
 
-/// The largest K (N/m) that passes with the b, B, T and d of `spring`, whose own K is not looked at; 0 when B alone
-/// is too much. Without damper: b/(T/2 + dT). Infinite never: b is finite.
+/// The largest K (N/m) that is passive with the b, B, T and d of `spring`, whose own K is ignored; 0 when B alone is
+/// too large. Without damper: b/(T/2 + dT). Never infinite, because b is finite.
 double largest_passive_stiffness(const SampledSpring& spring);
 
 /// The least b (N·s/m) for which any force field, linear or not, is passive when its slope nowhere leaves
@@ -42,8 +42,8 @@ double largest_passive_stiffness(const SampledSpring& spring);
 /// usable special case of Miller, Colgate and Freeman, IEEE T-RA 16(6), 2000, with K_max that of the virtual coupling.
 double passive_viscous_friction_of_field(double steepest, Duration period, int delay_samples);
 
-/// What is felt of an environment K (N/m) behind a virtual coupling K_c, both springs in series: K_c K/(K_c + K).
-/// The coupling, as the only thing that the device touches, is what has to pass the conditions above.
+/// The stiffness felt of an environment K (N/m) behind a virtual coupling K_c, two springs in series: K_c K/(K_c + K).
+/// The device touches only the coupling, so the coupling has to meet the conditions above.
 /// Source: Colgate, Stanley and Brown, IROS 1995 (recalled; control.md 5.4).
 double felt_stiffness(double coupling, double environment);
 

@@ -14,7 +14,7 @@ namespace tendon {
 /// with x(k) the position at kT rounded to the encoder step. No hand, no unilateral contact.
 ///
 /// Every function that takes one throws std::invalid_argument naming the field, its value and what was expected,
-/// also when a field is set of which its law knows nothing. None is for the haptic loop.
+/// even when a field is set that its law does not use. None is for the haptic loop.
 struct SampledSpring {
   double mass = 0;          ///< m, kg
   double viscous = 0;       ///< b, N·s/m, of the device

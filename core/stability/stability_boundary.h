@@ -13,8 +13,8 @@ namespace tendon {
 /// Thread-safe: yes. Realtime-safe: no.
 double spectral_radius(const SampledSpring& spring);
 
-/// The K (N/m) at which the spectral radius reaches 1, relative error 1e-9; the K of `spring` is not looked at. 0 when
-/// already the softest spring is unstable, because the virtual damper is.
+/// The K (N/m) at which the spectral radius reaches 1, relative error 1e-9; the K of `spring` is ignored. 0 when even
+/// the softest spring is unstable, because the virtual damper is.
 double largest_stable_stiffness(const SampledSpring& spring);
 
 /// The same in closed form for B = 0, d = 0, from Jury's criterion, with δ = e^{−bT/m}:
@@ -24,7 +24,7 @@ double largest_stable_stiffness(const SampledSpring& spring);
 /// Throws std::invalid_argument for another B or d. Source: control.md 6.2 (derived).
 double jury_stiffness(const SampledSpring& spring);
 
-/// Gil's linear law and how far it can be believed.
+/// Gil's linear law and its validity.
 struct LinearLaw {
   /// (b + B)/(T/2 + dT), N/m
   double stiffness = 0;

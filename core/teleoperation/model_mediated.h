@@ -7,7 +7,7 @@
 
 namespace tendon {
 
-/// A flat, springy surface: what the follower sends instead of forces.
+/// A flat, springy surface, which the follower sends instead of forces.
 ///
 ///     F(x) = K (d − n·x)₊ n       N, on whoever is at x
 template <int N>

@@ -8,7 +8,7 @@
 
 namespace tendon {
 
-/// What one end sends to the other: where its own end is. As seldom and as irregularly as it likes.
+/// The message of one end to the other: where its own end is. It may be sent as seldom and as irregularly as one likes.
 template <int N>
 struct SetPosition {
   std::uint64_t sequence = 0;        ///< 1, 2, …; a message with one that is not above the newest is dropped
@@ -20,9 +20,9 @@ struct SetPosition {
 ///
 ///     F_wanted = K (ȳ − x),   ȳ the nearest to the set position y with   ½ K ‖x − ȳ‖² ≤ E
 ///
-/// E is the ledger of the port (energy_ledger.h), fed with the force really applied: what the hand has put in plus
-/// what friction has dissipated for certain. ½ K ‖x − ȳ‖² is what of it is in the spring, so the rest is what may pay
-/// for a jump of the set position. ȳ is chosen anew in every period, and so follows y as soon as it can.
+/// E is the ledger of the port (energy_ledger.h), fed with the force really applied: the energy that the hand has put
+/// in plus a lower bound of what friction has dissipated. The spring holds ½ K ‖x − ȳ‖² of it; the rest may pay for a
+/// jump of the set position. ȳ is chosen again in every period, and so follows y as soon as it can.
 ///
 /// Passive for every sequence of set positions and every motion with K ≤ 2b/T_max, which the constructor asks for: for
 /// that K, T (‖F‖ − f_c)₊²/(4b) ≤ ½ K ‖x − ȳ‖² ≤ E, so that a limiter with the same friction and hold never clips its

@@ -7,7 +7,7 @@
 
 namespace tendon {
 
-/// What the leader's port sends in each period.
+/// The message that the leader's port sends in each period.
 template <int N>
 struct LeaderMessage {
   std::uint64_t sequence = 0;            ///< 1, 2, …; a message with one that is not above the newest is dropped
@@ -16,7 +16,7 @@ struct LeaderMessage {
   double energy_in = 0;                  ///< J, what the leader's port has taken in, never decreasing
 };
 
-/// What the follower's port sends in each period.
+/// The message that the follower's port sends in each period.
 template <int N>
 struct FollowerMessage {
   std::uint64_t sequence = 0;
@@ -61,7 +61,7 @@ class PassivityLeader {
   /// The interval that has just ended; returns what to send.
   LeaderMessage<N> observe(const Interval<N>& interval) noexcept;
 
-  /// What may still be given out, J: E_in,follower(received) − E_out. Below zero: see above.
+  /// The energy that may still be given out, J: E_in,follower(received) − E_out. Below zero: see above.
   double energy() const noexcept { return newest_.energy_in - out_; }
 
  private:
@@ -107,7 +107,7 @@ class PassivityFollower {
   /// One step: `force` is what the tool's controller exerts on the tool in the period that begins.
   Command step(const Vec<N>& force) noexcept;
 
-  /// What may still be given out, J; never below zero but for rounding.
+  /// The energy that may still be given out, J; below zero only by rounding.
   double energy() const noexcept { return newest_.energy_in - out_; }
 
  private:

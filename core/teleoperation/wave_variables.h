@@ -7,7 +7,8 @@
 
 namespace tendon {
 
-/// What one wave port sends to the other in each period. Sums since the start, so that no loss is for ever.
+/// The message that one wave port sends to the other in each period. It holds sums since the start, so that no loss is
+/// permanent.
 template <int N>
 struct WaveMessage {
   std::uint64_t sequence = 0;        ///< 1, 2, …; a message with one that is not above the newest is dropped
@@ -16,8 +17,8 @@ struct WaveMessage {
   double energy = 0;  ///< J, ∫ ‖wave‖²/2 dt, never decreasing: the most that may be made of the waves
 };
 
-/// One end of a bilateral connection that stays passive however late its messages are: it exchanges not velocity and
-/// force but wave variables, which carry their own energy.
+/// One end of a bilateral connection that stays passive however late its messages are. Instead of velocity and force it
+/// exchanges wave variables, which carry their own energy.
 ///
 ///     F_wanted = √(2B) r̂ − B v            r̂: the wave that came in
 ///     s        = (B v̄ − F) / √(2B)        s: the wave to send;  −F·v̄ = (s² − r²)/2

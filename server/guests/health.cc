@@ -21,6 +21,7 @@ void HealthMeter::observe(const StepRecord& step) noexcept {
   counted_.steps = step.tick;
   counted_.overruns += step.reasons.has(Reason::kOverrun) ? 1 : 0;
   counted_.unseen += step.reasons.has(Reason::kUnseen) ? 1 : 0;
+  counted_.broken_assumptions += step.assumption_broken ? 1 : 0;
   ++counted_.lateness[lateness_bucket(step.hand.at - step.scheduled)];
 }
 
@@ -43,6 +44,8 @@ DeviceReport report(const Health& before, const Health& now) {
   say(now.not_realtime, "the kernel refused the haptic thread real time");
   say(counted < report.steps, "the log thread does not follow");
   say(now.recording_ended, "the recording has ended");
+  // Than limiter.bounded_acceleration allows. Short, because all four sentences have to fit (limits::kMaxDetail).
+  say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
   return report;
 }
 

@@ -94,6 +94,8 @@ std::string encode(const StepRecord& step) {
   if (step.force_error) out.set_force_error_n(*step.force_error);
   out.set_rearmed(step.rearmed);
   out.set_disarmed(step.disarmed);
+  out.set_longest_hold_ns(step.longest_hold.count());
+  out.set_assumption_broken(step.assumption_broken);
   if (!step.stiffness.isZero(0)) {
     for (const auto row : step.stiffness.rowwise()) {
       for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
@@ -160,6 +162,8 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   if (in.has_force_error_n()) out.force_error = in.force_error_n();
   out.rearmed = in.rearmed();
   out.disarmed = in.disarmed();
+  out.longest_hold = Duration(in.longest_hold_ns());
+  out.assumption_broken = in.assumption_broken();
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

@@ -230,6 +230,14 @@ void declare_scene(Table& scene, Draft& draft) {
     loop.key("longest_hold_us", draft.longest_hold, kAboveZero,
              "T_max of the limiter: a force held for longer is an overrun. Not below the period",
              Absent{.text = "2 periods"});
+    loop.key(
+        "hold_memory_ms", draft.follow_holds.memory, kZeroOrMore,
+        "time constant with which the limiter forgets a hold longer than longest_hold_us; until then it counts on one "
+        "more like it. 0: it never does");
+    loop.key("hold_margin", draft.follow_holds.margin, Number{.least = 0, .most = 10},
+             "how much longer than that hold, as a share of it, the next one may be");
+    loop.key("hold_most", draft.follow_holds.most, Number{.least = 1, .most = 1000},
+             "in longest_hold_us: it counts on no longer hold than this");
     loop.key("max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
              "a position that no hand comes to at this speed is a fault: an encoder that wraps or loses count",
              Absent{.text = "every position is believed"});

@@ -36,6 +36,7 @@ struct Draft {
   std::optional<RecordedMotionFile> recorded_motion;
   std::optional<std::filesystem::path> replayed;  ///< a recording of tendond
   std::optional<Duration> longest_hold;
+  HoldBound::Follow follow_holds;  ///< a memory of 0: none
   std::optional<double> coulomb_bound;
   std::optional<double> viscous_bound;
   std::optional<double> max_force;

@@ -246,6 +246,8 @@ class SceneResolver {
 
     // A loop without real-time priority is late by up to a period now and then; each time is an overrun beyond this.
     control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
+    control.limiter.follow_holds.reset();
+    if (draft_.follow_holds.memory > Duration::zero()) control.limiter.follow_holds = draft_.follow_holds;
     control.max_missed = std::max(2U, static_cast<std::uint32_t>(kMostMissed / loop.period));
     if (control.limiter.longest_hold < loop.period) {
       blame("loop.longest_hold_us", {}, at_least(loop.period, "the period", control.limiter.longest_hold, "_us"));

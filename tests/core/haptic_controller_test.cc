@@ -125,6 +125,49 @@ TEST(HapticController, AfterAnOverrunTheLedgerRecoversMonotonicallyWithFrictionF
   }
 }
 
+TEST(HapticController, TheSecondHoldAsLongAsALateOneTakesNothing) {
+  Bench bench(config());
+  const Step first = after_a_pause(bench, std::chrono::microseconds(2230));
+  // (T_act − T)(‖F‖ − f_c)²/(4b), because all that was there went, too.
+  EXPECT_NEAR(first.energy, -1.23e-3 * std::pow(first.was_applied.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
+  EXPECT_EQ(first.longest_hold, Duration(2787500)) << "2.23 ms and a quarter more";
+  double x = bench.last.hand.position.x();
+  while (bench.last.energy < 1e-3) bench.move_to(x += 2e-4);
+  bench.want(-6);
+  const Step before = bench.move_to(x);
+  ASSERT_GT(before.longest_hold, std::chrono::microseconds(2500));
+  const double follows = 2.5e-3 * (before.force.norm() - 0.05) / (2 * 0.26);
+  const Step second = bench.move_to(x - follows, std::chrono::microseconds(2500));
+  EXPECT_TRUE(second.reasons.has(Reason::kOverrun)) << "beyond what the scene says";
+  EXPECT_GE(second.energy, 0);
+}
+
+TEST(HapticController, TheIntervalAfterAnUnseenStepIsBookedAtItsWorst) {
+  Bench bench(config());
+  bench.move_to(0);
+  for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
+  bench.want(-6);
+  const Step before = bench.move_to(0.02);
+  bench.now += milliseconds(1);
+  const Step unseen = bench.controller.step_unseen(LocalTime(bench.now), bench.applied);
+  ASSERT_EQ(unseen.force, Vec3::Zero());
+  // The device was told zero, and holds its force for one more interval.
+  bench.applied = before.force;
+  const Step seen = bench.move_to(0.02);
+  EXPECT_NEAR(seen.energy, unseen.energy - 1e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
+}
+
+TEST(HapticController, ABrokenAssumptionIsInTheStepThatSawIt) {
+  HapticController::Config c = config();
+  c.limiter.parts.bounded_acceleration = {.most = {100}, .shaping_viscous = {0.5}};
+  Bench bench(c);
+  bench.move_to(0);
+  EXPECT_FALSE(bench.move_to(1e-5).assumption_broken);
+  EXPECT_FALSE(bench.move_to(2e-5).assumption_broken);
+  EXPECT_TRUE(bench.move_to(4e-4).assumption_broken);
+  EXPECT_FALSE(bench.move_to(7.8e-4).assumption_broken);
+}
+
 TEST(HapticController, APauseBeyondTheDevicesWatchdogIsChargedTheWorstAndNoMore) {
   HapticController::Config c = config();
   c.watchdog = milliseconds(5);

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/realtime/heap_guard.h"
 
+#include <bit>
+#include <cerrno>
 #include <cstddef>
 
 // glibc's own allocator, below the names that are replaced here.
 extern "C" {
-void* __libc_malloc(std::size_t size);                     // NOLINT(readability-identifier-naming)
-void* __libc_calloc(std::size_t count, std::size_t size);  // NOLINT(readability-identifier-naming)
-void* __libc_realloc(void* block, std::size_t size);       // NOLINT(readability-identifier-naming)
-void __libc_free(void* block);                             // NOLINT(readability-identifier-naming)
+void* __libc_malloc(std::size_t size);                           // NOLINT(readability-identifier-naming)
+void* __libc_calloc(std::size_t count, std::size_t size);        // NOLINT(readability-identifier-naming)
+void* __libc_realloc(void* block, std::size_t size);             // NOLINT(readability-identifier-naming)
+void* __libc_memalign(std::size_t alignment, std::size_t size);  // NOLINT(readability-identifier-naming)
+void __libc_free(void* block);                                   // NOLINT(readability-identifier-naming)
 }
 
 namespace {
@@ -39,6 +42,23 @@ void* realloc(void* block, std::size_t size) {
 void free(void* block) {
   count();
   __libc_free(block);
+}
+// operator new with an alignment ends in one of these.
+void* memalign(std::size_t alignment, std::size_t size) {
+  count();
+  return __libc_memalign(alignment, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  count();
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
+  count();
+  if (!std::has_single_bit(alignment) || alignment % sizeof(void*) != 0) return EINVAL;
+  void* const made = __libc_memalign(alignment, size);
+  if (made == nullptr) return ENOMEM;
+  *block = made;
+  return 0;
 }
 
 }  // extern "C"

@@ -5,8 +5,9 @@
 
 namespace tendon {
 
-/// Counts every heap call of the calling thread while it lives: malloc, calloc, realloc, free and all that
-/// ends in them (new, delete, std::string …). For the promise that the haptic thread makes none.
+/// Counts every heap call of the calling thread while it lives: malloc, calloc, realloc, free, their aligned forms
+/// (aligned_alloc, posix_memalign, memalign), and everything that ends in them (new, delete, std::string …). Tests that
+/// the haptic thread makes none.
 ///
 /// Works by interposing glibc's malloc in this executable: link heap_guard.cc, not into sanitizer builds.
 class HeapGuard {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <string>
 
@@ -22,6 +25,25 @@ TEST(HeapGuard, SeesEveryKindOfHeapCall) {
   EXPECT_EQ(guard.calls(), 1U);
   const std::string text(100, 'x');
   EXPECT_EQ(guard.calls(), 2U);
+}
+
+TEST(HeapGuard, SeesAlignedHeapCalls) {
+  struct alignas(64) Wide {
+    char bytes[64];
+  };
+  const HeapGuard guard;
+  auto wide = std::make_unique<Wide>();
+  EXPECT_EQ(guard.calls(), 1U) << "operator new with an alignment";
+  wide.reset();
+  EXPECT_EQ(guard.calls(), 2U) << "and its delete";
+  void* block = std::aligned_alloc(64, 128);
+  EXPECT_EQ(guard.calls(), 3U);
+  std::free(block);
+  ASSERT_EQ(posix_memalign(&block, 64, 100), 0);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(block) % 64, 0U);
+  EXPECT_EQ(guard.calls(), 5U);
+  std::free(block);
+  EXPECT_EQ(posix_memalign(&block, 3, 100), EINVAL);
 }
 
 // The whole haptic thread: device, velocity, controller with every limiter at work, mail, recording ring full

@@ -35,5 +35,11 @@ TEST(Time, SecondsAndNanosecondsAgree) {
   EXPECT_EQ(from_seconds(-0.25), std::chrono::milliseconds(-250));
 }
 
+TEST(Time, SecondsAreRoundedDownBelowZeroToo) {
+  EXPECT_EQ(from_seconds(1.5e-9), Duration(1));
+  EXPECT_EQ(from_seconds(-1.5e-9), Duration(-2));
+  EXPECT_EQ(from_seconds(-2e-9), Duration(-2));
+}
+
 }  // namespace
 }  // namespace tendon

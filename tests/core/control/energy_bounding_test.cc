@@ -122,8 +122,9 @@ TEST(EnergyBounding, RefusesSlopesThatContradictEachOther) {
   const auto say = [](std::optional<double> c1, std::optional<double> c2) {
     return complaint([&] { EnergyBounding<1>({kFriction, milliseconds(1), c1, c2}); });
   };
-  EXPECT_NE(say(261, {}).find("c1 must be above 0 and at most b/T = 260"), std::string::npos) << say(261, {});
-  EXPECT_NE(say(200, 201).find("c2 must be above 0 and at most c1 = 200"), std::string::npos);
+  EXPECT_NE(say(261, {}).find("c1 = 261: expected a number above 0 and at most b/T = 260"), std::string::npos)
+      << say(261, {});
+  EXPECT_NE(say(200, 201).find("c2 = 201: expected a number above 0 and at most c1 = 200"), std::string::npos);
   EXPECT_NE(say(0, {}).find("c1"), std::string::npos);
   EXPECT_EQ(say(200, 200), "");
   EXPECT_THROW(EnergyBounding<1>({kFriction, Duration::zero()}), std::invalid_argument);

@@ -181,7 +181,7 @@ TEST(ForceBounding, ShowsAStiffWallAsTwoBOverTAndQuietly) {
 
 TEST(ForceBounding, RefusesADeviceWithoutViscousFrictionAndAHoldOfNoLength) {
   const std::string why = complaint([] { ForceBounding<1>({{0.05, 0}, milliseconds(1)}); });
-  EXPECT_NE(why.find("friction.viscous must be above 0"), std::string::npos) << why;
+  EXPECT_NE(why.find("friction.viscous = 0: expected a finite number above 0"), std::string::npos) << why;
   EXPECT_NE(complaint([] {
               MemorylessForceBounding<3>({kFriction, Duration::zero()});
             }).find("longest_hold"),

@@ -35,7 +35,7 @@ TEST(HardClamp, IsNotPassive) {
 }
 
 TEST(HardClamp, RefusesALimitThatIsNone) {
-  EXPECT_NE(complaint([] { HardClamp<3>({kFriction, -1}); }).find("max_force must be"), std::string::npos);
+  EXPECT_NE(complaint([] { HardClamp<3>({kFriction, -1}); }).find("max_force = -1: expected"), std::string::npos);
   EXPECT_THROW(HardClamp<1>({kFriction, std::numeric_limits<double>::infinity()}), std::invalid_argument);
   EXPECT_THROW(HardClamp<1>({{-1, 0.26}, 1}), std::invalid_argument);
 }

@@ -136,7 +136,7 @@ TEST(NonlinearCoupling, ShowsEveryStiffWallAsTwoBOverT) {
 
 TEST(NonlinearCoupling, RefusesASlopeThatFrictionDoesNotAfford) {
   const std::string why = complaint([] { NonlinearCoupling<1>({kFriction, milliseconds(1), 521}); });
-  EXPECT_NE(why.find("max_slope must be above 0 and at most 2b/T = 520"), std::string::npos) << why;
+  EXPECT_NE(why.find("expected a number above 0 and at most 2b/T = 520"), std::string::npos) << why;
   EXPECT_THROW(NonlinearCoupling<1>({{0.05, 0}, milliseconds(1)}), std::invalid_argument);
   EXPECT_THROW(NonlinearCoupling<1>({kFriction, Duration::zero()}), std::invalid_argument);
 }

@@ -59,7 +59,7 @@ TEST(ReferenceEnergyController, ActsOneIntervalLateSoAnAdversaryDrawsEnergy) {
 
 TEST(ReferenceEnergyController, RefusesAReferenceWithoutStiffness) {
   const std::string why = complaint([] { ReferenceEnergyController<1>({kFriction, 0, 20}); });
-  EXPECT_NE(why.find("stiffness must be finite and above 0"), std::string::npos) << why;
+  EXPECT_NE(why.find("expected a finite number above 0 N/m"), std::string::npos) << why;
   EXPECT_THROW(ReferenceEnergyController<1>({kFriction, 500, 0}), std::invalid_argument);
   EXPECT_THROW(ReferenceEnergyController<1>({kFriction, 500, 20, -1}), std::invalid_argument);
 }

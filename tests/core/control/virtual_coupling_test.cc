@@ -165,7 +165,7 @@ TEST(CouplingDesign, TheTwoPortRuleIsLlewellynsOnTheEdgeWhateverTheMass) {
 
 TEST(VirtualCoupling, RefusesACouplingThatIsNone) {
   const std::string why = complaint([] { VirtualCoupling<1>({kFriction, milliseconds(1), 0}); });
-  EXPECT_NE(why.find("stiffness must be finite and above 0"), std::string::npos) << why;
+  EXPECT_NE(why.find("expected a finite number above 0 N/m"), std::string::npos) << why;
   EXPECT_THROW(VirtualCoupling<1>({kFriction, milliseconds(1), 400, -0.1}), std::invalid_argument);
   EXPECT_THROW(VirtualCoupling<1>({kFriction, Duration::zero(), 400, 0}), std::invalid_argument);
 }

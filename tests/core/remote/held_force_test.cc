@@ -70,12 +70,46 @@ TEST(HeldForce, SafeStopIsLeftOnlyByAFreshForceAndThatIsRampedIn) {
   EXPECT_EQ(held.wanted(at(milliseconds(1100))).force.x(), 2);
 }
 
-TEST(HeldForce, AFreshForceWhileFadingIsNotRampedAgain) {
+TEST(HeldForce, AFreshForceWhileFadingIsRampedInOverTheShareThatWasLost) {
   HeldForce held({});
   held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
-  EXPECT_EQ(held.wanted(at(milliseconds(150))).mode, Mode::kDecaying);
-  held.observe(force_at(milliseconds(151), Vec3(2, 0, 0)));
-  EXPECT_EQ(held.wanted(at(milliseconds(152))).force.x(), 2);
+  // 100 ms after the hold has ended e⁻² is left: 13.5 %. The rest comes back in 86.5 % of the ramp's 100 ms.
+  const double left = held.wanted(at(milliseconds(150))).force.x();
+  EXPECT_NEAR(left, 2 * std::exp(-2.0), 1e-12);
+  held.observe(force_at(milliseconds(150), Vec3(2, 0, 0), milliseconds(400)));
+  const auto first = held.wanted(at(milliseconds(150)));
+  EXPECT_EQ(first.mode, Mode::kActive);
+  EXPECT_TRUE(first.reasons.has(Reason::kRampIn));
+  EXPECT_NEAR(first.force.x(), left, 1e-12);
+  EXPECT_NEAR(held.wanted(at(milliseconds(160))).force.x(), left + 2 * 0.1, 1e-6);
+  EXPECT_EQ(held.wanted(at(milliseconds(237))).force.x(), 2);
+}
+
+TEST(HeldForce, AnEngineThatStuttersNeverKicksTheHand) {
+  for (const int silence : {40, 51, 60, 90, 120, 200, 279, 290, 400}) {
+    HeldForce held({});
+    double before = 0;
+    double most = 0;
+    Duration next = milliseconds(0);
+    for (int ms = 0; ms < 3000; ++ms) {
+      if (milliseconds(ms) >= next) {
+        held.observe(force_at(milliseconds(ms), Vec3(8, 0, 0)));
+        next += milliseconds(silence);
+      }
+      const double force = held.wanted(at(milliseconds(ms))).force.x();
+      most = std::max(most, force - before);
+      before = force;
+    }
+    EXPECT_LE(most, 8 / 100.0 + 1e-6) << "N in a millisecond, silent for " << silence << " ms";
+  }
+}
+
+TEST(HeldForce, AFreshForceBeforeItFadesIsRenderedAtOnce) {
+  HeldForce held(without_ramp());
+  held.observe(force_at(Duration::zero(), Vec3(2, 0, 0)));
+  ASSERT_EQ(held.wanted(at(milliseconds(45))).mode, Mode::kHolding);
+  held.observe(force_at(milliseconds(46), Vec3(3, 0, 0)));
+  EXPECT_EQ(held.wanted(at(milliseconds(46))).force.x(), 3);
 }
 
 TEST(HeldForce, FollowsTheHandWithTheLocalModel) {

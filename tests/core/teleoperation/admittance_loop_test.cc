@@ -327,7 +327,7 @@ TEST(AdmittanceLoop, SaysWhatIsWrongWithItsConfiguration) {
 // constant accelerations, with the bound f_c + 2 √(b (E + credit) / T).
 double least_hand_work(bool credit, double a_max) {
   constexpr double kMass = 2;
-  const AdjustingOutputLimiter limiter({{.coulomb = kCoulomb, .viscous = kViscous}, kPeriod});
+  const OutputBound bound = OutputBound::of({.coulomb = kCoulomb, .viscous = kViscous}, kPeriod);
   EnergyLedger ledger({.coulomb = kCoulomb, .viscous = kViscous});
   const int ramp = 100;
   const int cruise = 20;
@@ -341,7 +341,7 @@ double least_hand_work(bool credit, double a_max) {
     const double lent = credit ? kMass / 2 * sure * sure : 0.0;
     // On the hand, along with the motion; nothing while it speeds up, so that what it earns is kinetic energy only.
     const bool push = i >= ramp;
-    const double force = push ? limiter.permitted(ledger.energy() + lent) : 0.0;
+    const double force = push ? bound.largest(ledger.energy() + lent) : 0.0;
     const double dx = v * kT + a * kT * kT / 2;
     const double v_squared = v * v * kT + v * a * kT * kT + a * a * kT * kT * kT / 3;  // ∫ v² dt
     const double after = v + a * kT;

@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/control/adjusting_output_limiter.h"
+#include "core/ledger/output_bound.h"
 #include "tests/support/dice.h"
 
 namespace tendon {
@@ -31,7 +31,7 @@ Outcome attack(std::uint64_t seed, const typename PassiveSetPosition<N>::Config&
   Dice dice(seed);
   PassiveSetPosition<N> spring(config);
   EnergyLedger ledger(truth);
-  const AdjustingOutputLimiter limiter({truth, config.longest_hold});
+  const OutputBound bound = OutputBound::of(truth, config.longest_hold);
   const double greed = dice.uniform();
   const double messages = dice.decades(-3, 0);  // per period
   const auto random = [&](double size) {
@@ -48,8 +48,8 @@ Outcome attack(std::uint64_t seed, const typename PassiveSetPosition<N>::Config&
       spring.receive({++sequence, random(size)});
     }
     const Vec<N> force = spring.command(x).force;
-    if (!limiter.limit(force, ledger.energy()).reasons.empty() &&
-        force.norm() > limiter.permitted(ledger.energy()) * (1 + 1e-9) + 1e-9) {
+    if (!bound.limit(force, ledger.energy()).reasons.empty() &&
+        force.norm() > bound.largest(ledger.energy()) * (1 + 1e-9) + 1e-9) {
       ++outcome.clipped;
     }
     const double held = kT * (dice.chance(0.1) ? 1.0 : dice.within(0.3, 1.0));

@@ -101,6 +101,20 @@ TEST(HealthMeter, AStepThatItWasNotShownIsNeitherCountedNorMissed) {
   EXPECT_EQ(told.degraded, "the log thread does not follow");
 }
 
+TEST(HealthMeter, ABrokenAccelerationBoundDegradesTheDeviceInThatReportOnly) {
+  HealthMeter meter(milliseconds(1));
+  StepRecord step;
+  meter.observe(step);
+  const Health before = meter.counted();
+  step.tick = 1;
+  step.assumption_broken = true;
+  meter.observe(step);
+  const Health broken = meter.counted();
+  EXPECT_EQ(broken.broken_assumptions, 1U);
+  EXPECT_EQ(report(before, broken).degraded, "accelerates too hard");
+  EXPECT_EQ(report(broken, broken).degraded, "");
+}
+
 TEST(HealthMeter, CountsStepsInWhichTheDeviceWasNotSeen) {
   HealthMeter meter(milliseconds(1));
   StepRecord step;
@@ -146,9 +160,11 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   Health now;
   now.steps = 1;
   now.not_realtime = now.recording_ended = true;
+  now.broken_assumptions = 1;
   const std::string degraded = report({}, now).degraded;
   EXPECT_EQ(degraded,
-            "the kernel refused the haptic thread real time; the log thread does not follow; the recording has ended");
+            "the kernel refused the haptic thread real time; the log thread does not follow; the recording has ended; "
+            "accelerates too hard");
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
 }
 

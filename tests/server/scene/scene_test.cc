@@ -94,6 +94,8 @@ TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
   const HapticController::Config& control = scene.loop.control;
   EXPECT_EQ(scene.loop.period, HapticLoop::Config{}.period);
   EXPECT_EQ(control.limiter.longest_hold, 2 * scene.loop.period);
+  ASSERT_TRUE(control.limiter.follow_holds);
+  EXPECT_EQ(control.limiter.follow_holds->memory, HoldBound::Follow{}.memory);
   EXPECT_EQ(control.watchdog, 0ns);
   EXPECT_EQ(control.limiter.law, Law::kAolPlus);
   EXPECT_EQ(control.limiter.friction.coulomb, falcon.coulomb_bound.value);
@@ -142,6 +144,9 @@ direction = [0, 0, 2]
 [loop]
 period_us = 500
 longest_hold_us = 1500
+hold_memory_ms = 5000
+hold_margin = 0.5
+hold_most = 3
 max_speed_m_per_s = 10
 [limiter]
 kind = "aol-per-axis"
@@ -182,6 +187,10 @@ path = "run.mcap"
   const HapticController::Config& control = scene.loop.control;
   EXPECT_EQ(scene.loop.period, 500us);
   EXPECT_EQ(control.limiter.longest_hold, 1500us);
+  ASSERT_TRUE(control.limiter.follow_holds);
+  EXPECT_EQ(control.limiter.follow_holds->memory, 5s);
+  EXPECT_EQ(control.limiter.follow_holds->margin, 0.5);
+  EXPECT_EQ(control.limiter.follow_holds->most, 3);
   EXPECT_EQ(control.max_speed, 10);
   EXPECT_EQ(control.watchdog, 5500us);
   EXPECT_EQ(control.limiter.law, Law::kAolPerAxis);
@@ -850,6 +859,7 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
                                                              ": unknown key; known here: period_us, longest_hold_us, "
+                                                             "hold_memory_ms, hold_margin, hold_most, "
                                                              "max_speed_m_per_s, cpu"},
   });
 }

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/control/adjusting_output_limiter.h"
 #include "core/estimation/velocity_estimator.h"
 #include "core/exchange/flight_recorder.h"
 #include "core/exchange/spsc_ring.h"
 #include "core/haptic_controller.h"
 #include "core/ledger/energy_ledger.h"
+#include "core/ledger/output_bound.h"
 #include "server/recording/byte_sink.h"
 #include "server/recording/recorder.h"
 #include "server/recording/records.h"
@@ -77,7 +77,7 @@ void measure_steps(Run& run) {
   };
 
   EnergyLedger ledger(kFriction);
-  const AdjustingOutputLimiter limiter({kFriction, milliseconds(1)});
+  const OutputBound bound = OutputBound::of(kFriction, milliseconds(1));
   Vec3 applied = Vec3::Zero();
   std::size_t at = 0;
   Row row = row_of(in_turns(
@@ -86,11 +86,11 @@ void measure_steps(Run& run) {
                          const Vec3& before = places[at % places.size()];
                          const Vec3& x = places[++at % places.size()];
                          const double energy = ledger.observe(applied, Vec3(x - before), milliseconds(1));
-                         applied = limiter.limit(Vec3(-3000 * x), energy).force;
+                         applied = bound.limit<3>(Vec3(-3000 * x), energy).force;
                          keep(applied);
                        },
                        square_root_and_divide),
-                   "EnergyLedger + AdjustingOutputLimiter, 3 DOF", root);
+                   "EnergyLedger + OutputBound, 3 DOF", root);
   row.target = Row::Target{"≤ 15 ns, ≤ 4 × the floor", row.p50 <= 15 && *row.ratio <= 4};
   run.add(row);
 

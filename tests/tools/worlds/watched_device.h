@@ -16,10 +16,11 @@ namespace tendon::simulation {
 ///
 ///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]        and the same for each axis by itself
 ///
-/// An interval whose motion nobody saw (the reading failed, or the device's watchdog ended the force) is booked at its
-/// worst, −T (‖F‖ − f_c)₊²/(4b). Nothing of the code under test is used for it.
+/// An interval whose motion nobody saw (a reading at either end failed, or the device's watchdog ended the force) is
+/// booked at its worst, −T (‖F‖ − f_c)₊²/(4b). It uses none of the code under test.
 ///
-/// It can make readings fail, as a bad cable does.
+/// It can make readings fail, as a bad cable does, and go on holding its force when it is told zero, as an amplifier
+/// that falls slowly or a command that was lost does.
 class WatchedDevice final : public Device {
  public:
   struct Config {
@@ -27,6 +28,7 @@ class WatchedDevice final : public Device {
     Duration watchdog{};   ///< … of the device; zero: it has none
     double unseen = 0;     ///< probability that a reading fails
     double most_gone = 0;  ///< … and then so many in a row, at most
+    double disobeys = 0;   ///< probability that it keeps its force when it is told zero
     std::uint64_t seed = 0;
   };
 
@@ -46,6 +48,8 @@ class WatchedDevice final : public Device {
       if (last_at_) book_unseen(held);
     } else if (last_) {
       book(sample->position - *last_, held);
+    } else if (last_at_) {
+      book_unseen(held);
     }
     last_at_ = now;
     if (fails) {
@@ -58,7 +62,8 @@ class WatchedDevice final : public Device {
 
   Vec3 apply(const Vec3& force) noexcept override {
     told_ = force;
-    force_ = device_.apply(force);
+    const bool keeps = config_.disobeys > 0 && force.isZero(0) && dice_.chance(config_.disobeys);
+    force_ = device_.apply(keeps ? force_ : force);
     return force_;
   }
 

@@ -20,8 +20,10 @@ constexpr Duration kClockRounding{4};
 constexpr Duration kServed = std::chrono::milliseconds(400);
 
 constexpr std::array kOracles = {
-    OracleInfo{Oracle::kLedger, "ledger",
-               "the device never gives out energy that it was not given, −1 nJ for rounding"},
+    OracleInfo{
+        Oracle::kLedger, "ledger",
+        "the device gives out no energy that it was not given, −1 nJ for rounding, and in a hold beyond the law's "
+        "bound no more than the law says"},
     OracleInfo{Oracle::kTruth, "truth", "the hand has really done at least the work that the account of the port says"},
     OracleInfo{Oracle::kBound, "bound", "no force is larger than the scene's bound, or than the law's own"},
     OracleInfo{Oracle::kFinite, "finite", "only numbers reach the device"},
@@ -133,22 +135,18 @@ void Witness::see(const StepRecord& step) {
 void Witness::see_energy(const StepRecord& step) {
   const double now = account();
   const double before = std::exchange(last_account_, now);
-  if (step.reasons.has(Reason::kOverrun)) {
-    overdrawn_ = now < 0;
-    return;
+  // A hold beyond the bound that the force was chosen for takes at most (T_act − T)(‖F‖ − f_c)₊²/(4b) from below zero;
+  // then the account only rises until it is back.
+  const Friction& friction = drawn_.config.loop.control.limiter.friction;
+  const Duration held = drawn_.port.watchdog > Duration::zero() ? std::min(step.held, drawn_.port.watchdog) : step.held;
+  const double beyond = std::max(0.0, seconds(held - std::exchange(bound_, step.longest_hold)));
+  const double excess = std::max(0.0, step.was_applied.norm() - friction.coulomb);
+  const double may_leave = std::min(before, 0.0) - beyond * excess * excess / (4 * friction.viscous);
+  if (now < may_leave - kRounding) {
+    report(Oracle::kLedger, number(now) + " J, where a hold of " + ms(held) + " may leave " + number(may_leave) +
+                                " J; the law says " + number(step.energy) + " J");
   }
-  // What the other laws do after an overrun, nobody promises.
-  if (drawn_.pauses() && !aol_) return;
-  if (overdrawn_ && now < -kRounding) {
-    if (now < before - kRounding) {
-      report(Oracle::kLedger,
-             "below zero after an overrun, and still falling: " + number(before) + " J to " + number(now) + " J");
-    }
-    return;
-  }
-  overdrawn_ = false;
-  least_energy_ = std::min(least_energy_, now);
-  if (now < -kRounding) report(Oracle::kLedger, number(now) + " J; the law says " + number(step.energy) + " J");
+  if (before >= 0 && beyond == 0) least_energy_ = std::min(least_energy_, now);
 }
 
 void Witness::see_age(const StepRecord& step) {

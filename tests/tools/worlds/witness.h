@@ -83,9 +83,8 @@ class Witness {
   bool felt() const { return felt_; }        ///< a remote force was rendered
   bool limited() const { return limited_; }  ///< … and limited by energy
   bool checked_recovery() const { return checked_recovery_; }
-  double least_energy() const {
-    return least_energy_;
-  }  ///< J, of the port's account, but for what overruns drew below zero
+  /// J, of the port's account, while it owes nothing to holds beyond the law's bound.
+  double least_energy() const { return least_energy_; }
 
  private:
   struct Mark {  ///< of a client, when it had to be recovered
@@ -107,7 +106,7 @@ class Witness {
   World& world_;
   const WatchedDevice& port_;
   const SimulatedDevice* simulated_;
-  bool aol_;        ///< one of the family whose ledger recovers from overruns by itself
+  bool aol_;        ///< one of the family of the AOL
   Duration valid_;  ///< the longest that a force may be fresh
   Duration safe_stop_;
   Duration slew_time_;     ///< from the largest force to none
@@ -122,7 +121,7 @@ class Witness {
   LocalTime answered_ = LocalTime::min();  ///< when the motion was sampled which the rendered force answers
   std::optional<LocalTime> silent_since_;  ///< there should be no force
   double last_account_ = 0;
-  bool overdrawn_ = false;  ///< since an overrun
+  Duration bound_ = Duration::max();  ///< so long the force held now may be held, by the step that chose it
   bool felt_ = false;
   bool limited_ = false;
   bool checked_recovery_ = false;

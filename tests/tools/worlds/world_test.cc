@@ -18,6 +18,7 @@
 #include "server/recording/flight_file.h"
 #include "server/recording/recording_reader.h"
 #include "tests/tools/worlds/adversary.h"
+#include "tests/tools/worlds/watched_device.h"
 
 namespace tendon::simulation {
 namespace {
@@ -362,6 +363,26 @@ TEST(World, NotANumberOnTheWireIsCountedAndNeverReachesTheDevice) {
     ASSERT_LE(step.applied.norm(), device.info().max_force);
   }
   EXPECT_EQ(log.steps.back().mode, Mode::kActive);
+}
+
+TEST(World, TheLawBooksTheForceThatADeviceKeepsWhenItIsToldZero) {
+  SimulatedDevice device(pressing_hand());
+  World::Config config = world_config(device);
+  config.loop.control.limiter.law = Law::kAol;
+  WatchedDevice port(
+      device,
+      {.friction = config.loop.control.limiter.friction, .unseen = 0.05, .most_gone = 3, .disobeys = 0.5, .seed = 11});
+  World world(config, port);
+  world.add_controller(at_100_hz(), wall());
+  int kept = 0;
+  double worst = 0;
+  world.watch_steps([&](const StepRecord& step) {
+    if (step.reasons.has(Reason::kUnseen) && step.applied.norm() > 0.5) ++kept;
+    worst = std::max(worst, std::abs(step.energy - port.energy()));
+  });
+  world.run_for(seconds(4));
+  EXPECT_GT(kept, 20) << "zero must have been ignored while a force was held";
+  EXPECT_LT(worst, 1e-9) << "J, the law's account against the witness's";
 }
 
 TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) {

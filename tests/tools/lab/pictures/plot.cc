@@ -210,10 +210,11 @@ class Script {
     const std::string given_out = with_unit(run.energy_given_out, "J");
     std::string verdict = "active: gave out " + given_out + " that nobody had put in";
     if (run.passive()) {
-      verdict = run.energy_given_out > kPromise ? "passive but for overruns: they gave out " + given_out
-                                                : "passive: gave out nothing that the hand had not put in";
+      verdict = "passive: gave out nothing that the hand had not put in";
+    } else if (run.kept_its_promise()) {
+      verdict = "gave out " + given_out + ", all in holds beyond the limiter's bound";
     }
-    label(left(i), kFigures, verdict) << "tc rgb '" << (run.passive() ? kGreen : kVermilion) << "'\n";
+    label(left(i), kFigures, verdict) << "tc rgb '" << (run.kept_its_promise() ? kGreen : kVermilion) << "'\n";
 
     std::string figures =
         "peak force " + with_unit(run.peak_force, "N") + ", peak speed " + with_unit(run.peak_speed, "m/s");

@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -119,7 +120,11 @@ void RunObserver::observe_energy(const StepRecord& step) {
   energy_ = step.energy;
   so_far_.energy_given_out = std::max(so_far_.energy_given_out, -energy_);
   if (energy_ >= 0) overdrawn_ = 0;
-  if (step.reasons.has(Reason::kOverrun)) {
+  // Recordings made before a step knew its bound have 0 there: the scene's bound, which flags overruns, was in force.
+  const Duration bound = std::exchange(bound_, step.longest_hold);
+  const bool beyond = bound > Duration::zero() ? step.held > bound : step.reasons.has(Reason::kOverrun);
+  if (beyond) {
+    ++so_far_.holds_beyond_bound;
     overdrawn_ += std::min(std::min(energy_, 0.0) - before, 0.0);
   } else {
     so_far_.least_energy = std::min(so_far_.least_energy, energy_ - overdrawn_);

@@ -45,17 +45,21 @@ struct RunSummary {
   std::uint64_t steps = 0;
   LocalTime start{};            ///< of the first step
   Duration span{};              ///< from the first step to the last
-  std::uint64_t overruns = 0;   ///< intervals longer than the limiter's T_max
+  std::uint64_t overruns = 0;   ///< intervals longer than the scene's longest_hold
   std::uint64_t watchdogs = 0;  ///< … and than the device's own watchdog
   Duration longest_interval{};
 
   // Energy. E(n) is the recorded ledger.
   double energy_given_out = 0;  ///< J, max(0, max over n of −E(n)): beyond what the device had taken in
-  /// J, min over the steps not flagged as overrun of E(n) − D(n). D ≤ 0 is what overruns have drawn below zero, until
-  /// the ledger has recovered from it. +∞ when every step is an overrun.
+  /// The ledger was never below −1 nJ.
+  bool passive() const noexcept { return energy_given_out <= kPromise; }
+  /// Intervals longer than the limiter's T in force (Step::longest_hold), for which it promises nothing.
+  std::uint64_t holds_beyond_bound = 0;
+  /// J, min over all other steps of E(n) − D(n). D ≤ 0 is what holds beyond the bound have drawn below zero, until the
+  /// ledger has recovered. +∞ when there is no other step.
   double least_energy = std::numeric_limits<double>::infinity();
-  /// The promise: least_energy ≥ −1 nJ.
-  bool passive() const noexcept { return least_energy >= -kPromise; }
+  /// What the limiter promises: never below −1 nJ by anything else than holds beyond its bound.
+  bool kept_its_promise() const noexcept { return least_energy >= -kPromise; }
   /// A limiter was at work: some step had a finite bound.
   bool limiter_on = false;
 
@@ -142,7 +146,8 @@ class RunObserver {
 
   RunSummary so_far_;
   double energy_ = 0;
-  double overdrawn_ = 0;  ///< D, J
+  double overdrawn_ = 0;              ///< D, J
+  Duration bound_ = Duration::max();  ///< T in force when the force of the next interval was chosen
 
   std::optional<Vec3> origin_;  ///< the first position: sums of small numbers keep their digits
   double positions_ = 0;

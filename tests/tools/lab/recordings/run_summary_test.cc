@@ -43,14 +43,36 @@ TEST(RunSummary, ALedgerThatNeverWasBelowZeroGaveNothingOut) {
   EXPECT_TRUE(run.passive());
 }
 
-TEST(RunSummary, WhatAnOverrunDrewIsCountedButBreaksNoPromiseWhileTheLedgerRecovers) {
-  auto steps = with_energies({0, 0.1, -0.5, -0.4, -0.2, 0.3});
+TEST(RunSummary, WhatAHoldBeyondTheBoundDrewIsGivenOutAndToldApart) {
+  for (const bool knows_its_bound : {false, true}) {
+    auto steps = with_energies({0, 0.1, -0.5, -0.4, -0.2, 0.3});
+    steps[2].reasons = Reason::kOverrun;
+    if (knows_its_bound) {
+      for (StepRecord& step : steps) {
+        step.held = std::chrono::microseconds(1000);
+        step.longest_hold = std::chrono::microseconds(2000);
+      }
+      steps[2].held = std::chrono::microseconds(2230);
+      steps[2].longest_hold = std::chrono::microseconds(2788);
+    }
+    const RunSummary run = summarise(steps);
+    EXPECT_DOUBLE_EQ(run.energy_given_out, 0.5);
+    EXPECT_FALSE(run.passive()) << "it was below −1 nJ, whatever the reason";
+    EXPECT_TRUE(run.kept_its_promise());
+    EXPECT_EQ(run.holds_beyond_bound, 1U);
+    EXPECT_EQ(run.least_energy, 0);
+    EXPECT_EQ(run.overruns, 1U);
+  }
+}
+
+TEST(RunSummary, AnOverrunWithinTheBoundInForceExcusesNothing) {
+  auto steps = with_energies({0, 0.1, -0.5, 0.3});
+  for (StepRecord& step : steps) step.longest_hold = std::chrono::microseconds(2788);
+  steps[2].held = std::chrono::microseconds(2500);
   steps[2].reasons = Reason::kOverrun;
   const RunSummary run = summarise(steps);
-  EXPECT_DOUBLE_EQ(run.energy_given_out, 0.5);
-  EXPECT_EQ(run.least_energy, 0);
-  EXPECT_TRUE(run.passive());
-  EXPECT_EQ(run.overruns, 1U);
+  EXPECT_FALSE(run.kept_its_promise());
+  EXPECT_EQ(run.holds_beyond_bound, 0U);
 }
 
 TEST(RunSummary, AFallAfterAnOverrunBreaksThePromise) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/control/worst_loss.h"
+#include "core/ledger/output_bound.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 
@@ -12,19 +14,24 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-double WorstLoss::slope(double force) const noexcept {
+OutputBound OutputBound::of(const Friction& friction, Duration longest_hold) {
+  expect_above_zero(seconds(longest_hold), "longest_hold");
+  return {.coulomb = friction.coulomb, .viscous_per_hold = friction.viscous / seconds(longest_hold)};
+}
+
+double OutputBound::slope(double force) const noexcept {
   if (!(force > coulomb) || reach <= 0) return 0;
   return std::min((force - coulomb) / (2 * viscous_per_hold), reach);
 }
 
-double WorstLoss::at(double force) const noexcept {
+double OutputBound::at(double force) const noexcept {
   const double travel = slope(force);
   if (travel == 0) return 0;
   if (std::isinf(travel)) return kInfinite;
   return travel * ((force - coulomb) - viscous_per_hold * travel);
 }
 
-double WorstLoss::largest(double energy) const noexcept {
+double OutputBound::largest(double energy) const noexcept {
   if (reach <= 0) return kInfinite;
   // max(E, 0) written so that a NaN energy permits friction only.
   if (!(energy > 0)) return coulomb;
@@ -35,15 +42,15 @@ double WorstLoss::largest(double energy) const noexcept {
 }
 
 template <std::size_t Parts>
-double largest_scale(const std::array<WorstLoss, Parts>& losses, const std::array<double, Parts>& sizes,
+double largest_scale(const std::array<OutputBound, Parts>& bounds, const std::array<double, Parts>& sizes,
                      double energy) noexcept {
   if constexpr (Parts == 1) {
-    return sizes[0] > 0 ? losses[0].largest(energy) / sizes[0] : kInfinite;
+    return sizes[0] > 0 ? bounds[0].largest(energy) / sizes[0] : kInfinite;
   }
   const double budget = energy > 0 ? energy : 0;
   const auto loss_at = [&](double scale) {
     double sum = 0;
-    for (std::size_t i = 0; i < Parts; ++i) sum += losses[i].at(scale * sizes[i]);
+    for (std::size_t i = 0; i < Parts; ++i) sum += bounds[i].at(scale * sizes[i]);
     return sum;
   };
   // The sum is convex and smooth between the scales at which a part leaves Coulomb friction or meets its reach.
@@ -51,13 +58,13 @@ double largest_scale(const std::array<WorstLoss, Parts>& losses, const std::arra
   std::size_t count = 0;
   double ceiling = kInfinite;  // where friction gives no bound of the loss at all
   for (std::size_t i = 0; i < Parts; ++i) {
-    const WorstLoss& loss = losses[i];
-    if (!(sizes[i] > 0) || loss.reach <= 0) continue;
-    corners[count++] = loss.coulomb / sizes[i];
-    if (std::isfinite(loss.reach)) {
-      corners[count++] = (loss.coulomb + 2 * loss.viscous_per_hold * loss.reach) / sizes[i];
-    } else if (loss.viscous_per_hold == 0) {
-      ceiling = std::min(ceiling, loss.coulomb / sizes[i]);
+    const OutputBound& bound = bounds[i];
+    if (!(sizes[i] > 0) || bound.reach <= 0) continue;
+    corners[count++] = bound.coulomb / sizes[i];
+    if (std::isfinite(bound.reach)) {
+      corners[count++] = (bound.coulomb + 2 * bound.viscous_per_hold * bound.reach) / sizes[i];
+    } else if (bound.viscous_per_hold == 0) {
+      ceiling = std::min(ceiling, bound.coulomb / sizes[i]);
     }
   }
   std::sort(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(count));
@@ -68,16 +75,16 @@ double largest_scale(const std::array<WorstLoss, Parts>& losses, const std::arra
   double slope = 0;
   double curvature = 0;
   for (std::size_t i = 0; i < Parts; ++i) {
-    const WorstLoss& loss = losses[i];
-    // The quotients, as among the corners: `from` times the size may round to just below one.
-    if (!(sizes[i] > 0) || loss.reach <= 0 || from < loss.coulomb / sizes[i]) continue;
-    if (loss.viscous_per_hold == 0) {
-      if (std::isfinite(loss.reach)) slope += loss.reach * sizes[i];
+    const OutputBound& bound = bounds[i];
+    // Compare quotients, as for the corners: `from` times the size may round to just below a corner.
+    if (!(sizes[i] > 0) || bound.reach <= 0 || from < bound.coulomb / sizes[i]) continue;
+    if (bound.viscous_per_hold == 0) {
+      if (std::isfinite(bound.reach)) slope += bound.reach * sizes[i];
       continue;
     }
-    slope += loss.slope(from * sizes[i]) * sizes[i];
-    if (from < (loss.coulomb + 2 * loss.viscous_per_hold * loss.reach) / sizes[i]) {
-      curvature += sizes[i] * sizes[i] / (4 * loss.viscous_per_hold);
+    slope += bound.slope(from * sizes[i]) * sizes[i];
+    if (from < (bound.coulomb + 2 * bound.viscous_per_hold * bound.reach) / sizes[i]) {
+      curvature += sizes[i] * sizes[i] / (4 * bound.viscous_per_hold);
     }
   }
   const double left = budget - loss_at(from);
@@ -86,9 +93,9 @@ double largest_scale(const std::array<WorstLoss, Parts>& losses, const std::arra
   return std::min(divisor > 0 ? from + 2 * left / divisor : kInfinite, ceiling);
 }
 
-template double largest_scale<1>(const std::array<WorstLoss, 1>&, const std::array<double, 1>&, double) noexcept;
-template double largest_scale<2>(const std::array<WorstLoss, 2>&, const std::array<double, 2>&, double) noexcept;
-template double largest_scale<3>(const std::array<WorstLoss, 3>&, const std::array<double, 3>&, double) noexcept;
-template double largest_scale<6>(const std::array<WorstLoss, 6>&, const std::array<double, 6>&, double) noexcept;
+template double largest_scale<1>(const std::array<OutputBound, 1>&, const std::array<double, 1>&, double) noexcept;
+template double largest_scale<2>(const std::array<OutputBound, 2>&, const std::array<double, 2>&, double) noexcept;
+template double largest_scale<3>(const std::array<OutputBound, 3>&, const std::array<double, 3>&, double) noexcept;
+template double largest_scale<6>(const std::array<OutputBound, 6>&, const std::array<double, 6>&, double) noexcept;
 
 }  // namespace tendon

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/control/adjusting_output_limiter.h"
+#include "core/ledger/output_bound.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-
 #include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 
 #include "core/ledger/energy_ledger.h"
+#include "tests/support/dice.h"
 
 namespace tendon {
 namespace {
@@ -20,58 +20,58 @@ using Vec1 = Eigen::Matrix<double, 1, 1>;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Friction kFriction{0.05, 0.26};
-const AdjustingOutputLimiter kLimiter({kFriction, milliseconds(1)});
+const OutputBound kBound = OutputBound::of(kFriction, milliseconds(1));
 
-TEST(AdjustingOutputLimiter, PermitsEquationEight) {
-  EXPECT_DOUBLE_EQ(kLimiter.permitted(0.01), 0.05 + 2 * std::sqrt(0.26 * 0.01 / 0.001));
+TEST(OutputBound, PermitsEquationEight) {
+  EXPECT_DOUBLE_EQ(kBound.largest(0.01), 0.05 + 2 * std::sqrt(0.26 * 0.01 / 0.001));
 }
 
-TEST(AdjustingOutputLimiter, TheFirstForceAllowedIsFrictionOnly) {
-  const auto limited = kLimiter.limit(Vec3(10, 0, 0), 0);
+TEST(OutputBound, TheFirstForceAllowedIsFrictionOnly) {
+  const auto limited = kBound.limit<3>(Vec3(10, 0, 0), 0);
   EXPECT_DOUBLE_EQ(limited.force.norm(), 0.05);
   EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));
 }
 
-TEST(AdjustingOutputLimiter, WithoutFrictionNothingIsRenderedUntilMotionHasEarnedIt) {
-  const AdjustingOutputLimiter frictionless({{0, 0.26}, milliseconds(1)});
-  EXPECT_EQ(frictionless.limit(Vec3(10, 0, 0), 0).force.norm(), 0);
-  EXPECT_GT(frictionless.limit(Vec3(10, 0, 0), 1e-6).force.norm(), 0);
+TEST(OutputBound, WithoutFrictionNothingIsRenderedUntilMotionHasEarnedIt) {
+  const OutputBound frictionless = OutputBound::of({0, 0.26}, milliseconds(1));
+  EXPECT_EQ(frictionless.limit<3>(Vec3(10, 0, 0), 0).force.norm(), 0);
+  EXPECT_GT(frictionless.limit<3>(Vec3(10, 0, 0), 1e-6).force.norm(), 0);
 }
 
-TEST(AdjustingOutputLimiter, NegativeEnergyPermitsFrictionOnly) {
-  EXPECT_EQ(kLimiter.permitted(-1), 0.05);
-  EXPECT_EQ(kLimiter.permitted(kNaN), 0.05);
+TEST(OutputBound, NegativeEnergyPermitsFrictionOnly) {
+  EXPECT_EQ(kBound.largest(-1), 0.05);
+  EXPECT_EQ(kBound.largest(kNaN), 0.05);
 }
 
-TEST(AdjustingOutputLimiter, LeavesAForceWithinTheBoundAloneAndGivesNoReason) {
-  const auto limited = kLimiter.limit(Vec3(0.5, -1, 0.25), 0.01);
+TEST(OutputBound, LeavesAForceWithinTheBoundAloneAndGivesNoReason) {
+  const auto limited = kBound.limit<3>(Vec3(0.5, -1, 0.25), 0.01);
   EXPECT_EQ(limited.force, Vec3(0.5, -1, 0.25));
   EXPECT_TRUE(limited.reasons.empty());
 }
 
-TEST(AdjustingOutputLimiter, KeepsTheDirection) {
+TEST(OutputBound, KeepsTheDirection) {
   const Vec3 wanted(35.9, 2.0, -7.0);
-  const auto limited = kLimiter.limit(wanted, 0.01);
-  EXPECT_NEAR(limited.force.norm(), kLimiter.permitted(0.01), 1e-12);
+  const auto limited = kBound.limit<3>(wanted, 0.01);
+  EXPECT_NEAR(limited.force.norm(), kBound.largest(0.01), 1e-12);
   EXPECT_NEAR(limited.force.normalized().dot(wanted.normalized()), 1, 1e-15);
 }
 
-TEST(AdjustingOutputLimiter, NotANumberBecomesZeroWithTheReason) {
+TEST(OutputBound, NotANumberBecomesZeroWithTheReason) {
   for (const double bad : {kNaN, kInf, -kInf}) {
-    const auto limited = kLimiter.limit(Vec3(0.1, bad, 0), 1);
+    const auto limited = kBound.limit<3>(Vec3(0.1, bad, 0), 1);
     EXPECT_EQ(limited.force, Vec3::Zero());
     EXPECT_TRUE(limited.reasons.has(Reason::kNotFinite));
   }
 }
 
-TEST(AdjustingOutputLimiter, AMillionNewtonAndMoreStayWithinTheBound) {
+TEST(OutputBound, AMillionNewtonAndMoreStayWithinTheBound) {
   for (const double size : {1e6, 1e100, 1e300}) {
-    EXPECT_LE(kLimiter.limit(Vec3(size, -size, size), 0.01).force.norm(), kLimiter.permitted(0.01) * (1 + 1e-15));
+    EXPECT_LE(kBound.limit<3>(Vec3(size, -size, size), 0.01).force.norm(), kBound.largest(0.01) * (1 + 1e-15));
   }
 }
 
-TEST(AdjustingOutputLimiter, RefusesAHoldOfNoLength) {
-  EXPECT_THROW(AdjustingOutputLimiter({kFriction, Duration::zero()}), std::invalid_argument);
+TEST(OutputBound, RefusesAHoldOfNoLength) {
+  EXPECT_THROW(OutputBound::of(kFriction, Duration::zero()), std::invalid_argument);
 }
 
 // The motion that takes most out of the ledger while F is held for T, eq. (7): it follows the force.
@@ -95,26 +95,26 @@ double least_energy_against_adversary(double scale, std::uint64_t seed) {
       dx = Vec3(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5) * std::pow(10, -7 + 5 * uniform());
     least = std::min(least, ledger.observe(force, dx, milliseconds(1)));
     const Vec3 wanted = Vec3(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5) * std::pow(10, -1 + 4 * uniform());
-    force = wanted * std::min(1.0, scale * kLimiter.permitted(ledger.energy()) / wanted.norm());
-    if (scale == 1.0) force = kLimiter.limit(wanted, ledger.energy()).force;
+    force = wanted * std::min(1.0, scale * kBound.largest(ledger.energy()) / wanted.norm());
+    if (scale == 1.0) force = kBound.limit<3>(wanted, ledger.energy()).force;
   }
   return least;
 }
 
-TEST(AdjustingOutputLimiter, TheWorstMotionCannotMakeTheEnergyNegative) {
+TEST(OutputBound, TheWorstMotionCannotMakeTheEnergyNegative) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     ASSERT_GE(least_energy_against_adversary(1.0, seed), -1e-12) << "seed " << seed;
   }
 }
 
-TEST(AdjustingOutputLimiter, ABoundOnePercentHigherIsBrokenByTheWorstMotion) {
+TEST(OutputBound, ABoundOnePercentHigherIsBrokenByTheWorstMotion) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     ASSERT_LT(least_energy_against_adversary(1.01, seed), -1e-6) << "seed " << seed;
   }
 }
 
 // control.md 8.5: history of pure x-motion, desired (35.9, 2.0) N.
-TEST(AdjustingOutputLimiter, TheJointFormGivesTheSameForceInEveryFrameAndThePerAxisFormDoesNot) {
+TEST(OutputBound, OnlyTheJointFormIsTheSameInEveryFrame) {
   const auto after_pushing_along_x = [](double angle, bool joint) {
     const Eigen::Rotation2D<double> turn(angle);
     const auto turned = [&turn](double x, double y) -> Vec3 {
@@ -133,10 +133,10 @@ TEST(AdjustingOutputLimiter, TheJointFormGivesTheSameForceInEveryFrameAndThePerA
     const Vec3 wanted = turned(35.9, 2.0);
     Vec3 force = Vec3::Zero();
     if (joint) {
-      force = kLimiter.limit(wanted, all.energy()).force;
+      force = kBound.limit<3>(wanted, all.energy()).force;
     } else {
       for (int axis = 0; axis < 2; ++axis) {
-        force[axis] = kLimiter.limit(Vec1(wanted[axis]), axes[static_cast<std::size_t>(axis)].energy()).force[0];
+        force[axis] = kBound.limit<1>(Vec1(wanted[axis]), axes[static_cast<std::size_t>(axis)].energy()).force[0];
       }
     }
     return Eigen::Vector2d(turn.inverse() * force.head<2>());
@@ -150,7 +150,7 @@ TEST(AdjustingOutputLimiter, TheJointFormGivesTheSameForceInEveryFrameAndThePerA
 }
 
 // control.md 6, oracle (iv).
-TEST(AdjustingOutputLimiter, NeverClipsASpringSofterThanTwoBOverT) {
+TEST(OutputBound, NeverClipsASpringSofterThanTwoBOverT) {
   std::mt19937_64 random(4);
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   for (int run = 0; run < 150; ++run) {
@@ -164,7 +164,7 @@ TEST(AdjustingOutputLimiter, NeverClipsASpringSofterThanTwoBOverT) {
       const double dx = speed * 1e-3;
       ledger.observe(force, Vec1(dx), milliseconds(1));
       x += dx;
-      const auto limited = kLimiter.limit(Vec1(-stiffness * x), ledger.energy());
+      const auto limited = kBound.limit<1>(Vec1(-stiffness * x), ledger.energy());
       ASSERT_TRUE(limited.reasons.empty()) << "run " << run << " step " << step;
       force = limited.force;
     }
@@ -172,17 +172,48 @@ TEST(AdjustingOutputLimiter, NeverClipsASpringSofterThanTwoBOverT) {
 }
 
 // control.md 1.4: a saturated slow push is felt as a spring of stiffness 2b/T, whatever the wall.
-TEST(AdjustingOutputLimiter, ShowsAStiffWallAsASpringOfTwoBOverT) {
+TEST(OutputBound, ShowsAStiffWallAsASpringOfTwoBOverT) {
   const Friction friction{0.0, 0.26};
-  const AdjustingOutputLimiter limiter({friction, milliseconds(1)});
+  const OutputBound bound = OutputBound::of(friction, milliseconds(1));
   EnergyLedger ledger(friction);
   Vec1 force(0);
   const double dx = 5e-6;
   for (int step = 0; step < 4000; ++step) {
     ledger.observe(force, Vec1(dx), milliseconds(1));
-    force = limiter.limit(Vec1(-1e6), ledger.energy()).force;
+    force = bound.limit<1>(Vec1(-1e6), ledger.energy()).force;
   }
   EXPECT_NEAR(-force[0] / (4000 * dx), 2 * 0.26 / 1e-3, 15);
+}
+
+TEST(OutputBound, TheLargestScaleSpendsTheBudgetAndNotMore) {
+  Dice dice(17);
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::array<OutputBound, 6> bounds;
+    std::array<double, 6> sizes;
+    for (std::size_t i = 0; i < 6; ++i) {
+      bounds[i] = {.coulomb = dice.chance(0.3) ? 0 : dice.decades(-3, 0),
+                   .viscous_per_hold = dice.chance(0.1) ? 0 : dice.decades(-1, 3),
+                   .reach = dice.chance(0.5)   ? kInf
+                            : dice.chance(0.1) ? 0
+                                               : dice.decades(-6, -2)};
+      sizes[i] = dice.chance(0.1) ? 0 : dice.decades(-2, 2);
+    }
+    const double budget = dice.chance(0.1) ? 0 : dice.decades(-9, 1);
+    const double scale = largest_scale(bounds, sizes, budget);
+    const auto loss = [&](double at) {
+      double sum = 0;
+      for (std::size_t i = 0; i < 6; ++i) sum += bounds[i].at(at * sizes[i]);
+      return sum;
+    };
+    if (std::isinf(scale)) {
+      EXPECT_EQ(loss(1e12), 0);
+      continue;
+    }
+    EXPECT_LE(loss(scale * (1 - 1e-12)), budget * (1 + 1e-9));
+    if (scale > 0) {
+      EXPECT_GT(loss(scale * (1 + 1e-6)), budget);
+    }
+  }
 }
 
 }  // namespace
