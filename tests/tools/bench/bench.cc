@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <fstream>
 #include <iostream>
 #include <stdexcept>
 #include <system_error>
 
 #include "server/machine/clock.h"
+#include "tests/support/files.h"
 
 namespace tendon::bench {
 
@@ -29,6 +31,8 @@ const std::vector<Section>& sections() {
   };
   return kSections;
 }
+
+void end_with_parent() { ::prctl(PR_SET_PDEATHSIG, SIGKILL); }
 
 AtPriority::AtPriority(int priority) {
   if (priority == 0) return;
@@ -56,6 +60,7 @@ void bench(const BenchOptions& options, std::ostream& out) {
       throw std::invalid_argument("--only " + name + ": expected " + names);
     }
   }
+  if (options.write) expect_replaceable(*options.write, {kPageBegins});
   { const AtPriority may_we(options.priority); }  // or say so before an hour has passed
 
   Circumstances here = look_around();
@@ -73,6 +78,7 @@ void bench(const BenchOptions& options, std::ostream& out) {
   Run run(options, [&](const Row& row) {
     if (options.progress) std::cerr << "\r\033[K" << std::flush;
     out << (options.json ? to_json(row) + "\n" : to_text(row)) << std::flush;
+    if (!out) throw std::runtime_error("nobody takes the lines any more: the run ends here");
     ++lines;
   });
   for (const Section& section : sections()) {

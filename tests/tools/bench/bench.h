@@ -64,6 +64,9 @@ void measure_sessions(Run& run);    ///< sessions.cc
 void measure_512(Run& run);         ///< sessions.cc
 const std::vector<Section>& sections();
 
+/// In a child, right after fork(): it does not outlive its parent, however that ends.
+void end_with_parent();
+
 /// While it lives, the calling thread has that real-time priority, and no timer slack. 0: nothing.
 class AtPriority {
  public:

@@ -136,7 +136,7 @@ class OtherProcess {
   explicit OtherProcess(Work work) : pid_(::fork()) {
     if (pid_ < 0) fail("fork");
     if (pid_ > 0) return;
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    end_with_parent();
     try {
       work();
       ::_exit(0);

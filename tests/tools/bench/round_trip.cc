@@ -205,6 +205,7 @@ class RoundTrip {
     child_ = ::fork();
     if (child_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
     if (child_ == 0) {
+      end_with_parent();
       try {
         const AtPriority high(options.priority);
         serve(*orders_, server, bare_client_.fd(), wait, sealed ? std::optional(key_) : std::nullopt);

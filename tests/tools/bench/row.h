@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace tendon::bench {
@@ -52,6 +53,9 @@ struct Circumstances {
 Circumstances look_around();
 /// Of the last minute.
 double load();
+
+/// The first line of the page.
+inline constexpr std::string_view kPageBegins = "# What things cost";
 
 /// Heading and line of the table for a terminal; a note follows on a line of its own.
 std::string heading();

@@ -76,6 +76,7 @@ class Guests {
     orders_ = ends[child_ > 0 ? 0 : 1];
     ::close(ends[child_ > 0 ? 1 : 0]);
     if (child_ > 0) return;
+    end_with_parent();
     try {
       serve(server, observers);
       ::_exit(0);

@@ -15,6 +15,8 @@ std::int64_t ns(LocalTime time) { return time.time_since_epoch().count(); }
 
 std::string packet(std::uint64_t number) { return "packet " + std::to_string(number); }
 
+std::string must_drop(const std::string& wrong) { return "dropped: its datagram had " + wrong; }
+
 }  // namespace
 
 Conversation::Conversation(Wire& wire, Report& report, const Setup& setup)
@@ -95,8 +97,8 @@ void Conversation::say_bytes(Span datagram) {
   wire_.send(setup_.port, datagram);
 }
 
-void Conversation::say_bad(std::string_view check, std::uint64_t number, Span datagram) {
-  bad_[number] = check;
+void Conversation::say_bad(std::string_view check, std::uint64_t number, Span datagram, std::string_view wrong) {
+  bad_[number] = {check, std::string(wrong)};
   say_bytes(datagram);
 }
 
@@ -206,7 +208,7 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
   const pb::Echo& echo = body.echo();
   const std::uint64_t told = echo.peer_packet_number();
   if (const auto bad = bad_.find(told); bad != bad_.end()) {
-    report_.judge(bad->second, false, "an echo of " + packet(told), "it was bad and had to be dropped");
+    report_.judge(bad->second.check, false, "an echo of " + packet(told), must_drop(bad->second.wrong));
     return;
   }
   const auto said = said_.find(told);
@@ -238,8 +240,8 @@ void Conversation::judge_echo(std::uint64_t number, const pb::Datagram& body) {
     const bool has = (echo.received_mask() >> i & 1U) != 0;
     const std::string mask = "echo of " + packet(told) + ", mask " + std::to_string(echo.received_mask());
     if (const auto bad = bad_.find(other); bad != bad_.end()) {
-      report_.judge(bad->second, !has, mask + ": " + packet(other) + " has arrived",
-                    "it was bad and had to be dropped");
+      report_.judge(bad->second.check, !has, mask + ": " + packet(other) + " has arrived",
+                    must_drop(bad->second.wrong));
       continue;
     }
     const auto known = said_.find(other);

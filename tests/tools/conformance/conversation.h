@@ -51,8 +51,8 @@ class Conversation {
   /// The bytes that `say_at` sends.
   Bytes compose(std::uint64_t number, pb::Datagram body);
   /// Says bytes that must be dropped. A peer that tells of `number` all the same has broken the rule `check`; until
-  /// something good is said under that number.
-  void say_bad(std::string_view check, std::uint64_t number, Span datagram);
+  /// something good is said under that number. `wrong` says what is wrong with them, for the report: "magic 0x55".
+  void say_bad(std::string_view check, std::uint64_t number, Span datagram, std::string_view wrong);
   /// Seals anything under a header of one's own, `epochs` keys further on.
   Bytes seal(Head head, Span body, int epochs = 0) const;
   void say_bytes(Span datagram);
@@ -135,8 +135,12 @@ class Conversation {
   Key receive_key_;
   std::uint8_t receive_epoch_ = 0;
   LocalTime last_said_{};
-  std::map<std::uint64_t, Said> said_;             ///< the good ones
-  std::map<std::uint64_t, std::string_view> bad_;  ///< numbers that only bad ones had, and the rule that they test
+  std::map<std::uint64_t, Said> said_;  ///< the good ones
+  struct Bad {
+    std::string_view check;  ///< the rule that it tests
+    std::string wrong;
+  };
+  std::map<std::uint64_t, Bad> bad_;  ///< numbers that only bad datagrams had
   std::map<std::uint64_t, std::string_view> owners_;
   std::set<std::uint64_t> repeated_;
   std::vector<Heard> heard_;

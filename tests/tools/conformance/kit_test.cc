@@ -117,6 +117,11 @@ TEST_P(BrokenToy, FailsTheCheckOfTheRuleItBreaksAndNoOther) {
   }
 }
 
+TEST(Kit, SaysWhichForeignHeaderWasTaken) {
+  const Report report = server_report(0, Fault::kTakesForeignHeaders);
+  EXPECT_NE(told(report).find("dropped: its datagram had "), std::string::npos) << told(report);
+}
+
 std::vector<Case> cases(Toy toy, const std::vector<Broken>& all) {
   std::vector<Case> out;
   for (const Broken& broken : all) out.push_back({toy, broken});

@@ -714,7 +714,7 @@ void ServerJudge::check_roaming(Conversation& talk) {
     pb::Datagram body;
     talk.stamp(body);
     talk.move_to(elsewhere);
-    talk.say_bad("roaming", late, talk.seal(talk.head(late), bytes_of(body)));
+    talk.say_bad("roaming", late, talk.seal(talk.head(late), bytes_of(body)), "an older number, from another port");
     talk.move_to(before);
     const bool stays = talk.confirmed(talk.say());
     report_.judge("roaming", stays && replies(elsewhere, kSilence).empty(),

@@ -35,6 +35,7 @@ Bytes with(Bytes bytes, std::size_t at, std::byte difference) {
 
 struct Bad {
   std::string_view check;
+  std::string_view wrong;  ///< what is wrong with it: "magic 0x55"
   std::function<Bytes(std::uint64_t number, const pb::Datagram& body)> make;
 };
 
@@ -47,12 +48,12 @@ std::vector<Bad> foreign_headers(Conversation& talk) {
       return talk.seal(head, bytes_of(body));
     };
   };
-  return {{"foreign-header", changed([](Head& head) { head.magic = 0x55; })},
-          {"foreign-header", changed([](Head& head) { head.version = 2; })},
-          {"foreign-header", changed([](Head& head) { head.type = 5; })},
-          {"foreign-header", changed([](Head& head) { head.suite ^= 1U; })},
-          {"foreign-header", changed([](Head& head) { head.connection_id ^= 0x80000000U; })},
-          {"foreign-header", [&talk](std::uint64_t number, const pb::Datagram& body) {
+  return {{"foreign-header", "magic 0x55", changed([](Head& head) { head.magic = 0x55; })},
+          {"foreign-header", "version 2", changed([](Head& head) { head.version = 2; })},
+          {"foreign-header", "type 5", changed([](Head& head) { head.type = 5; })},
+          {"foreign-header", "the other suite", changed([](Head& head) { head.suite ^= 1U; })},
+          {"foreign-header", "another connection id", changed([](Head& head) { head.connection_id ^= 0x80000000U; })},
+          {"foreign-header", "1201 bytes", [&talk](std::uint64_t number, const pb::Datagram& body) {
              const std::size_t overhead = kHeadSize + (talk.setup().suite == 1 ? crypto::kTagSize : 0);
              Bytes bytes = bytes_of(body);
              // An unknown field that fills it to 1201 bytes: 2 bytes of key, 2 of length.
@@ -70,10 +71,11 @@ std::vector<Bad> malformed_bodies(Conversation& talk) {
   const RawProtobuf latin1 = RawProtobuf().varint(1, 1).varint(2, 1).text(3, "caf\xe9");
   RawProtobuf many;
   for (int i = 0; i < 64; ++i) many.message(3, {});
-  return {{"malformed-body", more(RawProtobuf().text(3, "\x0a\x7f"))},  // a frame that ends too soon
-          {"malformed-body", more(RawProtobuf().message(3, RawProtobuf().message(4, latin1)))},
-          {"malformed-body", more(many)},  // 65 with the one before
-          {"malformed-body", more(RawProtobuf().fixed64(1, (std::uint64_t{1} << 60) + 1))}};
+  return {
+      {"malformed-body", "a frame that ends too soon", more(RawProtobuf().text(3, "\x0a\x7f"))},
+      {"malformed-body", "a text that is not UTF-8", more(RawProtobuf().message(3, RawProtobuf().message(4, latin1)))},
+      {"malformed-body", "65 frames", more(many)},
+      {"malformed-body", "a time beyond 2^60 ns", more(RawProtobuf().fixed64(1, (std::uint64_t{1} << 60) + 1))}};
 }
 
 std::vector<Bad> forgeries(Conversation& talk) {
@@ -81,21 +83,24 @@ std::vector<Bad> forgeries(Conversation& talk) {
     return talk.seal(talk.head(number), bytes_of(body));
   };
   return {
-      {"forged",
+      {"forged", "its last bit flipped",
        [good](std::uint64_t number, const pb::Datagram& body) {
          Bytes bytes = good(number, body);
          const std::size_t last = bytes.size() - 1;
          return with(std::move(bytes), last, std::byte{1});
        }},
-      {"forged", [good](std::uint64_t number,
-                        const pb::Datagram& body) { return with(good(number, body), kHeadSize, std::byte{0x80}); }},
-      {"forged",  // another packet's, under this number
+      {"forged", "a bit of its body flipped",
+       [good](std::uint64_t number, const pb::Datagram& body) {
+         return with(good(number, body), kHeadSize, std::byte{0x80});
+       }},
+      {"forged", "the body of another number",
        [good](std::uint64_t number, const pb::Datagram& body) {
          return with(good(number ^ 1U, body), 8, std::byte{1});
        }},
-      {"forged",  // in the clear
+      {"forged", "a body in the clear",
        [&talk](std::uint64_t number, const pb::Datagram& body) { return write(talk.head(number)) + bytes_of(body); }},
-      {"forged", [&talk](std::uint64_t number, const pb::Datagram&) { return write(talk.head(number)); }}};
+      {"forged", "a header and nothing else",
+       [&talk](std::uint64_t number, const pb::Datagram&) { return write(talk.head(number)); }}};
 }
 
 /// Says each under a number of its own; none may be believed. The first of these numbers.
@@ -106,7 +111,7 @@ std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<
   for (std::size_t i = 0; i < all.size(); ++i) {
     pb::Datagram body = of(evidence.frame(unseen + i));
     talk.stamp(body);
-    talk.say_bad(all[i].check, first + i, all[i].make(first + i, body));
+    talk.say_bad(all[i].check, first + i, all[i].make(first + i, body), all[i].wrong);
   }
   if (!numbers_stay_free) talk.overhear(kMoment);  // so that an echo of the last of them would be told
   // Where the numbers are used up, the ack vector may hold them: it reaches 32 back.
@@ -116,7 +121,7 @@ std::uint64_t say_all(Conversation& talk, Evidence& evidence, const std::vector<
   for (std::size_t i = 0; i < all.size(); ++i) {
     talk.report().judge(all[i].check, lives, "no answer after bad datagrams", "the conversation goes on");
     talk.report().judge(all[i].check, !evidence.shown(unseen + i), number_text(unseen + i) + " was believed",
-                        "it came in a datagram that had to be dropped");
+                        "dropped: its datagram had " + std::string(all[i].wrong));
   }
   return first;
 }
@@ -128,7 +133,7 @@ void check_bad_datagrams(Conversation& talk, Evidence& evidence) {
   const std::uint64_t too_far = std::uint64_t{1} << 60;
   pb::Datagram body;
   talk.stamp(body);
-  talk.say_bad("foreign-header", too_far, talk.seal(talk.head(too_far), bytes_of(body)));
+  talk.say_bad("foreign-header", too_far, talk.seal(talk.head(too_far), bytes_of(body)), "packet number 2^60");
   talk.say_bytes(bytes_of("T\x13"));
 
   std::vector<Bad> all = foreign_headers(talk);
@@ -190,7 +195,7 @@ void check_window(Conversation& talk, Evidence& evidence) {
   const std::uint64_t just_in_time = evidence.next++;
   pb::Datagram body = of(evidence.frame(too_old));
   talk.stamp(body);
-  talk.say_bad("window-edge", edge, talk.seal(talk.head(edge), bytes_of(body)));
+  talk.say_bad("window-edge", edge, talk.seal(talk.head(edge), bytes_of(body)), "a number 1984 behind the newest");
   talk.overhear(kMoment);
   talk.say_at(edge + 1, of(evidence.frame(just_in_time)));
   const bool shown = shows(talk, evidence, just_in_time);
@@ -274,7 +279,7 @@ void check_rekey(Conversation& talk) {
   talk.skip_to(ahead + 1);
   pb::Datagram body;
   talk.stamp(body);
-  talk.say_bad("old-key-over", ahead, talk.seal(talk.head(ahead), bytes_of(body), 2));
+  talk.say_bad("old-key-over", ahead, talk.seal(talk.head(ahead), bytes_of(body), 2), "a key after the next");
 
   const std::uint64_t old = talk.next_number();
   talk.skip_to(old + 1);
@@ -294,7 +299,7 @@ void check_old_key(Conversation& talk, LocalTime renewed) {
   talk.skip_to(old + 1);
   pb::Datagram body;
   talk.stamp(body);
-  talk.say_bad("old-key-over", old, talk.seal(talk.head(old), bytes_of(body), -1));
+  talk.say_bad("old-key-over", old, talk.seal(talk.head(old), bytes_of(body), -1), "the old key");
   const bool lives = talk.confirmed(talk.say());
   talk.report().judge("old-key-over", lives && talk.told_of(old) == false,
                       "a datagram of a key that is over was accepted",
@@ -326,7 +331,7 @@ void check_timeout(Conversation& talk, Duration timeout) {
     talk.say_bytes(last);
     talk.say_bytes(talk.seal(foreign, bytes_of(body)));
     if (!talk.report().failed("malformed-body"))
-      talk.say_bad("timeout", number + 2, talk.seal(talk.head(number + 2), bytes_of("\xff\xff")));
+      talk.say_bad("timeout", number + 2, talk.seal(talk.head(number + 2), bytes_of("\xff\xff")), "a malformed body");
     talk.overhear(milliseconds(100));
   }
   LocalTime heard_last = fell_silent;

@@ -7,8 +7,12 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <stdexcept>
+#include <string>
 #include <system_error>
+
+#include "tests/support/files.h"
 
 namespace tendon::lab {
 namespace {
@@ -28,6 +32,21 @@ class IgnoreBrokenPipe {
  private:
   struct sigaction before_ {};
 };
+
+constexpr std::string_view kPngBegins = "\x89PNG";
+constexpr std::string_view kSvgBegins = "<?xml";
+
+/// Both formats have a last word.
+bool is_whole(const std::filesystem::path& path) {
+  constexpr std::streamoff kTail = 32;
+  std::ifstream picture(path, std::ios::binary | std::ios::ate);
+  if (!picture) return false;
+  const std::streamoff size = picture.tellg();
+  std::string tail(static_cast<std::size_t>(std::min(size, kTail)), '\0');
+  picture.seekg(size - static_cast<std::streamoff>(tail.size()));
+  picture.read(tail.data(), static_cast<std::streamsize>(tail.size()));
+  return picture && tail.find(path.extension() == ".svg" ? "</svg>" : "IEND") != std::string::npos;
+}
 
 }  // namespace
 
@@ -55,6 +74,7 @@ void check_picture_name(const std::filesystem::path& path) {
     throw std::invalid_argument(path.string() + ": expected a name that ends with .svg or .png");
   if (std::ranges::any_of(path.string(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }))
     throw std::invalid_argument("the name of the picture has control characters in it");
+  expect_replaceable(path, {path.extension() == ".svg" ? kSvgBegins : kPngBegins});
 }
 
 void run_gnuplot(const std::string& script, const std::filesystem::path& path) {
@@ -67,7 +87,13 @@ void run_gnuplot(const std::string& script, const std::filesystem::path& path) {
   // A gnuplot that ends early shows in its status.
   std::fwrite(script.data(), 1, script.size(), gnuplot);
   const int status = ::pclose(gnuplot);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    // gnuplot does not say when the disk is full.
+    if (is_whole(path)) return;
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
+    throw std::runtime_error("cannot write " + path.string() + ": the picture has no end; is the disk full?");
+  }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
     throw std::runtime_error("cannot draw " + path.string() + ": gnuplot is not installed (package gnuplot-nox)");
   throw std::runtime_error("cannot draw " + path.string() + ": gnuplot failed; what it says is above");

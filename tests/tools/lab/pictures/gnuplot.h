@@ -24,11 +24,12 @@ std::string literal(std::string_view text);
 /// `set encoding`, `set terminal` and `set output` for a picture, .svg or .png by the name of `path`.
 std::string begin_picture(const std::filesystem::path& path, int width, int height);
 
-/// Throws std::invalid_argument unless `path` ends with .svg or .png and has no control characters in it.
+/// Throws std::invalid_argument unless `path` ends with .svg or .png and has no control characters in it, and
+/// std::runtime_error when a file of another kind is there, which the picture would replace.
 void check_picture_name(const std::filesystem::path& path);
 
 /// Has gnuplot (package gnuplot-nox) run a script which draws `path`, and waits for it. Throws std::runtime_error when
-/// gnuplot is not installed or fails.
+/// gnuplot is not installed or fails, or when the picture is not whole afterwards, as on a full disk; it is removed then.
 void run_gnuplot(const std::string& script, const std::filesystem::path& path);
 
 }  // namespace tendon::lab

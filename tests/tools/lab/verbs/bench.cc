@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <iostream>
 #include <string>
 
@@ -16,9 +17,8 @@ void add(CLI::App& verb, int& /*exit*/) {
   static bench::BenchOptions options;
   const std::string names = names_of(bench::sections());
   verb.add_option("--only", options.only, names + "; any number of times")->type_name("NAME")->allow_extra_args(false);
-  verb.add_option(
-          "--fifo", options.priority,
-          "real-time priority of what is measured, on a machine with other work; it takes both cores from that")
+  verb.add_option("--fifo", options.priority,
+                  "real-time priority of what is measured, on a machine with other work; it takes both cores from that")
       ->type_name("PRIORITY")
       ->check(CLI::Range(1, 60));
   verb.add_option("--seed", options.seed, "of worlds, keys and networks")->capture_default_str();
@@ -33,6 +33,7 @@ void add(CLI::App& verb, int& /*exit*/) {
       "usage.");
   verb.callback([] {
     options.progress = isatty(STDERR_FILENO) != 0;
+    std::signal(SIGPIPE, SIG_IGN);  // a reader that has gone ends the run in order: no process is left behind
     bench::bench(options, std::cout);
   });
 }
