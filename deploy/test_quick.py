@@ -48,7 +48,7 @@ def changed_files(base):
         return output("git", "diff", "--no-renames", "--name-only", base).splitlines() + untracked, f"since {base}"
     uncommitted = output("git", "diff", "--no-renames", "--name-only", "HEAD").splitlines() + untracked
     if uncommitted:
-        return uncommitted, "not committed"
+        return uncommitted, "and not committed"
     head = commit_of("HEAD")
     base = commit_of("origin/main") and output("git", "merge-base", "HEAD", "origin/main").strip()
     if base in ("", head):
@@ -108,6 +108,7 @@ class Test:
         self.name = entry["name"]
         self.executable = inside(entry["command"][0]).removeprefix("build/release/") if "command" in entry else ""
         properties = {p["name"]: p["value"] for p in entry.get("properties", [])}
+        self.wants_programs = str(BUILD / "bin") in entry.get("command", [])
         self.labels = set(properties.get("LABELS", []))
         self.environment = properties.get("ENVIRONMENT", [])
         files, nodes = backtrace["files"], backtrace["nodes"]
@@ -186,10 +187,13 @@ def choose(changed, graph, tests):
 
 
 def run(name, *command, environment=None):
+    """What it prints is shown only when it fails."""
     say(name)
-    done = subprocess.run(command, cwd=ROOT, env={**os.environ, **(environment or {})}, check=False)
+    done = subprocess.run(command, cwd=ROOT, env={**os.environ, **(environment or {})}, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, errors="replace", check=False)
     if done.returncode:
-        say(f"{name} FAILED")
+        print(done.stdout, end="")
+        say(f"FAILED: {name}")
         sys.exit(1)
 
 
@@ -197,7 +201,7 @@ def main():
     if not (BUILD / "build.ninja").exists():
         run("configure release", "cmake", "--preset", "release", "-DTENDON_TESTS=ON")
     changed, since = changed_files(sys.argv[1] if len(sys.argv) > 1 else "")
-    say(f"{len(changed)} files changed ({since})")
+    say(f"changed {since}: {len(changed)} {'file' if len(changed) == 1 else 'files'}")
     subprocess.run(["ninja", "-C", str(BUILD), "--quiet", "build.ninja"], stdout=subprocess.DEVNULL, check=True)
     graph = Graph()
     executables, folders, own = choose(changed, graph, known_tests(graph))
@@ -211,10 +215,11 @@ def main():
 
     # Once more: what has been built may have other cases.
     tests = known_tests(graph)
+    missing = [name for name in graph.own if name.startswith("bin/") and not (BUILD / name).exists()]
     chosen = [
         test for test in tests
         if (test.executable in executables or test.folder in folders) and
-        (not test.labels & SLOW or test.executable in own or test.folder in own)
+        (not test.labels & SLOW or test.executable in own or test.folder in own) and not (missing and test.wants_programs)
     ]
     fewer = {}
     for test in chosen:
@@ -225,7 +230,7 @@ def main():
         run(f"{executable}: {PROPERTY_CASES} cases for each property", str(BUILD / executable), "--gtest_brief=1",
             environment={"RC_PARAMS": parameters})
     numbers = [str(test.number) for test in chosen if test.executable not in fewer]
-    run(f"{len(numbers)} tests", "ctest", "--test-dir", str(BUILD), "--output-on-failure", "--quiet", "-j", str(os.cpu_count()), "-I",
+    run(f"{len(numbers)} tests", "ctest", "--test-dir", str(BUILD), "--output-on-failure", "-j", str(os.cpu_count()), "-I",
         ",".join(["0", "0", "0", *numbers]))
 
     left = len(tests) - len(chosen)
@@ -234,6 +239,8 @@ def main():
     say(f"passed: {len(chosen)} of {len(tests)} tests")
     print(f"  Not run: the other {left} tests, clang-tidy, the sanitizers, the READMEs' commands, the Debian packages"
           + (f"; properties had {PROPERTY_CASES} cases" if fewer else "") + ".")
+    if missing:
+        print(f"  Not run: the commands in documents, because {len(missing)} programs are not built.")
     if not_linked:
         print(f"  Not linked with the change: {len(not_linked)} other programs and test programs.")
     if touched - built:
