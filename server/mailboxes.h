@@ -38,7 +38,8 @@ struct HapticOrder {
 ///     haptic  ──steps──▶ log         all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
 ///     log     ──health─▶ network     newest wins: what it counts is since the start
-///     network ─datagrams▶ log        all of them, those of other devices too; what does not fit is counted
+///     network ─datagrams▶ log        of all devices, those that DatagramSieve lets through; what it leaves out, and what
+///                                    does not fit, is counted
 ///
 /// Takes its memory when it is made, before the loops run: some 14 MB with the default capacities.
 struct Mailboxes {
@@ -64,7 +65,9 @@ struct Mailboxes {
   FlightRecorder<StepRecord> flight;
   Latest<Health> health;
   SpscRing<DatagramRecord> datagrams;
-  std::atomic<std::uint64_t> datagrams_lost{0};
+  std::atomic<std::uint64_t> datagrams_lost{0};         ///< did not fit
+  std::atomic<std::uint64_t> strangers_left_out{0};     ///< datagrams from or to strangers beyond the sample
+  std::atomic<std::uint64_t> datagrams_over_budget{0};  ///< beyond the bytes of a second
 };
 
 }  // namespace tendon

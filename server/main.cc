@@ -164,14 +164,24 @@ void print_json(const Server::Summary& summary) {
     add("clock_error_bound_ms", seconds(clock->error_bound) * 1e3);
   }
   if (recording) {
+    add("recorded_parts", recording->parts);
     add("recorded_bytes", recording->bytes);
     add("recorded_steps", recording->steps);
     add("lost_steps", recording->lost_steps);
     add("lost_datagrams", recording->lost_datagrams);
+    add("strangers_left_out", recording->strangers_left_out);
+    add("datagrams_over_budget", recording->datagrams_over_budget);
     add("recording_ended_early", !recording->error.empty());
   }
   add("devices", by_device(summary));
   print(out);
+}
+
+std::string what_is_missing(const PartRecorder::Status& recording) {
+  std::string text = std::to_string(recording.lost_steps) + " steps and " + std::to_string(recording.lost_datagrams) +
+                     " datagrams are missing";
+  if (!recording.error.empty()) text += "; " + recording.error;
+  return text;
 }
 
 int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
@@ -183,11 +193,18 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   std::signal(SIGPIPE, SIG_IGN);
 
   Server server(scenes);
+  const auto recording = server.recording();
   server.start(duration_s > 0 ? std::optional(from_seconds(duration_s)) : std::nullopt);
   log::info("tendond " + version_text() + " listens on " + to_string(server.address()));
-  if (const auto& recording = scenes.front().recording) log::info("recording to " + recording->string());
+  if (recording) {
+    const std::filesystem::path& wanted = scenes.front().recording->path;
+    log::info("recording to " + recording->string() +
+              (*recording == wanted ? "" : ": there is a " + wanted.string() + " already"));
+  }
   if (json) {
-    print({{"event", "listening"}, {"address", to_string(server.address())}});
+    nlohmann::ordered_json listening = {{"event", "listening"}, {"address", to_string(server.address())}};
+    if (recording) listening["recording"] = recording->string();
+    print(listening);
   }
   service::ready();
   const std::string why = wait_for_the_end(signals, duration_s, server);
@@ -197,7 +214,9 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   log::info("stopped: " + why + "; " + std::to_string(haptic.steps) + " steps, " + std::to_string(haptic.overruns) +
             " overruns, " + std::to_string(summary.network.forces) + " forces");
   if (json) print_json(summary);
-  return 0;
+  if (!summary.recording || summary.recording->complete()) return 0;
+  log::error("the recording is not whole: " + what_is_missing(*summary.recording));
+  return 1;
 }
 
 int explain_each(const std::vector<std::filesystem::path>& files, bool json) {
@@ -246,14 +265,13 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
   if (firmware && !any) throw std::runtime_error("--falcon-firmware: no scene has [device] kind = \"falcon\"");
 }
 
-void switch_limiter_off(std::vector<Scene>& scenes) {
-  for (Scene& scene : scenes) {
-    if (scene.driver().moves_a_hand) {
-      throw std::runtime_error("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
-                               std::string(scene.driver().name));
-    }
-    scene.loop.control.limiter.law = Law::kNone;
+/// As settings of the scene, so that the recording has them too.
+std::vector<std::string> without_limiter_settings(const Scene& scene) {
+  if (scene.driver().moves_a_hand) {
+    throw std::runtime_error("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
+                             std::string(scene.driver().name));
   }
+  return limiter_settings("none", scene.loop.control.limiter.friction);
 }
 
 /// The name becomes a file's name and a word in the log.
@@ -298,7 +316,9 @@ int main(int argc, char** argv) {
   bool scene_help = false;
   auto* scene_option = app.add_option("scene", scene_files, "Scene files (TOML), one for each device");
   scene_option->expected(1, static_cast<int>(limits::kMaxDevices));
-  app.add_option("--record", record, "Record to this MCAP file, whatever the scene says");
+  app.add_option("--record", record,
+                 "Record to this MCAP file, whatever the scene's [recording] says. A file that is there is never "
+                 "overwritten: run.mcap goes on as run-2.mcap");
   app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
   app.add_option("--duration-s", duration_s,
                  "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM");
@@ -368,11 +388,10 @@ int main(int argc, char** argv) {
       std::cout << (json ? in_json(diagnosis) + "\n" : in_words(diagnosis));
       return 0;
     }
-    std::vector<Scene> scenes = read_scenes(scene_files);
-    if (!record.empty()) scenes.front().recording = record;
+    std::vector<Scene> scenes = read_scenes(scene_files, without_limiter ? without_limiter_settings : Overrides());
+    if (!record.empty()) scenes.front().recording = Scene::Recording{.path = record};
     if (!listen.empty()) scenes.front().network.listen = parse_address(listen);
     set_falcon(scenes, firmware_file, accept_unknown_firmware);
-    if (without_limiter) switch_limiter_off(scenes);
     return run(scenes, duration_s, json);
   } catch (const std::exception& problem) {
     log::error(problem.what());

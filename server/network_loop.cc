@@ -13,6 +13,8 @@ namespace tendon {
 
 namespace {
 
+using enum DatagramSieve::Sender;
+
 constexpr std::size_t kMaxNotices = 64;
 
 /// What this server can do beyond the version's minimum.
@@ -52,6 +54,7 @@ void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
 NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes*> mail)
     : config_(config),
       link_(link),
+      sieve_(config.recorded),
       doorman_({.secret = config.secret, .keys = config.keys}),
       admission_({.keys = config.keys.size(), .max_observers = config.max_observers}, devices_, guests_),
       leases_(devices_, config.takeover),
@@ -97,9 +100,9 @@ bool NetworkLoop::drain(LocalTime& now) {
     if (size == 0) return false;
     now = link_.received_by(now);
     const auto datagram = std::span(buffer).first(std::min(size, buffer.size()));
-    tap(now, DatagramRecord::Direction::kIn, from, datagram, size);
     if (size > buffer.size()) {
       ++stats_.malformed;
+      tap(now, DatagramRecord::Direction::kIn, kStranger, from, datagram, size);
     } else {
       receive(now, from, datagram);
     }
@@ -108,17 +111,22 @@ bool NetworkLoop::drain(LocalTime& now) {
 }
 
 void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
+  const auto tap_from = [&](DatagramSieve::Sender sender) {
+    tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
+  };
   const auto header = decode_header(datagram);
   if (header && header->type == DatagramType::kHello) return greet(now, from, datagram);
   if (!header || header->type != DatagramType::kData) {
     ++stats_.malformed;
-    return;
+    return tap_from(kStranger);
   }
   const auto is_meant = [&](const Guest& guest) {
     return !guest.gone && guest.id() == header->connection_id && (guest.key != nullptr || guest.address == from);
   };
   if (const auto guest = std::find_if(guests_.begin(), guests_.end(), is_meant); guest != guests_.end()) {
+    const std::uint64_t accepted = guest->session.stats().datagrams_received;
     const bool newest = guest->session.receive(now, datagram);
+    tap_from(guest->session.stats().datagrams_received > accepted ? kGuest : kStranger);
     if (newest && guest->address != from) {
       guest->address = from;
       ++stats_.roamed;
@@ -127,21 +135,30 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
     take_events(now, *guest);  // a force waits for no further system call
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
-    if (!waiting->session.receive(now, datagram)) return;
+    if (!waiting->session.receive(now, datagram)) return tap_from(kStranger);
+    tap_from(kGuest);
     Guest arrived = std::move(*waiting);
     half_open_.erase(waiting);
     arrived.address = from;
     open(now, std::move(arrived));
   } else {
     ++stats_.unknown_connection;
+    tap_from(kStranger);
   }
 }
 
 void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
   std::array<std::byte, kMaxDatagram> answer;
   const Doorman::Reply reply = doorman_.receive(now, from, datagram, answer);
+  const DatagramSieve::Sender sender = reply.guest ? sender_of(*reply.guest) : kStranger;
+  tap(now, DatagramRecord::Direction::kIn, sender, from, datagram, datagram.size());
   if (reply.guest) return admit(now, from, *reply.guest);
-  if (reply.size > 0) send(now, from, std::span(answer).first(reply.size));
+  if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
+}
+
+/// Where there are keys, only who has one is no stranger.
+DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest) const {
+  return guest.key != nullptr || config_.keys.empty() ? kGuest : kStranger;
 }
 
 /// Our answer was lost and the guest asks again: the same answer. In suite 1 it may come from anywhere, it is of
@@ -151,7 +168,7 @@ bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman
     for (const Guest& present : *list) {
       if (present.random != guest.random || present.key != guest.key || present.gone) continue;
       if (present.key == nullptr && present.address != from) continue;
-      send(now, from, present.answer);
+      send(now, sender_of(guest), from, present.answer);
       return true;
     }
   }
@@ -176,7 +193,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
     ++stats_.refused;
     notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal->reason);
     const Refused refused{refusal->code, std::move(refusal->reason), kProtocolVersion, kProtocolVersion};
-    return send(now, from, std::span(answer).first(doorman_.refuse(guest, refused, answer).size));
+    const auto size = doorman_.refuse(guest, refused, answer).size;
+    return send(now, sender_of(guest), from, std::span(answer).first(size));
   }
   const auto& seats = std::get<std::vector<Seat>>(claimed);
 
@@ -207,7 +225,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   const Doorman::Answered answered = doorman_.welcome(guest, session.connection_id, welcome, answer);
   if (answered.size == 0) return;
   const auto bytes = std::span(answer).first(answered.size);
-  send(now, from, bytes);
+  send(now, sender_of(guest), from, bytes);
 
   Guest arrived{from,
                 guest.random,
@@ -381,7 +399,7 @@ void NetworkLoop::take_events(LocalTime now, Guest& guest) {
 void NetworkLoop::send_all(LocalTime now, Guest& guest) {
   std::array<std::byte, kMaxDatagram> buffer;
   while (const std::size_t size = guest.session.next_datagram(now, buffer)) {
-    send(now, guest.address, std::span(buffer).first(size));
+    send(now, kGuest, guest.address, std::span(buffer).first(size));
   }
 }
 
@@ -543,19 +561,27 @@ NetworkLoop::Stats NetworkLoop::stats() const {
   return stats;
 }
 
-void NetworkLoop::send(LocalTime now, const Address& to, std::span<const std::byte> datagram) {
+void NetworkLoop::send(LocalTime now, DatagramSieve::Sender partner, const Address& to,
+                       std::span<const std::byte> datagram) {
   link_.send(to, datagram);
-  tap(now, DatagramRecord::Direction::kOut, to, datagram, datagram.size());
+  tap(now, DatagramRecord::Direction::kOut, partner, to, datagram, datagram.size());
 }
 
-void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer,
-                      std::span<const std::byte> datagram, std::size_t size) {
+/// Into the recording, unless the sieve leaves it out. `partner` is the one at the other end.
+void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner,
+                      const Address& peer, std::span<const std::byte> datagram, std::size_t size) {
   Mailboxes& mail = *devices_.front().mail;
-  DatagramRecord* const record = mail.datagrams.back();
-  if (record == nullptr) {
-    mail.datagrams_lost.fetch_add(1, std::memory_order_relaxed);
-    return;
+  const auto left_out = [](std::atomic<std::uint64_t>& count) { count.fetch_add(1, std::memory_order_relaxed); };
+  switch (sieve_.judge(now, partner, size)) {
+    case DatagramSieve::Verdict::kRecord:
+      break;
+    case DatagramSieve::Verdict::kStranger:
+      return left_out(mail.strangers_left_out);
+    case DatagramSieve::Verdict::kOverBudget:
+      return left_out(mail.datagrams_over_budget);
   }
+  DatagramRecord* const record = mail.datagrams.back();
+  if (record == nullptr) return left_out(mail.datagrams_lost);
   record->at = now;
   record->direction = direction;
   record->peer = peer;

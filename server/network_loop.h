@@ -17,6 +17,7 @@
 #include "server/guests/leases.h"
 #include "server/guests/reports.h"
 #include "server/mailboxes.h"
+#include "server/recording/datagram_sieve.h"
 
 namespace tendon {
 
@@ -65,6 +66,7 @@ class NetworkLoop {
     bool adapt_state_rate = false;
     /// Datagrams taken in one turn; a flood must not keep states from being sent. A 1 kHz engine sends 1 per turn.
     std::size_t max_datagrams = 256;
+    DatagramSieve::Config recorded{};  ///< of the datagrams in and out
   };
 
   /// What guests' links have dropped, of all guests that were and are; see LinkStats.
@@ -149,13 +151,15 @@ class NetworkLoop {
   void measure(LocalTime now, Guest& guest);
   void adapt(LocalTime now, Guest& guest);
   void report(LocalTime now);
-  void send(LocalTime now, const Address& to, std::span<const std::byte> datagram);
-  void tap(LocalTime now, DatagramRecord::Direction direction, const Address& peer, std::span<const std::byte> datagram,
-           std::size_t size);
+  DatagramSieve::Sender sender_of(const Doorman::Guest& guest) const;
+  void send(LocalTime now, DatagramSieve::Sender partner, const Address& to, std::span<const std::byte> datagram);
+  void tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner, const Address& peer,
+           std::span<const std::byte> datagram, std::size_t size);
   void notice(bool warning, std::string text);
 
   Config config_;
   Link& link_;
+  DatagramSieve sieve_;
   std::vector<ServedDevice> devices_;
   Doorman doorman_;
   std::vector<Guest> guests_;

@@ -82,6 +82,34 @@ std::string describe(Device::State state, const Scene& scene) {
   return "unknown";
 }
 
+/// How far a counter has come since the last look at it.
+std::uint64_t news(const std::atomic<std::uint64_t>& counter, std::uint64_t& told) {
+  const std::uint64_t now = counter.load(std::memory_order_relaxed);
+  return now - std::exchange(told, now);
+}
+
+SceneRecord scene_record(const Scene& scene) {
+  return {.text = scene.text,
+          .version = std::string(kVersion),
+          .commit = std::string(kCommit),
+          .unix_offset = clock::unix_offset()};
+}
+
+std::unique_ptr<PartRecorder> recorder_of(const std::vector<Scene>& scenes, LocalTime started) {
+  const auto& recording = scenes.front().recording;
+  if (!recording) return nullptr;
+  PartRecorder::Config config;
+  config.path = recording->path;
+  config.run = {.scene = scene_record(scenes.front()), .started = started};
+  for (std::size_t i = 1; i < scenes.size(); ++i) {
+    config.run.more_devices.push_back({scenes[i].name, scene_record(scenes[i])});
+  }
+  config.rotate_bytes = static_cast<std::uint64_t>(recording->rotate_bytes);
+  config.rotate_after = from_seconds(recording->rotate_after);
+  config.budget_bytes = static_cast<std::uint64_t>(recording->budget_bytes.value_or(0));
+  return std::make_unique<PartRecorder>(config);
+}
+
 }  // namespace
 
 Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capacities, Guardian* guardian)
@@ -124,31 +152,21 @@ NetworkLoop::Config Server::network_config(const Lanes& lanes) {
   config.controller_timeout = scene.network.controller_timeout;
   config.observer_timeout = scene.network.observer_timeout;
   config.adapt_state_rate = scene.network.adapt_state_rate;
+  if (scene.recording) config.recorded.bytes_per_s = static_cast<std::uint64_t>(scene.recording->datagram_bytes_per_s);
   return config;
 }
 
 Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
       guardian_(make_guardian(scenes)),
+      recorder_(recorder_of(scenes, started_)),
       lanes_(lanes_of(scenes, guardian_.get())),
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       network_(network_config(lanes_), link_, mail_of(lanes_)),
-      tell_next_(started_ + kTellPeriod) {
-  if (const auto& path = lanes_.front()->scene.recording) {
-    Recorder::Config config{.scene = scene_record(*lanes_.front()), .started = started_};
-    for (std::size_t i = 1; i < lanes_.size(); ++i) {
-      config.more_devices.push_back({lanes_[i]->scene.name, scene_record(*lanes_[i])});
-    }
-    sink_ = std::make_unique<FileSink>(*path);
-    recorder_ = std::make_unique<Recorder>(config, *sink_);
-  }
-}
+      tell_next_(started_ + kTellPeriod) {}
 
-SceneRecord Server::scene_record(const Lane& lane) const {
-  return {.text = lane.scene.text,
-          .version = std::string(kVersion),
-          .commit = std::string(kCommit),
-          .unix_offset = clock::unix_offset()};
+std::optional<std::filesystem::path> Server::recording() const {
+  return recorder_ ? std::optional(recorder_->status().path) : std::nullopt;
 }
 
 std::string Server::prefix(const Lane& lane) const { return lanes_.size() == 1 ? "" : lane.scene.name + ": "; }
@@ -239,11 +257,15 @@ void Server::run_log() {
     for (auto& lane : lanes_) report_health(now, *lane);
     if (now >= tell_next_ || last) {
       for (auto& lane : lanes_) report_trouble(*lane);
+      record_left_out(now);
       tell_next_ = now + kTellPeriod;
     }
     if (!last) clock::sleep_until(now + kLogPeriod);
   }
-  if (recorder_) recorder_->close();
+  if (recorder_) {
+    recorder_->close(clock::now());
+    tell_of_recording();
+  }
 }
 
 void Server::drain_to_recorder(LocalTime now) {
@@ -255,27 +277,41 @@ void Server::drain_to_recorder(LocalTime now) {
       if (recorder_) recorder_->record(*step, device);
       lane.mail.steps.pop();
     }
-    const std::uint64_t lost = lane.mail.steps_lost.load(std::memory_order_relaxed);
-    steps_lost += lost - std::exchange(lane.told_steps_lost, lost);
+    steps_lost += news(lane.mail.steps_lost, lane.told_steps_lost);
   }
   Mailboxes& first = lanes_.front()->mail;
   while (const DatagramRecord* datagram = first.datagrams.front()) {
     if (recorder_) recorder_->record(*datagram);
     first.datagrams.pop();
   }
-  const std::uint64_t lost = first.datagrams_lost.load(std::memory_order_relaxed);
-  const std::uint64_t datagrams_lost = lost - std::exchange(told_datagrams_lost_, lost);
+  const std::uint64_t datagrams_lost = news(first.datagrams_lost, told_datagrams_lost_);
   if (steps_lost > 0 || datagrams_lost > 0) {
     log::warn("the log thread could not follow: " + std::to_string(steps_lost) + " steps and " +
               std::to_string(datagrams_lost) + " datagrams are missing");
-    if (recorder_) recorder_->lost(now, steps_lost, datagrams_lost);
+    if (recorder_) recorder_->lost({.at = now, .steps = steps_lost, .datagrams = datagrams_lost});
   }
   if (!recorder_) return;
   recorder_->tick(now);
-  if (const auto status = recorder_->status(); !status.error.empty() && !told_recording_ended_) {
-    told_recording_ended_ = true;
-    log::error("recording has ended, the device runs on: " + status.error);
+  tell_of_recording();
+}
+
+/// What the network thread has left out of the recording since the last call.
+void Server::record_left_out(LocalTime now) {
+  if (!recorder_) return;
+  Mailboxes& mail = lanes_.front()->mail;
+  if (const std::uint64_t strangers = news(mail.strangers_left_out, told_strangers_); strangers > 0) {
+    recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .strangers = strangers});
   }
+  if (const std::uint64_t datagrams = news(mail.datagrams_over_budget, told_over_budget_); datagrams > 0) {
+    log::warn(std::to_string(datagrams) + " datagrams are not recorded: more bytes came in a second than [recording] " +
+              "datagrams_kb_per_s");
+    recorder_->lost({.at = now, .datagrams = datagrams, .cause = LossRecord::Cause::kByteBudget});
+  }
+}
+
+void Server::tell_of_recording() {
+  for (const auto& [warning, text] : recorder_->take_notices()) warning ? log::error(text) : log::info(text);
+  recording_stopped_ = !recorder_->status().error.empty();
 }
 
 /// To the network thread, for observers that ask.
@@ -293,7 +329,7 @@ void Server::report_health(LocalTime now, Lane& lane) {
     health.safety = ready ? Safety::kUnguarded : on_the_wire(static_cast<SafetyState>(haptic.device));
   }
   health.not_realtime = lane.not_realtime.load(std::memory_order_relaxed);
-  health.recording_ended = told_recording_ended_;
+  health.recording_ended = recording_stopped_;
   lane.mail.health.put(health);
 }
 
@@ -333,11 +369,11 @@ void Server::report_trouble(Lane& lane) {
 
 void Server::save_flight(Lane& lane) {
   try {
-    const std::filesystem::path path =
-        flight_path(lanes_.front()->scene.recording, lanes_.size() == 1 ? "" : lane.scene.name, ++lane.flights);
-    FileSink sink(path);
-    write_flight(lane.mail.flight, {.scene = scene_record(lane), .started = started_}, sink);
-    log::error("the steps before the fault are in " + path.string());
+    const auto& recording = lanes_.front()->scene.recording;
+    const auto sink = open_flight(recording ? std::optional(recording->path) : std::nullopt,
+                                  lanes_.size() == 1 ? "" : lane.scene.name);
+    write_flight(lane.mail.flight, {.scene = scene_record(lane.scene), .started = started_}, *sink);
+    log::error("the steps before the fault are in " + sink->path().string());
   } catch (const std::exception& problem) {
     log::error(std::string("the steps before the fault are lost: ") + problem.what());
   }

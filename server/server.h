@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,8 +20,7 @@
 #include "server/machine/udp_link.h"
 #include "server/mailboxes.h"
 #include "server/network_loop.h"
-#include "server/recording/byte_sink.h"
-#include "server/recording/recorder.h"
+#include "server/recording/part_recorder.h"
 #include "server/scene/scene.h"
 
 namespace tendon {
@@ -32,7 +32,7 @@ namespace tendon {
 /// |---------|------------------------------|-----------------------------------------|-------------------------|
 /// | haptic… | HapticLoop, Device           | the absolute time of its next step      | nothing but compute     |
 /// | network | NetworkLoop, UdpLink         | a datagram, a haptic step, a timer      | allocate, log rarely    |
-/// | log     | Recorder, HealthMeters       | 20 ms                                   | allocate, write, log    |
+/// | log     | PartRecorder, meters          | 20 ms                                   | allocate, write, log    |
 ///
 /// They share the Mailboxes of each device, and nothing else.
 class Server {
@@ -45,7 +45,7 @@ class Server {
   struct Summary {
     std::vector<DeviceSummary> devices;
     NetworkLoop::Stats network;
-    std::optional<Recorder::Status> recording;  ///< empty when the scene records nothing
+    std::optional<PartRecorder::Status> recording;  ///< empty when the scene records nothing
     Duration uptime{};
   };
 
@@ -68,6 +68,10 @@ class Server {
 
   Address address() const { return link_.local_address(); }
 
+  /// The file that it records to, which is not the scene's when that exists. Empty when it records nothing. Before
+  /// `start` only.
+  std::optional<std::filesystem::path> recording() const;
+
  private:
   /// A device and what it needs to itself.
   struct Lane {
@@ -86,7 +90,6 @@ class Server {
     HapticLoop::Stats told;
     SafeDevice::Status told_safety;
     std::uint64_t told_steps_lost = 0;
-    int flights = 0;
   };
   using Lanes = std::vector<std::unique_ptr<Lane>>;
 
@@ -95,28 +98,30 @@ class Server {
   static std::vector<Mailboxes*> mail_of(const Lanes& lanes);
   /// "left: ", where there is more than one.
   std::string prefix(const Lane& lane) const;
-  SceneRecord scene_record(const Lane& lane) const;
   void run_haptic(Lane& lane);
   void run_network();
   void run_log();
   void drain_to_recorder(LocalTime now);
+  void record_left_out(LocalTime now);
+  void tell_of_recording();
   void report_health(LocalTime now, Lane& lane);
   void report_trouble(Lane& lane);
   void report_safety(Lane& lane);
   void save_flight(Lane& lane);
 
   LocalTime started_;
-  std::unique_ptr<Guardian> guardian_;  ///< of real devices; null when there are none
+  std::unique_ptr<Guardian> guardian_;      ///< of real devices; null when there are none
+  std::unique_ptr<PartRecorder> recorder_;  ///< null when the scene records nothing
   Lanes lanes_;
   UdpLink link_;
   Doorbell stepped_;
   NetworkLoop network_;
-  std::unique_ptr<FileSink> sink_;
-  std::unique_ptr<Recorder> recorder_;
 
   // What run_log has told the operator already.
   std::uint64_t told_datagrams_lost_ = 0;
-  bool told_recording_ended_ = false;
+  std::uint64_t told_strangers_ = 0;
+  std::uint64_t told_over_budget_ = 0;
+  bool recording_stopped_ = false;
   LocalTime tell_next_{};
 
   std::optional<Duration> run_for_;  ///< set before the threads start

@@ -23,22 +23,56 @@ bool MemorySink::append(std::span<const std::byte> bytes) {
   return true;
 }
 
-FileSink::FileSink(std::filesystem::path path) : path_(std::move(path)) {
-  // O_APPEND: after a piece has been cut off, the next one starts where the file ends.
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (descriptor_ < 0) throw std::runtime_error("cannot write recording " + path_.string() + ": " + reason(errno));
-  // A pipe or /dev/null has nothing to lose, and others may write to it.
+/// Opens a file to which nobody has written yet. Below 0: there is something in it, or another sink writes to it.
+FileSink::Opened FileSink::open(const std::filesystem::path& path) {
+  const auto fail = [&path](const std::string& why) {
+    throw std::runtime_error("cannot write recording " + path.string() + ": " + why);
+  };
+  // O_APPEND: after a piece has been cut off, the next one starts where the file ends. O_NONBLOCK: a pipe that nobody
+  // reads must not hang us before it is refused; it changes nothing for a file.
+  constexpr int kFlags = O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
+  int descriptor = ::open(path.c_str(), kFlags | O_CREAT | O_EXCL, 0644);
+  if (descriptor < 0 && errno == EEXIST) descriptor = ::open(path.c_str(), kFlags);
+  const int error = errno;
   struct stat status {};
-  if (::fstat(descriptor_, &status) == 0 && !S_ISREG(status.st_mode)) return;
-  // Emptied only once it is ours: the recording of another server that still runs is not.
-  const bool busy = ::flock(descriptor_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-  if (!busy && ::ftruncate(descriptor_, 0) == 0) return;
-  const std::string why = busy ? "another recording is being written to it" : reason(errno);
-  ::close(descriptor_);
-  throw std::runtime_error("cannot write recording " + path_.string() + ": " + why);
+  const bool known = (descriptor >= 0 ? ::fstat(descriptor, &status) : ::stat(path.c_str(), &status)) == 0;
+  const auto give_up = [&](const std::string& why) {
+    if (descriptor >= 0) ::close(descriptor);
+    fail(why);
+  };
+  if (known && !S_ISREG(status.st_mode) && !S_ISCHR(status.st_mode) && !S_ISDIR(status.st_mode)) {
+    give_up(std::string("it is ") +
+            (S_ISFIFO(status.st_mode) ? "a pipe" : (S_ISSOCK(status.st_mode) ? "a socket" : "a block device")) +
+            ", expected a file");
+  }
+  if (descriptor < 0) fail(reason(error));
+  if (!known) give_up(reason(errno));
+  if (S_ISCHR(status.st_mode)) return {descriptor, false};
+  // Looked at again once it is ours: another sink may have written to it meanwhile.
+  const bool busy = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  if (!busy && ::fstat(descriptor, &status) == 0 && status.st_size == 0) return {descriptor, true};
+  ::close(descriptor);
+  return {-1, true};
 }
 
-FileSink::~FileSink() { ::close(descriptor_); }
+FileSink::FileSink(std::filesystem::path path, const Opened& opened)
+    : path_(std::move(path)), descriptor_(opened.descriptor), is_file_(opened.is_file) {}
+
+FileSink::FileSink(std::filesystem::path path) : FileSink(path, open(path)) {
+  if (descriptor_ < 0) {
+    throw std::runtime_error("cannot write recording " + path_.string() + ": there is a file of that name already");
+  }
+}
+
+std::unique_ptr<FileSink> FileSink::open_new(const std::filesystem::path& path) {
+  const Opened opened = open(path);
+  if (opened.descriptor < 0) return nullptr;
+  return std::unique_ptr<FileSink>(new FileSink(path, opened));
+}
+
+FileSink::~FileSink() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
 
 bool FileSink::append(std::span<const std::byte> bytes) {
   std::size_t done = 0;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,23 +37,42 @@ class MemorySink final : public ByteSink {
   std::vector<std::byte> bytes_;
 };
 
-/// A file, created or emptied. Each piece is handed to the kernel at once: a killed process loses none of
-/// them (a power cut may). A piece that does not fit on the disk is cut off again.
+/// A new file. Never touches a byte that was there before it. Each piece is handed to the kernel at once: a killed
+/// process loses none of them (a power cut may). A piece that does not fit on the disk is cut off again.
+///
+/// It also writes to devices that keep nothing (/dev/null, /dev/full), which any number of sinks may share. A pipe, a
+/// socket, a block device and a folder are refused: a recording is a file, and a pipe that nobody reads would hang.
 class FileSink final : public ByteSink {
  public:
-  /// Throws std::runtime_error with path and reason when the file cannot be written to, or is the recording of
-  /// another server that still runs.
+  /// Makes the file; takes over an empty one that no other sink writes to. Throws std::runtime_error with path and
+  /// reason when there is something in it already, or it cannot be written to.
   explicit FileSink(std::filesystem::path path);
   ~FileSink() override;
   FileSink(const FileSink&) = delete;
   FileSink& operator=(const FileSink&) = delete;
 
+  /// As the constructor; null when the file exists and has something in it, or is another sink's.
+  static std::unique_ptr<FileSink> open_new(const std::filesystem::path& path);
+
   bool append(std::span<const std::byte> bytes) override;
   std::string error() const override { return error_; }
 
+  const std::filesystem::path& path() const noexcept { return path_; }
+  std::uint64_t size() const noexcept { return size_; }
+  /// It is a file on a disk, and not a device.
+  bool is_file() const noexcept { return is_file_; }
+
  private:
+  struct Opened {
+    int descriptor;
+    bool is_file;
+  };
+  FileSink(std::filesystem::path path, const Opened& opened);
+  static Opened open(const std::filesystem::path& path);
+
   std::filesystem::path path_;
   int descriptor_ = -1;
+  bool is_file_ = false;
   std::uint64_t size_ = 0;
   std::string error_;
 };

@@ -18,7 +18,14 @@ std::filesystem::path flight_path(const std::optional<std::filesystem::path>& re
   return path;
 }
 
-void write_flight(const decltype(Mailboxes::flight)& flight, const Recorder::Config& config, ByteSink& sink) {
+std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>& recording,
+                                      const std::string& device) {
+  for (int number = 1;; ++number) {
+    if (auto sink = FileSink::open_new(flight_path(recording, device, number))) return sink;
+  }
+}
+
+void write_flight(const FlightRecorder<StepRecord>& flight, const Recorder::Config& config, ByteSink& sink) {
   Recorder recorder(config, sink);
   for (std::size_t i = 0; i < flight.size(); ++i) recorder.record(flight[i]);
   recorder.close();

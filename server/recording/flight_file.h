@@ -2,11 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
-#include "server/mailboxes.h"
+#include "core/exchange/flight_recorder.h"
+#include "server/recording/byte_sink.h"
 #include "server/recording/recorder.h"
+#include "server/recording/records.h"
 
 namespace tendon {
 
@@ -16,10 +19,14 @@ namespace tendon {
 std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
                                   int number);
 
+/// A new file for a fault: the first of these paths, from number 1 on, at which there is none yet. The faults of all runs
+/// of a name thus stay. Throws std::runtime_error with path and reason. Log thread only.
+std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>& recording, const std::string& device);
+
 /// Writes the steps that led to a fault as a recording of its own.
 ///
 /// `flight` must be frozen, and is left so. Throws std::runtime_error with the sink's reason when not all of them could
 /// be written. Log thread only.
-void write_flight(const decltype(Mailboxes::flight)& flight, const Recorder::Config& config, ByteSink& sink);
+void write_flight(const FlightRecorder<StepRecord>& flight, const Recorder::Config& config, ByteSink& sink);
 
 }  // namespace tendon

@@ -51,6 +51,9 @@ class McapWriter {
   /// Flushes, and ends the file with summary and footer. False: the sink has failed. Later calls do nothing.
   bool close();
 
+  /// Chunks so far. The index of each stays in memory until `close`.
+  std::size_t chunks() const noexcept { return chunks_.size(); }
+
   /// Bytes that the sink has taken.
   std::uint64_t bytes_written() const noexcept { return written_; }
 

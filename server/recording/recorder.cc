@@ -51,10 +51,10 @@ void Recorder::record(const DatagramRecord& datagram) {
   write(datagram_channel_, datagram.at, recording::encode(datagram));
 }
 
-void Recorder::lost(LocalTime at, std::uint64_t steps, std::uint64_t datagrams) {
-  lost_.steps += steps;
-  lost_.datagrams += datagrams;
-  if (recording()) write(loss_channel_, at, recording::encode(LossRecord{at, steps, datagrams}));
+void Recorder::lost(const LossRecord& loss) {
+  lost_.steps += loss.steps;
+  lost_.datagrams += loss.datagrams;
+  if (recording()) write(loss_channel_, loss.at, recording::encode(loss));
 }
 
 void Recorder::tick(LocalTime now) {

@@ -21,7 +21,7 @@ namespace tendon {
 /// * A server killed at any instant leaves a readable file that lacks at most the last `flush_after` of its run.
 /// * The same calls give the same bytes: no clock is read and nothing depends on an address.
 /// * When the sink fails (a full disk), recording ends for good: later records are counted, nothing else happens, and
-///   what was written stays readable. `status().error` says why.
+///   what was written stays readable. `status().error` says why. PartRecorder goes on in another file.
 ///
 /// Steps come in the order of their time, and so do datagrams; how the two interleave does not matter.
 ///
@@ -61,7 +61,7 @@ class Recorder {
   void record(const StepRecord& step, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   /// Notes that records were dropped before they came here, so that a reader knows of the gap.
-  void lost(LocalTime at, std::uint64_t steps, std::uint64_t datagrams);
+  void lost(const LossRecord& loss);
 
   /// Flushes what is older than `flush_after`, though nothing new comes. Call it after each batch of records.
   void tick(LocalTime now);
@@ -71,6 +71,11 @@ class Recorder {
   void close();
 
   Status status() const;
+  /// Parts of `status()`, without its cost.
+  bool failed() const noexcept { return failed_; }
+  std::uint64_t bytes() const noexcept { return writer_.bytes_written(); }
+  /// In the index, which is kept in memory until `close`: some 150 bytes each.
+  std::size_t chunks() const noexcept { return writer_.chunks(); }
 
  private:
   struct Counts {

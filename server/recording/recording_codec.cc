@@ -65,6 +65,8 @@ std::string encode(const SceneRecord& scene) {
   out.set_version(scene.version);
   out.set_commit(scene.commit);
   out.set_unix_offset_ns(scene.unix_offset.count());
+  out.set_part(scene.part);
+  out.set_budget_bytes(scene.budget_bytes);
   return out.SerializeAsString();
 }
 
@@ -124,6 +126,8 @@ std::string encode(const LossRecord& loss) {
   pb::Lost out;
   out.set_steps(loss.steps);
   out.set_datagrams(loss.datagrams);
+  out.set_cause(static_cast<pb::LossCause>(loss.cause));
+  out.set_strangers(loss.strangers);
   return out.SerializeAsString();
 }
 
@@ -133,7 +137,9 @@ SceneRecord decode_scene(std::string_view message) {
           .seed = in.seed(),
           .version = in.version(),
           .commit = in.commit(),
-          .unix_offset = Duration(in.unix_offset_ns())};
+          .unix_offset = Duration(in.unix_offset_ns()),
+          .part = in.part(),
+          .budget_bytes = in.budget_bytes()};
 }
 
 StepRecord decode_step(std::string_view message, LocalTime at) {
@@ -191,7 +197,13 @@ DatagramRecord decode_datagram(std::string_view message, LocalTime at) {
 
 LossRecord decode_loss(std::string_view message, LocalTime at) {
   const auto in = parse<pb::Lost>(message);
-  return {.at = at, .steps = in.steps(), .datagrams = in.datagrams()};
+  if (!pb::LossCause_IsValid(in.cause()))
+    throw std::invalid_argument("a loss has the unknown cause " + std::to_string(in.cause()));
+  return {.at = at,
+          .steps = in.steps(),
+          .datagrams = in.datagrams(),
+          .cause = static_cast<LossRecord::Cause>(in.cause()),
+          .strangers = in.strangers()};
 }
 
 }  // namespace tendon::recording

@@ -19,15 +19,26 @@ struct SceneRecord {
   std::string version;     ///< of the program that recorded
   std::string commit;      ///< it was built from
   Duration unix_offset{};  ///< log_time − local time; 0 in simulations
+  std::uint32_t part = 0;  ///< of its run, from 1; 0: a recording that has only this one
+  /// The recording may be deleted to keep all that have its name within so many bytes; 0: it is kept.
+  std::uint64_t budget_bytes = 0;
 
   bool operator==(const SceneRecord&) const = default;
 };
 
 /// Records that did not make it into the file, counted since the loss before.
 struct LossRecord {
+  enum class Cause : std::uint8_t {
+    kLogThread = 0,   ///< it could not follow
+    kDisk = 1,        ///< it was full, or failed
+    kByteBudget = 2,  ///< guests' datagrams beyond the bytes of a second, see DatagramSieve
+    kSample = 3,      ///< strangers' datagrams beyond the sample of a second, likewise
+  };
   LocalTime at{};  ///< when it was noticed
   std::uint64_t steps = 0;
-  std::uint64_t datagrams = 0;
+  std::uint64_t datagrams = 0;  ///< from and to guests
+  Cause cause = Cause::kLogThread;
+  std::uint64_t strangers = 0;  ///< datagrams from and to strangers; only with kSample
 
   bool operator==(const LossRecord&) const = default;
 };

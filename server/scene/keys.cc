@@ -320,8 +320,21 @@ void declare_scene(Table& scene, Draft& draft) {
              "names of the keys (without keys: of the clients) that may take a channel from its holder at once");
   });
 
-  scene.optional_table("recording", [&draft](Table& recording) {
-    recording.key("path", draft.scene.recording, Path{}, "MCAP file, relative to the current directory", kRequired);
+  scene.part("recording", draft.scene.recording, [](Table& keys, Scene::Recording& recording) {
+    keys.key(
+        "path", recording.path, Path{},
+        "MCAP file, relative to the current directory. A file that is there is never overwritten: run.mcap goes on "
+        "as run-2.mcap, run-3.mcap",
+        kRequired);
+    keys.key("rotate_mb", recording.rotate_bytes, Number{.least = 4, .most = 4000},
+             "a file that has become so large is followed by the next number");
+    keys.key("rotate_min", recording.rotate_after, Number{.least = 1, .most = 240}, "… and one that is so old");
+    keys.key("budget_mb", recording.budget_bytes, Number{.least = 16, .most = 1e9},
+             "all files of this name that have a budget are kept within it: the oldest are deleted. Never a fault's. A "
+             "file is at most a quarter of it",
+             Absent{.text = "nothing is deleted"});
+    keys.key("datagrams_kb_per_s", recording.datagram_bytes_per_s, Number{.least = 1, .most = 1e6},
+             "of guests' datagrams no more are recorded; steps always are");
   });
 }
 

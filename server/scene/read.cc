@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -60,7 +61,20 @@ void apply_setting(toml::table& file, const std::string& setting) {
   }
 }
 
+/// With all digits of each number.
+std::string text_of(const toml::table& file) {
+  std::ostringstream text;
+  text << toml::toml_formatter(file, toml::toml_formatter::default_flags & ~toml::format_flags::indentation) << '\n';
+  return text.str();
+}
+
 }  // namespace
+
+std::vector<std::string> limiter_settings(std::string_view law, const Friction& friction) {
+  return {"limiter=", "limiter.kind=\"" + std::string(law) + '"',
+          "limiter.coulomb_friction_n=" + scene_file::digits(friction.coulomb),
+          "limiter.viscous_friction_n_s_per_m=" + scene_file::digits(friction.viscous)};
+}
 
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
                   std::span<const std::string> settings) {
@@ -70,7 +84,8 @@ Scene parse_scene(std::string_view text, const std::string& name, const std::fil
   toml::table file = parse_toml(text, name);
   for (const std::string& setting : settings) apply_setting(file, setting);
   scene_file::Draft draft;
-  draft.scene.text = text;
+  draft.scene.text = settings.empty() ? std::string(text) : text_of(file);
+  if (draft.scene.text.size() > kMaxSceneBytes) throw SceneError(name + ": the settings make the scene too long");
   draft.scene.has_network = file.contains("network");
   draft.scene.name = scene_file::label_of(std::filesystem::path(name).stem().string());
   scene_file::SceneProblems problems;
@@ -93,10 +108,13 @@ Scene read_scene(const std::filesystem::path& file) {
   return parse_scene(text, file.string(), file.parent_path());
 }
 
-std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files) {
+std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides) {
   std::vector<Scene> scenes;
   for (const std::filesystem::path& file : files) {
     Scene scene = read_scene(file);
+    if (const auto settings = overrides ? overrides(scene) : std::vector<std::string>(); !settings.empty()) {
+      scene = parse_scene(scene.text, file.string(), file.parent_path(), settings);
+    }
     scene.loop.device = static_cast<std::uint32_t>(scenes.size());
     for (const Scene& before : scenes) {
       if (scene.name != before.name) continue;

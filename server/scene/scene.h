@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -48,6 +49,15 @@ struct Scene {
   using AnyDevice = std::variant<SimulatedDevice::Config, falcon::Config, ReplayDevice::Config, spacemouse::Config,
                                  woodenhaptics::Config>;
 
+  /// What is recorded, and where; see PartRecorder and DatagramSieve.
+  struct Recording {
+    std::filesystem::path path;  ///< relative to the current directory
+    double rotate_bytes = 4e9;
+    double rotate_after = 4 * 3600;        ///< s
+    std::optional<double> budget_bytes{};  ///< empty: nothing is ever deleted
+    double datagram_bytes_per_s = 4e6;
+  };
+
   std::string name;  ///< of the device, as clients claim it
   AnyDevice device;
   std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
@@ -55,9 +65,9 @@ struct Scene {
   std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere
   std::vector<Channel> channels = {Channel{}};
   Network network;
-  bool has_network = false;                        ///< the file says something about it
-  std::optional<std::filesystem::path> recording;  ///< relative to the current directory; empty: nothing is recorded
-  std::string text;                                ///< the file, whole, for the recording
+  bool has_network = false;            ///< the file says something about it
+  std::optional<Recording> recording;  ///< empty: nothing is recorded
+  std::string text;                    ///< for the recording: the file, whole; with settings, the scene that they make
 
   /// The row of its device.
   const Driver& driver() const;
@@ -88,16 +98,23 @@ inline constexpr std::size_t kMaxSceneBytes = 16'384;
 Scene read_scene(const std::filesystem::path& file);
 
 /// The scenes of the devices that one server runs. Only the first may have [network] and [recording]; a later scene
-/// with such a table is refused, and so are two devices with one name.
-std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files);
+/// with such a table is refused, and so are two devices with one name. `overrides` returns the settings (parse_scene)
+/// that the command line makes in a scene which has been read.
+using Overrides = std::function<std::vector<std::string>(const Scene&)>;
+std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, const Overrides& overrides = {});
 
 /// The same for a scene in memory. `name` is what errors call it; a recorded motion is looked for
 /// relative to `directory`.
 ///
 /// `settings` change what the text says, each "TABLE.KEY=VALUE" with a value in TOML or a word that needs no quotes;
-/// without a value the key, or the whole table, is taken out. `Scene::text` is the text all the same.
+/// without a value the key, or the whole table, is taken out. `Scene::text` is then the scene that they make, without
+/// comments: parsed alone, it gives the same scene.
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
                   std::span<const std::string> settings = {});
+
+/// The settings that put `law` in place of the scene's limiter, without its parts. The friction bounds stay: they are
+/// the device's.
+std::vector<std::string> limiter_settings(std::string_view law, const Friction& friction);
 
 /// Every key that a scene may have: meaning, what is accepted in which unit, and what holds without it.
 std::string scene_reference();

@@ -11,15 +11,18 @@ namespace {
 /// Longest suffix first.
 constexpr std::array kUnits = {
     Unit{"_n_s_per_m", "N·s/m", 1},
+    Unit{"_kb_per_s", "kB/s", 1e-3},
     Unit{"_m_per_s2", "m/s²", 1},
     Unit{"_m_per_s", "m/s", 1},
     Unit{"_n_per_m", "N/m", 1},
     Unit{"_n_per_s", "N/s", 1},
     Unit{"_n_m_s", "N·m·s/rad", 1},
     Unit{"_n_m", "N·m", 1},
+    Unit{"_min", "min", 1.0 / 60},
     Unit{"_hz", "Hz", 1},
     Unit{"_kg", "kg", 1},
     Unit{"_ma", "mA", 1e3},
+    Unit{"_mb", "MB", 1e-6},
     Unit{"_mj", "mJ", 1e3},
     Unit{"_mm", "mm", 1e3},
     Unit{"_ms", "ms", 1e3},

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/recording/byte_sink.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <csignal>
 #include <cstddef>
 #include <filesystem>
+#include <fstream>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -31,6 +34,7 @@ TEST(FileSink, LeavesTheFileOfAnotherRecordingThatStillRunsAlone) {
   FileSink first(path);
   ASSERT_TRUE(first.append(piece));
   EXPECT_THROW(FileSink{path}, std::runtime_error);
+  EXPECT_EQ(FileSink::open_new(path), nullptr);
   EXPECT_EQ(std::filesystem::file_size(path), 3U);
   ASSERT_TRUE(first.append(piece));
   EXPECT_EQ(std::filesystem::file_size(path), 6U);
@@ -60,12 +64,52 @@ TEST(FileSink, ReportsAFullDisk) {
   EXPECT_EQ(sink.error(), "cannot write recording /dev/full: No space left on device");
 }
 
-TEST(FileSink, ReplacesWhatWasThere) {
+TEST(FileSink, NeverTouchesWhatWasThere) {
   const ScratchFolder folder;
   const auto path = folder.path() / "run.mcap";
   { ASSERT_TRUE(FileSink(path).append(bytes("old and long"))); }
-  { ASSERT_TRUE(FileSink(path).append(bytes("new"))); }
+  EXPECT_EQ(FileSink::open_new(path), nullptr);
+  try {
+    FileSink sink(path);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), "cannot write recording " + path.string() + ": there is a file of that name already");
+  }
+  EXPECT_EQ(std::filesystem::file_size(path), 12U);
+}
+
+TEST(FileSink, TakesOverAnEmptyFile) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  std::ofstream{path};
+  ASSERT_TRUE(FileSink(path).append(bytes("new")));
   EXPECT_EQ(std::filesystem::file_size(path), 3U);
+}
+
+TEST(FileSink, AnEmptyFileIsOneSinksOnly) {
+  const ScratchFolder folder;
+  const FileSink first(folder.path() / "run.mcap");
+  EXPECT_EQ(FileSink::open_new(folder.path() / "run.mcap"), nullptr);
+}
+
+TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
+  const ScratchFolder folder;
+  const auto pipe = folder.path() / "pipe.mcap";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const auto refusal = [](const std::filesystem::path& path) {
+    try {
+      FileSink::open_new(path);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string cannot = "cannot write recording ";
+  EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a pipe, expected a file");
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a pipe, expected a file") << "that somebody reads";
+  ::close(reader);
+  EXPECT_EQ(refusal(folder.path()), cannot + folder.path().string() + ": Is a directory");
 }
 
 /// A disk with room for part of the piece only: the kernel's limit on the size of a file plays it.

@@ -37,19 +37,30 @@ TEST(FlightPath, IsInTheWorkingDirectoryWhereTheRecordingIsNoFileOrThereIsNone) 
   EXPECT_EQ(flight_path({}, "left", 4), "tendon.left.fault-4.mcap");
 }
 
+TEST(FlightFile, OfAnEarlierRunStays) {
+  const ScratchFolder folder;
+  const auto recording = folder.path() / "run.mcap";
+  for (int fault = 1; fault <= 3; ++fault) {
+    const auto sink = open_flight(recording, "");
+    EXPECT_EQ(sink->path(), flight_path(recording, "", fault));
+    write_flight(FlightRecorder<StepRecord>(2), testing::sample_config(), *sink);
+  }
+  EXPECT_EQ(open_flight(recording, "left")->path(), flight_path(recording, "left", 1));
+}
+
 TEST(FlightFile, ThatDoesNotTakeItAllIsAnErrorWithTheReason) {
-  Mailboxes mail;
-  for (std::uint64_t tick = 0; tick < 100; ++tick) mail.flight.record(testing::sample_step(tick));
-  mail.flight.freeze();
+  FlightRecorder<StepRecord> flight(128);
+  for (std::uint64_t tick = 0; tick < 100; ++tick) flight.record(testing::sample_step(tick));
+  flight.freeze();
   FileSink full("/dev/full");
   try {
-    write_flight(mail.flight, testing::sample_config(), full);
+    write_flight(flight, testing::sample_config(), full);
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "cannot write recording /dev/full: No space left on device");
   }
   MemorySink memory;
-  write_flight(mail.flight, testing::sample_config(), memory);
+  write_flight(flight, testing::sample_config(), memory);
   EXPECT_EQ(testing::read_all(memory.bytes()).steps.size(), 100U);
 }
 

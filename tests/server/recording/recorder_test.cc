@@ -103,7 +103,7 @@ TEST(Recorder, TellsTheReaderWhereRecordsAreMissing) {
   MemorySink sink;
   Recorder recorder(sample_config(), sink);
   recorder.record(sample_step(0));
-  recorder.lost(ms(5), 4, 2);
+  recorder.lost({.at = ms(5), .steps = 4, .datagrams = 2});
   recorder.record(sample_step(5));
   recorder.close();
   const Contents contents = read_all(sink.bytes());
@@ -114,13 +114,26 @@ TEST(Recorder, TellsTheReaderWhereRecordsAreMissing) {
   EXPECT_EQ(recorder.status().lost_datagrams, 2U);
 }
 
+TEST(Recorder, SaysOfEachLossWhatItWas) {
+  MemorySink sink;
+  Recorder recorder(sample_config(), sink);
+  const std::vector<LossRecord> losses = {
+      {.at = ms(1), .steps = 7, .datagrams = 9, .cause = LossRecord::Cause::kDisk},
+      {.at = ms(2), .datagrams = 5, .cause = LossRecord::Cause::kByteBudget},
+      {.at = ms(3), .cause = LossRecord::Cause::kSample, .strangers = 39'000},
+  };
+  for (const LossRecord& loss : losses) recorder.lost(loss);
+  recorder.close();
+  EXPECT_EQ(read_all(sink.bytes()).losses, losses);
+}
+
 TEST(Recorder, CountsWhatComesAfterTheEndAsLost) {
   MemorySink sink;
   Recorder recorder(sample_config(), sink);
   recorder.close();
   const auto size = sink.bytes().size();
   recorder.record(sample_step(0));
-  recorder.lost(ms(1), 1, 1);
+  recorder.lost({.at = ms(1), .steps = 1, .datagrams = 1});
   recorder.tick(ms(1000));
   recorder.close();
   EXPECT_EQ(sink.bytes().size(), size);

@@ -26,10 +26,11 @@ int main(int argc, char** argv) {
     MemorySink sink;
     Recorder recorder(config, sink);
     testing::record_samples(recorder, 2000);
-    recorder.lost(testing::ms(2000), 3, 1);
+    recorder.lost({.at = testing::ms(2000), .steps = 3, .datagrams = 1});
     recorder.close();
 
     const std::span<const std::byte> bytes = sink.bytes();
+    for (const char* name : {"whole.mcap", "killed.mcap"}) std::filesystem::remove(folder / name);
     FileSink whole(folder / "whole.mcap");
     FileSink killed(folder / "killed.mcap");
     if (!whole.append(bytes) || !killed.append(bytes.first(bytes.size() / 2))) {

@@ -208,7 +208,8 @@ path = "run.mcap"
   EXPECT_EQ(scene.network.controller_timeout, 1500ms);
   EXPECT_EQ(scene.network.observer_timeout, 2500ms);
   EXPECT_TRUE(scene.network.adapt_state_rate);
-  EXPECT_EQ(scene.recording, "run.mcap");
+  ASSERT_TRUE(scene.recording);
+  EXPECT_EQ(scene.recording->path, "run.mcap");
 }
 
 TEST(Scene, ReadsAMotionOfRampAndHold) {
@@ -1186,7 +1187,9 @@ TEST(ShippedScenes, DemoIsAHandAtAWallWithTheLimiterOn) {
   EXPECT_EQ(scene.simulated().hand->mass, 0.05);
   EXPECT_EQ(target(scene, 0.5).position, Vec3(0.015, 0, 0));
   EXPECT_EQ(scene.loop.control.limiter.law, Law::kAolPlus);
-  EXPECT_EQ(scene.recording, "demo.mcap");
+  ASSERT_TRUE(scene.recording);
+  EXPECT_EQ(scene.recording->path, "demo.mcap");
+  EXPECT_EQ(scene.recording->budget_bytes, 4e9) << "it is the scene of the systemd unit";
 }
 
 TEST(ShippedScenes, AdmittanceIsAHeavyDeviceThatMovesAsATool) {

@@ -35,19 +35,13 @@ struct Gaps {
   bool truncated = false;
 };
 
-/// The settings that make `law` the scene's limiter.
-std::vector<std::string> settings_for(const std::string& law, const Friction& friction) {
-  return {"limiter=", "limiter.kind=" + law, "limiter.coulomb_friction_n=" + JsonLine::number(friction.coulomb),
-          "limiter.viscous_friction_n_s_per_m=" + JsonLine::number(friction.viscous)};
-}
-
 HapticController::Config control_of(const SceneRecord& scene, const Options& options) {
   const auto parse = [&](const std::vector<std::string>& settings) {
     return parse_scene(scene.text, "the recorded scene", options.files, settings).loop.control;
   };
   const HapticController::Config recorded = parse({});
   std::vector<std::string> settings;
-  if (options.law) settings = settings_for(*options.law, recorded.limiter.friction);
+  if (options.law) settings = limiter_settings(*options.law, recorded.limiter.friction);
   settings.insert(settings.end(), options.settings.begin(), options.settings.end());
   return settings.empty() ? recorded : parse(settings);
 }

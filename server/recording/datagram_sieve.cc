@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/datagram_sieve.h"
+
+namespace tendon {
+
+DatagramSieve::Verdict DatagramSieve::judge(LocalTime now, Sender sender, std::size_t size) noexcept {
+  if (now >= second_ends_) {
+    second_ends_ = now + std::chrono::seconds(1);
+    strangers_ = 0;
+    bytes_ = 0;
+  }
+  if (sender == Sender::kStranger && strangers_ >= config_.strangers_per_s) return Verdict::kStranger;
+  if (size > config_.bytes_per_s - bytes_) return Verdict::kOverBudget;
+  bytes_ += size;
+  if (sender == Sender::kStranger) ++strangers_;
+  return Verdict::kRecord;
+}
+
+}  // namespace tendon

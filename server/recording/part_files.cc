@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/part_files.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <variant>
+
+#include "server/recording/mcap_format.h"
+#include "server/recording/recording_reader.h"
+
+namespace tendon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kRoom = std::uint64_t{16} << 20;
+
+fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
+fs::path numbered(const fs::path& path, std::uint64_t number) {
+  fs::path part = path;
+  return part.replace_filename(path.stem().string() + "-" + std::to_string(number) + path.extension().string());
+}
+
+/// 1 for `path` itself, N for its part N, empty for any other file.
+std::optional<std::uint64_t> number_of(const fs::path& path, const fs::path& file) {
+  const std::string name = file.filename().string();
+  if (name == path.filename()) return 1;
+  const std::string before = path.stem().string() + "-";
+  const std::string after = path.extension().string();
+  if (name.size() <= before.size() + after.size() || !name.starts_with(before) || !name.ends_with(after)) return {};
+  const std::string_view digits =
+      std::string_view(name).substr(before.size(), name.size() - before.size() - after.size());
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error != std::errc{} || end != digits.data() + digits.size() || number < 2 || digits.front() == '0') return {};
+  return number;
+}
+
+struct Part {
+  fs::path path;
+  std::uint64_t number;
+  fs::file_time_type written;  ///< last
+  std::uint64_t bytes;
+};
+
+/// The regular files that have the name of a part; none where the folder cannot be read.
+std::vector<Part> parts_of(const fs::path& path) {
+  std::vector<Part> parts;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_of(path), error), end; !error && entry != end; entry.increment(error)) {
+    const auto number = number_of(path, entry->path());
+    std::error_code gone;
+    if (!number || !entry->is_regular_file(gone) || gone) continue;
+    const auto written = entry->last_write_time(gone);
+    const auto bytes = entry->file_size(gone);
+    if (!gone) parts.push_back({folder_of(path) / entry->path().filename(), *number, written, bytes});
+  }
+  return parts;
+}
+
+/// Whether an existing file is a recording, or the beginning of one. Where it cannot be read it counts as one.
+bool looks_like_a_recording(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return true;
+  std::array<char, mcap::kMagic.size()> head{};
+  file.read(head.data(), head.size());
+  const auto size = static_cast<std::size_t>(file.gcount());
+  return std::equal(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), mcap::kMagic.begin(),
+                    [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
+}
+
+/// Whether its Scene says that it may be deleted for a budget.
+bool has_a_budget(const fs::path& path) {
+  try {
+    RecordingReader reader(path);
+    const auto first = reader.next();
+    const auto* scene = first ? std::get_if<SceneRecord>(&*first) : nullptr;
+    return scene != nullptr && scene->budget_bytes > 0;
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
+
+/// Whether a server still writes to it.
+bool is_in_use(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return true;
+  const bool busy = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0;
+  ::close(descriptor);
+  return busy;
+}
+
+}  // namespace
+
+std::unique_ptr<FileSink> open_next_part(const fs::path& path) {
+  if (auto sink = FileSink::open_new(path)) return sink;
+  if (!looks_like_a_recording(path)) {
+    throw std::runtime_error("cannot write recording " + path.string() +
+                             ": there is a file of that name, which is no recording; it is left as it is");
+  }
+  std::uint64_t highest = 1;
+  for (const Part& part : parts_of(path)) highest = std::max(highest, part.number);
+  for (;;) {
+    if (auto sink = FileSink::open_new(numbered(path, ++highest))) return sink;
+  }
+}
+
+std::vector<fs::path> delete_oldest_parts(const fs::path& path, std::uint64_t most_bytes) {
+  std::vector<Part> parts = parts_of(path);
+  std::erase_if(parts, [](const Part& part) { return !has_a_budget(part.path) || is_in_use(part.path); });
+  std::sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
+    return std::pair(a.written, a.number) < std::pair(b.written, b.number);
+  });
+  std::uint64_t all = 0;
+  for (const Part& part : parts) all += part.bytes;
+  std::vector<fs::path> deleted;
+  for (const Part& part : parts) {
+    if (all <= most_bytes) break;
+    std::error_code refused;
+    if (!fs::remove(part.path, refused)) continue;
+    all -= part.bytes;
+    deleted.push_back(part.path);
+  }
+  return deleted;
+}
+
+bool has_room(const fs::path& path) {
+  struct statvfs disk {};
+  if (::statvfs(folder_of(path).c_str(), &disk) != 0) return true;
+  return disk.f_bavail * disk.f_frsize >= kRoom;
+}
+
+}  // namespace tendon

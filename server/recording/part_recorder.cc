@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/part_recorder.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "server/recording/part_files.h"
+
+namespace tendon {
+namespace {
+
+constexpr std::size_t kMostChunks = 65'536;
+
+/// Longer than its file's share by its last chunk and its index: some of the budget is kept for these.
+std::uint64_t part_of_budget(std::uint64_t budget) { return budget / 4 - budget / 32; }
+
+std::string count_of(std::uint64_t steps, std::uint64_t datagrams) {
+  return std::to_string(steps) + " steps and " + std::to_string(datagrams) + " datagrams";
+}
+
+}  // namespace
+
+PartRecorder::PartRecorder(const Config& config) : config_(config) {
+  if (config_.budget_bytes > 0) {
+    config_.rotate_bytes = std::min(config_.rotate_bytes, part_of_budget(config_.budget_bytes));
+    config_.run.scene.budget_bytes = config_.budget_bytes;
+  }
+  closed_.path = config_.path;
+  open_part(config_.run.started);
+}
+
+void PartRecorder::record(const StepRecord& step, std::size_t device) {
+  if (!recorder_) {
+    ++missing_.steps;
+    return;
+  }
+  recorder_->record(step, device);
+  look_after(step.hand.at);
+}
+
+void PartRecorder::record(const DatagramRecord& datagram) {
+  if (!recorder_) {
+    ++missing_.datagrams;
+    return;
+  }
+  recorder_->record(datagram);
+  look_after(datagram.at);
+}
+
+void PartRecorder::lost(const LossRecord& loss) {
+  if (loss.cause == LossRecord::Cause::kByteBudget) {
+    closed_.datagrams_over_budget += loss.datagrams;
+  } else {
+    closed_.lost_steps += loss.steps;
+    closed_.lost_datagrams += loss.datagrams;
+  }
+  closed_.strangers_left_out += loss.strangers;
+  if (!recorder_) return;
+  told_.steps += loss.steps;
+  told_.datagrams += loss.datagrams;
+  recorder_->lost(loss);
+  look_after(loss.at);
+}
+
+void PartRecorder::tick(LocalTime now) {
+  if (!recorder_) return go_on(now);
+  recorder_->tick(now);
+  look_after(now);
+}
+
+void PartRecorder::close(LocalTime now) {
+  if (!recorder_) return;
+  recorder_->close();
+  if (recorder_->failed()) return stop(now, recorder_->status().error);
+  finish_part();
+}
+
+PartRecorder::Status PartRecorder::status() const {
+  Status all = closed_;
+  all.lost_steps += missing_.steps;
+  all.lost_datagrams += missing_.datagrams;
+  if (recorder_) {
+    const Recorder::Status open = recorder_->status();
+    all.bytes += open.bytes;
+    all.steps += open.steps;
+    all.datagrams += open.datagrams;
+  }
+  return all;
+}
+
+std::vector<PartRecorder::Notice> PartRecorder::take_notices() { return std::exchange(notices_, {}); }
+
+/// False: it could not be written to, and recording has stopped.
+bool PartRecorder::open_part(LocalTime now) {
+  if (config_.budget_bytes > 0) {
+    for (const auto& gone : delete_oldest_parts(config_.path, config_.budget_bytes - config_.budget_bytes / 4)) {
+      notices_.push_back({false, "deleted " + gone.string() + ", the oldest recording, to keep the budget of " +
+                                     std::to_string(config_.budget_bytes / 1'000'000) + " MB"});
+    }
+  }
+  sink_ = open_next_part(config_.path);
+  Recorder::Config part = config_.run;
+  part.scene.part = static_cast<std::uint32_t>(closed_.parts + 1);
+  part.started = now;
+  part_began_ = now;
+  told_ = {};
+  recorder_.emplace(part, *sink_);
+  if (recorder_->failed()) {
+    stop(now, recorder_->status().error);
+    return false;
+  }
+  ++closed_.parts;
+  closed_.path = sink_->path();
+  return true;
+}
+
+/// After each record: ends a part that is full, large or old.
+void PartRecorder::look_after(LocalTime now) {
+  if (recorder_->failed()) return stop(now, recorder_->status().error);
+  const bool due = recorder_->bytes() + config_.run.flush_size >= config_.rotate_bytes ||
+                   now - part_began_ >= config_.rotate_after || recorder_->chunks() >= kMostChunks;
+  if (!due) return;
+  recorder_->close();
+  if (recorder_->failed()) return stop(now, recorder_->status().error);
+  finish_part();
+  try {
+    if (open_part(now)) notices_.push_back({false, "recording goes on in " + closed_.path.string()});
+  } catch (const std::runtime_error& refused) {
+    stop(now, refused.what());
+  }
+}
+
+/// Takes the open part's account, whatever has become of it.
+void PartRecorder::finish_part() {
+  const Recorder::Status part = recorder_->status();
+  closed_.bytes += part.bytes;
+  closed_.steps += part.steps;
+  closed_.datagrams += part.datagrams;
+  missing_.steps += part.lost_steps - told_.steps;
+  missing_.datagrams += part.lost_datagrams - told_.datagrams;
+  recorder_.reset();
+  // Not even its scene could be written: no such file.
+  const bool empty = sink_->is_file() && sink_->size() == 0;
+  std::error_code ignored;
+  if (empty) std::filesystem::remove(sink_->path(), ignored);
+  sink_.reset();
+}
+
+void PartRecorder::stop(LocalTime now, std::string why) {
+  if (recorder_) finish_part();
+  try_again_ = now + config_.retry_after;
+  if (closed_.error.empty()) {
+    notices_.push_back({true, "recording has stopped, the device runs on: " + why + "; it goes on when there is room"});
+  }
+  closed_.error = std::move(why);
+}
+
+void PartRecorder::go_on(LocalTime now) {
+  if (closed_.error.empty() || now < try_again_) return;  // closed, or too early
+  try_again_ = now + config_.retry_after;
+  if (!has_room(config_.path)) return;
+  try {
+    if (!open_part(now)) return;
+  } catch (const std::runtime_error& refused) {
+    return stop(now, refused.what());
+  }
+  closed_.error.clear();
+  const Counts missing = std::exchange(missing_, {});
+  notices_.push_back({true, "recording goes on in " + closed_.path.string() + "; " +
+                                count_of(missing.steps, missing.datagrams) + " are missing"});
+  lost({.at = now, .steps = missing.steps, .datagrams = missing.datagrams, .cause = LossRecord::Cause::kDisk});
+}
+
+}  // namespace tendon

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/time.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
+
+namespace tendon {
+
+/// Records a run into as many files as it takes (part_files.h), each of them a whole recording with the scenes at its
+/// front. A new part begins
+///
+/// * when the part has reached `rotate_bytes`, or is `rotate_after` old;
+/// * when its index has 65 536 chunks, some 10 MB: the memory of a run does not grow with its length;
+/// * when the part before could not be written to (a full disk), as soon as there is room again. It begins with what is
+///   missing, as a Lost record.
+///
+/// With a budget the oldest parts are deleted before a new one begins, so that all of them together stay within it.
+///
+/// Records come in the order of Recorder. Thread-safe: no; the log thread owns it. Realtime-safe: no.
+class PartRecorder {
+ public:
+  struct Config {
+    std::filesystem::path path;
+    Recorder::Config run;
+    std::uint64_t rotate_bytes = 4'000'000'000;
+    Duration rotate_after = std::chrono::hours(4);
+    /// Of all parts that have this name, those of earlier runs too; 0: nothing is deleted. A part is then at most a
+    /// quarter of it.
+    std::uint64_t budget_bytes = 0;
+    /// From one look for room to the next, while recording has stopped.
+    Duration retry_after = std::chrono::seconds(1);
+  };
+  struct Status {
+    std::filesystem::path path;  ///< of the newest part
+    std::uint64_t parts = 0;
+    std::uint64_t bytes = 0;                  ///< in all parts of this run
+    std::uint64_t steps = 0;                  ///< likewise, or in the open chunk
+    std::uint64_t datagrams = 0;              ///< likewise
+    std::uint64_t lost_steps = 0;             ///< not recorded: the disk was full, or the log thread could not follow
+    std::uint64_t lost_datagrams = 0;         ///< likewise
+    std::uint64_t strangers_left_out = 0;     ///< on purpose, see DatagramSieve
+    std::uint64_t datagrams_over_budget = 0;  ///< likewise
+    std::string error;                        ///< why nothing is recorded now; empty while it is
+
+    /// Nothing is missing but what was left out on purpose.
+    bool complete() const noexcept { return lost_steps == 0 && lost_datagrams == 0 && error.empty(); }
+  };
+  /// What the operator should read in the log.
+  struct Notice {
+    bool warning = false;
+    std::string text;
+  };
+
+  /// Opens the first part. Throws std::runtime_error, see open_next_part. A disk that is full shows in `status()`.
+  explicit PartRecorder(const Config& config);
+  PartRecorder(const PartRecorder&) = delete;
+  PartRecorder& operator=(const PartRecorder&) = delete;
+
+  /// As those of Recorder.
+  void record(const StepRecord& step, std::size_t device = 0);
+  void record(const DatagramRecord& datagram);
+  void lost(const LossRecord& loss);
+  void tick(LocalTime now);
+  void close(LocalTime now);
+
+  Status status() const;
+  /// What happened since the last call.
+  std::vector<Notice> take_notices();
+
+ private:
+  struct Counts {
+    std::uint64_t steps = 0;
+    std::uint64_t datagrams = 0;
+  };
+
+  bool open_part(LocalTime now);
+  void look_after(LocalTime now);
+  void finish_part();
+  void stop(LocalTime now, std::string why);
+  void go_on(LocalTime now);
+
+  Config config_;
+  std::unique_ptr<FileSink> sink_;
+  std::optional<Recorder> recorder_;  ///< of the open part; empty while recording has stopped, and after `close`
+  LocalTime part_began_{};
+  Counts told_;     ///< losses that the open part was told of
+  Counts missing_;  ///< since recording stopped
+  LocalTime try_again_{};
+  Status closed_;  ///< of the parts before, and all losses that were told
+  std::vector<Notice> notices_;
+};
+
+}  // namespace tendon

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/datagram_sieve.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstddef>
+
+#include "tests/server/recording/recording_samples.h"
+
+namespace tendon {
+namespace {
+
+using testing::ms;
+using enum DatagramSieve::Sender;
+using Verdict = DatagramSieve::Verdict;
+
+TEST(DatagramSieve, RecordsTheFirstFewStrangersOfEachSecond) {
+  DatagramSieve sieve({.strangers_per_s = 3});
+  for (const int second : {0, 1, 5}) {
+    for (int i = 0; i < 1000; ++i) {
+      const auto verdict = sieve.judge(ms(1000 * second + i), kStranger, 1200);
+      EXPECT_EQ(verdict, i < 3 ? Verdict::kRecord : Verdict::kStranger) << second << " s, " << i;
+    }
+  }
+}
+
+TEST(DatagramSieve, AFloodOfStrangersLeavesAllGuestsIn) {
+  DatagramSieve sieve(DatagramSieve::Config{});
+  for (int i = 0; i < 40'000; ++i) {
+    const LocalTime now = LocalTime(i * std::chrono::microseconds(25));
+    sieve.judge(now, kStranger, 1200);
+    if (i % 40 == 0) {
+      ASSERT_EQ(sieve.judge(now, kGuest, 1200), Verdict::kRecord) << i;
+    }
+  }
+}
+
+TEST(DatagramSieve, AFloodOfAGuestIsRecordedUpToTheBudgetOfEachSecond) {
+  DatagramSieve sieve({.bytes_per_s = 10'000});
+  for (const int second : {0, 1}) {
+    std::array<int, 3> count{};
+    for (int i = 0; i < 1000; ++i) {
+      ++count[static_cast<std::size_t>(sieve.judge(ms(1000 * second + i), kGuest, 300))];
+    }
+    EXPECT_EQ(count[static_cast<std::size_t>(Verdict::kRecord)], 33) << "33 × 300 bytes are 9900";
+    EXPECT_EQ(count[static_cast<std::size_t>(Verdict::kOverBudget)], 967);
+  }
+}
+
+TEST(DatagramSieve, ADatagramLargerThanTheWholeBudgetIsLeftOut) {
+  DatagramSieve sieve({.bytes_per_s = 1000});
+  EXPECT_EQ(sieve.judge(ms(0), kGuest, 1001), Verdict::kOverBudget);
+  EXPECT_EQ(sieve.judge(ms(0), kGuest, 1000), Verdict::kRecord);
+  EXPECT_EQ(sieve.judge(ms(0), kGuest, 1), Verdict::kOverBudget);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/recording/part_recorder.h"
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "server/recording/flight_file.h"
+#include "tests/server/recording/recording_samples.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Contents;
+using testing::ms;
+using testing::sample_datagram;
+using testing::sample_step;
+using testing::ScratchFolder;
+
+PartRecorder::Config config_at(const fs::path& path) {
+  PartRecorder::Config config;
+  config.path = path;
+  config.run = testing::sample_config();
+  return config;
+}
+
+Contents read_file(const fs::path& path) {
+  RecordingReader reader(path);
+  return testing::read_all(reader);
+}
+
+/// What a run of `steps` steps from tick `first` on leaves; one tick of the log thread for each.
+void record_run(PartRecorder& recorder, std::uint64_t first, std::uint64_t steps) {
+  for (std::uint64_t tick = first; tick < first + steps; ++tick) {
+    recorder.record(sample_step(tick));
+    recorder.tick(ms(static_cast<std::int64_t>(tick)));
+  }
+}
+
+std::string whole_run(const fs::path& path, std::uint64_t steps = 10) {
+  PartRecorder recorder(config_at(path));
+  record_run(recorder, 0, steps);
+  recorder.close(ms(static_cast<std::int64_t>(steps)));
+  return recorder.status().path.filename();
+}
+
+std::set<std::string> names_in(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename());
+  return names;
+}
+
+TEST(PartFiles, ANameThatExistsIsNumberedOn) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  EXPECT_EQ(whole_run(path, 11), "run.mcap");
+  EXPECT_EQ(whole_run(path, 12), "run-2.mcap");
+  EXPECT_EQ(whole_run(path, 13), "run-3.mcap");
+  EXPECT_EQ(read_file(path).steps.size(), 11U);
+  EXPECT_EQ(read_file(folder.path() / "run-2.mcap").steps.size(), 12U);
+  fs::remove(folder.path() / "run-2.mcap");
+  EXPECT_EQ(whole_run(path), "run-4.mcap") << "the order of the numbers is that of the runs";
+  std::ofstream(folder.path() / "run-9.mcap") << "anything at all";
+  EXPECT_EQ(whole_run(path), "run-10.mcap");
+  std::ofstream(folder.path() / "run-99.fault-1.mcap") << "no part";
+  std::ofstream(folder.path() / "run-011.mcap") << "no part";
+  EXPECT_EQ(whole_run(path), "run-11.mcap");
+}
+
+TEST(PartFiles, AFileThatIsNoRecordingIsRefusedAndLeftAsItIs) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "scene.toml";
+  std::ofstream(path) << "[device]\nkind = \"simulated\"\n";
+  const auto size = fs::file_size(path);
+  try {
+    PartRecorder recorder(config_at(path));
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), "cannot write recording " + path.string() +
+                                ": there is a file of that name, which is no recording; it is left as it is");
+  }
+  EXPECT_EQ(fs::file_size(path), size);
+  EXPECT_EQ(names_in(folder.path()).size(), 1U);
+}
+
+TEST(PartFiles, ARecordingThatAnotherServerWritesIsNumberedOn) {
+  const ScratchFolder folder;
+  PartRecorder first(config_at(folder.path() / "run.mcap"));
+  PartRecorder second(config_at(folder.path() / "run.mcap"));
+  EXPECT_EQ(second.status().path.filename(), "run-2.mcap");
+}
+
+TEST(PartRecorder, EachPartIsAWholeRecordingAndNoStepIsMissing) {
+  const ScratchFolder folder;
+  PartRecorder::Config config = config_at(folder.path() / "run.mcap");
+  config.run.more_devices = {{"left", config.run.scene}};
+  config.rotate_after = std::chrono::seconds(1);
+  PartRecorder recorder(config);
+  record_run(recorder, 0, 3500);
+  recorder.close(ms(3500));
+  EXPECT_EQ(recorder.status().parts, 4U);
+  EXPECT_EQ(recorder.status().steps, 3500U);
+  EXPECT_TRUE(recorder.status().complete());
+  std::uint64_t tick = 0;
+  std::uint32_t part = 0;
+  for (const char* name : {"run.mcap", "run-2.mcap", "run-3.mcap", "run-4.mcap"}) {
+    const Contents contents = read_file(folder.path() / name);
+    EXPECT_EQ(contents.error, "");
+    EXPECT_FALSE(contents.truncated) << name;
+    ASSERT_EQ(contents.scenes.size(), 2U) << name << ", one for each device";
+    EXPECT_EQ(contents.scenes[0].text, config.run.scene.text);
+    EXPECT_EQ(contents.scenes[0].commit, config.run.scene.commit);
+    EXPECT_EQ(contents.scenes[0].part, ++part);
+    for (const StepRecord& step : contents.steps) ASSERT_EQ(step.tick, tick++);
+  }
+  EXPECT_EQ(tick, 3500U);
+}
+
+TEST(PartRecorder, APartIsNoLargerThanItMayBe) {
+  const ScratchFolder folder;
+  PartRecorder::Config config = config_at(folder.path() / "run.mcap");
+  config.rotate_bytes = 1'000'000;
+  PartRecorder recorder(config);
+  record_run(recorder, 0, 8000);
+  recorder.close(ms(8000));
+  EXPECT_GE(recorder.status().parts, 3U);
+  for (const auto& entry : fs::directory_iterator(folder.path())) EXPECT_LE(entry.file_size(), 1'000'000U);
+}
+
+TEST(PartRecorder, ABudgetDeletesItsOwnOldestPartsAndNothingElse) {
+  const ScratchFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  EXPECT_EQ(whole_run(path, 3000), "run.mcap") << "without a budget: it is kept";
+  {
+    const auto fault = open_flight(path, "");
+    FlightRecorder<StepRecord> flight(8);
+    for (std::uint64_t tick = 0; tick < 5; ++tick) flight.record(sample_step(tick));
+    write_flight(flight, config_at(path).run, *fault);
+  }
+  std::ofstream(folder.path() / "run-notes.mcap") << "somebody's";
+  PartRecorder::Config config = config_at(path);
+  config.budget_bytes = 4'000'000;
+  for (int run = 0; run < 2; ++run) {  // the parts of an earlier run count too
+    PartRecorder recorder(config);
+    for (std::uint64_t tick = 0; tick < 20'000; ++tick) {
+      recorder.record(sample_step(tick));
+      if (tick % 250 != 0) continue;
+      recorder.tick(ms(static_cast<std::int64_t>(tick)));
+      std::uint64_t bytes = 0;
+      for (const auto& entry : fs::directory_iterator(folder.path())) {
+        if (entry.path().filename().string().starts_with("run-")) bytes += entry.file_size();
+      }
+      ASSERT_LE(bytes, config.budget_bytes);
+    }
+    recorder.close(ms(20'000));
+    EXPECT_TRUE(recorder.status().complete()) << "what the budget deletes is not missing";
+    const auto notices = recorder.take_notices();
+    EXPECT_TRUE(std::ranges::any_of(notices, [](const auto& notice) {
+      return notice.text.find("deleted ") != std::string::npos &&
+             notice.text.find("budget of 4 MB") != std::string::npos;
+    }));
+  }
+  EXPECT_EQ(read_file(path).steps.size(), 3000U);
+  EXPECT_EQ(read_file(folder.path() / "run.fault-1.mcap").steps.size(), 5U);
+  EXPECT_TRUE(fs::exists(folder.path() / "run-notes.mcap"));
+  EXPECT_FALSE(fs::exists(folder.path() / "run-2.mcap"));
+}
+
+/// A disk that is full: the kernel's limit on the size of a file plays it, for the part that is open.
+class FullDisk {
+ public:
+  FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit small = before_;
+    small.rlim_cur = 1;
+    ::setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST(PartRecorder, GoesOnWhenThereIsRoomAgainAndSaysWhatIsMissing) {
+  const ScratchFolder folder;
+  PartRecorder recorder(config_at(folder.path() / "run.mcap"));
+  record_run(recorder, 0, 1000);
+  {
+    const FullDisk disk;
+    record_run(recorder, 1000, 5000);
+    recorder.record(sample_datagram(ms(6000), 100, true));
+    EXPECT_NE(recorder.status().error.find("File too large"), std::string::npos);
+    EXPECT_EQ(names_in(folder.path()), (std::set<std::string>{"run.mcap"})) << "no empty files";
+  }
+  record_run(recorder, 6000, 2000);
+  recorder.close(ms(8000));
+
+  const PartRecorder::Status status = recorder.status();
+  EXPECT_EQ(status.error, "");
+  EXPECT_FALSE(status.complete());
+  const Contents first = read_file(folder.path() / "run.mcap");
+  const Contents second = read_file(folder.path() / "run-2.mcap");
+  EXPECT_TRUE(first.truncated);
+  EXPECT_FALSE(second.truncated);
+  EXPECT_EQ(first.steps.size() + second.steps.size(), status.steps);
+  EXPECT_EQ(status.steps + status.lost_steps, 8000U);
+  ASSERT_FALSE(second.steps.empty());
+  EXPECT_LE(second.steps.front().tick, 7001U) << "within a second";
+  ASSERT_EQ(second.losses.size(), 1U);
+  EXPECT_EQ(second.losses[0].cause, LossRecord::Cause::kDisk);
+  EXPECT_EQ(second.losses[0].steps, second.steps.front().tick - first.steps.back().tick - 1);
+  EXPECT_EQ(second.losses[0].steps, status.lost_steps);
+  EXPECT_EQ(second.losses[0].datagrams, 1U);
+
+  std::string said;
+  for (const auto& notice : recorder.take_notices()) said += notice.text + "\n";
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 2) << said;
+  EXPECT_NE(said.find("recording has stopped, the device runs on: cannot write recording "), std::string::npos) << said;
+  EXPECT_NE(said.find("recording goes on in " + (folder.path() / "run-2.mcap").string() + "; " +
+                      std::to_string(status.lost_steps) + " steps and 1 datagrams are missing"),
+            std::string::npos)
+      << said;
+}
+
+TEST(PartRecorder, OnADeviceWithoutSpaceCountsEverythingAndSaysSoOnce) {
+  PartRecorder recorder(config_at("/dev/full"));
+  record_run(recorder, 0, 5000);
+  recorder.close(ms(5000));
+  EXPECT_EQ(recorder.status().error, "cannot write recording /dev/full: No space left on device");
+  EXPECT_EQ(recorder.status().lost_steps, 5000U);
+  EXPECT_FALSE(recorder.status().complete());
+  EXPECT_EQ(recorder.take_notices().size(), 1U);
+}
+
+TEST(PartRecorder, HoldsNoMoreMemoryAfterADayThanAfterTwoHours) {
+  PartRecorder::Config config = config_at("/dev/null");
+  config.rotate_after = std::chrono::hours(1);
+  PartRecorder recorder(config);
+  const auto held = [] {
+    const auto heap = ::mallinfo2();
+    return static_cast<double>(heap.uordblks + heap.hblkhd);
+  };
+  double after_two_hours = 0;
+  for (std::int64_t quarter = 0; quarter < std::int64_t{4} * 86'400; ++quarter) {  // a flush each
+    StepRecord step = sample_step(1);
+    step.hand.at = ms(250 * quarter);
+    recorder.record(step);
+    recorder.tick(ms(250 * quarter + 249));
+    if (quarter == std::int64_t{8} * 3600 - 10) after_two_hours = held();
+  }
+  EXPECT_GE(recorder.status().parts, 23U);
+  // Both at the end of an hour; a chunk's index takes some 150 bytes.
+  EXPECT_NEAR(held(), after_two_hours, 100e3);
+}
+
+}  // namespace
+}  // namespace tendon
