@@ -202,7 +202,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
               (*recording == wanted ? "" : ": there is a " + wanted.string() + " already"));
   }
   if (json) {
-    nlohmann::ordered_json listening = {{"event", "listening"}, {"address", to_string(server.address())}};
+    Json listening = {{"event", "listening"}, {"address", to_string(server.address())}};
     if (recording) listening["recording"] = recording->string();
     print(listening);
   }

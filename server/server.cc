@@ -159,11 +159,12 @@ NetworkLoop::Config Server::network_config(const Lanes& lanes) {
 Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
       guardian_(make_guardian(scenes)),
-      recorder_(recorder_of(scenes, started_)),
       lanes_(lanes_of(scenes, guardian_.get())),
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       network_(network_config(lanes_), link_, mail_of(lanes_)),
-      tell_next_(started_ + kTellPeriod) {}
+      tell_next_(started_ + kTellPeriod) {
+  recorder_ = recorder_of(scenes, started_);  // last: what is refused before leaves no file behind
+}
 
 std::optional<std::filesystem::path> Server::recording() const {
   return recorder_ ? std::optional(recorder_->status().path) : std::nullopt;

@@ -110,12 +110,12 @@ class Server {
   void save_flight(Lane& lane);
 
   LocalTime started_;
-  std::unique_ptr<Guardian> guardian_;      ///< of real devices; null when there are none
-  std::unique_ptr<PartRecorder> recorder_;  ///< null when the scene records nothing
+  std::unique_ptr<Guardian> guardian_;  ///< of real devices; null when there are none
   Lanes lanes_;
   UdpLink link_;
   Doorbell stepped_;
   NetworkLoop network_;
+  std::unique_ptr<PartRecorder> recorder_;  ///< null when the scene records nothing
 
   // What run_log has told the operator already.
   std::uint64_t told_datagrams_lost_ = 0;

@@ -43,7 +43,7 @@ DeviceReport report(const Health& before, const Health& now) {
   const auto counted = std::accumulate(report.lateness.begin(), report.lateness.end(), std::uint64_t{0});
   say(now.not_realtime, "the kernel refused the haptic thread real time");
   say(counted < report.steps, "the log thread does not follow");
-  say(now.recording_ended, "the recording has ended");
+  say(now.recording_ended, "recording has stopped");
   // Than limiter.bounded_acceleration allows. Short, because all four sentences have to fit (limits::kMaxDetail).
   say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
   return report;

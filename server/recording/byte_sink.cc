@@ -11,6 +11,8 @@
 #include <system_error>
 #include <utility>
 
+#include "server/machine/regular_file.h"
+
 namespace tendon {
 namespace {
 
@@ -40,10 +42,8 @@ FileSink::Opened FileSink::open(const std::filesystem::path& path) {
     if (descriptor >= 0) ::close(descriptor);
     fail(why);
   };
-  if (known && !S_ISREG(status.st_mode) && !S_ISCHR(status.st_mode) && !S_ISDIR(status.st_mode)) {
-    give_up(std::string("it is ") +
-            (S_ISFIFO(status.st_mode) ? "a pipe" : (S_ISSOCK(status.st_mode) ? "a socket" : "a block device")) +
-            ", expected a file");
+  if (known && !S_ISCHR(status.st_mode)) {
+    if (const auto why = why_not_regular(status.st_mode)) give_up(*why);
   }
   if (descriptor < 0) fail(reason(error));
   if (!known) give_up(reason(errno));

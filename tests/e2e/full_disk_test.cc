@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A disk that is full ends the recording, not the run.
+// A disk that is full stops the recording, not the run; with room again it goes on. The exit code says that something is
+// missing.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 
 #include <cerrno>
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <system_error>
 
@@ -17,12 +21,12 @@ namespace {
 
 using testing::ScratchFolder;
 
-/// A file system of 1 MB in memory; needs the right to mount. Gone at the end of the test.
+/// A file system of `size` in memory; needs the right to mount. Gone at the end of the test.
 class SmallDisk {
  public:
-  explicit SmallDisk(std::filesystem::path path) : path_(std::move(path)) {
+  SmallDisk(std::filesystem::path path, const std::string& size) : path_(std::move(path)) {
     std::filesystem::create_directory(path_);
-    if (::mount("tendon-test", path_.c_str(), "tmpfs", 0, "size=1m") != 0) error_ = errno;
+    if (::mount("tendon-test", path_.c_str(), "tmpfs", 0, ("size=" + size).c_str()) != 0) error_ = errno;
   }
   ~SmallDisk() {
     // Lazily, so that it goes even when a program that was not stopped still writes to it.
@@ -33,6 +37,10 @@ class SmallDisk {
 
   const std::filesystem::path& path() const noexcept { return path_; }
   int error() const noexcept { return error_; }
+  std::string why_not() const {
+    return "may not mount a small tmpfs here (" + std::system_category().message(error_) +
+           "); run as root to test what a full disk does";
+  }
 
  private:
   std::filesystem::path path_;
@@ -42,24 +50,22 @@ class SmallDisk {
 void expect_the_device_to_run_on(Server& server, Process& echo, std::uint64_t after_tick) {
   while (count_in(echo.wait_for_line(R"("tick")"), "tick") < after_tick + 500) {
   }
-  const std::string end = server.stop();
+  const std::string end = server.stop(SIGTERM, 1);
+  EXPECT_NE(server.process().err().find("the recording is not whole: "), std::string::npos) << server.process().err();
   EXPECT_NE(end.find(R"("recording_ended_early":true)"), std::string::npos) << end;
   EXPECT_EQ(count_in(end, "recorded_steps") + count_in(end, "lost_steps"), count_in(end, "steps"));
   EXPECT_EQ(count_in(end, "fault"), 0U);
 }
 
-TEST(FullDisk, EndsTheRecordingAndNotTheRunAndTheFileStillReads) {
+TEST(FullDisk, StopsTheRecordingAndNotTheRunAndTheFileStillReads) {
   const ScratchFolder folder;
-  const SmallDisk disk(folder.path() / "disk");
-  if (disk.error() != 0) {
-    GTEST_SKIP() << "may not mount a small tmpfs here (" << std::system_category().message(disk.error())
-                 << "); run as root to test what a full disk does";
-  }
+  const SmallDisk disk(folder.path() / "disk", "1m");
+  if (disk.error() != 0) GTEST_SKIP() << disk.why_not();
   const auto file = disk.path() / "run.mcap";
   Server server(folder.path(), demo_scene(), {"--record", file.string()});
   Client wall("virtual_wall", server.address(), folder.path());
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
-  const std::string told = server.process().wait_for_line("recording has ended, the device runs on");
+  const std::string told = server.process().wait_for_line("recording has stopped, the device runs on");
   EXPECT_NE(told.find("cannot write recording " + file.string() + ": No space left on device"), std::string::npos)
       << told;
 
@@ -71,10 +77,36 @@ TEST(FullDisk, EndsTheRecordingAndNotTheRunAndTheFileStillReads) {
   EXPECT_EQ(read_recording(file).steps.size(), recording.steps.size());
 }
 
+TEST(FullDisk, ThatHasRoomAgainIsRecordedToAgainAndSaysWhatIsMissing) {
+  const ScratchFolder folder;
+  const SmallDisk disk(folder.path() / "disk", "24m");
+  if (disk.error() != 0) GTEST_SKIP() << disk.why_not();
+  const auto ballast = disk.path() / "ballast";
+  std::ofstream(ballast) << std::string(std::size_t{23} << 20, 'x');
+  Server server(folder.path(), demo_scene(), {"--record", (disk.path() / "run.mcap").string()});
+  Client wall("virtual_wall", server.address(), folder.path());
+  server.process().wait_for_line("recording has stopped, the device runs on");
+  std::filesystem::remove(ballast);
+  server.process().wait_for_line("recording goes on in " + (disk.path() / "run-2.mcap").string() + "; ");
+  Client echo("echo_motion", server.address(), folder.path(), {"--json"});
+  const std::uint64_t tick = count_in(echo.wait_for_line(R"("tick")"), "tick");
+  while (count_in(echo.wait_for_line(R"("tick")"), "tick") < tick + 500) {
+  }
+  const std::string end = server.stop(SIGTERM, 1);
+  EXPECT_NE(end.find(R"("recording_ended_early":false)"), std::string::npos) << end;
+  EXPECT_EQ(count_in(end, "recorded_parts"), 2U);
+  const Recording first = read_recording(disk.path() / "run.mcap");
+  const Recording second = read_recording(disk.path() / "run-2.mcap");
+  EXPECT_EQ(first.steps.size() + second.steps.size() + count_in(end, "lost_steps"), count_in(end, "steps"));
+  EXPECT_GT(count_in(end, "lost_steps"), 0U);
+  EXPECT_FALSE(second.truncated);
+  EXPECT_EQ(second.losses, 1U);
+}
+
 TEST(FullDisk, FromTheFirstByteIsToldAtOnce) {
   const ScratchFolder folder;
   Server server(folder.path(), demo_scene(), {"--record", "/dev/full"});
-  server.process().wait_for_line("recording has ended, the device runs on: cannot write recording /dev/full: No space");
+  server.process().wait_for_line("recording has stopped, the device runs on: cannot write recording /dev/full: No space");
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
   expect_the_device_to_run_on(server, echo, count_in(echo.wait_for_line(R"("tick")"), "tick"));
 }

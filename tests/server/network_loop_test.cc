@@ -658,7 +658,7 @@ TEST_F(SealedServer, TellsAnObserverThatAsksWhatIsWantedAndOnceASecondHowTheLoop
   EXPECT_EQ(report.unseen, 3U);
   EXPECT_EQ(report.safety, Safety::kFault);
   EXPECT_EQ(report.fault, "the handle was faster than a hand");
-  EXPECT_EQ(report.degraded, "the recording has ended");
+  EXPECT_EQ(report.degraded, "recording has stopped");
 
   ASSERT_EQ(b.client->peer_reports().size(), 1U);
   const PeerReport& peer = b.client->peer_reports().front();

@@ -70,11 +70,11 @@ Service::Service(const std::string& name, std::vector<std::string> arguments, co
                folder, std::move(more_environment)),
       address_(text_in(process_.wait_for_line("\"event\":\"" + event + '"'), key)) {}
 
-std::string Service::stop(int signal) {
+std::string Service::stop(int signal, int exit_code) {
   process_.signal(signal);
   const int code = process_.wait();
   std::string said = process_.out();
-  if (code != 0) throw std::runtime_error("exit code " + std::to_string(code) + ", stderr:\n" + process_.err());
+  if (code != exit_code) throw std::runtime_error("exit code " + std::to_string(code) + ", stderr:\n" + process_.err());
   if (said.ends_with('\n')) said.pop_back();
   return said.substr(said.rfind('\n') + 1);
 }
@@ -94,7 +94,10 @@ Recording read_recording(const std::filesystem::path& file) {
   RecordingReader reader(file);
   while (const auto record = reader.next()) {
     if (const auto* step = std::get_if<StepRecord>(&*record)) recording.steps.push_back(*step);
-    if (std::holds_alternative<LossRecord>(*record)) ++recording.losses;
+    if (const auto* loss = std::get_if<LossRecord>(&*record)) {
+      recording.strangers_left_out += loss->strangers;
+      recording.losses += loss->steps + loss->datagrams > 0 ? 1U : 0U;
+    }
     if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) {
       if (datagram->direction == DatagramRecord::Direction::kIn) recording.arrived.push_back(*datagram);
     }

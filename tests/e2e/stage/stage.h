@@ -62,8 +62,8 @@ class Service {
   const std::string& address() const noexcept { return address_; }
   Process& process() noexcept { return process_; }
 
-  /// SIGTERM; the last line on stdout. Throws std::runtime_error when the exit code is not 0.
-  std::string stop(int signal = SIGTERM);
+  /// SIGTERM; the last line on stdout. Throws std::runtime_error when the exit code is another one.
+  std::string stop(int signal = SIGTERM, int exit_code = 0);
 
  private:
   Process process_;
@@ -95,7 +95,8 @@ void watch_force(Process& echo, Enough enough) {
 struct Recording {
   std::vector<StepRecord> steps;
   std::vector<DatagramRecord> arrived;  ///< of the datagrams, those that came in
-  std::uint64_t losses = 0;             ///< reports of records that are missing
+  std::uint64_t losses = 0;             ///< reports of records that are missing, and not left out on purpose
+  std::uint64_t strangers_left_out = 0;
   bool truncated = false;
 };
 Recording read_recording(const std::filesystem::path& file);

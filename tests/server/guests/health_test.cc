@@ -163,7 +163,7 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   now.broken_assumptions = 1;
   const std::string degraded = report({}, now).degraded;
   EXPECT_EQ(degraded,
-            "the kernel refused the haptic thread real time; the log thread does not follow; the recording has ended; "
+            "the kernel refused the haptic thread real time; the log thread does not follow; recording has stopped; "
             "accelerates too hard");
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
 }

@@ -105,9 +105,9 @@ TEST(FileSink, RefusesWhatIsNoFileAndDoesNotHang) {
     return std::string();
   };
   const std::string cannot = "cannot write recording ";
-  EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a pipe, expected a file");
+  EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a named pipe, expected a regular file");
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
-  EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a pipe, expected a file") << "that somebody reads";
+  EXPECT_EQ(refusal(pipe), cannot + pipe.string() + ": it is a named pipe, expected a regular file") << "with a reader";
   ::close(reader);
   EXPECT_EQ(refusal(folder.path()), cannot + folder.path().string() + ": Is a directory");
 }

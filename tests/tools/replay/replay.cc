@@ -46,22 +46,28 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
   return settings.empty() ? recorded : parse(settings);
 }
 
-/// Reads the recording once; `visit` has every step, as it was and as it is again. The first record is the scene.
+/// Reads the parts of the recording once; `visit` has every step, as it was and as it is again. The first record of each
+/// part is the scene; that of the first part is run.
 template <class Visit, class VisitDatagram>
 Gaps read_run(const Options& options, Rerun::Held held, const Visit& visit, const VisitDatagram& visit_datagram) {
   Gaps gaps;
   std::optional<Rerun> rerun;
-  RecordingReader reader(options.recording);
-  while (const auto record = reader.next()) {
-    if (const auto* scene = std::get_if<SceneRecord>(&*record)) rerun.emplace(control_of(*scene, options), held);
-    if (const auto* loss = std::get_if<LossRecord>(&*record)) {
-      gaps.lost_steps += loss->steps;
-      gaps.lost_datagrams += loss->datagrams;
+  const auto read_part = [&](const std::filesystem::path& file) {
+    RecordingReader reader(file);
+    while (const auto record = reader.next()) {
+      const auto* scene = std::get_if<SceneRecord>(&*record);
+      if (scene != nullptr && !rerun) rerun.emplace(control_of(*scene, options), held);
+      if (const auto* loss = std::get_if<LossRecord>(&*record)) {
+        gaps.lost_steps += loss->steps;
+        gaps.lost_datagrams += loss->datagrams;
+      }
+      if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) visit_datagram(*datagram);
+      if (const auto* step = std::get_if<StepRecord>(&*record)) visit(*step, rerun->step(*step));
     }
-    if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) visit_datagram(*datagram);
-    if (const auto* step = std::get_if<StepRecord>(&*record)) visit(*step, rerun->step(*step));
-  }
-  gaps.truncated = reader.truncated();
+    gaps.truncated = gaps.truncated || reader.truncated();
+  };
+  read_part(options.recording);
+  for (const std::filesystem::path& part : options.more_parts) read_part(part);
   return gaps;
 }
 

@@ -12,6 +12,7 @@ namespace tendon::replay {
 /// `tendon-replay`: a recording through the control law again.
 struct Options {
   std::filesystem::path recording;
+  std::vector<std::filesystem::path> more_parts = {};  ///< of the same run, in order: run-2.mcap, run-3.mcap …
   /// Another law, of core/control/limiter.h: of the scene's limiter it takes over the friction bounds only.
   std::optional<std::string> law = {};
   std::vector<std::string> settings = {};  ///< "TABLE.KEY=VALUE", as `parse_scene` takes them; after `law`
@@ -23,7 +24,7 @@ struct Options {
   bool progress = false;  ///< to stderr, a line that is written over
 };
 
-/// Reads the recording of one device (of several: the first) and takes every step of it again, in bounded memory.
+/// Reads the recording, with its parts as one run, of one device (of several: the first) and takes every step of it again, in bounded memory.
 ///
 /// Without `law` and `settings` the scene that was recorded is run, each step with what the device held then, and
 /// whatever the law decides has to be the same bit for bit: interval, account, bound, force, mode, reasons. Returns

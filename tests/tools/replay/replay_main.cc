@@ -36,6 +36,9 @@ int main(int argc, char** argv) {
       ->type_name("FILE.mcap")
       ->required()
       ->check(CLI::ExistingFile.description(""));
+  app.add_option("PART", parts, "the parts that follow it, in order: run-2.mcap run-3.mcap")
+      ->type_name("FILE.mcap")
+      ->check(CLI::ExistingFile.description(""));
   app.add_option("--law", law, "another limiter, with the scene's friction bounds: " + names)->type_name("NAME");
   app.add_option("--set", options.settings,
                  "another value in the scene: limiter.kind=aol, force.max_force_n=2; without a "
@@ -49,6 +52,7 @@ int main(int argc, char** argv) {
   app.footer(
       "\nExamples\n"
       "  tendon-replay run.mcap                          is what was recorded what the law decides?\n"
+      "  tendon-replay run.mcap run-2.mcap               … of a long run, which has parts\n"
       "  tendon-replay run.mcap --law aol --out both.png  what would the law of 2009 have permitted?\n"
       "\nExit: 0 done; 1 a step differs (it is named), or a file cannot be read or written; 2 wrong usage.");
 
@@ -59,6 +63,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     options.recording = recording;
+    options.more_parts.assign(parts.begin(), parts.end());
     options.files = files;
     if (!law.empty()) options.law = law;
     if (!csv.empty()) options.csv = csv;

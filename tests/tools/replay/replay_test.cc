@@ -117,6 +117,19 @@ TEST(Replay, AfterAGapItComparesNothingAndSaysSo) {
       << outcome.said;
 }
 
+TEST(Replay, PartsOfARunAreComparedAsOne) {
+  const ScratchFolder folder;
+  const std::vector<StepRecord> steps = tapping();
+  const auto first = write(folder.path() / "run.mcap", {steps.begin(), steps.begin() + 700});
+  const auto second = write(folder.path() / "run-2.mcap", {steps.begin() + 700, steps.begin() + 1200});
+  const auto third = write(folder.path() / "run-3.mcap", {steps.begin() + 1200, steps.end()});
+  const Outcome outcome = run({.recording = first, .more_parts = {second, third}});
+  EXPECT_TRUE(outcome.held);
+  EXPECT_TRUE(contains(outcome.said, "2000 of 2000 steps are the same bit for bit\n")) << outcome.said;
+  const Outcome gap = run({.recording = first, .more_parts = {third}});
+  EXPECT_TRUE(contains(gap.said, "there is a gap before step 1201")) << gap.said;
+}
+
 TEST(Replay, OfARecordingThatBeginsInTheMiddleNothingCanBeCompared) {
   const ScratchFolder folder;
   std::vector<StepRecord> steps = tapping();

@@ -82,6 +82,7 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, co
   });
   world.run_for(from_seconds(length));
 
+  std::filesystem::remove(out);  // of an earlier test run
   FileSink sink(out);
   sink.append(world.finish_recording());
   return outcome;

@@ -96,6 +96,7 @@ TEST_F(Report, AFlippedBitIsReportedByFileAndPlaceAndNothingIsPrinted) {
 
 TEST_F(Report, ARecordingWithoutAStepIsNoRun) {
   {
+    std::filesystem::remove(on_);
     FileSink sink(on_);
     Recorder recorder({}, sink);
     recorder.close();
