@@ -13,7 +13,8 @@ namespace tendon {
 namespace {
 
 bool is(const McapReader::Channel& channel, const recording::Channel& kind) {
-  return channel.schema_name == kind.schema && channel.message_encoding == recording::kEncoding;
+  return channel.topic == kind.topic && channel.schema_name == kind.schema &&
+         channel.message_encoding == recording::kEncoding;
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ namespace tendon {
 /// A recording that was cut off anywhere gives every record of its whole chunks. Corruption, a file that is not MCAP,
 /// and one that is not a Tendon recording throw std::runtime_error with the file's name and, where it applies, the
 /// byte offset; records before a corruption have been given. Channels that Tendon does not know are skipped.
+/// So are the scenes and steps of devices besides the first.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class RecordingReader {

@@ -106,7 +106,8 @@ TEST(FullDisk, ThatHasRoomAgainIsRecordedToAgainAndSaysWhatIsMissing) {
 TEST(FullDisk, FromTheFirstByteIsToldAtOnce) {
   const ScratchFolder folder;
   Server server(folder.path(), demo_scene(), {"--record", "/dev/full"});
-  server.process().wait_for_line("recording has stopped, the device runs on: cannot write recording /dev/full: No space");
+  server.process().wait_for_line(
+      "recording has stopped, the device runs on: cannot write recording /dev/full: No space");
   Client echo("echo_motion", server.address(), folder.path(), {"--json"});
   expect_the_device_to_run_on(server, echo, count_in(echo.wait_for_line(R"("tick")"), "tick"));
 }

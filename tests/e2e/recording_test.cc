@@ -125,8 +125,8 @@ TEST(Recordings, AFloodOfHellosIsASampleAndACountAndCostsNoStep) {
   const Recording recording = read_recording(file);
   EXPECT_EQ(recording.steps.size(), count_in(end, "steps"));
   EXPECT_EQ(count_in(end, "lost_steps") + count_in(end, "lost_datagrams"), 0U);
-  const auto strangers = static_cast<double>(
-      std::ranges::count(recording.arrived, stranger.local_address(), &DatagramRecord::peer));
+  const auto strangers =
+      static_cast<double>(std::ranges::count(recording.arrived, stranger.local_address(), &DatagramRecord::peer));
   EXPECT_GT(strangers, 0);
   EXPECT_LE(strangers, 16 * (number_in(end, "uptime_s") + 2));
   EXPECT_GT(count_in(end, "strangers_left_out"), 1000U);

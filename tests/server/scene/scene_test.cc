@@ -74,6 +74,32 @@ void write(const std::filesystem::path& file, std::string_view text) { std::ofst
 
 ScriptedMotion::Point target(const Scene& scene, double t) { return scene.simulated().hand->motion.at(t); }
 
+// What a recording holds: the scene as it ran, command line and all.
+TEST(Scene, WithSettingsItsTextIsTheSceneThatTheyMake) {
+  const Scene as_written = read_scene(std::string(TENDON_SCENES) + "/demo.toml");
+  const Friction friction = as_written.loop.control.limiter.friction;
+  const auto settings = limiter_settings("none", friction);
+  const Scene changed = parse_scene(as_written.text, "demo.toml", TENDON_SCENES, settings);
+  EXPECT_EQ(changed.loop.control.limiter.law, Law::kNone);
+  EXPECT_EQ(changed.loop.control.limiter.friction.coulomb, friction.coulomb);
+  EXPECT_EQ(changed.loop.control.limiter.friction.viscous, friction.viscous);
+  const Scene again = parse_scene(changed.text, "demo.toml", TENDON_SCENES);
+  EXPECT_EQ(again.text, changed.text);
+  EXPECT_EQ(again.loop.control.limiter.law, Law::kNone);
+  EXPECT_EQ(again.loop.control.limiter.friction.coulomb, friction.coulomb);
+  EXPECT_EQ(again.loop.control.max_force, as_written.loop.control.max_force);
+  EXPECT_EQ(again.device.mass, as_written.device.mass);
+}
+
+TEST(Scene, TheTextThatSettingsMakeHasAllDigits) {
+  const double odd = 0.1 + 0.2;
+  const Scene changed =
+      parse_scene(kMinimal, "s.toml", {}, limiter_settings("aol", {.coulomb = odd / 100, .viscous = odd / 70}));
+  const Scene again = parse_scene(changed.text, "s.toml", {});
+  EXPECT_EQ(again.loop.control.limiter.friction.coulomb, odd / 100);
+  EXPECT_EQ(again.loop.control.limiter.friction.viscous, odd / 70);
+}
+
 // --- Good scenes --------------------------------------------------------------------------------------
 
 TEST(Scene, TakesWhatItDoesNotSayFromTheProfileAndTheStructs) {
@@ -168,6 +194,10 @@ observer_timeout_ms = 2500
 adapt_state_rate = true
 [recording]
 path = "run.mcap"
+rotate_mb = 50
+rotate_min = 90
+budget_mb = 200.5
+datagrams_kb_per_s = 100
 )");
   EXPECT_EQ(scene.simulated().start_position, Vec3(0.001, -0.0025, 0.003));
   EXPECT_EQ(scene.simulated().mass, 0.1);
@@ -210,6 +240,10 @@ path = "run.mcap"
   EXPECT_TRUE(scene.network.adapt_state_rate);
   ASSERT_TRUE(scene.recording);
   EXPECT_EQ(scene.recording->path, "run.mcap");
+  EXPECT_DOUBLE_EQ(scene.recording->rotate_bytes, 50e6);
+  EXPECT_DOUBLE_EQ(scene.recording->rotate_after, 5400);
+  EXPECT_DOUBLE_EQ(scene.recording->budget_bytes.value(), 200.5e6);
+  EXPECT_DOUBLE_EQ(scene.recording->datagram_bytes_per_s, 100e3);
 }
 
 TEST(Scene, ReadsAMotionOfRampAndHold) {
@@ -855,7 +889,9 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
   expect_errors({
       {"profil = \"falcon\"\n", "s.toml:4: device.profil: unknown key; did you mean profile?"},
       {"[limitre]\n", "s.toml:4: limitre: unknown table; did you mean limiter?"},
-      {"[recording]\nfilename = \"x\"\n", "s.toml:5: recording.filename: unknown key; known here: path"},
+      {"[recording]\nfilename = \"x\"\n",
+       "s.toml:5: recording.filename: unknown key; known here: path, rotate_mb, rotate_min, "
+       "budget_mb, datagrams_kb_per_s"},
       {"[device.gravity]\n",
        "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +

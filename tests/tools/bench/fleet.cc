@@ -480,6 +480,7 @@ class Host {
     const Key secret = secrets_.next();
     std::copy(secret.bytes().begin(), secret.bytes().end(), config.secret.begin());
     config.max_observers = 1000;
+    config.recorded.bytes_per_s = UINT64_MAX;  // run_log counts all
     std::vector<Mailboxes*> mail;
     for (std::size_t d = server * limits::kMaxDevices; d < std::min(fleet_.devices, (server + 1) * limits::kMaxDevices);
          ++d) {

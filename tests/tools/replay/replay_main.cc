@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
 
   tendon::replay::Options options;
   std::string recording;
+  std::vector<std::string> parts;
   std::string law;
   std::string files;
   std::string csv;
