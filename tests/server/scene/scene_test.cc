@@ -88,7 +88,7 @@ TEST(Scene, WithSettingsItsTextIsTheSceneThatTheyMake) {
   EXPECT_EQ(again.loop.control.limiter.law, Law::kNone);
   EXPECT_EQ(again.loop.control.limiter.friction.coulomb, friction.coulomb);
   EXPECT_EQ(again.loop.control.max_force, as_written.loop.control.max_force);
-  EXPECT_EQ(again.device.mass, as_written.device.mass);
+  EXPECT_EQ(again.simulated().mass, as_written.simulated().mass);
 }
 
 TEST(Scene, TheTextThatSettingsMakeHasAllDigits) {
