@@ -15,7 +15,7 @@ namespace tendon {
 /// * Guests are recorded whole, up to `bytes_per_s` in each second. The default is 10 times what an engine at 1 kHz and
 ///   an observer need.
 ///
-/// What is left out is for the caller to count. A second begins with the first datagram after the last second.
+/// The caller counts what is left out. A second begins with the first datagram after the last second.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class DatagramSieve {

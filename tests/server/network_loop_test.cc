@@ -982,7 +982,7 @@ Recorded take_recorded(Mailboxes& mail, const Address& guest) {
   return recorded;
 }
 
-TEST_F(SealedServer, AFloodOfStrangersIsRecordedAsASampleAndACountAndGuestsWhole) {
+TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
   Client client = controller(wall_, "198.51.100.1:1000");
   run(milliseconds(500), {&client});
   take_recorded(*mail_, client.end->self);
