@@ -5,6 +5,7 @@ state, sends the force that comes back, and begins again when the server is gone
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -157,7 +158,8 @@ class Stats:
     states_foretold: int = 0  # handed out without that they came in
     states_skipped: int = 0  # of these that came in, replaced by a newer one before they were due
     forces: int = 0  # forces sent
-    forces_unusable: int = 0  # forces not sent: not finite, or out of bounds
+    forces_unusable: int = 0  # forces not sent: not finite, out of bounds, or to a state that did not come
+    unusable: str = ""  # what was wrong with the newest of them; empty: none
     forces_alike: int = 0  # forces not sent: a hand could not have told them from the one before
     lease_lost_to: str = ""  # name of the one that has taken the channel from us; empty: nobody
 
@@ -235,10 +237,34 @@ class ForceClient:
         elif self.phase in _WAITING and now >= self._retry:
             self._greet(now)
 
+    def _objection(
+        self,
+        hand: DeviceState,
+        touch: Touch,
+        force: Vec3,
+        stiffness: tuple[Vec3, Vec3, Vec3] | None,
+        contact: Contact | None,
+    ) -> str:
+        """Why an answer cannot be used; empty: it can."""
+        if not 0 < hand.tick <= max(self._seen_tick, self._newest.tick if self._newest else 0):
+            return f"it answers tick {hand.tick}, which has not come"
+        if not all(map(math.isfinite, force)):
+            return "the force is not finite (NaN or infinity)"
+        if not _usable(force):
+            return f"the force is beyond {limits.MAX_VALUE:g} N"
+        if (
+            (stiffness is not None and not all(map(_usable, stiffness)))
+            or (contact is not None and not codec.is_contact(contact))
+            or not codec.is_radius(touch.valid_radius)
+            or (touch.error is not None and not 0 <= touch.error <= limits.MAX_VALUE)
+        ):
+            return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md"
+        return ""
+
     def send(self, hand: DeviceState, touch: Touch) -> None:
-        """Answers a state. What has a number that is not finite, or out of bounds, is counted and not sent;
-        the server then treats this client as one that is late. While another one holds the channel, nothing is
-        sent. Raises ValueError when it has a wrong shape, PermissionError for an observer.
+        """Answers a state. An answer with a number that is not finite or out of bounds, or to a state that did not
+        come in this session, is counted and not sent (`stats.unusable` says why); the server then treats this client
+        as one that is late. While another one holds the channel, nothing is sent. Raises ValueError when it has a wrong shape, PermissionError for an observer.
 
         Take a fresh `now` before the next call: the datagram's time stamp must not be older than the physics' work.
         """
@@ -250,14 +276,10 @@ class ForceClient:
         session = self._session
         if session is None or self.welcome is None or not self.holds:
             return
-        if not (
-            _usable(force)
-            and (stiffness is None or all(map(_usable, stiffness)))
-            and (contact is None or codec.is_contact(contact))
-            and codec.is_radius(touch.valid_radius)
-            and (touch.error is None or 0 <= touch.error <= limits.MAX_VALUE)
-        ):
+        objection = self._objection(hand, touch, force, stiffness, contact)
+        if objection:
             self._stats.forces_unusable += 1
+            self._stats.unusable = objection
             return
         alike = self._deadband is not None and not self._deadband.passes(session.latest, force)
         if alike and not touch.topology_changed:

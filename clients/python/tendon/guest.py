@@ -64,6 +64,7 @@ class Guest:
         self.clock = clock
         self._doubt = "is tendond running there" + (", and does it know our key" if config.key else "")
         self._said = ""
+        self._said_unusable = ""
         self._told: LinkReport | None = None
 
     def turn(self, now: int) -> None:
@@ -157,6 +158,10 @@ class Guest:
             self._told = report
             if report.words:
                 log.warning("the server says: %s", report.words)
+        unusable = self.core.stats.unusable
+        if unusable and unusable != self._said_unusable:
+            self._said_unusable = unusable
+            log.warning("a force is not sent: %s", unusable)
         sentence = self._sentence()
         if sentence and sentence != self._said:
             self._said = sentence

@@ -387,6 +387,21 @@ def test_a_force_that_is_not_usable_is_counted_and_not_sent(touch):
     stage.run(1 * SECOND)
     assert stage.forces == []
     assert stage.client.stats.forces_unusable == len(stage.seen) > 50
+    finite = all(abs(component) < inf for component in touch.force)  # NaN is not
+    assert ("the force is not finite" in stage.client.stats.unusable) is not finite
+
+
+def test_an_answer_to_a_state_that_did_not_come_is_not_sent():
+    stage = Stage(Config(rate_hz=100))
+    stage.run(SECOND // 2)
+    sent = len(stage.forces)
+    hand = replace(stage.seen[-1], tick=stage.seen[-1].tick + 1000)
+    stage.client.send(hand, Touch((1, 0, 0)))
+    assert stage.client.stats.unusable == f"it answers tick {hand.tick}, which has not come"
+    stage.client.send(stage.seen[-1], Touch((0, -2e12, 0)))
+    assert stage.client.stats.unusable == "the force is beyond 1e+12 N"
+    assert stage.client.stats.forces_unusable == 2
+    assert len(stage.forces) == sent
 
 
 @pytest.mark.parametrize("touch", [Touch((1, 2)), Touch((1, 2, 3), (1, 2)), Touch(7), Touch(("a", 0, 0))])
