@@ -22,6 +22,8 @@ export interface ConnectConfig extends ClientConfig {
   readonly onPhase?: (guest: Guest) => void;
   /** Told of each report of the server. */
   readonly onReport?: (report: LinkReport) => void;
+  /** Told, once for each new reason, why a force of the callback was not sent. */
+  readonly onUnusable?: (why: string) => void;
 }
 
 /** A guest in real time. */
@@ -77,6 +79,8 @@ class RealTimeGuest implements Guest {
   readonly #transport: Transport;
   readonly #onPhase: ((guest: Guest) => void) | undefined;
   readonly #onReport: ((report: LinkReport) => void) | undefined;
+  readonly #onUnusable: ((why: string) => void) | undefined;
+  #unusable = "";
   #told: LinkReport | undefined;
   readonly #defer: (task: () => void) => void;
   #resolve!: () => void;
@@ -98,6 +102,7 @@ class RealTimeGuest implements Guest {
     });
     this.#onPhase = config.onPhase;
     this.#onReport = config.onReport;
+    this.#onUnusable = config.onUnusable;
     this.#defer = makeDefer();
     this.#client = new ForceClient(config, callback, (datagram) => this.#transport.send(datagram), readClock());
     this.#transport = open((datagram) => this.#receive(datagram), (error) => this.#fail(error));
@@ -192,6 +197,7 @@ class RealTimeGuest implements Guest {
       this.#arm(now, next);
       this.#tellPhase();
       this.#tellReport();
+      this.#tellUnusable();
     } catch (error) {
       this.#fail(error);
     }
@@ -209,6 +215,13 @@ class RealTimeGuest implements Guest {
       this.#transport.again?.(this.phase === "unanswered");
     }
     this.#onPhase?.(this);
+  }
+
+  #tellUnusable(): void {
+    const { unusable } = this.#client.stats();
+    if (!unusable || unusable === this.#unusable) return;
+    this.#unusable = unusable;
+    this.#onUnusable?.(unusable);
   }
 
   #tellReport(): void {

@@ -3,7 +3,7 @@ import { randomBytes } from "@noble/hashes/utils";
 import { isContact, isError, isForce, isRadius, isStiffness, type ControlAck } from "./codec.js";
 import { Deadband, foretell, forceDeadbandObjection, stateDeadbandObjection, type ForceDeadband } from "./deadband.js";
 import { ClientHandshake } from "./handshake.js";
-import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
+import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs, kMaxValue } from "./limits.js";
 import {
   Code, kFeatureChannels, kFeatureDiagnostics, kFeatureLocalModel, kProtocolVersion, Role, type Contact, type DeviceDescription,
   type DeviceReport, type DeviceState, type Grant, type Hello, type LinkReport, type PeerReport, type Request, type StateDeadband,
@@ -112,6 +112,8 @@ export interface ClientStats {
   forces: number;
   /** Forces not sent: not finite, or out of bounds. */
   forcesUnusable: number;
+  /** What was wrong with the newest of them; empty: none. */
+  unusable: string;
   /** Forces not sent: a hand could not have told them from the one before. */
   forcesAlike: number;
   /** Name of the one that has taken the channel from us; empty: nobody. */
@@ -223,7 +225,7 @@ export class ForceClient {
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
     phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesForetold: 0,
-    statesSkipped: 0, forces: 0, forcesUnusable: 0, forcesAlike: 0, leaseLostTo: "",
+    statesSkipped: 0, forces: 0, forcesUnusable: 0, unusable: "", forcesAlike: 0, leaseLostTo: "",
   };
 
   /**
@@ -530,6 +532,11 @@ export class ForceClient {
     if (!isForce(force) || (stiffness && !isStiffness(stiffness)) || !isRadius(validRadius) ||
         (contact && !isContact(contact)) || !isError(error)) {
       ++this.#stats.forcesUnusable;
+      this.#stats.unusable = isForce(force)
+        ? "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md"
+        : [force.x, force.y, force.z].every(Number.isFinite)
+          ? `the force is beyond ${kMaxValue} N`
+          : "the force is not finite (NaN or infinity)";
       return;
     }
     if (this.#deadband && !this.#deadband.passes(now, force) && !topologyChanged) {

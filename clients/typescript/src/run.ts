@@ -93,6 +93,7 @@ export async function run(
       changed.stop();
     },
     onReport: (report) => printReport(report, options),
+    onUnusable: (why) => console.error(`${name}: a force is not sent: ${why}`),
   }, callback);
 
   const stop = (): void => guest.stop();
