@@ -80,6 +80,7 @@ TEST_F(Report, JsonIsOneLineForEachRecordingAndNothingElse) {
 }
 
 TEST_F(Report, ReadsWhatAKilledServerLeftAndSaysSo) {
+  std::filesystem::remove(on_);
   record(on_, toy_run(Law::kAol, 3000), false);
   report({.recordings = {on_}}, out_);
   EXPECT_NE(out_.str().find("on.mcap: has no end mark"), std::string::npos);
