@@ -28,14 +28,11 @@ struct Figure {
   const char* name;
   double Outcome::*value;
 };
-constexpr std::array kFigures = {Figure{"least_energy_j", &Outcome::least_energy},
-                                 Figure{"k_op_n_per_m", &Outcome::operational_stiffness},
-                                 Figure{"force_error_n", &Outcome::force_error},
-                                 Figure{"true_force_n", &Outcome::true_force},
-                                 Figure{"largest_force_n", &Outcome::largest_force},
-                                 Figure{"late_vibration_m_per_s", &Outcome::late_vibration},
-                                 Figure{"limited_share", &Outcome::limited_share},
-                                 Figure{"latency_s", &Outcome::latency}};
+constexpr std::array kFigures = {
+    Figure{"least_energy_j", &Outcome::least_energy},   Figure{"k_op_n_per_m", &Outcome::operational_stiffness},
+    Figure{"force_error_n", &Outcome::force_error},     Figure{"true_force_n", &Outcome::true_force},
+    Figure{"largest_force_n", &Outcome::largest_force}, Figure{"late_vibration_m_per_s", &Outcome::late_vibration},
+    Figure{"limited_share", &Outcome::limited_share},   Figure{"latency_s", &Outcome::latency}};
 
 GoldenTable::Row row_of(Law law, std::string situation, const Outcome& outcome) {
   GoldenTable::Row row{.law = std::string(info(law).name), .situation = std::move(situation), .figures = {}};

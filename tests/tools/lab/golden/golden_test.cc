@@ -92,7 +92,7 @@ TEST(GoldenChild, DISABLED_SaysTheBitsOfLibm) { std::cout << "bits of libm: " <<
 
 TEST(Golden, NoFigureDependsOnTheProcessorsFusedMultiplyAdd) {
   const Ran other = shell(kWithoutFma + std::string(TENDON_LAB_TEST) +
-                        " --gtest_also_run_disabled_tests --gtest_filter=GoldenChild.*");
+                          " --gtest_also_run_disabled_tests --gtest_filter=GoldenChild.*");
   const auto at = other.out.find("bits of libm: ");
   ASSERT_NE(at, std::string::npos) << other.out;
   if (std::stoull(other.out.substr(at + 14)) == bits_of_libm()) {

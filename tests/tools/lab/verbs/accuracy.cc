@@ -98,18 +98,18 @@ void add(CLI::App& verb, int& /*exit*/) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb.add_option("--longest-setup-s", options.longest_setup_s,
-                   "… and this for its set-up; left out: 30, with a budget 5")
+                  "… and this for its set-up; left out: 30, with a budget 5")
       ->check(CLI::PositiveNumber);
   verb.add_option("--longest-point-s", options.longest_point_s, "… and this to measure it, all in all")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb.add_option("--network", arguments.network,
-                   "what is left at the hand behind it: " + injector::names_of_profiles())
+                  "what is left at the hand behind it: " + injector::names_of_profiles())
       ->type_name("NAME|LINE");
   verb.add_option("--seed", arguments.seed, "of the network")->capture_default_str();
   verb.add_option("--budget-ms", options.budget_ms,
-                   "only say what is best at the hand in so long an update, "
-                   "of what is not there for comparison")
+                  "only say what is best at the hand in so long an update, "
+                  "of what is not there for comparison")
       ->check(CLI::PositiveNumber);
   verb.add_option("--truth-cells", options.truth.cells, "of the mesh of the truth, to the patch's radius")
       ->check(CLI::Range(2.0, 8.0))

@@ -21,7 +21,8 @@ void add(CLI::App& verb, int& /*exit*/) {
   verb.callback([] { netem(options, std::cout); });
 }
 
-const Verb kVerb("netem", "What is left of loss and delay asked for with a correlation: tc-netem beside tendon-inject", add);
+const Verb kVerb("netem", "What is left of loss and delay asked for with a correlation: tc-netem beside tendon-inject",
+                 add);
 
 }  // namespace
 }  // namespace tendon::lab
