@@ -763,7 +763,7 @@ TEST(Scene, AnEstimatorIsThereWhenItsTableIs) {
   ASSERT_TRUE(sent.adaptive_local_model && !sent.output_estimator);
   EXPECT_EQ(sent.adaptive_local_model->share, 0.8);
   EXPECT_EQ(error_of_minimal_and("[force.output_estimator]\n[force.adaptive_local_model]\n"),
-            "s.toml:4: force: adaptive_local_model and output_estimator both say what lies between two forces");
+            "s.toml:4: force: adaptive_local_model and output_estimator: expected one of them, not both");
 }
 
 TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {
