@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/arithmetic.h"
 #include "protocol/limits.h"
 
 namespace tendon {
