@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <random>
-#include <set>
 #include <span>
 #include <string>
 #include <thread>
@@ -50,31 +49,14 @@ void wait_until_said(const Relay& relay, std::size_t count) {
   }
 }
 
-/// The counts that the server must show for what has arrived.
-struct Expected {
-  std::uint64_t malformed = 0;   ///< of nobody's conversation
-  std::uint64_t duplicated = 0;  ///< of the client's, with a number that was there before
-  std::uint64_t oversized = 0;   ///< of the malformed
-};
-
-Expected expected_of(const std::vector<DatagramRecord>& arrived, const Address& client) {
-  Expected expected;
-  std::set<std::uint64_t> numbers;
-  for (const DatagramRecord& record : arrived) {
-    if (record.size > kMaxDatagram) {
-      ++expected.oversized;
-      ++expected.malformed;
-      continue;
-    }
+/// How many recorded datagrams are nobody's conversation. The recording holds only a sample of those.
+std::uint64_t strangers_in(const std::vector<DatagramRecord>& arrived, const Address& client) {
+  return static_cast<std::uint64_t>(std::count_if(arrived.begin(), arrived.end(), [&](const DatagramRecord& record) {
+    if (record.size > kMaxDatagram) return true;
     const auto header = decode_header(std::span(record.bytes).first(record.size));
-    if (header && header->type == DatagramType::kHello) continue;
-    if (!header || header->type != DatagramType::kData || record.peer != client) {
-      ++expected.malformed;
-    } else if (!numbers.insert(header->packet_number).second) {
-      ++expected.duplicated;
-    }
-  }
-  return expected;
+    if (header && header->type == DatagramType::kHello) return false;
+    return !header || header->type != DatagramType::kData || record.peer != client;
+  }));
 }
 
 TEST(HostileDatagrams, AreCountedAndChangeNothing) {
@@ -115,12 +97,16 @@ TEST(HostileDatagrams, AreCountedAndChangeNothing) {
   const Recording recording = read_recording(file);
   expect_passive(recording, read_scene(demo_scene()));
   ASSERT_EQ(recording.losses, 0U);
-  const Expected expected = expected_of(recording.arrived, relay.clients_address());
-  EXPECT_GE(expected.malformed, static_cast<std::uint64_t>(kGarbage) / 2);
-  EXPECT_GE(expected.duplicated, said.size() / 2);
-  EXPECT_GE(expected.oversized, 1U);
-  EXPECT_GE(count_in(end, "malformed") + count_in(end, "unknown_connection"), expected.malformed);
-  EXPECT_EQ(count_in(end, "duplicated"), expected.duplicated);
+  const std::uint64_t strangers = count_in(end, "malformed") + count_in(end, "unknown_connection");
+  const std::uint64_t duplicated = count_in(end, "duplicated");
+  const std::uint64_t sampled = strangers_in(recording.arrived, relay.clients_address());
+  // The kernel may have dropped some; not more than half.
+  EXPECT_GE(strangers, static_cast<std::uint64_t>(kGarbage) / 2);
+  EXPECT_GE(duplicated, said.size() / 2);
+  EXPECT_LE(duplicated, said.size());
+  EXPECT_GE(sampled, 1U);
+  EXPECT_LT(sampled, strangers) << "the recording holds a sample";
+  EXPECT_GE(sampled + count_in(end, "strangers_left_out"), strangers) << "and a count of the rest";
   EXPECT_GE(count_in(end, "lost"), static_cast<std::uint64_t>(kCut));  // the cut ones were not taken for whole ones
 
   // And nothing else: one guest, who stayed; its forces went on, each newer than the one before.

@@ -90,7 +90,7 @@ describe("of several", () => {
     assert.equal(await push.end("SIGINT"), 0);
     const nowhere = startNode(test, "examples/virtual_wall", "--server", tendond.address, "--device", "middle");
     assert.equal(await nowhere.end(), 1);
-    assert.match(nowhere.lines.join("\n"), /refuses: there is no device "middle", but "left", "right"/);
+    assert.match(nowhere.lines.join("\n"), /refuses: there is no device "middle", only "left", "right"/);
   });
 
   it("a channel's lease goes from an engine that falls silent to one that waits, and from one that leaves to the next", async (test) => {
