@@ -123,7 +123,7 @@ void add(CLI::App& verb, int& /*exit*/) {
       "all of it, in half an hour or more\n  tendon-lab accuracy --network wifi-good --out figures\n"
       "what to take\n  tendon-lab accuracy --budget-ms 5 --network wifi-good --json\n"
       "\nTimes are those of this machine, now. Exit: 0 done; 1 cannot write, or gnuplot failed; 2 wrong usage.");
-  verb.callback([&options, models, elements] {
+  verb.callback([models, elements] {
     options.models = named(arguments.models, softbody::model_named, models);
     options.elements = named(arguments.elements, softbody::element_named, elements);
     options.block = {.size = lengths(arguments.block_mm),
