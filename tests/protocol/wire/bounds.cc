@@ -309,7 +309,7 @@ std::vector<Case> cases(std::string_view proto) {
   std::vector<Case> out;
   Maker maker(bounds, out);
   for (const auto& example : examples::datagrams()) {
-    const auto& datagram = example.second;  // clang 14 captures no structured binding
+    const auto& datagram = example.bytes;  // clang 14 captures no structured binding
     const auto body = [&](std::size_t at) { return std::span(datagram).subspan(at); };
     const auto parse = [](Message& message, std::span<const std::byte> bytes) {
       if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
