@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/cpp/run.h"
 
-#include <sys/random.h>
-
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -14,6 +12,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/cpp/machine.h"
 #include "clients/cpp/udp_transport.h"
 
 namespace tendon {
@@ -48,16 +47,6 @@ class StopSignals {
   struct sigaction old_int_ {};
   struct sigaction old_term_ {};
 };
-
-LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
-
-Seed seed_from_system() {
-  Seed seed;
-  if (getrandom(seed.bytes.data(), seed.bytes.size(), 0) != static_cast<ssize_t>(seed.bytes.size())) {
-    throw std::runtime_error("the system gives no random numbers");
-  }
-  return seed;
-}
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 

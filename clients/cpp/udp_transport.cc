@@ -13,6 +13,8 @@
 #include <string>
 #include <utility>
 
+#include "clients/cpp/machine.h"
+
 namespace tendon {
 namespace {
 
@@ -83,9 +85,7 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
   return 0;
 }
 
-LocalTime UdpTransport::received_by(LocalTime now) const {
-  return std::max(now, LocalTime(std::chrono::steady_clock::now().time_since_epoch()));
-}
+LocalTime UdpTransport::received_by(LocalTime now) const { return std::max(now, read_clock()); }
 
 void UdpTransport::wait(Duration timeout) {
   pollfd readable{socket_->socket.native_handle(), POLLIN, 0};

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-dash: a web page that shows what a Tendon server does, live and recorded. It only looks on, unless it may arm.
-#include <sys/random.h>
-
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <exception>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "clients/cpp/key_file.h"
+#include "clients/cpp/machine.h"
 #include "clients/cpp/server_name.h"
 #include "clients/cpp/udp_transport.h"
 #include "clients/dashboard/board.h"
@@ -30,16 +29,6 @@
 
 namespace tendon::dash {
 namespace {
-
-LocalTime read_clock() { return LocalTime(std::chrono::steady_clock::now().time_since_epoch()); }
-
-Seed seed_from_system() {
-  Seed seed;
-  if (getrandom(seed.bytes.data(), seed.bytes.size(), 0) != static_cast<ssize_t>(seed.bytes.size())) {
-    throw std::runtime_error("the system gives no random numbers");
-  }
-  return seed;
-}
 
 /// 128 bits, for one run.
 std::string new_pass() {

@@ -145,7 +145,7 @@ TEST(Rooms, OnlyTheClockFilesReadAClock) {
                                    "clients/cpp/force_client.cc", "tests/tools/worlds/world.cc"}) {
       EXPECT_EQ(places(path, text), Places{path + ":2"}) << call;
     }
-    for (const std::string path : {"server/machine/clock.cc", "clients/cpp/run.cc", "tests/tools/bench/bench.cc"}) {
+    for (const std::string path : {"server/machine/clock.cc", "clients/cpp/machine.cc", "tests/tools/bench/bench.cc"}) {
       EXPECT_EQ(places(path, text), Places{}) << call;
     }
   }
