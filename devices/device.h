@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/motion.h"
+#include "devices/counts.h"
 
 namespace tendon {
 
@@ -60,6 +61,8 @@ class Device {
   virtual std::uint32_t times_armed() const noexcept { return 0; }
   /// How often the device has ended the force by itself because of a fault (SafeDevice).
   virtual std::uint32_t faults() const noexcept { return 0; }
+  /// What its driver has counted so far. May be called from any thread.
+  virtual DeviceCounts counts() const noexcept { return {}; }
 
   /// Samples the position. Empty when the device did not answer.
   virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;

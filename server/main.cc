@@ -77,7 +77,7 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server&
 /// Of all devices together.
 HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   HapticLoop::Stats sum;
-  for (const auto& [name, haptic, safety] : devices) {
+  for (const auto& [name, haptic, safety, counts] : devices) {
     sum.steps += haptic.steps;
     sum.overruns += haptic.overruns;
     sum.unseen += haptic.unseen;
@@ -90,7 +90,7 @@ HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
 /// Of each device, with its channels.
 Json by_device(const Server::Summary& summary) {
   Json devices = Json::array();
-  for (const auto& [name, haptic, safety] : summary.devices) {
+  for (const auto& [name, haptic, safety, counts] : summary.devices) {
     Json device = {{"name", name},
                    {"steps", haptic.steps},
                    {"overruns", haptic.overruns},
@@ -99,11 +99,15 @@ Json by_device(const Server::Summary& summary) {
                    {"fault", static_cast<int>(haptic.fault)},
                    {"force_n", haptic.force},
                    {"safety", nullptr},
+                   {"counts", nullptr},
                    {"channels", Json::array()}};
     if (safety) {
       device["safety"] = {{"state", to_string(safety->state)},
                           {"faults", safety->faults},
                           {"last_fault", to_string(safety->last_fault)}};
+    }
+    if (counts) {
+      for (const DeviceCounter& row : kDeviceCounters) device["counts"][row.name] = (*counts)[row.count];
     }
     for (const auto& channel : summary.network.channels) {
       if (channel.device != name) continue;

@@ -196,8 +196,10 @@ Server::Summary Server::stop() {
 
   Summary summary;
   for (const auto& lane : lanes_) {
-    summary.devices.push_back({lane->scene.name, lane->haptic.stats(), std::nullopt});
-    if (lane->safe) summary.devices.back().safety = lane->safe->status();
+    DeviceSummary& device = summary.devices.emplace_back(DeviceSummary{
+        .name = lane->scene.name, .haptic = lane->haptic.stats(), .safety = std::nullopt, .counts = std::nullopt});
+    if (lane->safe) device.safety = lane->safe->status();
+    if (!lane->scene.driver().ids.empty()) device.counts = lane->device->counts();
   }
   summary.network = network_.stats();
   if (recorder_) summary.recording = recorder_->status();
@@ -329,6 +331,7 @@ void Server::report_health(LocalTime now, Lane& lane) {
     const bool ready = haptic.device == Device::State::kHomed;
     health.safety = ready ? Safety::kUnguarded : on_the_wire(static_cast<SafetyState>(haptic.device));
   }
+  health.device = lane.device->counts();
   health.not_realtime = lane.not_realtime.load(std::memory_order_relaxed);
   health.recording_ended = recording_stopped_;
   lane.mail.health.put(health);
@@ -347,8 +350,20 @@ void Server::report_safety(Lane& lane) {
   lane.told_safety = now;
 }
 
+/// The counters of its driver that mean trouble, when they have risen.
+void Server::report_counts(Lane& lane) {
+  const DeviceCounts now = lane.device->counts();
+  const DeviceCounts before = std::exchange(lane.told_counts, now);
+  for (const DeviceCounter& row : kDeviceCounters) {
+    if (row.degraded.empty() || now[row.count] == before[row.count]) continue;
+    log::warn(prefix(lane) + std::string(row.name) + ": " + std::to_string(now[row.count] - before[row.count]) +
+              " more (" + std::string(row.meaning) + ")");
+  }
+}
+
 void Server::report_trouble(Lane& lane) {
   report_safety(lane);
+  report_counts(lane);
   const HapticLoop::Stats now = lane.haptic.stats();
   if (now.overruns > lane.told.overruns) {
     log::warn(prefix(lane) + std::to_string(now.overruns - lane.told.overruns) +

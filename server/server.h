@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "devices/counts.h"
 #include "devices/device.h"
 #include "devices/safety/guardian.h"
 #include "devices/safety/safe_device.h"
@@ -41,6 +42,7 @@ class Server {
     std::string name;
     HapticLoop::Stats haptic;
     std::optional<SafeDevice::Status> safety;  ///< empty: its scene lists no safety layer
+    std::optional<DeviceCounts> counts;        ///< of its driver; empty: a device without a plug
   };
   struct Summary {
     std::vector<DeviceSummary> devices;
@@ -89,6 +91,7 @@ class Server {
     // What run_log has told the operator already.
     HapticLoop::Stats told;
     SafeDevice::Status told_safety;
+    DeviceCounts told_counts;
     std::uint64_t told_steps_lost = 0;
   };
   using Lanes = std::vector<std::unique_ptr<Lane>>;
@@ -105,6 +108,7 @@ class Server {
   void record_left_out(LocalTime now);
   void tell_of_recording();
   void report_health(LocalTime now, Lane& lane);
+  void report_counts(Lane& lane);
   void report_trouble(Lane& lane);
   void report_safety(Lane& lane);
   void save_flight(Lane& lane);

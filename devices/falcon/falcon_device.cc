@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 using falcon::Counts;
 using falcon::Reply;
 
-/// 1.5 Mbaud. The last byte of a reply flushes it: without that it waits for the latency timer, up to 1 ms.
+/// 1.5 Mbaud. The last byte of a reply makes the chip send it at once, instead of after its latency timer of 1 ms.
 constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, flush_at(falcon::kPacketEnd),
                                  kPurgeOne,  kPurgeOther};
 
@@ -25,21 +25,13 @@ constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, f
 constexpr Duration kProbing = 300ms;
 /// Then the plug is looked at again: somebody may have switched the device's own supply on.
 constexpr Duration kRest = 2s;
-/// A reply later than this is lost, and asked for again.
-constexpr Duration kAnswerTime = 5ms;
-/// No force on a device that nobody has heard of for so long: ten periods.
-constexpr Duration kQuiet = 10ms;
-/// After this it is as good as unplugged. A loop that was stopped for so long by its machine has its replies waiting,
-/// and takes them first.
-constexpr Duration kLost = 100ms;
+/// 16 bytes each way at 1.5 Mbaud take 0.2 ms.
+constexpr usb::Dialogue::Patience kPatience{.most_under_way = 1, .answer = 5ms};
 
-/// One garbled byte can say that all legs are homed, or that one is not; ten replies in a row cannot.
-constexpr int kSureReplies = 10;
-
-/// A mm is at most 55 counts of a motor within 50 mm of the centre: 3 m/s there, 5 m/s at the centre. A handle that
-/// nobody holds does not get to 3 m/s within the workspace.
+/// Within 50 mm of the centre, a mm is at most 55 counts of a motor: so this is 3 m/s there, and 5 m/s at the centre.
+/// A handle that nobody holds does not reach 3 m/s within the workspace.
 constexpr double kMostCountsPerSecond = 165e3;
-/// For replies that come closer together than they were taken.
+/// Allows for replies that come closer together than they were taken.
 constexpr double kMoreCounts = 30;
 
 constexpr Counts kNoTorque{};
@@ -48,12 +40,12 @@ constexpr Counts kNoTorque{};
 
 FalconDevice::FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe)
     : info_{.name = "Novint Falcon",
-            .max_force = 8,  // CHAI3D's device table. Of ±4096 counts: 16 N along z, 6 to 8 N across it
+            .max_force = 8,  // from CHAI3D's device table; ±4096 counts give 16 N along z, 6 to 8 N across
             .position_resolution = 43e-6,
-            .force_resolution = 0.01,  // a count of each motor, within 50 mm of the centre
+            .force_resolution = 0.01,  // one count of each motor, within 50 mm of the centre
             .watchdog = Duration::zero()},
       firmware_(std::move(config.firmware)),
-      pipe_(std::move(pipe)),
+      dialogue_(std::move(pipe)),
       loader_(firmware_) {}
 
 bool FalconDevice::streaming() const noexcept {
@@ -63,14 +55,13 @@ bool FalconDevice::streaming() const noexcept {
 
 void FalconDevice::enter(State state) noexcept {
   state_.store(state, std::memory_order_relaxed);
-  entered_ = now_;
+  entered_ = dialogue_.now();
   switch (state) {
     case State::kOpening:
       setup_ = Setup(kRunMode);
       set_up_ = false;
-      asked_.reset();
+      dialogue_.restart(kPatience);
       newest_.reset();
-      held_ = kNoTorque;
       break;
     case State::kFirmware:
       loader_.restart();
@@ -85,23 +76,17 @@ void FalconDevice::enter(State state) noexcept {
   }
 }
 
-void FalconDevice::follow_connection() noexcept {
-  const std::uint32_t connection = pipe_->connection();
-  if (connection == connection_) return;
-  connection_ = connection;
-  loaded_ = false;
-  enter(connection == 0 ? State::kAbsent : State::kOpening);
-}
-
 void FalconDevice::give_up() noexcept {
-  pipe_->reopen();
+  dialogue_.reopen();
   enter(State::kAbsent);
 }
 
 std::optional<PositionSample> FalconDevice::read(LocalTime now) noexcept {
-  now_ = now;
   fresh_ = false;
-  follow_connection();
+  if (dialogue_.begin(now)) {
+    loaded_ = false;
+    enter(dialogue_.connected() ? State::kOpening : State::kAbsent);
+  }
   if (state() == State::kAbsent) return std::nullopt;
   receive();
   advance();
@@ -113,22 +98,21 @@ std::optional<PositionSample> FalconDevice::read(LocalTime now) noexcept {
 }
 
 void FalconDevice::receive() noexcept {
-  std::array<std::uint8_t, usb::kPacketSize> packet;
-  while (const std::size_t size = pipe_->read(packet)) {
-    const auto bytes = payload(std::span(packet).first(size));
+  dialogue_.receive([this](std::span<const std::uint8_t> packet) {
+    const auto bytes = payload(packet);
     if (state() == State::kFirmware) {
       loader_.receive(bytes);
     } else if (streaming()) {
       parser_.feed(bytes);
       while (const auto reply = parser_.next()) believe(*reply);
     }
-  }
-  left_out_bytes_.set(parser_.left_out());
+  });
+  dialogue_.counters().set(DeviceCount::kUnreadable, parser_.left_out());
 }
 
 bool FalconDevice::plausible(const Reply& reply) const noexcept {
   if (!newest_) return true;
-  const double most = kMoreCounts + kMostCountsPerSecond * seconds(now_ - heard_);
+  const double most = kMoreCounts + kMostCountsPerSecond * seconds(dialogue_.since_heard());
   for (std::size_t leg = 0; leg < reply.encoders.size(); ++leg) {
     if (std::abs(reply.encoders[leg] - newest_->encoders[leg]) > most) return false;
   }
@@ -138,24 +122,22 @@ bool FalconDevice::plausible(const Reply& reply) const noexcept {
 void FalconDevice::believe(const Reply& reply) noexcept {
   const bool homed = reply.homed == Reply::kAllHomed;
   const bool in_step = plausible(reply);
-  asked_.reset();
-  heard_ = now_;
-  // A leg that finds its home, or loses it, jumps.
+  dialogue_.hear();
+  // The encoders of a leg that finds its home, or loses it, jump.
   if (state() == State::kHomed && homed && !in_step) {
-    implausible_.add();
+    dialogue_.counters().add(DeviceCount::kImplausible);
     return;
   }
-  replies_.add();
-  believed_ = now_;
+  dialogue_.believe();
   newest_ = reply;
   if (homed) {
     homed_replies_ = in_step ? std::max(homed_replies_, 0) + 1 : 0;
   } else {
     homed_replies_ = std::min(homed_replies_, 0) - 1;
   }
-  if (homed_replies_ <= -kSureReplies) moved_origin_ = false;
+  if (homed_replies_ <= -usb::Dialogue::kSure) moved_origin_ = false;
   if (state() == State::kOpening || (state() == State::kHomed && !homed)) enter(State::kUnhomed);
-  if (state() == State::kUnhomed && homed_replies_ >= kSureReplies && !moved_origin_) enter(State::kHomed);
+  if (state() == State::kUnhomed && homed_replies_ >= usb::Dialogue::kSure && !moved_origin_) enter(State::kHomed);
   if (state() == State::kHomed) locate(reply);
 }
 
@@ -167,22 +149,22 @@ void FalconDevice::locate(const Reply& reply) noexcept {
   if (pose) {
     pose_ = pose;
   } else {
-    unreachable_.add();
+    dialogue_.counters().add(DeviceCount::kUnreachable);
   }
 }
 
 void FalconDevice::advance() noexcept {
-  const Duration here = now_ - entered_;
+  const Duration here = dialogue_.now() - entered_;
   switch (state()) {
     case State::kOpening:
       if (!set_up_) {
-        set_up_ = setup_.step(*pipe_);
+        set_up_ = setup_.step(dialogue_.pipe());
         if (set_up_) {
           parser_.clear();
-          entered_ = now_;
+          entered_ = dialogue_.now();
         }
       } else if (here >= kProbing) {
-        if (loaded_) failed_loads_.add();
+        if (loaded_) dialogue_.counters().add(DeviceCount::kFailedSetups);
         enter(State::kFirmware);
         resting_ = resting_ || loaded_;
       }
@@ -192,7 +174,7 @@ void FalconDevice::advance() noexcept {
         if (here >= kRest) give_up();
         break;
       }
-      switch (loader_.step(now_, *pipe_)) {
+      switch (loader_.step(dialogue_.now(), dialogue_.pipe())) {
         case falcon::FirmwareLoader::Progress::kBusy:
           break;
         case falcon::FirmwareLoader::Progress::kDone:
@@ -201,19 +183,19 @@ void FalconDevice::advance() noexcept {
           enter(State::kOpening);
           break;
         case falcon::FirmwareLoader::Progress::kFailed:
-          failed_loads_.add();
+          dialogue_.counters().add(DeviceCount::kFailedSetups);
           resting_ = true;
-          entered_ = now_;
+          entered_ = dialogue_.now();
           break;
       }
       break;
     case State::kUnhomed:
     case State::kHomed:
-      if (now_ - heard_ >= kLost) {
-        silences_.add();
+      if (dialogue_.silent()) {
+        dialogue_.counters().add(DeviceCount::kSilences);
         give_up();
-      } else if (now_ - believed_ >= kLost) {
-        lost_counts_.add();
+      } else if (state() == State::kHomed && dialogue_.lost_count()) {
+        dialogue_.counters().add(DeviceCount::kLostCounts);
         moved_origin_ = true;
         enter(firmware_.empty() ? State::kUnhomed : State::kFirmware);
       }
@@ -225,30 +207,14 @@ void FalconDevice::advance() noexcept {
 
 Vec3 FalconDevice::apply(const Vec3& force) noexcept {
   if (!streaming()) return Vec3::Zero();
-  const bool ready = state() == State::kHomed && located_ && now_ - believed_ < kQuiet;
+  const bool ready = state() == State::kHomed && located_ && dialogue_.trusted();
   const Counts wanted = ready ? falcon::counts_for(*pose_, force) : kNoTorque;
-  const bool lost = asked_ && now_ - *asked_ >= kAnswerTime;
-  const bool let_go = wanted == kNoTorque && held_ != kNoTorque;
-  if (!asked_ || lost || let_go) {
+  const bool exerts = wanted != kNoTorque;
+  if (dialogue_.may_send(exerts)) {
     const falcon::Command command{.torque = wanted, .homing = true, .lamps = ready ? falcon::kGreen : falcon::kRed};
-    if (pipe_->write(falcon::encode(command))) {
-      if (lost) unanswered_.add();
-      asked_ = now_;
-      held_ = wanted;
-    }
+    if (dialogue_.send(falcon::encode(command), exerts)) held_ = wanted;
   }
-  return pose_ && held_ != kNoTorque ? falcon::force_of(*pose_, held_) : Vec3::Zero();
-}
-
-FalconDevice::Stats FalconDevice::stats() const noexcept {
-  return {.replies = replies_.value(),
-          .implausible = implausible_.value(),
-          .unreachable = unreachable_.value(),
-          .left_out_bytes = left_out_bytes_.value(),
-          .unanswered = unanswered_.value(),
-          .silences = silences_.value(),
-          .lost_counts = lost_counts_.value(),
-          .failed_loads = failed_loads_.value()};
+  return pose_ && dialogue_.holds_force() ? falcon::force_of(*pose_, held_) : Vec3::Zero();
 }
 
 namespace falcon {

@@ -109,6 +109,7 @@ class SafeDevice final : public Device {
 
   const DeviceInfo& info() const noexcept override { return info_; }
   State state() const noexcept override { return device_.state(); }
+  DeviceCounts counts() const noexcept override { return device_.counts(); }
   void arm() noexcept override;
   void disarm() noexcept override;
   std::uint32_t times_armed() const noexcept override { return times_armed_; }

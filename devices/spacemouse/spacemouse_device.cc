@@ -22,7 +22,7 @@ constexpr Duration kHeld = 100ms;
 SpaceMouseDevice::SpaceMouseDevice(const Config& config, std::unique_ptr<usb::Pipe> pipe)
     : config_(config),
       info_{.name = "3Dconnexion SpaceMouse", .max_force = 0, .position_resolution = 0},
-      pipe_(std::move(pipe)) {
+      dialogue_(std::move(pipe)) {
   expect_above_zero(config.speed, "spacemouse.speed");
   expect(config.dead_band >= 0 && config.dead_band < 1, "spacemouse.dead_band", config.dead_band, "0 or more, below 1");
   expect_above_zero(config.reach, "spacemouse.reach");
@@ -42,45 +42,32 @@ void SpaceMouseDevice::let_go() noexcept {
 }
 
 void SpaceMouseDevice::receive(LocalTime now) noexcept {
-  std::array<std::uint8_t, usb::kPacketSize> packet;
-  while (const std::size_t size = pipe_->read(packet)) {
-    const auto report = spacemouse::parse(std::span(packet).first(size));
-    (report ? reports_ : unknown_).add();
-    if (!report) continue;
+  dialogue_.receive([this, now](std::span<const std::uint8_t> packet) {
+    const auto report = spacemouse::parse(packet);
+    dialogue_.counters().add(report ? DeviceCount::kAnswers : DeviceCount::kUnreadable);
+    if (!report) return;
     if (const auto* motion = std::get_if<spacemouse::Motion>(&*report); motion != nullptr && motion->translation) {
       velocity_ = velocity_for(config_, *motion->translation);
       pushed_ = now;
     } else if (const auto* buttons = std::get_if<spacemouse::Buttons>(&*report)) {
       buttons_ = buttons->held;
-    } else if (const auto* battery = std::get_if<spacemouse::Battery>(&*report)) {
-      battery_percent_.store(battery->percent, std::memory_order_relaxed);
     }
-  }
+  });
   if (now - pushed_ >= kHeld) velocity_.setZero();
 }
 
 std::optional<PositionSample> SpaceMouseDevice::read(LocalTime now) noexcept {
   const Duration gap = std::clamp(now - before_, Duration::zero(), kHeld);
   before_ = now;
-  if (const std::uint32_t connection = pipe_->connection(); connection != connection_) {
-    connection_ = connection;
-    let_go();
-  }
-  state_.store(connection_ == 0 ? State::kAbsent : State::kHomed, std::memory_order_relaxed);
-  if (connection_ == 0) return std::nullopt;
+  if (dialogue_.begin(now)) let_go();
+  state_.store(dialogue_.connected() ? State::kHomed : State::kAbsent, std::memory_order_relaxed);
+  if (!dialogue_.connected()) return std::nullopt;
   position_ = (position_ + velocity_ * seconds(gap)).cwiseMax(-config_.reach).cwiseMin(config_.reach);
   receive(now);
   return PositionSample{.at = now, .position = position_, .hand_force = std::nullopt, .buttons = buttons_};
 }
 
 Vec3 SpaceMouseDevice::apply(const Vec3& /*force*/) noexcept { return Vec3::Zero(); }
-
-SpaceMouseDevice::Stats SpaceMouseDevice::stats() const noexcept {
-  Stats stats{.reports = reports_.value(), .unknown = unknown_.value()};
-  const std::int16_t percent = battery_percent_.load(std::memory_order_relaxed);
-  if (percent >= 0) stats.battery_percent = static_cast<std::uint8_t>(percent);
-  return stats;
-}
 
 namespace spacemouse {
 

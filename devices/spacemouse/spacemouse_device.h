@@ -8,28 +8,29 @@
 #include <optional>
 #include <string>
 
-#include "core/exchange/counter.h"
 #include "devices/device.h"
 #include "devices/driver.h"
 #include "devices/simulated/simulated_device.h"
 #include "devices/spacemouse/report.h"
-#include "devices/usb/pipe.h"
+#include "devices/usb/dialogue.h"
 
 namespace tendon {
 
-/// A 3Dconnexion SpaceMouse over a `usb::Pipe`, as a leader without force: how far its cap is pushed is how fast the
-/// position goes (rate control), because it has some millimetres of travel and comes back to the middle by itself.
+/// A 3Dconnexion SpaceMouse over a `usb::Pipe`, as a leader without force. Its cap travels some millimetres and springs
+/// back, so it controls the speed (rate control): the further the cap is pushed, the faster the position moves.
 ///
 ///     d = (X, −Z, Y) / 350, no longer than 1;     v = speed · (|d| − dead_band) / (1 − dead_band) · d/|d|, or 0
 ///     within; p ← p + v (now − before), each component within ±reach
 ///
-/// x right, y up, z towards the user, as the Falcon's. It starts at the origin, and where it was once the plug was out.
-/// Rotation is read and not used. A push that no report has confirmed for 100 ms is over, and no `read` moves further
-/// than 100 ms do. `apply` returns zero, whatever is asked for.
+/// x right, y up, z towards the user, as the Falcon's. The position starts at the origin, and stays while the plug is
+/// out. Rotation is read and not used. A push that no report has confirmed for 100 ms has ended, and one `read` moves
+/// the position at most as far as 100 ms of pushing do. `apply` returns zero, whatever is asked for.
 ///
-/// kAbsent while it is not plugged in, else kHomed: it needs no opening. Buttons are those of its report, from bit 0.
+/// kAbsent while it is not plugged in, otherwise kHomed: it needs no opening. Buttons are those of its report, from
+/// bit 0.
 ///
-/// Thread-safe: `stats` and `state` from any thread, the rest from one. Realtime-safe: `read` and `apply`.
+/// Thread-safe: `counts` and `state` from any thread, the rest from one. Realtime-safe: `read`, `apply` and
+/// `counts`.
 class SpaceMouseDevice final : public Device {
  public:
   /// Vendor and product, as spacenavd lists them: from the SpaceMouse Plus XT to those with Bluetooth at a cable.
@@ -45,22 +46,14 @@ class SpaceMouseDevice final : public Device {
     double reach = 0.05;      ///< m to either side of the origin on each axis, > 0
   };
 
-  /// Of all connections so far.
-  struct Stats {
-    std::uint64_t reports = 0;  ///< understood
-    std::uint64_t unknown = 0;  ///< other packets
-    std::optional<std::uint8_t> battery_percent{};
-  };
-
   /// Takes the pipe to a SpaceMouse. Throws std::invalid_argument naming the field, its value and what was expected.
   SpaceMouseDevice(const Config& config, std::unique_ptr<usb::Pipe> pipe);
 
   const DeviceInfo& info() const noexcept override { return info_; }
   State state() const noexcept override { return state_.load(std::memory_order_relaxed); }
+  DeviceCounts counts() const noexcept override { return dialogue_.counts(); }
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
-
-  Stats stats() const noexcept;
 
   /// m/s: v of the equation above. Realtime-safe.
   static Vec3 velocity_for(const Config& config, const spacemouse::Axes& cap) noexcept;
@@ -71,30 +64,24 @@ class SpaceMouseDevice final : public Device {
 
   Config config_;
   DeviceInfo info_;
-  std::unique_ptr<usb::Pipe> pipe_;
+  usb::Dialogue dialogue_;
   std::atomic<State> state_{State::kAbsent};
-  std::uint32_t connection_ = 0;
   LocalTime before_{};            ///< the last `read`
   LocalTime pushed_{};            ///< when the last translation was reported
   Vec3 velocity_ = Vec3::Zero();  ///< since then
   Vec3 position_ = Vec3::Zero();
   std::uint32_t buttons_ = 0;
-
-  // One writer.
-  Counter reports_;
-  Counter unknown_;
-  std::atomic<std::int16_t> battery_percent_{-1};
 };
 
 namespace spacemouse {
 
-/// A SpaceMouse in a scene.
+/// A SpaceMouse, as a scene describes it.
 struct Config {
   std::string port{};  ///< as `tendond devices` names it; empty: the first free one
   SpaceMouseDevice::Config motion{};
 };
 
-// The row of this driver: see driver.h.
+// The overloads of driver.h.
 const Driver& driver(const Config& config);
 SimulatedDevice::Config stand_in(const Config& config);
 std::unique_ptr<Device> make(const Config& config, FromOutside outside);

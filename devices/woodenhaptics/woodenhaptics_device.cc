@@ -24,29 +24,23 @@ using woodenhaptics::Report;
 
 constexpr Currents kNoCurrent{};
 
-/// A board that was just switched on flashes its lamps for a second before it listens, and has room for one report
-/// until then: a second one would wait for it until its transfer fails.
-constexpr Duration kAskAgain = 1500ms;
+/// A board that was just switched on flashes its lamps for a second before it listens. Until then it has room for one
+/// report; a second one would wait for it until its transfer fails.
+constexpr usb::Dialogue::Patience kWhileItStarts{.most_under_way = 1, .answer = 1500ms};
 /// An answer takes 2 ms: a frame of the bus each way.
-constexpr Duration kAnswerTime = 5ms;
-constexpr int kMostUnderWay = 2;
-/// No force on a device that nobody has heard of for so long: ten periods.
-constexpr Duration kQuiet = 10ms;
-/// After this it is as good as unplugged.
-constexpr Duration kLost = 100ms;
+constexpr usb::Dialogue::Patience kPatience{.most_under_way = 2, .answer = 5ms};
 
-constexpr int kSureReplies = 10;
-/// When the request is still there so long after command 1, it was lost: a newer report had overtaken it.
+/// When the board still asks to be calibrated so long after command 1, a newer report had overtaken the command.
 constexpr Duration kCalibrateAgain = 20ms;
 
 /// rad/s, of a body: 5 m/s at 0.1 m from the column's axis, and more than that at either link's end. A handle that
 /// nobody holds does not get there within the workspace.
 constexpr double kMostSpeed = 50;
-/// … and while the operator holds the arm in its calibration pose.
+/// rad/s, of a body while the operator holds the arm in its calibration pose.
 constexpr double kStillSpeed = 2;
-/// For reports that come closer together than they were taken.
+/// Allows for reports that come closer together than they were taken.
 constexpr double kMoreCounts = 30;
-/// Of a difference of 16 bits nobody knows more.
+/// A quarter turn of a 16-bit counter: beyond it the nearer way round is a guess.
 constexpr double kMostStep = 16'384;
 
 const Model& checked(const Model* model) {
@@ -80,7 +74,7 @@ WoodenHapticsDevice::WoodenHapticsDevice(const Config& config, std::unique_ptr<u
       most_ma_(1e3 * config.max_current),
       counts_per_radian_(counts_per_radian(model_)),
       info_(info_of(model_)),
-      pipe_(std::move(pipe)) {
+      dialogue_(std::move(pipe), kWatchdog) {
   expect(config.max_current > 0 && config.max_current <= model_.full_scale, "woodenhaptics.max_current",
          config.max_current, "above 0 A, at most " + shortest(model_.full_scale) + " A, the amplifiers' full scale");
 }
@@ -89,12 +83,11 @@ void WoodenHapticsDevice::enter(State state) noexcept {
   state_.store(state, std::memory_order_relaxed);
   switch (state) {
     case State::kOpening:
-      under_way_ = 0;
+      dialogue_.restart(kWhileItStarts);
       newest_.reset();
-      held_ = kNoCurrent;
       break;
     case State::kUnhomed:
-      heard_ = now_;
+      dialogue_.set_patience(kPatience);
       asking_replies_ = 0;
       set_replies_ = 0;
       calibrated_.reset();
@@ -106,22 +99,9 @@ void WoodenHapticsDevice::enter(State state) noexcept {
   }
 }
 
-void WoodenHapticsDevice::follow_connection() noexcept {
-  const std::uint32_t connection = pipe_->connection();
-  if (connection == connection_) return;
-  connection_ = connection;
-  enter(connection == 0 ? State::kAbsent : State::kOpening);
-}
-
-void WoodenHapticsDevice::give_up() noexcept {
-  pipe_->reopen();
-  enter(State::kAbsent);
-}
-
 std::optional<PositionSample> WoodenHapticsDevice::read(LocalTime now) noexcept {
-  now_ = now;
   fresh_ = false;
-  follow_connection();
+  if (dialogue_.begin(now)) enter(dialogue_.connected() ? State::kOpening : State::kAbsent);
   if (state() == State::kAbsent) return std::nullopt;
   receive();
   advance();
@@ -133,14 +113,13 @@ std::optional<PositionSample> WoodenHapticsDevice::read(LocalTime now) noexcept 
 }
 
 void WoodenHapticsDevice::receive() noexcept {
-  std::array<std::uint8_t, usb::kPacketSize> packet;
-  while (const std::size_t size = pipe_->read(packet)) {
-    if (const auto report = woodenhaptics::parse(std::span(packet).first(size))) {
+  dialogue_.receive([this](std::span<const std::uint8_t> packet) {
+    if (const auto report = woodenhaptics::parse(packet)) {
       believe(*report);
     } else {
-      unknown_.add();
+      dialogue_.counters().add(DeviceCount::kUnreadable);
     }
-  }
+  });
 }
 
 Counts WoodenHapticsDevice::steps_to(const Report& report) const noexcept {
@@ -154,7 +133,7 @@ Counts WoodenHapticsDevice::steps_to(const Report& report) const noexcept {
 }
 
 bool WoodenHapticsDevice::plausible(const Counts& steps) const noexcept {
-  const double passed = seconds(now_ - heard_);
+  const double passed = seconds(dialogue_.since_heard());
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const double most = kMoreCounts + kMostSpeed * counts_per_radian_[static_cast<Eigen::Index>(i)] * passed;
     if (std::abs(steps[i]) > std::min(most, kMostStep)) return false;
@@ -163,17 +142,16 @@ bool WoodenHapticsDevice::plausible(const Counts& steps) const noexcept {
 }
 
 void WoodenHapticsDevice::believe(const Report& report) noexcept {
-  if (state() == State::kOpening && under_way_ == 0) return;  // nobody has asked yet: it may be as old as the last host
+  // Nobody has asked yet: this report may be as old as the last host.
+  if (state() == State::kOpening && !dialogue_.awaits_answer()) return;
   const Counts steps = steps_to(report);
   const bool in_step = plausible(steps);
-  under_way_ = 0;
-  heard_ = now_;
+  dialogue_.hear();
   if (state() == State::kHomed && !report.calibrate && !in_step) {
-    implausible_.add();
+    dialogue_.counters().add(DeviceCount::kImplausible);
     return;
   }
-  reports_.add();
-  believed_ = now_;
+  dialogue_.believe();
   newest_ = report;
   if (state() == State::kOpening || (state() == State::kHomed && report.calibrate)) enter(State::kUnhomed);
   if (state() == State::kUnhomed) {
@@ -188,7 +166,7 @@ void WoodenHapticsDevice::believe(const Report& report) noexcept {
 }
 
 bool WoodenHapticsDevice::near_calibration(const Report& report) const noexcept {
-  const double passed = seconds(now_ - *calibrated_);
+  const double passed = seconds(dialogue_.now() - *calibrated_);
   for (std::size_t i = 0; i < model_.joints.size(); ++i) {
     const double most = kMoreCounts + kStillSpeed * counts_per_radian_[static_cast<Eigen::Index>(i)] * passed;
     if (std::abs(report.counters[i] - model_.joints[i].calibration) > most) return false;
@@ -205,77 +183,51 @@ void WoodenHapticsDevice::home(const Report& report) noexcept {
   asking_replies_ = 0;
   if (!calibrated_) return;
   if (!near_calibration(report)) {
-    failed_calibrations_.add();
+    dialogue_.counters().add(DeviceCount::kFailedSetups);
     calibrated_.reset();
     set_replies_ = 0;
     return;
   }
-  if (++set_replies_ < kSureReplies) return;
+  if (++set_replies_ < usb::Dialogue::kSure) return;
   std::copy_n(report.counters.begin(), counts_.size(), counts_.begin());
   enter(State::kHomed);
 }
 
 void WoodenHapticsDevice::advance() noexcept {
   if (state() != State::kUnhomed && state() != State::kHomed) return;
-  if (now_ - heard_ >= kLost) {
-    silences_.add();
-    give_up();
-  } else if (state() == State::kHomed && now_ - believed_ >= kLost) {
-    lost_counts_.add();
+  if (dialogue_.silent()) {
+    dialogue_.counters().add(DeviceCount::kSilences);
+    dialogue_.reopen();
+    enter(State::kAbsent);
+  } else if (state() == State::kHomed && dialogue_.lost_count()) {
+    dialogue_.counters().add(DeviceCount::kLostCounts);
     enter(State::kUnhomed);
   }
 }
 
-bool WoodenHapticsDevice::may_write() const noexcept {
-  if (under_way_ == 0) return true;
-  if (state() == State::kOpening) return now_ - asked_ >= kAskAgain;
-  return under_way_ < kMostUnderWay || now_ - asked_ >= kAnswerTime;
-}
-
 void WoodenHapticsDevice::write(const Currents& wanted) noexcept {
-  const bool calibrate = state() == State::kUnhomed && asking_replies_ >= kSureReplies &&
-                         (!calibrated_ || now_ - *calibrated_ >= kCalibrateAgain);
+  const bool calibrate = state() == State::kUnhomed && asking_replies_ >= usb::Dialogue::kSure &&
+                         (!calibrated_ || dialogue_.now() - *calibrated_ >= kCalibrateAgain);
   const auto& [a, b, c] = model_.joints;
-  if (!pipe_->write(calibrate ? woodenhaptics::encode_calibration({a.calibration, b.calibration, c.calibration})
-                              : woodenhaptics::encode(wanted))) {
-    return;
-  }
+  const auto report = calibrate ? woodenhaptics::encode_calibration({a.calibration, b.calibration, c.calibration})
+                                : woodenhaptics::encode(wanted);
+  if (!dialogue_.send(report, wanted != kNoCurrent)) return;
   if (calibrate) {
-    calibrated_ = now_;
-    asking_replies_ = 0;  // only what is heard from now on asks for it again
+    calibrated_ = dialogue_.now();
+    asking_replies_ = 0;  // only reports from now on can ask for it again
   }
-  const bool late = under_way_ > 0 && now_ - asked_ >= kAnswerTime;
-  if (late) unanswered_.add();
-  if (late || under_way_ == 0) {
-    asked_ = now_;
-    under_way_ = 0;
-  }
-  ++under_way_;
-  told_ = now_;
   held_ = wanted;
 }
 
 Vec3 WoodenHapticsDevice::apply(const Vec3& force) noexcept {
   if (state() == State::kAbsent) return Vec3::Zero();
-  if (now_ - told_ >= kWatchdog) held_ = kNoCurrent;
-  const bool ready = state() == State::kHomed && now_ - believed_ < kQuiet;
+  const bool ready = state() == State::kHomed && dialogue_.trusted();
   const Currents wanted = ready ? woodenhaptics::currents_for(model_, pose_, force, most_ma_) : kNoCurrent;
-  const bool let_go = wanted == kNoCurrent && held_ != kNoCurrent;
-  if (may_write() || let_go) write(wanted);
-  if (held_ == kNoCurrent) return Vec3::Zero();
-  // In a singular pose nobody knows; it was on its way there.
+  if (dialogue_.may_send(wanted != kNoCurrent)) write(wanted);
+  if (!dialogue_.holds_force()) return Vec3::Zero();
+  // In a singular pose the force is not known: the last one that was known is kept.
   held_force_ = woodenhaptics::force_of(model_, pose_, held_).value_or(held_force_);
   return held_force_;
-}
-
-WoodenHapticsDevice::Stats WoodenHapticsDevice::stats() const noexcept {
-  return {.reports = reports_.value(),
-          .unknown = unknown_.value(),
-          .implausible = implausible_.value(),
-          .unanswered = unanswered_.value(),
-          .silences = silences_.value(),
-          .lost_counts = lost_counts_.value(),
-          .failed_calibrations = failed_calibrations_.value()};
 }
 
 namespace woodenhaptics {

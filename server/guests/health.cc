@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/guests/health.h"
 
+#include <algorithm>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -37,15 +38,20 @@ DeviceReport report(const Health& before, const Health& now) {
   report.safety = now.safety;
   report.fault = now.fault;
 
-  const auto say = [&](bool true_now, const char* words) {
+  const auto say = [&](bool true_now, std::string_view words) {
     if (true_now) report.degraded += (report.degraded.empty() ? "" : "; ") + std::string(words);
   };
   const auto counted = std::accumulate(report.lateness.begin(), report.lateness.end(), std::uint64_t{0});
-  say(now.not_realtime, "the kernel refused the haptic thread real time");
+  // Short, because all five sentences have to fit (limits::kMaxDetail).
+  say(now.not_realtime, "the kernel refused real time");
   say(counted < report.steps, "the log thread does not follow");
   say(now.recording_ended, "recording has stopped");
-  // Than limiter.bounded_acceleration allows. Short, because all four sentences have to fit (limits::kMaxDetail).
+  // Harder than limiter.bounded_acceleration allows.
   say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
+  const auto worst = std::ranges::find_if(kDeviceCounters, [&](const DeviceCounter& row) {
+    return !row.degraded.empty() && now.device[row.count] > before.device[row.count];
+  });
+  if (worst != kDeviceCounters.end()) say(true, worst->degraded);
   return report;
 }
 

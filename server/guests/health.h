@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/base/time.h"
+#include "devices/counts.h"
 #include "protocol/messages.h"
 #include "server/recording/records.h"
 
@@ -21,6 +22,7 @@ struct Health {
   std::uint64_t unseen = 0;    ///< steps with Reason::kUnseen
   /// Intervals in which the hand accelerated by more than AOL+'s bounded_acceleration allows: the scene's bound is wrong.
   std::uint64_t broken_assumptions = 0;
+  DeviceCounts device{};  ///< what the device's driver has counted
   LatenessHistogram lateness{};
   Safety safety = Safety::kAbsent;
   std::string_view fault{};  ///< of static storage; empty: none

@@ -148,5 +148,17 @@ TEST(FalconServer, UnpluggedInMidForceItPushesAgainOnlyAfterHomingAndArming) {
   });
 }
 
+TEST(FalconServer, WhatItsDriverCountsIsInTheLogAndInTheLastReport) {
+  on_a_stage({}, [](FalconStage& stage) {
+    stage.wait_for_commands(100);
+    stage.falcon().with([](FakeFalcon& falcon) { falcon.set_fault(FakeFalcon::Fault::kSilent); });
+    stage.server().process().wait_for_line("silences: ");
+    const std::string end = stage.server().stop();
+    const std::string counts = end.substr(end.find("\"counts\""));
+    EXPECT_GE(count_in(counts, "silences"), 1U) << end;
+    EXPECT_GE(count_in(counts, "answers"), 100U) << end;
+  });
+}
+
 }  // namespace
 }  // namespace tendon::e2e

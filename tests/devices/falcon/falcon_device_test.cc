@@ -126,8 +126,8 @@ TEST(FalconDevice, PositionsAreThoseOfTheGripRelativeToTheCentre) {
     ASSERT_EQ(bench.sample->at, bench.now);
     ASSERT_LT((bench.sample->position - to).norm(), 150e-6) << "more than counts can be rounded";
   }
-  EXPECT_EQ(bench.device.stats().implausible, 0U);
-  EXPECT_EQ(bench.device.stats().unreachable, 0U);
+  EXPECT_EQ(bench.device.counts()[DeviceCount::kImplausible], 0U);
+  EXPECT_EQ(bench.device.counts()[DeviceCount::kUnreachable], 0U);
 }
 
 TEST(FalconDevice, ButtonsComeWithThePosition) {
@@ -151,7 +151,7 @@ TEST(FalconDevice, EveryPeriodOfAMillisecondHasItsSample) {
       seen += bench.sample ? 1 : 0;
     }
     EXPECT_GE(seen, flush ? 1000 : 500);
-    EXPECT_EQ(bench.device.stats().unanswered, 0U);
+    EXPECT_EQ(bench.device.counts()[DeviceCount::kUnanswered], 0U);
   }
 }
 
@@ -275,7 +275,7 @@ TEST(FalconDevice, ALoopThatWasStoppedTakesUpWhereItWas) {
   bench.step(kForce);
   EXPECT_EQ(bench.device.state(), State::kHomed);
   EXPECT_TRUE(bench.sample);
-  EXPECT_EQ(bench.device.stats().silences, 0U);
+  EXPECT_EQ(bench.device.counts()[DeviceCount::kSilences], 0U);
 }
 
 TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
@@ -284,10 +284,10 @@ TEST(FalconDevice, AMomentaryEncoderJumpCostsOnlySamples) {
   bench.run(20ms, kForce);
   bench.falcon.set_fault(Fault::kJumps);
   bench.run(1ms, kForce);  // takes the reply from before
-  const auto replies = bench.device.stats().replies;
+  const auto replies = bench.device.counts()[DeviceCount::kAnswers];
   bench.run(4ms, kForce);
-  EXPECT_EQ(bench.device.stats().replies, replies);
-  EXPECT_EQ(bench.device.stats().implausible, 4U);
+  EXPECT_EQ(bench.device.counts()[DeviceCount::kAnswers], replies);
+  EXPECT_EQ(bench.device.counts()[DeviceCount::kImplausible], 4U);
   EXPECT_FALSE(bench.sample);
   bench.falcon.set_fault(Fault::kNone);
   bench.run(2ms, kForce);
@@ -305,7 +305,7 @@ TEST(FalconDevice, AMovedOriginIsNotBelievedUntilHomedAnew) {
     bench.run(20ms, kForce);
     bench.falcon.set_fault(Fault::kJumps);
     bench.run(200ms, kForce);
-    EXPECT_EQ(bench.device.stats().lost_counts, 1U);
+    EXPECT_EQ(bench.device.counts()[DeviceCount::kLostCounts], 1U);
     if (with_firmware) {
       EXPECT_EQ(bench.device.state(), State::kFirmware) << "which sets it back";
     } else {

@@ -189,7 +189,7 @@ TEST_F(MockUsbTest, ASpaceMouseIsReadThroughTheRealLibraryAndSurvivesAReplug) {
     other.unplug();
     EXPECT_TRUE(comes_true([&] { return device.read(real_now()), device.state() == State::kAbsent; }));
   }
-  EXPECT_EQ(device.stats().unknown, 0U);
+  EXPECT_EQ(device.counts()[DeviceCount::kUnreadable], 0U);
 }
 
 }  // namespace

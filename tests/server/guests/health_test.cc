@@ -161,11 +161,31 @@ TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   now.steps = 1;
   now.not_realtime = now.recording_ended = true;
   now.broken_assumptions = 1;
+  now.device.values[static_cast<std::size_t>(DeviceCount::kSilences)] = 1;  // the longest words of a counter
   const std::string degraded = report({}, now).degraded;
-  EXPECT_EQ(degraded,
-            "the kernel refused the haptic thread real time; the log thread does not follow; recording has stopped; "
-            "accelerates too hard");
+  EXPECT_EQ(
+      degraded,
+      "the kernel refused real time; the log thread does not follow; recording has stopped; accelerates too hard; "
+      "device fell silent");
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
+}
+
+// DeviceCounters.HaveNamesOfTheirOwnAndWordsThatFitIntoAReport bounds the words of the others.
+TEST(Health, EachCounterOfADriverThatMeansTroubleDegradesItsDevice) {
+  for (const DeviceCounter& row : kDeviceCounters) {
+    Health before;
+    before.device.values[static_cast<std::size_t>(row.count)] = 3;
+    Health now = before;
+    EXPECT_EQ(report(before, now).degraded, "") << row.name;
+    now.device.values[static_cast<std::size_t>(row.count)] = 4;
+    EXPECT_EQ(report(before, now).degraded, row.degraded) << row.name;
+  }
+}
+
+TEST(Health, OfSeveralCountersOfADriverTheWorstIsTold) {
+  Health now;
+  for (std::uint64_t& value : now.device.values) value = 1;
+  EXPECT_EQ(report({}, now).degraded, "set-up fails");
 }
 
 }  // namespace

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "core/exchange/counter.h"
+
+namespace tendon {
+
+/// What the drivers of real devices count, since the driver was made, over all its connections. A driver counts those
+/// that its device can show. The order is that of `kDeviceCounters`.
+enum class DeviceCount : std::uint8_t {
+  kAnswers,
+  kUnreadable,
+  kFailedSetups,
+  kLostCounts,
+  kSilences,
+  kImplausible,
+  kUnreachable,
+  kUnanswered,
+};
+
+/// The row of one counter. This table is the only place that names it: `tendond --json` prints each by its name, the log
+/// gives the meaning, and observers and /metrics are told that the device is degraded.
+struct DeviceCounter {
+  DeviceCount count;
+  std::string_view name;      ///< key in `tendond --json`
+  std::string_view meaning;   ///< for people: what it is a number of
+  std::string_view degraded;  ///< what observers are told of a report's time in which it rose; empty: nothing
+};
+
+/// Those that degrade the device, the worst first: a report names only the first that rose, in at most 18 bytes.
+inline constexpr std::array kDeviceCounters = {
+    DeviceCounter{DeviceCount::kAnswers, "answers", "answers of the device that were believed", ""},
+    // A serial line begins in the middle of an answer: some bytes after each opening are normal.
+    DeviceCounter{DeviceCount::kUnreadable, "unreadable", "packets, or bytes of a serial line, that are no answer", ""},
+    DeviceCounter{DeviceCount::kFailedSetups, "failed_setups", "firmware or calibrations that the device did not take",
+                  "set-up fails"},
+    DeviceCounter{DeviceCount::kLostCounts, "lost_counts",
+                  "times when the encoders had lost count, and the device had to be homed again", "device lost count"},
+    DeviceCounter{DeviceCount::kSilences, "silences",
+                  "times when the device said nothing for 100 ms, and was opened again", "device fell silent"},
+    DeviceCounter{DeviceCount::kImplausible, "implausible",
+                  "answers not believed, because no hand can have moved the encoders so far", "encoders jump"},
+    DeviceCounter{DeviceCount::kUnreachable, "unreachable",
+                  "answers not used, because their encoders belong to no position", "impossible pose"},
+    DeviceCounter{DeviceCount::kUnanswered, "unanswered",
+                  "requests without an answer in time, after which the driver asked again", "answers are late"},
+};
+static_assert([] {
+  for (std::size_t i = 0; i < kDeviceCounters.size(); ++i) {
+    if (static_cast<std::size_t>(kDeviceCounters[i].count) != i) return false;
+  }
+  return true;
+}());
+
+/// The numbers, in the order of `kDeviceCounters`.
+struct DeviceCounts {
+  std::array<std::uint64_t, kDeviceCounters.size()> values{};
+
+  constexpr std::uint64_t operator[](DeviceCount count) const noexcept {
+    return values[static_cast<std::size_t>(count)];
+  }
+  friend bool operator==(const DeviceCounts&, const DeviceCounts&) = default;
+};
+
+/// What a driver keeps.
+///
+/// Thread-safe: `counts` from any thread, the rest from one. Realtime-safe.
+class DeviceCountersKept {
+ public:
+  void add(DeviceCount count) noexcept { kept_[static_cast<std::size_t>(count)].add(); }
+  void set(DeviceCount count, std::uint64_t number) noexcept { kept_[static_cast<std::size_t>(count)].set(number); }
+
+  DeviceCounts counts() const noexcept {
+    DeviceCounts now;
+    for (std::size_t i = 0; i < kept_.size(); ++i) now.values[i] = kept_[i].value();
+    return now;
+  }
+
+ private:
+  std::array<Counter, kDeviceCounters.size()> kept_;
+};
+
+}  // namespace tendon
