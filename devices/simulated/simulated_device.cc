@@ -158,7 +158,7 @@ void SimulatedDevice::live(Duration gap) noexcept {
   integrate(gap);
 }
 
-/// What is left of the gap after the watchdog has taken the force away, or all of it when it does not.
+/// Ends the force when the watchdog trips within the gap. Returns the rest of the gap: all of it when it does not trip.
 Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
   if (gap <= *until_watchdog_) {
     *until_watchdog_ -= gap;

@@ -14,8 +14,8 @@
 namespace tendon::usb {
 
 /// What a driver and its device say to each other over a `Pipe`, one connection after another: who is there, which
-/// request still waits for its answer, since when nothing was heard, and what went wrong how often. What the bytes mean
-/// is the driver's.
+/// request still waits for its answer, since when nothing was heard, and what went wrong how often. The driver gives the
+/// bytes their meaning.
 ///
 /// In each turn the driver calls, in this order:
 ///

@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// Of what is plugged in, a device that Tendon has a driver for, and what keeps it from being used: `tendond devices`.
+/// A plugged-in device that Tendon has a driver for, and what keeps it from being used: `tendond devices`.
 struct PluggedDevice {
   struct Lack {
     std::string what;

@@ -171,7 +171,7 @@ class SceneResolver {
               digits(device.structural_mode->handle_mass));
   }
 
-  /// Friction is in the joints or at the handle. What is known of a device is that at the handle.
+  /// Friction is in the joints or at the handle. Profiles know only that at the handle.
   void resolve_joint_friction() {
     SimulatedDevice::Config& device = draft_.simulated;
     if (!device.joint_friction) return;

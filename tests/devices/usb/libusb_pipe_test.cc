@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real libusb, with threads and in real time, against a model of the kernel and of a Falcon. What is waited for has
-// seconds to happen; no test depends on how fast this machine is.
+// The real libusb, with threads and in real time, against a model of the kernel and of a Falcon. Each wait has a limit
+// of seconds; no test depends on how fast this machine is.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real libusb and the real libudev on a machine that umockdev makes up. What is waited for has seconds to happen.
+// The real libusb and the real libudev on a machine that umockdev makes up. Each wait has a limit of seconds.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -443,7 +443,7 @@ TEST(WoodenHapticsDevice, ReportsOfAnotherLengthDoNotFeedTheWatchdog) {
   EXPECT_FALSE(arm.pushes());
 }
 
-// What `apply` returns is what the ledger counts.
+// The ledger counts the force that `apply` returns.
 TEST(WoodenHapticsDevice, AfterAPauseBeyondTheWatchdogTheOldForceIsOver) {
   for (const Duration pause : {Duration(300ms), Duration(700ms)}) {
     Bench bench;
