@@ -21,9 +21,9 @@ std::array<std::byte, Size> first_of(const Bytes32& bytes) noexcept {
   return first;
 }
 
-/// What both ends know before the first message of Noise. The cookie is not in it: one attempt has one
-/// message 1, whatever cookies it collects; with another prologue the same ephemeral key would
-/// authenticate two messages with one nonce.
+/// What both ends know before the first message of Noise. The cookie is not part of it: an attempt has one message 1,
+/// however many cookies it collects. A second prologue would make one ephemeral key authenticate two messages with one
+/// nonce.
 std::vector<std::byte> prologue(const KeyId& id, const ClientRandom& random) {
   const auto header = encode_header({.type = DatagramType::kHello, .suite = Suite::kNoise});
   std::vector<std::byte> out;
@@ -64,8 +64,8 @@ void ClientHandshake::receive(LocalTime now, std::span<const std::byte> datagram
   if (outcome_) return;
   const Suite suite = noise_ ? Suite::kNoise : Suite::kPlain;
   if (const auto retry = decode_retry(datagram); retry && retry->suite == suite && retry->random == random_) {
-    // Only the first cookie is worth an immediate Hello. Were every Retry, a server that dislikes our
-    // cookies and we would play ping-pong.
+    // Only the first cookie is answered by an immediate Hello. Otherwise we and a server that rejects our cookies would
+    // exchange datagrams as fast as the network carries them.
     if (!cookie_) {
       due_ = true;
       next_tick_ = now;
@@ -94,7 +94,7 @@ void ClientHandshake::settle(const AnswerDatagram& datagram) {
     if (opened) accepted.keys = {opened->split.initiator_to_responder, opened->split.responder_to_initiator};
     outcome_ = std::move(accepted);
   }
-  noise_.reset();  // the ephemeral key has done its work
+  noise_.reset();  // wipes the ephemeral key
   due_ = false;
   next_tick_ = LocalTime::max();
 }

@@ -23,23 +23,22 @@
 
 namespace tendon {
 
-/// The client's half of the handshake: says Hello until a Retry brings a cookie, says Hello with the
-/// cookie until it is answered. It never gives up; its owner may. Sans-I/O.
+/// The client's half of the handshake: repeats its Hello until a Retry brings a cookie, then repeats it with the cookie
+/// until an Answer comes. It never gives up by itself; its owner may. Sans-I/O.
 ///
-/// A datagram that is malformed, of another suite, not authentic, or does not carry this attempt's
-/// `random`, is ignored.
+/// It ignores every datagram that is malformed, of another suite, not authentic, or without this attempt's `random`.
 class ClientHandshake {
  public:
   struct Config {
     Hello hello;
     ClientRandom random{};  ///< from a cryptographic source, new for each attempt
-    /// Suite 1 when set, and only that: nobody can talk this client out of it.
+    /// When set, the client speaks suite 1 only: no answer can make it fall back to suite 0.
     struct Secret {
-      Key key;        ///< that of ClientKey
+      Key key;        ///< ClientKey::key
       Key ephemeral;  ///< from a cryptographic source, new for each attempt
     };
     std::optional<Secret> secret{};
-    /// 10 Hz: a lost Hello costs a person no noticeable wait, a dead server 12 kB/s.
+    /// A lost Hello delays the client by 0.1 s, which nobody notices; a dead server is sent 12 kB/s.
     Duration resend = std::chrono::milliseconds(100);
   };
   struct Accepted {
@@ -49,7 +48,7 @@ class ClientHandshake {
   };
   using Outcome = std::variant<Accepted, Refused>;
 
-  /// Throws std::invalid_argument when the Hello is longer than a datagram holds: too many claims with long names.
+  /// Throws std::invalid_argument when the Hello does not fit into a datagram (too many claims with long names).
   ClientHandshake(const Config& config, LocalTime now);
 
   void receive(LocalTime now, std::span<const std::byte> datagram);
@@ -69,40 +68,40 @@ class ClientHandshake {
   ClientRandom random_;
   Duration resend_;
   std::optional<NoiseInitiator> noise_;  ///< in suite 1
-  std::vector<std::byte> body_;          ///< of the Hello: written once, whatever cookies come
+  std::vector<std::byte> body_;          ///< of the Hello: written once, the same for every cookie
   std::optional<Cookie> cookie_;
   std::optional<Outcome> outcome_;
   bool due_ = true;
   LocalTime next_tick_;
 };
 
-/// The server's half: answers a Hello without a valid cookie by a Retry, keeping no state and never
-/// sending more bytes than it got, so that a spoofed source can neither fill memory nor be flooded.
+/// The server's half: answers a Hello without a valid cookie by a Retry. It keeps no state for it and never sends more
+/// bytes than it received, so spoofed Hellos neither fill our memory nor flood the address they were spoofed from.
 ///
 ///     key n  = HMAC-SHA-256(secret, "tendon-cookie-key" ‖ n as 8 bytes LE),  n = ⌊now / key_lifetime⌋
 ///     cookie = HMAC-SHA-256(key n, "tendon-cookie" ‖ ip[16] ‖ port as 2 bytes LE ‖ client random)[0..16)
 ///
-/// Cookies of key n and n − 1 are valid, so one lives between one and two key lifetimes and no key has to
-/// be remembered. Only then is anything counted against the source, and only then is a key tried. Silent
-/// on everything that fails. Sans-I/O; what is random comes from Config::secret.
+/// Cookies of key n and n − 1 are valid, so a cookie lives between one and two key lifetimes, and no key has to be
+/// remembered. Only after a valid cookie is a Hello counted against its source, and only then is a client's key tried.
+/// Every failure is silent. Sans-I/O; all randomness comes from Config::secret.
 class Doorman {
  public:
   struct Config {
-    /// Random at start. Cookie keys are derived from it and the time, ephemeral keys by a Ratchet. Wipe it
-    /// after the construction: what it was opens the handshakes to come.
+    /// Drawn at start. Cookie keys are derived from it and the time, ephemeral keys by a Ratchet. Wipe it after the
+    /// construction: with it, later handshakes could be opened.
     Bytes32 secret{};
-    /// Who may come in by suite 1.
+    /// The clients that may enter by suite 1.
     std::vector<ClientKey> keys{};
     std::uint32_t version_min = kProtocolVersion;
     std::uint32_t version_max = kProtocolVersion;
-    /// Longer than any client takes to come back with its cookie, short enough that a stolen one is of little use.
+    /// Longer than any client takes to return with its cookie; short enough that a stolen cookie is of little use.
     Duration key_lifetime = std::chrono::seconds(120);
   };
   /// A Hello whose sender has proved to own its address and, in suite 1, its key.
   struct Guest {
     Hello hello;
-    ClientRandom random;                  ///< the same random is the same attempt, resent: answer it alike
-    std::uint32_t version;                ///< the highest both speak; 0 = none in common: refuse with our range
+    ClientRandom random;                  ///< the same random means a resent Hello: repeat the answer
+    std::uint32_t version;                ///< the highest that both speak; 0 = none: refuse, with our range
     const ClientKey* key = nullptr;       ///< null in suite 0
     std::optional<NoiseResponder> noise;  ///< in suite 1
   };
@@ -114,20 +113,20 @@ class Doorman {
     std::size_t size = 0;             ///< of the Answer; 0 = stay silent
     std::optional<SessionKeys> keys;  ///< in suite 1
   };
-  /// Hellos that were not answered with what they wanted.
+  /// Hellos that did not lead to a Guest, by reason.
   struct Stats {
-    std::uint64_t retries = 0;      ///< no cookie, or an old one
-    std::uint64_t malformed = 0;    ///< no Hello of ours
-    std::uint64_t plain = 0;        ///< in suite 0 from another machine
+    std::uint64_t retries = 0;      ///< no cookie, or an invalid one: a Retry was sent
+    std::uint64_t malformed = 0;    ///< not a well-formed Hello
+    std::uint64_t plain = 0;        ///< suite 0 from another machine
     std::uint64_t limited = 0;      ///< too many from one source
-    std::uint64_t unknown_key = 0;  ///< of a key that nobody has here
-    std::uint64_t forged = 0;       ///< not sealed with the key they name
+    std::uint64_t unknown_key = 0;  ///< no client has a key with that id
+    std::uint64_t forged = 0;       ///< not sealed with the key that it names
   };
 
   /// Throws std::invalid_argument when `key_lifetime` is not positive, the version range is empty or two
   /// clients have one key, and std::runtime_error when libsodium cannot start.
   explicit Doorman(const Config& config);
-  // Guests point at our keys.
+  // A Guest points at our keys.
   Doorman(const Doorman&) = delete;
   Doorman& operator=(const Doorman&) = delete;
 
@@ -135,8 +134,8 @@ class Doorman {
   Reply receive(LocalTime now, const Address& from, std::span<const std::byte> datagram,
                 std::span<std::byte, kMaxDatagram> answer);
 
-  /// The bytes of yes and no, both shorter than a Hello. In suite 1 each call makes other bytes and other
-  /// keys: keep them for when the guest asks again.
+  /// Writes the Answer that admits the guest, or refuses it; both are shorter than a Hello. In suite 1 each call draws
+  /// new keys and so writes other bytes: keep them, for when the same Hello comes again.
   Answered welcome(const Guest& guest, std::uint32_t connection_id, const Welcome& welcome,
                    std::span<std::byte, kMaxDatagram> buffer);
   Answered refuse(const Guest& guest, const Refused& refused, std::span<std::byte, kMaxDatagram> buffer);

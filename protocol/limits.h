@@ -12,36 +12,36 @@
 
 namespace tendon::limits {
 
-/// Largest magnitude of any physical quantity in SI units, per component. It is not physics (what a
-/// device can do is the server's business): its square times itself stays finite even in single
-/// precision (1e36 < 3.4e38), and a unit mistaken by 1e9 or more is noticed.
+/// Largest magnitude of any physical quantity in SI units, per component. It is no physical limit (those are the
+/// server's): its cube stays finite in single precision (1e36 < 3.4e38), and a unit that is wrong by 1e9 or more is
+/// noticed.
 inline constexpr double kMaxValue = 1e12;
 
-/// Largest distance of any clock reading from its zero: 36 years. The sum of four such times, which a
-/// round trip is, cannot overflow 64 bits.
+/// Largest distance of any clock reading from its zero: 36 years. A round trip is the sum of four such times; it cannot
+/// overflow 64 bits.
 inline constexpr Duration kMaxTime{std::int64_t{1} << 60};
 
-/// A force cannot be promised for longer: beyond every peer timeout, the promise is about a dead peer.
+/// The longest validity of a force. A longer one would outlast every peer timeout, and so speak for a dead peer.
 inline constexpr Duration kMaxValidFor = std::chrono::seconds(10);
 
-/// Frames in one datagram. The two request windows and sixteen states or forces are 48; a 1200-byte datagram
-/// could otherwise hold 590 empty ones.
+/// Frames in one datagram. A correct peer needs 48 at most: both request windows and sixteen states or forces. Without
+/// this bound a datagram of 1200 bytes could hold 590 empty frames.
 inline constexpr int kMaxFrames = 64;
 
-/// Requests sent and not yet answered. Both ends keep this many slots, which is what makes the answers
-/// survive loss (see requests.h). A request is a human act; 16 are a burst of clicks.
+/// Requests sent and not yet answered. Both ends keep this many slots, so that answers survive loss (see requests.h).
+/// People make requests; 16 are a burst of clicks.
 inline constexpr std::uint32_t kRequestWindow = 16;
 
-/// The widest deadband of states that a server grants. Half the speed is beyond every threshold of touch (7 … 15 %).
-/// In 20 ms of silence a hand at 1 m/s moves 20 mm as predicted. A shorter silence than 1 ms would leave nothing out.
+/// The widest deadband of states that a server grants. Half the speed is far beyond the thresholds of touch (7 … 15 %).
+/// A hand at 1 m/s moves 20 mm in the longest silence. A silence below 1 ms, one haptic step, would leave nothing out.
 inline constexpr double kMaxDeadbandShare = 0.5;
 inline constexpr double kMaxDeadbandFloor = 0.1;  ///< m/s
 inline constexpr Duration kMinStateSilence = std::chrono::milliseconds(1);
 inline constexpr Duration kMaxStateSilence = std::chrono::milliseconds(20);
 
-/// Devices of one server, numbered from 0: two hands of five fingers, and as much again for tools. Each has a thread.
+/// Devices of one server, numbered from 0: ten fingers of two hands, and six more for tools. Each has a thread.
 inline constexpr std::uint32_t kMaxDevices = 16;
-/// Channels of one device, numbered from 0. Each costs its haptic step a reconstruction.
+/// Channels of one device, numbered from 0. Each adds a reconstruction to every haptic step.
 inline constexpr std::uint32_t kMaxChannels = 8;
 /// Claims in one Hello.
 inline constexpr int kMaxClaims = 16;
@@ -49,31 +49,30 @@ inline constexpr int kMaxClaims = 16;
 inline constexpr std::size_t kMaxLabel = 24;
 
 /// Bytes of UTF-8. With these the largest Hello without claims (674 bytes before padding) and the largest Welcome
-/// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) do not
-/// go with sixteen of the longest features (544): ClientHandshake refuses what is too long.
+/// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) and
+/// sixteen of the longest features (544) do not fit together: ClientHandshake refuses such a Hello.
 inline constexpr std::size_t kMaxName = 64;
 inline constexpr std::size_t kMaxFeature = 32;
 inline constexpr int kMaxFeatures = 16;
 /// One sentence: the reason of a refusal, an answer or a Bye.
 inline constexpr std::size_t kMaxDetail = 128;
 
-/// Buckets of the histogram of a loop's lateness, by powers of two of a microsecond: the last but one ends at 4.2 s,
-/// beyond every safe stop.
+/// Buckets of the histogram of a loop's lateness, by powers of two of 1 µs. The last but one ends at 4.2 s, beyond every
+/// safe stop.
 inline constexpr std::size_t kLatenessBuckets = 24;
-/// The rarest that a state is sent to a guest, one in so many: fifty times beyond what RateAdaptation does.
+/// At the rarest a guest is sent one state in this many: fifty times rarer than RateAdaptation makes them.
 inline constexpr std::uint32_t kMaxOneIn = 1000;
 
-/// Haptic steps per second: ten times beyond the fastest loop known to us (100 kHz, on FPGAs).
+/// Haptic steps per second: ten times the fastest loop known to us (100 kHz, on FPGAs).
 inline constexpr std::uint32_t kMaxLoopHz = 1'000'000;
 
-/// The longest silence that a server may grant. An hour is far beyond any use; it keeps sums of times small.
+/// The longest silence that a server may grant. An hour is longer than anybody needs, and keeps sums of times small.
 inline constexpr Duration kMaxTimeout = std::chrono::hours(1);
 
-/// Packet numbers are below this: the nonces of one key never come near the one that renews it, 2⁶⁴ − 1.
-/// At 1 MHz, 36 000 years.
+/// Packet numbers are below this, far from 2⁶⁴ − 1, the nonce that renews a key. At 1 MHz it takes 36 000 years.
 inline constexpr std::uint64_t kMaxPacketNumber = std::uint64_t{1} << 60;
 
-/// How often a Bye is said: at 10 % loss one conversation in a thousand ends by timeout instead.
+/// How often a Bye is sent: at 10 % loss, one conversation in a thousand loses all three and ends by timeout.
 inline constexpr int kByes = 3;
 
 }  // namespace tendon::limits

@@ -13,7 +13,7 @@
 
 namespace tendon {
 
-/// No datagram is larger than this: below every common path MTU, so it is never fragmented.
+/// The largest datagram, in bytes: below every common path MTU, so none is fragmented.
 inline constexpr std::size_t kMaxDatagram = 1200;
 
 /// Where a datagram comes from or goes to: a 16-byte IPv6 (or IPv4-mapped) address and a UDP port.
@@ -38,26 +38,24 @@ bool is_ipv4(const Address& address) noexcept;
 /// True for 127.0.0.0/8 and ::1: datagrams to it never leave this machine.
 bool is_loopback(const Address& address) noexcept;
 
-/// The edge of the world towards other machines: unreliable datagrams out and in. The real one is a
-/// UDP socket; in tests it is a simulated network.
+/// Where datagrams leave and arrive, unreliably: a UDP socket, or in tests a simulated network.
 ///
 /// Thread-safe: no.
 class Link {
  public:
   virtual ~Link() = default;
 
-  /// Sends one datagram, or loses it: like UDP, nobody is told.
+  /// Sends one datagram, or loses it without telling, as UDP does.
   virtual void send(const Address& to, std::span<const std::byte> datagram) = 0;
 
-  /// The next datagram that has arrived, copied into `buffer`; 0 when there is none, never waits.
-  /// A datagram larger than the buffer is cut and its full size returned, so that the caller sees
-  /// that it was too large.
+  /// Copies the next datagram that has arrived into `buffer` and returns its size; 0 when there is none. Never waits.
+  /// A datagram larger than the buffer is cut, and its full size returned, so that the caller can tell.
   virtual std::size_t receive(Address& from, std::span<std::byte> buffer) = 0;
 
-  /// A time, not before `now`, by which the datagram that receive() has just returned was certainly here. A turn that
-  /// loses its processor after it has been told the time finds datagrams younger than that; taken for as old, their
-  /// round trip and one of its ways would look short by as much, and of round trips the shortest is believed most
-  /// (ClockOffsetEstimator). A link without a clock says `now`.
+  /// A time, not before `now`, by which the datagram that receive() has just returned had certainly arrived. When a
+  /// turn is preempted after it has read `now`, it may find datagrams that arrived later. With `now` as their time of
+  /// arrival their round trip would look too short, and ClockOffsetEstimator trusts the shortest round trips most. A
+  /// link without a clock returns `now`.
   virtual LocalTime received_by(LocalTime now) const { return now; }
 };
 

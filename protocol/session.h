@@ -26,13 +26,13 @@ struct LinkStats {
   std::uint64_t datagrams_sent = 0;
   std::uint64_t datagrams_received = 0;  ///< accepted ones
   std::uint64_t lost = 0;                ///< peer packet numbers never seen (so far)
-  std::uint64_t lost_outgoing = 0;       ///< ours that the peer had not seen, as far as its ack vectors reach
-  std::uint64_t seen_outgoing = 0;       ///< … and those that it had
+  std::uint64_t lost_outgoing = 0;       ///< ours that the peer's ack vectors report as missing
+  std::uint64_t seen_outgoing = 0;       ///< ours that the peer's ack vectors report as received
   std::uint64_t reordered = 0;           ///< accepted, but older than one seen before
-  std::uint64_t duplicated = 0;          ///< seen before, older than the window, or of the handshake: dropped
+  std::uint64_t duplicated = 0;          ///< seen before, too old to tell, or a late handshake datagram: dropped
   std::uint64_t malformed = 0;           ///< not a datagram of this conversation: dropped
-  std::uint64_t forged = 0;              ///< suite 1: did not open; forged, or damaged under way: dropped
-  std::uint64_t old_key = 0;             ///< suite 1: of a key that is over, or far ahead: dropped
+  std::uint64_t forged = 0;              ///< suite 1: not authentic (forged, or damaged on the way): dropped
+  std::uint64_t old_key = 0;             ///< suite 1: sealed with a key no longer or not yet held: dropped
   std::uint64_t invalid = 0;             ///< well-formed, with a value out of bounds (NaN, Inf …): frame dropped
   std::uint64_t stale = 0;               ///< state, force or report not newer than the newest one: frame dropped
   Duration round_trip{};                 ///< newest sample, (T4 − T1) − (T3 − T2); 0 = none yet
@@ -40,20 +40,19 @@ struct LinkStats {
   Duration round_trip_variation{};       ///< RFC 6298 RTTVAR
 };
 
-/// One open conversation between a client and a server, seen from either end: bytes and instants in,
-/// bytes and events out (sans-I/O, pull). It has no socket, clock, thread or randomness of its own.
+/// One open conversation between a client and a server; both ends use this class. Bytes and instants go in, bytes and
+/// events come out (sans-I/O, pull). It has no socket, clock, thread or randomness of its own.
 ///
-/// * State, force and the reports are unreliable and newest-wins, those of each device and channel by
-///   themselves: `send` replaces what has not left yet, and a received one older than the newest is dropped and
-///   counted.
-/// * Requests are reliable and in order: resent until answered. Between requests, states and forces no
-///   order is promised.
-/// * Every datagram carries tx_time and an Echo, so each gives a round trip and an ack vector.
-/// * Silence is filled with keep-alives and, when too long, ends the conversation.
+/// * States, forces and reports are unreliable, and the newest wins, separately for each device and channel: `send`
+///   replaces a value that has not left yet; a received value older than the newest is dropped and counted.
+/// * Requests are reliable and in order: each is resent until it is answered. No order is promised between requests,
+///   states and forces.
+/// * Every datagram carries its sending time and an Echo, so each one received gives a round trip and an ack vector.
+/// * Our own silence is filled with keep-alives; too long a silence of the peer ends the conversation.
 ///
-/// Nothing queues without a bound: there is room for one state and one report of each device, one force and one report
-/// of each channel, one report of the link and limits::kRequestWindow requests each way; an event that was not taken
-/// out is replaced by a newer one of its kind.
+/// No queue is unbounded: there is room for one state and one report of each device, one force and one report of each
+/// channel, one report of the link and limits::kRequestWindow requests each way. A newer event replaces one of its kind
+/// that was not taken out in time.
 ///
 /// SESSION.md describes the behaviour over time, WIRE.md the bytes.
 ///
@@ -65,33 +64,35 @@ class Session {
  public:
   struct Config {
     std::uint32_t connection_id = 0;
-    /// Longest silence we leave: five are lost before a server comes to its 250 ms safe stop.
+    /// A keep-alive is sent after this much silence of ours. Five in a row must be lost before a server reaches its
+    /// 250 ms safe stop.
     Duration keep_alive = std::chrono::milliseconds(50);
-    /// Silence of the peer after which it is gone: longer than a Wi-Fi roam, shorter than patience.
+    /// The session ends after this much silence of the peer: longer than a Wi-Fi roam takes, shorter than a person
+    /// waits.
     Duration timeout = std::chrono::seconds(2);
-    /// A request is sent again after max(this, SRTT + 4 RTTVAR). Below it a peer that is merely scheduled
-    /// late (tens of ms on a virtual machine) would be asked twice.
+    /// A request is sent again after max(this, SRTT + 4 RTTVAR). A shorter wait would ask twice whenever the peer is
+    /// scheduled late, which takes tens of ms on a virtual machine.
     Duration min_resend = std::chrono::milliseconds(20);
 
     // In suite 1:
     Rekey rekey{};
-    /// After this age a session ends, kExpired: a new handshake, and no key is older than a day.
+    /// A session of this age ends with kExpired. The client then shakes hands again, so no key is older than a day.
     Duration life = std::chrono::hours(24);
-    /// … or when so many datagrams have left: a packet number is never used twice.
+    /// It also ends after this many datagrams of ours, so that no packet number is used twice.
     std::uint64_t max_datagrams = limits::kMaxPacketNumber;
   };
 
-  /// Either end of a conversation. `opened` is the instant of the handshake's end. The first datagram is
-  /// due at once, so that the peer knows us to be there and both have a round trip.
+  /// Either end of a conversation of suite 0. `opened` is the instant at which the handshake ended. The first datagram
+  /// is due at once: it tells the peer that we are there, and gives both ends a round trip.
   /// Throws std::invalid_argument when a duration of `config` is not positive.
   Session(const Config& config, LocalTime opened);
-  /// … sealed, in suite 1.
+  /// The same in suite 1: datagrams are sealed with `keys`.
   Session(const Config& config, const SessionKeys& keys, LocalTime opened);
   ~Session();
   Session(Session&&) noexcept;
   Session& operator=(Session&&) noexcept;
 
-  // What can be told to the owner.
+  // Events for the owner.
   struct StateArrived {
     DeviceState state;
   };
@@ -115,54 +116,54 @@ class Session {
     std::uint32_t id;
     Code code;
     std::string detail;
-    Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
-    std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
+    Duration wait{};                            ///< after a TakeLease answered kBusy; 0 = not known
+    std::optional<DeviceDescription> device{};  ///< after a Describe answered kOk
   };
   struct Closed {
-    Code code;  ///< as the peer said Bye: kOk, kShutdown …; kTimedOut: it fell silent; kExpired: too old
+    Code code;  ///< the code of the peer's Bye; kTimedOut: it fell silent; kExpired: the session is too old
     std::string reason;
   };
   using Event = std::variant<StateArrived, ForceArrived, ReportArrived, DeviceReportArrived, PeerReportArrived,
                              RequestArrived, RequestAnswered, Closed>;
 
   // In.
-  /// Takes any bytes. A datagram that is not a good one of this conversation is counted and dropped. True when
-  /// it was good and the newest so far: where it came from is where the peer is now. That is proved in
-  /// suite 1 only.
+  /// Takes any bytes. A datagram that does not belong to this conversation, or is malformed, is counted and dropped.
+  /// True when the datagram was accepted and is the newest so far: its source is then the peer's present address. Only
+  /// suite 1 proves that.
   bool receive(LocalTime now, std::span<const std::byte> datagram);
   void send(const DeviceState& state);
   void send(const ForceCommand& command);
   void send(const LinkReport& report);
   void send(const DeviceReport& report);
   void send(const PeerReport& report);
-  /// Queues a reliable request and returns its id; empty when limits::kRequestWindow are open, that is
-  /// sent and their RequestAnswered not yet taken out.
+  /// Queues a reliable request and returns its id; empty when limits::kRequestWindow are open. A request is open until
+  /// its RequestAnswered has been taken out.
   std::optional<std::uint32_t> request(const Request& request);
-  /// Answers a `RequestArrived`. Every request must be answered; an id that waits for none is ignored.
+  /// Answers a `RequestArrived`. Every request must be answered. An id that is not waiting for an answer is ignored.
   void answer(std::uint32_t id, Code code, std::string detail, Duration wait = {});
-  /// … a Describe.
+  /// Answers a Describe with kOk.
   void answer(std::uint32_t id, DeviceDescription device);
-  /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. Whatever was not sent yet is
-  /// dropped. No Closed comes: the owner knows.
+  /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. Anything not sent yet is dropped. No
+  /// Closed event follows, because the owner knows.
   void close(Code code, std::string reason);
-  /// Notices the silence of the peer, and our age.
+  /// Ends the session when the peer has been silent for too long, or the session is too old.
   void tick(LocalTime now);
 
   // Out.
   /// Writes the next datagram to send into `buffer` and returns its size; 0 = nothing to send now.
   std::size_t next_datagram(LocalTime now, std::span<std::byte, kMaxDatagram> buffer);
-  /// The next thing to tell; Closed is the last.
+  /// The next event, or empty; Closed is the last one.
   std::optional<Event> next_event();
-  /// When `tick` and `next_datagram` are due next; not in the future when something waits to be sent.
+  /// When to call `tick` and `next_datagram` next; not in the future when something waits to be sent.
   LocalTime next_tick() const noexcept;
 
   bool open() const noexcept;
   std::uint32_t connection_id() const noexcept;
   const LinkStats& stats() const noexcept;
-  /// The newest echo with its four time stamps; empty before the first.
+  /// The four time stamps of the newest echo; empty before the first.
   const std::optional<ClockExchange>& newest_exchange() const noexcept;
-  /// The peer's clock, as the echoes tell of it up to the newest `now`, with the bound on its error; empty before the
-  /// first.
+  /// The peer's clock, estimated from all echoes up to the newest `now`, with a bound on the error; empty before the
+  /// first echo.
   std::optional<ClockOffsetEstimator::Estimate> peer_clock() const noexcept;
 
  private:

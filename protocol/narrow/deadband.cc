@@ -20,7 +20,7 @@ bool Deadband::passes(LocalTime now, const Vec3& value) noexcept {
   const bool imperceptible =
       sent_ && now - sent_->at < config_.longest_silence &&
       (value - sent_->value).norm() <= std::max(config_.share * sent_->value.norm(), config_.floor);
-  if (imperceptible) return false;  // a value that is not a number is none of these, and passes
+  if (imperceptible) return false;  // false when `value` is not a number: that passes
   sent(now, value);
   return true;
 }

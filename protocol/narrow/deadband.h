@@ -9,12 +9,12 @@
 
 namespace tendon {
 
-/// Leaves out what a hand cannot feel: a vector is worth sending when it differs from the last one sent by more than
-/// Weber's share of it, and in any case after a silence, so that a lost one does not stay wrong.
+/// Leaves out changes that a hand cannot feel (Weber's law): a vector is sent when it differs from the last one sent by
+/// more than a share of it, and in any case after a silence, so that a lost vector does not stay wrong.
 ///
 ///     ‖v − v_sent‖ > max(share · ‖v_sent‖, floor)   or   now − sent ≥ longest_silence
 ///
-/// What the receiver rebuilds can hold more energy than what was left out, so a limiter has to stand behind it:
+/// The receiver's reconstruction can contain more energy than the vectors left out, so a limiter has to follow it;
 /// Tendon's does.
 ///
 /// Source: Hinterseer, Hirche, Chaudhuri, Steinbach, Buss, "Perception-based data reduction and transmission of haptic
@@ -25,18 +25,18 @@ class Deadband {
  public:
   struct Config {
     double share = 0.10;  ///< 0 … 1; the just noticeable difference of force is 7 to 15 %
-    double floor = 0.05;  ///< in the unit of the vector, ≥ 0: below it everything counts as nothing
+    double floor = 0.05;  ///< in the unit of the vector, ≥ 0: smaller changes are left out
     Duration longest_silence = std::chrono::milliseconds(20);
   };
   static constexpr Config force() noexcept { return {}; }
   static constexpr Config velocity() noexcept { return {.floor = 1e-3}; }
 
-  /// Throws std::invalid_argument naming the field when `config` is impossible.
+  /// Throws std::invalid_argument that names the field when a value of `config` is out of bounds.
   explicit Deadband(const Config& config);
 
-  /// Whether `value` is worth sending at `now`; if so it counts as sent.
+  /// True when `value` should be sent at `now`; it then counts as sent.
   bool passes(LocalTime now, const Vec3& value) noexcept;
-  /// It has been sent for another reason.
+  /// Says that `value` has been sent for another reason.
   void sent(LocalTime now, const Vec3& value) noexcept { sent_ = {now, value}; }
 
  private:
@@ -48,32 +48,32 @@ class Deadband {
   std::optional<Sent> sent_;
 };
 
-/// Where the device is `later` than in `sent`, as far as the line goes that it was on. Both ends reckon with this, so
-/// that the sender knows what the receiver believes. In whole haptic periods, so that the result is at a tick:
+/// The state `later` after `sent`, if the device keeps its velocity. Both ends use this function, so the sender knows
+/// what the receiver believes. It counts whole haptic periods T, so that the result belongs to a tick:
 ///
 ///     n = ⌊later / haptic_period⌋      tick + n      sampled + n T      position + velocity · n T
 ///
-/// Everything else is as it was. A `later` below zero is none. Realtime-safe: yes.
+/// All other fields are those of `sent`. A `later` below zero counts as zero. Realtime-safe: yes.
 DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
 
-/// Leaves out the device states that their receiver can foretell: a deadband on velocity, which is the slope of the
-/// line that it goes on along. A state of another mode passes always.
+/// Leaves out the device states that their receiver can foretell(): a deadband on velocity. A state whose mode differs
+/// from the last one sent always passes.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class StateDeadband {
  public:
-  /// What is wrong with what a client asks for; empty when it can be granted. Off is granted.
+  /// Why a client's request cannot be granted; empty when it can be. A request to turn the deadband off can.
   static std::string objection(const SetStateDeadband& asked);
 
-  /// `asked` is one that can be granted, and not off.
+  /// `asked` must be grantable, and not off.
   explicit StateDeadband(const SetStateDeadband& asked);
 
-  /// Whether the receiver needs this state; if so it counts as sent.
+  /// True when the receiver needs this state; it then counts as sent.
   bool passes(const DeviceState& state) noexcept;
 
  private:
   Deadband velocity_;
-  std::optional<Mode> mode_;  ///< as sent
+  std::optional<Mode> mode_;  ///< of the last state sent
 };
 
 }  // namespace tendon

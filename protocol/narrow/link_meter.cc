@@ -33,7 +33,7 @@ void LinkMeter::Samples::add(Duration sample) noexcept {
     for (std::size_t i = 0; i < kMost / 2; ++i) kept_[i] = kept_[2 * i];
     kept_.resize(kMost / 2);
     one_in_ *= 2;
-    // This one's number is a multiple of kMost · one_in / 2: it stays in the grid.
+    // The index of this sample is a multiple of the doubled one_in_ too, so it is kept.
   }
   kept_.push_back(sample);
 }
@@ -41,7 +41,7 @@ void LinkMeter::Samples::add(Duration sample) noexcept {
 std::optional<Delays> LinkMeter::Samples::take() {
   std::optional<Delays> delays;
   if (!kept_.empty()) {
-    // The least sample that at least this share of them does not exceed.
+    // The smallest sample that is not exceeded by `percent` of them.
     const auto quantile = [&](std::size_t percent) {
       const auto at = kept_.begin() + static_cast<std::ptrdiff_t>((kept_.size() * percent + 99) / 100 - 1);
       std::nth_element(kept_.begin(), at, kept_.end());

@@ -11,33 +11,33 @@
 
 namespace tendon {
 
-/// What a link did lately: quantiles of its delays, and how long nothing came of it.
+/// Measures a link: quantiles of its delays, and its longest silence, since the last report.
 ///
 ///     round trip = (T4 − T1) − (T3 − T2)      to the peer = T2 − θ − T1      from the peer = T4 − (T3 − θ)
 ///
-/// with the offset θ of the peer's clock as it is known when the exchange arrives: the two of one way are as wrong as θ
-/// is, in opposite directions.
+/// with θ the estimated offset of the peer's clock when the exchange arrives. An error of θ makes both one-way delays
+/// wrong by that much, in opposite directions.
 ///
-/// Of a delay at most 1024 samples are kept; beyond that every second, every fourth … one counts. Takes its memory when
-/// it is made.
+/// Keeps at most 1024 samples of each delay; when there are more, only every second, then every fourth … is used.
+/// Allocates all its memory in the constructor.
 ///
-/// Thread-safe: no. Realtime-safe: yes, but for report().
+/// Thread-safe: no. Realtime-safe: yes, except report().
 class LinkMeter {
  public:
   explicit LinkMeter(LocalTime now) : heard_(now) {}
 
-  /// A good datagram of the peer has come.
+  /// A good datagram of the peer has arrived.
   void heard(LocalTime now) noexcept;
-  /// … with an echo. `clock` is the peer's, by ours.
+  /// The datagram carried an echo. `clock` relates the peer's clock to ours.
   void observe(const ClockExchange& exchange, const ClockOffsetEstimator::Estimate& clock) noexcept;
 
   struct Report {
     std::optional<Delays> round_trip;
     std::optional<Delays> to_peer;
     std::optional<Delays> from_peer;
-    Duration longest_gap{};  ///< a silence that still lasts counts
+    Duration longest_gap{};  ///< a silence that still lasts counts too
   };
-  /// Since the last call.
+  /// The measurements since the last call.
   Report report(LocalTime now);
 
  private:
@@ -45,11 +45,11 @@ class LinkMeter {
    public:
     Samples() { kept_.reserve(kMost); }
     void add(Duration sample) noexcept;
-    /// Empties it.
+    /// The quantiles of the samples, which are then forgotten; empty when there are none.
     std::optional<Delays> take();
 
    private:
-    static constexpr std::size_t kMost = 1024;  ///< of a second at 1 kHz all
+    static constexpr std::size_t kMost = 1024;  ///< all those of one second at 1 kHz
     std::vector<Duration> kept_;
     std::uint64_t seen_ = 0;
     std::uint64_t one_in_ = 1;
@@ -57,7 +57,7 @@ class LinkMeter {
 
   LocalTime heard_;
   Duration longest_gap_{};
-  std::optional<LocalTime> newest_sent_;  ///< T1 of the newest exchange: the same way there is one sample
+  std::optional<LocalTime> newest_sent_;  ///< T1 of the newest exchange: counts each way there only once
   Samples round_trip_;
   Samples to_peer_;
   Samples from_peer_;

@@ -9,15 +9,16 @@
 
 namespace tendon {
 
-/// How often states should leave when the way to the peer is full: one in 1, 2, 4, 10 or 20 of them (1000, 500, 250,
-/// 100, 50 Hz of a 1 kHz loop). On a narrow link fewer states arrive sooner: over recorded LTE uplinks the 95th
+/// Chooses how many states to send when the way to the peer is full: one in 1, 2, 4, 10 or 20 (1000, 500, 250, 100
+/// or 50 Hz of a 1 kHz loop). On a narrow link fewer states arrive sooner: over recorded LTE uplinks the 95th
 /// percentile of the delay was 963 ms at 1 kHz and 22 ms at 100 Hz.
 ///
-/// A step down when the round trip has been `queueing` above its least of the last 10 to 20 s for `patience`, or when
-/// more than `loss` of our datagrams were lost in a window of `patience` and at least 20 datagrams. A step up after
-/// `clean` without either; when that brought the trouble back, the next wait is twice as long, at most `longest_clean`.
-/// On the lowest rate, with more than `hopeless_loss` lost for `hopeless_after`, the link is of no use: a circuit
-/// breaker in the sense of RFC 8084, for the owner to act on.
+/// It takes a step down when the round trip has been more than `queueing` above its minimum of the last 10 to 20 s
+/// for `patience`, or when more than `loss` of our datagrams were lost in a window of at least `patience` and 20
+/// datagrams. It takes a step up after `clean` without either. When that step up brings the trouble back, the next
+/// wait is twice as long, up to `longest_clean`. When at the lowest rate more than `hopeless_loss` is lost for
+/// `hopeless_after`, the link is of no use and hopeless() says so: a circuit breaker in the sense of RFC 8084, for
+/// the owner to act on.
 ///
 /// Source: RFC 8085 (a sender of UDP must not overload the path), network.md section 2.
 ///
@@ -35,16 +36,17 @@ class RateAdaptation {
   };
   static constexpr std::array<std::uint32_t, 5> kOneIn = {1, 2, 4, 10, 20};
 
-  /// Throws std::invalid_argument when a duration of `config` is not positive or a share not within 0 … 1.
+  /// Throws std::invalid_argument when a duration of `config` is not positive, longest_clean is below clean, or a share
+  /// is not within 0 … 1.
   RateAdaptation(const Config& config, LocalTime now);
 
-  /// What an answer of the peer has told: its round trip, and how many of our datagrams it had seen or missed since the
-  /// beginning. `now` does not go back, `seen` and `missed` do not shrink.
+  /// Takes a round trip, and how many of our datagrams the peer had seen and missed since the session began. `now`,
+  /// `seen` and `missed` never decrease.
   void observe(LocalTime now, Duration round_trip, std::uint64_t seen, std::uint64_t missed) noexcept;
 
-  /// One state in so many.
+  /// Send one state in this many.
   std::uint32_t one_in() const noexcept { return kOneIn[step_]; }
-  /// The circuit breaker.
+  /// True while the link loses too much at the lowest rate (circuit breaker).
   bool hopeless() const noexcept { return hopeless_; }
 
  private:
@@ -55,15 +57,15 @@ class RateAdaptation {
   std::size_t step_ = 0;
   bool hopeless_ = false;
 
-  // The least round trip of the present 10 s, and of the 10 s before.
+  // The shortest round trip of the present window of 10 s, and of the one before.
   LocalTime least_since_;
   Duration least_ = Duration::max();
   Duration least_before_ = Duration::max();
 
   LocalTime short_queue_at_;                     ///< when the queue was last seen short, or looked at
   Duration longest_queue_{};                     ///< since then
-  LocalTime trouble_at_;                         ///< when there last was any, or a step was taken
-  std::array<Duration, kOneIn.size()> clean_{};  ///< wait for the step up from each
+  LocalTime trouble_at_;                         ///< the last trouble or step
+  std::array<Duration, kOneIn.size()> clean_{};  ///< the wait before the step up from each rate
   bool just_up_ = false;                         ///< the last step was up, and has not yet been clean for `clean`
 
   LocalTime window_start_;

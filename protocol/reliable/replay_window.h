@@ -6,19 +6,19 @@
 
 namespace tendon {
 
-/// Which packet numbers have arrived, as far back as it matters: a packet is let in once. A ring of
-/// bits as in RFC 6479: a number's bit never moves, advancing clears the words it runs over.
+/// Remembers which packet numbers have arrived, so that each packet is accepted once. A ring of bits as in RFC 6479:
+/// the bit of a number never moves, and advancing clears the words that it passes.
 ///
-/// Ask with `contains` before anything is believed of a packet, `insert` once it has proved good, so
-/// that a forged one cannot use up the number of a real one.
+/// Call `contains` before a packet is opened, and `insert` only after it has proved authentic: a forged packet then
+/// cannot use up the number of a real one.
 class ReplayWindow {
  public:
-  /// 2048 bits, of which the word being filled is not a full memory: 1984 numbers are always remembered,
-  /// about two seconds at 1 kHz. Anything later is of no use to a hand.
+  /// The word that is being filled may still be nearly empty, so only 1984 of the 2048 numbers are sure to be
+  /// remembered: about two seconds at 1 kHz. A datagram that is later than that is of no use to a hand.
   static constexpr std::uint64_t kBits = 2048;
   static constexpr std::uint64_t kRemembered = kBits - 64;
 
-  /// True when `number` was inserted, or is too old to know.
+  /// True when `number` was inserted, or is too old to tell.
   bool contains(std::uint64_t number) const noexcept {
     if (empty_ || number > highest_) return false;
     if (highest_ - number >= kRemembered) return true;
@@ -40,7 +40,7 @@ class ReplayWindow {
     ++count_;
   }
 
-  /// Bit i: (number − 1 − i) is known to have been inserted. `number` is not above the highest.
+  /// Bit i is set when (number − 1 − i) is known to have been inserted. `number` must not be above the highest.
   std::uint32_t mask_before(std::uint64_t number) const noexcept {
     // The 64 numbers before it, its predecessor in the uppermost bit.
     const std::uint64_t into = number % 64;

@@ -54,12 +54,12 @@ std::optional<ControlAck> OutgoingRequests::next_answer() {
 bool IncomingRequests::take(const Control& control) {
   Slot& mine = slot(control.id);
   if (control.id < next_) {
-    // Older than what the slot remembers: a late copy of a request whose answer has long arrived.
+    // When the slot holds a newer request, this is a late copy of one whose answer has arrived long ago.
     if (mine.control.id == control.id && mine.stage == Slot::Stage::kAnswered) set_due(mine, true);
     return true;
   }
   if (control.id - next_ >= limits::kRequestWindow) return false;
-  if (mine.stage == Slot::Stage::kTaken) return false;  // cannot know the answer to the one 16 before
+  if (mine.stage == Slot::Stage::kTaken) return false;  // the one 16 before is not answered yet
   set_due(mine, false);
   mine = {.stage = Slot::Stage::kArrived, .control = control, .answer = {}, .due = false};
   return true;

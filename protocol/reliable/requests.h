@@ -12,32 +12,31 @@
 
 // The reliable part of a session: requests arrive exactly once and in order, and each gets its answer.
 //
-// The requester numbers its requests 1, 2, 3 … and repeats each until the answer has come; the answer is
-// the acknowledgement. The answerer keeps the last 16 answers and repeats one whenever its request comes
-// again. That is enough for ever: the requester has at most 16 requests open, so when request n + 16
-// arrives, the answer to n has.
+// The requester numbers its requests 1, 2, 3 … and repeats each until its answer arrives; the answer is the
+// acknowledgement. The answerer keeps its last 16 answers and repeats one whenever its request comes again. Sixteen are
+// always enough: the requester has at most 16 requests open, so when request n + 16 arrives, it has the answer to n.
 
 namespace tendon {
 
-/// The asking end.
+/// The end that asks.
 class OutgoingRequests {
  public:
-  /// Waits double with every repetition up to this: twice within a 2 s timeout. Also where the round trip is longer:
-  /// what has been slow for a while and lost a copy must not then wait for all that time; a copy a second costs
-  /// nothing.
+  /// The wait doubles with every repetition up to this, so that a request is repeated at least twice within a timeout
+  /// of 2 s. The limit holds even where the round trip is longer: a request that has lost a copy on a slow link must
+  /// not wait for another slow round trip, and one copy a second costs nothing.
   static constexpr Duration kMaxWait = std::chrono::seconds(1);
 
   /// Queues a request and returns its id; empty when kRequestWindow are open.
   std::optional<std::uint32_t> add(const Request& request);
 
-  /// The first request to be sent (again) now; null when none is.
+  /// The first request that is due to be sent, or sent again; null when none is.
   const Control* next_due(LocalTime now) const noexcept;
-  /// It has been sent; it is due again after `timeout`, doubled for every time before, at most kMaxWait.
+  /// Request `id` has been sent. It is due again after `timeout`, doubled for each earlier time, at most kMaxWait.
   void sent(std::uint32_t id, LocalTime now, Duration timeout) noexcept;
-  /// When the next one is due: LocalTime::min() = it was never sent, LocalTime::max() = none.
+  /// When the next request is due: LocalTime::min() = one was never sent, LocalTime::max() = none is open.
   LocalTime next_due_time() const noexcept;
 
-  /// Takes an answer. False when it answers what was never asked.
+  /// Takes an answer. False when it answers a request that was never sent.
   bool acknowledge(const ControlAck& ack);
   /// The next answer, in the order of the requests.
   std::optional<ControlAck> next_answer();
@@ -57,18 +56,18 @@ class OutgoingRequests {
   std::uint32_t next_ = 1;    ///< id of the next request
 };
 
-/// The answering end.
+/// The end that answers.
 class IncomingRequests {
  public:
-  /// Takes a request in any order. One that was answered before has its answer sent again. False when
-  /// the id is one that a correct peer cannot use yet.
+  /// Takes a request, in any order. The answer to one that was answered before is sent again. False when a correct peer
+  /// cannot use that id yet.
   bool take(const Control& control);
-  /// The next request, exactly once and in order. Those this build does not know are answered here.
+  /// The next request: each exactly once, in order. Requests that this version does not know are answered here.
   std::optional<Control> next();
   /// Answers a request that `next` returned; any other id is ignored.
   void answer(ControlAck ack);
 
-  /// The first answer to be sent now; null when none is.
+  /// The first answer that is due to be sent; null when none is.
   const ControlAck* next_due() const noexcept;
   void sent(std::uint32_t id) noexcept;
 
@@ -85,7 +84,7 @@ class IncomingRequests {
 
   std::array<Slot, limits::kRequestWindow> slots_;
   std::uint32_t next_ = 1;  ///< the next request to hand out
-  int due_ = 0;             ///< slots that are: asked for at every datagram, and hardly ever any
+  int due_ = 0;             ///< slots with `due` set; it saves the search, which nearly every datagram would do in vain
 };
 
 }  // namespace tendon

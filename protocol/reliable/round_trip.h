@@ -8,15 +8,15 @@
 
 namespace tendon {
 
-/// How long to and fro takes, and how long to wait for an answer before asking again (RFC 6298):
+/// The smoothed round trip, and how long to wait for an answer before asking again (RFC 6298):
 ///
 ///     first sample R:  SRTT = R, RTTVAR = R/2
 ///     then:            RTTVAR += (|SRTT − R| − RTTVAR)/4,  SRTT += (R − SRTT)/8
 ///     wait for:        max(minimum, SRTT + 4 RTTVAR)
 class RoundTrip {
  public:
-  /// What to wait before the first sample. The RFC says 1 s; a handshake has just gone through, so the
-  /// peer is there, and 100 ms is beyond the round trip of any link on which touch makes sense.
+  /// The wait before there is a sample. The RFC says 1 s. Here a handshake has just succeeded, so the peer is
+  /// reachable, and 100 ms is beyond the round trip of any link on which touch makes sense.
   static constexpr Duration kFirstTimeout = std::chrono::milliseconds(100);
 
   void observe(Duration sample) noexcept {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::string_view kLabel = "tendon-key-id";
 
-/// Of 32 random bytes some 30 are different; that fewer than 18 are happens once in 10¹¹ keys.
+/// 32 random bytes have about 30 different values. One random key in 10¹¹ has fewer than 18.
 constexpr std::size_t kFewestDifferent = 18;
 
 constexpr std::string_view kExpected = "expected one line, `controller` or `observer` and 64 hexadecimal digits";
@@ -36,7 +36,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
   }
 }
 
-/// The words of the one line that is no comment.
+/// The words of the only line that is not a comment.
 std::vector<std::string_view> only_line(std::string_view text) {
   std::vector<std::string_view> found;
   while (!text.empty()) {

@@ -13,12 +13,11 @@
 
 namespace tendon {
 
-/// How many handshakes a source may ask for: `kPerSecond` in the long run, `kBurst` at once. A source is
-/// an IPv4 address or the /64 of an IPv6 one, because whoever has one address there has all of them.
+/// Limits the handshakes of each source: `kPerSecond` in the long run, `kBurst` at once. A source is an IPv4 address, or
+/// the /64 of an IPv6 address, because whoever has one address of a /64 has all of them.
 ///
-/// The table never grows: sources share kBuckets buckets, by a hash that nobody outside can foresee. It
-/// is asked only once a cookie has proved the address, so that spoofed sources cannot use up the share
-/// of a real one.
+/// The table never grows: sources share kBuckets buckets, by a hash that outsiders cannot predict. It is consulted only
+/// after a cookie has proved the address, so spoofed sources cannot use up the share of a real one.
 class HelloLimit {
  public:
   static constexpr int kPerSecond = 20;  ///< two clients at the handshake's 10 Hz
@@ -29,9 +28,9 @@ class HelloLimit {
     buckets_.fill(LocalTime::min());
   }
 
-  /// True, and counted, when the source is within its limit.
+  /// True when the source is within its limit; the handshake is then counted.
   bool admit(LocalTime now, const Address& from) noexcept {
-    // Generic cell rate algorithm: a bucket is the time at which it would be empty again.
+    // Generic cell rate algorithm: a bucket stores the time at which it will be empty again.
     constexpr Duration kEvery = std::chrono::nanoseconds(std::chrono::seconds(1)) / kPerSecond;
     LocalTime& empty_at = buckets_[bucket(from)];
     const LocalTime begin = std::max(empty_at, now);

@@ -41,7 +41,7 @@ void mix_key_and_hash(NoiseState& state, const Key& material) noexcept {
   state.key = keys[2];
 }
 
-/// Tokens `psk` and what comes before: the same at both ends.
+/// The protocol's name, the prologue and the token `psk`: the same at both ends.
 NoiseState begin(const Key& psk, Bytes prologue) noexcept {
   NoiseState state;
   state.hash = crypto::sha256({std::as_bytes(std::span(kName))});
@@ -51,7 +51,7 @@ NoiseState begin(const Key& psk, Bytes prologue) noexcept {
   return state;
 }
 
-/// Token `e`; with a pre-shared key the public key is mixed into the key as well.
+/// Token `e`. Because there is a pre-shared key, the public key is mixed into the chaining key too.
 void mix_ephemeral(NoiseState& state, const Bytes32& public_key) noexcept {
   mix_hash(state, public_key);
   mix_key(state, public_key);

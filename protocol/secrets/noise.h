@@ -13,19 +13,19 @@
 //     -> psk, e
 //     <- e, ee
 //
-// Both ends know the pre-shared key; each brings an ephemeral key of its own, drawn for this handshake
-// and never used again. Sans-I/O, no randomness.
+// Both ends know the pre-shared key. Each brings an ephemeral key, drawn for this handshake and never used again.
+// Sans-I/O, no randomness.
 
 namespace tendon {
 
-/// What a handshake ends with, the same at both ends.
+/// The result of a handshake, the same at both ends.
 struct NoiseSplit {
   Key initiator_to_responder;
   Key responder_to_initiator;
-  Bytes32 handshake_hash{};  ///< of all that was said
+  Bytes32 handshake_hash{};  ///< over both messages
 };
 
-/// What both ends have mixed so far: the SymmetricState of the specification.
+/// The SymmetricState of the specification: all that was mixed so far.
 struct NoiseState {
   Bytes32 hash{};
   Key chaining_key;
@@ -33,14 +33,14 @@ struct NoiseState {
 };
 
 inline constexpr std::size_t kNoisePublicSize = 32;
-/// Bytes of a message beyond those of its payload.
+/// A message is this many bytes longer than its payload.
 inline constexpr std::size_t kNoiseOverhead = kNoisePublicSize + crypto::kTagSize;
 
 /// The client's end.
 class NoiseInitiator {
  public:
-  /// Writes message 1. One object, one message: a second payload under this ephemeral key would use a
-  /// nonce twice.
+  /// Writes message 1. An object writes only one message: a second payload under the same ephemeral key would use a nonce
+  /// twice.
   NoiseInitiator(const Key& psk, const Key& ephemeral, std::span<const std::byte> prologue,
                  std::span<const std::byte> payload);
 
@@ -50,7 +50,7 @@ class NoiseInitiator {
     std::vector<std::byte> payload;
     NoiseSplit split;
   };
-  /// Reads message 2. Empty when it is not authentic; a later one may be.
+  /// Reads message 2. Empty when it is not authentic; another message may still be read afterwards.
   std::optional<Answer> read(std::span<const std::byte> message) const;
 
  private:
@@ -59,10 +59,10 @@ class NoiseInitiator {
   std::vector<std::byte> message_;
 };
 
-/// The server's end: message 1, read.
+/// The server's end, after message 1 has been read.
 class NoiseResponder {
  public:
-  /// Empty when message 1 is not authentic, that is not written with this `psk` and `prologue`.
+  /// Empty when message 1 was not written with this `psk` and `prologue`.
   static std::optional<NoiseResponder> read(const Key& psk, std::span<const std::byte> prologue,
                                             std::span<const std::byte> message);
 
@@ -72,7 +72,7 @@ class NoiseResponder {
     std::vector<std::byte> message;
     NoiseSplit split;
   };
-  /// Writes message 2. Empty when the peer's ephemeral key is of low order. Once per `ephemeral`.
+  /// Writes message 2. Empty when the peer's ephemeral key is of low order. Use each `ephemeral` only once.
   std::optional<Reply> reply(const Key& ephemeral, std::span<const std::byte> payload) const;
 
  private:

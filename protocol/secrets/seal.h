@@ -13,7 +13,7 @@
 
 namespace tendon {
 
-/// The keys of one conversation of suite 1, from where we stand.
+/// The keys of one conversation of suite 1: those with which this end sends and receives.
 struct SessionKeys {
   Key send;
   Key receive;
@@ -21,11 +21,11 @@ struct SessionKeys {
 
 /// When keys are renewed. The sender decides; the receiver follows the epoch in the header.
 struct Rekey {
-  /// Far below what ChaCha20-Poly1305 bears (2⁶⁰ and more at our sizes), often enough that a key that is
-  /// read from memory opens minutes, not a day: 17 min at 1 kHz.
+  /// A key is renewed after this many datagrams, 17 min at 1 kHz. ChaCha20-Poly1305 would bear 2⁶⁰ and more of our size;
+  /// but a key that is read from memory now opens minutes of the conversation, not a day.
   std::uint64_t datagrams = std::uint64_t{1} << 20;
   Duration age = std::chrono::minutes(10);
-  /// How long the key before is still good: longer than any datagram that is of use is under way.
+  /// How long the previous key is still accepted: longer than any useful datagram is on its way.
   Duration overlap = std::chrono::seconds(2);
 };
 
@@ -34,19 +34,19 @@ class Sealer {
  public:
   Sealer(const Key& key, const Rekey& rekey, LocalTime opened) noexcept;
 
-  /// The epoch of the datagram that is about to be written: renews the key when it is time.
+  /// The epoch for the next datagram. Renews the key first when that is due.
   std::uint8_t next_epoch(LocalTime now) noexcept;
 
-  /// Seals what follows the header, in place, and returns the new size of the datagram: crypto::kTagSize
-  /// more. `buffer` must hold that. Once per packet number.
+  /// Seals the bytes after the header in place and returns the new size of the datagram, `size` + crypto::kTagSize, which
+  /// `buffer` must hold. Call once for each packet number.
   std::size_t seal(const Header& header, std::span<std::byte> buffer, std::size_t size) noexcept;
 
  private:
   Rekey rekey_;
   Key key_;
   std::uint8_t epoch_ = 0;
-  std::uint64_t sealed_ = 0;  ///< with this key
-  LocalTime since_;           ///< this key is used
+  std::uint64_t sealed_ = 0;  ///< datagrams, with the present key
+  LocalTime since_;           ///< start of the present key
 };
 
 /// Opens the datagrams of the other direction.
@@ -56,11 +56,11 @@ class Opener {
 
   enum class Verdict : std::uint8_t {
     kOpened,
-    kForged,  ///< not sealed with the key of its epoch: forged, or damaged under way
-    kOldKey,  ///< of an epoch whose key we do not hold: over, or far ahead
+    kForged,  ///< not sealed with the key of its epoch: forged, or damaged on the way
+    kOldKey,  ///< its epoch's key is not held any more, or not yet
   };
-  /// Opens what follows the header into `body`, which must hold as many bytes. A datagram of the next
-  /// epoch that opens makes that the present one.
+  /// Opens the bytes after the header into `body`, which must hold as many. A datagram of the next epoch that opens makes
+  /// that epoch the present one.
   Verdict open(LocalTime now, const Header& header, std::span<const std::byte> datagram,
                std::span<std::byte> body) noexcept;
 

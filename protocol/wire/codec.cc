@@ -43,9 +43,8 @@ pb::Datagram& new_datagram(google::protobuf::Arena& arena) {
 
 }  // namespace
 
-/// One small Datagram per kind of frame. Protobuf defines the concatenation of two messages as their
-/// merge, so a datagram with several frames is written piece after piece, and each piece keeps its
-/// objects for the next time.
+/// One small Datagram for each kind of frame. Protobuf defines the concatenation of two messages as their merge, so a
+/// datagram with several frames is written piece by piece, and each piece keeps its objects for the next datagram.
 struct DataWriter::Pieces {
   pb::Datagram head, state, force, control, ack, bye, report, device_report, peer_report;
   pb::Frame& state_frame = *state.add_frames();
@@ -127,8 +126,8 @@ bool DataWriter::add(const PeerReport& report) {
   return append(pieces_->peer_report);
 }
 
-/// Parsed objects live in an arena whose first block is ours: no heap for a state or a force, and one
-/// `Reset` frees what a hostile datagram made of its 1200 bytes.
+/// Parsed objects live in an arena whose first block is ours, so a state or a force needs no heap. One `Reset` frees
+/// all objects that the 1200 bytes of a hostile datagram can create.
 struct DataReader::Memory {
   alignas(16) std::array<char, 8192> block;
   google::protobuf::Arena arena{block.data(), block.size()};
