@@ -57,8 +57,8 @@ inline constexpr int kMaxFeatures = 16;
 /// One sentence: the reason of a refusal, an answer or a Bye.
 inline constexpr std::size_t kMaxDetail = 128;
 
-/// Buckets of the histogram of a loop's lateness, by powers of two of 1 µs. The last but one ends at 4.2 s, beyond every
-/// safe stop.
+/// Buckets of the histogram of a loop's lateness, by powers of two of 1 µs. The last but one ends at 4.2 s, beyond
+/// every safe stop.
 inline constexpr std::size_t kLatenessBuckets = 24;
 /// At the rarest a guest is sent one state in this many: fifty times rarer than RateAdaptation makes them.
 inline constexpr std::uint32_t kMaxOneIn = 1000;

@@ -31,9 +31,9 @@ KeyId key_id(const Key& key) noexcept;
 
 std::string key_file_text(const ClientKey& key);
 
-/// Reads the text of a key file whose permissions are `mode` (st_mode). Throws std::invalid_argument when anybody but the
-/// owner may read or write the file, when the text is no key file, or when the key is weak. The message is a sentence
-/// without the file's name, and never contains the key.
+/// Reads the text of a key file whose permissions are `mode` (st_mode). Throws std::invalid_argument when anybody but
+/// the owner may read or write the file, when the text is no key file, or when the key is weak. The message is a
+/// sentence without the file's name, and never contains the key.
 ClientKey read_key_file(std::string_view text, unsigned mode, std::string name);
 
 /// Bytes of the largest key file: one line and a few comments.

@@ -48,8 +48,8 @@ bool x25519(const Key& secret, const Bytes32& point, Key& shared) noexcept;
 
 inline constexpr std::size_t kTagSize = 16;
 
-/// ChaCha20-Poly1305 with the nonce of Noise: 4 zeros and `number` as 8 bytes LE. `sealed` is kTagSize bytes longer than
-/// `text`; the two may begin at the same address.
+/// ChaCha20-Poly1305 with the nonce of Noise: 4 zeros and `number` as 8 bytes LE. `sealed` is kTagSize bytes longer
+/// than `text`; the two may begin at the same address.
 void seal(const Key& key, std::uint64_t number, std::span<const std::byte> associated, std::span<const std::byte> text,
           std::span<std::byte> sealed) noexcept;
 /// The inverse of seal(); `text` is kTagSize bytes shorter than `sealed`. False when `sealed` is not authentic: `text`
@@ -78,9 +78,9 @@ struct Seed {
   Bytes32 bytes{};
 };
 
-/// A sequence of secrets from one seed, as random as that seed. Each call returns 32 bytes and erases the state they came
-/// from (fast key erasure: half a block of ChaCha20 is the next state, half is the output), so that reading this memory
-/// later reveals none of the earlier keys.
+/// A sequence of secrets from one seed, as random as that seed. Each call returns 32 bytes and erases the state they
+/// came from (fast key erasure: half a block of ChaCha20 is the next state, half is the output), so that reading this
+/// memory later reveals none of the earlier keys.
 class Ratchet {
  public:
   explicit Ratchet(const Seed& seed) noexcept : state_(seed.bytes) {}

@@ -13,8 +13,8 @@
 
 namespace tendon {
 
-/// Limits the handshakes of each source: `kPerSecond` in the long run, `kBurst` at once. A source is an IPv4 address, or
-/// the /64 of an IPv6 address, because whoever has one address of a /64 has all of them.
+/// Limits the handshakes of each source: `kPerSecond` in the long run, `kBurst` at once. A source is an IPv4 address,
+/// or the /64 of an IPv6 address, because whoever has one address of a /64 has all of them.
 ///
 /// The table never grows: sources share kBuckets buckets, by a hash that outsiders cannot predict. It is consulted only
 /// after a cookie has proved the address, so spoofed sources cannot use up the share of a real one.

@@ -39,8 +39,8 @@ inline constexpr std::size_t kNoiseOverhead = kNoisePublicSize + crypto::kTagSiz
 /// The client's end.
 class NoiseInitiator {
  public:
-  /// Writes message 1. An object writes only one message: a second payload under the same ephemeral key would use a nonce
-  /// twice.
+  /// Writes message 1. An object writes only one message: a second payload under the same ephemeral key would use a
+  /// nonce twice.
   NoiseInitiator(const Key& psk, const Key& ephemeral, std::span<const std::byte> prologue,
                  std::span<const std::byte> payload);
 

@@ -21,8 +21,8 @@ struct SessionKeys {
 
 /// When keys are renewed. The sender decides; the receiver follows the epoch in the header.
 struct Rekey {
-  /// A key is renewed after this many datagrams, 17 min at 1 kHz. ChaCha20-Poly1305 would bear 2⁶⁰ and more of our size;
-  /// but a key that is read from memory now opens minutes of the conversation, not a day.
+  /// A key is renewed after this many datagrams, 17 min at 1 kHz. ChaCha20-Poly1305 would bear 2⁶⁰ and more of our
+  /// size; but a key that is read from memory now opens minutes of the conversation, not a day.
   std::uint64_t datagrams = std::uint64_t{1} << 20;
   Duration age = std::chrono::minutes(10);
   /// How long the previous key is still accepted: longer than any useful datagram is on its way.
@@ -37,8 +37,8 @@ class Sealer {
   /// The epoch for the next datagram. Renews the key first when that is due.
   std::uint8_t next_epoch(LocalTime now) noexcept;
 
-  /// Seals the bytes after the header in place and returns the new size of the datagram, `size` + crypto::kTagSize, which
-  /// `buffer` must hold. Call once for each packet number.
+  /// Seals the bytes after the header in place and returns the new size of the datagram, `size` + crypto::kTagSize,
+  /// which `buffer` must hold. Call once for each packet number.
   std::size_t seal(const Header& header, std::span<std::byte> buffer, std::size_t size) noexcept;
 
  private:
@@ -59,8 +59,8 @@ class Opener {
     kForged,  ///< not sealed with the key of its epoch: forged, or damaged on the way
     kOldKey,  ///< its epoch's key is not held any more, or not yet
   };
-  /// Opens the bytes after the header into `body`, which must hold as many. A datagram of the next epoch that opens makes
-  /// that epoch the present one.
+  /// Opens the bytes after the header into `body`, which must hold as many. A datagram of the next epoch that opens
+  /// makes that epoch the present one.
   Verdict open(LocalTime now, const Header& header, std::span<const std::byte> datagram,
                std::span<std::byte> body) noexcept;
 
