@@ -10,32 +10,31 @@
 
 namespace tendon::softbody {
 
-/// Where a body comes apart: the parallelogram corner + s·`along` + t·`deep`, 0 ≤ s, t ≤ 1; m, the body's frame, as it
-/// lies at rest.
+/// A planned cut: the parallelogram corner + s·`along` + t·`deep`, 0 ≤ s, t ≤ 1; m, in the body's frame, at rest.
 struct Cut {
   Vec3 corner;
   Vec3 along;
   Vec3 deep;
 };
 
-/// A mesh after cuts. Its elements are those that there were, so that the cut runs along their faces: it opens each
-/// face between two elements whose middles the parallelogram lies between. Nodes keep their numbers, and the copies on
-/// a cut's other side come behind them; at the tip of a cut, where the elements around a node still hang together,
-/// there is none.
+/// A mesh after cuts. Its elements stay as they were, so a cut runs along their faces: it opens each face whose two
+/// elements have their centres on different sides of the parallelogram. Nodes keep their numbers, and the copies on the
+/// other side of a cut come after them. At the tip of a cut, where the elements around a node are still connected,
+/// there is no copy.
 struct Division {
   Mesh mesh;
-  Fixed fixed;                   ///< copies of held nodes are held, and so are nodes that no element has any more
-  std::vector<int> node_before;  ///< for each node: which it was
-  int opened = 0;                ///< faces, those included that were opened before
-  int lost = 0;                  ///< elements of pieces that nothing holds (three held nodes do): they are taken out
+  Fixed fixed;                   ///< copies of held nodes are held, and so are nodes without an element
+  std::vector<int> node_before;  ///< for each node: its number before the cuts
+  int opened = 0;                ///< faces, including those opened before
+  int lost = 0;                  ///< elements removed with pieces that nothing holds (three held nodes hold one)
 };
 
-/// `cuts`: all that were ever made in this mesh, also those that it shows already: where a cut was too short to part a
-/// node, the next to it can.
+/// `cuts`: all that were ever made in this mesh, even those that it shows already: a later cut can split a node for
+/// which an earlier one was too short.
 Division divide(const Mesh& mesh, const Fixed& fixed, std::span<const Cut> cuts);
 
-/// For each free displacement that is there for the first time, that of whose node it is a copy. Of a division without
-/// losses, where those that there were have kept their numbers.
+/// For each new free displacement, the one of the node that was copied. Only for a division that lost no elements, in
+/// which the earlier displacements have kept their numbers.
 std::vector<int> twins(const Elastic& divided, const Division& division);
 
 /// A cut that a scene has planned.
@@ -49,7 +48,8 @@ struct PlannedCut {
   double value;
 };
 
-/// The effect: which cuts have been made, in their order; each waits for those before it. Thread-safe: no.
+/// The effect: which cuts have been made. They are made in their order; each waits for those before it. Thread-safe:
+/// no.
 class Cutting {
  public:
   /// Throws std::invalid_argument that names the cut: a parallelogram without area, a time below 0, a force not above
@@ -59,7 +59,7 @@ class Cutting {
   bool due(PlannedCut::When when, double value) const noexcept;
   std::span<const Cut> make_next();  ///< all that are made then; one must be left
   std::size_t left() const noexcept { return plan_.size() - made_.size(); }
-  bool take_changed() noexcept;  ///< whether cuts were made since this was asked last
+  bool take_changed() noexcept;  ///< true when cuts were made since the last call
   std::size_t bytes() const noexcept;
 
  private:

@@ -10,10 +10,10 @@
 
 namespace tendon::softbody {
 
-/// Something else than elasticity that acts on all of a body. As one step of time sees it, it is an energy that is
-/// quadratic in the free displacements u, and the body goes where the sum of all energies is least; with inertia that
-/// is the implicit Euler method. An effect that a scene does not list is not constructed: it has no state, and no
-/// instruction of a step is its.
+/// An effect beside elasticity on the whole body. Within one time step it is an energy, quadratic in the free
+/// displacements u, and the body moves to the minimum of the sum of all energies; with inertia that is the implicit
+/// Euler method. An effect that a scene does not list is not constructed, has no state, and costs a step no
+/// instruction.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Effect {
@@ -45,7 +45,7 @@ class Gravity : public Effect {
   VectorXd weight_;  ///< N
 };
 
-/// Mass that keeps on: ½ Σ m (u − u₀ − v₀ dt)² / dt², of a step from u₀ with the velocity v₀.
+/// Inertia: ½ Σ m (u − u₀ − v₀ dt)² / dt², for a step from u₀ with the velocity v₀.
 class Inertia : public Effect {
  public:
   Inertia(const Elastic& elastic, const VectorXd& u, double density, double dt);
@@ -61,8 +61,8 @@ class Inertia : public Effect {
   VectorXd ahead_;   ///< u₀ + v₀ dt, m
 };
 
-/// A bath around every particle, which pulls with −rate·m·v: ½ Σ rate/dt m (u − u₀)². It also slows a body that moves
-/// as a whole, and so is for bringing one to rest rather than for tissue.
+/// Viscous drag on every particle, −rate·m·v: ½ Σ rate/dt m (u − u₀)². It also slows a body that moves as a whole, so
+/// it serves to bring a body to rest and does not model tissue.
 class Damping : public Effect {
  public:
   /// `rate` 1/s.
@@ -78,9 +78,9 @@ class Damping : public Effect {
   VectorXd start_;  ///< u₀, m
 };
 
-/// A material that resists being deformed quickly (Kelvin and Voigt): the stress of a strain ε is that of ε + τ ∂ε/∂t,
-/// with the stiffness K₀ of the body at rest: ½ τ/dt (u − u₀)ᵀ K₀ (u − u₀). Right for small rotations: a body that
-/// turns as a whole is slowed too.
+/// A material that resists fast deformation (Kelvin and Voigt): a strain ε has the stress of ε + τ ∂ε/∂t. With the
+/// stiffness K₀ of the body at rest: ½ τ/dt (u − u₀)ᵀ K₀ (u − u₀). Valid for small rotations only: a body that turns as
+/// a whole is slowed too.
 class Viscosity : public Effect {
  public:
   /// `relaxation` τ, s.
@@ -96,12 +96,12 @@ class Viscosity : public Effect {
   VectorXd start_;              ///< u₀, m
 };
 
-/// The effects of a scene. What is empty or false is not there.
+/// The effects of a scene. Empty or false: not simulated, costs nothing.
 struct EffectsConfig {
   double density = 0;                    ///< kg/m³, above 0; for gravity, inertia and damping
-  double step = 0;                       ///< s, above 0: how long an answer lasts; for those with time
+  double step = 0;                       ///< s, above 0: the time step of an answer; for effects with time
   std::optional<Vec3> gravity = {};      ///< m/s², in the body's frame
-  bool inertia = false;                  ///< has time, and so have the next two
+  bool inertia = false;                  ///< has time, as the next two have
   std::optional<double> damping = {};    ///< 1/s
   std::optional<double> viscosity = {};  ///< s
 
@@ -111,16 +111,17 @@ struct EffectsConfig {
 /// Throws std::invalid_argument that names the field.
 void check(const EffectsConfig& config);
 
-/// For models that are made of steps of time: throws std::invalid_argument without inertia and with viscosity.
+/// For models that consist of time steps: throws std::invalid_argument without inertia, or with viscosity.
 void check_only_with_inertia(const EffectsConfig& config);
 
 using Effects = std::vector<std::unique_ptr<Effect>>;
 
-/// What acts on a body at rest too; and what acts only on one that moves, here from rest at u (m, free displacements).
+/// The effects that act even on a body at rest; and those that act only on a moving body, which starts from rest at u
+/// (m, free displacements).
 Effects effects_at_rest(const EffectsConfig& config, const Elastic& elastic);
 void add_effects_of_time(Effects& effects, const EffectsConfig& config, const Elastic& elastic, const VectorXd& u);
 
-/// Their energy and forces at u (m, all nodes), to those of elasticity; the forces of free displacements.
+/// Adds the effects' energy and forces at u (m, all nodes) to those of elasticity; forces on free displacements.
 void add_forces(const Effects& effects, const Elastic& elastic, const VectorXd& u, Elastic::Forces& to);
 
 std::size_t bytes(const Effects& effects) noexcept;

@@ -10,7 +10,7 @@
 
 namespace tendon::softbody {
 
-/// Keeps the sides of one body out of each other: the effect of a fold, a flap or a cut that closes again. Where a node
+/// Keeps the sides of one body from overlapping, in a fold, at a flap, or where a cut closes again. Where a node
 /// of the surface lies g > 0 m behind a facet that faces it, a bed of springs between the two sides pushes them apart
 /// with the pressure c·g, half of it from the nodes of either side:
 ///
@@ -18,13 +18,13 @@ namespace tendon::softbody {
 ///
 /// with y the point of the facet that is nearest, n the facet's normal out of the body, and Aᵢ the node's share of the
 /// surface at rest. Node and facet are pushed by equal and opposite forces on one line (node to segment, by penalty:
-/// Hallquist, Goudreau & Benson 1985). Which facet a node is at, y's share of it and n are kept while a shape is
-/// sought, and looked up again in the shape that was found, until that changes nothing: as y is the nearest point, the
-/// forces are then the slope of the energy. Facets reach a little beyond their rims.
+/// Hallquist, Goudreau & Benson 1985). The facet of each node, the position of y on it and n are kept during a
+/// solution, and looked up again in the new shape until that changes nothing: because y is the nearest point, the
+/// forces are then the gradient of the energy. Facets extend a little beyond their rims.
 ///
-/// Facets are cut into flat triangles from their middles. A node is never pushed by a facet that one of its own
-/// elements has a node on: what folds over less than two elements is not seen, nor are edges that cross edges, nor
-/// sides that have gone through each other by more than half a facet before they were looked for.
+/// Facets are divided into flat triangles around their centres. A facet never pushes a node when one of the node's
+/// elements has a node on that facet. Not detected: folds over less than two elements, edges that cross edges, and
+/// sides that overlapped by more than half a facet before the first search.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class SelfCollision {
@@ -33,32 +33,32 @@ class SelfCollision {
   /// is not above 0.
   SelfCollision(const Elastic& elastic, double bed, const VectorXd& u);
 
-  /// Looks up what is near what at u. By which part of themselves, 0 … 2, the forces there become
-  /// others.
+  /// Looks up the neighbours at u. Returns the relative change of the forces there, 0 … 2.
   double look(const VectorXd& u);
 
   VectorXd free_forces(const VectorXd& u) const { return elastic_.to_free(forces(u)); }  ///< ∂energy/∂u, N
-  /// The bed's energy and forces, those of free displacements, to those of elasticity.
+  /// Adds the bed's energy and its forces on free displacements to those of elasticity.
   void add_forces(const VectorXd& u, Elastic::Forces& to) const;
 
-  /// A step of Newton's method wants to know who will be pushed at its end: the bed pushes only, and a step that meets
-  /// it unawares goes nowhere. This takes those whom the step d pushes that makes
+  /// A Newton step must know which nodes will be pushed at its end, because the bed only pushes, and a step that does
+  /// not expect it makes no progress. This selects the nodes that are pushed by the step d that makes
   ///
   ///     ½ dᵀK d − d·b + energy(u + d)
   ///
-  /// least, of all or of those with held·d = `by` if `held` is given; `factor` is that of K. The N along `held`. With
-  /// the forces on the nodes as unknowns it is a linear complementarity problem with a positive definite matrix, solved
-  /// by Gauss and Seidel's method with projection (Cottle, Pang & Stone 1992, chapter 5).
+  /// least, among all steps, or among those with held·d = `by` if `held` is given; `factor` is that of K. Returns the
+  /// force along `held`, N. With the forces on the nodes as unknowns it is a linear complementarity problem with a
+  /// positive definite matrix, solved by Gauss and Seidel's method with projection (Cottle, Pang & Stone 1992, chapter
+  /// 5).
   double foresee(const Factor& factor, const VectorXd& u, const VectorXd& b, const VectorXd* held, double by);
 
-  /// What acts on the free displacements at u if just those are pushed, or pulled, less what acts there.
+  /// The forces on the free displacements at u if exactly those nodes are pushed, or pulled, minus the present forces.
   VectorXd foreseen_forces(const VectorXd& u) const;
 
-  /// x with (K + the stiffness of the bed below those) x = b, of each column; `factor` is that of K. By Woodbury's
-  /// identity: a solution for each of them, and K's factor and pattern stay what they are.
+  /// Solves (K + the bed's stiffness at those nodes) x = b for each column; `factor` is that of K. By Woodbury's
+  /// identity: it costs one solution for each node, and K's factor and pattern stay as they are.
   MatrixXd solve(const Factor& factor, const MatrixXd& b) const;
 
-  double overlap(const VectorXd& u) const;  ///< m, how far a node is behind its facet, at most
+  double overlap(const VectorXd& u) const;  ///< m, the largest distance of a node behind its facet
   std::size_t bytes() const noexcept;
 
  private:
@@ -91,7 +91,7 @@ class SelfCollision {
     double offset;
     std::vector<int> nodes;   ///< the node itself, then those of y
     std::vector<Vec3> along;  ///< n, then −share·n
-    bool pushed = false;      ///< at the end of a step, as far as can be foreseen
+    bool pushed = false;      ///< at the end of the step, as predicted
 
     double gap(const VectorXd& u) const;
     void add(double force, VectorXd& to) const;

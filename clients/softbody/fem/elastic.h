@@ -11,7 +11,7 @@
 
 namespace tendon::softbody {
 
-/// Which displacements are given, and which are to be found. Component c of node i has the number 3 i + c.
+/// Which displacements are fixed, and which are unknown. Component c of node i has the number 3 i + c.
 using Fixed = std::vector<bool>;
 
 /// The number 3 i + c of every component of every node for which `holds(position)`.
@@ -25,8 +25,9 @@ Fixed fix_where(const Mesh& mesh, Predicate holds) {
   return fixed;
 }
 
-/// A mesh, held somewhere, with an elastic energy: its value and first two derivatives by the displacements u (m, all
-/// nodes). The energy has a minimum of 0 at u = 0, and nodes act on each other only within an element.
+/// A mesh, held somewhere, with an elastic energy: its value and its first two derivatives with respect to the
+/// displacements u (m, all nodes). The energy has a minimum of 0 at u = 0, and nodes act on each other only within an
+/// element.
 ///
 /// Without state. Thread-safe: yes, once built. Realtime-safe: no.
 class Elastic {
@@ -43,7 +44,7 @@ class Elastic {
   void add_free(const VectorXd& free, VectorXd& all) const;  ///< all += free; the fixed ones stay
 
   virtual double energy(const VectorXd& u) const = 0;  ///< J
-  /// ∂energy/∂u, N: what must act on the nodes from outside to hold them there.
+  /// ∂energy/∂u, N: the external forces that hold the nodes there.
   struct Forces {
     double energy;
     VectorXd force;
@@ -51,9 +52,9 @@ class Elastic {
   virtual Forces forces(const VectorXd& u) const = 0;
 
   enum class Curvature : std::uint8_t { kExact, kWithoutNegative };
-  /// The second derivative by the free displacements, N/m.
+  /// The second derivative with respect to the free displacements, N/m.
   virtual void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const = 0;
-  /// Its pattern, with zeros.
+  /// Its pattern; all values are zero.
   const SymmetricMatrix& pattern() const noexcept { return pattern_; }
 
   virtual std::size_t bytes() const noexcept = 0;
@@ -77,13 +78,13 @@ class Elastic {
   SymmetricMatrix pattern_;
 };
 
-/// The kg that are at each free displacement.
+/// The mass of each free displacement, kg.
 VectorXd lumped_mass(const Elastic& elastic, double density);
 
 /// 1 N on the patch, against the normal, as forces on all nodes.
 VectorXd patch_load(const Elastic& elastic, const Vec3& normal, const Patch& patch);
 
-/// The mean depth of a patch, m, and its change as the patch moves, of a body with the displacements u.
+/// The mean depth of a patch, m, and its derivative as the patch moves, for a body with the displacements u.
 double depth_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
 Vec2 slope_below(const Patch& patch, const Vec3& normal, const VectorXd& u);
 

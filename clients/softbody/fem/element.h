@@ -13,13 +13,13 @@ namespace tendon::softbody {
 using Vec3 = Eigen::Vector3d;  ///< m or N, scene frame
 using Mat3 = Eigen::Matrix3d;
 
-/// Nodes and elements have signed numbers, as Eigen's rows do; the standard library's containers want this.
+/// Nodes and elements have signed numbers, like Eigen's rows; this converts one for the standard containers.
 inline std::size_t at(int index) noexcept { return static_cast<std::size_t>(index); }
 
-/// Where an element's nodes are. Their order is gmsh's.
+/// The shape of an element, and where its nodes are, in gmsh's order.
 enum class Shape : std::uint8_t { kTet4, kHex8, kHex20, kHex27 };
 
-/// A shape and how its energy is integrated.
+/// A shape, and the rule that integrates its energy.
 enum class Element : std::uint8_t { kTet4, kHex8, kHex8Sri, kHex20, kHex27, kHex27Sri };
 
 struct ElementInfo {
@@ -27,7 +27,7 @@ struct ElementInfo {
   Shape shape;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  /// Above this Poisson ratio it locks: it is stiffer than what it stands for, without end as ν goes to ½.
+  /// Above this Poisson ratio it locks: it is stiffer than the material, without limit as ν approaches ½.
   double locks_above;
 };
 
@@ -38,7 +38,7 @@ std::optional<Element> element_named(std::string_view name) noexcept;
 
 inline constexpr int kMaxNodes = 27;
 int nodes_of(Shape shape) noexcept;
-int corners_of(Shape shape) noexcept;  ///< the first so many nodes
+int corners_of(Shape shape) noexcept;  ///< the first nodes of an element; their number
 
 /// A reference element is the cube [−1, 1]³, or the tetrahedron 0 ≤ x, y, z, x + y + z ≤ 1.
 Vec3 node_at(Shape shape, int node) noexcept;
@@ -50,8 +50,8 @@ struct ShapeValues {
 };
 ShapeValues shape_at(Shape shape, const Vec3& at);
 
-/// A point of integration. The shares say which part of the material is integrated here: with selective reduced
-/// integration the volumetric part (Lamé's λ) has fewer points than the rest (µ), so that a nearly
+/// A point of integration. The shares `mu` and `lambda` say which part of the material is integrated here: with
+/// selective reduced integration the volumetric part (Lamé's λ) has fewer points than the rest (µ), so that a nearly
 /// incompressible material is not kept from bending (Hughes 1980).
 struct QuadraturePoint {
   Vec3 at;

@@ -17,10 +17,10 @@ namespace tendon::softbody {
 /// turned inside out or has no volume, or shapes are mixed.
 Mesh read_gmsh(const std::filesystem::path& file, double scale);
 
-/// The same for text in memory; `name` is what errors call it.
+/// The same for text in memory; errors call it `name`.
 Mesh parse_gmsh(std::string_view text, std::string_view name, double scale);
 
-/// A larger file is refused: a mesh with a million nodes is far beyond what any model here answers with in time.
+/// Bytes of the largest file: no model here is fast enough for a mesh with a million nodes.
 inline constexpr std::uintmax_t kMaxMeshBytes = 256U << 20U;
 
 }  // namespace tendon::softbody

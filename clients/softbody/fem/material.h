@@ -8,8 +8,8 @@
 
 namespace tendon::softbody {
 
-/// Energy densities Ψ(F), F = I + ∂u/∂X. All agree for small strains, and all are linear in µ and λ, which is what
-/// selective reduced integration needs. With J = det F, ε = sym(F − I), E = ½(FᵀF − I), R the rotation next to F:
+/// Energy densities Ψ(F), F = I + ∂u/∂X. All agree for small strains, and all are linear in µ and λ, as selective
+/// reduced integration requires. With J = det F, ε = sym(F − I), E = ½(FᵀF − I), R the rotation next to F:
 ///
 ///     linear         µ ε:ε + ½ λ (tr ε)²                             a rotation is a strain
 ///     corotational   µ |F − R|² + ½ λ (tr(RᵀF) − 3)²
@@ -33,7 +33,7 @@ void check(const Material& material);
 
 using Mat9 = Eigen::Matrix<double, 9, 9>;
 
-/// A linear map of matrices, as one of columns: `change(dF)` for each entry of dF.
+/// The matrix of a linear map of 3 × 3 matrices: a column `change(dF)` for each entry of dF.
 template <class Change>
 Mat9 by_columns(const Change& change) {
   Mat9 all;
@@ -46,7 +46,7 @@ Mat9 by_columns(const Change& change) {
   return all;
 }
 
-/// What a law says at one F.
+/// The values of a law at one F.
 struct Stress {
   double energy;  ///< Ψ, J/m³
   Mat3 piola;     ///< P = ∂Ψ/∂F, Pa

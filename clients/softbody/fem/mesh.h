@@ -22,9 +22,9 @@ struct Mesh {
   std::span<const int> element(int index) const noexcept;
 };
 
-/// A block whose layers lie at `xs`, `ys` and `zs` (m, ascending, at least two each): equal steps, or finer where it
-/// is touched. Tetrahedra are cut so that the two halves of an even block are mirror images: a
-/// press in the middle has no force aside.
+/// A block whose layers lie at `xs`, `ys` and `zs` (m, ascending, at least two each): equal steps, or finer where it is
+/// touched. The tetrahedra of the two halves of an even block are mirror images, so that pressing its middle gives no
+/// sideways force.
 Mesh block(Shape shape, std::span<const double> xs, std::span<const double> ys, std::span<const double> zs);
 
 /// A block of `size` m on the plane z = 0, its middle above the origin, in `cells` equal cells for each axis.
@@ -42,7 +42,7 @@ double check(const Mesh& mesh, std::string_view name);
 /// hands out slivers below 1e-4.
 inline constexpr double kLeastQuality = 1e-9;
 
-/// The share of each node in the volume of the body, m³, all above 0: the diagonal of the consistent mass matrix,
+/// The volume that belongs to each node, m³, all above 0: the diagonal of the consistent mass matrix,
 /// scaled so that their sum is the volume (Hinton, Rock & Zienkiewicz 1976).
 std::vector<double> nodal_volumes(const Mesh& mesh);
 
@@ -52,14 +52,14 @@ struct Facet {
   int face;
 };
 
-/// Those where no other lies: the body's surface. The two sides of a cut that is not open yet lie on each other, and
-/// are none.
+/// The surface: the faces on which no other face lies. The two sides of a cut that is still closed lie on each other
+/// and do not count.
 std::vector<Facet> surface(const Mesh& mesh);
 
 /// The faces that belong to one element only: the surface, and both sides of a cut, even where they touch.
 std::vector<Facet> sides(const Mesh& mesh);
 
-/// Those that two elements share.
+/// The faces that two elements share.
 std::vector<std::pair<Facet, Facet>> inner_faces(const Mesh& mesh);
 
 /// The nodes on a facet.

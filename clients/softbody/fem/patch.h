@@ -12,22 +12,22 @@ namespace tendon::softbody {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Where a tool presses, as weights of nodes: the mean of any field over the patch is Σ wᵢ·fieldᵢ, and a force F on it
-/// is F·wᵢ on each node. The weight of a point at the distance r from the middle is
+/// The patch on which a tool presses, as weights of nodes: the mean of any field over the patch is Σ wᵢ·fieldᵢ, and a
+/// force F on it is F·wᵢ on each node. The weight of a point at the distance r from the middle is
 ///
 ///     p(r) = 3/(πa²) · (1 − (r/a)²)²,   r < a
 ///
-/// with consistent shares for the nodes. The size a is fixed: the stiffness under one node has no limit as a mesh
-/// becomes finer (it goes as 1/r, Boussinesq), under a patch it has.
+/// with consistent shares for the nodes. The size a is fixed because the stiffness under a patch converges as the mesh
+/// becomes finer; under a single node it does not (displacements go as 1/r, Boussinesq).
 struct Patch {
   std::vector<int> nodes;                           ///< ascending
   VectorXd weights;                                 ///< their sum is 1
   Eigen::Matrix<double, 2, Eigen::Dynamic> slopes;  ///< 1/m, how the weights change as the middle moves
-  double covered = 0;                               ///< the part of the patch that lies on the body, 0 … 1
+  double covered = 0;                               ///< the fraction of the patch that lies on the body, 0 … 1
 };
 
-/// The side of a body that a tool can touch, seen along one direction: the facets that face it, as a landscape of
-/// heights over the plane across it.
+/// The side of a body that a tool can touch, seen along one direction: the facets that face it, as a height field over
+/// the plane normal to it.
 ///
 /// Thread-safe: yes, once built. Realtime-safe: no.
 class TouchSurface {
@@ -47,10 +47,10 @@ class TouchSurface {
   const std::vector<int>& nodes() const noexcept { return nodes_; }
   std::vector<int> nodes_of_patches(const Vec2& middle, double reach) const;
 
-  /// The patch around `middle`. None where less of it lies on the body than `least_covered`.
+  /// The patch around `middle`; empty where less of it than `least_covered` lies on the body.
   std::optional<Patch> patch(const Vec2& middle, double least_covered = 0.5) const;
 
-  /// A node's position across, and its height, the one along the normal; m.
+  /// A node's position across the normal, and its height along the normal; m.
   const Vec2& place(int node) const { return places_[static_cast<std::size_t>(node)]; }
   double height(int node) const { return heights_[static_cast<std::size_t>(node)]; }
 

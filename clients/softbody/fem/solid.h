@@ -35,7 +35,7 @@ class Solid : public Elastic {
 
   std::size_t bytes() const noexcept override;
 
-  /// A point of integration: the part of an element that it stands for, and of which of its moduli.
+  /// An integration point: the volume and the moduli that it stands for.
   struct Point {
     double volume;  ///< m³
     double mu;      ///< Pa; 0 where only λ is integrated
@@ -48,10 +48,10 @@ class Solid : public Elastic {
   Nodal displacements(const VectorXd& u, int element) const;       ///< of an element's nodes, m
 
  protected:
-  /// Energy and forces of a material of which `stress_at(element, point, F)` says the Stress.
+  /// Energy and forces of a material with the Stress `stress_at(element, point, F)`.
   template <class StressAt>
   Forces sum_forces(const VectorXd& u, const StressAt& stress_at) const;
-  /// The stiffness of one of which `tangent_at(element, point, F)` says the tangent.
+  /// The stiffness of a material with the tangent `tangent_at(element, point, F)`.
   template <class TangentAt>
   void sum_stiffness(const VectorXd& u, const TangentAt& tangent_at, SymmetricMatrix& to) const;
 

@@ -24,8 +24,8 @@ struct SymmetricMatrix {
 };
 
 /// The Cholesky factor of a symmetric positive definite matrix (CHOLMOD, supernodal). The order of elimination is found
-/// once for a pattern; factorize() does the rest again for new values. After split() the pattern is the grown one,
-/// whose order the next factorize() finds.
+/// once for each pattern; factorize() then uses it for new values. After split() the pattern is the grown one, and the
+/// next factorize() finds its order.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Factor {
@@ -39,20 +39,20 @@ class Factor {
   /// False when the matrix is not positive definite; the factor then has no values.
   [[nodiscard]] bool factorize(const SymmetricMatrix& matrix);
 
-  /// Goes on as the factor of `grown`, which the matrix becomes when some unknowns are given twins that take over a
-  /// part of what couples them to others: `grown` has the twins behind the unknowns that there were, `twin_of` says
-  /// whose they are, and with every twin held to its own it is the matrix that this is a factor of. With d = how far
-  /// the twins are from their own, T all of them held together and C each twin alone,
+  /// Becomes the factor of `grown`: the same matrix after some unknowns got twins, which take over some of their
+  /// coupling to other unknowns. In `grown` the twins come after the old unknowns; `twin_of` names the original of
+  /// each. With every twin tied to its original, `grown` is the old matrix. With d the distances of the twins from
+  /// their originals, T the map that ties them and C the map that moves each twin alone,
   ///
   ///     TᵀAT = the old matrix,   S = CᵀAC − (CᵀAT)(TᵀAT)⁻¹(TᵀAC),   S d = Cᵀb − (CᵀAT)(TᵀAT)⁻¹Tᵀb
   ///
-  /// (block elimination; a capacitance matrix, James & Pai 1999): the factor stays, and S, one row for each twin, costs
-  /// a solution each. False, and nothing is changed, where `grown` is not positive definite, or where all solutions
-  /// since factorize() would be more work than a new factor, as CHOLMOD counts. What CHOLMOD has for this itself, rank
-  /// updates (Davis & Hager 1999), wants the slower simplicial factor and more of them: a twin changes many rows.
+  /// (block elimination; a capacitance matrix, James & Pai 1999): the factor stays, and each row of S, one for each
+  /// twin, costs one solution. False, and nothing changes, when `grown` is not positive definite, or when by CHOLMOD's
+  /// count all solutions since factorize() would be more work than a new factor. CHOLMOD's own rank updates (Davis &
+  /// Hager 1999) need the slower simplicial factor, and many of them, because a twin changes many rows.
   [[nodiscard]] bool split(const SymmetricMatrix& grown, const std::vector<int>& twin_of);
 
-  /// x with A x = b; of each column.
+  /// Solves A x = b for each column.
   MatrixXd solve(const MatrixXd& b) const;
 
   std::size_t bytes() const noexcept;

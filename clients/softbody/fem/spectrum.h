@@ -5,7 +5,8 @@
 
 namespace tendon::softbody {
 
-/// How a body swings: K x = ω² M x, with the masses M on the diagonal. By Lanczos' method (Spectra), to 1e-6 or better.
+/// The vibration modes of a body: K x = ω² M x, with the masses M on the diagonal. By Lanczos' method (Spectra), to
+/// 1e-6 or better.
 
 /// The largest ω, rad/s. `mass` in kg, all above 0.
 double fastest_swing(const SymmetricMatrix& stiffness, const VectorXd& mass);
