@@ -82,7 +82,7 @@ it("shows a server, its device and its engine, live and as metrics", async (test
   await until("its place is free", async () => (await metric(url, "tendon_dash_pages")) === 0);
 });
 
-it("watches all devices of a server, and tells a page of the one that it chose", async (test) => {
+it("watches all devices of a server; a page gets the one that it chose", async (test) => {
   const folder = scratch(test);
   const server = await startServer(test, folder, ["left", "right"], "--record", "/dev/null");
   const { address } = await startDash(test, server.address);
@@ -97,7 +97,7 @@ it("watches all devices of a server, and tells a page of the one that it chose",
   assert.ok(said.slice(change).every((m) => m.type !== "states" || m.device === 1));
 });
 
-it("serves the page, compressed where that is understood, under a strict policy", async (test) => {
+it("serves the page under a strict policy, compressed on request", async (test) => {
   const { socket, address: nobody } = await fakeServer(test);
   const { url, address } = await startDash(test, nobody);
   const page = await fetch(`${url}/`);
@@ -165,7 +165,7 @@ async function crowd(test, address, count, words) {
   return sockets;
 }
 
-it("serves others while 300 slow connections wait, and ends those after 5 s", async (test) => {
+it("serves others while 300 slow connections wait, ends those after 5 s", async (test) => {
   const { address: nobody } = await fakeServer(test);
   const { url, address } = await startDash(test, nobody);
   const sockets = await crowd(test, address, 300, "GET /metrics HTTP/1.1\r\nHost: ");
@@ -213,7 +213,7 @@ it("says how to listen beyond this machine, and which folder is none", async (te
   assert.match(taken.lines.join("\n"), /cannot listen on .*: Address already in use/);
 });
 
-it("bridge: passes each datagram on as it is, both ways, and each WebSocket has a port of its own", async (test) => {
+it("bridge: passes datagrams unchanged; each WebSocket has its own port", async (test) => {
   const { socket, arrived, address: server } = await fakeServer(test);
   const { url, address } = await startDash(test, server);
   const [a, b] = [await open(test, `ws://${address}/bridge`), await open(test, `ws://${address}/bridge`)];
@@ -235,7 +235,7 @@ it("bridge: passes each datagram on as it is, both ways, and each WebSocket has 
   await until("the place is free", async () => (await metric(url, "tendon_bridge_pages")) === 1);
 });
 
-it("bridge: lets in pages of this machine, of the origins it was told, and programs; nobody else's pages", async (test) => {
+it("bridge: lets in this machine's pages, named origins and programs only", async (test) => {
   const { address: server } = await fakeServer(test);
   const { url, address } = await startDash(test, server, "--origin", "https://lab.example");
   for (const origin of ["http://localhost:8000", "http://127.0.0.1", "http://[::1]:3000", "https://lab.example", undefined]) {
@@ -260,7 +260,7 @@ it("bridge: passes sealed datagrams only on for others than this machine", async
   assert.equal(await metric(url, 'tendon_bridge_dropped_total{cause="plain"}'), 4);
 });
 
-it("bridge: drops and counts what is no datagram, and closes for what is larger than one can be", async (test) => {
+it("bridge: counts what is no datagram, and closes for what is too large", async (test) => {
   const { arrived, address: server } = await fakeServer(test);
   const { url, address } = await startDash(test, server);
   const page = await open(test, `ws://${address}/bridge`);
@@ -289,7 +289,7 @@ it("bridge: has a limit on WebSockets, and one on the datagrams of each", async 
   assert.ok(arrived.length > 0);
 });
 
-it("bridge: keeps nothing for a page that does not read: a newer state follows", async (test) => {
+it("bridge: a page that does not read gets a newer state, not a queue", async (test) => {
   const { socket, arrived, address: server } = await fakeServer(test);
   const { url, address } = await startDash(test, server);
   const page = await open(test, `ws://${address}/bridge`);

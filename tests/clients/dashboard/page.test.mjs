@@ -8,7 +8,7 @@ import { it } from "node:test";
 import { painted, picture, says, shown, visit } from "./browser.mjs";
 import { Program, makeKeys, scratch, startDash, startServer, until } from "./support.mjs";
 
-it("shows live what the server does, stands still when it is told to, and goes on", async (test) => {
+it("shows the server live, pauses when told to, and goes on", async (test) => {
   const folder = scratch(test);
   const server = await startServer(test, folder, ["demo"], "--record", "/dev/null");
   new Program(test, "virtual_wall", ["--server", server.address, "--rate-hz", "200"]);
@@ -125,7 +125,7 @@ async function guarded(test) {
 const applied = async (page) => parseFloat(await page.locator("[data-tile=force] .value").textContent());
 const result = (page, level, text) => says(page, `.arming .result[data-level=${level}]`, text);
 
-it("arms and disarms by two buttons, beside an engine that goes on, and says what became of it", async (test) => {
+it("two buttons arm and disarm beside a running engine and say the result", async (test) => {
   const { server, key } = await guarded(test);
   const { url, operatorUrl, program } = await startDash(test, server.address, ...key("operator"), "--arm", "operator");
   const page = await visit(test, url, { at: operatorUrl });
@@ -175,7 +175,7 @@ it("arms nothing by a channel that an engine holds, and says who holds it", asyn
   assert.match(await answer.text(), /^"virtual_wall" holds the channel/);
 });
 
-it("shows no button without leave to arm, but what that takes, and is closed to whoever is not its page", async (test) => {
+it("without leave to arm: no button, how to get one, closed to other pages", async (test) => {
   const { server, key } = await guarded(test);
   const { url } = await startDash(test, server.address, ...key("screen"));
   const page = await visit(test, url);

@@ -159,7 +159,7 @@ async function lengthen(from, to, count) {
   closeSync(file);
 }
 
-it("reads a recording of more than ten minutes in parts, and of the file only what it shows", async (test) => {
+it("reads a recording over ten minutes in parts, only those that it shows", async (test) => {
   const folder = scratch(test);
   const server = await startServer(test, folder, ["demo"], "--record", "short.mcap", "--duration-s", "1");
   await server.program.ended;

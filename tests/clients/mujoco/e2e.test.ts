@@ -68,7 +68,7 @@ it("forces that the device gives out are those that MuJoCo gave", async (test) =
   assert.ok(answers > 0 && steps >= answers);
 });
 
-it("the README's example compiles and is the one that is run, word for word", () => {
+it("the README's example compiles and is, word for word, the one run", () => {
   const [, example] = /```ts\n([\s\S]*?)```/.exec(readFileSync(join(kRoot, "clients/mujoco/README.md"), "utf8"))!;
   const source = readFileSync(join(kRoot, "clients/mujoco/examples/touch_block.ts"), "utf8");
   assert.equal(example, source.replace(/^\/\/ SPDX.*\n/, ""));

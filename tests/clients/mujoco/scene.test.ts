@@ -69,7 +69,7 @@ function press(scene: TouchableScene, n: number, newtons: number, steps: number)
 }
 
 describe("the force", () => {
-  it("of a weight that lies on the hand is its weight, straight down, however the hand is tilted", async (test) => {
+  it("of a weight on the hand is its weight, straight down at any tilt", async (test) => {
     const { scene } = await load(test, kRigid(kPlate));
     let force;
     for (let i = 0; i < 100; ++i) force = scene.answer(at(0, 0, 0), 0.01);
@@ -175,7 +175,7 @@ describe("a scene in which MuJoCo would be wrong", () => {
 });
 
 describe("while it runs", () => {
-  it("a position that is no number changes nothing, is counted, and gives no force", async (test) => {
+  it("a position that is no number is counted and gives no force", async (test) => {
     const { scene, warnings } = await load(test, block({ n: 4 }));
     const state = () => {
       const { mujoco, model, data } = scene;
@@ -196,7 +196,7 @@ describe("while it runs", () => {
     assert.ok(scene.answer(at(0, 0, -0.0075), 0.01)!.z > 0.1);
   });
 
-  it("a hand that is 20 mm deep from one state to the next meets no blow: the tool follows no faster than it may", async (test) => {
+  it("a hand that jumps 20 mm deep gets no blow: the tool's speed is limited", async (test) => {
     const dive = async (config: Partial<SceneConfig>) => {
       const { scene, warnings } = await load(test, block({ n: 4 }), config);
       const force: number[] = [];
@@ -213,7 +213,7 @@ describe("while it runs", () => {
     assert.ok(free.lagging === 0 && free.least < -30, JSON.stringify(free));
   });
 
-  it("a solution that MuJoCo loses is no force and a new beginning, said aloud", async (test) => {
+  it("a solution that MuJoCo loses gives no force, a warning and a restart", async (test) => {
     // A spring of 1e9 N/m under an explicit integrator.
     const { scene, warnings } = await load(test, kRigid(`
       <body name="tool" mocap="true" pos="0 0 0.1"><geom type="sphere" size="0.01"/></body>
@@ -233,7 +233,7 @@ describe("while it runs", () => {
     assert.deepEqual(scene.answer(at(0, 0, 0), 0.01), { x: 0, y: 0, z: 0 }, "clear of it, it is well again");
   });
 
-  it("a state that is no number is no force either, whether MuJoCo resets itself or not", async (test) => {
+  it("a state that is no number gives no force, with MuJoCo's reset or not", async (test) => {
     for (const flags of [0, 1 << 16]) { // mjDSBL_AUTORESET
       const { scene, warnings } = await load(test, block({ n: 4 }));
       scene.model.opt.disableflags = flags;

@@ -55,7 +55,7 @@ function datagram(packetNumber: number, suite: CipherSuite = CipherSuite.Plain):
   return concat(encodeHeader(header), new Random(packetNumber).bytes(packetNumber % 1184));
 }
 
-it("passes each datagram on as it is, both ways, and each WebSocket has a port of its own", async (test) => {
+it("passes datagrams unchanged both ways; each WebSocket has its own port", async (test) => {
   const { bridge, url, server, arrived } = await setStage(test);
   const [a, b] = [await openPage(test, url), await openPage(test, url)];
   const back: Buffer[] = [];
@@ -76,7 +76,7 @@ it("passes each datagram on as it is, both ways, and each WebSocket has a port o
   await until("the place is free", () => bridge.counts.peers === 1);
 });
 
-it("lets in pages of this machine, of the origins it was told, and programs; nobody else's pages", async (test) => {
+it("lets in this machine's pages, named origins and programs only", async (test) => {
   const { bridge, url } = await setStage(test, { origins: ["https://lab.example"] });
   const welcome = ["http://localhost:8000", "http://127.0.0.1", "http://[::1]:3000", "https://lab.example", undefined];
   for (const origin of welcome) {
@@ -101,7 +101,7 @@ it("passes sealed datagrams only on for others than this machine", async (test) 
   assert.equal(bridge.counts.plain, 4);
 });
 
-it("drops and counts what is no datagram, and closes for what is larger than one can be", async (test) => {
+it("counts what is no datagram, and closes for what is too large", async (test) => {
   const { bridge, url, arrived } = await setStage(test);
   const page = await openPage(test, url);
   page.send("a text");
@@ -150,7 +150,7 @@ it("says what it is to a browser that asks without WebSocket", async (test) => {
   assert.match(await response.text(), /tendon-bridge/);
 });
 
-it("webSocket() opens another WebSocket for the next datagram when the bridge was gone", async (test) => {
+it("webSocket() opens another WebSocket after the bridge was gone", async (test) => {
   const { bridge, url, server, arrived } = await setStage(test);
   const transport = webSocket(url, WebSocket as unknown as typeof globalThis.WebSocket)(() => {}, assert.fail);
   test.after(() => transport.close());

@@ -70,7 +70,7 @@ describe("a TypeScript wall", () => {
 });
 
 describe("of several", () => {
-  it("the device that a TypeScript wall names is the one at which it is felt, and no other", async (test) => {
+  it("a TypeScript wall is felt at the device that it names, and no other", async (test) => {
     const tendond = await startTendond(test, { scenes: [scene("left"), scene("right")] });
     if (!tendond) return;
     let felt = 0;
@@ -93,7 +93,7 @@ describe("of several", () => {
     assert.match(nowhere.lines.join("\n"), /refuses: there is no device "middle", only "left", "right"/);
   });
 
-  it("a channel's lease goes from an engine that falls silent to one that waits, and from one that leaves to the next", async (test) => {
+  it("a lease goes from a silent engine to a waiting one, then to the next", async (test) => {
     const tendond = await startTendond(test, { scenes: [scene("two-engines")] });
     if (!tendond) return;
     let silent = false;
@@ -120,7 +120,7 @@ describe("of several", () => {
 });
 
 describe("with a key", () => {
-  it("a TypeScript wall is felt over UDP and through the bridge, and nobody else is let in", async (test) => {
+  it("a TypeScript wall is felt over UDP and the bridge; others are kept out", async (test) => {
     const folder = mkdtempSync(join(tmpdir(), "tendon-"));
     test.after(() => rmSync(folder, { recursive: true }));
     const tool = findTendond(test);
@@ -165,7 +165,7 @@ describe("a guest", () => {
     await until("open again", () => here.phase === "open" && here.stats().sessions === 2);
   });
 
-  it("whose physics was slow sees the newest state next, not the oldest that waits in its socket", async (test) => {
+  it("after slow physics it sees the newest state, not the oldest that waits", async (test) => {
     const server = createSocket("udp4");
     await new Promise<void>((resolve) => server.bind(0, "127.0.0.1", resolve));
     test.after(() => server.close());

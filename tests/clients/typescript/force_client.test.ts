@@ -33,7 +33,7 @@ function controller(seed: number, weather: Weather, config: ClientConfig = {}, c
 
 for (const [suite, key] of kSuites) {
   describe(`over a fair network, ${suite}`, () => {
-    it("a controller sees every state once and answers each with a force that names it", () => {
+    it("a controller sees every state once and answers it with a force", () => {
       const { seen, world } = controller(1, kFair, { name: "wall", key }, { key });
       world.runMs(1000);
       const { forces, hellos, session } = world.server;
@@ -65,7 +65,7 @@ for (const [suite, key] of kSuites) {
   });
 
   describe(`over a network that loses 30 %, reorders and doubles, ${suite}`, () => {
-    it("states and forces go on, the newest only, and every request is answered once and in order", () => {
+    it("the newest states and forces arrive; requests are answered in order", () => {
       for (let seed = 1; seed <= 10; ++seed) {
         const renewAfter = { datagrams: 50n, time: 600n * kSecond };
         const { seen, world } = controller(seed, kFoul, { key, stateHz: 1000 }, { key, renewAfter });
@@ -88,7 +88,7 @@ for (const [suite, key] of kSuites) {
       }
     });
 
-    it("a session outlives a silence of 1.5 s and ends after one of 2 s; then a new one opens", () => {
+    it("a session outlives 1.5 s of silence; after 2 s a new one opens", () => {
       for (let seed = 1; seed <= 5; ++seed) {
         const { world } = controller(seed, kFoul, { key }, { key });
         assert.ok(world.runUntil(() => world.client.phase === "open", 10_000));
@@ -122,7 +122,7 @@ describe("the same seed", () => {
 });
 
 describe("the handshake", () => {
-  it("keeps its random and its Noise message 1 through an attempt, and takes new ones for the next", () => {
+  it("keeps its random and Noise message 1; the next attempt draws new ones", () => {
     const sent: Uint8Array[] = [];
     const random = new Random(3);
     const config = { key: kKey, random: (size: number) => random.bytes(size), patienceMs: 250 };
@@ -161,7 +161,7 @@ describe("the handshake", () => {
     assert.ok(world.runUntil(() => world.client.phase === "open", 200));
   });
 
-  it("does not open without the server's key, nor in the clear when it has one", () => {
+  it("opens only with the server's key, and not in the clear when it has one", () => {
     for (const [mine, theirs] of [[kKey, flipped(kKey, 0)], [kKey, undefined], [undefined, kKey]] as const) {
       const { world } = controller(1, kFair, { key: mine }, { key: theirs });
       world.runMs(5000);
@@ -188,7 +188,7 @@ describe("the handshake", () => {
 });
 
 describe("reconnection", () => {
-  it("waits 100 ms, then twice as long each time up to 2 s, and begins anew after a session that had states", () => {
+  it("waits 100 ms, doubled up to 2 s; a session with states resets that", () => {
     const { world } = controller(1, kFair, { patienceMs: 100 }, { up: false });
     const begins: number[] = [];
     let attempts = 0;
@@ -264,7 +264,7 @@ describe("a session's end", () => {
 });
 
 describe("the callback", () => {
-  it("sees the newest of the states that came in since its last call, at multiples of its period", () => {
+  it("sees the newest state since its last call, at multiples of its period", () => {
     const times: bigint[] = [];
     const seen: DeviceState[] = [];
     const world: World = new World(1, kFair, { rateHz: 100 }, {
@@ -283,7 +283,7 @@ describe("the callback", () => {
     assert.ok(states - statesSkipped - seen.length <= 1);
   });
 
-  it("gets its forces out as fresh for three periods, 20 ms at least, or as asked for", () => {
+  it("its forces are valid for three periods, at least 20 ms, or as asked", () => {
     const validity = (config: ClientConfig, stateEvery = 1): number => {
       const { world } = controller(1, kFair, config);
       const plain = world.server.conduct.state;
@@ -313,7 +313,7 @@ describe("the callback", () => {
     }
   });
 
-  it("gets its stiffness to the server when the server knows the feature, and only then", () => {
+  it("sends its stiffness only to a server that knows the feature", () => {
     for (const features of [["local-model"], []]) {
       const world = new World(1, kFair, {}, { physics: () => ({ force: kPush, stiffness: [2000, 0, 0] }) }, { features });
       world.runMs(100);
@@ -323,7 +323,7 @@ describe("the callback", () => {
     }
   });
 
-  it("sends all that the engine knows, and nothing of it with a number out of its bounds", () => {
+  it("sends all that the engine knows, except numbers out of bounds", () => {
     const kContact = { normal: { x: 0, y: 0, z: 1 }, gap: -1e-3, table: { first: -1e-3, step: 1e-3, force: [0, 1, 3] } };
     const kAll = { force: kPush, validRadius: 3e-3, contact: kContact, topologyChanged: true, error: 0.02 };
     const world = new World(1, kFair, {}, { physics: () => kAll });
@@ -347,7 +347,7 @@ describe("the callback", () => {
     }
   });
 
-  it("ends the session with a Bye when it throws, and what it threw comes out", () => {
+  it("ends the session with a Bye when it throws, and rethrows", () => {
     const world = new World(1, kFair, { name: "wall" }, { physics: () => { throw new Error("no world"); } });
     assert.throws(() => world.runMs(1000), /no world/);
     assert.equal(world.client.phase, "stopped");
@@ -394,7 +394,7 @@ describe("what need not be sent", () => {
     }),
   });
 
-  it("states that were left out are foretold at the callback's rate, their tick and time included", () => {
+  it("states left out are foretold, time included, at the callback's rate", () => {
     const { seen, world } = controller(1, kFair, { rateHz: 500, stateDeadband }, moving(10n));
     world.runMs(1000);
     assert.deepEqual(world.server.requests, [{ kind: "setStateDeadband", ...stateDeadband }]);
@@ -408,7 +408,7 @@ describe("what need not be sent", () => {
     assert.ok(world.server.forces.every(({ command }) => seen.some(({ tick }) => tick === command.basedOnTick)));
   });
 
-  it("nothing is foretold beyond the longest silence, nor for a server that does not grant it", () => {
+  it("nothing is foretold after the longest silence or without a grant", () => {
     const silent = controller(1, kFair, { rateHz: 500, stateDeadband }, moving(200n));
     silent.world.runMs(1000);
     assert.ok(silent.seen.length > 30 && silent.seen.length < 65, `${silent.seen.length}`);
@@ -418,7 +418,7 @@ describe("what need not be sent", () => {
     assert.ok(old.seen.length > 450);
   });
 
-  it("forces that feel alike are left out, but not for longer than the silence", () => {
+  it("forces that feel alike are left out, for the silence at most", () => {
     const deadband = { share: 0.1, floor: 0.05, longestSilenceMs: 20 };
     const { seen, world } = controller(1, kFair, { deadband });
     world.runMs(1000);
@@ -465,7 +465,7 @@ describe("diagnostics", () => {
     ({ name }: { name: string }) => name === "reports on a device and on an engine")!.body))!.frames;
   assert.ok(device?.kind === "deviceReport" && peer?.kind === "peerReport");
 
-  it("an observer that asks for them has the newest of the device and of each channel, and they go with the session", () => {
+  it("an observer that asks has the newest reports, until its session ends", () => {
     const seen: (DeviceState["forceWanted"])[] = [];
     const world = new World(1, kFair, { diagnostics: true }, { watch: ({ forceWanted }) => seen.push(forceWanted) });
     const { state } = world.server.conduct;
@@ -510,7 +510,7 @@ describe("diagnostics", () => {
     assert.deepEqual([...world.client.peerReports.keys()].sort(), [0, 1, 2, 3, 4, 5, 6, 7]);
   });
 
-  it("a controller does not ask for them, nor an observer that was not told to", () => {
+  it("neither a controller nor an untold observer asks for them", () => {
     assert.throws(() => new ForceClient({ diagnostics: true }, { physics: () => kPush }, () => {}, 0n),
       /diagnostics: for observers only/);
     const world = new World(1, kFair, {}, { watch: () => {} });
@@ -562,7 +562,7 @@ describe("devices and channels", () => {
     for (const { command } of world.server.forces) assert.deepEqual([command.device, command.channel], [1, 2]);
   });
 
-  it("are claimed when only one of the two is named, and an observer claims as one", () => {
+  it("are claimed when only one is named; an observer claims as observer", () => {
     for (const [config, device, channel] of [[{ device: "right" }, "right", ""], [{ channel: "tissue" }, "", "tissue"]] as const) {
       const world = new World(1, kFair, config, { watch: () => {} }, { grants: kAnothers });
       world.runMs(100);
@@ -584,7 +584,7 @@ describe("devices and channels", () => {
     assert.deepEqual([world.client.phase, world.client.description], ["open", undefined]);
   });
 
-  it("that nobody named are the first ones, which are not claimed, nor described", () => {
+  it("that nobody named are the first ones, neither claimed nor described", () => {
     const { world } = controller(1, kFair);
     world.runMs(100);
     assert.equal(world.server.hellos[0]!.hello.claims, undefined);
@@ -601,7 +601,7 @@ describe("devices and channels", () => {
     assert.equal(observer.client.holds, false);
   });
 
-  it("a server that grants none, or another number of them, is refused with a sentence", () => {
+  it("a server that grants none, or a wrong number, is refused in a sentence", () => {
     for (const grants of [[], [...kHeld, ...kHeld]]) {
       const { world } = controller(1, kFair, kNamed, { grants });
       assert.ok(world.runUntil(() => world.client.phase === "refused", 200));
@@ -611,7 +611,7 @@ describe("devices and channels", () => {
     }
   });
 
-  it("a channel that another holds gets no force, and its lease is asked for once only by who calls for it", () => {
+  it("a channel that another holds gets no force; takeLease asks once", () => {
     const { seen, world } = controller(1, kFair, kNamed, { grants: kAnothers, ...taken });
     world.runMs(500);
     assert.deepEqual([world.client.phase, world.client.holds, seen.length], ["open", false, 0]);
@@ -628,7 +628,7 @@ describe("devices and channels", () => {
     assert.ok(seen.length > 10);
   });
 
-  it("takeLease asks again when the lease may be over, but no more often than every 50 ms, until it has it", () => {
+  it("takeLease asks again when the lease may be over, every 50 ms at most", () => {
     let answer: ReturnType<ServerConduct["answer"]> = busy(300);
     const { seen, world } = controller(1, kFair, { ...kNamed, takeLease: true },
       { grants: kAnothers, ...answering(() => answer) });
@@ -651,7 +651,7 @@ describe("devices and channels", () => {
     assert.equal(asked(world, "takeLease"), last);
   });
 
-  it("a lease that is denied is not asked for again, and who only looks on asks for none", () => {
+  it("a denied lease is not asked for again; an observer asks for none", () => {
     const denied = answering(() => ({ code: Code.DENIED, detail: "" }));
     const { world } = controller(1, kFair, { ...kNamed, takeLease: true }, { grants: kAnothers, ...denied });
     world.runMs(1000);
@@ -664,7 +664,7 @@ describe("devices and channels", () => {
     assert.equal(asked(holder.world, "takeLease"), 0);
   });
 
-  it("a lease that is lost ends the forces and is told with the name, until it is taken again or another session opens", () => {
+  it("a lost lease ends the forces and names the taker, until it is retaken", () => {
     const { seen, world } = controller(1, kFair, kNamed, { grants: kHeld, ...answering(() => ok) });
     world.runMs(100);
     loseTo(world, "surgeon");
@@ -710,7 +710,7 @@ describe("devices and channels", () => {
     assert.equal(world.client.holds, true);
   });
 
-  it("a session that ends before it has answered leaves nothing to wait for in the next", () => {
+  it("a request that its session never answered is not awaited in the next", () => {
     const { world } = controller(1, kFair, { ...kNamed, takeLease: true }, { grants: kAnothers });
     const { server } = world;
     Object.assign(server.conduct, answering(() => {
@@ -727,7 +727,7 @@ describe("devices and channels", () => {
     assert.deepEqual([world.client.phase, world.client.holds], ["lost", false]);
   });
 
-  it("a lease of another place may be lost, and a server may ask for nothing else", () => {
+  it("another place's lease may be lost; a server may ask for nothing else", () => {
     const { world } = controller(1, kFair, kNamed, { grants: kHeld });
     world.runMs(100);
     loseTo(world, "surgeon", { device: 0, channel: 2 });
@@ -742,7 +742,7 @@ describe("devices and channels", () => {
 
   for (const onceMore of [busy(0), ok]) {
     const then = onceMore === ok ? "given once more" : "busy";
-    it(`a lease that it has had and lost before it hears of either is asked for again, once: ${then}`, () => {
+    it(`a lease gained and lost unheard is asked for again, once: ${then}`, () => {
       const { world } = controller(1, kFair, kNamed, { grants: kAnothers });
       const { server } = world;
       let asks = 0;
@@ -768,7 +768,7 @@ describe("devices and channels", () => {
     assert.ok(world.client.holds && seen.length > 900);
   });
 
-  it("a lease that is given up is gone at once, is not asked for again, and an earlier request for it gives nothing", () => {
+  it("a lease given up is gone at once; an earlier request for it is void", () => {
     const { seen, world } = controller(1, kFair, { ...kNamed, takeLease: true }, { grants: kHeld, ...answering(() => ok) });
     world.runMs(100);
     assert.equal(world.client.takeLease(), true);

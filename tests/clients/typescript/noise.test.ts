@@ -19,7 +19,7 @@ describe("Noise_NNpsk0_25519_ChaChaPoly_SHA256", () => {
   const begin = (): Initiator =>
     new Initiator(kPsk, fromHex(kVector.init_prologue), fromHex(kVector.init_ephemeral), payload(0));
 
-  it("reproduces every byte of the public vector, as initiator and as responder", () => {
+  it("reproduces the public vector's bytes as initiator and as responder", () => {
     const initiator = begin();
     assert.equal(toHex(initiator.message1), kVector.messages[0].ciphertext);
     const read = readMessage1(kPsk, fromHex(kVector.init_prologue), message(0));
@@ -61,7 +61,7 @@ describe("Noise_NNpsk0_25519_ChaChaPoly_SHA256", () => {
 });
 
 describe("the cipher", () => {
-  it("is the ChaCha20-Poly1305 of node:crypto, with header and number in the nonce's place", () => {
+  it("is node:crypto's ChaCha20-Poly1305, header and number included", () => {
     const random = new Random(1);
     for (const size of [0, 1, 15, 16, 17, 64, 181, 1168]) {
       const [key, header, body] = [random.bytes(32), random.bytes(16), random.bytes(size)];

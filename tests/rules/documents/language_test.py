@@ -2,7 +2,8 @@
 """The rules of language that a machine can hold, over all files of the tree:
 
     columns   prose of Markdown pages has at most 120 columns (wrap.py wraps it)
-    name      a test's name, suite and dot included, has at most 70 characters
+    name      a test's name has at most 70 characters: in C++ suite, dot and name; in TypeScript and JavaScript the title
+              of each test or group; in Python the function's name
     cleft     no sentence of a page or a comment begins with "Of what", or is of the form "What … is …."
 
 remaining.txt lists what still breaks a rule, as "RULE COUNT PATH". Its counts only shrink: the test fails when a file has
@@ -21,6 +22,8 @@ import wrap  # noqa: E402
 REMAINING = pathlib.Path(__file__).with_name("remaining.txt")
 NOT_PROSE = ("CHANGELOG.md", "tests/tools/bench/RESULTS.md")  # what was said then; written by a program
 TEST = re.compile(r"^\s*(?:TEST|TEST_F|TEST_P|TYPED_TEST|TYPED_TEST_P|RC_GTEST_PROP)\(\s*(\w+),\s*(\w+)", re.M)
+TITLE = re.compile(r"(?<![.\w])(?:test|it|describe)(?:\.(?:only|skip|todo))?\(\s*([\"'`])((?:(?!\1)[^\\]|\\.)*)\1")
+FUNCTION = re.compile(r"^\s*(?:async )?def (test\w*)", re.M)
 COMMENT = {
     **dict.fromkeys((".h", ".cc", ".ts", ".js", ".mjs", ".proto"), re.compile(r"^\s*(?://[/<!]*|/?\*+/?)\s?(.*)|//[/<]*\s(.*)")),
     **dict.fromkeys((".py", ".sh", ".cmake", ".toml", ".txt"), re.compile(r"^\s*#+\s?(.*)")),
@@ -64,16 +67,25 @@ def paragraphs(path, text):
             yield number, said.strip()
 
 
+def test_names(path, text):
+    """(offset, name) of each test of a source."""
+    if path.endswith(".cc"):
+        return [(found.start(2), f"{found[1]}.{found[2]}") for found in TEST.finditer(text)]
+    if path.startswith("tests/") and path.endswith((".ts", ".mjs")):
+        return [(found.start(2), found[2]) for found in TITLE.finditer(text)]
+    if path.startswith("tests/") and path.endswith(".py"):
+        return [(found.start(1), found[1]) for found in FUNCTION.finditer(text)]
+    return []
+
+
 def broken(path, text):
     """(rule, line, words) of all that breaks a rule in one file."""
     if path.endswith(".md") and path not in NOT_PROSE:
         for number in wrap.too_long(text):
             yield "columns", number, "more than 120 columns; run tests/rules/documents/wrap.py " + path
-    if path.endswith(".cc"):
-        for found in TEST.finditer(text):
-            name = f"{found[1]}.{found[2]}"
-            if len(name) > 70:
-                yield "name", text.count("\n", 0, found.start(2)) + 1, f"{name} has {len(name)} characters"
+    for at, name in test_names(path, text):
+        if len(name) > 70:
+            yield "name", text.count("\n", 0, at) + 1, f"{name} has {len(name)} characters"
     if path not in NOT_PROSE and not path.startswith("tests/rules/documents/"):
         for number, words in paragraphs(path, text):
             for found in CLEFT.finditer(words):
@@ -91,6 +103,12 @@ def check_the_rules():
     assert rules("a.md", "```\n" + "a " * 70 + "\n```") == []
     assert rules("a_test.cc", f"TEST(A, {'B' * 69})") == ["name"]
     assert rules("a_test.cc", f"TEST(A, {'B' * 68})") == []
+    assert rules("tests/a.test.ts", f'it("{"b" * 71}", () => {{') == ["name"]
+    assert rules("tests/a.test.mjs", f"test(`{'b' * 71}`, async (test) => {{") == ["name"]
+    assert rules("tests/a.test.ts", f'describe("{"b" * 70}", () => {{') == []
+    assert rules("tests/a.test.ts", f'test.diagnostic("{"b" * 71}");') == []
+    assert rules("tests/test_a.py", f"def test_{'b' * 66}():") == ["name"]
+    assert rules("tests/test_a.py", f"def test_{'b' * 65}():") == []
     assert rules("a.h", "/// Of what was sent that is followed.") == ["cleft"]
     assert rules("a.h", "/// It ends. What is empty is\n/// not there.") == ["cleft"]
     assert rules("a.h", "int a;  ///< What is empty is not there.") == ["cleft"]

@@ -14,11 +14,18 @@ export class Program {
   readonly #process: ChildProcess;
   readonly #news = new EventEmitter();
   readonly #ended: Promise<number | null>;
+  #over = false;
 
   constructor(test: TestContext, command: string, args: readonly string[]) {
     this.#process = spawn(command, args, { stdio: ["ignore", "pipe", "pipe"] });
     this.#news.setMaxListeners(0);
-    this.#ended = new Promise((resolve) => this.#process.once("close", resolve));
+    this.#ended = new Promise((resolve) =>
+      this.#process.once("close", (code) => {
+        this.#over = true;
+        resolve(code);
+        this.#news.emit("line"); // whoever waits for another line learns that none will come
+      }),
+    );
     for (const stream of [this.#process.stdout!, this.#process.stderr!]) {
       createInterface(stream).on("line", (line) => {
         this.lines.push(line);
@@ -31,13 +38,15 @@ export class Program {
     });
   }
 
-  /** The first line, from now on or before, that `matches`. */
+  /** The first line, from now on or before, that `matches`. Throws when the program ends, or 30 s pass, without one. */
   async line(matches: (line: string) => boolean): Promise<string> {
     const signal = AbortSignal.timeout(kPatienceMs);
+    const said = () => this.lines.slice(-20).join("\n");
     for (let i = 0; ; ++i) {
       while (i >= this.lines.length) {
+        if (this.#over) throw new Error(`ended without the expected line; it said: ${said()}`);
         await once(this.#news, "line", { signal }).catch(() => {
-          throw new Error(`did not say it, but: ${this.lines.slice(-20).join("\n")}`);
+          throw new Error(`has not said the expected line within 30 s; it said: ${said()}`);
         });
       }
       if (matches(this.lines[i]!)) return this.lines[i]!;
