@@ -17,12 +17,12 @@ namespace tendon::dash {
 enum class Contact : std::uint8_t {
   kGreeting,    ///< an attempt is under way
   kOpen,        ///< states come in
-  kUnanswered,  ///< nobody answers; trying on
-  kRefused,     ///< the server said no; trying on
-  kLost,        ///< a session has ended; trying on
+  kUnanswered,  ///< nobody answers; it keeps trying
+  kRefused,     ///< the server said no; it keeps trying
+  kLost,        ///< a session has ended; it tries again
 };
 
-/// What became of the newest press of a button that arms or disarms.
+/// The result of the newest press of a button that arms or disarms.
 struct Press {
   enum class State : std::uint8_t { kUnderWay, kDone, kFailed };
   std::uint32_t device = 0;
@@ -31,14 +31,14 @@ struct Press {
   std::string words;  ///< for people
 };
 
-/// All that is known of a server at this instant, as values: what the Observer writes down, the page is told and
-/// /metrics exports. Counters only grow, as long as this object lives, whatever the server does.
+/// All that is known of a server at this instant, as values. The Observer writes them, the page is told them, and
+/// /metrics exports them. Counters never shrink while this object lives, even when the server restarts.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Board {
  public:
-  /// States of a device that wait for the page; of more the oldest are dropped and counted. Half a second at 1 kHz: the
-  /// page is told sixty times a second.
+  /// The most states of a device that wait for the page; when there are more, the oldest are dropped and counted. Half
+  /// a second at 1 kHz; the page takes them sixty times a second.
   static constexpr std::size_t kMaxWaiting = 500;
   static constexpr std::size_t kReasons = 32;
 
@@ -50,15 +50,15 @@ class Board {
     std::uint64_t late_server = 0;
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
-    /// Reports of the device that came since: an engine that has left is told of no more.
+    /// Reports of the device since this engine's last one: the reports on an engine end when it leaves.
     std::uint64_t silent_for = 0;
   };
 
   struct Device {
     std::optional<DeviceDescription> about;
     std::optional<DeviceState> newest;
-    std::vector<DeviceState> waiting;  ///< that the page has not been told, in order
-    std::uint64_t dropped = 0;         ///< of those, because nobody took them
+    std::vector<DeviceState> waiting;  ///< not yet told to the page, in order
+    std::uint64_t dropped = 0;         ///< states dropped because nobody took them
     std::uint64_t states = 0;
     std::array<std::uint64_t, kReasons> limited{};  ///< states with each bit of core/base/reason.h
     std::optional<DeviceReport> report;

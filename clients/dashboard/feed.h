@@ -15,22 +15,20 @@
 
 namespace tendon::dash {
 
-/// Tells every page that looks on what is new on the Board, without a socket: what a page says goes in, what it is to
-/// be told comes out.
+/// Tells every open page what is new on the Board. It has no socket: lines of a page go in, texts for it come out.
 ///
-/// A page looks at one device, at first at the server's first one. "watch N" says that it looks at device N from now
-/// on.
+/// A page watches one device, at first the server's first one. With the line "watch N" it changes to device N.
 ///
-/// It is told with every tick what has come of its device, and once a second how the loop and the engines do. Each text
-/// is made once for all pages that look at the same device.
+/// With every tick it is told the new states of its device, and once a second how the loop and the engines do. Each
+/// text is made once for all pages that watch the same device.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Feed {
  public:
   using PageId = std::uint64_t;
-  /// Between two ticks: what a screen shows.
+  /// Between two ticks: a screen's refresh period.
   static constexpr Duration kTick = std::chrono::microseconds(16'667);
-  /// Lines that a page may say in a second: a person clicks less often.
+  /// Lines that a page may send in a second: a person clicks less often.
   static constexpr double kMaxLinesHz = 20;
 
   /// `board` and `counts` must outlive the feed.
@@ -41,7 +39,7 @@ class Feed {
   void leave(PageId page);
   std::size_t pages() const noexcept { return pages_.size(); }
 
-  /// Takes a line that a page has said. False: it is not understood, or came too fast; the page should be closed.
+  /// Takes a line of a page. False when it is not understood, or came too fast: the page should then be closed.
   bool hear(LocalTime now, PageId page, std::string_view line);
   /// Takes what is new on the board.
   void tick(LocalTime now);

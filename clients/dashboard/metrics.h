@@ -9,16 +9,16 @@
 
 namespace tendon::dash {
 
-/// What tendon-dash counts of itself.
+/// The counts of tendon-dash itself.
 struct WebCounts {
-  std::uint64_t pages = 0;  ///< that look on now
+  std::uint64_t pages = 0;  ///< open now
   std::uint64_t requests = 0;
   std::uint64_t refused = 0;         ///< requests: another Host or Origin, too many, malformed
   std::uint64_t states_skipped = 0;  ///< not told to a page that did not keep up
 };
 
 /// All of it for Prometheus, in its text format 0.0.4. Names follow its conventions: base units (seconds, meters,
-/// newtons, joules), `_total` on what only grows. What is not known is not exported. README.md of this folder lists
+/// newtons, joules), `_total` on counters. Unknown values are not exported. README.md of this folder lists
 /// them; so does the test that reads deploy/monitoring.
 ///
 /// Thread-safe: no. Realtime-safe: no.

@@ -14,8 +14,8 @@
 
 namespace tendon::dash {
 
-/// Watches every device of a Tendon server in one session and writes what it hears on a Board. It is an observer, has
-/// no socket, clock or thread, and never sends a force.
+/// Watches every device of a Tendon server in one session and writes the news on a Board. It is an observer, has no
+/// socket, clock or thread, and never sends a force.
 ///
 ///     Observer observer(link, server, config, board, now);
 ///     for (;;) wait for a datagram, at most until observer.turn(now);
@@ -24,7 +24,7 @@ namespace tendon::dash {
 /// … until there is none. So a server with several is greeted twice: the first session asks, the second one claims them
 /// all.
 ///
-/// * **Reconnection.** As Connection says, for ever: a server that comes back is found.
+/// * **Reconnection.** It tries for ever, as Connection says, so a server that comes back is found.
 /// * **Holders.** Each device is described anew once in `describe_every`, because engines come and go.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -41,17 +41,16 @@ class Observer {
     /// Datagrams taken from the link in one turn: a quarter of a second of states at 1 kHz.
     int max_datagrams = 256;
   };
-  /// States per second and device while somebody looks: all. While nobody does, enough for /metrics.
+  /// States per second and device: all while somebody looks; while nobody does, enough for /metrics.
   static constexpr std::uint32_t kIdleStateHz = 20;
 
   /// `link` and `board` must outlive this object. The first Hello leaves with the first turn.
   Observer(Link& link, const Address& server, const Config& config, Board& board, LocalTime now);
 
-  /// Does all there is to do at `now` and returns when it wants to be called again at the latest; a datagram is a
-  /// reason to call it earlier.
+  /// Does everything due at `now` and returns the latest time for the next call; call earlier when a datagram arrives.
   LocalTime turn(LocalTime now);
 
-  /// Whether somebody looks at the states, which then come at the loop's own rate.
+  /// Says whether somebody looks at the states, which then come at the loop's own rate.
   void set_watched(bool watched) noexcept { watched_ = watched; }
 
   /// Says Bye. Any further turn does nothing.
@@ -75,8 +74,8 @@ class Observer {
   Board& board_;
   Connection connection_;
   std::map<std::uint32_t, std::string> names_;  ///< of the devices, as far as they are known
-  bool claims_ = false;                         ///< this attempt, or session, has claimed them by name
-  bool counted_ = false;                        ///< we know how many there are
+  bool claims_ = false;                         ///< this attempt or session has claimed the devices by name
+  bool counted_ = false;                        ///< the number of devices is known
   std::map<std::uint32_t, Asked> asked_;        ///< open requests, by id
   std::uint32_t next_describe_ = 0;             ///< the device to ask about next
   LocalTime describe_at_{};

@@ -17,14 +17,14 @@ namespace tendon::dash {
 /// Each press is a session of its own, beside the Observer's: a controller with the operator's key that claims one
 /// channel of the device, holds it, sends Rearm or Disarm and never a force, and leaves at the answer. Between two
 /// presses there is no controller. The result of a press is written on the Board in words. It tells what the device
-/// then did, not what the server answered: its states have the reason "disarmed" and no force, or its report says
+/// did, not what the server answered: the device's states have the reason "disarmed" and no force, or its report says
 /// "armed".
 ///
 /// * **An engine is never disturbed.** While another client holds the channel nothing is sent at all (`objection`), and
-///   a lease is never taken from anybody, not even by a key that the scene lets take over. Best is a channel of the
-///   operator's own. The key, too, should be his own: tendond gives a key's place to the newest who comes with it, and
-///   what the Board knows of holders is up to a second old.
-/// * **Disarm goes before.** It ends an arming that is under way; nothing ends a disarming.
+///   a lease is never taken from anybody, not even by a key that the scene lets take over. It is best to give the
+///   operator a channel of his own. The key, too, should be his own: tendond gives a key's place to the newest client
+///   that comes with it, and the Board's list of holders is up to a second old.
+/// * **Disarm has priority.** It ends an arming that is under way; nothing ends a disarming.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Operator {
@@ -33,27 +33,27 @@ class Operator {
 
   struct Config {
     std::string name = "tendon-dash operator";  ///< for the server's log; at most limits::kMaxLabel bytes
-    std::string channel;                        ///< that each device has for this
+    std::string channel;                        ///< the channel that each device has for the operator
     Key key;                                    ///< a controller's
     Seed seed{};                                ///< 32 bytes from the system at each start
-    /// For the session and the server's answer: a round trip of 1 s at 50 % loss is enough for it.
+    /// Time for the session and the server's answer: enough for a round trip of 1 s at 50 % loss.
     Duration patience = std::chrono::seconds(5);
-    /// For the device, from the answer on: the safety layer may take a second to grant it, the next report on it as
-    /// long to come.
+    /// Time for the device, from the answer on: the safety layer may take a second to grant the order, and the next
+    /// report on it may take another second.
     Duration granted_within = std::chrono::seconds(4);
   };
 
-  /// `link` must not be the Observer's: to the server one address is one guest. It and `board` must outlive this
-  /// object.
+  /// `link` must not be the Observer's, because to the server one address is one guest. `link` and `board` must outlive
+  /// this object.
   Operator(Link& link, const Address& server, const Config& config, Board& board);
 
-  /// Why a device cannot be armed or disarmed now, in a sentence; empty: it can.
+  /// Why a device cannot be armed or disarmed now, in a sentence; empty when it can.
   std::string objection(std::uint32_t device) const;
 
-  /// A button was pressed. Returns why nothing is done, or nothing when it has begun.
+  /// Takes the press of a button. Returns why nothing is done; empty when the order has begun.
   std::string press(LocalTime now, std::uint32_t device, Order order);
 
-  /// Does what is due; to be called sixty times a second or so.
+  /// Does everything due at `now`; call it about sixty times a second.
   void turn(LocalTime now);
 
   /// Leaves.
@@ -76,7 +76,7 @@ class Operator {
   std::optional<ForceClient> client_;  ///< until the server has answered
   bool asked_ = false;
   LocalTime give_up_{};
-  PeerTime answered_{};  ///< the newest sample of the device by then
+  PeerTime answered_{};  ///< the device's newest sample when the server answered
 };
 
 }  // namespace tendon::dash

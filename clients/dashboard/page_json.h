@@ -11,32 +11,32 @@
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/recordings.h"
 
-// What the page is told, one JSON object per WebSocket message. Units are in the names, as on the wire; an absent
+// The messages for the page, one JSON object per WebSocket message. Units are in the names, as on the wire; an absent
 // number is null. README.md of this folder lists the fields.
 
 namespace tendon::dash {
 
-/// What a tendon-dash lacks that may not arm.
+/// The sentence of a tendon-dash that may not arm: what it lacks.
 inline constexpr std::string_view kArmingNeeds =
     "This page only looks on. To arm and disarm from here start tendon-dash with --key FILE, a controller's key, and "
     "--arm CHANNEL.";
 
-/// What tendon-dash itself was told at its start, which the page has to know.
+/// The settings of tendon-dash that the page has to know.
 struct Abilities {
   std::string server;       ///< HOST:PORT of tendond
   bool recordings = false;  ///< there is a folder
-  bool arms = false;        ///< … and leave to arm and disarm
+  bool arms = false;        ///< arming and disarming are allowed
   /// Why a device cannot be armed and disarmed from the page now, in a sentence; empty: it can.
   std::function<std::string(std::uint32_t device)> arming_objection = [](std::uint32_t) {
     return std::string(kArmingNeeds);
   };
 };
 
-/// {"type":"server",…}: the contact, the devices and what they are. Told when it changes.
+/// {"type":"server",…}: the contact, the devices and their descriptions. Told when it changes.
 std::string server_json(const Board& board, const Abilities& abilities);
 
-/// {"type":"states",…}: states of one device in columns, in order, every one that came. Ticks that are missing were
-/// lost on the way, or the page did not keep up.
+/// {"type":"states",…}: all states received of one device, in columns and in order. Missing ticks were lost on the way,
+/// or the page did not keep up.
 std::string states_json(std::uint32_t device, std::span<const DeviceState> states);
 
 /// {"type":"reports",…}: how a device's loop and its engines do. Told once a second.

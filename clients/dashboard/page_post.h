@@ -11,22 +11,23 @@
 
 namespace tendon::dash {
 
-/// The messages that wait for one page while it is busy; newest wins. A page that does not read costs no more than
-/// this, however long it sleeps: one text of each kind, and a handful of batches of states.
+/// The messages that wait for one page while it is busy; the newest wins. A page that does not read costs at most one
+/// text of each kind and a few batches of states, however long it sleeps.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PagePost {
  public:
   enum class Kind : std::uint8_t {
-    kServer,   ///< the newest of these two replaces the one before
+    kServer,   ///< only the newest text of each of these two kinds is kept
     kReports,  //
   };
-  /// An eighth of a second: a page can catch up with that, and the hand on the screen does not look late.
+  /// The most batches that wait, an eighth of a second: a page can catch up with that, and the hand on the screen does
+  /// not look late.
   static constexpr std::size_t kMaxBatches = 8;
 
   void put(Kind kind, std::string text) { newest_[static_cast<std::size_t>(kind)] = std::move(text); }
 
-  /// A batch of `states` states. The oldest batch makes room, and its states are counted.
+  /// Adds a batch of `states` states. When there is no room the oldest batch is dropped, and its states are counted.
   void put_states(std::string text, std::size_t states) {
     batches_.push_back({std::move(text), states});
     if (batches_.size() <= kMaxBatches) return;
@@ -34,7 +35,7 @@ class PagePost {
     batches_.pop_front();
   }
 
-  /// States dropped since this was asked last.
+  /// States dropped since the last call.
   std::uint64_t take_skipped() noexcept { return std::exchange(skipped_, 0); }
 
   /// The next text to send; empty when nothing waits.

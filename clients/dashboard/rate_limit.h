@@ -7,7 +7,7 @@
 
 namespace tendon::dash {
 
-/// So many things a second, and as many at once as a tenth of that, at least one:
+/// Lets `rate` things a second pass, and at once as many as a tenth of that, at least one:
 ///
 ///     left ← min(left + rate · Δt, max(rate / 10, 1)),      a thing takes 1 of it
 ///
@@ -16,7 +16,7 @@ class RateLimit {
  public:
   RateLimit(double rate_hz, LocalTime now) noexcept : rate_hz_(rate_hz), left_(most()), then_(now) {}
 
-  /// Whether one more may pass.
+  /// True when one more may pass; it is then counted.
   bool take(LocalTime now) noexcept {
     left_ = std::min(left_ + rate_hz_ * seconds(now - then_), most());
     then_ = now;

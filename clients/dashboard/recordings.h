@@ -12,7 +12,7 @@
 
 namespace tendon::dash {
 
-/// A file that is open for reading. Its size is that of the instant it was opened: one that is being written grows.
+/// A file that is open for reading. Its size is that at the time of opening; a file that is still being written grows.
 class OpenFile {
  public:
   OpenFile(int descriptor, std::uint64_t size) noexcept : descriptor_(descriptor), size_(size) {}
@@ -39,16 +39,17 @@ class Recordings {
     std::uint64_t size = 0;      ///< bytes
     double modified_unix_s = 0;  ///< s since 1970
   };
-  /// Only the newest ones of a folder with more are listed: a page is no file manager.
+  /// The most recordings that are listed, the newest ones: a page is no file manager.
   static constexpr std::size_t kMaxListed = 1000;
 
-  /// Throws std::runtime_error when `folder` is none: "runs: not a folder".
+  /// Throws std::runtime_error when `folder` is not a folder: "runs: not a folder".
   explicit Recordings(std::filesystem::path folder);
 
   /// The newest first.
   std::vector<Entry> list() const;
 
-  /// Empty for whatever is no name of a recording: with a slash, hidden, not *.mcap, a symbolic link, no regular file.
+  /// Empty when `name` does not name a recording: it has a slash, is hidden, is not *.mcap, or is a symbolic link or
+  /// not a regular file.
   std::optional<OpenFile> open(std::string_view name) const;
 
  private:

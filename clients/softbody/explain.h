@@ -14,9 +14,9 @@ namespace tendon::softbody {
 
 /// Which effects a scene simulates, which it leaves out, and the cost of each: `tendon-softbody explain SCENE`.
 ///
-/// Costs are measured, here and now: processor time of an answer, the mean over a tool that presses 3 mm into the
-/// middle and comes back, of bodies that take turns; each is the least of up to 4 rounds. What an effect adds is the
-/// difference to the same scene without it, below 0 where the others have more to do then.
+/// Costs are measured on this machine, now: the processor time of an answer, averaged over a tool that presses 3 mm
+/// into the middle and comes back. The bodies take turns, and each cost is the least of up to 4 rounds. The cost of an
+/// effect is the difference to the same scene without it. It is below 0 where the other effects have more to do then.
 struct Explanation {
   struct Cost {
     double answer_s = 0;     ///< s of processor time
@@ -25,13 +25,13 @@ struct Explanation {
   struct Part {
     EffectKind kind;
     bool simulated;
-    std::optional<Cost> adds;  ///< of those that can be left out
+    std::optional<Cost> adds;  ///< for effects that can be left out
   };
   std::vector<Part> parts;  ///< every effect
   Cost all;
-  double resolution_s = 0;  ///< what two measurements of the same thing differed by; less cannot be told from nothing
+  double resolution_s = 0;  ///< by which two measurements of one thing differed; smaller costs mean nothing
   Body::Size size;
-  double step = 0;          ///< s, that an answer lasts; 0: at rest at every instant
+  double step = 0;          ///< s, the time step of an answer; 0: the body is at rest at every instant
   double stiffness = 0;     ///< N/m, at first touch
   double linear_up_to = 0;  ///< m; see Body
 };

@@ -22,12 +22,12 @@ struct PluggedDevice {
   std::vector<Lack> lacks;
 };
 
-/// `firmware_problem`: why the file that was given for a Falcon's firmware is none; empty when it is; none when no file
-/// was given.
+/// `firmware_problem`: why the file given as a Falcon's firmware is not one; an empty text when it is; not set when no
+/// file was given.
 std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugged,
                                           const std::optional<std::string>& firmware_problem);
 
-/// For people; and one JSON object for each device, a line each.
+/// The report for people; and one JSON object for each device, a line each.
 std::string in_words(std::span<const PluggedDevice> devices);
 std::string in_json(std::span<const PluggedDevice> devices);
 

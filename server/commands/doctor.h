@@ -11,11 +11,11 @@
 
 namespace tendon {
 
-/// What this machine gives a haptic loop, and what to change to get more: `tendond doctor`. Looks and measures; changes
-/// nothing.
+/// How well this machine can run a haptic loop, and what to change to improve it: `tendond doctor`. It looks and
+/// measures, and changes nothing.
 struct Diagnosis {
-  /// How late a thread wakes that sleeps until the next of many instants, 1 ms apart: the floor of every haptic loop
-  /// here, as cyclictest measures it.
+  /// How late a thread wakes when it sleeps until instants 1 ms apart, as cyclictest measures it. No haptic loop on
+  /// this machine can do better.
   struct WakeUps {
     std::size_t count = 0;
     Duration median{};
@@ -28,9 +28,9 @@ struct Diagnosis {
     std::string advice;  ///< empty: nothing to change
   };
 
-  WakeUps ordinary;                  ///< of a thread like any other
-  WakeUps realtime;                  ///< of one that asked for what the haptic thread asks for
-  std::vector<std::string> refused;  ///< … and what it was refused (enter_realtime)
+  WakeUps ordinary;                  ///< of an ordinary thread
+  WakeUps realtime;                  ///< of a thread with the settings of the haptic thread
+  std::vector<std::string> refused;  ///< the settings that it was refused (enter_realtime)
   std::vector<Finding> findings;
 };
 
@@ -43,14 +43,13 @@ struct WakeUpClock {
 /// Sleeps `count` times until one period after the instant before.
 Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, std::size_t count);
 
-/// What the kernel says of itself below `root` (proc, sys, boot). A file that is not there is "unknown", without
-/// advice.
+/// The kernel's settings, read below `root` (proc, sys, boot). A missing file gives "unknown", without advice.
 std::vector<Diagnosis::Finding> look_around(const std::filesystem::path& root);
 
-/// All of it. Takes some two seconds, in threads of its own.
+/// The whole examination. Takes about two seconds, in threads of its own.
 Diagnosis diagnose(const WakeUpClock& clock);
 
-/// For people; and a JSON object in one line.
+/// The report for people; and a JSON object in one line.
 std::string in_words(const Diagnosis& diagnosis);
 std::string in_json(const Diagnosis& diagnosis);
 

@@ -5,7 +5,7 @@ namespace tendon {
 
 /// Wakes the one thread that waits for it, from another thread or from a signal handler: the haptic
 /// thread rings it after each step, the network thread waits for it together with its socket.
-/// Rings that nobody has answered yet count as one. (An eventfd.)
+/// Unanswered rings count as one. (An eventfd.)
 class Doorbell {
  public:
   /// Throws std::system_error when the process has no file descriptor left.
@@ -18,10 +18,10 @@ class Doorbell {
   /// that never waits, no heap, no lock of ours.
   void ring() noexcept;
 
-  /// Takes back the rings so far. Called by whoever waits on fd(); UdpLink::wait does it by itself.
+  /// Answers the rings so far. A caller that waits on fd() itself calls this; UdpLink::wait does so by itself.
   void answer() noexcept;
 
-  /// Readable while the bell has rung and was not answered: for poll() and UdpLink::wait.
+  /// Readable while a ring is unanswered: for poll() and UdpLink::wait.
   int fd() const noexcept { return fd_; }
 
  private:

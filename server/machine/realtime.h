@@ -12,9 +12,9 @@ namespace tendon {
 /// Below the kernel's own watchdog and migration threads (99) and above ordinary IRQ threads (50).
 inline constexpr int kHapticPriority = 70;
 
-/// Asks the kernel to treat the calling thread as a haptic thread: SCHED_FIFO, no timer slack, memory
-/// locked, stack touched beforehand. Returns a plain sentence for each wish that was refused (with what
-/// it would take to be granted); the thread runs all the same, later now and then.
+/// Asks the kernel to treat the calling thread as a haptic thread: SCHED_FIFO, no timer slack, memory locked, stack
+/// touched beforehand. Returns a plain sentence for each request that was refused, which says what would grant it. The
+/// thread then runs all the same, but may wake late.
 ///
 /// `priority`: 1…99.
 std::vector<std::string> enter_realtime(int priority);
@@ -23,9 +23,9 @@ std::vector<std::string> enter_realtime(int priority);
 /// sentence when the kernel refuses; the thread then runs where it did.
 std::optional<std::string> stay_on(std::uint32_t cpu);
 
-/// Keeps the processors from sleeping so deep that waking takes long, for as long as it lives: holds the kernel's file
-/// open in which 0 µs are written as 32 bits (Documentation/power/pm_qos_interface.rst). Costs power. A kernel without
-/// that file has no such sleep to forbid, or does not let us: that is no refusal.
+/// While it lives, keeps the processors out of sleep states that are slow to leave: it holds /dev/cpu_dma_latency open,
+/// with 0 µs written to it as 32 bits (Documentation/power/pm_qos_interface.rst). Costs power. A kernel without that
+/// file has no such states, or does not offer the choice: that does not count as a refusal.
 ///
 /// Thread-safe: no.
 class WakefulProcessors {
@@ -36,7 +36,7 @@ class WakefulProcessors {
   WakefulProcessors& operator=(const WakefulProcessors&) = delete;
 
   bool held() const noexcept { return held_; }
-  /// A plain sentence with what it would take, when the kernel refused; else empty.
+  /// When the kernel refused: a plain sentence that says what would grant it; else empty.
   const std::optional<std::string>& refused() const noexcept { return refused_; }
 
  private:
@@ -45,11 +45,11 @@ class WakefulProcessors {
   std::optional<std::string> refused_;
 };
 
-/// Names the calling thread for people who look on: top -H, perf, gdb. At most 15 characters are kept. Which there are,
-/// and what each does: server/THREADS.md.
+/// Names the calling thread for top -H, perf and gdb. At most 15 characters are kept. server/THREADS.md lists all
+/// threads and what each does.
 void name_thread(const std::string& name);
 
-/// A network or log thread: no timer slack only.
+/// For a network or log thread: only turns timer slack off.
 void enter_punctual();
 
 }  // namespace tendon

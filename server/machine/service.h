@@ -5,8 +5,8 @@
 
 #include "core/base/time.h"
 
-/// Tells the service manager that has started this process how it is (systemd, sd_notify(3)). When none has, nothing
-/// happens.
+/// Tells the service manager that started this process (systemd, sd_notify(3)) how the process does. Without a service
+/// manager it does nothing.
 namespace tendon::service {
 
 /// It serves.
@@ -14,8 +14,8 @@ void ready();
 /// It has begun to end.
 void stopping();
 
-/// How often to call `alive`: half of the time (WatchdogSec=) after which the manager ends a process that it has not
-/// heard of. Empty when it does not watch this one.
+/// How often to call `alive`: half of WatchdogSec=, the silence after which the manager ends a process. Empty when the
+/// manager does not watch this one.
 std::optional<Duration> watch_period();
 void alive();
 

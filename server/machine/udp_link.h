@@ -13,22 +13,21 @@ namespace tendon {
 /// Who may reach a socket.
 enum class Reach : std::uint8_t {
   kThisMachine,  ///< loopback only
-  kAnywhere,     ///< for those who let in nobody without a key
+  kAnywhere,     ///< only for servers that require a key
 };
 
 /// The real link: one UDP socket on one address of this machine, IPv4 or IPv6.
 ///
 /// send() and receive() never wait; wait() is the only place where the network thread sleeps.
-/// Datagrams are whatever anyone on this machine cares to send: nothing here looks inside them.
+/// Anybody may send anything; nothing here looks inside the datagrams.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class UdpLink : public Link {
  public:
-  /// Opens and binds; port 0 lets the system choose one (see local_address()).
-  /// Throws std::invalid_argument when `listen` is not a loopback address, unless the caller says that it is
-  /// meant: without keys anyone on a network could command forces.
-  /// Throws std::runtime_error when the system refuses:
-  /// "cannot listen on 127.0.0.1:47100: Address already in use".
+  /// Opens and binds; port 0 lets the system choose one (see local_address()). Throws std::invalid_argument when
+  /// `listen` is not a loopback address and the caller has not allowed others: without keys anybody on the network
+  /// could command forces. Throws std::runtime_error when the system refuses: "cannot listen on 127.0.0.1:47100:
+  /// Address already in use".
   explicit UdpLink(const Address& listen, Reach reach = Reach::kThisMachine);
   ~UdpLink() override;
 

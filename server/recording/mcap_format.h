@@ -36,7 +36,8 @@ enum class Opcode : std::uint8_t {
 /// Opcode and length, before the content of every record.
 inline constexpr std::size_t kRecordHead = 1 + 8;
 
-/// The CRC-32 (of zlib, PNG, Ethernet) of some bytes followed by `bytes`, given that of the former; that of none is 0.
+/// Continues a CRC-32 (that of zlib, PNG and Ethernet) with `bytes`: `crc` is that of the bytes before; 0 when there
+/// are none.
 std::uint32_t extend_crc(std::uint32_t crc, std::span<const std::byte> bytes);
 
 }  // namespace tendon::mcap

@@ -16,7 +16,7 @@
 namespace tendon {
 
 /// Writes an indexed MCAP file (https://mcap.dev/spec): messages in uncompressed chunks with a CRC and a message
-/// index, and at the end a summary that lets a reader seek. What the messages mean is the caller's.
+/// index, and at the end a summary that lets a reader seek. It does not know what the messages mean.
 ///
 /// Bytes leave in whole pieces, one `ByteSink::append` each: the first `flush_chunk` takes the beginning of the file
 /// along, `close` writes the summary. So a file is readable at any time, up to its last chunk; without the summary a

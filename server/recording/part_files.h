@@ -13,17 +13,17 @@
 
 namespace tendon {
 
-/// A new file for the next part: `path` while there is none or an empty one, else the first free number after the
-/// highest. Any number of parts and of runs thus share a name, and none of them overwrites another. A device such as
-/// /dev/null is opened as it is.
+/// A new file for the next part: `path` if it does not exist or is empty, else the first free number after the highest.
+/// So any number of parts and runs share a name, and none overwrites another. A device such as /dev/null is opened as
+/// it is.
 ///
-/// Throws std::runtime_error with path and reason when it cannot be made, and when `path` exists, is not empty and is no
-/// MCAP file: then it is somebody else's.
+/// Throws std::runtime_error with path and reason when it cannot be made, and when `path` exists, is not empty and is
+/// no MCAP file: then it is somebody else's.
 std::unique_ptr<FileSink> open_next_part(const std::filesystem::path& path);
 
 /// Deletes the oldest parts of `path` until all of them have at most `most_bytes`; returns what it has deleted.
 ///
-/// It touches only recordings that say that it may: whose Scene has a budget. Those of runs without a budget, of faults,
+/// It deletes only recordings whose own Scene has a budget. Those of runs without a budget, of faults,
 /// and parts that another server still writes to, stay and do not count. What cannot be deleted stays.
 std::vector<std::filesystem::path> delete_oldest_parts(const std::filesystem::path& path, std::uint64_t most_bytes);
 

@@ -15,8 +15,8 @@
 
 namespace tendon {
 
-/// Records a run into as many files as it takes (part_files.h), each of them a whole recording with the scenes at its
-/// front. A new part begins
+/// Records a run into as many files as needed (part_files.h), each a complete recording that begins with the scenes. A
+/// new part begins
 ///
 /// * when the part has reached `rotate_bytes`, or is `rotate_after` old;
 /// * when its index has 65 536 chunks, some 10 MB: the memory of a run does not grow with its length;
@@ -33,10 +33,10 @@ class PartRecorder {
     Recorder::Config run;
     std::uint64_t rotate_bytes = 4'000'000'000;
     Duration rotate_after = std::chrono::hours(4);
-    /// Of all parts that have this name, those of earlier runs too; 0: nothing is deleted. A part is then at most a
-    /// quarter of it.
+    /// Bytes of all parts with this name, including those of earlier runs; 0: nothing is deleted. With a budget a part
+    /// has at most a quarter of it.
     std::uint64_t budget_bytes = 0;
-    /// From one look for room to the next, while recording has stopped.
+    /// The time between two looks for free space while recording has stopped.
     Duration retry_after = std::chrono::seconds(1);
   };
   struct Status {
@@ -51,10 +51,10 @@ class PartRecorder {
     std::uint64_t datagrams_over_budget = 0;  ///< likewise
     std::string error;                        ///< why nothing is recorded now; empty while it is
 
-    /// Nothing is missing but what was left out on purpose.
+    /// True when nothing is missing except records left out on purpose.
     bool complete() const noexcept { return lost_steps == 0 && lost_datagrams == 0 && error.empty(); }
   };
-  /// What the operator should read in the log.
+  /// An event that the operator should read in the log.
   struct Notice {
     bool warning = false;
     std::string text;
@@ -73,7 +73,7 @@ class PartRecorder {
   void close(LocalTime now);
 
   Status status() const;
-  /// What happened since the last call.
+  /// The events since the last call.
   std::vector<Notice> take_notices();
 
  private:

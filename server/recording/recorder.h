@@ -63,7 +63,8 @@ class Recorder {
   /// Notes that records were dropped before they came here, so that a reader knows of the gap.
   void lost(const LossRecord& loss);
 
-  /// Flushes what is older than `flush_after`, though nothing new comes. Call it after each batch of records.
+  /// Flushes records that are older than `flush_after`, even when no new ones come. Call it after each batch of
+  /// records.
   void tick(LocalTime now);
 
   /// Ends the file with an index. Without it the file is readable, but counts as truncated, and opens slower.

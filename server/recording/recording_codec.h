@@ -12,7 +12,7 @@
 
 namespace tendon {
 
-/// What was run: enough to run it again.
+/// The scene of a run: enough to run it again.
 struct SceneRecord {
   std::string text;  ///< the scene file, whole; UTF-8
   std::uint64_t seed = 0;
@@ -26,7 +26,7 @@ struct SceneRecord {
   bool operator==(const SceneRecord&) const = default;
 };
 
-/// Records that did not make it into the file, counted since the loss before.
+/// Records that are missing in the file, counted since the previous Lost record.
 struct LossRecord {
   enum class Cause : std::uint8_t {
     kLogThread = 0,   ///< it could not follow
@@ -45,7 +45,7 @@ struct LossRecord {
 
 namespace recording {
 
-/// Where a kind of record is found in the MCAP file.
+/// The channel of one kind of record in the MCAP file.
 struct Channel {
   std::string_view topic;
   std::string_view schema;  ///< full name of its protobuf message

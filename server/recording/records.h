@@ -10,12 +10,11 @@
 
 namespace tendon {
 
-/// One haptic step, as it is recorded: everything that it takes to take it again, and what the device
-/// made of it.
+/// One haptic step, as it is recorded: all inputs that are needed to repeat it, and what the device did.
 struct StepRecord : Step {
   std::uint64_t tick = 0;
   LocalTime scheduled{};        ///< when the step was due
-  Vec3 applied = Vec3::Zero();  ///< N, really written by the device (`force` is what it was told)
+  Vec3 applied = Vec3::Zero();  ///< N, really given out by the device (`force` is what it was told)
   bool rearmed = false;         ///< the controller was rearmed since the step before
   bool disarmed = false;        ///< the operator had disarmed the device
 };

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A hand, a server, a bad network and a remote wall, each a process of its own, and what becomes of the others when one
-// of them is killed. Nothing here measures a time: virtual machines pause. What is claimed is in the recordings.
+// A hand, a server, a bad network and a remote wall, each a process of its own, and what happens to the others when one
+// of them is killed. Nothing here measures a time, because virtual machines pause. All claims are checked in the
+// recordings.
 #include <gtest/gtest.h>
 
 #include <algorithm>

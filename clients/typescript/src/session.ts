@@ -159,7 +159,7 @@ export class Session {
 
   // ---- In
 
-  /** Takes any bytes. What is not a good datagram of this conversation is counted and dropped. */
+  /** Takes any bytes. A datagram that is malformed, or of another conversation, is counted and dropped. */
   receive(now: Nanoseconds, datagram: Uint8Array): void {
     this.#latest = now;
     if (!this.#open) return;
@@ -187,7 +187,8 @@ export class Session {
     const content = decodeData(body);
     if (!content) {
       ++this.stats.malformed;
-      // Its number is used up when it was authentic. In suite 0 nobody knows: a damaged copy must not shut out the good one.
+      // Its number is used up when it was authentic. In suite 0 nobody knows: a damaged copy must not shut out the good
+      // one.
       if (seal.suite !== CipherSuite.Plain) this.#seen.insert(header.packetNumber);
       return;
     }

@@ -25,7 +25,7 @@ TEST(FlightPath, IsBesideTheRecordingAlsoWhenThatHasBeenMovedAway) {
   EXPECT_EQ(flight_path(recording, "left", 12), folder.path() / "run.2.left.fault-12.mcap");
 }
 
-TEST(FlightPath, IsInTheWorkingDirectoryWhereTheRecordingIsNoFileOrThereIsNone) {
+TEST(FlightPath, IsInTheWorkingDirectoryWithoutARecordingFile) {
   const ScratchFolder folder;
   const auto pipe = folder.path() / "pipe.mcap";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);

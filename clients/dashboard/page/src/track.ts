@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** One haptic step, as the page knows it. What is not known is NaN. */
+/** One haptic step, as the page knows it. Unknown values are NaN. */
 export interface Sample {
   /** s */ t: number;
   /** m */ x: number;
