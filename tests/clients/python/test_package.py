@@ -60,7 +60,8 @@ def test_a_wheel_holds_the_package_with_its_types(tmp_path):
     run(sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index", "-w", tmp_path, source)
     (wheel,) = tmp_path.glob("*.whl")
     held = {name for name in zipfile.ZipFile(wheel).namelist() if name.startswith("tendon/")}
-    there = {f"tendon/{file.name}" for file in (PACKAGE / "tendon").iterdir() if file.is_file()}
+    files = (PACKAGE / "tendon").rglob("*")
+    there = {str(file.relative_to(PACKAGE)) for file in files if file.is_file() and file.parent.name != "__pycache__"}
     assert held == there
     assert {"tendon/py.typed", "tendon/tendon_pb2.pyi"} <= held
 

@@ -227,3 +227,15 @@ export class World {
     return true;
   }
 }
+
+export const kPush = { x: -1, y: 0, z: 0 };
+
+/** A controller that keeps the states it has seen. */
+export function controller(seed: number, weather: Weather, config: ClientConfig = {}, conduct: Partial<ServerConduct> = {}) {
+  const seen: DeviceState[] = [];
+  const physics = (hand: DeviceState) => {
+    seen.push(hand);
+    return kPush;
+  };
+  return { seen, world: new World(seed, weather, config, { physics }, conduct) };
+}

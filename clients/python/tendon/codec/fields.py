@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Single values of protobuf messages: each is checked against its bound. Out of bounds raises OutOfBounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import TypeVar
+
+from google.protobuf.message import DecodeError
+
+from .. import limits
+from .. import tendon_pb2 as pb
+from ..messages import ChannelRule, Code, Mode, Role, Safety, Vec3
+
+
+class OutOfBounds(Exception):
+    """A value that no correct peer sends."""
+
+
+def number(value: float) -> float:
+    if not -limits.MAX_VALUE <= value <= limits.MAX_VALUE:  # nor is NaN
+        raise OutOfBounds
+    return value
+
+
+def magnitude(value: float) -> float:
+    if not 0 <= value <= limits.MAX_VALUE:
+        raise OutOfBounds
+    return value
+
+
+def vector(message: pb.Vec3) -> Vec3:
+    x, y, z = message.x, message.y, message.z
+    most = limits.MAX_VALUE
+    if not (-most <= x <= most and -most <= y <= most and -most <= z <= most):
+        raise OutOfBounds
+    return (x, y, z)
+
+
+def whole(value: int, least: int, most: int) -> int:
+    if not least <= value <= most:
+        raise OutOfBounds
+    return value
+
+
+def time(ns: int) -> int:
+    return whole(ns, -limits.MAX_TIME_NS, limits.MAX_TIME_NS)
+
+
+def length(ns: int) -> int:
+    """Of time, which is never below zero."""
+    return whole(ns, 0, limits.MAX_TIME_NS)
+
+
+def device(number: int) -> int:
+    return whole(number, 0, limits.MAX_DEVICES - 1)
+
+
+def channel(number: int) -> int:
+    return whole(number, 0, limits.MAX_CHANNELS - 1)
+
+
+def text(text: str, limit: int) -> str:
+    if len(text) > limit or len(text.encode()) > limit:
+        raise OutOfBounds
+    return text
+
+
+def features(features: Sequence[str]) -> tuple[str, ...]:
+    if len(features) > limits.MAX_FEATURES:
+        raise OutOfBounds
+    return tuple(text(feature, limits.MAX_FEATURE) for feature in features)
+
+
+_Number = TypeVar("_Number", bound=IntEnum)
+MODES: dict[int, Mode] = {int(mode): mode for mode in Mode}
+CODES: dict[int, Code] = {int(code): code for code in Code}
+ROLES: dict[int, Role] = {int(role): role for role in Role}
+SAFETY: dict[int, Safety] = {int(safety): safety for safety in Safety}
+RULES: dict[int, ChannelRule] = {int(rule): rule for rule in ChannelRule}
+
+
+def enum(known: dict[int, _Number], number: int) -> _Number:
+    value = known.get(number)
+    if value is None:
+        raise OutOfBounds
+    return value
+
+
+def clip(text: str, limit: int) -> str:
+    """The front of `text`, at most `limit` bytes of UTF-8, and up to the first lone surrogate, which has no UTF-8."""
+    try:
+        encoded = text.encode()
+    except UnicodeEncodeError as error:
+        encoded = text[: error.start].encode()
+    return encoded[:limit].decode(errors="ignore")
+
+
+_Message = TypeVar("_Message", pb.Datagram, pb.Hello, pb.Answer)
+
+
+def parsed(message: _Message, body: bytes) -> _Message:
+    """Raises DecodeError when the body is not protobuf."""
+    message.ParseFromString(body)
+    try:
+        whole = _is_whole(body)
+    except IndexError:
+        whole = False
+    if not whole:
+        raise DecodeError
+    return message
+
+
+def _is_whole(body: bytes) -> bool:
+    """Some versions of protobuf, Debian's among them, take a field 0, and the end of a group that has not begun, for the
+    end of the message, and do not look at what follows. Raises IndexError when that is nothing like protobuf."""
+    at, groups = 0, 0
+    while at < len(body):
+        tag, at = _varint(body, at)
+        field, kind = tag >> 3, tag & 7
+        if field == 0:
+            return False
+        if kind == 0:
+            at = _varint(body, at)[1]
+        elif kind == 1:
+            at += 8
+        elif kind == 2:
+            size, at = _varint(body, at)
+            at += size
+        elif kind == 5:
+            at += 4
+        else:
+            groups += 1 if kind == 3 else -1
+            if groups < 0:
+                return False
+    return True
+
+
+def _varint(body: bytes, at: int) -> tuple[int, int]:
+    """The integer at `at`, and where it ends."""
+    value = shift = 0
+    while True:
+        byte = body[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            return value, at

@@ -1,0 +1,465 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The frames of a Data datagram: values to protobuf messages and back."""
+
+from __future__ import annotations
+
+from math import hypot, inf
+from typing import cast
+
+from .. import limits
+from .. import tendon_pb2 as pb
+from ..messages import (
+    Bye,
+    ChannelDescription,
+    Contact,
+    Control,
+    ControlAck,
+    Delays,
+    Describe,
+    DeviceDescription,
+    DeviceReport,
+    DeviceState,
+    Disarm,
+    ForceCommand,
+    ForceTable,
+    Frame,
+    GiveLease,
+    LeaseLost,
+    LinkReport,
+    LocalModel,
+    Mat3,
+    PeerReport,
+    Rearm,
+    Request,
+    SetStateDeadband,
+    SetStateRate,
+    TakeLease,
+    Vec3,
+)
+from . import fields
+
+
+def _read_state(message: pb.DeviceState) -> DeviceState:
+    permitted = message.permitted_force_n
+    return DeviceState(
+        tick=message.tick,
+        sampled_ns=fields.time(message.sampled_ns),
+        position=fields.vector(message.position_m),
+        velocity=fields.vector(message.velocity_mps),
+        force_applied=fields.vector(message.force_applied_n),
+        energy=fields.number(message.energy_j),
+        permitted_force=permitted if permitted == inf else fields.magnitude(permitted),
+        reasons=message.reasons,
+        force_sequence=message.force_sequence,
+        force_age_ns=fields.length(message.force_age_ns),
+        mode=fields.enum(fields.MODES, message.mode),
+        device=fields.device(message.device),
+        channel=fields.channel(message.channel),
+        force_wanted=fields.vector(message.force_wanted_n) if message.HasField("force_wanted_n") else None,
+    )
+
+
+def is_radius(metres: float) -> bool:
+    return metres == inf or 0 <= metres <= limits.MAX_VALUE
+
+
+def is_contact(contact: Contact) -> bool:
+    """Whether a peer takes it: every number is within its bounds."""
+    table = contact.table
+    numbers = [*contact.normal, contact.gap]
+    if table is not None:
+        if not (table.step > 0 and limits.MIN_TABLE <= len(table.force) <= limits.MAX_TABLE):
+            return False
+        numbers += [table.first, table.step, *table.force]
+    bounded = all(abs(number) <= limits.MAX_VALUE for number in numbers)  # nor is NaN
+    return bounded and abs(hypot(*contact.normal) - 1) <= limits.UNIT_TOLERANCE
+
+
+def _read_contact(message: pb.Contact) -> Contact:
+    table = None
+    if message.HasField("table"):
+        table = ForceTable(message.table.first_depth_m, message.table.step_m, tuple(message.table.force_n))
+    contact = Contact(fields.vector(message.normal), message.gap_m, table)
+    if not is_contact(contact):
+        raise fields.OutOfBounds
+    return contact
+
+
+def _write_contact(contact: Contact) -> pb.Contact:
+    x, y, z = contact.normal
+    message = pb.Contact(normal=pb.Vec3(x=x, y=y, z=z), gap_m=contact.gap)
+    if contact.table is not None:
+        table = contact.table
+        message.table.CopyFrom(pb.ForceTable(first_depth_m=table.first, step_m=table.step, force_n=table.force))
+    return message
+
+
+def _read_model(message: pb.LocalModel) -> LocalModel:
+    k = [fields.number(value) for value in message.stiffness_npm]
+    stiffness: Mat3
+    if len(k) == 1:
+        stiffness = ((k[0], 0.0, 0.0), (0.0, k[0], 0.0), (0.0, 0.0, k[0]))
+    elif len(k) == 3:
+        stiffness = ((k[0], 0.0, 0.0), (0.0, k[1], 0.0), (0.0, 0.0, k[2]))
+    elif len(k) == 9:
+        stiffness = ((k[0], k[1], k[2]), (k[3], k[4], k[5]), (k[6], k[7], k[8]))
+    else:
+        raise fields.OutOfBounds
+    valid_radius = message.valid_radius_m if message.HasField("valid_radius_m") else inf
+    if not is_radius(valid_radius):
+        raise fields.OutOfBounds
+    return LocalModel(
+        at=fields.vector(message.at_m),
+        stiffness=stiffness,
+        valid_radius=valid_radius,
+        contact=_read_contact(message.contact) if message.HasField("contact") else None,
+    )
+
+
+def _write_model(model: LocalModel) -> pb.LocalModel:
+    """The shortest of the three forms that says the same."""
+    (a, b, c), (d, e, f), (g, h, i) = model.stiffness
+    entries: list[float] = [a, b, c, d, e, f, g, h, i]
+    if not any((b, c, d, f, g, h)):
+        entries = [a] if a == e == i else [a, e, i]
+    return pb.LocalModel(
+        at_m=_write_vector(model.at),
+        stiffness_npm=entries,
+        valid_radius_m=None if model.valid_radius == inf else model.valid_radius,
+        contact=None if model.contact is None else _write_contact(model.contact),
+    )
+
+
+def _read_force(message: pb.ForceCommand) -> ForceCommand:
+    return ForceCommand(
+        sequence=fields.whole(message.sequence, 1, 2**64),
+        based_on_tick=message.based_on_tick,
+        force=fields.vector(message.force_n),
+        valid_for_us=fields.whole(message.valid_for_us, 1, limits.MAX_VALID_FOR_US),
+        model=_read_model(message.model) if message.HasField("model") else None,
+        device=fields.device(message.device),
+        channel=fields.channel(message.channel),
+        topology_changed=message.topology_changed,
+        error=fields.magnitude(message.error_n) if message.HasField("error_n") else None,
+    )
+
+
+def _read_control(message: pb.Control) -> Control:
+    op = message.WhichOneof("op")
+    request: Request | None = None
+    if op == "set_state_rate":
+        request = SetStateRate(message.set_state_rate.hz, fields.device(message.set_state_rate.device))
+    elif op == "rearm":
+        request = Rearm(fields.device(message.rearm.device))
+    elif op == "disarm":
+        request = Disarm(fields.device(message.disarm.device))
+    elif op == "describe":
+        request = Describe(fields.device(message.describe.device))
+    elif op == "take_lease":
+        request = TakeLease(fields.device(message.take_lease.device), fields.channel(message.take_lease.channel))
+    elif op == "give_lease":
+        request = GiveLease(fields.device(message.give_lease.device), fields.channel(message.give_lease.channel))
+    elif op == "lease_lost":
+        lost = message.lease_lost
+        request = LeaseLost(fields.device(lost.device), fields.channel(lost.channel), fields.text(lost.to, limits.MAX_NAME))
+    elif op == "set_state_deadband":
+        asked = message.set_state_deadband
+        request = SetStateDeadband(fields.number(asked.share), fields.number(asked.floor_mps), asked.max_silence_us)
+    return Control(id=fields.whole(message.id, 1, 2**32), request=request)
+
+
+def _read_ack(message: pb.ControlAck) -> ControlAck:
+    return ControlAck(
+        id=fields.whole(message.id, 1, 2**32),
+        code=fields.enum(fields.CODES, message.code),
+        detail=fields.text(message.detail, limits.MAX_DETAIL),
+        wait_ms=fields.whole(message.wait_ms, 0, limits.MAX_TIMEOUT_MS),
+        device=_read_description(message.device) if message.HasField("device") else None,
+    )
+
+
+def _read_description(message: pb.DeviceDescription) -> DeviceDescription:
+    if message.HasField("workspace_min_m") != message.HasField("workspace_max_m"):
+        raise fields.OutOfBounds
+    workspace = None
+    if message.HasField("workspace_min_m"):
+        low, high = workspace = (fields.vector(message.workspace_min_m), fields.vector(message.workspace_max_m))
+        if any(a > b for a, b in zip(low, high)):
+            raise fields.OutOfBounds
+    fields.whole(len(message.channels), 1, limits.MAX_CHANNELS)
+    return DeviceDescription(
+        device=fields.device(message.device),
+        name=fields.text(message.name, limits.MAX_LABEL),
+        model=fields.text(message.model, limits.MAX_NAME),
+        position_dof=fields.whole(message.position_dof, 1, limits.MAX_DOF),
+        force_dof=fields.whole(message.force_dof, 1, limits.MAX_DOF),
+        workspace=workspace,
+        max_force=fields.magnitude(message.max_force_n),
+        continuous_force=fields.magnitude(message.continuous_force_n),
+        max_stiffness=fields.magnitude(message.max_stiffness_npm),
+        position_resolution=fields.magnitude(message.position_resolution_m),
+        loop_hz=fields.whole(message.loop_hz, 1, limits.MAX_LOOP_HZ),
+        channels=tuple(
+            ChannelDescription(
+                name=fields.text(channel.name, limits.MAX_LABEL),
+                rule=fields.enum(fields.RULES, channel.rule),
+                lease_ms=fields.whole(channel.lease_ms, 0, limits.MAX_TIMEOUT_MS),
+                holder=fields.text(channel.holder, limits.MAX_LABEL),
+            )
+            for channel in message.channels
+        ),
+    )
+
+
+def _write_description(description: DeviceDescription) -> pb.DeviceDescription:
+    message = pb.DeviceDescription(
+        device=description.device,
+        name=fields.clip(description.name, limits.MAX_LABEL),
+        model=fields.clip(description.model, limits.MAX_NAME),
+        position_dof=description.position_dof,
+        force_dof=description.force_dof,
+        max_force_n=description.max_force,
+        continuous_force_n=description.continuous_force,
+        max_stiffness_npm=description.max_stiffness,
+        position_resolution_m=description.position_resolution,
+        loop_hz=description.loop_hz,
+    )
+    if description.workspace is not None:
+        low, high = description.workspace
+        message.workspace_min_m.CopyFrom(_write_vector(low))
+        message.workspace_max_m.CopyFrom(_write_vector(high))
+    for channel in description.channels[: limits.MAX_CHANNELS]:
+        message.channels.append(
+            pb.ChannelDescription(
+                name=fields.clip(channel.name, limits.MAX_LABEL),
+                rule=cast(pb.ChannelRule, channel.rule),
+                lease_ms=channel.lease_ms,
+                holder=fields.clip(channel.holder, limits.MAX_LABEL),
+            )
+        )
+    return message
+
+
+def _read_bye(message: pb.Bye) -> Bye:
+    return Bye(code=fields.enum(fields.CODES, message.code), reason=fields.text(message.reason, limits.MAX_DETAIL))
+
+
+def _read_delays(message: pb.Delays) -> Delays:
+    return Delays(fields.time(message.median_ns), fields.time(message.p99_ns))
+
+
+def _read_report(message: pb.LinkReport) -> LinkReport:
+    return LinkReport(
+        number=fields.whole(message.number, 1, 2**64),
+        until_ns=fields.time(message.until_ns),
+        span_ns=fields.length(message.span_ns),
+        forces=message.forces,
+        late_server=message.late_server,
+        late_network=message.late_network,
+        late_engine=message.late_engine,
+        worst_late_ns=fields.length(message.worst_late_ns),
+        longest_gap_ns=fields.length(message.longest_gap_ns),
+        round_trip=_read_delays(message.round_trip) if message.HasField("round_trip") else None,
+        to_server=_read_delays(message.to_server) if message.HasField("to_server") else None,
+        to_client=_read_delays(message.to_client) if message.HasField("to_client") else None,
+        clock_offset_ns=fields.time(message.clock_offset_ns),
+        clock_drift_ppm=fields.number(message.clock_drift_ppm),
+        clock_error_ns=fields.length(message.clock_error_ns),
+        received=message.received,
+        lost=message.lost,
+        reordered=message.reordered,
+        duplicated=message.duplicated,
+        words=fields.text(message.words, limits.MAX_DETAIL),
+    )
+
+
+def _write_delays(delays: Delays | None) -> pb.Delays | None:
+    return None if delays is None else pb.Delays(median_ns=delays.median_ns, p99_ns=delays.p99_ns)
+
+
+def _write_report(report: LinkReport) -> pb.LinkReport:
+    return pb.LinkReport(
+        number=report.number,
+        until_ns=report.until_ns,
+        span_ns=report.span_ns,
+        forces=report.forces,
+        late_server=report.late_server,
+        late_network=report.late_network,
+        late_engine=report.late_engine,
+        worst_late_ns=report.worst_late_ns,
+        longest_gap_ns=report.longest_gap_ns,
+        round_trip=_write_delays(report.round_trip),
+        to_server=_write_delays(report.to_server),
+        to_client=_write_delays(report.to_client),
+        clock_offset_ns=report.clock_offset_ns,
+        clock_drift_ppm=report.clock_drift_ppm,
+        clock_error_ns=report.clock_error_ns,
+        received=report.received,
+        lost=report.lost,
+        reordered=report.reordered,
+        duplicated=report.duplicated,
+        words=fields.clip(report.words, limits.MAX_DETAIL),
+    )
+
+
+def _read_device_report(message: pb.DeviceReport) -> DeviceReport:
+    steps, lateness = message.steps, tuple(message.lateness_us_log2)
+    fields.whole(len(lateness), 0, limits.LATENESS_BUCKETS)
+    fields.whole(sum(lateness), 0, steps)
+    return DeviceReport(
+        number=fields.whole(message.number, 1, 2**64),
+        until_ns=fields.time(message.until_ns),
+        span_ns=fields.length(message.span_ns),
+        device=fields.device(message.device),
+        steps=steps,
+        missed=message.missed,
+        overruns=fields.whole(message.overruns, 0, steps),
+        unseen=fields.whole(message.unseen, 0, steps),
+        lateness=lateness,
+        safety=fields.enum(fields.SAFETY, message.safety),
+        fault=fields.text(message.fault, limits.MAX_DETAIL),
+        degraded=fields.text(message.degraded, limits.MAX_DETAIL),
+    )
+
+
+def _write_device_report(report: DeviceReport) -> pb.DeviceReport:
+    return pb.DeviceReport(
+        number=report.number,
+        until_ns=report.until_ns,
+        span_ns=report.span_ns,
+        device=report.device,
+        steps=report.steps,
+        missed=report.missed,
+        overruns=report.overruns,
+        unseen=report.unseen,
+        lateness_us_log2=report.lateness,
+        safety=cast(pb.Safety, report.safety),
+        fault=fields.clip(report.fault, limits.MAX_DETAIL),
+        degraded=fields.clip(report.degraded, limits.MAX_DETAIL),
+    )
+
+
+def _read_peer_report(message: pb.PeerReport) -> PeerReport:
+    if not message.HasField("link"):
+        raise fields.OutOfBounds
+    return PeerReport(
+        device=fields.device(message.device),
+        channel=fields.channel(message.channel),
+        name=fields.text(message.name, limits.MAX_NAME),
+        state_one_in=fields.whole(message.state_one_in, 1, limits.MAX_ONE_IN),
+        forces_refused=message.forces_refused,
+        link=_read_report(message.link),
+    )
+
+
+def _write_peer_report(report: PeerReport) -> pb.PeerReport:
+    return pb.PeerReport(
+        device=report.device,
+        channel=report.channel,
+        name=fields.clip(report.name, limits.MAX_NAME),
+        state_one_in=report.state_one_in,
+        forces_refused=report.forces_refused,
+        link=_write_report(report.link),
+    )
+
+
+def _write_vector(vector: Vec3) -> pb.Vec3:
+    return pb.Vec3(x=vector[0], y=vector[1], z=vector[2])
+
+
+def _write_control(frame: Control) -> pb.Control:
+    control, request = pb.Control(id=frame.id), frame.request
+    if isinstance(request, SetStateRate):
+        control.set_state_rate.CopyFrom(pb.SetStateRate(hz=request.hz, device=request.device))
+    elif isinstance(request, Rearm):
+        control.rearm.CopyFrom(pb.Rearm(device=request.device))
+    elif isinstance(request, Disarm):
+        control.disarm.CopyFrom(pb.Disarm(device=request.device))
+    elif isinstance(request, Describe):
+        control.describe.CopyFrom(pb.Describe(device=request.device))
+    elif isinstance(request, TakeLease):
+        control.take_lease.CopyFrom(pb.TakeLease(device=request.device, channel=request.channel))
+    elif isinstance(request, GiveLease):
+        control.give_lease.CopyFrom(pb.GiveLease(device=request.device, channel=request.channel))
+    elif isinstance(request, LeaseLost):
+        to = fields.clip(request.to, limits.MAX_NAME)
+        control.lease_lost.CopyFrom(pb.LeaseLost(device=request.device, channel=request.channel, to=to))
+    elif isinstance(request, SetStateDeadband):
+        control.set_state_deadband.CopyFrom(
+            pb.SetStateDeadband(share=request.share, floor_mps=request.floor, max_silence_us=request.max_silence_us)
+        )
+    return control
+
+
+def write(frame: Frame) -> pb.Frame:
+    if isinstance(frame, ForceCommand):
+        force = pb.ForceCommand(
+            sequence=frame.sequence,
+            based_on_tick=frame.based_on_tick,
+            force_n=_write_vector(frame.force),
+            model=_write_model(frame.model) if frame.model else None,
+            valid_for_us=frame.valid_for_us,
+            device=frame.device,
+            channel=frame.channel,
+            topology_changed=frame.topology_changed,
+            error_n=frame.error,
+        )
+        return pb.Frame(force=force)
+    if isinstance(frame, DeviceState):
+        state = pb.DeviceState(
+            tick=frame.tick,
+            sampled_ns=frame.sampled_ns,
+            position_m=_write_vector(frame.position),
+            velocity_mps=_write_vector(frame.velocity),
+            force_applied_n=_write_vector(frame.force_applied),
+            energy_j=frame.energy,
+            permitted_force_n=frame.permitted_force,
+            reasons=frame.reasons,
+            force_sequence=frame.force_sequence,
+            force_age_ns=frame.force_age_ns,
+            mode=cast(pb.Mode, frame.mode),
+            device=frame.device,
+            channel=frame.channel,
+            force_wanted_n=None if frame.force_wanted is None else _write_vector(frame.force_wanted),
+        )
+        return pb.Frame(state=state)
+    if isinstance(frame, Control):
+        return pb.Frame(control=_write_control(frame))
+    if isinstance(frame, ControlAck):
+        ack = pb.ControlAck(
+            id=frame.id,
+            code=cast(pb.Code, frame.code),
+            detail=fields.clip(frame.detail, limits.MAX_DETAIL),
+            wait_ms=frame.wait_ms,
+            device=None if frame.device is None else _write_description(frame.device),
+        )
+        return pb.Frame(control_ack=ack)
+    if isinstance(frame, LinkReport):
+        return pb.Frame(report=_write_report(frame))
+    if isinstance(frame, DeviceReport):
+        return pb.Frame(device_report=_write_device_report(frame))
+    if isinstance(frame, PeerReport):
+        return pb.Frame(peer_report=_write_peer_report(frame))
+    bye = pb.Bye(code=cast(pb.Code, frame.code), reason=fields.clip(frame.reason, limits.MAX_DETAIL))
+    return pb.Frame(bye=bye)
+
+
+def read(message: pb.Frame) -> Frame | None:
+    body = message.WhichOneof("body")
+    if body == "state":
+        return _read_state(message.state)
+    if body == "force":
+        return _read_force(message.force)
+    if body == "control":
+        return _read_control(message.control)
+    if body == "control_ack":
+        return _read_ack(message.control_ack)
+    if body == "bye":
+        return _read_bye(message.bye)
+    if body == "report":
+        return _read_report(message.report)
+    if body == "device_report":
+        return _read_device_report(message.device_report)
+    if body == "peer_report":
+        return _read_peer_report(message.peer_report)
+    return None  # a frame of a newer peer

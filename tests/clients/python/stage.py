@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A guest, a stand-in server and a hand 1 mm inside a wall, on virtual time."""
+
+from __future__ import annotations
+
+import random
+from math import inf
+
+from stand_in import StandIn
+from world import MS, PERFECT, Weather, World
+
+from tendon import (
+    ChannelDescription,
+    ChannelRule,
+    Code,
+    Config,
+    DeviceDescription,
+    ForceClient,
+    Mode,
+    SetStateDeadband,
+    Touch,
+)
+from tendon.messages import (
+    Control,
+    ControlAck,
+    Describe,
+    DeviceState,
+    ForceCommand,
+    LeaseLost,
+    TakeLease,
+)
+
+KEY = bytes(range(32))
+ZERO = (0.0, 0.0, 0.0)
+KEPT = SetStateDeadband(share=0.1, floor=1e-3, max_silence_us=20_000)
+DESCRIPTION = DeviceDescription(
+    device=1,
+    name="right",
+    model="stand-in",
+    position_dof=3,
+    force_dof=3,
+    workspace=None,
+    max_force=8.0,
+    continuous_force=0.0,
+    max_stiffness=0.0,
+    position_resolution=0.0,
+    loop_hz=1000,
+    channels=(
+        ChannelDescription("tissue", ChannelRule.SUM),
+        ChannelDescription("needle", ChannelRule.SUM),
+        ChannelDescription("tool", ChannelRule.PRIORITY, 500, "wall"),
+    ),
+)
+
+
+class Stage:
+    """A guest whose physics is a wall at x = 0, and a device whose hand is 1 mm inside it, at 1 kHz."""
+
+    def __init__(self, config: Config, server: StandIn | None = None, weather: Weather = PERFECT, seed: int = 1):
+        self.client = ForceClient(config, World.START, random.Random(seed).randbytes)
+        self.server = server or StandIn()
+        self.world = World(self.client, self.server, weather, seed)
+        self.touch = lambda hand: Touch((-2000 * hand.position[0], 0, 0))
+        self.seen: list[DeviceState] = []
+        self.seen_at: list[int] = []
+        self.forces: list[ForceCommand] = []
+        self.requests: list[Control] = []
+        self.requested_at: list[int] = []
+        self.answers: list[ControlAck] = []  # to what the server has asked
+        self.grant = Code.OK
+        self.wait_ms = 0  # said with each answer
+        self.lease_answers: list[Code] = []  # to TakeLease, in this order; then `grant`
+        self.snatches = 0  # so many leases are another one's as soon as they are given
+        self.speed = 0.0  # m/s
+        self.every = 1  # ms from one state to the next that is sent
+        self._next_state = World.START
+
+    def run(self, length: int) -> None:
+        self.world.run(length, self._each_turn)
+
+    def _each_turn(self):
+        now = self.world.now
+        session = self.server.session
+        while session is not None and (event := session.next_event()) is not None:
+            if isinstance(event, ForceCommand):
+                self.forces.append(event)
+            elif isinstance(event, Control):
+                self.requests.append(event)
+                self.requested_at.append(now)
+                asks_lease = isinstance(event.request, TakeLease)
+                code = self.lease_answers.pop(0) if asks_lease and self.lease_answers else self.grant
+                described = isinstance(event.request, Describe) and code is Code.OK
+                session.answer(event.id, code, "", self.wait_ms, DESCRIPTION if described else None)
+                if asks_lease and code is Code.OK and self.snatches > 0:
+                    self.snatches -= 1
+                    session.request(LeaseLost(1, 2, "another"))
+            elif isinstance(event, ControlAck):
+                self.answers.append(event)
+        if now >= self._next_state:
+            tick = (now - World.START) // MS
+            self._next_state = World.START + (tick + 1) * MS
+            if session is not None and tick % self.every == 0:
+                position = (1e-3 + 1e-3 * self.speed * tick, 0.0, 0.0)
+                velocity = (self.speed, 0.0, 0.0)
+                session.send(DeviceState(tick, now, position, velocity, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
+        while (hand := self.client.next_state(now)) is not None:
+            self.seen.append(hand)
+            self.seen_at.append(now)
+            if self.touch is not None:
+                self.client.send(hand, self.touch(hand))
+        device = self._next_state if session is not None and session.open and not self.server.deaf else inf
+        return min(device, self.client.next_state_due())
