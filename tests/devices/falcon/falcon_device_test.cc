@@ -9,6 +9,7 @@
 #include <string>
 
 #include "devices/safety/safe_device.h"
+#include "tests/devices/driver_bench.h"
 #include "tests/devices/falcon/fake_firmware.h"
 #include "tests/devices/falcon/memory_pipe.h"
 
@@ -19,23 +20,18 @@ using State = Device::State;
 using Fault = FakeFalcon::Fault;
 using namespace std::chrono_literals;
 
-/// A driver, a cable and a Falcon, one turn of the haptic loop after the other in simulated time.
-struct Bench {
+/// A driver, a cable and a Falcon; lawful is torque in a Falcon that runs its firmware and is homed.
+struct Bench : DriverBench<Bench> {
   explicit Bench(const FakeFalcon::Options& options = {}, std::vector<std::uint8_t> firmware = fake_firmware(4096))
       : falcon(options), device({.firmware = std::move(firmware)}, std::make_unique<MemoryPipe>(falcon, now)) {}
 
   void step(const Vec3& force = Vec3::Zero()) {
     now += 1ms;
-    sample = device.read(now);
-    written = device.apply(force);
-    lawless = falcon.pushes() && !(falcon.running() && falcon.homed()) ? lawless + 1 : 0;
-    most_lawless = std::max(most_lawless, lawless);
-    after_zero = falcon.pushes() ? 0 : after_zero + 1;
+    drive(device, force);
+    look(falcon.pushes(), falcon.running() && falcon.homed());
   }
 
-  void run(Duration time, const Vec3& force = Vec3::Zero()) {
-    for (const LocalTime end = now + time; now < end;) step(force);
-  }
+  void home(const Vec3& /*force*/) { falcon.pull_through(); }
 
   /// At 2 m/s to a place relative to the centre.
   void move_to(const Vec3& place) {
@@ -48,24 +44,9 @@ struct Bench {
     }
   }
 
-  /// Whether it comes to `state`; homes where that is the way.
-  bool reaches(State state, Duration most, const Vec3& force = Vec3::Zero()) {
-    for (const LocalTime end = now + most; now < end && device.state() != state;) {
-      step(force);
-      if (state == State::kHomed && device.state() == State::kUnhomed) falcon.pull_through();
-    }
-    return device.state() == state;
-  }
-
-  LocalTime now{};
   FakeFalcon falcon;
   FalconDevice device;
-  std::optional<PositionSample> sample;
-  Vec3 written = Vec3::Zero();
   Vec3 grip = Vec3::Zero();
-  int lawless = 0;  ///< turns in a row with torque on a Falcon that has no home
-  int most_lawless = 0;
-  int after_zero = 0;  ///< turns in a row without torque
 };
 
 const Vec3 kForce(1, -2, 2);

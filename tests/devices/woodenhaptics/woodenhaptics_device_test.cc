@@ -3,116 +3,23 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <limits>
 #include <memory>
 #include <numbers>
-#include <span>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "devices/safety/safe_device.h"
-#include "tests/devices/model_pipe.h"
-#include "tests/devices/woodenhaptics/fake_woodenhaptics.h"
+#include "tests/devices/woodenhaptics/woodenhaptics_bench.h"
 
 namespace tendon {
 namespace {
 
 using State = Device::State;
 using Fault = FakeWoodenHaptics::Fault;
+using Bench = WoodenHapticsBench;
 using namespace std::chrono_literals;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-const Vec3 kForce(1, -0.5, 1);
-
-/// A cable whose driver's end can be full.
-class Cable final : public usb::Pipe {
- public:
-  Cable(FakeWoodenHaptics& arm, const LocalTime& now, const bool& full) : pipe_(arm, now), full_(full) {}
-  std::uint32_t connection() noexcept override { return pipe_.connection(); }
-  bool request(const usb::Request& request) noexcept override { return pipe_.request(request); }
-  bool write(std::span<const std::uint8_t> bytes) noexcept override { return !full_ && pipe_.write(bytes); }
-  bool settled() const noexcept override { return pipe_.settled(); }
-  std::size_t read(std::span<std::uint8_t, usb::kPacketSize> packet) noexcept override { return pipe_.read(packet); }
-  void reopen() noexcept override { pipe_.reopen(); }
-
- private:
-  ModelPipe<FakeWoodenHaptics> pipe_;
-  const bool& full_;
-};
-
-/// A driver, a cable and an arm, one turn of the haptic loop after the other in simulated time.
-struct Bench {
-  explicit Bench(const FakeWoodenHaptics::Options& options = {}, double max_current = 2)
-      : arm(options),
-        device({.model = woodenhaptics::find_model(options.model), .max_current = max_current},
-               std::make_unique<Cable>(arm, now, full)) {}
-
-  void step(const Vec3& force = Vec3::Zero()) {
-    now += 1ms;
-    arm.advance(now);
-    sample = device.read(now);
-    written = device.apply(force);
-    lawless = arm.pushes() && !arm.calibrated() ? lawless + 1 : 0;
-    most_lawless = std::max(most_lawless, lawless);
-    after_zero = arm.pushes() ? 0 : after_zero + 1;
-    for (std::size_t motor = 0; motor < 3; ++motor) {
-      EXPECT_GE(arm.pulse_width(motor), 0.1);
-      EXPECT_LE(arm.pulse_width(motor), 0.9);
-    }
-  }
-
-  void run(Duration time, const Vec3& force = Vec3::Zero()) {
-    for (const LocalTime end = now + time; now < end;) step(force);
-  }
-
-  /// At 2 m/s to a place relative to the centre.
-  void move_to(const Vec3& place, const Vec3& force = Vec3::Zero()) {
-    const Vec3 from = arm.position();
-    const int turns = static_cast<int>((place - from).norm() / 0.002) + 1;
-    for (int turn = 1; turn <= turns; ++turn) {
-      arm.move_to(from + (place - from) * turn / turns);
-      step(force);
-    }
-  }
-
-  /// As the operator does: into the calibration pose, the button, and back to the centre.
-  void calibrate(const Vec3& force = Vec3::Zero()) {
-    const Vec3 counts = arm.arm().calibration();
-    arm.turn_to(counts.cwiseProduct(arm.arm().per_count()));
-    run(20ms, force);
-    if (device.state() != State::kHomed) arm.press_calibrate();
-    run(60ms, force);
-    // By turning: straight lines out of a folded arm are faster than a hand.
-    const Vec3 from = counts.cwiseProduct(arm.arm().per_count());
-    const Vec3 to = arm.arm().angles_at(Vec3::Zero());
-    for (int turn = 1; turn <= 100; ++turn) {
-      arm.turn_to(from + (to - from) * turn / 100);
-      step(force);
-    }
-  }
-
-  /// Whether it comes to `state`; calibrates where that is the way.
-  bool reaches(State state, Duration most, const Vec3& force = Vec3::Zero()) {
-    for (const LocalTime end = now + most; now < end && device.state() != state;) {
-      step(force);
-      if (state == State::kHomed && device.state() == State::kUnhomed) calibrate(force);
-    }
-    return device.state() == state;
-  }
-
-  LocalTime now{};
-  bool full = false;
-  FakeWoodenHaptics arm;
-  WoodenHapticsDevice device;
-  std::optional<PositionSample> sample;
-  Vec3 written = Vec3::Zero();
-  int lawless = 0;  ///< turns in a row with current in an arm whose counters mean nothing
-  int most_lawless = 0;
-  int after_zero = 0;  ///< turns in a row without current
-};
 
 TEST(WoodenHapticsDevice, FromThePlugToTheForceItTakesEveryStep) {
   for (const auto& model : woodenhaptics::models()) {
@@ -128,7 +35,7 @@ TEST(WoodenHapticsDevice, FromThePlugToTheForceItTakesEveryStep) {
     EXPECT_EQ(bench.device.state(), State::kUnhomed);
     EXPECT_FALSE(bench.sample);
     EXPECT_FALSE(bench.arm.pushes());
-    bench.calibrate(kForce);
+    bench.home(kForce);
     EXPECT_EQ(bench.device.state(), State::kHomed);
     EXPECT_EQ(bench.arm.calibrations(), 1);
     EXPECT_EQ(bench.most_lawless, 0);
@@ -291,108 +198,6 @@ TEST(WoodenHapticsDevice, ZeroDoesNotWaitForAnAnswer) {
   EXPECT_FALSE(bench.arm.pushes());
 }
 
-// --- Calibration
-// ------------------------------------------------------------------------------------------------------
-
-TEST(WoodenHapticsDevice, WithoutTheButtonItIsNeverHomed) {
-  Bench bench;
-  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
-  bench.run(5s, kForce);
-  EXPECT_EQ(bench.device.state(), State::kUnhomed);
-  EXPECT_EQ(bench.arm.calibrations(), 0);
-  EXPECT_EQ(bench.most_lawless, 0);
-  EXPECT_GT(bench.arm.obeyed(), 4900) << "and its watchdog is fed with zeros";
-}
-
-TEST(WoodenHapticsDevice, OneReportOfAPressedButtonIsNotEnough) {
-  Bench bench;
-  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
-  bench.run(10ms, kForce);
-  bench.arm.press_calibrate();
-  bench.run(8ms, kForce);
-  EXPECT_EQ(bench.arm.calibrations(), 0);
-  bench.run(8ms, kForce);
-  EXPECT_EQ(bench.arm.calibrations(), 1);
-  EXPECT_EQ(bench.device.state(), State::kUnhomed) << "nor is one that has the counters";
-  bench.run(20ms, kForce);
-  EXPECT_EQ(bench.device.state(), State::kHomed);
-  EXPECT_EQ(bench.arm.calibrations(), 1);
-}
-
-TEST(WoodenHapticsDevice, TheButtonEndsTheForceAtOnceAndCalibratesAnew) {
-  Bench bench;
-  ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
-  bench.run(20ms, kForce);
-  ASSERT_TRUE(bench.arm.pushes());
-  bench.most_lawless = 0;
-  bench.arm.press_calibrate();
-  bench.run(4ms, kForce);
-  EXPECT_FALSE(bench.arm.pushes());
-  EXPECT_EQ(bench.device.state(), State::kUnhomed);
-  EXPECT_LE(bench.most_lawless, 3) << "a frame for the report, one for the answer";
-}
-
-TEST(WoodenHapticsDevice, CountersNotSetAsToldAreNoCalibration) {
-  Bench bench;
-  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms));
-  bench.arm.press_calibrate();
-  for (int i = 0; i < 100 && bench.arm.calibrations() == 0; ++i) bench.step();
-  bench.arm.set_fault(Fault::kJumps);
-  bench.run(100ms, kForce);
-  EXPECT_EQ(bench.device.state(), State::kUnhomed);
-  EXPECT_EQ(bench.device.counts()[DeviceCount::kFailedSetups], 1U);
-  EXPECT_FALSE(bench.arm.pushes());
-  bench.arm.set_fault(Fault::kNone);
-  bench.run(100ms, kForce);
-  EXPECT_EQ(bench.device.state(), State::kUnhomed) << "until the button is pressed again";
-  EXPECT_TRUE(bench.reaches(State::kHomed, 1s));
-}
-
-// Found by tests/fuzz: whoever does not answer has not asked again.
-TEST(WoodenHapticsDevice, TheCountersAreNotSetAgainUnlessItIsAskedForAgain) {
-  int until_set = 0;
-  for (const bool silent : {false, true}) {
-    Bench bench;
-    ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms));
-    bench.arm.press_calibrate();
-    if (!silent) {
-      for (; until_set < 100 && bench.arm.calibrations() == 0; ++until_set) bench.step();
-      ASSERT_EQ(bench.arm.calibrations(), 1);
-      continue;
-    }
-    for (int i = 1; i < until_set; ++i) bench.step();
-    ASSERT_EQ(bench.arm.calibrations(), 0) << "command 1 is on the bus";
-    bench.arm.set_fault(Fault::kSilent);  // the last that is heard of it is the request
-    bench.run(90ms);
-    EXPECT_EQ(bench.arm.calibrations(), 1);
-  }
-}
-
-// Nobody knows what became of its counters meanwhile.
-TEST(WoodenHapticsDevice, ABoardThatWasCalibratedBeforeIsNotBelievedToBe) {
-  for (const bool own_supply : {false, true}) {
-    Bench bench({.own_supply = own_supply});
-    ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
-    bench.run(20ms, kForce);
-    bench.arm.unplug();
-    bench.arm.plug();  // between two turns
-    bench.step(kForce);
-    EXPECT_EQ(bench.device.state(), State::kAbsent);
-    EXPECT_FALSE(bench.sample);
-    EXPECT_EQ(bench.written, Vec3::Zero());
-    EXPECT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
-    bench.run(1s, kForce);
-    EXPECT_EQ(bench.device.state(), State::kUnhomed);
-    EXPECT_FALSE(bench.arm.pushes());
-    EXPECT_TRUE(bench.reaches(State::kHomed, 1s, kForce));
-    bench.run(10ms, kForce);
-    EXPECT_TRUE(bench.arm.pushes());
-  }
-}
-
-// --- The firmware's watchdog
-// ------------------------------------------------------------------------------------------
-
 // Of the model, which is the firmware step by step: no code of the driver is alive here.
 TEST(WoodenHapticsDevice, WhenTheHostIsDeadTheFirmwareLetsGoHalfASecondLater) {
   Bench bench;
@@ -522,124 +327,6 @@ TEST(WoodenHapticsDevice, ASafeDeviceIsHomedAndArmedAgainAfterAReplug) {
     run(1ms, kForce);
     EXPECT_EQ(safe.status().state, SafetyState::kFault);
     EXPECT_EQ(safe.status().last_fault, SafetyFault::kDeviceLost);
-  }
-}
-
-// --- Every fault at every state
-// ---------------------------------------------------------------------------------------
-
-enum class Place { kBooting, kOpening, kUnhomed, kCalibrating, kSetting, kHomed, kPushing };
-constexpr std::array kPlaces = {Place::kBooting, Place::kOpening, Place::kUnhomed, Place::kCalibrating,
-                                Place::kSetting, Place::kHomed,   Place::kPushing};
-
-FakeWoodenHaptics::Options options_for(Place place) { return {.boot = place == Place::kBooting ? 1s : 0s}; }
-
-void go_to(Bench& bench, Place place) {
-  if (place <= Place::kOpening) {
-    ASSERT_TRUE(bench.reaches(State::kOpening, 100ms, kForce));
-    return;
-  }
-  if (place >= Place::kHomed) {
-    ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
-    bench.run(20ms, place == Place::kPushing ? kForce : Vec3::Zero());
-    ASSERT_EQ(bench.arm.pushes(), place == Place::kPushing);
-    return;
-  }
-  ASSERT_TRUE(bench.reaches(State::kUnhomed, 200ms, kForce));
-  bench.run(20ms, kForce);
-  if (place == Place::kUnhomed) return;
-  bench.arm.press_calibrate();
-  bench.run(5ms, kForce);
-  for (int i = 0; i < 100 && place == Place::kSetting && bench.arm.calibrations() == 0; ++i) bench.step(kForce);
-  ASSERT_EQ(bench.device.state(), State::kUnhomed);
-}
-
-class WoodenHapticsFault : public testing::TestWithParam<Fault> {};
-
-/// Those that cost reports and not the device. A wrong byte in one of three reports may say that the button was
-/// pressed, which costs the home: USB's own checksum makes it none that is seen.
-bool is_harmless(Fault fault) { return fault == Fault::kDropsSome || fault == Fault::kBabbles; }
-
-TEST_P(WoodenHapticsFault, EndsInZeroForceAtEveryState) {
-  const Fault fault = GetParam();
-  for (const Place place : kPlaces) {
-    SCOPED_TRACE(static_cast<int>(place));
-    Bench bench(options_for(place));
-    go_to(bench, place);
-    ASSERT_EQ(bench.most_lawless, 0);
-
-    const int obeyed = bench.arm.obeyed();
-    bench.arm.set_fault(fault);
-    bench.run(1s, kForce);
-    if (is_harmless(fault)) {
-      EXPECT_EQ(bench.most_lawless, 0);
-      if (place == Place::kPushing) {
-        EXPECT_TRUE(bench.arm.pushes()) << "this fault costs samples, not the device";
-        EXPECT_EQ(bench.device.state(), State::kHomed);
-      }
-    } else if (fault == Fault::kGarblesSome) {
-      EXPECT_EQ(bench.most_lawless, 0);
-    } else if (fault == Fault::kStalls || fault == Fault::kHangs) {
-      // It takes nothing any more: what it holds is its watchdog's to end.
-      EXPECT_LE(bench.arm.obeyed(), obeyed + 1);
-      EXPECT_GE(bench.after_zero, 1000 - 502);
-      EXPECT_NE(bench.device.state(), State::kHomed);
-      EXPECT_EQ(bench.written, Vec3::Zero());
-    } else if (fault == Fault::kCalibrates && place >= Place::kCalibrating) {
-      EXPECT_LE(bench.most_lawless, 3) << "until it has been calibrated anew, as whoever pressed it wanted";
-    } else if (fault != Fault::kCalibrates) {
-      EXPECT_GE(bench.after_zero, 1000 - 15) << "current later than 15 ms after the fault";
-      EXPECT_EQ(bench.written, Vec3::Zero());
-      EXPECT_LE(bench.most_lawless, 15);
-    }
-
-    // Once the trouble is over it comes back, calibrated anew, and never pushes on the way.
-    bench.arm.set_fault(Fault::kNone);
-    bench.run(2s);  // a button that was pressed before is pressed
-    bench.most_lawless = bench.lawless = 0;
-    EXPECT_TRUE(bench.reaches(State::kHomed, 5s, kForce));
-    bench.move_to(Vec3::Zero());
-    bench.run(20ms, kForce);
-    EXPECT_TRUE(bench.arm.pushes());
-    EXPECT_EQ(bench.most_lawless, 0);
-  }
-}
-
-std::string name_of(const testing::TestParamInfo<Fault>& info) {
-  constexpr std::array kNames = {"None",       "Silent",  "Hangs",      "DropsSome", "GarblesSome",
-                                 "GarblesAll", "CutsAll", "PadsAll",    "Babbles",   "BabblesOnly",
-                                 "Jumps",      "Forgets", "Calibrates", "Stalls"};
-  return kNames[static_cast<std::size_t>(info.param)];
-}
-
-INSTANTIATE_TEST_SUITE_P(Each, WoodenHapticsFault, testing::ValuesIn(FakeWoodenHaptics::kFaults), name_of);
-
-TEST(WoodenHapticsDevice, UnpluggedItIsAbsentAtOnceAndNanChangesNothing) {
-  for (const Place place : kPlaces) {
-    for (const Vec3& force : {kForce, Vec3(kNan, 0, 0)}) {
-      SCOPED_TRACE(static_cast<int>(place));
-      Bench bench(options_for(place));
-      go_to(bench, place);
-      bench.arm.unplug();
-      bench.step(force);
-      EXPECT_EQ(bench.device.state(), State::kAbsent);
-      EXPECT_EQ(bench.written, Vec3::Zero());
-      bench.run(50ms, force);
-      bench.arm.plug();
-      EXPECT_TRUE(bench.reaches(State::kHomed, 5s, force));
-      EXPECT_EQ(bench.most_lawless, 0);
-    }
-  }
-}
-
-TEST(WoodenHapticsDevice, AForceThatIsNoNumberIsNoneAtEveryState) {
-  for (const Place place : kPlaces) {
-    SCOPED_TRACE(static_cast<int>(place));
-    Bench bench(options_for(place));
-    go_to(bench, place);
-    bench.run(3ms, Vec3(0, kNan, 0));
-    EXPECT_FALSE(bench.arm.pushes());
-    EXPECT_EQ(bench.written, Vec3::Zero());
   }
 }
 

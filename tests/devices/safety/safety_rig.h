@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "devices/safety/safe_device.h"
+
+namespace tendon {
+
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Does and says what the test wants, and keeps what it was told.
+struct Puppet final : Device {
+  DeviceInfo about{.name = "puppet", .max_force = 10, .position_resolution = 50e-6, .watchdog = {}};
+  State stage = State::kHomed;
+  Vec3 position = Vec3::Zero();
+  std::uint32_t buttons = 0;
+  bool answers = true;
+  Duration age{};  ///< of the samples
+  Vec3 told = Vec3::Constant(kNaN);
+
+  const DeviceInfo& info() const noexcept override { return about; }
+  State state() const noexcept override { return stage; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    if (!answers) return std::nullopt;
+    PositionSample sample{now - age, position};
+    sample.buttons = buttons;
+    return sample;
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return told = force; }
+};
+
+/// A safe device around a puppet, and the loop that steps it at 1 kHz.
+struct Rig {
+  explicit Rig(const SafeDevice::Config& config = {}) : safe(config, puppet) {}
+
+  /// One step; returns the force applied.
+  Vec3 step(const Vec3& asked = Vec3::Zero()) {
+    now += std::chrono::milliseconds(1);
+    seen = safe.read(now).has_value();
+    return safe.apply(asked);
+  }
+  Vec3 steps(int count, const Vec3& asked = Vec3::Zero()) {
+    Vec3 last = Vec3::Zero();
+    for (int i = 0; i < count; ++i) last = step(asked);
+    return last;
+  }
+  /// The whole way, by the operator's request.
+  void arm() {
+    steps(60);
+    safe.arm();
+    step();
+    ASSERT_EQ(safe.status().state, SafetyState::kArmed);
+  }
+  SafetyState state() const { return safe.status().state; }
+  SafetyFault fault() const { return safe.status().last_fault; }
+
+  Puppet puppet;
+  SafeDevice safe;
+  LocalTime now{std::chrono::seconds(1)};
+  bool seen = false;
+};
+
+inline const Vec3 kPush(3, 0, -4);
+
+}  // namespace tendon

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "devices/simulated/profiles.h"
+#include "tests/server/scene/scene_text.h"
+
+namespace tendon {
+namespace {
+
+TEST(Scene, PerAxisTheProfilesCoulombFrictionIsSharedByTheAxes) {
+  const Scene scene = minimal_and("[limiter]\nkind = \"aol-per-axis\"\n");
+  const DeviceProfile& falcon = *find_device_profile("falcon");
+  EXPECT_DOUBLE_EQ(scene.loop.control.limiter.friction.coulomb * std::sqrt(3), falcon.coulomb_bound.value);
+  EXPECT_EQ(scene.loop.control.limiter.friction.viscous, falcon.viscous_bound.value);
+}
+
+TEST(Scene, ABoundMayBeTheTrueFrictionItself) {
+  EXPECT_EQ(minimal_and("[limiter]\ncoulomb_friction_n = 0.4\nviscous_friction_n_s_per_m = 1\n")
+                .loop.control.limiter.friction.coulomb,
+            0.4);
+}
+
+TEST(Scene, APartOfAolPlusIsThereWhenItsTableIs) {
+  const auto parts = minimal_and("[limiter]\n[limiter.knee]\nstart = 0.7\n[limiter.energy_cap]\nenergy_mj = 3\n")
+                         .loop.control.limiter.parts;
+  ASSERT_TRUE(parts.knee);
+  EXPECT_EQ(parts.knee->start, 0.7);
+  ASSERT_TRUE(parts.energy_cap);
+  EXPECT_EQ(parts.energy_cap->energy, 0.003);
+  EXPECT_EQ(parts.energy_cap->most_contact, 0.13);
+  EXPECT_FALSE(parts.robust_ledger || parts.latency_reserve || parts.bounded_acceleration || parts.adaptive_friction);
+  const auto none = minimal_and("").loop.control.limiter.parts;
+  EXPECT_FALSE(none.knee || none.energy_cap || none.robust_ledger || none.latency_reserve ||
+               none.bounded_acceleration || none.adaptive_friction);
+}
+
+TEST(Scene, EveryLawOfTheCatalogueCanBeChosenByName) {
+  for (const LawInfo& law : laws()) {
+    std::string text = "[limiter]\nkind = \"" + std::string(law.name) + "\"\n";
+    if (law.needs_stiffness) text += "environment_stiffness_n_per_m = 1000\n";
+    if (law.law == Law::kClamp) text += "clamp_n = 2\n";
+    EXPECT_EQ(minimal_and(text).loop.control.limiter.law, law.law) << law.name;
+    EXPECT_EQ(&info(law.law), &law);
+    EXPECT_NE(scene_reference().find('"' + std::string(law.name) + '"'), std::string::npos) << law.name;
+  }
+}
+
+TEST(Scene, AnEstimatorIsThereWhenItsTableIs) {
+  const auto learned =
+      minimal_and("[force.output_estimator]\nmodel = \"spring-and-bias\"\nscale_mm = 5\n").loop.control.hold;
+  ASSERT_TRUE(learned.output_estimator && !learned.adaptive_local_model);
+  EXPECT_EQ(learned.output_estimator->model, OutputEstimator::Model::kSpringAndBias);
+  EXPECT_EQ(learned.output_estimator->scale, 0.005);
+  const auto sent = minimal_and("[force.adaptive_local_model]\nshare = 0.8\n").loop.control.hold;
+  ASSERT_TRUE(sent.adaptive_local_model && !sent.output_estimator);
+  EXPECT_EQ(sent.adaptive_local_model->share, 0.8);
+  EXPECT_EQ(error_of_minimal_and("[force.output_estimator]\n[force.adaptive_local_model]\n"),
+            "s.toml:4: force: adaptive_local_model and output_estimator: expected one of them, not both");
+}
+
+TEST(Scene, AToolNeedsADeviceThatMeasuresTheHand) {
+  const std::string tool = "[admittance]\nmass_kg = 3\nproportional_n_s_per_m = 400\n";
+  const Scene scene = minimal_and("[device.effects]\nforce_sensor = 0.1\n" + tool);
+  ASSERT_TRUE(scene.loop.control.admittance);
+  EXPECT_EQ(scene.loop.control.admittance->mass, Vec3(3, 3, 3));
+  EXPECT_EQ(scene.simulated().force_sensor->resolution, 0.1);
+  EXPECT_EQ(error_of_minimal_and(tool),
+            "s.toml:4: admittance: expected a device with force_sensor among its effects: the tool is driven by the "
+            "hand's force");
+  EXPECT_EQ(error_of_minimal_and("[device.effects]\nforce_sensor = true\n"),
+            "s.toml:5: device.effects.force_sensor: expected the size of one count in N, 0 for an exact one, or false "
+            "for none, found true");
+}
+
+TEST(Scene, FrictionCanDifferByPlace) {
+  const std::string map =
+      "[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0], [80, 0, 0]]\ncoulomb_friction_n = [0.3, 0.2]\n"
+      "viscous_friction_n_s_per_m = [0.5, 0.4]\nreach_mm = 30\n";
+  const auto control = minimal_and(map).loop.control;
+  ASSERT_TRUE(control.friction_map);
+  ASSERT_EQ(control.friction_map->places.size(), 2U);
+  EXPECT_EQ(control.friction_map->places[1].position, Vec3(0.08, 0, 0));
+  EXPECT_EQ(control.friction_map->places[1].friction.coulomb, 0.2);
+  EXPECT_EQ(control.friction_map->reach, 0.03);
+  EXPECT_EQ(error_of_minimal_and("[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0]]\ncoulomb_friction_n = [0.3, 0.2]"
+                                 "\nviscous_friction_n_s_per_m = [0.5]\n"),
+            "s.toml:5: limiter.adaptive_friction.places_mm: expected as many places as friction bounds of each kind");
+  EXPECT_EQ(error_of_minimal_and("[limiter.adaptive_friction]\nplaces_mm = [[0, 0, 0]]\ncoulomb_friction_n = [0.5]"
+                                 "\nviscous_friction_n_s_per_m = [0.5]\n"),
+            "s.toml:6: limiter.adaptive_friction.coulomb_friction_n: expected at most 0.4 N, the true friction of the "
+            "simulated device, found 0.5");
+}
+
+TEST(Scene, TheRobustLedgerTakesTheDevicesEncoderAndTheKeyOverrides) {
+  const DeviceProfile& falcon = *find_device_profile("falcon");
+  const auto step = [](const std::string& more) {
+    return minimal_and("[limiter.robust_ledger]\n" + more).loop.control.limiter.parts.robust_ledger->encoder_step[0];
+  };
+  EXPECT_EQ(step(""), falcon.encoder_step.value);
+  EXPECT_EQ(step("encoder_step_um = 100\n"), 1e-4);
+}
+
+TEST(Scene, BoundedAccelerationNeverShapesBelowTheFrictionItself) {
+  const auto parts = minimal_and("[limiter.bounded_acceleration]\nmost_m_per_s2 = 200\n").loop.control.limiter.parts;
+  EXPECT_EQ(parts.bounded_acceleration->most[0], 200);
+  EXPECT_EQ(parts.bounded_acceleration->shaping_viscous[0],
+            std::max(0.3, find_device_profile("falcon")->viscous_bound.value));
+}
+
+TEST(Scene, HasOneChannelForAllWhoNameNone) {
+  const Scene scene = minimal_and("");
+  ASSERT_EQ(scene.channels.size(), 1U);
+  EXPECT_EQ(scene.channels[0].name, "main");
+  EXPECT_EQ(scene.channels[0].lease, Duration::zero());
+  EXPECT_EQ(scene.loop.control.channels, std::vector{ChannelRule::kSum});
+  EXPECT_EQ(scene.name, "s") << "that of the file";
+}
+
+TEST(Scene, ListsItsChannelsInOrder) {
+  const Scene scene = minimal_and(
+      "name = \"left-hand\"\n[[channel]]\nname = \"wall\"\n[[channel]]\nname = \"tissue\"\nrule = \"priority\"\n"
+      "lease_ms = 500\n[network]\ntakeover = [\"surgeon\"]\n");
+  EXPECT_EQ(scene.name, "left-hand");
+  ASSERT_EQ(scene.channels.size(), 2U);
+  EXPECT_EQ(scene.channels[0].name, "wall");
+  EXPECT_EQ(scene.channels[1].name, "tissue");
+  EXPECT_EQ(scene.channels[1].lease, std::chrono::milliseconds(500));
+  EXPECT_EQ(scene.loop.control.channels, (std::vector{ChannelRule::kSum, ChannelRule::kPriority}));
+  EXPECT_EQ(scene.network.takeover, std::vector<std::string>{"surgeon"});
+}
+
+TEST(Scene, SeveralMakeOneServerWhoseNetworkIsTheFirstOnes) {
+  const std::filesystem::path shipped(TENDON_SCENES);
+  const auto scenes = read_scenes({shipped / "left.toml", shipped / "right.toml"});
+  ASSERT_EQ(scenes.size(), 2U);
+  EXPECT_EQ(scenes[0].name, "left");
+  EXPECT_EQ(scenes[1].name, "right");
+  EXPECT_EQ(scenes[1].loop.device, 1U);
+  const auto error_of_both = [&](const std::filesystem::path& second) -> std::string {
+    try {
+      read_scenes({shipped / "left.toml", second});
+    } catch (const SceneError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_TRUE(error_of_both(shipped / "left.toml").ends_with("expected a name of its own, found \"left\" again"));
+  EXPECT_NE(error_of_both(shipped / "demo.toml").find("recording: expected in the first scene only"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace tendon
