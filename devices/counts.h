@@ -23,8 +23,8 @@ enum class DeviceCount : std::uint8_t {
   kUnanswered,
 };
 
-/// The row of one counter. This table is the only place that names it: `tendond --json` prints each by its name, the log
-/// gives the meaning, and observers and /metrics are told that the device is degraded.
+/// The row of one counter. This table is the only place that names it: `tendond --json` prints each by its name, the
+/// log gives the meaning, and observers and /metrics are told that the device is degraded.
 struct DeviceCounter {
   DeviceCount count;
   std::string_view name;      ///< key in `tendond --json`

@@ -15,16 +15,15 @@
 
 namespace tendon {
 
-/// One row for each kind of device: what scenes, `tendond devices`, the server and the udev rules have to know of it.
-/// The row stands beside the driver. Each kind has a configuration of its own, X, and these overloads, which
-/// std::visit finds by argument:
+/// One row for each kind of device, beside its driver. Scenes, `tendond devices`, the server and the udev rules read
+/// it. Each kind has a configuration of its own, X, and these overloads, which std::visit finds by argument:
 ///
 ///     const Driver& driver(const X&)                        this row
 ///     SimulatedDevice::Config stand_in(const X&)            simulates it where the cost of a step is measured
 ///     std::unique_ptr<Device> make(const X&, FromOutside)   the device itself
 struct Driver {
   std::string_view kind;                ///< in a scene: [device] kind
-  std::string_view name;                ///< of what it drives, for people
+  std::string_view name;                ///< of the hardware, for people
   bool exerts_force = true;             ///< false: an input only; nobody feels the forces of engines
   bool moves_a_hand = false;            ///< a real device with motors: it never runs without limiter and safety layer
   std::uint32_t buttons = 0;            ///< how many a real device has
@@ -39,7 +38,7 @@ struct Driver {
   std::vector<std::uint8_t> zero_packet{};  ///< ends its force; what the guardian writes when the server dies
 };
 
-/// What a device needs of the world to be made.
+/// What `make` needs from outside.
 struct FromOutside {
   std::unique_ptr<usb::Pipe> pipe;                                       ///< null for a device without a plug
   std::function<std::ifstream(const std::filesystem::path&)> open_file;  ///< throws when it cannot

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-/// What the Falcon's firmware and the host say to each other: packets of 16 bytes, `<` p1 … p14 `>`, each p = 0x41 + a
+/// The packets between the Falcon's firmware and the host: 16 bytes, `<` p1 … p14 `>`, with each p = 0x41 + a
 /// nibble. Source: libnifalcon, FalconFirmwareNovintSDK.cpp. There is neither a checksum nor a number: a reply counts
 /// as one when its frame and each of its nibbles are possible, and the encoders' steps are checked besides
 /// (`FalconDevice`).
@@ -32,10 +32,10 @@ inline constexpr std::uint8_t kGreen = 2;
 inline constexpr std::uint8_t kBlue = 4;
 inline constexpr std::uint8_t kRed = 8;
 
-/// No torque, and red lamps: the last word to a device whose driver is dead.
+/// No torque, and red lamps. The guardian sends it when the driver's process is dead.
 inline constexpr Command kLastCommand{.torque = {}, .homing = true, .lamps = kRed};
 
-/// Byte 14 is sent as nibble 0: nobody knows its meaning.
+/// Byte 14, whose meaning is unknown, is sent as nibble 0.
 std::array<std::uint8_t, kPacketBytes> encode(const Command& command) noexcept;
 
 /// Device to host.
@@ -46,12 +46,12 @@ struct Reply {
   static constexpr std::uint8_t kAllHomed = 7;
 };
 
-/// The reply in these 16 bytes; empty when the frame is not there or a nibble is none. Byte 14 is not looked at.
+/// The reply in these 16 bytes; empty when the frame is missing or a byte is no nibble. Byte 14 is ignored.
 std::optional<Reply> decode(std::span<const std::uint8_t, kPacketBytes> bytes) noexcept;
 
-/// Finds replies in a stream of bytes of which some are lost, spoilt or added. What cannot be the beginning of a reply
-/// is left out one byte at a time, so a whole reply is found whatever stands before it; what may become one is kept
-/// until the rest comes.
+/// Finds replies in a stream in which bytes may be lost, garbled or added. Bytes that cannot begin a reply are dropped
+/// one at a time, so a whole reply is found whatever stands before it. The beginning of a reply is kept until the rest
+/// comes.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class ReplyParser {

@@ -15,7 +15,7 @@ constexpr double kBoundTime_s = 1.0;
 constexpr double kWarm = 0.7;
 constexpr double kCool = 0.5;
 
-/// Also of a force whose norm is not a number: none of it.
+/// The share that shortens `size` to `max`; 0 when `size` is not a number.
 double up_to(double max, double size) noexcept {
   if (size <= max) return 1;
   return size > max && max > 0 ? max / size : 0;

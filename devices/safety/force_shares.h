@@ -7,16 +7,15 @@
 
 namespace tendon {
 
-// What a safety layer may do to a force: give a share s of it, 0 ≤ s ≤ 1, the same for all its components. So no part
-// here makes a force longer, turns it or raises one of its components, and a bound that the force kept before (the
-// energy limiter's, joint or of each axis) it keeps after any of them. Each is a small value of its own; a SafeDevice
-// has those that its Config lists.
+// The parts of the safety layer that reduce a force. Each gives a share s of it, 0 ≤ s ≤ 1, the same for all
+// components. So none makes a force longer, turns it or raises a component, and the force still keeps every bound that
+// it kept before: the energy limiter's on the norm or on each axis. A SafeDevice has those that its Config lists.
 //
 // Thread-safe: no. Realtime-safe: all but the constructors, which throw std::invalid_argument naming the field.
 
-/// No force longer than `max`: s = max / ‖F‖. Clipping each component by itself would turn the force, and wrapping it
-/// (Novint Falcon with libnifalcon: 30 N·m asked for, 16 bits sent) would turn it round.
-/// Source: HD_EXCEEDED_MAX_FORCE of OpenHaptics.
+/// No force is longer than `max`: s = max / ‖F‖. Clipping each component by itself would turn the force; wrapping
+/// (Novint Falcon with libnifalcon: 30 N·m asked for, 16 bits sent) would reverse it. Source: HD_EXCEEDED_MAX_FORCE of
+/// OpenHaptics.
 class ForceLimit {
  public:
   struct Config {
@@ -30,12 +29,12 @@ class ForceLimit {
   Config config_;
 };
 
-/// No force grows along itself by more than `rate`:
+/// No force grows along its own direction faster than `rate`:
 ///
 ///     ‖s F‖ ≤ (F_before · F/‖F‖)₊ + rate · T
 ///
-/// It falls at once, and one that turns back begins at zero. A limit on any change would hold on to a force after
-/// nobody asks for it any more, which safety must not. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
+/// A force falls at once; one that reverses begins at zero. A limit on every change would keep up a force that nobody
+/// asks for any more, which a safety layer must not do. Source: HD_EXCEEDED_MAX_FORCE_IMPULSE (0x0202) of OpenHaptics.
 class GrowthLimit {
  public:
   struct Config {
@@ -62,14 +61,14 @@ class RampIn {
   Config config_;
 };
 
-/// From the whole force to none: s = 1 − (t − since) / time. How a watchdog that has tripped ends a force.
+/// From the whole force to zero: s = 1 − (t − since) / time. A watchdog that has tripped ends a force this way.
 struct RampOut {
   LocalTime since{};
   Duration time{};
   double share(LocalTime now) const noexcept;
 };
 
-/// Keeps motors from burning: first-order heat of the force that was really held,
+/// Keeps motors from burning: a first-order model of their heat under the force that was really held,
 ///
 ///     τ dθ/dt = (‖F‖ / continuous)² − θ                         θ = 1: as warm as `continuous` for ever makes them
 ///
@@ -77,8 +76,8 @@ struct RampOut {
 /// rises again with the same one when θ < 0.5. At θ ≥ 1 it is `continuous` at once; so θ never exceeds
 /// 1 + (T/τ)(peak/continuous)².
 ///
-/// One heat for all motors, from the force at the handle: right where the motors share it evenly, and too low for one
-/// that bears more than its share. Torques by joint are known only to the device, which has to bound them itself.
+/// There is one heat for all motors, from the force at the handle. It is right where the motors share the force evenly,
+/// and too low for a motor that bears more. Only the device knows the torque of each joint, and has to bound it itself.
 ///
 /// Source: PreventWarmMotors of OpenHaptics (0.7, 0.5, × 0.999 each ms). Touch: peak 3.3 N, continuous 0.88 N.
 class HeatLimit {
@@ -101,18 +100,18 @@ class HeatLimit {
   double bound_;
 };
 
-/// Where forces may push outwards: nowhere beyond `margin` outside a sphere or box, and less and less on the way there.
-/// With n outward and w = 1 inside, 0 from the depth `margin` on, linear between,
+/// Forces may push outwards inside a sphere or box, less and less outside it, and no more at the distance `margin` from
+/// it. With the outward direction n, and w = 1 inside, 0 from that distance on and linear between,
 ///
 ///     s = 1 − (1 − w) (F·n/‖F‖)₊
 ///
-/// so a force that pulls the hand back stays whole. Out there devices come near their stops and singularities, where a
-/// small error of position is a large one of force.
+/// so a force that pulls the hand back stays whole. Far out, devices come near their stops and singularities, where a
+/// small error of position makes a large error of force.
 ///
-/// It does not push or brake by itself. A wall that pushes is a force that no energy limiter has seen, and passive only
-/// up to b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1), 1997): a device with b = 1 N·s/m at 1 kHz
-/// bears 2 N/mm and no brake, or a brake of 1 N·s/m and no spring, and then the limiter may not count on that b any
-/// more. Who wants such a wall has the engine render it, through the limiter.
+/// It neither pushes nor brakes by itself. The energy limiter would not see the force of such a wall, which is passive
+/// only while b > K T/2 + |B| (Colgate and Schenkel, J. Robotic Systems 14(1), 1997): with b = 1 N·s/m at 1 kHz, a wall
+/// of 2 N/mm without a brake, or a brake of 1 N·s/m without a spring; and the limiter could not count on that b any
+/// more. An engine can render such a wall through the limiter.
 class Workspace {
  public:
   struct Sphere {

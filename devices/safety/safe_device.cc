@@ -11,11 +11,11 @@ namespace tendon {
 
 namespace {
 
-/// So long a handle must have been still before it is said to rest: longer than a tremor (8 to 12 Hz) turns round.
+/// A handle rests when it has been still for this long, which no turning point of a tremor (8 to 12 Hz) is.
 constexpr Duration kRest = std::chrono::milliseconds(50);
 /// Missing samples for up to 10 ms do not reset the rest timer; USB replies jitter.
 constexpr Duration kBlind = std::chrono::milliseconds(10);
-/// After a pause the force may not have grown for as long as the pause lasted.
+/// After a pause, the force may grow by one step of this length at most, not by the whole pause.
 constexpr Duration kLongestStep = std::chrono::milliseconds(10);
 
 template <class Part, class Config, class... More>
@@ -110,7 +110,7 @@ void SafeDevice::disarm() noexcept {
   publish();
 }
 
-/// Not by a fault; but one that is on its way to zero stays one.
+/// For a reason that is no fault. A fault whose force is still on its way to zero remains a fault.
 void SafeDevice::leave_armed() noexcept {
   if (stage_ != Stage::kArmed) return;
   stage_ = stopping_ ? Stage::kFault : Stage::kWaiting;

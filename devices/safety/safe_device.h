@@ -12,15 +12,15 @@
 
 namespace tendon {
 
-/// Where a device stands between the plug and the force. Only in `kArmed` is there any.
+/// Where a device stands between the plug and the force. There is force in `kArmed` only.
 enum class SafetyState : std::uint8_t {
-  kAbsent,    ///< kAbsent … kHomed: Device::State of the device inside
-  kOpening,   //
-  kFirmware,  //
-  kUnhomed,   //
+  kAbsent,    ///< kAbsent to kHomed: the Device::State of the device inside
+  kOpening,   ///< see kAbsent
+  kFirmware,  ///< see kAbsent
+  kUnhomed,   ///< see kAbsent
   kHomed,     ///< ready, and waiting to be armed
   kArmed,     ///< gives forces
-  kFault,     ///< was armed, and something happened: no force until it is armed again
+  kFault,     ///< there was a fault (SafetyFault): no force until it is armed again
 };
 std::string_view to_string(SafetyState state) noexcept;
 
@@ -28,7 +28,7 @@ std::string_view to_string(SafetyState state) noexcept;
 enum class SafetyFault : std::uint8_t {
   kNone,
   kForceNotFinite,     ///< NaN or infinity was asked for
-  kPositionNotFinite,  ///< … or measured
+  kPositionNotFinite,  ///< the device measured NaN or infinity
   kPositionJumped,     ///< StepBound
   kTooFast,            ///< SpeedTrip
   kCommandSilent,      ///< nobody called `apply` in time (Watchdog)
@@ -41,33 +41,34 @@ std::string_view to_string(SafetyFault fault) noexcept;
 /// The safety layer: a device around any other, between the control law and the motors.
 ///
 ///     F ← 0                              unless armed; F with a NaN or infinity is a fault
-///     F ← s F, 0 ≤ s ≤ 1                 for each part that is listed: growth, size, heat, workspace, ramp-in, and the
-///                                        ramp to zero of a watchdog that has tripped
+///     F ← s F, 0 ≤ s ≤ 1                 for each listed part: size, heat, workspace, ramp-in, the ramp to zero of a
+///                                        watchdog that has tripped, and growth
 ///
-/// So for whatever is asked |F_i applied| ≤ |F_i asked| for each component i, as long as the device inside does not
-/// write more than it is told; and `apply` returns what it wrote, so that the energy ledger counts what is left. No
-/// part is on unless it is listed: one that is not costs a branch. What is always there is the state machine:
+/// So |F_i applied| ≤ |F_i asked| for each component i, provided that the device inside writes no more than it is told.
+/// `apply` returns the force that the device wrote, and the energy ledger counts that one. A part that the scene does
+/// not list costs a branch. The state machine is always there:
 ///
 ///     Absent → Opening → Firmware → Unhomed → Homed ⇄ Armed → Fault → Armed
 ///
-/// **Arming** has to be asked for (Arming), and is granted by the first `apply` at which the device is homed, its
-/// handle has gone no further than `rest_speed` allows for 50 ms and was never unseen for more than 10 of them, the
-/// force asked for is at most `rest_force`, and the dead man's button, if there is one, is held. A request that is not
-/// granted within `patience` is forgotten, as is one before the first `read`.
+/// **Arming** needs a request (Arming::By). The first `apply` grants it at which all of this holds: the device is
+/// homed; for 50 ms its handle has moved no further than `rest_speed` allows, and no two positions were more than 10 ms
+/// apart; the force asked for is at most `rest_force`; the dead man's button, if the scene lists one, is held. A
+/// request that is not granted within `patience` is forgotten. So is a request before the first `read`.
 ///
-/// **Faults** are latched, in Armed only: outside it there is no force to take away, and what is wrong there keeps it
-/// from being armed. Force is zero from the next `apply` on; with a watchdog's ramp it stays in Armed, on its way to
-/// zero, until it is there. Letting go of the dead man's button is no fault: Armed → Homed, zero at once.
+/// **Faults** are latched in Armed only. Outside Armed there is no force to take away, and a trouble there keeps the
+/// device from being armed. The force is zero from the next `apply` on. A watchdog with a ramp takes the force to zero
+/// over that time; the state stays Armed until the force is zero. Releasing the dead man's button is no fault: Armed →
+/// Homed, and the force is zero at once.
 ///
-/// **Disarming** is the operator's, and no fault: Armed → Homed, zero at once, from whatever state; a request to arm
-/// that was not granted yet is withdrawn. Nothing but `arm` ends it: not the start (`kStart`), and the dead man's
-/// button arms only by being pressed anew after that. A fault stays one, and one that is on its way to zero becomes
-/// one.
+/// **Disarming** is the operator's order and no fault: Armed → Homed, and the force is zero at once. It withdraws a
+/// request to arm that is not granted yet. Only `arm` ends it: neither the start (`kStart`) arms the device then, nor
+/// the dead man's button, which has to be pressed anew after `arm`. A fault stays a fault; a ramp of a watchdog becomes
+/// one at once.
 ///
-/// What this layer cannot do: act while nobody calls it. When the whole process hangs or dies, forces end by the
-/// device's own watchdog, or by the guardian (guardian.h).
+/// This layer cannot act while nobody calls it. When the whole process hangs or dies, the device's own watchdog ends
+/// the force, or the guardian does (guardian.h).
 ///
-/// Positions that are no numbers or jumped (StepBound) are passed on as not seen.
+/// A position that is not a number, or that jumped (StepBound), is passed on as no position.
 ///
 /// Thread-safe: no; but `status` may be read from any thread. Realtime-safe: all but the constructor.
 class SafeDevice final : public Device {
@@ -76,7 +77,7 @@ class SafeDevice final : public Device {
     enum class By : std::uint8_t {
       kRequest,  ///< only `arm`
       kStart,    ///< the first time by itself, then `arm`
-      kDeadMan,  ///< only by pressing the dead man's button; `arm` only ends what `disarm` began
+      kDeadMan,  ///< only by pressing the dead man's button; `arm` only takes a `disarm` back
     };
     By by = By::kRequest;
     double rest_speed = 0.02;  ///< m/s, > 0
@@ -100,7 +101,7 @@ class SafeDevice final : public Device {
 
   struct Status {
     SafetyState state = SafetyState::kAbsent;
-    SafetyFault last_fault = SafetyFault::kNone;  ///< also after it was armed again
+    SafetyFault last_fault = SafetyFault::kNone;  ///< stays after the device was armed again
     std::uint32_t faults = 0;                     ///< so far
   };
 
@@ -152,13 +153,13 @@ class SafeDevice final : public Device {
   Stage stage_ = Stage::kWaiting;
   std::optional<RampOut> stopping_;             ///< a fault whose force is on its way to zero
   LocalTime request_until_ = LocalTime::min();  ///< the operator's request to arm is open until then
-  bool button_held_ = true;                     ///< one that is stuck has never been pressed
-  bool disarmed_ = false;                       ///< by the operator, who alone may end it
+  bool button_held_ = true;                     ///< true at first: a stuck button was never pressed
+  bool disarmed_ = false;                       ///< by the operator; only `arm` ends it
 
   std::optional<LocalTime> now_;  ///< of the last `read`
   Duration passed_{};             ///< between the last two
   std::optional<PositionSample> last_;
-  /// Since when, and about where, the handle has been at rest; empty when it is not known to be.
+  /// When and where the handle came to rest; empty: it is not known to rest.
   std::optional<PositionSample> rest_;
   LocalTime heard_at_{};  ///< when the newest good position was sampled
   LocalTime applied_at_{};

@@ -8,12 +8,11 @@
 
 namespace tendon {
 
-// What takes all force away. Each is a small value of its own that says whether it has tripped; a SafeDevice has those
-// that its Config lists, and latches what they say.
+// Each of these says when all force has to end. A SafeDevice has those that its Config lists, and latches a trip.
 //
 // Thread-safe: no. Realtime-safe: all but the constructors, which throw std::invalid_argument naming the field.
 
-/// A handle faster than any hand that holds it: it has been let go, or is being thrown.
+/// Trips when the handle is faster than any hand that holds it: it has been let go, or is being thrown.
 /// Source: Force Dimension's SDK: above the velocity threshold "forces are automatically disabled and brakes engaged";
 /// HD_EXCEEDED_MAX_VELOCITY of OpenHaptics.
 class SpeedTrip {
@@ -21,11 +20,11 @@ class SpeedTrip {
   struct Config {
     double max = 0;  ///< m/s, > 0
   };
-  /// `resolution`: one encoder count, m, ≥ 0: what VelocityEstimator wants to know.
+  /// `resolution`: one encoder count, m, ≥ 0, for the VelocityEstimator.
   SpeedTrip(const Config& config, double resolution);
   /// The next position, sampled at `at`.
   bool tripped(LocalTime at, const Vec3& position) noexcept;
-  /// What comes next has nothing to do with what came before.
+  /// Forgets all positions so far: the next one is the first.
   void forget() noexcept;
 
  private:
@@ -34,9 +33,9 @@ class SpeedTrip {
   VelocityEstimator estimator_;
 };
 
-/// Encoders that wrap, lose count or arrive garbled: a position further from the one before than `max_speed` and one
-/// count on each axis allow. The Falcon's packets have neither check sum nor number, so a garbled one looks like any
-/// other.
+/// Trips when a position is further from the one before than `max_speed` and one count on each axis allow: the encoders
+/// have wrapped or lost count, or the packet was garbled. The Falcon's packets have neither checksum nor number, so a
+/// garbled one looks like any other.
 class StepBound {
  public:
   struct Config {
@@ -52,15 +51,15 @@ class StepBound {
   double resolution_;
 };
 
-/// Nothing has come for longer than `timeout`; then what is asked for is given less and less of, and none after `ramp`.
+/// Trips when nothing has come for longer than `timeout`. The force then falls to zero over the time `ramp`.
 /// Source: watchdogs of Force Dimension (firmware ≥ 3.0), Haptikfabriken Polhem (0.5 s); the Falcon documents none.
 class Watchdog {
  public:
   struct Config {
     Duration timeout{};                             ///< > 0
-    Duration ramp = std::chrono::milliseconds(20);  ///< ≥ 0; 0: none at once
+    Duration ramp = std::chrono::milliseconds(20);  ///< ≥ 0; 0: zero at once
   };
-  /// `field` is what errors call it.
+  /// `field`: its name in errors.
   Watchdog(const Config& config, const char* field);
   bool tripped(Duration silent) const noexcept { return silent > config_.timeout; }
   Duration ramp() const noexcept { return config_.ramp; }
@@ -69,12 +68,12 @@ class Watchdog {
   Config config_;
 };
 
-/// A button that has to be held, as on every robot's teach pendant (ISO 10218-1 calls it an enabling device): who lets
-/// go of the handle lets go of it.
+/// A button that has to be held, as on every robot's teach pendant (ISO 10218-1 calls it an enabling device). Whoever
+/// lets go of the handle releases it.
 class DeadManSwitch {
  public:
   struct Config {
-    std::uint32_t button = 0;  ///< bit of PositionSample::buttons, below 32
+    std::uint32_t button = 0;  ///< its bit in PositionSample::buttons, below 32
   };
   explicit DeadManSwitch(const Config& config);
   bool held(std::uint32_t buttons) const noexcept { return ((buttons >> config_.button) & 1U) != 0; }

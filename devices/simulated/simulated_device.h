@@ -21,32 +21,31 @@ namespace tendon {
 ///
 ///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      sgn(v) = v/|v|;  any |sgn| ≤ 1 at v = 0
 ///
-/// Forces in N on the handle: F_device is what the device exerts on the hand, F_hand what the hand
-/// exerts on the device. Friction is isotropic, or that of the joints of a mechanism (JointFriction). Each effect is
-/// one that the configuration lists or that does not exist: what is left out costs an empty optional, and in a substep
-/// nothing: each combination of effects has a loop of its own.
+/// Forces in N on the handle: F_device is the force of the device on the hand, F_hand the force of the hand on the
+/// device. Friction is isotropic, or that of the joints of a mechanism (JointFriction). The device has the effects that
+/// its configuration lists, and no others. An effect that is left out costs an empty optional, and nothing in a
+/// substep: each combination of effects has a loop of its own.
 ///
 /// **A structural mode** parts the mass: motors, friction and encoder are at one end of a spring K and damper C, handle
 /// and hand at the other. With the motor side at y = x + e and of mass m − m_h,
 ///
 ///     (m − m_h) dẏ/dt = F_device − b ẏ − f_c sgn(ẏ) − K e − C ė,      m_h dv/dt = F_hand + K e + C ė
 ///
-/// Nobody holding it, it rings at ω² = K (1/(m − m_h) + 1/m_h), ζ = C ω/(2 K); with the motor side held still at
-/// ω² = K/m_h. Resonances of the mechanism narrow the impedances that a device can show (Gil et al., IROS 2010;
-/// Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002). Here: what the hand feels is never stiffer than K, and the
-/// most damping that can be rendered falls from about 2 m/T to 2 (m − m_h)/T, further as the mode comes near the rate.
-/// The stiffest sampled spring does not get softer by it, because encoder and motors are on one side.
+/// When nobody holds the handle, the mode rings at ω² = K (1/(m − m_h) + 1/m_h), ζ = C ω/(2 K); with the motor side
+/// held still, at ω² = K/m_h. Resonances of the mechanism narrow the impedances that a device can show (Gil et al.,
+/// IROS 2010; Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002). Here the hand never feels a stiffness above K. The
+/// most damping that can be rendered falls from about 2 m/T to 2 (m − m_h)/T, and further the nearer the mode is to the
+/// loop's rate. The stiffest stable sampled spring stays as stiff, because encoder and motors are on one side.
 ///
-/// **Time.** The device lives from `read` to `read`: the first one sets the instant 0, each later one
-/// moves the world on to its `now` with the force that `apply` left there. Encoder and force change at
-/// the same instant, that of the last `read`. Time that goes backwards moves nothing. Of a gap longer
-/// than kMaxGap only that much is lived through: to the simulated world, the rest did not happen.
+/// **Time.** The first `read` sets the instant 0. Each later one integrates up to its `now`, with the force that the
+/// last `apply` left. Encoder and force change at the same instant, that of the last `read`. Time that goes backwards
+/// moves nothing. Of a gap longer than kMaxGap only that much is integrated; the rest is skipped.
 ///
-/// **Transport delay.** With `sample_delay` d_s, `read(now)` gives the sample taken at now − d_s, which says so (`at`),
-/// and the world, `truth()` too, is lived up to that instant: all of the above is meant with now − d_s for now. With
-/// `force_delay` d_f the force that `apply` returns reaches the motors that much later; until the first has come there
-/// is none. Both are exact to the nanosecond, whatever the period. A sample shows the first effect of a force d_s + d_f
-/// after it was applied. The device's watchdog counts the forces that reach it.
+/// **Transport delay.** With `sample_delay` d_s, `read(now)` gives the sample taken at now − d_s, and `at` says so. The
+/// integration, and with it `truth()`, ends at that instant: read now − d_s for now above. With `force_delay` d_f, the
+/// force that `apply` returns reaches the motors that much later; before the first one arrives there is no force. Both
+/// are exact to the nanosecond, whatever the period. A sample shows the first effect of a force d_s + d_f after it was
+/// applied. The device's watchdog counts the forces that reach it.
 ///
 /// **Integration.** Substeps of equal length h ≤ max_substep; each is one implicit midpoint rule with
 /// set-valued friction (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
@@ -58,10 +57,10 @@ namespace tendon {
 ///
 ///     v̄ = (1 − h f_c/(2|p|))₊ p / (m + (h/2)(b + c + k h/2)),      p = m v₀ + (h/2)(F_device + drive)
 ///
-/// and when the velocity came to or through zero and friction can hold what pushes, the device rests:
-/// v₁ = 0. So it sticks exactly, with no velocity threshold, in any direction. Why this rule: it is
-/// stable for any hand, and since m (v₁ − v₀)·v̄ is exactly the change of kinetic energy it neither
-/// makes energy nor hides any. A damped integrator would make every limiter look better than it is:
+/// When the velocity reaches or crosses zero and friction can hold the pushing force, the device rests: v₁ = 0. So it
+/// sticks exactly, without a velocity threshold, in any direction. Reason for this rule: it is stable for any hand, and
+/// it neither makes nor hides energy, because m (v₁ − v₀)·v̄ is exactly the change of kinetic energy. A damped
+/// integrator would make every limiter look better than it is:
 /// semi-implicit Euler at 50 µs holds springs stable that are 5 % too stiff for the real device. With a structural mode
 /// its spring force is that of the mean deflection, and both velocities come of one linear equation; the mode rings at
 /// (2/h) atan(ω h/2), 0.03 % low at 200 Hz. Consequently, as long as the force held is the force returned (no
@@ -84,9 +83,9 @@ class SimulatedDevice final : public Device {
     /// Effects: listed (> 0) or not there.
     std::optional<double> viscous_friction;  ///< b, N·s/m
     std::optional<double> coulomb_friction;  ///< f_c, N
-    /// In the joints instead: not together with `coulomb_friction`. Keeps the energy balance.
+    /// Friction in the joints, in place of `coulomb_friction`. The energy balance holds with it.
     std::optional<JointFriction::Config> joint_friction;
-    /// The mass that the hand holds, on a spring: see above. Keeps the energy balance.
+    /// The mass that the hand holds is on a spring: see above. The energy balance holds with it.
     struct StructuralMode {
       double handle_mass = 0;  ///< m_h, kg, of `mass`; > 0 and below it
       double stiffness = 0;    ///< K, N/m, > 0
@@ -99,15 +98,14 @@ class SimulatedDevice final : public Device {
     std::optional<double> max_force;  ///< N, norm of the force vector; its direction is kept
     /// Hz, −3 dB, first order. The motors follow the force that `apply` returned with this lag.
     std::optional<double> amplifier_bandwidth;
-    /// A sensor between handle and hand: what makes it a device of admittance type. It measures the mean of F_hand
-    /// over the last substep, without noise. Keeps the energy balance: it only looks.
+    /// A sensor between handle and hand, as devices of admittance type have. It measures the mean of F_hand over the
+    /// last substep, without noise. The energy balance holds with it.
     struct ForceSensor {
       std::optional<double> resolution;  ///< N, one count per axis; the sample is the centre of the count
     };
     std::optional<ForceSensor> force_sensor;
     std::optional<Duration> watchdog;  ///< without an `apply` for so long the force is zero until the next one
-    /// d_s and d_f, each up to kMostDelay: what USB and a device's own loop take is 1 to 2 ms. They break the energy
-    /// balance.
+    /// d_s and d_f, each up to kMostDelay. USB and a device's own loop take 1 to 2 ms. They break the energy balance.
     std::optional<Duration> sample_delay;
     std::optional<Duration> force_delay;
 
@@ -120,7 +118,7 @@ class SimulatedDevice final : public Device {
     Duration max_substep = std::chrono::microseconds(50);
   };
 
-  /// What really happens, for tests: nothing in production may look at it.
+  /// The true state, for tests; no production code may read it.
   struct Truth {
     Vec3 position = Vec3::Zero();      ///< m, of the handle
     Vec3 velocity = Vec3::Zero();      ///< m/s, of the handle

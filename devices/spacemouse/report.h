@@ -7,8 +7,8 @@
 #include <span>
 #include <variant>
 
-/// What a 3Dconnexion SpaceMouse says: HID input reports, each a number (its id) and its fields, integers least byte
-/// first. As free drivers read them (spacenavd's and hidapi's users); the maker documents nothing.
+/// The HID input reports of a 3Dconnexion SpaceMouse: a number (the id) and the fields, integers least byte first.
+/// Source: free drivers (spacenavd, users of hidapi); the maker documents nothing.
 ///
 ///     id 1    X Y Z (7 bytes), or X Y Z Rx Ry Rz (13 bytes): int16 each, ±350 at the stops
 ///     id 2    Rx Ry Rz (7 bytes): older devices, beside a 1 of 7 bytes
@@ -34,8 +34,8 @@ struct Battery {
 };
 using Report = std::variant<Motion, Buttons, Battery>;
 
-/// The report in these bytes, of which the first is its id. Empty for an id that is not above, and for a length that
-/// its id does not have. Thread-safe, realtime-safe.
+/// The report in these bytes; the first is its id. Empty for an id that is not above, and for a length that its id does
+/// not have. Thread-safe, realtime-safe.
 std::optional<Report> parse(std::span<const std::uint8_t> bytes) noexcept;
 
 }  // namespace tendon::spacemouse

@@ -14,8 +14,8 @@
 namespace tendon::usb {
 
 /// What a driver and its device say to each other over a `Pipe`, one connection after another: who is there, which
-/// request still waits for its answer, since when nothing was heard, and what went wrong how often. The driver gives the
-/// bytes their meaning.
+/// request still waits for its answer, since when nothing was heard, and what went wrong how often. The driver gives
+/// the bytes their meaning.
 ///
 /// In each turn the driver calls, in this order:
 ///
@@ -25,9 +25,9 @@ namespace tendon::usb {
 ///     trusted()                        false for 10 ms without an answer that can be true: then no force
 ///     may_send(…), send(…)             the next request
 ///
-/// **Requests.** Up to `Patience::most_under_way` of them go without an answer; one answer is an answer to all. When the
-/// oldest waits for `Patience::answer`, they are taken for lost, and the next request may be sent. A request that ends a
-/// force waits for none of this: it is sent at once.
+/// **Requests.** Up to `Patience::most_under_way` of them go without an answer; one answer is an answer to all. When
+/// the oldest waits for `Patience::answer`, they are taken for lost, and the next request may be sent. A request that
+/// ends a force waits for none of this: it is sent at once.
 ///
 /// **Force.** The device is taken to hold what it was told last, until its own watchdog ends it.
 ///

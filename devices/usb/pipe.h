@@ -22,12 +22,12 @@ struct Id {
   friend bool operator==(const Id&, const Id&) = default;
 };
 
-/// The largest full-speed packet, bulk or interrupt (USB 2.0, 5.8.3 and 5.7.3): what one IN transfer brings at most,
-/// and one `write` takes.
+/// The largest full-speed packet, bulk or interrupt (USB 2.0, 5.8.3 and 5.7.3). An IN transfer brings at most this
+/// much, and a `write` takes at most this much.
 inline constexpr std::size_t kPacketSize = 64;
 
-/// One USB device with an endpoint each way. No call ever waits. The drivers run over it; behind it is libusb (`usb.h`)
-/// or a model in memory.
+/// One USB device with an endpoint each way. No call waits. Drivers use it through `Dialogue`; behind it is libusb
+/// (`usb.h`), or a model in memory.
 ///
 /// A transfer that fails ends the connection; the next device that is plugged in is a new connection. A driver has no
 /// other error to handle: unplugging, a stall and a device that babbles all look the same.

@@ -50,8 +50,8 @@ struct PipeConfig {
 /// like `plugged_in`.
 ///
 /// A separate thread makes all calls to libusb; it wakes for each transfer. 4 IN transfers are always queued, 4 OUT
-/// transfers take turns, and each fails after 100 ms. That thread and the user of the pipe share two rings and a wake-up
-/// (one `write` to an eventfd): no lock, no heap.
+/// transfers take turns, and each fails after 100 ms. That thread and the user of the pipe share two rings and a
+/// wake-up (one `write` to an eventfd): no lock, no heap.
 ///
 /// The destructor sends all packets that were accepted, waits until the device has them or the transfers have failed,
 /// cancels and awaits the other transfers, and closes the device.

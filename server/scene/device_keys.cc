@@ -36,7 +36,7 @@ struct UsbPort {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
-/// An arm of Haptikfabriken's whose kinematics are published.
+/// An arm by Haptikfabriken whose kinematics are published.
 struct ArmModel {
   static std::string expected(const Unit&) {
     std::string text = "one of ";
@@ -61,7 +61,7 @@ struct ArmModel {
   }
 };
 
-/// A force sensor: there or not, with the size of one count.
+/// A force sensor, with the size of one count; or none.
 struct Sensor {
   static std::string expected(const Unit&) {
     return "the size of one count in N, 0 for an exact one, or false for none";
@@ -134,12 +134,12 @@ void declare_joint_friction(Table& friction, Draft& draft, JointFriction::Config
   friction.kind(kinds, [&](Table& keys, MechanismKind kind) {
     if (kind == MechanismKind::kArm) {
       auto& arm = config.mechanism.emplace<Mechanism::Arm>();
-      keys.key("upper_arm_mm", arm.upper_arm, Number{.least = 10, .most = 1e4}, "of a Phantom's: shoulder to elbow",
-               kRequired);
+      keys.key("upper_arm_mm", arm.upper_arm, Number{.least = 10, .most = 1e4},
+               "shoulder to elbow, of an arm like a Phantom's", kRequired);
       keys.key("forearm_mm", arm.forearm, Number{.least = 10, .most = 1e4}, "elbow to handle", kRequired);
     }
     keys.key("coulomb_n_m", draft.joint_coulomb, Vector{}, "Coulomb friction of each joint, in place of the handle's",
-             Absent{.text = "so much that coulomb_friction_n is the least at any place and in any direction"});
+             Absent{.text = "enough that coulomb_friction_n is the least friction at any place and in any direction"});
     keys.key("viscous_n_m_s", config.viscous, Vector{}, "viscous friction of each joint, besides the handle's");
     keys.key("centre_mm", config.centre, Vector{}, "where the middle of the mechanism's workspace lies");
   });
@@ -164,17 +164,18 @@ void declare_effects(Table& effects, Draft& draft) {
               "measures the force of the hand: what a device of admittance type has", kProfiles);
   effects.key("watchdog_ms", device.watchdog, kEffect,
               "the device drops the force when it gets no command for this long", kProfiles);
-  effects.key("sample_delay_ms", device.sample_delay, kDelay, "positions come so late, and say when they were taken");
-  effects.key("force_delay_ms", device.force_delay, kDelay, "so late do forces reach the motors");
+  effects.key("sample_delay_ms", device.sample_delay, kDelay,
+              "positions arrive this much later, with the time at which they were taken");
+  effects.key("force_delay_ms", device.force_delay, kDelay, "forces reach the motors this much later");
   effects.part("joint_friction", device.joint_friction, [&draft](Table& friction, JointFriction::Config& config) {
     declare_joint_friction(friction, draft, config);
   });
   effects.part(
       "structural_mode", device.structural_mode, [](Table& keys, SimulatedDevice::Config::StructuralMode& mode) {
-        keys.key("handle_mass_kg", mode.handle_mass, kAboveZero, "of mass_kg, what is on the hand's side of the spring",
+        keys.key("handle_mass_kg", mode.handle_mass, kAboveZero, "the part of mass_kg on the hand's side of the spring",
                  kRequired);
         keys.key("stiffness_n_per_m", mode.stiffness, kAboveZero, "of the spring between motors and handle", kRequired);
-        keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "beside it");
+        keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "of the damper beside the spring");
       });
 }
 
@@ -204,16 +205,18 @@ void declare_motion(Table& motion, Draft& draft) {
         auto& ramp = std::get<ScriptedMotion::RampHold>(draft.motion = ScriptedMotion::RampHold{});
         keys.key("from_mm", ramp.from, Vector{}, "where it starts", kRequired);
         keys.key("to_mm", ramp.to, Vector{}, "where it goes at constant speed", kRequired);
-        keys.key("ramp_ms", ramp.ramp, kAboveZero, "for how long it goes", kRequired);
-        keys.key("hold_ms", ramp.hold, kZeroOrMore, "for how long it rests at either end, to and fro for ever",
+        keys.key("ramp_ms", ramp.ramp, kAboveZero, "how long the way takes", kRequired);
+        keys.key("hold_ms", ramp.hold, kZeroOrMore, "how long it rests at either end, going to and fro for ever",
                  Absent{.text = "it goes once and stays"});
         return;
       }
       case MotionKind::kMinimumJerk: {
         auto& reach = std::get<ScriptedMotion::MinimumJerk>(draft.motion = ScriptedMotion::MinimumJerk{});
-        keys.key("points_mm", reach.points, ListOf<Vector>{}, "2 or more points, at rest at each", kRequired);
-        keys.key("durations_ms", reach.durations, ListOf<Number>{kAboveZero}, "of the ways between them", kRequired);
-        keys.key("back_and_forth", reach.back_and_forth, YesNo{}, "for ever; else it stays at the last point");
+        keys.key("points_mm", reach.points, ListOf<Vector>{}, "2 or more points; the hand rests at each", kRequired);
+        keys.key("durations_ms", reach.durations, ListOf<Number>{kAboveZero}, "the time from each point to the next",
+                 kRequired);
+        keys.key("back_and_forth", reach.back_and_forth, YesNo{},
+                 "goes to and fro for ever, instead of staying at the last point");
         return;
       }
       case MotionKind::kRecorded: {
@@ -237,14 +240,14 @@ void declare_port(Table& keys, std::string& port) {
 template <class Table>
 void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
   SimulatedDevice::Config& config = draft.simulated;
-  keys.key("profile", draft.profile, profile_names(), "a real device's effects; keys below override one each");
+  keys.key("profile", draft.profile, profile_names(), "the effects of a real device; each key below overrides one");
   if (draft.profile != nullptr) config = draft.profile->device();
   keys.key("start_position_mm", config.start_position, Vector{}, "of the handle",
            Absent{.text = "where the hand starts, or the origin"});
   keys.table("effects", [&draft](Table& effects) { declare_effects(effects, draft); });
   draft.has_hand = keys.optional_table("hand", [&draft](Table& hand) {
     hand.key("profile", draft.operator_profile, operator_names(),
-             "what holds the handle: the middle of what is known of such; keys below override one number each");
+             "what holds the handle, with the middle of the published numbers; each key below overrides one");
     const OperatorProfile* const profile = draft.operator_profile;
     if (profile != nullptr) draft.hand = profile->hand(std::move(draft.hand.motion));
     constexpr Absent kProfiles{.text = "the profile's; 0 without a profile"};
@@ -265,7 +268,7 @@ void declare(Table& keys, falcon::Config& device, Draft& /*draft*/) {
            "the file of your own Novint software, relative to this file; --falcon-firmware overrides it",
            Absent{.text = "none; only a device that has its firmware already can be used"});
   keys.key("accept_unknown_firmware", device.accept_unknown_firmware, YesNo{},
-           "even a file that is none of the known ones");
+           "accepts a file that is none of the known ones, too");
 }
 
 template <class Table>
@@ -275,7 +278,7 @@ void declare(Table& keys, ReplayDevice::Config& device, Draft& draft) {
            Absent{.text = "none; then there is a table csv"});
   keys.key("at_end", device.at_end, at_end_names(), "stay at the last sample, or start again");
   keys.key("encoder_step_um", device.position_resolution, kZeroOrMore,
-           "one count of the device that was recorded; 0: its positions were exact");
+           "one encoder count of the device that was recorded; 0: its positions were exact");
   keys.part("csv", draft.recorded_motion, [](Table& csv, RecordedMotionFile& file) { declare_csv(csv, file); });
 }
 

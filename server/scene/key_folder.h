@@ -8,9 +8,9 @@
 
 namespace tendon {
 
-/// The keys of a folder, one for each file NAME.key, by name. Other files are left alone. Throws std::runtime_error,
-/// "FILE: what is wrong": the folder cannot be read or has no key, or one of its keys is readable by others, is no
-/// regular file, is no key file, or is weak.
+/// The keys of a folder, one for each file NAME.key, in the order of the names. Other files are ignored. Throws
+/// std::runtime_error, "FILE: what is wrong", when the folder cannot be read or has no key, and when one of its keys is
+/// readable by others, no regular file, no key file, or weak.
 std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder);
 
 /// Writes a new key file that only its owner may read. Throws std::runtime_error when it cannot, or when there is such

@@ -50,80 +50,88 @@ void declare_workspace(Table& workspace, Workspace::Config& config) {
   workspace.kind(shapes, [&config](Table& keys, WorkspaceShape shape) {
     if (shape == WorkspaceShape::kSphere) {
       auto& sphere = config.shape.emplace<Workspace::Sphere>();
-      keys.key("radius_mm", sphere.radius, kAboveZero, "of the space in which forces are whole", kRequired);
+      keys.key("radius_mm", sphere.radius, kAboveZero, "of the space inside which forces are given whole", kRequired);
     } else {
       auto& box = config.shape.emplace<Workspace::Box>();
-      keys.key("half_mm", box.half, Vector{}, "half the edges of the space in which forces are whole", kRequired);
+      keys.key("half_mm", box.half, Vector{}, "half the edges of the space inside which forces are given whole",
+               kRequired);
     }
-    keys.key("centre_mm", config.centre, Vector{}, "of that space");
-    keys.key("margin_mm", config.margin, kAboveZero, "so far beyond it nothing pushes outwards any more", kRequired);
+    keys.key("centre_mm", config.centre, Vector{}, "the centre of that space");
+    keys.key("margin_mm", config.margin, kAboveZero, "this far outside it, no force pushes further outwards",
+             kRequired);
   });
 }
 
 template <class Table>
 void declare_watchdog(Table& keys, Watchdog::Config& dog, std::string_view meaning) {
   keys.key("timeout_ms", dog.timeout, kAboveZero, meaning, kRequired);
-  keys.key("ramp_ms", dog.ramp, kZeroOrMore, "then what is asked for falls to nothing within this time");
+  keys.key("ramp_ms", dog.ramp, kZeroOrMore, "after that the force falls to zero within this time");
 }
 
-/// The safety layer: there when its table is, as is each part of it.
+/// The safety layer. It exists when its table does, and so does each part of it.
 template <class Table>
 void declare_safety(Table& safety, SafeDevice::Config& config) {
   using By = SafeDevice::Arming::By;
   safety.key(
       "arm", config.arming.by,
       Names<By>{{{"by request", By::kRequest}, {"at start", By::kStart}, {"by dead man", By::kDeadMan}}},
-      "what gives forces, at first and after a fault: a guest's request (rearm); the first time nobody, then that; "
-      "or nothing but pressing the dead man's button");
+      "who arms the device. By request: a guest (rearm). At start: the device itself the first time, then a guest. By "
+      "dead man: whoever presses the dead man's button");
   safety.key("rest_speed_m_per_s", config.arming.rest_speed, kAboveZero,
-             "armed is only a handle that was no faster for 50 ms");
-  safety.key("rest_force_n", config.arming.rest_force, kAboveZero, "… and of which no more force is asked");
-  safety.key("patience_ms", config.arming.patience, kAboveZero, "a request to arm is open for so long");
+             "the device is armed only after its handle was no faster than this for 50 ms");
+  safety.key("rest_force_n", config.arming.rest_force, kAboveZero,
+             "the device is armed only while no larger force than this is asked for");
+  safety.key("patience_ms", config.arming.patience, kAboveZero,
+             "a request to arm that is not granted within this time is forgotten");
   safety.part("force_limit", config.force_limit, [](Table& keys, ForceLimit::Config& part) {
-    keys.key("max_n", part.max, kAboveZero, "no force is longer; its direction is kept", kRequired);
+    keys.key("max_n", part.max, kAboveZero, "a longer force is shortened to this; its direction is kept", kRequired);
   });
   safety.part("growth_limit", config.growth_limit, [](Table& keys, GrowthLimit::Config& part) {
-    keys.key("rate_n_per_s", part.rate, kAboveZero, "no force grows faster; it falls at once", kRequired);
+    keys.key("rate_n_per_s", part.rate, kAboveZero, "a force grows no faster than this; it may fall at once",
+             kRequired);
   });
   safety.part("ramp_in", config.ramp_in, [](Table& keys, RampIn::Config& part) {
-    keys.key("time_ms", part.time, kAboveZero, "after arming, from nothing to the whole force", kRequired);
+    keys.key("time_ms", part.time, kAboveZero, "time from arming to the whole force, which rises from zero", kRequired);
   });
   safety.part("heat_limit", config.heat_limit, [](Table& keys, HeatLimit::Config& part) {
-    keys.key("peak_n", part.peak, kAboveZero, "of cool motors", kRequired);
-    keys.key("continuous_n", part.continuous, kAboveZero, "what they bear for ever. Not above peak_n", kRequired);
-    keys.key("time_constant_ms", part.time_constant, kAboveZero, "with which they heat up", kRequired);
+    keys.key("peak_n", part.peak, kAboveZero, "the largest force while the motors are cool", kRequired);
+    keys.key("continuous_n", part.continuous, kAboveZero, "the force that the motors bear for ever. Not above peak_n",
+             kRequired);
+    keys.key("time_constant_ms", part.time_constant, kAboveZero, "time constant with which the motors heat up",
+             kRequired);
   });
   safety.part("workspace", config.workspace,
               [](Table& keys, Workspace::Config& part) { declare_workspace(keys, part); });
   safety.part("speed_trip", config.speed_trip, [](Table& keys, SpeedTrip::Config& part) {
-    keys.key("max_m_per_s", part.max, kAboveZero, "a handle that is faster gets no force any more", kRequired);
+    keys.key("max_m_per_s", part.max, kAboveZero,
+             "a handle faster than this is a fault: no force until the device is armed again", kRequired);
   });
   safety.part("step_bound", config.step_bound, [](Table& keys, StepBound::Config& part) {
     keys.key("max_speed_m_per_s", part.max_speed, kAboveZero,
-             "as in [loop], and unarmed: a position that no hand comes to at this speed", kRequired);
+             "a position further away than a hand can move at this speed is a fault", kRequired);
   });
   safety.part("command_watchdog", config.command_watchdog, [](Table& keys, Watchdog::Config& part) {
-    declare_watchdog(keys, part, "the loop stood still for longer");
+    declare_watchdog(keys, part, "no force was commanded for longer than this");
   });
   safety.part("link_watchdog", config.link_watchdog, [](Table& keys, Watchdog::Config& part) {
-    declare_watchdog(keys, part, "the newest position is older");
+    declare_watchdog(keys, part, "the newest position is older than this");
   });
   safety.part("dead_man", config.dead_man, [](Table& keys, DeadManSwitch::Config& part) {
-    keys.key("button", part.button, Count{31}, "no force unless it is held", kRequired);
+    keys.key("button", part.button, Count{31}, "no force unless this button is held", kRequired);
   });
 }
 
-/// The parts of AOL+: each is there when its table is.
+/// The parts of AOL+. Each exists when its table does.
 template <class Table>
 void declare_parts(Table& limiter, Draft& draft) {
   using Plus = AolPlus<1, 3>;
   Plus::Parts& parts = draft.scene.loop.control.limiter.parts;
   limiter.part("energy_cap", parts.energy_cap, [](Table& keys, Plus::EnergyCap& cap) {
-    keys.key("energy_mj", cap.energy, kZeroOrMore, "credit that outlasts the contact in which it was earned");
-    keys.key("most_contact_mj", cap.most_contact, kZeroOrMore, "the most that one contact adds to that");
+    keys.key("energy_mj", cap.energy, kZeroOrMore, "the most credit that outlasts the contact in which it was earned");
+    keys.key("most_contact_mj", cap.most_contact, kZeroOrMore, "the most credit that one contact may add");
   });
   limiter.part("robust_ledger", parts.robust_ledger, [&draft](Table& keys, Plus::Robust& robust) {
-    keys.key("encoder_step_um", draft.ledger_step, kZeroOrMore, "one encoder count: credit is never due to rounding",
+    keys.key("encoder_step_um", draft.ledger_step, kZeroOrMore, "one encoder count: its rounding never earns credit",
              Absent{.text = "the device's; required when the device has none"});
     keys.key("window", robust.window, Count{1000, 1}, "haptic periods for each credit of viscous friction");
   });
@@ -145,10 +153,12 @@ void declare_parts(Table& limiter, Draft& draft) {
     keys.key("rise_ms", adaptive.rise, kAboveZero, "time constant with which the bounds may rise; they fall at once");
     keys.key("places_mm", draft.places, ListOf<Vector>{}, "where the friction was identified", kRequired);
     keys.key("coulomb_friction_n", draft.place_coulomb, ListOf<Number>{kZeroOrMore},
-             "lower bound at each of the places", kRequired);
-    keys.key("viscous_friction_n_s_per_m", draft.place_viscous, ListOf<Number>{kZeroOrMore}, "the same", kRequired);
-    keys.key("reach_mm", draft.reach, kZeroOrMore,
-             "in use is the least of the nearest place and of all within this distance of the hand");
+             "lower bound of the Coulomb friction at each of the places", kRequired);
+    keys.key("viscous_friction_n_s_per_m", draft.place_viscous, ListOf<Number>{kZeroOrMore},
+             "lower bound of the viscous friction at each of the places", kRequired);
+    keys.key(
+        "reach_mm", draft.reach, kZeroOrMore,
+        "the limiter uses the least bound of the nearest place and of all places within this distance of the hand");
   });
 }
 
@@ -157,29 +167,31 @@ Names<OutputEstimator::Model> estimator_models() {
   return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
 }
 
-/// How the force follows the hand between two arrivals, when not as the engine said. One table or none.
+/// How the force follows the hand between two arrivals, when not by the engine's own model. One table or none.
 template <class Table>
 void declare_between(Table& force, HeldForce::Config& hold) {
   force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
     keys.key("share", config.share, Number{.least = 0.01, .most = 1},
-             "of the stiffness that the engine sends; below 1 when that is an estimate itself");
+             "share of the engine's stiffness that is followed; below 1 when the engine only estimates it");
     keys.key("max_blend_ms", config.max_blend, kAboveZero, "a new model is blended in for one engine period, or this");
   });
   force.part("output_estimator", hold.output_estimator, [](Table& keys, OutputEstimator::Config& config) {
-    keys.key("model", config.model, estimator_models(), "what the environment is taken for, on each axis");
+    keys.key("model", config.model, estimator_models(), "the model of the environment, on each axis");
     keys.key("origin_mm", config.origin, Vector{}, "where the environment is at rest");
-    keys.key("scale_mm", config.scale, kAboveZero, "about the travel in the environment");
-    keys.key("forgetting", config.forgetting, Number{.least = 0.5, .most = 1}, "what is left of a weight per answer");
-    keys.key("dead_zone_n", config.dead_zone, kZeroOrMore, "smaller errors teach nothing: the noise of the engine");
-    keys.key("reset_error_n", config.reset_error, kAboveZero, "a larger error is another environment");
-    keys.key("reset_cooldown", config.reset_cooldown, Count{1000, 1}, "answers before the next one can be");
-    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "nothing stiffer is believed");
-    keys.key("largest_n", config.max_force, kAboveZero, "no estimate is larger, on each axis");
-    keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: less motion teaches nothing");
+    keys.key("scale_mm", config.scale, kAboveZero, "about how far the hand moves within the environment");
+    keys.key("forgetting", config.forgetting, Number{.least = 0.5, .most = 1},
+             "factor by which each answer lowers the weight of those before");
+    keys.key("dead_zone_n", config.dead_zone, kZeroOrMore, "smaller errors are taken for the engine's noise");
+    keys.key("reset_error_n", config.reset_error, kAboveZero,
+             "a larger error means another environment: the estimate begins anew");
+    keys.key("reset_cooldown", config.reset_cooldown, Count{1000, 1}, "the fewest answers between two such beginnings");
+    keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "no stiffer environment is believed");
+    keys.key("largest_n", config.max_force, kAboveZero, "the largest estimate of the force, on each axis");
+    keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: motion below it teaches nothing");
   });
 }
 
-/// What one law wants to know and others do not.
+/// The keys of some laws only.
 template <class Table>
 void declare_law(Table& limiter, Draft& draft) {
   LimiterConfig& config = draft.scene.loop.control.limiter;
@@ -187,23 +199,23 @@ void declare_law(Table& limiter, Draft& draft) {
     return Table::kDocuments || std::find(users.begin(), users.end(), config.law) != users.end();
   };
   if (used_by({Law::kClamp})) {
-    limiter.key("clamp_n", config.max_force, kZeroOrMore, "of \"clamp\": no force is longer than this", kRequired);
+    limiter.key("clamp_n", config.max_force, kZeroOrMore, "for \"clamp\": no force is longer than this", kRequired);
   }
   if (used_by({Law::kReferenceEnergy, Law::kPortHamiltonian, Law::kPassiveSynthesis})) {
     limiter.key(
         "environment_stiffness_n_per_m", config.environment_stiffness, kAboveZero,
-        "of \"reference-energy\", \"port-hamiltonian\", \"passive-synthesis\": of an environment that sends no "
-        "stiffness of its own",
+        "for \"reference-energy\", \"port-hamiltonian\", \"passive-synthesis\": the stiffness of an environment that "
+        "sends none",
         Absent{.required = info(config.law).needs_stiffness,
-               .text = "required, but for \"passive-synthesis\", which then learns it from forces that bring one"});
+               .text = "required; \"passive-synthesis\" can do without, and learns it from forces that bring one"});
   }
   if (used_by({Law::kPassiveSynthesis})) {
     limiter.key("environment_delay_ms", config.environment_delay, kZeroOrMore,
-                "of \"passive-synthesis\": from a position to the force that answers it");
+                "for \"passive-synthesis\": the time from a position to the force that answers it");
   }
   if (used_by({Law::kPassivityController, Law::kPassivityControllerPublished, Law::kReferenceEnergy})) {
     limiter.key("max_damping_n_s_per_m", config.max_damping, kAboveZero,
-                "of \"tdpa\", \"tdpa-2002\", \"reference-energy\": the most damping that is injected. Far below twice "
+                "for \"tdpa\", \"tdpa-2002\", \"reference-energy\": the most damping that is injected. Far below twice "
                 "the device's mass over the period");
   }
   if (used_by({Law::kAolPlus})) declare_parts(limiter, draft);
@@ -233,14 +245,15 @@ void declare_scene(Table& scene, Draft& draft) {
     loop.key(
         "hold_memory_ms", draft.follow_holds.memory, kZeroOrMore,
         "time constant with which the limiter forgets a hold longer than longest_hold_us; until then it counts on one "
-        "more like it. 0: it never does");
+        "more like it. 0: it never counts on one");
     loop.key("hold_margin", draft.follow_holds.margin, Number{.least = 0, .most = 10},
              "how much longer than that hold, as a share of it, the next one may be");
     loop.key("hold_most", draft.follow_holds.most, Number{.least = 1, .most = 1000},
-             "in longest_hold_us: it counts on no longer hold than this");
-    loop.key("max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
-             "a position that no hand comes to at this speed is a fault: an encoder that wraps or loses count",
-             Absent{.text = "every position is believed"});
+             "the longest hold that it counts on, as a multiple of longest_hold_us");
+    loop.key(
+        "max_speed_m_per_s", draft.scene.loop.control.max_speed, kAboveZero,
+        "a position further away than a hand can move at this speed is a fault: the encoder has wrapped or lost count",
+        Absent{.text = "every position is believed"});
     loop.key("cpu", draft.scene.cpu, kProcessor, "the processor on which the haptic thread stays: an isolated one",
              Absent{.text = "wherever the kernel puts it"});
   });
@@ -270,8 +283,8 @@ void declare_scene(Table& scene, Draft& draft) {
     };
     tool.mass.setZero();
     tool.proportional.setZero();
-    each("mass_kg", tool.mass, kAboveZero, "of the tool that the hand is to feel", kRequired);
-    each("damping_n_s_per_m", tool.damping, kZeroOrMore, "of the tool", {});
+    each("mass_kg", tool.mass, kAboveZero, "mass of the tool that the hand feels", kRequired);
+    each("damping_n_s_per_m", tool.damping, kZeroOrMore, "damping of the tool", {});
     each("stiffness_n_per_m", tool.stiffness, kZeroOrMore, "ties the tool to where it was at the start", {});
     each("proportional_n_s_per_m", tool.proportional, kZeroOrMore, "gain of the loop that makes the handle follow",
          kRequired);
@@ -291,18 +304,19 @@ void declare_scene(Table& scene, Draft& draft) {
     force.key("max_valid_for_ms", control.hold.max_valid_for, kAboveZero,
               "a force is valid for no longer than this, whatever its sender asks for");
     force.key("max_stiffness_n_per_m", control.hold.max_stiffness, kAboveZero,
-              "of what an engine sends with its forces, nothing stiffer is followed");
+              "the stiffness of an engine's local model is reduced to this");
     declare_between(force, control.hold);
   });
 
   scene.tables("channel", draft.scene.channels, limits::kMaxChannels, [](Table& keys, Scene::Channel& channel) {
-    keys.key("name", channel.name, Label{}, "what clients call it that want this one of several", kRequired);
-    keys.key("rule", channel.rule,
-             Names<ChannelRule>{{{"sum", ChannelRule::kSum}, {"priority", ChannelRule::kPriority}}},
-             "its force is added to the others; or it silences those of this rule that come after it, as long as it is "
-             "fresh, and is faded in and out for ramp_in_ms");
+    keys.key("name", channel.name, Label{}, "the name by which clients ask for this channel", kRequired);
+    keys.key(
+        "rule", channel.rule, Names<ChannelRule>{{{"sum", ChannelRule::kSum}, {"priority", ChannelRule::kPriority}}},
+        "sum: its force is added to the others. Priority: while its force is fresh, the later channels of this rule "
+        "are silent; it is faded in and out for ramp_in_ms");
     keys.key("lease_ms", channel.lease, Number{.least = 0, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)},
-             "another client may take it from one that has sent no force for so long; 0: it stays until it leaves");
+             "after so long without a force another client may take it from its holder; 0: the holder keeps it until "
+             "it leaves");
   });
 
   scene.table("network", [&draft](Table& keys) {
@@ -315,7 +329,7 @@ void declare_scene(Table& scene, Draft& draft) {
     keys.key("controller_timeout_ms", network.controller_timeout, kTimeout, "a controller silent for so long has left");
     keys.key("observer_timeout_ms", network.observer_timeout, kTimeout, "an observer silent for so long has left");
     keys.key("adapt_state_rate", network.adapt_state_rate, YesNo{},
-             "whether states leave more rarely where the way to a guest is full, down to 1 in 20");
+             "sends fewer states to a guest whose network is full, down to 1 in 20");
     keys.key("takeover", network.takeover, ListOf<Label>{},
              "names of the keys (without keys: of the clients) that may take a channel from its holder at once");
   });
@@ -327,14 +341,16 @@ void declare_scene(Table& scene, Draft& draft) {
         "as run-2.mcap, run-3.mcap",
         kRequired);
     keys.key("rotate_mb", recording.rotate_bytes, Number{.least = 4, .most = 4000},
-             "a file that has become so large is followed by the next number");
-    keys.key("rotate_min", recording.rotate_after, Number{.least = 1, .most = 240}, "… and one that is so old");
-    keys.key("budget_mb", recording.budget_bytes, Number{.least = 16, .most = 1e9},
-             "all files of this name that have a budget are kept within it: the oldest are deleted. Never a fault's. A "
-             "file is at most a quarter of it",
-             Absent{.text = "nothing is deleted"});
+             "a file that has grown to this size is followed by the next number");
+    keys.key("rotate_min", recording.rotate_after, Number{.least = 1, .most = 240},
+             "a file of this age is followed by the next number");
+    keys.key(
+        "budget_mb", recording.budget_bytes, Number{.least = 16, .most = 1e9},
+        "keeps all files of this name that have a budget within it: the oldest are deleted, but never a fault's. One "
+        "file takes at most a quarter of it",
+        Absent{.text = "nothing is deleted"});
     keys.key("datagrams_kb_per_s", recording.datagram_bytes_per_s, Number{.least = 1, .most = 1e6},
-             "of guests' datagrams no more are recorded; steps always are");
+             "the most that is recorded of guests' datagrams; steps are always recorded");
   });
 }
 

@@ -17,7 +17,7 @@
 
 namespace tendon::scene_file {
 
-/// A scene while it is read: what depends on several keys is still open.
+/// A scene while it is read. Values that depend on several keys are still open: resolver.h settles them.
 struct Draft {
   Draft() {
     // 1 N per step at 1 kHz: a hand cannot tell the ramp from a step, and a force that flips its sign at every
@@ -30,7 +30,8 @@ struct Draft {
   const DeviceProfile* profile = nullptr;
   const OperatorProfile* operator_profile = nullptr;
   std::optional<Vec3> joint_coulomb;
-  OperatorHand::Config hand{0, 0, 0, ScriptedMotion(ScriptedMotion::Sine{})};  // not listed: not there, so 0
+  OperatorHand::Config hand{0, 0, 0,
+                            ScriptedMotion(ScriptedMotion::Sine{})};  // 0: what the scene does not list does not exist
   bool has_hand = false;
   ScriptedMotion::Script motion = ScriptedMotion::Sine{};
   std::optional<RecordedMotionFile> recorded_motion;
@@ -51,7 +52,7 @@ struct Draft {
   double reach = 0.05;
 };
 
-/// What holds when a key is not there, where that is not simply the value of the target.
+/// What a missing key means, where it is not simply the default of the target.
 struct Absent {
   bool required = false;
   std::string_view text = {};

@@ -40,7 +40,7 @@ Place place_of(const toml::node& node);
 /// Throws SceneError "FILE:LINE: KEY: SENTENCE".
 [[noreturn]] void fail(const std::string& file, Place at, const std::string& key, const std::string& sentence);
 
-/// Of all that is wrong with a file, what to report.
+/// Collects what is wrong with a file, and reports the first: by line; a missing key only when nothing else is wrong.
 class SceneProblems {
  public:
   void wrong(Place at, std::string key, std::string sentence) { add({false, at, std::move(key), std::move(sentence)}); }
@@ -174,7 +174,7 @@ class Reader {
   std::string path_;
   Place place_;
   std::vector<std::string_view> known_;
-  bool kind_known_ = true;  ///< else the table's keys are not known either
+  bool kind_known_ = true;  ///< false: the table's keys are not known either
 };
 
 }  // namespace tendon::scene_file

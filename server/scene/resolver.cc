@@ -25,12 +25,12 @@
 namespace tendon::scene_file {
 namespace {
 
-/// N: how long the forces of engines may be that nobody feels, so that recordings have them as they came.
+/// N. Bounds the forces of engines that nobody feels; large enough that recordings hold them as they came.
 constexpr double kUnfelt = 10;
-/// Readings may fail for so long before it is a fault: what libfranka allows.
+/// After so long without a reading it is a fault; libfranka allows the same.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 
-/// Turns a draft without mistakes of its own into a scene: what depends on several keys.
+/// Turns a draft into a scene: settles the values that depend on several keys.
 class SceneResolver {
  public:
   SceneResolver(Draft draft, const toml::table& file, const std::string& name)
@@ -49,7 +49,7 @@ class SceneResolver {
     resolve_control();
     resolve_replay(directory);
     resolve_channels();
-    // Rules of the constructors that are not among ours yet.
+    // The constructors check rules that the keys do not.
     Scene& scene = draft_.scene;
     SimulatedDevice::Config& simulated = draft_.simulated;
     if (draft_.has_hand) simulated.hand = draft_.hand;
@@ -63,8 +63,8 @@ class SceneResolver {
   }
 
  private:
-  /// Throws. The line is that of the first of `places` that the file has; of the innermost table around the
-  /// key when it has none of them.
+  /// Throws. The line is that of the first of `places` that the file has; if it has none, that of the innermost table
+  /// around the key.
   [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
                           const std::string& sentence) const {
     Place place;
@@ -149,7 +149,7 @@ class SceneResolver {
       }
       ReplayDevice{replay};
     });
-    // Between samples the device is not seen.
+    // Between samples the device gives no position.
     const HapticLoop::Config& loop = draft_.scene.loop;
     const Duration most = (loop.control.max_missed - 1) * loop.period;
     const auto gap = std::ranges::adjacent_find(
@@ -207,7 +207,7 @@ class SceneResolver {
 
   void resolve_safety() {
     Scene& scene = draft_.scene;
-    // What moves a real hand is never without: then each part is there when it is listed, and arming always.
+    // A device that moves a real hand always has to be armed, even when the scene lists no part of the safety layer.
     if (scene.driver().moves_a_hand && !scene.safety) scene.safety.emplace();
     if (!scene.safety) return;
     if (scene.safety->dead_man) {
@@ -231,7 +231,7 @@ class SceneResolver {
   void resolve_network(const std::filesystem::path& directory) {
     Scene::Network& network = draft_.scene.network;
     if (network.keys) network.keys = directory / *network.keys;
-    // UdpLink refuses it too, but has no line to name.
+    // UdpLink refuses it too, but cannot name the line.
     if (!network.keys && !is_loopback(network.listen)) {
       blame("network.listen", {},
             "expected a loopback address like \"127.0.0.1:47100\" or \"[::1]:47100\", or a folder of keys besides: "
@@ -244,7 +244,7 @@ class SceneResolver {
     HapticLoop::Config& loop = draft_.scene.loop;
     HapticController::Config& control = loop.control;
 
-    // A loop without real-time priority is late by up to a period now and then; each time is an overrun beyond this.
+    // A loop without real-time priority is late by up to a period now and then. Beyond longest_hold it is an overrun.
     control.limiter.longest_hold = draft_.longest_hold.value_or(2 * loop.period);
     control.limiter.follow_holds.reset();
     if (draft_.follow_holds.memory > Duration::zero()) control.limiter.follow_holds = draft_.follow_holds;
@@ -282,7 +282,7 @@ class SceneResolver {
     resolve_places(control);
   }
 
-  /// The bounds by place may not be above the truth either, and the limiter's own hold wherever they are lower.
+  /// The bounds by place may not be above the true friction either.
   void resolve_places(HapticController::Config& control) const {
     if (!control.limiter.parts.adaptive_friction) return;
     const std::string table = "limiter.adaptive_friction";
@@ -337,7 +337,7 @@ class SceneResolver {
            Number::shown(unit, found);
   }
 
-  /// The bound that the limiter may count on. `axis_share`: of the friction, what an axis by itself has.
+  /// The friction that the limiter may count on. `axis_share`: the share of it that each axis has by itself.
   double friction_bound(const std::string& key, std::optional<double> given, const KnownNumber* profiles, double truth,
                         double axis_share) const {
     const std::string full = "limiter." + key;

@@ -49,7 +49,7 @@ struct Scene {
   using AnyDevice = std::variant<SimulatedDevice::Config, falcon::Config, ReplayDevice::Config, spacemouse::Config,
                                  woodenhaptics::Config>;
 
-  /// What is recorded, and where; see PartRecorder and DatagramSieve.
+  /// How the server records, and where; see PartRecorder and DatagramSieve.
   struct Recording {
     std::filesystem::path path;  ///< relative to the current directory
     double rotate_bytes = 4e9;
@@ -65,13 +65,13 @@ struct Scene {
   std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere
   std::vector<Channel> channels = {Channel{}};
   Network network;
-  bool has_network = false;            ///< the file says something about it
+  bool has_network = false;            ///< the file has a table [network]
   std::optional<Recording> recording;  ///< empty: nothing is recorded
   std::string text;                    ///< for the recording: the file, whole; with settings, the scene that they make
 
   /// The row of its device.
   const Driver& driver() const;
-  /// The simulated device itself; of another one, what simulates it where the cost of a step is measured.
+  /// The simulated device itself; for any other, the simulation that stands in where the cost of a step is measured.
   SimulatedDevice::Config simulated() const;
 };
 
@@ -90,8 +90,8 @@ class SceneError : public std::runtime_error {
 inline constexpr std::size_t kMaxSceneBytes = 16'384;
 
 /// Reads a scene file, and the recorded motion that it names. `scene_reference()` lists its keys. Throws SceneError:
-/// "cannot read FILE: No such file or directory" when there is no such file, likewise for a directory, a named pipe or a
-/// device.
+/// "cannot read FILE: No such file or directory" when there is no such file, likewise for a directory, a named pipe or
+/// a device.
 ///
 /// Of several mistakes, the first in the file is reported. A missing key is reported only when every key in the file is
 /// right, because a misspelt key is both unknown and missing.

@@ -48,7 +48,7 @@ std::string digits(double value);
 
 std::string in_quotes(std::string_view text);
 
-/// What the file has, in the words of an error.
+/// The value in the file, in the words of an error.
 std::string found_in(const toml::node& node);
 
 /// An integer or a floating-point number.
@@ -61,7 +61,7 @@ struct Refusal {
 };
 using Verdict = std::optional<Refusal>;
 
-/// The longest time in a scene. Nothing in a haptic loop is meant to last an hour, and sums of times stay small.
+/// The longest time in a scene: nothing in a haptic loop is meant to last an hour, and sums of times stay small.
 inline constexpr Duration kLongest = limits::kMaxTimeout;
 
 /// A number in the key's unit.
@@ -136,7 +136,8 @@ inline constexpr Number kAnyNumber{};
 inline constexpr Number kZeroOrMore{.least = 0};
 inline constexpr Number kAboveZero{.least = 0, .without_least = true};
 inline constexpr Number kAboveZeroOrInf{.least = 0, .without_least = true, .or_infinite = true};
-/// A number of the device's effects: what is `false` does not exist.
+
+/// A number of one of the device's effects; `false`: there is no such effect.
 struct OrFalse {
   Number number;
 
@@ -223,7 +224,7 @@ template <class Rule>
 struct ListOf {
   Rule rule;
 
-  std::string expected(const Unit& unit) const { return "[…], of which each is " + rule.expected(unit); }
+  std::string expected(const Unit& unit) const { return "[…], each " + rule.expected(unit); }
 
   template <class T>
   Verdict take(const toml::node& node, const Unit& unit, std::vector<T>& to) const {

@@ -9,7 +9,8 @@
 namespace tendon {
 
 /// A driver, a cable and a model of its device: one turn of the haptic loop after the other, in simulated time. `Bench`
-/// adds `device`, `step(force)`, which calls `drive` and `look`, and `home(force)`: what a user does to home the device.
+/// adds `device`, `step(force)`, which calls `drive` and `look`, and `home(force)`: what a user does to home the
+/// device.
 template <class Bench>
 struct DriverBench {
   /// The driver's part of a turn.
