@@ -146,8 +146,10 @@ TEST(Dialogue, AFullPipeChangesNothing) {
 }
 
 TEST(Dialogue, TheDevicesWatchdogEndsTheForceThatWasSentSoLongAgo) {
-  Bench bench;
+  Bench bench({.most_under_way = 2, .answer = 1h});
   ASSERT_TRUE(bench.ask(true));
+  bench.turn();
+  ASSERT_TRUE(bench.ask(true));  // the newest request counts
   bench.turn(kWatchdog - 1ns);
   EXPECT_TRUE(bench.dialogue.holds_force());
   bench.turn(1ns);
