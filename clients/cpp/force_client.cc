@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <variant>
 
 #include "core/base/arithmetic.h"
+#include "protocol/expect.h"
 #include "protocol/limits.h"
 #include "protocol/wire/bounds.h"
 
@@ -22,28 +24,31 @@ constexpr Duration kMaxObservedPeriod = std::chrono::milliseconds(100);
 /// time.
 constexpr Duration kAskLeaseAgain = std::chrono::milliseconds(50);
 
-void require(bool ok, const char* sentence) {
-  if (!ok) throw std::invalid_argument(sentence);
+constexpr const char* kNoDiagnostics = "0: they are for observers only";
+
+void expect_at_most(std::size_t most, const std::string& text, const std::string& field) {
+  expect(text.size() <= most, field + ".size", static_cast<double>(text.size()),
+         "at most " + std::to_string(most) + " bytes");
 }
 
 const ForceClient::Config& checked(const ForceClient::Config& config) {
-  require(config.name.size() <= limits::kMaxName, "name: at most 64 bytes");
-  require(config.device.size() <= limits::kMaxLabel, "device: at most 24 bytes");
-  require(config.channel.size() <= limits::kMaxLabel, "channel: at most 24 bytes");
-  require(
+  expect_at_most(limits::kMaxName, config.name, "name");
+  expect_at_most(limits::kMaxLabel, config.device, "device");
+  expect_at_most(limits::kMaxLabel, config.channel, "channel");
+  expect(
       config.rate_hz == 0 || (config.rate_hz >= ForceClient::kMinRateHz && config.rate_hz <= ForceClient::kMaxRateHz),
-      "rate_hz: expected 0, or 0.001 to 100000");
-  require(config.state_hz <= limits::kMaxLoopHz, "state_hz: expected 0 to 1000000");
-  require(config.valid_for >= Duration::zero() && config.valid_for <= limits::kMaxValidFor,
-          "valid_for: expected 0 to 10 s");
-  require(config.patience > Duration::zero(), "patience: must be above zero");
-  require(config.retry_min > Duration::zero(), "retry_min: must be above zero");
-  require(config.retry_max >= config.retry_min, "retry_max: must not be below retry_min");
-  require(config.max_datagrams > 0, "max_datagrams: must be above zero");
+      "rate_hz", config.rate_hz, "0, or 0.001 to 100000");
+  expect(config.state_hz <= limits::kMaxLoopHz, "state_hz", config.state_hz, "0 to 1000000");
+  expect(config.valid_for >= Duration::zero() && config.valid_for <= limits::kMaxValidFor, "valid_for_s",
+         seconds(config.valid_for), "0 to 10");
+  expect_above_zero(seconds(config.patience), "patience_s");
+  expect_above_zero(seconds(config.retry_min), "retry_min_s");
+  expect(config.retry_max >= config.retry_min, "retry_max_s", seconds(config.retry_max), "at least retry_min_s");
+  expect(config.max_datagrams > 0, "max_datagrams", config.max_datagrams, "1 or more");
   if (config.deadband) Deadband{*config.deadband};  // throws what is wrong with it
   if (config.state_deadband) {
     const std::string objection = StateDeadband::objection(*config.state_deadband);
-    if (!objection.empty()) throw std::invalid_argument("state_deadband: " + objection);
+    if (!objection.empty()) throw std::invalid_argument("state_deadband." + objection);
   }
   return config;
 }
@@ -80,15 +85,15 @@ ForceClient::ForceClient(Link& link, const Address& server, const Config& config
 
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now)
     : ForceClient(link, server, config, Role::kController, now) {
-  require(physics != nullptr, "physics: a controller needs a callback");
-  require(!config.diagnostics, "diagnostics: for observers only");
+  if (physics == nullptr) throw std::invalid_argument("physics: expected a callback");
+  expect(!config.diagnostics, "diagnostics", 1, kNoDiagnostics);
   physics_ = std::move(physics);
 }
 
 ForceClient::ForceClient(Link& link, const Address& server, const Config& config, Watch watch, LocalTime now)
     : ForceClient(link, server, config, config.operates ? Role::kController : Role::kObserver, now) {
-  require(watch != nullptr, "watch: an observer needs a callback");
-  require(!(config.operates && config.diagnostics), "diagnostics: for observers only");
+  if (watch == nullptr) throw std::invalid_argument("watch: expected a callback");
+  expect(!(config.operates && config.diagnostics), "diagnostics", 1, kNoDiagnostics);
   watch_ = std::move(watch);
 }
 

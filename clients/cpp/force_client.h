@@ -151,8 +151,8 @@ class ForceClient {
     std::string lease_lost_to;          ///< name of the client that took the channel from us; empty: nobody
   };
 
-  /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves
-  /// with the first turn. Throws std::invalid_argument naming the field when `config` is impossible.
+  /// A controller: sees states and sends forces. `link` must outlive this object. The first Hello leaves with the first
+  /// turn. Throws std::invalid_argument "FIELD = VALUE: expected …" when a value of `config` is impossible.
   ForceClient(Link& link, const Address& server, const Config& config, Physics physics, LocalTime now);
   /// An observer: sees states, and reports when it asks for them; or an operator (Config::operates). Never sends a
   /// force.

@@ -2,18 +2,16 @@
 #include "protocol/narrow/deadband.h"
 
 #include <algorithm>
-#include <stdexcept>
 
+#include "protocol/expect.h"
 #include "protocol/limits.h"
 
 namespace tendon {
 
 Deadband::Deadband(const Config& config) : config_(config) {
-  if (!(config.share >= 0 && config.share <= 1)) throw std::invalid_argument("deadband: share must be within 0 to 1");
-  if (!(config.floor >= 0)) throw std::invalid_argument("deadband: floor must not be negative");
-  if (config.longest_silence <= Duration::zero()) {
-    throw std::invalid_argument("deadband: longest_silence must be positive");
-  }
+  expect(config.share >= 0 && config.share <= 1, "deadband.share", config.share, "0 to 1");
+  expect(config.floor >= 0, "deadband.floor", config.floor, "0 or more");
+  expect_above_zero(seconds(config.longest_silence), "deadband.longest_silence_s");
 }
 
 bool Deadband::passes(LocalTime now, const Vec3& value) noexcept {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "protocol/expect.h"
+
 namespace tendon {
 namespace {
 
@@ -29,8 +31,10 @@ class Restored {
 
 std::optional<FdStiffness> fd_stiffness(const std::function<Vec3(const Vec3& position)>& force, const Vec3& at,
                                         double step, const SavedState& state) {
-  if (!(step > 0) || !std::isfinite(step)) throw std::invalid_argument("fd_stiffness: step must be a number > 0");
-  if (!state.save != !state.restore) throw std::invalid_argument("fd_stiffness: save and restore, or neither");
+  expect_above_zero(step, "step");
+  if (!state.save != !state.restore) {
+    throw std::invalid_argument("state: expected both save and restore, or neither");
+  }
 
   const Restored saved(state);
   const auto force_at = [&](const Vec3& position) {

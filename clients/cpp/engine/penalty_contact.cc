@@ -3,15 +3,14 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
+
+#include "protocol/expect.h"
 
 namespace tendon {
 
 PenaltyContact::PenaltyContact(const Config& config) : config_(config) {
-  if (!(config.stiffness >= 0) || !std::isfinite(config.stiffness))
-    throw std::invalid_argument("PenaltyContact: stiffness is impossible");
-  if (!(config.damping >= 0) || !std::isfinite(config.damping))
-    throw std::invalid_argument("PenaltyContact: damping is impossible");
+  expect_not_negative(config.stiffness, "stiffness");
+  expect_not_negative(config.damping, "damping");
 }
 
 Touch PenaltyContact::touch(const SurfacePoint& surface, const Vec3& velocity) const noexcept {

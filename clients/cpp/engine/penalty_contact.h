@@ -29,7 +29,7 @@ class PenaltyContact {
     double damping = 0;      ///< b, ≥ 0
   };
 
-  /// Throws std::invalid_argument naming the field when `config` is impossible.
+  /// Throws std::invalid_argument "FIELD = VALUE: expected …" when a value of `config` is impossible.
   explicit PenaltyContact(const Config& config);
 
   /// The answer to a hand at that point with this velocity (m/s).

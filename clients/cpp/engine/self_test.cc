@@ -15,6 +15,7 @@
 #include <string_view>
 #include <utility>
 
+#include "protocol/expect.h"
 #include "protocol/limits.h"
 
 namespace tendon {
@@ -29,11 +30,6 @@ constexpr double kNothingJ = 1e-12;
 constexpr double kSameForce = 1e-6;
 /// A surface is near where the stiffness ahead differs from that behind by more than a fifth.
 constexpr double kSmoothKink = 0.1;
-
-void expect(bool ok, const char* field) {
-  if (!ok) throw std::invalid_argument(std::string("self_test: ") + field + " is impossible");
-}
-bool positive(double value) { return value > 0 && std::isfinite(value); }
 
 bool usable(const Touch& touch) {
   const auto fits = [](const auto& values) {
@@ -332,16 +328,18 @@ std::string SelfTest::json() const {
 }
 
 SelfTest self_test(const Physics& engine, const SelfTestScript& script) {
-  expect(script.start.allFinite(), "start");
-  expect(positive(script.into.norm()), "into");
-  expect(positive(script.depth), "depth");
-  expect(positive(script.slide), "slide");
-  expect(positive(script.speed), "speed");
-  expect(positive(script.rate_hz), "rate_hz");
-  expect(script.work_tolerance >= 0, "work_tolerance");
-  expect(positive(script.stiffness_step), "stiffness_step");
-  expect(script.stiffness_tolerance >= 0, "stiffness_tolerance");
-  expect(!script.state.save == !script.state.restore, "state, half of which is missing,");
+  expect_finite(script.start, "start");
+  expect_above_zero(script.into.norm(), "into (its length)");
+  expect_above_zero(script.depth, "depth");
+  expect_above_zero(script.slide, "slide");
+  expect_above_zero(script.speed, "speed");
+  expect_above_zero(script.rate_hz, "rate_hz");
+  expect(script.work_tolerance >= 0, "work_tolerance", script.work_tolerance, "0 or more");
+  expect_above_zero(script.stiffness_step, "stiffness_step");
+  expect(script.stiffness_tolerance >= 0, "stiffness_tolerance", script.stiffness_tolerance, "0 or more");
+  if (!script.state.save != !script.state.restore) {
+    throw std::invalid_argument("state: expected both save and restore, or neither");
+  }
   return Tester(engine, script).run();
 }
 

@@ -65,7 +65,8 @@ struct SelfTestScript {
 ///
 /// Every state is a tick and 1/rate_hz s after the previous one, except where a claim says otherwise. The hand ends at
 /// `start`. Half a minute of the hand's time passes; the engine's own pace decides how long that takes. Throws
-/// std::invalid_argument naming the field when `script` is impossible; nothing that `engine` throws.
+/// std::invalid_argument "FIELD = VALUE: expected …" when a value of `script` is impossible; nothing that `engine`
+/// throws.
 SelfTest self_test(const Physics& engine, const SelfTestScript& script = {});
 
 }  // namespace tendon

@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/cpp/engine/tool_coupling.h"
 
-#include <cmath>
-#include <stdexcept>
-#include <string>
+#include "protocol/expect.h"
 
 namespace tendon {
-namespace {
-
-void expect(bool ok, const char* field) {
-  if (!ok) throw std::invalid_argument(std::string("ToolCoupling: ") + field + " is impossible");
-}
-bool positive(double value) { return value > 0 && std::isfinite(value); }
-
-}  // namespace
 
 ToolCoupling::ToolCoupling(const Config& config) : config_(config) {
-  expect(positive(config.stiffness), "stiffness");
-  expect(config.damping >= 0 && std::isfinite(config.damping), "damping");
-  expect(positive(config.tool_mass), "tool_mass");
-  expect(positive(config.step_s), "step_s");
-  expect(positive(config.max_force), "max_force");
+  expect_above_zero(config.stiffness, "stiffness");
+  expect_not_negative(config.damping, "damping");
+  expect_above_zero(config.tool_mass, "tool_mass");
+  expect_above_zero(config.step_s, "step_s");
+  expect_above_zero(config.max_force, "max_force");
   share_ = 1 / (1 + (config.damping + config.stiffness * config.step_s) * config.step_s / config.tool_mass);
 }
 

@@ -32,7 +32,7 @@ class ToolCoupling {
     Vec3 on_hand = Vec3::Zero();  ///< N, the answer to the server
   };
 
-  /// Throws std::invalid_argument naming the field when `config` is impossible.
+  /// Throws std::invalid_argument "FIELD = VALUE: expected …" when a value of `config` is impossible.
   explicit ToolCoupling(const Config& config);
 
   /// To be called before each step of the engine. Positions (m) and velocities (m/s) that are not finite make a force

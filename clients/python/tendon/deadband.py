@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import dist, hypot
 
+from .expect import expect
 from .messages import DeviceState, SetStateDeadband, Vec3
 
 
@@ -22,12 +23,9 @@ class ForceDeadband:
     """So that a force that was lost does not stay wrong."""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.share <= 1:
-            raise ValueError("deadband: share: expected 0 to 1")
-        if not self.floor >= 0:
-            raise ValueError("deadband: floor: must not be negative")
-        if not self.longest_silence_s > 0:
-            raise ValueError("deadband: longest_silence_s: must be above zero")
+        expect(0 <= self.share <= 1, "deadband.share", self.share, "0 to 1")
+        expect(self.floor >= 0, "deadband.floor", self.floor, "0 or more")
+        expect(self.longest_silence_s > 0, "deadband.longest_silence_s", self.longest_silence_s, "more than 0")
 
 
 class Deadband:
@@ -58,14 +56,11 @@ def foretell(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceS
     )
 
 
-def objection(asked: SetStateDeadband) -> str:
-    """What a server will not grant; empty when it will."""
+def check_state_deadband(asked: SetStateDeadband) -> None:
+    """Raises ValueError when no server grants it."""
     if asked.max_silence_us == 0:
-        return ""
-    if not 0 <= asked.share <= 0.5:
-        return "share: expected 0 to 0.5"
-    if not 0 <= asked.floor <= 0.1:
-        return "floor: expected 0 to 0.1 m/s"
-    if not 1000 <= asked.max_silence_us <= 20_000:
-        return "max_silence_us: expected 0, or 1000 to 20000"
-    return ""
+        return
+    expect(0 <= asked.share <= 0.5, "state_deadband.share", asked.share, "0 to 0.5")
+    expect(0 <= asked.floor <= 0.1, "state_deadband.floor", asked.floor, "0 to 0.1 m/s")
+    silence = asked.max_silence_us
+    expect(1000 <= silence <= 20_000, "state_deadband.max_silence_us", silence, "0, or 1000 to 20000")

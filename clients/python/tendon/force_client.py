@@ -13,7 +13,8 @@ from enum import Enum
 from typing import cast
 
 from . import codec, limits
-from .deadband import Deadband, ForceDeadband, foretell, objection
+from .deadband import Deadband, ForceDeadband, check_state_deadband, foretell
+from .expect import expect
 from .handshake import ClientHandshake
 from .messages import (
     FEATURE_CHANNELS,
@@ -71,7 +72,7 @@ _ASK_LEASE_AGAIN_NS = 50_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class Config:
-    """How a guest behaves. Raises ValueError naming the field when that is impossible."""
+    """How a guest behaves. Raises ValueError "FIELD = VALUE: expected …" when a value is impossible."""
 
     name: str = "guest"
     """For the server's log; at most 64 bytes."""
@@ -117,24 +118,26 @@ class Config:
     """… up to this. The first state of a session resets it."""
 
     def __post_init__(self) -> None:
-        def require(ok: bool, sentence: str) -> None:
-            if not ok:
-                raise ValueError(sentence)
+        def expect_at_most(most: int, text: str, field: str) -> None:
+            size = len(text.encode(errors="replace"))
+            expect(size <= most, f"{field}.size", size, f"at most {most} bytes")
 
-        require(len(self.name.encode(errors="replace")) <= limits.MAX_NAME, "name: at most 64 bytes")
-        require(len(self.device.encode(errors="replace")) <= limits.MAX_LABEL, "device: at most 24 bytes")
-        require(len(self.channel.encode(errors="replace")) <= limits.MAX_LABEL, "channel: at most 24 bytes")
-        require(self.key is None or len(self.key) == KEY_SIZE, "key: expected 32 bytes")
+        expect_at_most(limits.MAX_NAME, self.name, "name")
+        expect_at_most(limits.MAX_LABEL, self.device, "device")
+        expect_at_most(limits.MAX_LABEL, self.channel, "channel")
+        if self.key is not None:
+            expect(len(self.key) == KEY_SIZE, "key.size", len(self.key), f"{KEY_SIZE} bytes")
         rate_possible = self.rate_hz == 0 or MIN_RATE_HZ <= self.rate_hz <= MAX_RATE_HZ
-        require(rate_possible, "rate_hz: expected 0, or 0.001 to 100000")
-        require(0 <= self.state_hz <= limits.MAX_LOOP_HZ, "state_hz: expected 0 to 1000000")
-        require(0 <= self.valid_for_s <= 10, "valid_for_s: expected 0 to 10")
-        wrong = objection(self.state_deadband) if self.state_deadband else ""
-        require(not wrong, f"state_deadband: {wrong}")
-        require(not self.diagnostics or self.role is Role.OBSERVER, "diagnostics: for observers only")
-        require(self.patience_s > 0, "patience_s: must be above zero")
-        require(self.retry_min_s > 0, "retry_min_s: must be above zero")
-        require(self.retry_max_s >= self.retry_min_s, "retry_max_s: must not be below retry_min_s")
+        expect(rate_possible, "rate_hz", self.rate_hz, "0, or 0.001 to 100000")
+        expect(0 <= self.state_hz <= limits.MAX_LOOP_HZ, "state_hz", self.state_hz, "0 to 1000000")
+        expect(0 <= self.valid_for_s <= 10, "valid_for_s", self.valid_for_s, "0 to 10")
+        if self.state_deadband:
+            check_state_deadband(self.state_deadband)
+        observes = self.role is Role.OBSERVER
+        expect(not self.diagnostics or observes, "diagnostics", True, "False: they are for observers only")
+        expect(self.patience_s > 0, "patience_s", self.patience_s, "more than 0")
+        expect(self.retry_min_s > 0, "retry_min_s", self.retry_min_s, "more than 0")
+        expect(self.retry_max_s >= self.retry_min_s, "retry_max_s", self.retry_max_s, "at least retry_min_s")
 
 
 class Phase(Enum):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What need not be sent: forces that a hand cannot tell apart, and states that their receiver can foretell
 // (protocol/SESSION.md, "Deadbands").
+import { expect } from "./expect.js";
 import type { DeviceState, StateDeadband, Vec3 } from "./messages.js";
 import { fromMilliseconds, type Nanoseconds } from "./time.js";
 
@@ -17,20 +18,20 @@ export interface ForceDeadband {
   readonly longestSilenceMs: number;
 }
 
-/** What is impossible about it; empty when nothing is. */
-export function forceDeadbandObjection({ share, floor, longestSilenceMs }: ForceDeadband): string {
-  if (!(share >= 0 && share <= 1)) return "share: expected 0 to 1";
-  if (!(floor >= 0)) return "floor: must not be negative";
-  return longestSilenceMs > 0 ? "" : "longestSilenceMs: must be above zero";
+/** Refuses an impossible deadband of forces with a RangeError. */
+export function checkForceDeadband({ share, floor, longestSilenceMs }: ForceDeadband): void {
+  expect(share >= 0 && share <= 1, "deadband.share", share, "0 to 1");
+  expect(floor >= 0, "deadband.floor", floor, "0 or more");
+  expect(longestSilenceMs > 0, "deadband.longestSilenceMs", longestSilenceMs, "more than 0");
 }
 
-/** What a server will not grant; empty when it will. */
-export function stateDeadbandObjection({ share, floor, maxSilenceUs }: StateDeadband): string {
-  if (maxSilenceUs === 0) return "";
-  if (!(share >= 0 && share <= 0.5)) return "share: expected 0 to 0.5";
-  if (!(floor >= 0 && floor <= 0.1)) return "floor: expected 0 to 0.1 m/s";
+/** Refuses a deadband of states that no server grants with a RangeError. */
+export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband): void {
+  if (maxSilenceUs === 0) return;
+  expect(share >= 0 && share <= 0.5, "stateDeadband.share", share, "0 to 0.5");
+  expect(floor >= 0 && floor <= 0.1, "stateDeadband.floor", floor, "0 to 0.1 m/s");
   const possible = Number.isInteger(maxSilenceUs) && maxSilenceUs >= 1000 && maxSilenceUs <= 20_000;
-  return possible ? "" : "maxSilenceUs: expected 0, or a whole number from 1000 to 20000";
+  expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
 /** Of one session. */

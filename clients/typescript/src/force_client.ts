@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 import { randomBytes } from "@noble/hashes/utils";
 import { isContact, isError, isForce, isRadius, isStiffness, type ControlAck } from "./codec.js";
-import { Deadband, foretell, forceDeadbandObjection, stateDeadbandObjection, type ForceDeadband } from "./deadband.js";
+import { checkForceDeadband, checkStateDeadband, Deadband, foretell, type ForceDeadband } from "./deadband.js";
+import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs, kMaxValue } from "./limits.js";
 import {
@@ -140,25 +141,24 @@ function checked(config: ClientConfig): Required<ClientConfig> {
   const full: Required<ClientConfig> = {
     key: undefined, deadband: undefined, stateDeadband: undefined, ...kDefaults, ...given,
   };
-  const require = (ok: boolean, sentence: string): void => {
-    if (!ok) throw new RangeError(sentence);
+  const expectAtMost = (most: number, text: string, field: string): void => {
+    const size = new TextEncoder().encode(text).length;
+    expect(size <= most, `${field}.size`, size, `at most ${most} bytes`);
   };
-  const size = (text: string): number => new TextEncoder().encode(text).length;
-  require(size(full.name) <= kMaxName, `name: at most ${kMaxName} bytes`);
-  require(size(full.device) <= kMaxLabel, `device: at most ${kMaxLabel} bytes`);
-  require(size(full.channel) <= kMaxLabel, `channel: at most ${kMaxLabel} bytes`);
-  require(!full.key || full.key.length === kKeySize, `key: expected ${kKeySize} bytes, got ${full.key?.length}`);
-  require(full.rateHz === 0 || (full.rateHz >= 1e-3 && full.rateHz <= 1e5), "rateHz: expected 0, or 0.001 to 100000");
-  require(Number.isInteger(full.stateHz) && full.stateHz >= 0 && full.stateHz <= kMaxLoopHz,
-    `stateHz: expected a whole number from 0 to ${kMaxLoopHz}`);
-  require(full.validForMs >= 0 && full.validForMs <= kMaxValidForMs, `validForMs: expected 0 to ${kMaxValidForMs}`);
-  const force = full.deadband ? forceDeadbandObjection(full.deadband) : "";
-  require(!force, `deadband: ${force}`);
-  const state = full.stateDeadband ? stateDeadbandObjection(full.stateDeadband) : "";
-  require(!state, `stateDeadband: ${state}`);
-  require(full.patienceMs > 0, "patienceMs: must be above zero");
-  require(full.retryMinMs > 0, "retryMinMs: must be above zero");
-  require(full.retryMaxMs >= full.retryMinMs, "retryMaxMs: must not be below retryMinMs");
+  const { key, rateHz, stateHz, validForMs, patienceMs, retryMinMs, retryMaxMs } = full;
+  expectAtMost(kMaxName, full.name, "name");
+  expectAtMost(kMaxLabel, full.device, "device");
+  expectAtMost(kMaxLabel, full.channel, "channel");
+  expect(!key || key.length === kKeySize, "key.size", key?.length, `${kKeySize} bytes`);
+  expect(rateHz === 0 || (rateHz >= 1e-3 && rateHz <= 1e5), "rateHz", rateHz, "0, or 0.001 to 100000");
+  expect(Number.isInteger(stateHz) && stateHz >= 0 && stateHz <= kMaxLoopHz, "stateHz", stateHz,
+    `a whole number from 0 to ${kMaxLoopHz}`);
+  expect(validForMs >= 0 && validForMs <= kMaxValidForMs, "validForMs", validForMs, `0 to ${kMaxValidForMs}`);
+  if (full.deadband) checkForceDeadband(full.deadband);
+  if (full.stateDeadband) checkStateDeadband(full.stateDeadband);
+  expect(patienceMs > 0, "patienceMs", patienceMs, "more than 0");
+  expect(retryMinMs > 0, "retryMinMs", retryMinMs, "more than 0");
+  expect(retryMaxMs >= retryMinMs, "retryMaxMs", retryMaxMs, "at least retryMinMs");
   return full;
 }
 
@@ -240,7 +240,7 @@ export class ForceClient {
   ) {
     this.#config = checked(config);
     this.#physics = "physics" in callback ? callback.physics : undefined;
-    if (this.#physics && this.#config.diagnostics) throw new RangeError("diagnostics: for observers only");
+    expect(!(this.#physics && this.#config.diagnostics), "diagnostics", true, "false: they are for observers only");
     this.#watch = "watch" in callback ? callback.watch : undefined;
     this.#role = this.#physics ? Role.CONTROLLER : Role.OBSERVER;
     this.#send = send;

@@ -542,7 +542,7 @@ TEST(ForceClient, OneSeedIsOneWorld) {
   EXPECT_NE(run(25), run(26));
 }
 
-TEST(ForceClient, RefusesAnImpossibleConfigurationByName) {
+TEST(ForceClient, RefusesAnImpossibleConfigurationByFieldValueAndExpectation) {
   const auto complaint = [](const ForceClient::Config& config) -> std::string {
     World world(27);
     try {
@@ -553,16 +553,20 @@ TEST(ForceClient, RefusesAnImpossibleConfigurationByName) {
     return "";
   };
   EXPECT_EQ(complaint({}), "");
-  EXPECT_TRUE(complaint({.name = std::string(65, 'x')}).starts_with("name:"));
-  EXPECT_TRUE(complaint({.rate_hz = -1}).starts_with("rate_hz:"));
-  EXPECT_TRUE(complaint({.rate_hz = 1e-300}).starts_with("rate_hz:"));
-  EXPECT_TRUE(complaint({.rate_hz = std::nan("")}).starts_with("rate_hz:"));
-  EXPECT_TRUE(complaint({.state_hz = 2'000'000}).starts_with("state_hz:"));
-  EXPECT_TRUE(complaint({.valid_for = 11 * kSecond}).starts_with("valid_for:"));
-  EXPECT_TRUE(complaint({.patience = Duration::zero()}).starts_with("patience:"));
-  EXPECT_TRUE(complaint({.retry_min = Duration::zero()}).starts_with("retry_min:"));
-  EXPECT_TRUE(complaint({.retry_max = milliseconds(1)}).starts_with("retry_max:"));
-  EXPECT_TRUE(complaint({.max_datagrams = 0}).starts_with("max_datagrams:"));
+  EXPECT_EQ(complaint({.name = std::string(65, 'x')}), "name.size = 65: expected at most 64 bytes");
+  EXPECT_EQ(complaint({.device = std::string(25, 'x')}), "device.size = 25: expected at most 24 bytes");
+  EXPECT_EQ(complaint({.rate_hz = -1}), "rate_hz = -1: expected 0, or 0.001 to 100000");
+  EXPECT_EQ(complaint({.rate_hz = 1e-300}), "rate_hz = 1e-300: expected 0, or 0.001 to 100000");
+  EXPECT_EQ(complaint({.rate_hz = std::nan("")}), "rate_hz = nan: expected 0, or 0.001 to 100000");
+  EXPECT_EQ(complaint({.state_hz = 2'000'000}), "state_hz = 2e+06: expected 0 to 1000000");
+  EXPECT_EQ(complaint({.valid_for = 11 * kSecond}), "valid_for_s = 11: expected 0 to 10");
+  EXPECT_EQ(complaint({.deadband = Deadband::Config{.share = 2}}), "deadband.share = 2: expected 0 to 1");
+  EXPECT_EQ(complaint({.state_deadband = SetStateDeadband{.share = 0.6, .max_silence = milliseconds(20)}}),
+            "state_deadband.share: expected 0 to 0.5");
+  EXPECT_EQ(complaint({.patience = Duration::zero()}), "patience_s = 0: expected a finite number above 0");
+  EXPECT_EQ(complaint({.retry_min = Duration::zero()}), "retry_min_s = 0: expected a finite number above 0");
+  EXPECT_EQ(complaint({.retry_max = milliseconds(1)}), "retry_max_s = 0.001: expected at least retry_min_s");
+  EXPECT_EQ(complaint({.max_datagrams = 0}), "max_datagrams = 0: expected 1 or more");
 }
 
 }  // namespace

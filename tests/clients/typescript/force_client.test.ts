@@ -356,12 +356,18 @@ describe("stop()", () => {
 });
 
 describe("an impossible configuration", () => {
-  it("is refused with the name of the field", () => {
+  it("is refused with field, value and expectation", () => {
     const bad: [ClientConfig, RegExp][] = [
-      [{ name: "ä".repeat(33) }, /name/], [{ rateHz: -1 }, /rateHz/], [{ rateHz: NaN }, /rateHz/],
-      [{ stateHz: 1.5 }, /stateHz/], [{ validForMs: 10_001 }, /validForMs/], [{ patienceMs: 0 }, /patienceMs/],
-      [{ retryMinMs: 0 }, /retryMinMs/], [{ retryMaxMs: 50 }, /retryMaxMs/], [{ key: new Uint8Array(31) }, /key/],
-      [{ device: "ä".repeat(13) }, /device: at most 24 bytes/], [{ channel: "c".repeat(25) }, /channel: at most 24 bytes/],
+      [{ name: "ä".repeat(33) }, /^RangeError: name.size = 66: expected at most 64 bytes$/],
+      [{ device: "ä".repeat(13) }, /^RangeError: device.size = 26: expected at most 24 bytes$/],
+      [{ channel: "c".repeat(25) }, /^RangeError: channel.size = 25: expected at most 24 bytes$/],
+      [{ key: new Uint8Array(31) }, /^RangeError: key.size = 31: expected 32 bytes$/],
+      [{ rateHz: -1 }, /^RangeError: rateHz = -1: expected 0, or 0.001 to 100000$/], [{ rateHz: NaN }, /^RangeError: rateHz = NaN: expected 0/],
+      [{ stateHz: 1.5 }, /^RangeError: stateHz = 1.5: expected a whole number from 0 to 1000000$/],
+      [{ validForMs: 10_001 }, /^RangeError: validForMs = 10001: expected 0 to 10000$/],
+      [{ patienceMs: 0 }, /^RangeError: patienceMs = 0: expected more than 0$/],
+      [{ retryMinMs: 0 }, /^RangeError: retryMinMs = 0: expected more than 0$/],
+      [{ retryMaxMs: 50 }, /^RangeError: retryMaxMs = 50: expected at least retryMinMs$/],
     ];
     for (const [config, message] of bad) {
       assert.throws(() => new ForceClient(config, { watch: () => {} }, () => {}, 0n), message);
@@ -418,11 +424,11 @@ describe("what need not be sent", () => {
   it("an impossible deadband is refused with a sentence that names the field", () => {
     const wrong = (config: ClientConfig, message: RegExp) =>
       assert.throws(() => new ForceClient(config, { watch: () => {} }, () => {}, 0n), message);
-    wrong({ stateDeadband: { ...stateDeadband, share: 0.51 } }, /stateDeadband: share/);
-    wrong({ stateDeadband: { ...stateDeadband, floor: NaN } }, /stateDeadband: floor/);
-    wrong({ stateDeadband: { ...stateDeadband, maxSilenceUs: 999 } }, /stateDeadband: maxSilenceUs/);
-    wrong({ deadband: { share: -1, floor: 0, longestSilenceMs: 20 } }, /deadband: share/);
-    wrong({ deadband: { share: 0, floor: 0, longestSilenceMs: 0 } }, /deadband: longestSilenceMs/);
+    wrong({ stateDeadband: { ...stateDeadband, share: 0.51 } }, /^RangeError: stateDeadband.share = 0.51: expected 0 to 0.5$/);
+    wrong({ stateDeadband: { ...stateDeadband, floor: NaN } }, /^RangeError: stateDeadband.floor = NaN: expected 0 to 0.1 m\/s$/);
+    wrong({ stateDeadband: { ...stateDeadband, maxSilenceUs: 999 } }, /^RangeError: stateDeadband.maxSilenceUs = 999: expected 0, or a whole number from 1000 to 20000$/);
+    wrong({ deadband: { share: -1, floor: 0, longestSilenceMs: 20 } }, /^RangeError: deadband.share = -1: expected 0 to 1$/);
+    wrong({ deadband: { share: 0, floor: 0, longestSilenceMs: 0 } }, /^RangeError: deadband.longestSilenceMs = 0: expected more than 0$/);
   });
 });
 
@@ -499,7 +505,7 @@ describe("diagnostics", () => {
 
   it("neither a controller nor an untold observer asks for them", () => {
     assert.throws(() => new ForceClient({ diagnostics: true }, { physics: () => kPush }, () => {}, 0n),
-      /diagnostics: for observers only/);
+      /diagnostics = true: expected false: they are for observers only/);
     const world = new World(1, kFair, {}, { watch: () => {} });
     world.runMs(100);
     assert.deepEqual(world.server.hellos[0]!.hello.features, ["local-model", "channels"]);
