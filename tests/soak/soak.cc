@@ -24,7 +24,7 @@
 #include "tests/e2e/stage/stage.h"
 #include "tests/soak/guests.h"
 #include "tests/soak/vital_signs.h"
-#include "tests/tools/lab/pictures/json.h"
+#include "tests/support/json_line.h"
 
 namespace tendon::soak {
 
@@ -378,7 +378,7 @@ Report run(const Config& config, const std::function<void(double)>& progress) {
 std::string to_json(const Config& config, const Report& report) {
   std::string broken;
   for (const std::string& why : report.broken) broken += (broken.empty() ? "" : "; ") + why;
-  lab::JsonLine line;
+  JsonLine line;
   line.add("event", "soak")
       .add("passed", report.broken.empty())
       .add("broken", broken)

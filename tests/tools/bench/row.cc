@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "server/build_info.h"
-#include "tests/tools/lab/pictures/json.h"
+#include "tests/support/json_line.h"
 
 namespace tendon::bench {
 namespace {
@@ -117,7 +117,7 @@ std::string to_text(const Circumstances& c) {
 }
 
 std::string to_json(const Row& row) {
-  lab::JsonLine json;
+  JsonLine json;
   json.add("section", row.section)
       .add("what", row.what)
       .add("unit", row.unit)
@@ -134,7 +134,7 @@ std::string to_json(const Row& row) {
 }
 
 std::string to_json(const Circumstances& c) {
-  return lab::JsonLine()
+  return JsonLine()
       .add("section", "circumstances")
       .add("machine", c.machine)
       .add("processors", c.processors)

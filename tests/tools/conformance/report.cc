@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "tests/support/json_line.h"
+
 namespace tendon::conformance {
 namespace {
 
@@ -190,19 +192,6 @@ std::string_view word(Outcome outcome) {
   return "not reached";
 }
 
-std::string quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else {
-      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out + '"';
-}
-
 }  // namespace
 
 std::span<const Check> checks() { return kChecks; }
@@ -268,12 +257,14 @@ std::string text_of(const Verdict& verdict) {
 }
 
 std::string json_of(const Verdict& verdict) {
-  std::string out = R"({"check":)" + quoted(verdict.check->name) + R"(,"result":)" + quoted(word(verdict.outcome)) +
-                    R"(,"rule":)" + quoted(anchor(*verdict.check)) + R"(,"sentence":)" +
-                    quoted(verdict.check->sentence);
-  if (!verdict.seen.empty()) out += R"(,"seen":)" + quoted(verdict.seen);
-  if (!verdict.expected.empty()) out += R"(,"expected":)" + quoted(verdict.expected);
-  return out + '}';
+  JsonLine line;
+  line.add("check", verdict.check->name)
+      .add("result", word(verdict.outcome))
+      .add("rule", anchor(*verdict.check))
+      .add("sentence", verdict.check->sentence);
+  if (!verdict.seen.empty()) line.add("seen", verdict.seen);
+  if (!verdict.expected.empty()) line.add("expected", verdict.expected);
+  return line.str();
 }
 
 }  // namespace tendon::conformance

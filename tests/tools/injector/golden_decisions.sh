@@ -19,7 +19,7 @@ if [ "$program" = --with ]; then
   program=$scratch/golden_decisions
   cd "$source"
   tool=tests/tools/injector
-  for file in core/base/portable_math \
+  for file in core/base/portable_math server/machine/regular_file \
     $tool/models/bottleneck $tool/models/delay_model $tool/models/draws $tool/models/exact_math \
     $tool/models/loss_model $tool/models/quantile_table $tool/golden_decisions_main $tool/injector \
     $tool/profile/named_profiles $tool/profile/profile $tool/profile/timeline $tool/profile/units; do

@@ -7,6 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/machine/regular_file.h"
+#include "tests/support/files.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/injector/command_line.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/injector/proxy/control_socket.h"
@@ -24,9 +27,13 @@ struct Runner {
   int operator()(const ProfilesTask& task) const {
     for (const NamedProfile& profile : named_profiles()) {
       if (task.json) {
-        std::cout << R"({"name":)" << json_string(std::string(profile.name)) << R"(,"what":)"
-                  << json_string(std::string(profile.what)) << R"(,"up":)" << json_string(std::string(profile.up))
-                  << R"(,"down":)" << json_string(std::string(profile.down)) << "}\n";
+        std::cout << JsonLine()
+                         .add("name", profile.name)
+                         .add("what", profile.what)
+                         .add("up", profile.up)
+                         .add("down", profile.down)
+                         .str()
+                  << "\n";
       } else {
         std::cout << profile.name << "\n    " << profile.what << "\n    up:   " << profile.up
                   << "\n    down: " << profile.down << "\n";
@@ -47,6 +54,7 @@ struct Runner {
     std::ofstream file;
     std::optional<TraceWriter> trace;
     if (!task.record.empty()) {
+      expect_replaceable(task.record, {kTraceBegins});
       file.open(task.record, std::ios::binary);
       if (!file) throw std::invalid_argument("--record: cannot write " + task.record.string());
       trace.emplace(file, network.header());
@@ -59,13 +67,13 @@ struct Runner {
   }
 
   int operator()(const ImportTask& task) const {
-    std::ifstream from(task.from, std::ios::binary);
-    if (!from) throw std::invalid_argument("cannot read " + task.from.string());
+    std::ifstream from = open_regular_file(task.from);
     const std::string name = task.from.string();
     const Trace trace = task.format == "ping"   ? import_ping(from, name, task.options)
                         : task.format == "irtt" ? import_irtt(from, name, task.options)
                         : task.format == "csv"  ? import_csv(from, name, task.options)
                                                 : import_mahimahi_log(from, name, task.options);
+    expect_replaceable(task.to, {kTraceBegins});
     std::ofstream to(task.to, std::ios::binary);
     write_trace(to, trace);
     to.flush();

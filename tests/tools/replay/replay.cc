@@ -15,7 +15,8 @@
 #include "core/control/limiter.h"
 #include "server/recording/recording_reader.h"
 #include "server/scene/scene.h"
-#include "tests/tools/lab/pictures/json.h"
+#include "tests/support/files.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/pictures/plot.h"
 #include "tests/tools/lab/pictures/table.h"
 #include "tests/tools/lab/recordings/run_summary.h"
@@ -25,8 +26,6 @@
 namespace tendon::replay {
 
 namespace {
-
-using lab::JsonLine;
 
 /// What may stand in the way of reading a recording as one run.
 struct Gaps {
@@ -117,7 +116,9 @@ struct Comparison {
 /// A row for each step; what is not a number is left empty.
 class Csv {
  public:
-  explicit Csv(const std::filesystem::path& path) : path_(path), file_(path) {
+  explicit Csv(const std::filesystem::path& path) : path_(path) {
+    expect_replaceable(path, {"t_s,step,"});
+    file_.open(path);
     line_ =
         "t_s,step,x_m,y_m,z_m,vx_m_per_s,vy_m_per_s,vz_m_per_s,wanted_x_n,wanted_y_n,wanted_z_n,"
         "recorded_applied_x_n,recorded_applied_y_n,recorded_applied_z_n,recorded_permitted_n,recorded_energy_j,"

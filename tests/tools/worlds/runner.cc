@@ -13,7 +13,8 @@
 #include <string>
 #include <thread>
 
-#include "tests/tools/lab/pictures/json.h"
+#include "server/machine/regular_file.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/worlds/explore.h"
 
 namespace tendon::simulation {
@@ -105,7 +106,7 @@ void tell(const Broken& broken, bool json, std::ostream& out) {
   const OracleInfo& oracle = info(broken.breach.oracle);
   const double at = seconds(broken.breach.at.time_since_epoch());
   if (json) {
-    out << lab::JsonLine()
+    out << JsonLine()
                .add("kind", "broken")
                .add("seed", broken.seed)
                .add("oracle", oracle.name)
@@ -124,7 +125,7 @@ void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
   const double simulated = static_cast<double>(tally.worlds) * seconds(DrawnWorld::kLength);
   const auto worlds = static_cast<double>(tally.worlds);
   if (json) {
-    out << lab::JsonLine()
+    out << JsonLine()
                .add("kind", "end")
                .add("worlds", tally.worlds)
                .add("elapsed_s", elapsed)
@@ -201,8 +202,7 @@ bool run_one(std::uint64_t seed, bool verbose, std::ostream& out) {
 }
 
 std::vector<std::uint64_t> read_seeds(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) throw std::runtime_error("cannot read " + file.string());
+  std::ifstream in = open_regular_file(file, "seeds");
   std::vector<std::uint64_t> seeds;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/support/files.h"
 #include "tests/tools/injector/profile/shrink.h"
 #include "tests/tools/injector/traces/trace_player.h"
 
@@ -49,6 +50,7 @@ bool shrink_world(std::uint64_t seed, const std::filesystem::path& file, std::os
     return again.breach && again.breach->oracle == oracle;
   };
   const injector::Shrunk shrunk = injector::shrink(record_network(world), fails);
+  expect_replaceable(file, {injector::kTraceBegins});
   std::ofstream stream(file, std::ios::binary);
   injector::write_trace(stream, shrunk.trace);
   if (!stream.flush()) throw std::runtime_error("cannot write " + file.string());

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "server/build_info.h"
-#include "tests/tools/lab/pictures/json.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/worlds/day.h"
 #include "tests/tools/worlds/runner.h"
 #include "tests/tools/worlds/second_look.h"
@@ -133,7 +133,7 @@ int day(const DayArguments& arguments) {
       {"heap_second_half_bytes", std::uint64_t{report.heap_second_half}},
       {"cpu_s", static_cast<double>(std::clock()) / CLOCKS_PER_SEC},
   };
-  lab::JsonLine line;
+  JsonLine line;
   for (const auto& [name, value] : figures) {
     std::visit([&, key = name](auto number) { line.add(key, number); }, value);
     if (!arguments.json) std::visit([key = name](auto number) { std::cout << key << ' ' << number << '\n'; }, value);

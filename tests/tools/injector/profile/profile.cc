@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "server/machine/regular_file.h"
 #include "tests/tools/injector/models/exact_math.h"
 #include "tests/tools/injector/profile/units.h"
 
@@ -319,9 +320,13 @@ std::uint64_t whole(const std::string& field, std::string_view text, std::uint64
 /// Calls `take(line, number)` for each line of a file that holds more than blanks and a comment (#).
 template <typename Take>
 void for_each_line(const std::filesystem::path& file, const std::string& expected, Take take) {
-  std::ifstream in(file);
-  // A directory opens, and fails only when it is read.
-  if (!in || in.peek() == std::ifstream::traits_type::eof()) {
+  std::ifstream in;
+  try {
+    in = open_regular_file(file);
+  } catch (const std::runtime_error& error) {
+    throw std::invalid_argument(std::string(error.what()) + ", expected " + expected);
+  }
+  if (in.peek() == std::ifstream::traits_type::eof()) {
     throw std::invalid_argument(file.string() + ": cannot be read or is empty, expected " + expected);
   }
   std::string text;

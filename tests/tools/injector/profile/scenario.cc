@@ -9,6 +9,7 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "server/machine/regular_file.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/injector/profile/units.h"
 
@@ -232,8 +233,7 @@ Scenario parse_scenario(std::string_view toml, const std::string& name) {
 }
 
 Scenario read_scenario(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path.string() + ": cannot be opened");
+  std::ifstream file = open_regular_file(path, "scenario");
   return parse_scenario(std::string(std::istreambuf_iterator<char>(file), {}), path.string());
 }
 

@@ -130,9 +130,15 @@ class Conversation {
 
   void begin() {
     if (options_.json) {
-      std::cout << R"({"event":"start","listen":")" << heading_.listen << R"(","to":")" << heading_.server
-                << R"(","seed":)" << heading_.seed << R"(,"up":)" << json_string(network_.text[0]) << R"(,"down":)"
-                << json_string(network_.text[1]) << "}" << std::endl;
+      std::cout << JsonLine()
+                       .add("event", "start")
+                       .add("listen", heading_.listen)
+                       .add("to", heading_.server)
+                       .add("seed", heading_.seed)
+                       .add("up", network_.text[0])
+                       .add("down", network_.text[1])
+                       .str()
+                << std::endl;
     } else if (!terminal_) {
       std::cout << "tendon-inject: " << heading_.listen << " -> " << heading_.server << ", seed " << heading_.seed
                 << "\n  up:   " << network_.text[0] << "\n  down: " << network_.text[1] << std::endl;
@@ -168,8 +174,7 @@ class Conversation {
       terminal_.reset();
     }
     if (options_.json) {
-      std::cout << R"({"event":"end","seed":)" << heading_.seed << "," << json_members(last, options_.max_release_error)
-                << "}" << std::endl;
+      say("end", last);
     } else {
       std::cout << end_text(heading_, last) << std::flush;
     }
@@ -177,6 +182,12 @@ class Conversation {
   }
 
  private:
+  void say(const char* event, const Status& status) {
+    JsonLine line;
+    line.add("event", event).add("seed", heading_.seed).add_all(in_json(status, options_.max_release_error));
+    std::cout << line.str() << std::endl;
+  }
+
   void report() {
     Status status = driver_.status();
     tell_of_clients(status);
@@ -184,8 +195,7 @@ class Conversation {
     if (terminal_) {
       draw(status);
     } else if (options_.json) {
-      std::cout << R"({"event":"report","seed":)" << heading_.seed << ","
-                << json_members(status, options_.max_release_error) << "}" << std::endl;
+      say("report", status);
     } else {
       std::cout << log_line(status, said_.back()) << std::endl;
     }
@@ -253,7 +263,7 @@ std::string Conversation::execute(std::string_view line) {
   if (const auto* request = std::get_if<Request>(&command)) {
     switch (*request) {
       case Request::kStats:
-        return "{" + json_members(driver_.status(), options_.max_release_error) + "}";
+        return in_json(driver_.status(), options_.max_release_error).str();
       case Request::kHelp:
         return command_help();
       case Request::kStop:
@@ -267,7 +277,9 @@ std::string Conversation::execute(std::string_view line) {
   }
   driver_.change(prepare(change, network_.seed));
   if (recorder_ != nullptr) recorder_->note(change.text);
-  if (options_.json) std::cout << R"({"event":"change","change":)" << json_string(change.text) << "}" << std::endl;
+  if (options_.json) {
+    std::cout << JsonLine().add("event", "change").add("change", change.text).str() << std::endl;
+  }
   return "ok";
 }
 

@@ -15,47 +15,43 @@ std::string fixed(double value, int digits) {
 
 std::string us(Duration d) { return fixed(static_cast<double>(d.count()) / 1e3, 1); }
 
-std::string quantiles_json(const DurationHistogram& of) {
-  return R"({"n":)" + std::to_string(of.count()) + R"(,"p50":)" + us(of.quantile(0.5)) + R"(,"p95":)" +
-         us(of.quantile(0.95)) + R"(,"p99":)" + us(of.quantile(0.99)) + R"(,"max":)" + us(of.max()) + "}";
+/// Tenths of a microsecond: a histogram knows no more.
+double rounded_us(Duration d) { return with_decimals(static_cast<double>(d.count()) / 1e3, 1); }
+
+JsonLine quantiles_json(const DurationHistogram& of) {
+  JsonLine json;
+  json.add("n", of.count())
+      .add("p50", rounded_us(of.quantile(0.5)))
+      .add("p95", rounded_us(of.quantile(0.95)))
+      .add("p99", rounded_us(of.quantile(0.99)))
+      .add("max", rounded_us(of.max()));
+  return json;
 }
 
-std::string direction_json(const ProxyMeasurements& measured) {
+JsonLine direction_json(const ProxyMeasurements& measured) {
   const ProxyCounters& n = measured.counters;
-  std::string lost_by;
+  JsonLine lost_by;
   for (std::size_t cause = 0; cause < kCauses; ++cause) {
-    if (n.dropped[cause] == 0) continue;
-    lost_by += (lost_by.empty() ? "\"" : ",\"") + std::string(to_string(static_cast<Cause>(cause))) +
-               "\":" + std::to_string(n.dropped[cause]);
+    if (n.dropped[cause] > 0) lost_by.add(to_string(static_cast<Cause>(cause)), n.dropped[cause]);
   }
-  const auto count = [](const char* name, std::uint64_t value) {
-    return std::string(",\"") + name + "\":" + std::to_string(value);
-  };
-  return R"({"received":)" + std::to_string(n.received) + count("forwarded", n.forwarded) + count("lost", n.lost()) +
-         R"(,"lost_by":{)" + lost_by + "}" + count("duplicated", n.duplicated) + count("replayed", n.replayed) +
-         count("flipped", n.flipped) + count("truncated", n.truncated) + count("refused_clients", n.refused_clients) +
-         count("refused_full", n.refused_full) + count("unsent", n.unsent) + R"(,"delay_us":)" +
-         quantiles_json(measured.delay) + R"(,"release_error_us":)" + quantiles_json(measured.release_error) + "}";
+  JsonLine json;
+  json.add("received", n.received)
+      .add("forwarded", n.forwarded)
+      .add("lost", n.lost())
+      .add("lost_by", lost_by)
+      .add("duplicated", n.duplicated)
+      .add("replayed", n.replayed)
+      .add("flipped", n.flipped)
+      .add("truncated", n.truncated)
+      .add("refused_clients", n.refused_clients)
+      .add("refused_full", n.refused_full)
+      .add("unsent", n.unsent)
+      .add("delay_us", quantiles_json(measured.delay))
+      .add("release_error_us", quantiles_json(measured.release_error));
+  return json;
 }
 
 }  // namespace
-
-std::string json_string(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      result += '\\';
-      result += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      std::array<char, 8> escape{};
-      std::snprintf(escape.data(), escape.size(), "\\u%04x", static_cast<unsigned>(c));
-      result += escape.data();
-    } else {
-      result += c;
-    }
-  }
-  return result + '"';
-}
 
 std::vector<std::string> why_invalid(const Status& status, Duration max_release_error) {
   std::vector<std::string> why;
@@ -82,22 +78,24 @@ std::vector<std::string> why_invalid(const Status& status, Duration max_release_
   return why;
 }
 
-std::string json_members(const Status& status, Duration max_release_error) {
+JsonLine in_json(const Status& status, Duration max_release_error) {
   const std::vector<std::string> why = why_invalid(status, max_release_error);
-  std::string reasons;
-  for (const std::string& reason : why) reasons += (reasons.empty() ? "" : ",") + json_string(reason);
-  std::string json = R"("t_s":)" + fixed(seconds(status.elapsed), 3) + R"(,"clients":)" +
-                     std::to_string(status.clients.size()) + R"(,"in_flight":)" + std::to_string(status.in_flight) +
-                     R"(,"valid":)" + (why.empty() ? "true" : "false") + R"(,"invalid_because":[)" + reasons +
-                     R"(],"overflowed":)" + std::to_string(status.overflowed) + R"(,"timer_floor_us":)" +
-                     quantiles_json(status.timer_floor);
+  JsonLine json;
+  json.add("t_s", with_decimals(seconds(status.elapsed), 3))
+      .add("clients", status.clients.size())
+      .add("in_flight", status.in_flight)
+      .add("valid", why.empty())
+      .add("invalid_because", why)
+      .add("overflowed", status.overflowed)
+      .add("timer_floor_us", quantiles_json(status.timer_floor));
   if (status.scenario_steps > 0) {
-    json += R"(,"scenario":{"steps":)" + std::to_string(status.scenario_steps) + R"(,"done":)" +
-            std::to_string(status.scenario_done) + "}";
+    JsonLine scenario;
+    scenario.add("steps", status.scenario_steps).add("done", status.scenario_done);
+    json.add("scenario", scenario);
   }
-  if (!status.last_change.empty()) json += R"(,"last_change":)" + json_string(status.last_change);
-  return json + R"(,"up":)" + direction_json(status.of(Direction::kUp)) + R"(,"down":)" +
-         direction_json(status.of(Direction::kDown));
+  if (!status.last_change.empty()) json.add("last_change", status.last_change);
+  json.add("up", direction_json(status.of(Direction::kUp))).add("down", direction_json(status.of(Direction::kDown)));
+  return json;
 }
 
 }  // namespace tendon::injector

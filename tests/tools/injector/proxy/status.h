@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/time.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/injector/proxy/duration_histogram.h"
 #include "tests/tools/injector/proxy/proxy.h"
 
@@ -42,11 +43,8 @@ inline constexpr Duration kMaxReleaseError = std::chrono::milliseconds(1);
 /// datagram in a hundred may exceed, in either direction.
 std::vector<std::string> why_invalid(const Status& status, Duration max_release_error);
 
-/// One object on one line, without the braces: totals since the start, valid or not.
-///     "t_s":12.0,"clients":1,"in_flight":40,"valid":true,"invalid_because":[],"timer_floor_us":{…},"up":{…},"down":{…}
-std::string json_members(const Status& status, Duration max_release_error);
-
-/// `text` as a JSON string, with its quotation marks.
-std::string json_string(const std::string& text);
+/// Totals since the start, valid or not:
+///     {"t_s":12.0,"clients":1,"in_flight":40,"valid":true,"invalid_because":[],"timer_floor_us":{…},"up":{…},"down":{…}}
+JsonLine in_json(const Status& status, Duration max_release_error);
 
 }  // namespace tendon::injector

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/base/time.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/profile.h"
 
@@ -624,27 +625,15 @@ Check measured(const Histogram& histogram, const SelftestOptions& options) {
 
 // ---- Output ---------------------------------------------------------------------------------------------------------
 
-/// In quotes; a file may be called anything.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return result + "\"";
-}
-
 std::string json_line(const Check& check) {
-  std::ostringstream out;
-  out << R"({"model":)" << quoted(check.model) << R"(,"statistic":)" << quoted(check.statistic) << std::setprecision(6)
-      << R"(,"value":)";
-  if (std::isfinite(check.value)) {
-    out << check.value;
-  } else {
-    out << "null";
-  }
-  out << R"(,"bound":)" << check.bound << R"(,"passed":)" << (check.passed() ? "true" : "false") << "}\n";
-  return out.str();
+  return JsonLine()
+             .add("model", check.model)
+             .add("statistic", check.statistic)
+             .add("value", check.value)
+             .add("bound", check.bound)
+             .add("passed", check.passed())
+             .str() +
+         "\n";
 }
 
 std::string text_line(const Check& check, bool same_model) {

@@ -14,10 +14,12 @@
 #include <tuple>
 #include <utility>
 
+#include "server/machine/regular_file.h"
+
 namespace tendon::injector {
 namespace {
 
-constexpr std::string_view kVersion = "# tendon-trace 1";
+constexpr std::string_view kVersion = kTraceBegins;
 constexpr std::string_view kColumns =
     "dir,link,index,t_in_ns,bytes,hash,verdict,cause,t_out_ns,t_actual_ns,duplicate_ns,stale_back,stale_ns,flipped_bit,"
     "truncated_to,rebinds";
@@ -370,8 +372,7 @@ void write_trace(std::ostream& to, const Trace& trace) {
 Trace read_trace(std::istream& from, const std::string& name) { return Reader(from, name).read(); }
 
 Trace read_trace(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path.string() + ": cannot be opened");
+  std::ifstream file = open_regular_file(path, "trace");
   return read_trace(file, path.string());
 }
 

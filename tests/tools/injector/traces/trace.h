@@ -18,6 +18,9 @@
 
 namespace tendon::injector {
 
+/// The first line of a trace.
+inline constexpr std::string_view kTraceBegins = "# tendon-trace 1";
+
 // A recorded network: what happened to every datagram, when and why. One text format, which is CSV with a few lines in
 // front of it:
 //

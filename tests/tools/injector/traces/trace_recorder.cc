@@ -8,6 +8,8 @@
 #include <system_error>
 #include <utility>
 
+#include "tests/support/files.h"
+
 namespace tendon::injector {
 namespace {
 
@@ -15,6 +17,7 @@ namespace {
 constexpr auto kPeriod = std::chrono::milliseconds(50);
 
 std::ofstream open(const std::filesystem::path& file) {
+  expect_replaceable(file, {kTraceBegins});
   errno = 0;
   std::ofstream stream(file, std::ios::binary | std::ios::trunc);
   if (!stream) {

@@ -19,10 +19,11 @@
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
 #include "server/build_info.h"
+#include "tests/support/files.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {
@@ -219,7 +220,7 @@ void follow_script(Body& body, const std::vector<Touched>& script, const Meter& 
       if (took.instructions) instructions.push_back(static_cast<double>(*took.instructions));
       // Twice as long is no accident of a busy machine.
       if (times.size() == kFirstUpdates && 1e3 * quantile(times, 0.5) > 2 * slowest_ms) {
-        throw TooSlow("an update takes more than " + JsonLine::number(slowest_ms) + " ms");
+        throw TooSlow("an update takes more than " + shortest(slowest_ms) + " ms");
       }
     }
     return feel.force;
@@ -306,6 +307,7 @@ Figures figures(const AccuracyPoint& p, Truth& truth) {
 }
 
 void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth) {
+  expect_replaceable(file, {"model,"});
   std::ofstream csv(file);
   csv << "model";
   if (!points.empty()) {
@@ -315,7 +317,7 @@ void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoin
   for (const AccuracyPoint& point : points) {
     csv << point.candidate.name();
     for (const auto& [name, value] : figures(point, truth)) {
-      csv << ',' << (std::isfinite(value) ? JsonLine::number(value) : std::string());
+      csv << ',' << (std::isfinite(value) ? shortest(value) : std::string());
     }
     csv << ',' << kCommit << '\n';
   }
@@ -526,7 +528,7 @@ Panel error_over_n(const Ladders& ladders) {
   return panel;
 }
 
-std::string load_text(double newtons) { return JsonLine::number(newtons) + " N"; }
+std::string load_text(double newtons) { return shortest(newtons) + " N"; }
 
 }  // namespace
 
@@ -693,7 +695,7 @@ void write_answer(std::ostream& out, const AccuracyOptions& options, const std::
     out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
   } else {
     out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
-    if (options.budget_ms) out << ", in " << JsonLine::number(*options.budget_ms) << " ms";
+    if (options.budget_ms) out << ", in " << shortest(*options.budget_ms) << " ms";
     out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
         << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
         << with_tenths(100 * best->at_load[0].total) << " %.\n";

@@ -15,8 +15,8 @@
 #include "core/stability/stability_boundary.h"
 #include "devices/simulated/simulated_device.h"
 #include "server/build_info.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {
@@ -156,14 +156,13 @@ void boundary(const BoundaryOptions& options, std::ostream& out) {
   if (options.out) {
     std::filesystem::create_directories(*options.out);
     delays.erase(delays.begin());  // no delay has no place on a logarithmic axis
-    const auto files =
-        draw_panels(*options.out / "boundary", "How stiff a sampled spring may be",
-                    JsonLine::number(options.mass) + " kg, " + JsonLine::number(options.viscous) + " N s/m; commit " +
-                        std::string(kCommit),
-                    {panel("Stiffness, N/m, over delay at 1 kHz", "delay, ms", delays,
-                           [](const SampledSpring& s) { return seconds(s.period) * s.delay_samples * 1e3; }),
-                     panel("Stiffness, N/m, over rate without delay", "rate, Hz", rates,
-                           [](const SampledSpring& s) { return 1 / seconds(s.period); })});
+    const auto files = draw_panels(
+        *options.out / "boundary", "How stiff a sampled spring may be",
+        shortest(options.mass) + " kg, " + shortest(options.viscous) + " N s/m; commit " + std::string(kCommit),
+        {panel("Stiffness, N/m, over delay at 1 kHz", "delay, ms", delays,
+               [](const SampledSpring& s) { return seconds(s.period) * s.delay_samples * 1e3; }),
+         panel("Stiffness, N/m, over rate without delay", "rate, Hz", rates,
+               [](const SampledSpring& s) { return 1 / seconds(s.period); })});
     if (!options.json) {
       for (const auto& file : files) out << "picture: " << file.string() << "\n";
     }

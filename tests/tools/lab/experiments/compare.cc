@@ -11,9 +11,10 @@
 #include <stdexcept>
 
 #include "server/build_info.h"
+#include "tests/support/files.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {
@@ -62,12 +63,12 @@ void write_csv(std::ostream& out, const Cell& cell, std::uint64_t seed) {
   out << info(cell.law).name;
   for (const double value :
        {s.stiffness, s.delay_ms, s.jitter_ms, s.rate_hz, s.loss, s.friction.viscous, s.friction.coulomb}) {
-    out << "," << JsonLine::number(value);
+    out << "," << shortest(value);
   }
   out << "," << (s.firm ? "firm" : "loose") << "," << (cell.passive() ? 1 : 0);
   for (const double value : {std::max(0.0, -o.least_energy), o.operational_stiffness, o.force_error, o.true_force,
                              o.late_vibration, o.limited_share, o.latency, o.largest_force}) {
-    out << "," << JsonLine::number(value);
+    out << "," << shortest(value);
   }
   out << "," << seed << "," << kCommit << "\n";
 }
@@ -331,6 +332,7 @@ void compare(const CompareOptions& options, std::ostream& out) {
   std::vector<std::string> written;
   if (options.out) {
     std::filesystem::create_directories(*options.out);
+    expect_replaceable(*options.out / "compare.csv", {"law,"});
     std::ofstream csv(*options.out / "compare.csv");
     csv << kColumns << "\n";
     for (std::size_t i = 0; i < cells.size(); ++i) {

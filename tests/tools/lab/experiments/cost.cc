@@ -13,11 +13,11 @@
 #include "core/estimation/recursive_least_squares.h"
 #include "core/remote/output_estimator.h"
 #include "server/build_info.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/experiment.h"
 #include "tests/tools/lab/experiments/meter.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {

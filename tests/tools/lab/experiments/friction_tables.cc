@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include "server/build_info.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
-#include "tests/tools/lab/pictures/json.h"
 
 namespace tendon::lab {
 namespace {

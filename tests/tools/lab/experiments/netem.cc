@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "server/build_info.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/profile.h"
 #include "tests/tools/injector/selftest/statistics.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {
@@ -68,8 +68,8 @@ std::vector<injector::Decision> decisions(const std::string& line, const NetemOp
 double mean_burst(double probability, double correlation) { return 1 / ((1 - correlation) * (1 - probability)); }
 
 Losses our_losses(double probability, double correlation, const NetemOptions& options) {
-  const std::string line = "loss=burst(" + JsonLine::number(probability) + "," +
-                           JsonLine::number(mean_burst(probability, correlation)) + ")";
+  const std::string line =
+      "loss=burst(" + shortest(probability) + "," + shortest(mean_burst(probability, correlation)) + ")";
   std::vector<bool> lost;
   for (const auto& decision : decisions(line, options)) lost.push_back(decision.verdict == injector::Verdict::kDrop);
   return losses(lost);

@@ -10,9 +10,9 @@
 
 #include "core/base/portable_math.h"
 #include "server/build_info.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/friction_tables.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/json.h"
 #include "tests/tools/lab/pictures/panels.h"
 
 namespace tendon::lab {

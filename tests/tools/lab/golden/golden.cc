@@ -12,10 +12,12 @@
 #include <string_view>
 #include <utility>
 
+#include "server/machine/regular_file.h"
+#include "tests/support/files.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/compare.h"
 #include "tests/tools/lab/experiments/experiment.h"
 #include "tests/tools/lab/experiments/paper.h"
-#include "tests/tools/lab/pictures/json.h"
 
 namespace tendon::lab {
 namespace {
@@ -36,7 +38,7 @@ constexpr std::array kFigures = {
 
 GoldenTable::Row row_of(Law law, std::string situation, const Outcome& outcome) {
   GoldenTable::Row row{.law = std::string(info(law).name), .situation = std::move(situation), .figures = {}};
-  for (const Figure& figure : kFigures) row.figures.push_back(JsonLine::number(outcome.*figure.value));
+  for (const Figure& figure : kFigures) row.figures.push_back(shortest(outcome.*figure.value));
   return row;
 }
 
@@ -100,7 +102,7 @@ void write(std::ostream& out, const GoldenTable& table) {
 }
 
 GoldenTable read_golden(const std::filesystem::path& file) {
-  std::ifstream in(file);
+  std::ifstream in = open_regular_file(file, "golden table");
   std::string line;
   if (!std::getline(in, line) || !line.starts_with("law,situation,")) {
     throw std::runtime_error(file.string() + ": expected a table that begins with law,situation,");
@@ -184,6 +186,7 @@ bool golden(const GoldenOptions& options, std::ostream& out) {
     }
     return found.empty();
   }
+  expect_replaceable(file, {"law,situation,"});
   std::ofstream stream(file);
   write(stream, is);
   stream.close();

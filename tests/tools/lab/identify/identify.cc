@@ -13,6 +13,7 @@
 
 #include "core/identification/friction_identification.h"
 #include "devices/simulated/profiles.h"
+#include "tests/support/json_line.h"
 #include "tests/tools/lab/identify/ramp_csv.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
 
@@ -152,47 +153,30 @@ void write_table(const Source& source, const Identification& result, std::ostrea
 
 // ---- JSON -------------------------------------------------------------------------------------------------------
 
-std::string number(double value) {
-  if (!std::isfinite(value)) return "null";
-  std::array<char, 32> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end};
-}
-
-std::string quoted(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      result += formatted("\\u%04x", static_cast<unsigned>(c));
-    } else {
-      result += c;
-    }
-  }
-  return result + '"';
-}
-
-/// `"viscous_…":…,"coulomb_…":…` with a prefix to the keys.
-std::string pair(const std::string& prefix, const Friction& friction) {
-  return '"' + prefix + "viscous_n_s_per_m\":" + number(friction.viscous) + ",\"" + prefix +
-         "coulomb_n\":" + number(friction.coulomb);
+/// `viscous_…` and `coulomb_…`, with a prefix to the keys.
+void add(JsonLine& line, const std::string& prefix, const Friction& friction) {
+  line.add(prefix + "viscous_n_s_per_m", friction.viscous).add(prefix + "coulomb_n", friction.coulomb);
 }
 
 void write_json(const Source& source, const Identification& result, std::ostream& out) {
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const RunEstimate& run = result.runs[i];
-    out << "{\"run\":" << quoted(source.names[i]) << ",\"place\":" << quoted(run.place)
-        << ",\"slope_n_per_s\":" << number(run.direction * run.kelly.rate) << ",\"travel_m\":" << number(run.travel)
-        << ',' << pair("integral_", run.integral.friction) << ',' << pair("integral_sigma_", run.integral_error) << ','
-        << pair("kelly_", run.kelly.friction)
-        << ",\"kelly_long_enough\":" << (run.kelly.long_enough() ? "true" : "false") << "}\n";
+    JsonLine line;
+    line.add("run", source.names[i])
+        .add("place", run.place)
+        .add("slope_n_per_s", run.direction * run.kelly.rate)
+        .add("travel_m", run.travel);
+    add(line, "integral_", run.integral.friction);
+    add(line, "integral_sigma_", run.integral_error);
+    add(line, "kelly_", run.kelly.friction);
+    out << line.add("kelly_long_enough", run.kelly.long_enough()).str() << '\n';
   }
-  out << "{\"result\":" << quoted(to_string(result.trust)) << ",\"reason\":" << quoted(result.reason) << ','
-      << pair("estimate_", result.estimate) << ',' << pair("lower_bound_", result.lower_bound)
-      << ",\"mass_kg\":" << number(result.mass) << ",\"force_noise_n\":" << number(result.force_noise)
-      << ",\"warnings\":[";
-  for (std::size_t i = 0; i < result.warnings.size(); ++i) out << (i > 0 ? "," : "") << quoted(result.warnings[i]);
-  out << "]}\n";
+  JsonLine line;
+  line.add("result", to_string(result.trust)).add("reason", result.reason);
+  add(line, "estimate_", result.estimate);
+  add(line, "lower_bound_", result.lower_bound);
+  line.add("mass_kg", result.mass).add("force_noise_n", result.force_noise).add("warnings", result.warnings);
+  out << line.str() << '\n';
 }
 
 }  // namespace

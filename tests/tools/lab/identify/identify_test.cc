@@ -132,7 +132,7 @@ TEST_F(Identify, NamesTheFileWhoseRunCannotBeUsed) {
     file << "t_s,x_m,force_n\n0,0,0\n0.001,0,0\n";
   }
   EXPECT_EQ(error_of({.files = files}), files[3].string() + ": expected a run of 50 samples or more, found 2");
-  EXPECT_TRUE(holds(error_of({.files = {folder_.path() / "none.csv"}}), "cannot open it"));
+  EXPECT_TRUE(holds(error_of({.files = {folder_.path() / "none.csv"}}), "cannot read ramp run"));
 }
 
 TEST_F(Identify, RefusesOptionsThatMakeNoSense) {

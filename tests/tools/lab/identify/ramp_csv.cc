@@ -13,6 +13,8 @@
 #include <system_error>
 #include <vector>
 
+#include "server/machine/regular_file.h"
+
 namespace tendon::lab {
 namespace {
 
@@ -115,15 +117,7 @@ class Reader {
 RampRun read_ramp_csv(std::istream& in, const std::string& name) { return Reader(in, name).run(); }
 
 RampRun load_ramp_csv(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    throw std::runtime_error(file.string() + ": expected a CSV file of a ramp run, found a directory");
-  }
-  std::ifstream in(file);
-  if (!in) {
-    throw std::runtime_error(file.string() + ": expected a CSV file of a ramp run, cannot open it: " +
-                             std::error_code(errno, std::generic_category()).message());
-  }
+  std::ifstream in = open_regular_file(file, "ramp run");
   return read_ramp_csv(in, file.string());
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/reason.h"
+#include "tests/support/json_line.h"
 
 namespace tendon::lab {
 namespace {
@@ -165,51 +166,6 @@ std::string notes(std::span<const Run> runs) {
 
 // ---- For programs -----------------------------------------------------------------------------------------------
 
-/// Members of one JSON object, in the order in which they are added.
-class Json {
- public:
-  Json& add(std::string_view key, std::string_view value) { return put(key, quoted(value)); }
-  Json& add(std::string_view key, bool value) { return put(key, value ? "true" : "false"); }
-  Json& add(std::string_view key, std::uint64_t value) { return put(key, std::to_string(value)); }
-  Json& add(std::string_view key, double value) { return put(key, number(value)); }
-  Json& add(std::string_view key, const std::optional<double>& value) {
-    return put(key, value ? number(*value) : "null");
-  }
-  Json& add(std::string_view key, const Json& value) { return put(key, value.text()); }
-  std::string text() const { return "{" + members_ + "}"; }
-
- private:
-  Json& put(std::string_view key, const std::string& value) {
-    if (!members_.empty()) members_ += ",";
-    members_ += quoted(key) + ":" + value;
-    return *this;
-  }
-  /// The shortest text that reads back as the same number.
-  static std::string number(double value) {
-    if (!std::isfinite(value)) return "null";
-    std::array<char, 32> text{};
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-  }
-  static std::string quoted(std::string_view text) {
-    std::string result = "\"";
-    for (const char c : text) {
-      if (c == '"' || c == '\\') {
-        result += '\\';
-        result += c;
-      } else if (static_cast<unsigned char>(c) < 0x20) {
-        std::array<char, 8> escape{};
-        std::snprintf(escape.data(), escape.size(), "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
-        result += escape.data();
-      } else {
-        result += c;
-      }
-    }
-    return result + '"';
-  }
-
-  std::string members_;
-};
-
 std::optional<double> p50_ms(const std::optional<Spread>& times) {
   return times ? std::optional(ms(times->p50)) : std::nullopt;
 }
@@ -263,9 +219,9 @@ std::string to_table(std::span<const Run> runs) {
 
 std::string to_json(const Run& run) {
   const RunSummary& s = run.summary;
-  Json reasons;
+  JsonLine reasons;
   for (const ReasonName& name : kReasonNames) reasons.add(name.key, s.share_limited(name.reason) * 100);
-  Json json;
+  JsonLine json;
   json.add("recording", run.recording)
       .add("label", run.label)
       .add("truncated", run.truncated)
@@ -293,7 +249,7 @@ std::string to_json(const Run& run) {
       .add("overruns", s.overruns)
       .add("watchdogs", s.watchdogs)
       .add("longest_interval_ms", ms(s.longest_interval));
-  return json.text();
+  return json.str();
 }
 
 }  // namespace tendon::lab

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
-#include "tests/tools/lab/pictures/json.h"
+#include "tests/support/json_line.h"
 
 namespace tendon::lab {
 namespace {
@@ -70,8 +70,6 @@ std::string reasons_cell(Reasons reasons) {
   return text;
 }
 
-std::string number(double value) { return std::isfinite(value) ? JsonLine::number(value) : value > 0 ? "inf" : "-inf"; }
-
 /// "t_s,x_m" and so on, one after the other.
 std::vector<std::string_view> names(std::string_view header) {
   std::vector<std::string_view> result;
@@ -99,11 +97,10 @@ LimiterConfig limiter_of(const FilterLaw& law) {
       "[device]\nkind = \"simulated\"\n"
       "[device.effects]\nmass_kg = 0.1\nviscous_friction_n_s_per_m = 1e9\ncoulomb_friction_n = 1e9\n"
       "[limiter]\n[force]\nmax_force_n = 8.0\n";
-  std::vector<std::string> settings = {"limiter.kind=" + law.name,
-                                       "limiter.coulomb_friction_n=" + JsonLine::number(law.coulomb),
-                                       "limiter.viscous_friction_n_s_per_m=" + JsonLine::number(law.viscous),
-                                       "loop.period_us=" + JsonLine::number(std::min(law.period_us, 1000.0)),
-                                       "loop.longest_hold_us=" + JsonLine::number(law.period_us)};
+  std::vector<std::string> settings = {
+      "limiter.kind=" + law.name, "limiter.coulomb_friction_n=" + shortest(law.coulomb),
+      "limiter.viscous_friction_n_s_per_m=" + shortest(law.viscous),
+      "loop.period_us=" + shortest(std::min(law.period_us, 1000.0)), "loop.longest_hold_us=" + shortest(law.period_us)};
   settings.insert(settings.end(), law.settings.begin(), law.settings.end());
   return parse_scene(kScene, "the law's scene", ".", settings).loop.control.limiter;
 }
@@ -161,8 +158,8 @@ int filter(const FilterOptions& options, std::istream& in, std::ostream& out, st
       out << json.str() << "\n";
     } else {
       out << line;
-      for (int i = 0; i < format->axes; ++i) out << "," << number(applied[i]);
-      out << "," << number(limited.permitted) << "," << number(energy) << "," << reasons_cell(reasons) << "\n";
+      for (int i = 0; i < format->axes; ++i) out << "," << shortest(applied[i]);
+      out << "," << shortest(limited.permitted) << "," << shortest(energy) << "," << reasons_cell(reasons) << "\n";
     }
   }
   if (!out.flush()) throw std::runtime_error("cannot write the result: is the disk full?");
