@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# long.sh [RUNS [TARGET…]]: runs of each fuzz target of the preset `asan`, one after the other, at the lowest priority, for
-# hours: 10 000 000 unless told otherwise. What they find is in build/asan/long/TARGET/, what they say in TARGET.log there.
-# Afterwards TARGET/minimised holds the inputs that reach all that was reached. When they reach more than the committed
-# corpus, pack them (the last line printed says how), and commit that with the figures for README.md.
+# long.sh [RUNS [TARGET…]]: runs of each fuzz target of the preset `asan`, one after the other, at the lowest priority,
+# for hours: 10 000 000 unless told otherwise. Each target writes its finds to build/asan/long/TARGET/, and its log to
+# TARGET.log there. Afterwards TARGET/minimised holds the inputs that reach all that was reached. When they reach more
+# than the committed corpus, pack them (the last line printed says how), and commit that with the figures for README.md.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 runs=${1:-10000000}

@@ -9,8 +9,8 @@
 #include "server/recording/recording_reader.h"
 #include "tests/fuzz/target.h"
 
-// A recording: every byte sequence gives records and then ends, or is refused by name. What is read says the same
-// after it has been written again.
+// A recording: every byte sequence gives records and then ends, or is refused by name. A record that was read
+// is the same after it has been written and read again.
 
 using namespace tendon;
 

@@ -56,7 +56,7 @@ struct Options {
 
 enum class Wait : std::uint8_t { kBusy, kBlocking };
 
-/// What the other process is to do. In memory that both share.
+/// Orders to the other process, in memory that both share.
 struct Orders {
   enum Job : int { kRest, kEcho, kSealedEcho, kTendon, kQuit };
   std::atomic<int> job{kRest};

@@ -114,8 +114,8 @@ class Injector final : public Decider {
   /// … and the times of the profile count from `start`.
   Injector for_link(std::uint32_t link, LocalTime start) const;
 
-  /// Arrivals should not go back in time; when they do, FIFO still holds. What does not fit into a route of 60 s and
-  /// its queue is not delayed further.
+  /// Arrivals should not go back in time; when they do, FIFO still holds. A datagram that does not fit into a
+  /// route of 60 s and its queue is not delayed further.
   Decision decide(const Packet& packet) override;
 
   /// Another profile from now on, whose times count from `now`. Index, draws, queue, order and the states of correlated

@@ -113,7 +113,7 @@ TEST(Injector, ASecondCopyMayComeAfterNewerDatagrams) {
 
 constexpr const char* kPlain = "base=5ms delay=uniform(0ms,30ms) rho=0.5";
 
-TEST(Injector, WhateverIsAddedToAProfileLeavesTheReleasesOfAllOthersAsTheyWere) {
+TEST(Injector, AFieldThatIsAddedToAProfileMovesNoOtherRelease) {
   const auto plain = decisions(kPlain, 10'000, 1ms);
   // 1 kHz with 30 ms of jitter: most datagrams wait for one ahead of them, so waiting is in the claim.
   EXPECT_GT(count_if(plain, [](const Decision& d) { return d.cause == Cause::kFifo; }), 5000);
@@ -314,7 +314,7 @@ TEST(Injector, FreeOrderReleasesEachWhenItsOwnDelayIsOver) {
   EXPECT_GT(overtaken, 300);
 }
 
-TEST(Injector, AJumpLeavesJustAheadOfTheDatagramThatManyPlacesBeforeAndMovesNoOther) {
+TEST(Injector, AJumpOvertakesAsManyDatagramsAsItSaysAndMovesNoOther) {
   const auto plain = decisions("delay=10ms", 5000, 1ms);
   const auto jumping = decisions("delay=10ms jump(10%,3)", 5000, 1ms);
   double jumps = 0;

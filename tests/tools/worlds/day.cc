@@ -307,7 +307,7 @@ class Day {
       come_back(z_);
     }
     world_.network().change(fair(), world_.now());
-    // What is still under way may be as late as it likes.
+    // Datagrams that are still under way may come at any time.
     recover(std::max(world_.now(), world_.network().latest_arrival()));
   }
 

@@ -21,7 +21,7 @@ class Receipts {
   /// `overlap`: how long the key before is good for.
   explicit Receipts(Duration overlap) : overlap_(overlap) {}
 
-  /// What is not whole cannot be authentic.
+  /// A datagram that is not whole cannot be authentic.
   void see(LocalTime now, std::span<const std::byte> datagram, bool whole);
 
   /// That must be accepted (LinkStats::datagrams_received) in the conversation of that id, one of the newest.

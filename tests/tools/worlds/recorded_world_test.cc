@@ -90,7 +90,7 @@ Outcome run(const std::filesystem::path& data, const Hand& hand, Law limiter, co
 
 class RecordedWorld : public testing::TestWithParam<Hand> {};
 
-TEST_P(RecordedWorld, ARecordedHumanHandOnAWallBehindAMeasured5GNetworkIsPassiveWithTheLimiterAndActiveWithout) {
+TEST_P(RecordedWorld, ARecordedHandBehindMeasured5GIsPassiveOnlyWithTheLimiter) {
   const char* data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): nobody sets variables here
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no recorded hand, no measured network";
   const std::filesystem::path out = TENDON_RECORDED_WORLDS;

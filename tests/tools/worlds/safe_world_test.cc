@@ -72,7 +72,7 @@ class Pluggable final : public Device {
   Device& device_;
 };
 
-TEST(SafeWorld, TheAccountCountsWhatTheSafetyLayerHasLeftAndThePortStaysPassive) {
+TEST(SafeWorld, TheLedgerBooksTheForceAfterTheSafetyLayerAndStaysPassive) {
   SimulatedDevice device(hand());
   WatchedDevice witness(device, {.friction = kBounds});
   SafeDevice::Config config;
@@ -103,7 +103,7 @@ TEST(SafeWorld, TheAccountCountsWhatTheSafetyLayerHasLeftAndThePortStaysPassive)
   EXPECT_GE(witness.energy(), -1e-9);
 }
 
-TEST(SafeWorld, WhatIsUnpluggedInMidForceGivesForcesAgainOnlyAfterHomingAndTheEnginesRequest) {
+TEST(SafeWorld, ADeviceReplugedInMidForceWaitsForHomingAndTheEnginesRequest) {
   SimulatedDevice device(hand(Vec3(0.015, 0, 0)));
   Pluggable plug(device);
   plug.stage = Device::State::kUnhomed;

@@ -167,7 +167,7 @@ TEST(World, ARecordingHoldsEveryStepAndEveryDatagram) {
   EXPECT_GT(datagrams_in, world.client(z).stats().forces / 2);
 }
 
-TEST(World, WhenTheEngineIsKilledTheForceIsHeldThenFadesThenStopsAndComesBackRampedIn) {
+TEST(World, AKilledEnginesForceHoldsFadesStopsAndComesBackRampedIn) {
   SimulatedDevice device(pressing_hand());
   World world(world_config(device), device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
@@ -193,7 +193,7 @@ TEST(World, WhenTheEngineIsKilledTheForceIsHeldThenFadesThenStopsAndComesBackRam
   EXPECT_TRUE(ramped);
 }
 
-TEST(World, AFaultOfTheDeviceZeroesTheForceSavesTheStepsBeforeItAndIsLeftByRearmOnly) {
+TEST(World, ADeviceFaultZeroesTheForceSavesStepsAndOnlyRearmLeavesIt) {
   class FailingDevice final : public Device {
    public:
     explicit FailingDevice(const SimulatedDevice::Config& config) : device_(config) {}
@@ -304,7 +304,7 @@ TEST(World, ALocalModelIsUsedWhenBothEndsKnowItAndMakesTheContactStiffer) {
   EXPECT_LT(depth(true), depth(false));
 }
 
-TEST(World, GarbageTruncatedOversizedAndReplayedDatagramsAreCountedAndChangeNothing) {
+TEST(World, BadAndReplayedDatagramsAreCountedAndChangeNothing) {
   SimulatedDevice device(pressing_hand());
   World world(world_config(device), device);
   const std::size_t z = world.add_controller(at_100_hz(), wall());
@@ -385,7 +385,7 @@ TEST(World, TheLawBooksTheForceThatADeviceKeepsWhenItIsToldZero) {
   EXPECT_LT(worst, 1e-9) << "J, the law's account against the witness's";
 }
 
-TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversWithoutBeingLifted) {
+TEST(World, PausesOfTheMachineAreFlaggedAndTheLedgerRecoversByItself) {
   SimulatedDevice::Config hand = pressing_hand();
   hand.watchdog = milliseconds(5);
   SimulatedDevice device(hand);

@@ -27,7 +27,7 @@ TEST(Bottleneck, ADatagramTakesItsBitsOverTheRateAndThoseBehindItWait) {
   EXPECT_EQ(queue.pass(kStart + 10ms, 97), kStart + 11ms);
 }
 
-TEST(Bottleneck, ABusyLinkSendsExactlyItsRateAlthoughNoDatagramTakesWholeNanoseconds) {
+TEST(Bottleneck, ABusyLinkKeepsItsRateInFractionsOfNanoseconds) {
   BottleneckQueue queue(of("rate=7Mbit/s queue=1000000packets overhead=0"), kStart);
   std::optional<LocalTime> last;
   for (int i = 0; i < 70'000; ++i) last = queue.pass(kStart, 100);

@@ -198,7 +198,7 @@ TEST(Copula, ConsecutiveDeviatesAreCorrelatedAsAskedByPacketAndByTime) {
   }
 }
 
-TEST(Copula, DatagramsAtTheSameTimeShareTheirDeviateAndLongAfterNothingIsLeft) {
+TEST(Copula, OneTimeHasOneDeviateAndLongAfterNothingIsLeft) {
   Copula copula(0, 20ms);
   const std::uint64_t first = copula.next(123, LocalTime(1s));
   EXPECT_EQ(copula.next(~std::uint64_t{0} / 3, LocalTime(1s)), first);

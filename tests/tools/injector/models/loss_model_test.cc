@@ -77,7 +77,7 @@ TEST(LossModel, GilbertAndElliottLoseWhatTheirStatesLoseInTheirShares) {
   EXPECT_NEAR(simple.mean_burst, 1 / r, 4 * 5 * std::sqrt(0.8 / (kMany * bad * r)));
 }
 
-TEST(LossModel, AChainBeginsInItsStationaryDistributionSoThatShortRunsLoseAsMuchAsLongOnes) {
+TEST(LossModel, AChainBeginsStationarySoShortRunsLoseAsMuchAsLongOnes) {
   constexpr int kRuns = 20'000;
   int first = 0;
   int third = 0;

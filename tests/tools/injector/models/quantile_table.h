@@ -13,8 +13,8 @@ namespace tendon::injector {
 ///
 ///     least + ⌊width · (u − from)/(next from − from)⌋        so to least … least + width − 1
 ///
-/// which takes one multiplication, and no floating point. What is straight in truth (constant, uniform, histograms,
-/// samples) is exact; smooth distributions are cut by tabulate().
+/// which takes one multiplication, and no floating point. Distributions that are straight in truth (constant,
+/// uniform, histograms, samples) are exact; tabulate() cuts smooth ones into pieces.
 ///
 /// Thread-safe: yes, once built.
 class QuantileTable {

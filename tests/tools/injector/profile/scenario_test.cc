@@ -220,7 +220,7 @@ TEST(Command, IsOneLineOfText) {
   EXPECT_EQ(parse_command("stop"), Command(Request::kStop));
 }
 
-// What a file says and what a command says is the same thing in the same words.
+// A file and a command say the same change in the same words.
 TEST(Command, IsHowAScenariosChangeIsWrittenIntoTheTrace) {
   const Scenario scenario = parse_scenario("[[at]]\nt_s = 1\nlink = 2\nboth = \"delay=3ms\"", "x");
   EXPECT_EQ(parse_command(scenario.changes[0].change.text), Command(scenario.changes[0].change));

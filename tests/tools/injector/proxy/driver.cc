@@ -227,8 +227,8 @@ std::bitset<kUdpBatch> Driver::send_with(std::size_t first, const std::bitset<kU
   const Duration took = monotonic_now() - begin;
   for (std::size_t k = 0; k < count; ++k) {
     const Proxy::Departure& departure = due_[places[k]];
-    // A datagram leaves when the kernel turns to it: the call takes them one after the other. What it does then, up to
-    // waking the receiver, is the network's time and not ours.
+    // A datagram leaves when the kernel turns to it: the call takes them one after the other. Its work from then
+    // until the receiver wakes counts as the network's time, not ours.
     const LocalTime left = begin + took * static_cast<std::int64_t>(k) / static_cast<std::int64_t>(count);
     refused.test(k) ? proxy_.not_sent(departure) : proxy_.left(departure, left);
   }

@@ -236,7 +236,7 @@ TEST(Proxy, MeasuresHowLateDatagramsLeftAndHowLongTheyReallyTook) {
   EXPECT_EQ(measured.delay.max(), 23ms);
 }
 
-TEST(Proxy, ATimelineCountsFromTheFirstDatagramAndDoesNotDependOnWhenItIsAsked) {
+TEST(Proxy, ATimelineCountsFromTheFirstDatagramWheneverItIsAsked) {
   Proxy::Config o = config("delay=1ms", "delay=1ms");
   Proxy::PreparedChange slow;
   slow.to[0].emplace(parse_profile("delay=50ms"), 7, 0, Direction::kUp);
@@ -255,7 +255,7 @@ TEST(Proxy, ATimelineCountsFromTheFirstDatagramAndDoesNotDependOnWhenItIsAsked) 
   EXPECT_EQ(proxy.last_change(), "up delay=50ms");
 }
 
-TEST(Proxy, TheTimesOfAStepCountFromTheStepAndNotFromTheDatagramThatMeetsItFirst) {
+TEST(Proxy, TheTimesOfAStepCountFromTheStepNotFromItsFirstDatagram) {
   Proxy::Config o = config("", "");
   Proxy::PreparedChange outage;
   outage.to[0].emplace(parse_profile("outage(at=5ms,for=5ms)"), 7, 0, Direction::kUp);

@@ -22,7 +22,7 @@ struct Status {
   std::size_t in_flight = 0;
 
   /// How late the machine's own timer was: the same thread, asleep in the same system call for as long as before its
-  /// last release, woken with nothing to send. What a release error is on top of this, the proxy has added.
+  /// last release, woken with nothing to send. The proxy has added the rest of a release error.
   DurationHistogram timer_floor;
 
   std::uint64_t overflowed = 0;    ///< datagrams that the kernel threw away before the proxy had read them

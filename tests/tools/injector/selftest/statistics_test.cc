@@ -66,7 +66,7 @@ TEST(Statistics, CorrelatedSamplesCountForFewer) {
 }
 
 // The law of a dependent sample is not the one that the correction assumes: here is how far off it is.
-TEST(Statistics, GaussianSamplesInARowKeepToTheBoundOfTheIndependentSamplesTheyCountFor) {
+TEST(Statistics, CorrelatedGaussiansKeepTheBoundOfFewerIndependentSamples) {
   for (const double rho : {0.5, 0.9}) {
     int broken = 0;
     for (std::uint64_t seed = 0; seed < 300; ++seed) {
@@ -134,7 +134,7 @@ TEST(Statistics, NormalQuantileUndoesTheNormalLaw) {
   for (double x = -7; x <= 4; x += 0.125) EXPECT_NEAR(normal_quantile(normal_cdf(x)), x, 1e-11) << x;
 }
 
-TEST(Statistics, AutocorrelationOfAnAlternationIsMinusOneAndOfAConstantNothing) {
+TEST(Statistics, AnAlternationCorrelatesByMinusOneAndAConstantByNothing) {
   std::vector<double> alternating(1000);
   for (std::size_t i = 0; i < alternating.size(); ++i) alternating[i] = i % 2 == 0 ? 3 : 5;
   EXPECT_NEAR(autocorrelation(alternating, 1), -0.999, 1e-12);

@@ -33,7 +33,7 @@ TEST(DriftingClock, DriftIsExactAfterYears) {
   EXPECT_EQ(clock.reading(at(50 * 365 * 24h)), at(50 * 365 * 24h - 50 * 365 * 24 * 3600ns));
 }
 
-TEST(DriftingClock, ATimerThatIsSetAfterTheClockWasSetBackRingsWhenItReadsThatAgain) {
+TEST(DriftingClock, ATimerRingsWhenAClockThatWasSetBackReadsItsTimeAgain) {
   const DriftingClock clock({.offset = 1s, .drift_ppb = 0, .steps = {{10s, -3s}, {20s, 1s}}});
   EXPECT_EQ(clock.truth(at(10s)), at(9s));
   EXPECT_EQ(clock.truth(at(10s), at(9500ms)), at(9500ms));

@@ -94,7 +94,7 @@ TEST(TracePlayer, EachDirectionHasItsOwnFates) {
   for (std::uint64_t i = 0; i < 300; ++i) EXPECT_EQ(down.decide(packet_of(i)), original.decide(packet_of(i)));
 }
 
-TEST(TracePlayer, ByTimeTheNetworkIsBadAtTheSameTimesHoweverManyDatagramsThereAre) {
+TEST(TracePlayer, ByTimeTheNetworkIsBadAtTheSameTimesWhateverTheTraffic) {
   // 20 ms, between 1 s and 2 s lost, then 5 ms; a record every 10 ms.
   Trace trace;
   trace.start = at(100s);

@@ -49,7 +49,7 @@ TEST(AccuracyTruth, SaysHowFarItsOwnMeshesLeaveItOpen) {
   EXPECT_LT(std::abs(finer.limit(Law::kLinear, 0)->secant / truth().limit(Law::kLinear, 0)->secant - 1), coarse);
 }
 
-TEST(AccuracyTruth, IsAsMuchSofterOrStifferUnderAHardPressAsANeoHookeanSolidOfAnotherElement) {
+TEST(AccuracyTruth, ChangesUnderAHardPressAsANeoHookeanSolidOfAnotherElement) {
   const auto press = [&](ModelKind model) {
     softbody::BodyConfig config;
     config.shape = softbody::BlockShape{truth().block().size, {8, 8, 4}};
@@ -104,7 +104,7 @@ TEST(Accuracy, PartsOfAnErrorAddUpToItAndAreWhereTheyBelong) {
   }
 }
 
-TEST(Accuracy, TheScriptSeesTheSameErrorAsTheStiffnessAndASymmetricMeshPushesNotAside) {
+TEST(Accuracy, TheScriptSeesTheErrorOfTheStiffnessAndNoPushAside) {
   const Meter meter;
   const AccuracyPoint point = measure({ModelKind::kCondensed, Element::kHex8Sri, 8}, truth(), meter);
   EXPECT_NEAR(point.force_relative, point.at_load[0].total, 0.02);
@@ -146,7 +146,7 @@ TEST(Accuracy, TheExponentOfItsCostIsThatOfItsLadderAndOneMeshHasNone) {
   EXPECT_TRUE(std::isnan(cost_exponent({})));
 }
 
-TEST(Accuracy, WhatIsAsRigidAsPossibleIsABodyWithoutLambdaAndItsRoundsEndThere) {
+TEST(Accuracy, AnAsRigidAsPossibleBodyHasNoLambdaAndItsRoundsConverge) {
   const AccuracyPoint point = measure({ModelKind::kProjective, Element::kHex8Sri, 4}, truth(), Meter());
   for (const Accuracy& at : point.at_load) {
     EXPECT_NEAR(at.model + at.discretisation + at.solver, at.total, 1e-12);
@@ -156,7 +156,7 @@ TEST(Accuracy, WhatIsAsRigidAsPossibleIsABodyWithoutLambdaAndItsRoundsEndThere) 
   }
 }
 
-TEST(Accuracy, WhatSpringsBecomeOnAFineMeshHardlyDependsOnTheMeshThatItIsSeenOn) {
+TEST(Accuracy, TheLimitOfSpringsHardlyDependsOnTheMeshItIsSeenOn) {
   const auto at = [](int n) {
     const AccuracyPoint point = measure({ModelKind::kMassSpring, Element::kTet4, n}, truth(), Meter());
     EXPECT_NEAR(point.at_load[0].model + point.at_load[0].discretisation, point.at_load[0].total, 1e-12);

@@ -6,7 +6,7 @@
 namespace tendon::lab {
 namespace {
 
-TEST(FrictionTables, WhereTheTravelIsShortKellyIsOffByTenTimesAndTheIntegralIsTrusted) {
+TEST(FrictionTables, OnAShortTravelKellyIsOffTenfoldAndTheIntegralTrusted) {
   const std::vector<FrictionTable> tables = friction_tables();
   ASSERT_EQ(tables.size(), 3U);
   for (const FrictionTable& table : tables) {

@@ -49,7 +49,7 @@ TEST(Paper, TheLimiterMakesEachOfTheFiveStable) {
   }
 }
 
-TEST(Paper, WithExactPositionsTheLimiterNeverGivesOutEnergyAndAolPlusNotEvenWithCounts) {
+TEST(Paper, AolGivesOutNoEnergyAtExactPositionsAndAolPlusNoneWithCounts) {
   for (const PaperExperiment& e : paper_experiments()) {
     EXPECT_GE(paper_row(e, Law::kAol).prescribed.least_energy, -1e-12) << e.name;
     EXPECT_GE(paper_row(e, Law::kAolPlus).least_energy(), -1e-12) << e.name;
@@ -58,7 +58,7 @@ TEST(Paper, WithExactPositionsTheLimiterNeverGivesOutEnergyAndAolPlusNotEvenWith
 
 TEST(Paper, AolPlusDisplays400AtTheLowRateWhereThePaperHas16) { EXPECT_GE(displayed("D", Law::kAolPlus), 400); }
 
-TEST(Paper, AolPlusWithALocalModelDisplays500ThroughTheDelayWhereThePaperHas180) {
+TEST(Paper, AolPlusWithAModelDisplays500BehindADelayWhereThePaperHas180) {
   EXPECT_GE(displayed("C", Law::kAolPlus), 500);
 }
 
@@ -128,7 +128,7 @@ Outcome feel(const Composite& composite, const Friction& friction, const Limiter
 constexpr Friction kDamped{.coulomb = 0.02, .viscous = 0.26};
 constexpr Friction kUndamped{.coulomb = 0.04, .viscous = 0.005};
 
-TEST(AolPlus, DisplaysASpringOnADeviceWithoutDampingWherePlainAolShowsATenthOfIt) {
+TEST(AolPlus, DisplaysASpringWithoutDampingWherePlainAolShowsATenth) {
   const Composite spring = composites(Vec3::UnitX(), Vec3::UnitX())[1];
   const Outcome plain = feel(spring, kUndamped, {.law = Law::kAol, .friction = kUndamped});
   const Outcome plus = feel(spring, kUndamped, {.friction = kUndamped, .parts = low_friction_parts(kPaperEncoder)});

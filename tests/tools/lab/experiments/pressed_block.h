@@ -51,7 +51,7 @@ struct Touched {
 ///     K = K_linear(a/cells) · K_neo-Hookean(a/cells_for_large)/K_linear(a/cells_for_large)
 ///
 /// because the ratio hardly depends on the mesh. `uncertainty()` says what both factors still change by from the next
-/// coarser mesh. What is not asked for is not computed. Thread-safe: no.
+/// coarser mesh. It computes only what is asked for. Thread-safe: no.
 class Truth {
  public:
   /// Cells to a patch's radius, below the patch, 1.5 or more. As they stand here B1 takes half a minute and 0.3 GB.

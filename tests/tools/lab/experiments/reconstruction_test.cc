@@ -61,20 +61,20 @@ double error(double rate_hz, double late_ms, Sent sent) {
   return result.force_error / result.true_force;
 }
 
-TEST(Reconstruction, AHundredAnswersASecondAndFiveMillisecondsLateAreFollowedWithin2_5PercentByTheirStiffness) {
+TEST(Reconstruction, At100HzAnd5MsLateTheStiffnessBringsItWithin2_5Percent) {
   const double held = error(100, 5, Sent::kForce);
   EXPECT_NEAR(held, 0.175, 0.03);
   EXPECT_LT(error(100, 5, Sent::kForceAndStiffness), 0.025);
 }
 
-TEST(Reconstruction, AtThirtyAndTwentyMillisecondsLateOneStiffnessIsNotEnough) {
+TEST(Reconstruction, At30HzAnd20MsLateOneStiffnessIsNotEnough) {
   EXPECT_NEAR(error(30, 20, Sent::kForce), 0.585, 0.08);
   const double followed = error(30, 20, Sent::kForceAndStiffness);
   EXPECT_LT(followed, 0.3);
   EXPECT_GT(followed, 0.07);
 }
 
-TEST(Reconstruction, AtThirtyAndTwentyMillisecondsLateTheSurfaceHelpsAndTheTableBringsItWithin3Percent) {
+TEST(Reconstruction, At30HzAnd20MsLateTheTableBringsItWithin3Percent) {
   EXPECT_LT(error(30, 20, Sent::kAndSurface), 0.9 * error(30, 20, Sent::kForceAndStiffness));
   EXPECT_LT(error(30, 20, Sent::kAndTable), 0.03);
   EXPECT_LT(error(100, 5, Sent::kAndTable), 0.01);

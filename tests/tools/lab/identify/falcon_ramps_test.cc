@@ -81,7 +81,7 @@ Identification identified(const Friction& friction) {
   return identify_friction(runs, {.mass = kMass, .encoder_step = 43e-6});
 }
 
-TEST(FalconIdentification, FindsTheFrictionThatTheModelHasWithinTheBoundsThatItStates) {
+TEST(FalconIdentification, FindsTheModelsFrictionWithinTheBoundsItStates) {
   const Friction truth{.coulomb = 0.2, .viscous = 1};
   const Identification found = identified(truth);
   const PlaceEstimate& place = found.places.at(0);

@@ -50,7 +50,7 @@ TEST(SimulatedRamps, RefusesAnExperimentThatIsNone) {
   EXPECT_THROW(simulated_ramps(experiment), std::invalid_argument);
 }
 
-TEST(SimulatedIdentification, FindsLittleFrictionWhereKellyIsOffTenTimesAndSaysSo) {
+TEST(SimulatedIdentification, FindsLittleFrictionAndSaysThatKellyIsOff) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     RampExperiment experiment = experiment_with(0.005);
     experiment.seed = seed;

@@ -31,7 +31,7 @@ constexpr double kAbovePanel = 0.018;
 
 /// Energies of two runs that differ by more than this are drawn to scales of their own: one would be a flat line.
 constexpr double kTooDifferent = 20;
-/// What is wanted may be any number; what is applied has to stay visible.
+/// The force wanted may be any number; the force applied has to stay visible.
 constexpr double kMostWanted = 3;
 
 double picture_width(std::size_t drawings) { return kColumn * static_cast<double>(std::max<std::size_t>(drawings, 2)); }

@@ -280,7 +280,7 @@ TEST(RunSummary, SpanIntervalAndPeaksAreThoseOfTheSteps) {
   EXPECT_FALSE(run.limiter_on);
 }
 
-TEST(RunSummary, TheRealControlLawKeepsThePromiseAndWithoutALimiterItIsBroken) {
+TEST(RunSummary, ThePromiseIsKeptByTheRealLawAndBrokenWithoutALimiter) {
   const RunSummary on = summarise(toy_run(Law::kAol, 6000));
   EXPECT_TRUE(on.passive());
   EXPECT_TRUE(on.limiter_on);
