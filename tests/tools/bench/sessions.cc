@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocol/limits.h"
+#include "tests/tools/bench/bare_traffic.h"
 #include "tests/tools/bench/bench.h"
 #include "tests/tools/bench/fleet.h"
 

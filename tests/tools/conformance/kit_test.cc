@@ -11,7 +11,9 @@
 
 #include "tests/tools/conformance/client_checks.h"
 #include "tests/tools/conformance/server_checks.h"
-#include "tests/tools/conformance/toy_peer.h"
+#include "tests/tools/conformance/toy/client.h"
+#include "tests/tools/conformance/toy/server.h"
+#include "tests/tools/conformance/toy/wire.h"
 
 namespace tendon::conformance {
 namespace {

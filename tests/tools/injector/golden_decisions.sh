@@ -22,7 +22,8 @@ if [ "$program" = --with ]; then
   for file in core/base/portable_math server/machine/regular_file \
     $tool/models/bottleneck $tool/models/delay_model $tool/models/draws $tool/models/exact_math \
     $tool/models/loss_model $tool/models/quantile_table $tool/golden_decisions_main $tool/injector \
-    $tool/profile/named_profiles $tool/profile/profile $tool/profile/timeline $tool/profile/units; do
+    $tool/profile/limits $tool/profile/named_profiles $tool/profile/profile $tool/profile/profile_text \
+    $tool/profile/tables $tool/profile/timeline $tool/profile/units $tool/profile/words; do
     object=$scratch/$(basename "$file").o
     "$compiler" -std=c++20 -O2 -ffp-contract=off -I. -c "$file.cc" -o "$object"
     set -- "$@" "$object"

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -326,7 +327,7 @@ TEST(Profile, RefusesALineItDoesNotUnderstandAndSaysWhere) {
            {"queue=9", "queue is \"9\", expected a number with its unit like 64kB or 50packets (B, kB, MB, packets)"},
            {"opportunities(3,2)", "opportunities is not rising, expected times in order"},
            {"opportunities(none.trace)",
-            "none.trace: cannot be read or is empty, expected a time in whole ms in each line"},
+            "cannot read none.trace: No such file or directory, expected a time in whole ms in each line"},
            {"order=lifo", "order is \"lifo\", expected fifo or free"}}) {
     EXPECT_EQ(complaint_about(line), complaint) << line;
   }
@@ -372,10 +373,20 @@ TEST(ProfileFiles, WhatCannotBeReadIsNamedByFileAndLine) {
   EXPECT_EQ(complaint_in("1,-2\n"), ":1: weight is -2, expected a number that is zero or more");
   EXPECT_EQ(complaint_in("1e300,2\n"), ":1: value is 1e+300ms, expected 0ms to 60s");
   EXPECT_EQ(complaint_in("x\n", "samples("), ":1: expected VALUE_MS or VALUE_MS,COUNT like 0.56,72, got \"x\"");
-  EXPECT_EQ(complaint_in(""), ": cannot be read or is empty, expected one value in ms and its weight in each line");
+  EXPECT_EQ(complaint_in(""), " is empty, expected one value in ms and its weight in each line");
   EXPECT_EQ(complaint_about("delay=histogram(no/such.csv)"),
-            "no/such.csv: cannot be read or is empty, expected one value in ms and its weight in each line");
+            "cannot read no/such.csv: No such file or directory, expected one value in ms and its weight in each line");
   EXPECT_NE(complaint_about("delay=histogram(" + testing::TempDir() + ")"), "");
+}
+
+TEST(ProfileFiles, ANamedPipeIsRefusedAndNotWaitedFor) {
+  const std::string pipe = testing::TempDir() + "histogram_pipe.csv";
+  std::filesystem::remove(pipe);
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(complaint_about("delay=histogram(" + pipe + ")"),
+            "cannot read " + pipe +
+                ": it is a named pipe, expected a regular file, expected one value in ms and its weight in each line");
+  std::filesystem::remove(pipe);
 }
 
 }  // namespace

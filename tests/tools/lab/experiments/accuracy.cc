@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -18,13 +16,11 @@
 #include "clients/softbody/models/explicit.h"
 #include "clients/softbody/models/linear.h"
 #include "clients/softbody/models/quasi_static.h"
-#include "server/build_info.h"
-#include "tests/support/files.h"
-#include "tests/support/json_line.h"
+#include "core/base/expect.h"
 #include "tests/tools/injector/injector.h"
 #include "tests/tools/injector/profile/named_profiles.h"
-#include "tests/tools/lab/pictures/gnuplot.h"
-#include "tests/tools/lab/pictures/panels.h"
+#include "tests/tools/lab/experiments/accuracy_pictures.h"
+#include "tests/tools/lab/experiments/accuracy_table.h"
 
 namespace tendon::lab {
 namespace {
@@ -40,8 +36,6 @@ constexpr int kMostPresses = 10;           // of Newton's method, for an answer 
 constexpr double kReach = 0.3;             // patch radii, that a table of the surface holds
 constexpr int kStaticModes = 3;            // along each axis of that, of a modal body
 constexpr double kUnfeltMs = 0.1;          // a tenth of a period of the device: nobody feels who is quicker by less
-/// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
-constexpr double kJustNoticeable = 15;  // %
 
 std::array<int, 3> cells_of(const PressedBlock& block, int n) {
   const auto along = [&](int axis) {
@@ -256,74 +250,6 @@ void follow_script(Body& body, const std::vector<Touched>& script, const Meter& 
   if (!instructions.empty()) point.instructions = quantile(instructions, 0.5);
 }
 
-/// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
-using Figures = std::vector<std::pair<const char*, double>>;
-Figures figures(const AccuracyPoint& p, Truth& truth) {
-  const Accuracy& small = p.at_load[0];
-  const Accuracy& hard = p.at_load[1];
-  const auto& loads = truth.block().loads;
-  Figures all{{"n", p.candidate.n},
-              {"nodes", static_cast<double>(p.size.nodes)},
-              {"k_n_per_m", small.k},
-              {"error_percent", 100 * small.total},
-              {"update_ms_p50", p.update_ms_p50},
-              {"setup_s", p.setup_s},
-              {"bytes", static_cast<double>(p.size.bytes)},
-              {"load_n", loads[0]},
-              {"error_n", loads[0] * small.total},
-              {"model_percent", 100 * small.model},
-              {"discretisation_percent", 100 * small.discretisation},
-              {"solver_percent", 100 * small.solver},
-              {"tangent_error_percent", 100 * small.tangent},
-              {"hard_load_n", loads[1]},
-              {"hard_k_n_per_m", hard.k},
-              {"hard_error_percent", 100 * hard.total},
-              {"hard_error_n", loads[1] * hard.total},
-              {"hard_model_percent", 100 * hard.model},
-              {"hard_discretisation_percent", 100 * hard.discretisation},
-              {"hard_solver_percent", 100 * hard.solver},
-              {"hard_tangent_error_percent", 100 * hard.tangent},
-              {"script_rms_error_n", p.force_error},
-              {"script_largest_error_n", p.force_most},
-              {"script_rms_error_percent", 100 * p.force_relative},
-              {"spurious_lateral_percent", 100 * p.lateral},
-              {"update_ms_p99", p.update_ms_p99},
-              {"hz", 1e3 / p.update_ms_p50},
-              {"step_ms", p.step_ms},
-              {"instructions", p.instructions.value_or(kNoNumber)},
-              {"elements", static_cast<double>(p.size.elements)},
-              {"free", static_cast<double>(p.size.free)},
-              {"truth_k_n_per_m", truth.stiffness(0).secant},
-              {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
-  if (p.felt) {
-    all.insert(all.end(), {{"felt_error_percent", 100 * p.felt->force_error},
-                           {"felt_error_held_percent", 100 * p.felt->held_error},
-                           {"felt_stiffness_percent", 100 * p.felt->displayed},
-                           {"felt_limited_percent", 100 * p.felt->limited_share},
-                           {"felt_vibration_m_s", p.felt->vibration},
-                           {"felt_latency_ms", 1e3 * p.felt->latency}});
-  }
-  return all;
-}
-
-void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth) {
-  expect_replaceable(file, {"model,"});
-  std::ofstream csv(file);
-  csv << "model";
-  if (!points.empty()) {
-    for (const auto& [name, value] : figures(points.front(), truth)) csv << ',' << name;
-  }
-  csv << ",commit\n";
-  for (const AccuracyPoint& point : points) {
-    csv << point.candidate.name();
-    for (const auto& [name, value] : figures(point, truth)) {
-      csv << ',' << (std::isfinite(value) ? shortest(value) : std::string());
-    }
-    csv << ',' << kCommit << '\n';
-  }
-  if (!csv.flush()) throw std::runtime_error("cannot write " + file.string());
-}
-
 // ---- The refinement ladders -----------------------------------------------------------------------------------------
 
 /// What a larger n would cost, from the last two: cost ∝ n^p; from one alone with the p that is given.
@@ -371,8 +297,6 @@ std::vector<AccuracyPoint> ladder(ModelKind model, Element element, const Accura
   return points;
 }
 
-bool for_comparison(ModelKind kind) { return kind == ModelKind::kStVenantKirchhoff || kind >= ModelKind::kMassSpring; }
-
 std::vector<ModelKind> models_of(const AccuracyOptions& options) {
   if (!options.models.empty()) return options.models;
   // The quickest first: it is what the others have to beat.
@@ -388,147 +312,6 @@ std::vector<Element> elements_of(const AccuracyOptions& options) {
   for (const ElementInfo& element : elements()) all.push_back(element.element);
   return all;
 }
-
-// ---- Table and figures ----------------------------------------------------------------------------------------------
-
-void write_row(std::ostream& out, const AccuracyPoint& p) {
-  const Accuracy& small = p.at_load[0];
-  const Accuracy& hard = p.at_load[1];
-  std::array<char, 220> line{};
-  std::snprintf(line.data(), line.size(),
-                "%-24s %3d %6zu %8.1f %+8.1f %+8.1f | %+6.1f %+7.1f %+7.2f | %7.1f %7.1f %8.2f | %9.4f %9.4f %8.0f "
-                "%8.2f %8.2f\n",
-                p.candidate.name().c_str(), p.candidate.n, p.size.nodes, small.k, 100 * small.total, 100 * hard.total,
-                100 * hard.model, 100 * hard.discretisation, 100 * hard.solver, 100 * hard.tangent,
-                100 * p.force_relative, 100 * p.lateral, p.update_ms_p50, p.update_ms_p99, 1e3 / p.update_ms_p50,
-                p.setup_s, static_cast<double>(p.size.bytes) / 1e6);
-  out << line.data();
-}
-
-void write_felt(std::ostream& out, const AccuracyPoint& p) {
-  std::array<char, 160> line{};
-  std::snprintf(line.data(), line.size(), "%-24s %3d %9.4f %+8.1f %8.1f %8.1f %8.0f %8.0f %9.2f %9.0f\n",
-                p.candidate.name().c_str(), p.candidate.n, p.update_ms_p50, 100 * p.at_load[0].total,
-                100 * p.felt->force_error, 100 * p.felt->held_error, 100 * p.felt->displayed,
-                100 * p.felt->limited_share, 1e3 * p.felt->vibration, 1e3 * p.felt->latency);
-  out << line.data();
-}
-
-constexpr const char* kFeltHeading =
-    "                              update  error %        felt error %   shows %  limited vibration   latency\n"
-    "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
-
-constexpr const char* kHeading =
-    "                                           error %   error % | of the hard load's    | tangent  script lateral |"
-    "  update ms                        set-up      MB\n"
-    "model                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %       %        % "
-    "|"
-    "       p50       p99       Hz        s\n";
-
-const char* colour_of(std::size_t i) {
-  constexpr std::array kColours{kBlue, kVermilion, kGreen, kPurple, kOrange, kSky, kPale};
-  return kColours.at(i % kColours.size());
-}
-
-/// A line for a model, the same in all panels; broken for those that are there for comparison …
-Curve curve_of(ModelKind kind) {
-  return {.name = std::string(info(kind).name),
-          .colour = colour_of(static_cast<std::size_t>(kind)),
-          .style = for_comparison(kind) ? Curve::Style::kDashed : Curve::Style::kLine};
-}
-
-/// … whose points are rings.
-Curve::Style points_on(const Curve& line) {
-  return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
-}
-
-/// Draws a curve and its points; points alone where they make no line.
-void add_with_points(Panel& panel, Curve curve) {
-  Curve points{.name = "", .colour = curve.colour, .points = curve.points, .style = points_on(curve)};
-  if (curve.points.size() < 2) {
-    points.name = std::move(curve.name);
-  } else {
-    panel.curves.push_back(std::move(curve));
-  }
-  panel.curves.push_back(std::move(points));
-}
-
-using Ladders = std::vector<std::vector<AccuracyPoint>>;
-
-std::vector<ModelKind> kinds_in(const Ladders& ladders) {
-  std::vector<ModelKind> kinds;
-  for (const auto& ladder : ladders) {
-    if (kinds.empty() || kinds.back() != ladder.front().candidate.model)
-      kinds.push_back(ladder.front().candidate.model);
-  }
-  return kinds;
-}
-
-/// All of a model, or of all of them.
-std::vector<AccuracyPoint> points_of(const Ladders& ladders, std::optional<ModelKind> kind) {
-  std::vector<AccuracyPoint> points;
-  for (const auto& ladder : ladders) {
-    if (!kind || ladder.front().candidate.model == *kind) points.insert(points.end(), ladder.begin(), ladder.end());
-  }
-  return points;
-}
-
-/// |error| over time: a point for everything, a line for each model through those that nothing else of the same model
-/// is both quicker and closer than.
-Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
-  Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
-  const auto place = [&](const AccuracyPoint& p) {
-    return std::pair(p.update_ms_p50 + extra_ms, std::max(0.01, 100 * std::abs(p.at_load.at(load).total)));
-  };
-  const std::vector<AccuracyPoint> all = points_of(ladders, {});
-  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
-  for (const AccuracyPoint& p : all) {
-    range = {std::min(range.first, place(p).first), std::max(range.second, place(p).first)};
-  }
-  panel.x_range = {{range.first / 1.5, range.second * 1.5}};
-  panel.curves.push_back({.name = "not noticed",
-                          .colour = kGrey,
-                          .points = {{panel.x_range->first, kJustNoticeable}, {panel.x_range->second, kJustNoticeable}},
-                          .style = Curve::Style::kBelow});
-  Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
-  for (const AccuracyPoint& p : pareto_front(all, load)) front.points.push_back(place(p));
-  panel.curves.push_back(front);
-  for (const ModelKind kind : kinds_in(ladders)) {
-    Curve line = curve_of(kind);
-    Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
-    for (const AccuracyPoint& p : points_of(ladders, kind)) points.points.push_back(place(p));
-    // A model that collapses on a fine mesh has no parts, and no such points: its name still goes with its colour.
-    for (const AccuracyPoint& p : pareto_front(points_of(ladders, kind), load)) line.points.push_back(place(p));
-    if (line.points.size() < 2) points.name = std::move(line.name);
-    if (line.points.size() >= 2) panel.curves.push_back(std::move(line));
-    panel.curves.push_back(std::move(points));
-  }
-  return panel;
-}
-
-/// |error| of each element over n, for the first model: what refining brings.
-Panel error_over_n(const Ladders& ladders) {
-  const ModelKind kind = ladders.front().front().candidate.model;
-  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
-  Panel panel{.title = "|error| of K, %, over cells along x, an element each: " + std::string(info(kind).name),
-              .x_label = "n",
-              .log_y = true};
-  std::size_t colour = 0;
-  for (const auto& ladder : ladders) {
-    if (ladder.front().candidate.model != kind) continue;
-    range = {std::min<double>(range.first, ladder.front().candidate.n),
-             std::max<double>(range.second, ladder.back().candidate.n)};
-    Curve curve{.name = std::string(info(ladder.front().candidate.element).name), .colour = colour_of(colour++)};
-    for (const AccuracyPoint& p : ladder) {
-      curve.points.emplace_back(p.candidate.n, std::max(0.01, 100 * std::abs(p.at_load[0].total)));
-    }
-    add_with_points(panel, std::move(curve));
-  }
-  panel.x_range = {{range.first - 0.5, range.second + 0.5}};
-  return panel;
-}
-
-std::string load_text(double newtons) { return shortest(newtons) + " N"; }
 
 }  // namespace
 
@@ -566,7 +349,7 @@ void feel(Trial& trial, Truth& truth, const Network& network, double longest_s) 
 
 AccuracyPoint measure(const Candidate& candidate, Truth& truth, OnMesh& on_mesh, const Meter& meter,
                       const std::optional<Network>& network, const Patience& patience) {
-  // What is found once for all points is none of this one's work.
+  // Work that is done once for all points does not count as this one's.
   truth.script();
   truth.limit(info(candidate.model).law, material_of(truth.block(), candidate.model), 0);
   const Meter::Reading before = meter.read();
@@ -640,67 +423,7 @@ const AccuracyPoint* closest_at_the_hand(const std::vector<AccuracyPoint>& point
   return best;
 }
 
-std::string to_json(const AccuracyPoint& point, Truth& truth) {
-  JsonLine line;
-  line.add("model", point.candidate.name());
-  for (const auto& [name, value] : figures(point, truth)) line.add(name, value);
-  return line.add("commit", kCommit).str();
-}
-
 namespace {
-
-/// "420.2"
-std::string with_tenths(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.1f", value);
-  return text.data();
-}
-
-void write_truth(std::ostream& out, Truth& truth) {
-  const auto& loads = truth.block().loads;
-  out << "The truth: " << with_tenths(truth.limit(softbody::Law::kLinear, 0)->secant)
-      << " N/m while strains are small, " << with_tenths(truth.stiffness(0).secant) << " N/m under "
-      << load_text(loads[0]) << ", " << with_tenths(truth.stiffness(1).secant) << " N/m under " << load_text(loads[1])
-      << "; its own meshes leave " << with_tenths(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n";
-}
-
-/// What refining costs: a line for each ladder.
-void write_exponents(std::ostream& out, const Ladders& ladders) {
-  out << "\nAn update takes as long as its unknowns to the power of\n";
-  for (const auto& ladder : ladders) {
-    if (ladder.size() < 2) continue;
-    std::array<char, 160> line{};
-    std::snprintf(line.data(), line.size(), "%-24s %5.2f   n = %d to %d, %zu to %zu unknowns, %.4f to %.4f ms\n",
-                  ladder.front().candidate.name().c_str(), cost_exponent(ladder), ladder.front().candidate.n,
-                  ladder.back().candidate.n, ladder.front().size.free, ladder.back().size.free,
-                  ladder.front().update_ms_p50, ladder.back().update_ms_p50);
-    out << line.data();
-  }
-}
-
-/// Which one to take.
-void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
-                  Truth& truth) {
-  if (options.json) {
-    JsonLine line;
-    line.add("budget_ms", *options.budget_ms).add("network", options.network->name);
-    if (best) {
-      line.add("model", best->candidate.name());
-      for (const auto& [name, value] : figures(*best, truth)) line.add(name, value);
-    } else {
-      line.add("model", std::optional<double>());
-    }
-    out << line.add("commit", kCommit).str() << "\n";
-  } else if (!best) {
-    out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
-  } else {
-    out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
-    if (options.budget_ms) out << ", in " << shortest(*options.budget_ms) << " ms";
-    out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
-        << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
-        << with_tenths(100 * best->at_load[0].total) << " %.\n";
-  }
-}
 
 /// The answer to AccuracyOptions::budget_ms.
 std::optional<AccuracyPoint> best_within(const AccuracyOptions& options, Truth& truth, OnMesh& on_mesh,
@@ -755,62 +478,6 @@ double round_trip_ms(const Network& network) {
     ms.push_back(1e3 * seconds(back.decide({.arrival = arrived, .size = 200}).release - sent));
   }
   return quantile(ms, 0.5);
-}
-
-/// Of all elements of a model the ladder with the point that is felt best.
-std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
-  std::vector<const std::vector<AccuracyPoint>*> best;
-  const auto least = [](const std::vector<AccuracyPoint>& ladder) {
-    double error = std::numeric_limits<double>::infinity();
-    for (const AccuracyPoint& p : ladder) error = std::min(error, p.felt->force_error);
-    return error;
-  };
-  for (const auto& ladder : ladders) {
-    const auto same = std::ranges::find_if(
-        best, [&](const auto* known) { return known->front().candidate.model == ladder.front().candidate.model; });
-    if (same == best.end()) {
-      best.push_back(&ladder);
-    } else if (least(ladder) < least(**same)) {
-      *same = &ladder;
-    }
-  }
-  return best;
-}
-
-/// What refining a model brings to the hand, over `x` of its points.
-template <class X>
-Panel felt_over(const std::string& title, const std::string& label, const Ladders& ladders, bool log_x, X x) {
-  Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};
-  std::pair<double, double> range{std::numeric_limits<double>::infinity(), 0};
-  for (const auto* ladder : felt_best(ladders)) {
-    Curve curve = curve_of(ladder->front().candidate.model);
-    for (const AccuracyPoint& p : *ladder) {
-      range = {std::min<double>(range.first, x(p)), std::max<double>(range.second, x(p))};
-      curve.points.emplace_back(x(p), 100 * p.felt->force_error);
-    }
-    add_with_points(panel, std::move(curve));
-  }
-  panel.x_range =
-      log_x ? std::pair(range.first / 1.5, range.second * 1.5) : std::pair(range.first - 0.5, range.second + 0.5);
-  return panel;
-}
-
-void draw(const AccuracyOptions& options, const Ladders& ladders) {
-  const auto& loads = options.block.loads;
-  std::vector<Panel> panels{
-      error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0, 0),
-      error_over_time("… under " + load_text(loads[1]), ladders, 0, 1), error_over_n(ladders)};
-  if (options.network) {
-    panels.push_back(error_over_time(
-        "… under " + load_text(loads[0]) + ", over that and " + options.network->name + ", there and back", ladders,
-        round_trip_ms(*options.network), 0));
-    panels.push_back(felt_over("Error at the hand, %, over cells along x, each model with its best element", "n",
-                               ladders, false, [](const AccuracyPoint& p) { return p.candidate.n; }));
-    panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
-                               [](const AccuracyPoint& p) { return p.update_ms_p50; }));
-  }
-  draw_panels(*options.out / "accuracy", "What accuracy costs in time",
-              "processor time of one core; commit " + std::string(kCommit), panels);
 }
 
 }  // namespace
@@ -882,7 +549,7 @@ void accuracy(const AccuracyOptions& options, std::ostream& out) {
   if (options.out) {
     std::filesystem::create_directories(*options.out);
     write_csv(*options.out / "accuracy.csv", all, truth);
-    if (!ladders.empty()) draw(options, ladders);
+    if (!ladders.empty()) draw(options, ladders, options.network ? round_trip_ms(*options.network) : 0);
     if (rows) out << "written: " << (*options.out / "accuracy.csv").string() << " and a figure\n";
   }
   if (!out.flush()) throw std::runtime_error("cannot write the table: is the disk full?");

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/expect.h"
 #include "core/stability/passivity_boundary.h"
 #include "core/stability/stability_boundary.h"
 #include "devices/simulated/simulated_device.h"

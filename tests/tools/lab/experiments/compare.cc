@@ -10,6 +10,7 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "core/base/expect.h"
 #include "server/build_info.h"
 #include "tests/support/files.h"
 #include "tests/support/json_line.h"

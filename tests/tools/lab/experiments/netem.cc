@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/expect.h"
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/injector/injector.h"

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/time.h"
+#include "tests/tools/injector/proxy/duration_histogram.h"
+
+namespace tendon::bench {
+
+/// The floor of such a fleet: as many datagrams of such sizes there and back, in the same rhythm, between as many
+/// sockets of two processes, with nothing in them.
+struct BareTraffic {
+  std::size_t sessions = 0;
+  std::size_t sockets = 1;  ///< of the host
+  Duration period = std::chrono::milliseconds(1);
+  std::size_t out_per_round = 1;  ///< datagrams to each session in a period
+  std::size_t out_bytes = 0;
+  std::size_t in_per_round = 1;
+  std::size_t in_bytes = 0;
+  Duration length = std::chrono::seconds(1);
+  int priority = 0;
+};
+struct BareResult {
+  double seconds = 0;
+  std::uint64_t rounds = 0;
+  std::uint64_t sent = 0;
+  std::uint64_t received = 0;       ///< answers
+  injector::DurationHistogram age;  ///< when the guest's kernel had one − when its round was due to begin
+  Duration host{};                  ///< processor time
+  Duration guests{};
+};
+BareResult run_bare(const BareTraffic& traffic);
+
+}  // namespace tendon::bench

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include "core/base/time.h"
+#include "tests/tools/bench/bench.h"
+
+namespace tendon::bench {
+
+// The guests' process, and what it shares with the host's.
+
+/// Throws std::system_error of errno.
+[[noreturn]] void fail(const std::string& what);
+
+Duration read(clockid_t clock);
+
+/// As many open files as the system lets this process have.
+void raise_file_limit();
+
+template <class T>
+class SharedMemory {
+ public:
+  SharedMemory() {
+    void* const memory = ::mmap(nullptr, sizeof(T), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) fail("mmap");
+    value_ = new (memory) T;
+  }
+  ~SharedMemory() { ::munmap(value_, sizeof(T)); }
+  SharedMemory(const SharedMemory&) = delete;
+  SharedMemory& operator=(const SharedMemory&) = delete;
+  T* operator->() const { return value_; }
+  T& operator*() const { return *value_; }
+
+ private:
+  T* value_;
+};
+
+/// Another process that runs `work`, until it has ended or this one wants no more of it.
+class OtherProcess {
+ public:
+  template <class Work>
+  explicit OtherProcess(Work work) : pid_(::fork()) {
+    if (pid_ < 0) fail("fork");
+    if (pid_ > 0) return;
+    end_with_parent();
+    try {
+      work();
+      ::_exit(0);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "tendon-lab bench: guests: %s\n", error.what());
+      ::_exit(1);
+    }
+  }
+  ~OtherProcess() { ::waitpid(pid_, nullptr, 0); }
+  OtherProcess(const OtherProcess&) = delete;
+  OtherProcess& operator=(const OtherProcess&) = delete;
+
+  /// Throws when it has ended by itself.
+  void check() const {
+    int status = 0;
+    if (::waitpid(pid_, &status, WNOHANG) == pid_) throw std::runtime_error("the guests' process has ended");
+  }
+  Duration processor_time() const {
+    clockid_t clock{};
+    ::clock_getcpuclockid(pid_, &clock);
+    return read(clock);
+  }
+
+ private:
+  pid_t pid_;
+};
+
+}  // namespace tendon::bench

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "tests/tools/conformance/opening.h"
+#include "tests/tools/conformance/wire.h"
+
+// The smallest server and client that pass, and what happens to them when one rule is broken on purpose: the kit is
+// tested with these. In virtual time, without a socket.
+
+namespace tendon::conformance {
+
+/// Which rule is broken.
+enum class Fault : std::uint8_t {
+  kNone,
+  // Data, either end.
+  kWrongVersion,
+  kSkipsNumbers,
+  kTimeGoesBack,
+  kEchoOfTheLast,
+  kEchoTimeIsNow,
+  kEmptyMask,
+  kNoKeepAlive,
+  kTakesForeignHeaders,
+  kTakesMalformed,
+  kTakesForged,
+  kDamagedUsesNumber,
+  kTakesReplays,
+  kDropsTheLate,
+  kLongWindow,
+  kShortWindow,
+  kDropsTheUnknown,
+  kTakesAnyValue,
+  kOlderWins,
+  kDoesNotFollowRekey,
+  kNoOverlap,
+  kOldKeyForEver,
+  kNeverRenews,
+  kTalksAfterBye,
+  kOneBye,
+  kNoTimeout,
+  kAnythingIsALifeSign,
+  kBodyIsNoMessage,
+  // A server's.
+  kLongRetry,
+  kTwoRetries,
+  kAnswersShortHellos,
+  kTakesAnyHello,
+  kOneCookieForAll,
+  kBadWelcome,
+  kInventsFeatures,
+  kSecondSession,
+  kLowestVersion,
+  kWelcomesAnyVersion,
+  kWelcomesPlain,
+  kRefusesUnknownKeys,
+  kStatesWhileHalfOpen,
+  kTwoControllers,
+  kWrongReplacedCode,
+  kNoHelloLimit,
+  kTicksGoBack,
+  kAnswersStrays,
+  kRoamsByAnything,
+  kObserversPush,
+  kObserversRearm,
+  kObserversDisarm,
+  kRequestsAsTheyCome,
+  kRequestsAgain,
+  kForgetsAnswers,
+  kSilentToUnknownRequests,
+  kTakesAnyRequestId,
+  kGrantsUnasked,
+  kGrantsBackwards,
+  kGrantsAnything,
+  kDescribesAnother,
+  kDescribesAnyNumber,
+  kAnybodyTakesTheLease,
+  kDeniesTheHolder,
+  kKeepsTheLease,
+  kTakesAnyDeadband,
+  kSendsTheForetold,
+  kSilentWithDeadband,
+  kDeadbandForEver,
+  kTellsNothing,
+  kReportsAllTheTime,
+  kReportsOfOneNumber,
+  kReportsBeyondBounds,
+  kDiagnosesUnasked,
+  kKnowsNoChannels,  ///< no fault: an older server
+  // A client's.
+  kShortHello,
+  kHelloWithConnection,
+  kDirtyPadding,
+  kCookieFromTheStart,
+  kNoRole,
+  kSlowHellos,
+  kHelloChanges,
+  kRandomStays,
+  kIgnoresRetries,
+  kPingPong,
+  kTakesForeignRetry,
+  kTakesForeignAnswer,
+  kTakesAnyVersion,
+  kTakesBadWelcome,
+  kTakesPlainAnswer,
+  kGoesOnWhenRefused,
+  kSequenceStays,
+  kValidForAnHour,
+  kAnswersNoState,
+  kObserverPushes,
+  kRequestsFromTwo,
+  kAsksOnce,
+  kAsksAllTheTime,
+  kAsksForEver,
+};
+
+/// A peer in this process. Port numbers stand for addresses.
+class ToyPeer {
+ public:
+  struct Outgoing {
+    int port;
+    Bytes datagram;
+  };
+  virtual ~ToyPeer() = default;
+  virtual void receive(LocalTime now, int port, Span datagram) = 0;
+  /// Every millisecond.
+  virtual void tick(LocalTime now) = 0;
+  std::vector<Outgoing> take() { return std::exchange(out_, {}); }
+
+ protected:
+  void send(int port, Bytes datagram) { out_.push_back({port, std::move(datagram)}); }
+  std::vector<Outgoing> out_;
+};
+
+}  // namespace tendon::conformance

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/accuracy_pictures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/build_info.h"
+#include "tests/tools/lab/pictures/gnuplot.h"
+#include "tests/tools/lab/pictures/panels.h"
+
+namespace tendon::lab {
+
+using namespace softbody;
+
+bool for_comparison(ModelKind kind) { return kind == ModelKind::kStVenantKirchhoff || kind >= ModelKind::kMassSpring; }
+
+namespace {
+
+/// Of the stiffness of a surface that a bare finger pad feels: Bergmann Tiest & Kappers 2009.
+constexpr double kJustNoticeable = 15;  // %
+
+const char* colour_of(std::size_t i) {
+  constexpr std::array kColours{kBlue, kVermilion, kGreen, kPurple, kOrange, kSky, kPale};
+  return kColours.at(i % kColours.size());
+}
+
+/// A line for a model, the same in all panels; broken for those that are there for comparison …
+Curve curve_of(ModelKind kind) {
+  return {.name = std::string(info(kind).name),
+          .colour = colour_of(static_cast<std::size_t>(kind)),
+          .style = for_comparison(kind) ? Curve::Style::kDashed : Curve::Style::kLine};
+}
+
+/// … whose points are rings.
+Curve::Style points_on(const Curve& line) {
+  return line.style == Curve::Style::kDashed ? Curve::Style::kRings : Curve::Style::kPoints;
+}
+
+/// Draws a curve and its points; points alone where they make no line.
+void add_with_points(Panel& panel, Curve curve) {
+  Curve points{.name = "", .colour = curve.colour, .points = curve.points, .style = points_on(curve)};
+  if (curve.points.size() < 2) {
+    points.name = std::move(curve.name);
+  } else {
+    panel.curves.push_back(std::move(curve));
+  }
+  panel.curves.push_back(std::move(points));
+}
+
+std::vector<ModelKind> kinds_in(const Ladders& ladders) {
+  std::vector<ModelKind> kinds;
+  for (const auto& ladder : ladders) {
+    if (kinds.empty() || kinds.back() != ladder.front().candidate.model)
+      kinds.push_back(ladder.front().candidate.model);
+  }
+  return kinds;
+}
+
+/// All of a model, or of all of them.
+std::vector<AccuracyPoint> points_of(const Ladders& ladders, std::optional<ModelKind> kind) {
+  std::vector<AccuracyPoint> points;
+  for (const auto& ladder : ladders) {
+    if (!kind || ladder.front().candidate.model == *kind) points.insert(points.end(), ladder.begin(), ladder.end());
+  }
+  return points;
+}
+
+/// |error| over time: a point for everything, a line for each model through those that nothing else of the same model
+/// is both quicker and closer than.
+Panel error_over_time(const std::string& title, const Ladders& ladders, double extra_ms, std::size_t load) {
+  Panel panel{.title = title, .x_label = "ms", .log_x = true, .log_y = true};
+  const auto place = [&](const AccuracyPoint& p) {
+    return std::pair(p.update_ms_p50 + extra_ms, std::max(0.01, 100 * std::abs(p.at_load.at(load).total)));
+  };
+  const std::vector<AccuracyPoint> all = points_of(ladders, {});
+  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
+  for (const AccuracyPoint& p : all) {
+    range = {std::min(range.first, place(p).first), std::max(range.second, place(p).first)};
+  }
+  panel.x_range = {{range.first / 1.5, range.second * 1.5}};
+  panel.curves.push_back({.name = "not noticed",
+                          .colour = kGrey,
+                          .points = {{panel.x_range->first, kJustNoticeable}, {panel.x_range->second, kJustNoticeable}},
+                          .style = Curve::Style::kBelow});
+  Curve front{.name = "best", .colour = kInk, .style = Curve::Style::kBold};
+  for (const AccuracyPoint& p : pareto_front(all, load)) front.points.push_back(place(p));
+  panel.curves.push_back(front);
+  for (const ModelKind kind : kinds_in(ladders)) {
+    Curve line = curve_of(kind);
+    Curve points{.name = "", .colour = line.colour, .style = points_on(line)};
+    for (const AccuracyPoint& p : points_of(ladders, kind)) points.points.push_back(place(p));
+    // A model that collapses on a fine mesh has no parts, and no such points: its name still goes with its colour.
+    for (const AccuracyPoint& p : pareto_front(points_of(ladders, kind), load)) line.points.push_back(place(p));
+    if (line.points.size() < 2) points.name = std::move(line.name);
+    if (line.points.size() >= 2) panel.curves.push_back(std::move(line));
+    panel.curves.push_back(std::move(points));
+  }
+  return panel;
+}
+
+/// |error| of each element over n, for the first model: what refining brings.
+Panel error_over_n(const Ladders& ladders) {
+  const ModelKind kind = ladders.front().front().candidate.model;
+  std::pair range{std::numeric_limits<double>::infinity(), 0.0};
+  Panel panel{.title = "|error| of K, %, over cells along x, an element each: " + std::string(info(kind).name),
+              .x_label = "n",
+              .log_y = true};
+  std::size_t colour = 0;
+  for (const auto& ladder : ladders) {
+    if (ladder.front().candidate.model != kind) continue;
+    range = {std::min<double>(range.first, ladder.front().candidate.n),
+             std::max<double>(range.second, ladder.back().candidate.n)};
+    Curve curve{.name = std::string(info(ladder.front().candidate.element).name), .colour = colour_of(colour++)};
+    for (const AccuracyPoint& p : ladder) {
+      curve.points.emplace_back(p.candidate.n, std::max(0.01, 100 * std::abs(p.at_load[0].total)));
+    }
+    add_with_points(panel, std::move(curve));
+  }
+  panel.x_range = {{range.first - 0.5, range.second + 0.5}};
+  return panel;
+}
+
+/// Of all elements of a model the ladder with the point that is felt best.
+std::vector<const std::vector<AccuracyPoint>*> felt_best(const Ladders& ladders) {
+  std::vector<const std::vector<AccuracyPoint>*> best;
+  const auto least = [](const std::vector<AccuracyPoint>& ladder) {
+    double error = std::numeric_limits<double>::infinity();
+    for (const AccuracyPoint& p : ladder) error = std::min(error, p.felt->force_error);
+    return error;
+  };
+  for (const auto& ladder : ladders) {
+    const auto same = std::ranges::find_if(
+        best, [&](const auto* known) { return known->front().candidate.model == ladder.front().candidate.model; });
+    if (same == best.end()) {
+      best.push_back(&ladder);
+    } else if (least(ladder) < least(**same)) {
+      *same = &ladder;
+    }
+  }
+  return best;
+}
+
+/// What refining a model brings to the hand, over `x` of its points.
+template <class X>
+Panel felt_over(const std::string& title, const std::string& label, const Ladders& ladders, bool log_x, X x) {
+  Panel panel{.title = title, .x_label = label, .log_x = log_x, .log_y = true};
+  std::pair<double, double> range{std::numeric_limits<double>::infinity(), 0};
+  for (const auto* ladder : felt_best(ladders)) {
+    Curve curve = curve_of(ladder->front().candidate.model);
+    for (const AccuracyPoint& p : *ladder) {
+      range = {std::min<double>(range.first, x(p)), std::max<double>(range.second, x(p))};
+      curve.points.emplace_back(x(p), 100 * p.felt->force_error);
+    }
+    add_with_points(panel, std::move(curve));
+  }
+  panel.x_range =
+      log_x ? std::pair(range.first / 1.5, range.second * 1.5) : std::pair(range.first - 0.5, range.second + 0.5);
+  return panel;
+}
+
+}  // namespace
+
+void draw(const AccuracyOptions& options, const Ladders& ladders, double round_trip_ms) {
+  const auto& loads = options.block.loads;
+  std::vector<Panel> panels{
+      error_over_time("|error| of K, %, under " + load_text(loads[0]) + ", over the time of an update", ladders, 0, 0),
+      error_over_time("… under " + load_text(loads[1]), ladders, 0, 1), error_over_n(ladders)};
+  if (options.network) {
+    panels.push_back(error_over_time(
+        "… under " + load_text(loads[0]) + ", over that and " + options.network->name + ", there and back", ladders,
+        round_trip_ms, 0));
+    panels.push_back(felt_over("Error at the hand, %, over cells along x, each model with its best element", "n",
+                               ladders, false, [](const AccuracyPoint& p) { return p.candidate.n; }));
+    panels.push_back(felt_over("… over the time of an update", "ms", ladders, true,
+                               [](const AccuracyPoint& p) { return p.update_ms_p50; }));
+  }
+  draw_panels(*options.out / "accuracy", "What accuracy costs in time",
+              "processor time of one core; commit " + std::string(kCommit), panels);
+}
+
+}  // namespace tendon::lab

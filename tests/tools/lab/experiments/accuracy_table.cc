@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/accuracy_table.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "core/base/expect.h"
+#include "server/build_info.h"
+#include "tests/support/files.h"
+#include "tests/support/json_line.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+/// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
+using Figures = std::vector<std::pair<const char*, double>>;
+Figures figures(const AccuracyPoint& p, Truth& truth) {
+  const Accuracy& small = p.at_load[0];
+  const Accuracy& hard = p.at_load[1];
+  const auto& loads = truth.block().loads;
+  Figures all{{"n", p.candidate.n},
+              {"nodes", static_cast<double>(p.size.nodes)},
+              {"k_n_per_m", small.k},
+              {"error_percent", 100 * small.total},
+              {"update_ms_p50", p.update_ms_p50},
+              {"setup_s", p.setup_s},
+              {"bytes", static_cast<double>(p.size.bytes)},
+              {"load_n", loads[0]},
+              {"error_n", loads[0] * small.total},
+              {"model_percent", 100 * small.model},
+              {"discretisation_percent", 100 * small.discretisation},
+              {"solver_percent", 100 * small.solver},
+              {"tangent_error_percent", 100 * small.tangent},
+              {"hard_load_n", loads[1]},
+              {"hard_k_n_per_m", hard.k},
+              {"hard_error_percent", 100 * hard.total},
+              {"hard_error_n", loads[1] * hard.total},
+              {"hard_model_percent", 100 * hard.model},
+              {"hard_discretisation_percent", 100 * hard.discretisation},
+              {"hard_solver_percent", 100 * hard.solver},
+              {"hard_tangent_error_percent", 100 * hard.tangent},
+              {"script_rms_error_n", p.force_error},
+              {"script_largest_error_n", p.force_most},
+              {"script_rms_error_percent", 100 * p.force_relative},
+              {"spurious_lateral_percent", 100 * p.lateral},
+              {"update_ms_p99", p.update_ms_p99},
+              {"hz", 1e3 / p.update_ms_p50},
+              {"step_ms", p.step_ms},
+              {"instructions", p.instructions.value_or(kNoNumber)},
+              {"elements", static_cast<double>(p.size.elements)},
+              {"free", static_cast<double>(p.size.free)},
+              {"truth_k_n_per_m", truth.stiffness(0).secant},
+              {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
+  if (p.felt) {
+    all.insert(all.end(), {{"felt_error_percent", 100 * p.felt->force_error},
+                           {"felt_error_held_percent", 100 * p.felt->held_error},
+                           {"felt_stiffness_percent", 100 * p.felt->displayed},
+                           {"felt_limited_percent", 100 * p.felt->limited_share},
+                           {"felt_vibration_m_s", p.felt->vibration},
+                           {"felt_latency_ms", 1e3 * p.felt->latency}});
+  }
+  return all;
+}
+
+/// "420.2"
+std::string with_tenths(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1f", value);
+  return text.data();
+}
+
+}  // namespace
+
+void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoint>& points, Truth& truth) {
+  expect_replaceable(file, {"model,"});
+  std::ofstream csv(file);
+  csv << "model";
+  if (!points.empty()) {
+    for (const auto& [name, value] : figures(points.front(), truth)) csv << ',' << name;
+  }
+  csv << ",commit\n";
+  for (const AccuracyPoint& point : points) {
+    csv << point.candidate.name();
+    for (const auto& [name, value] : figures(point, truth)) {
+      csv << ',' << (std::isfinite(value) ? shortest(value) : std::string());
+    }
+    csv << ',' << kCommit << '\n';
+  }
+  if (!csv.flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+const char* const kFeltHeading =
+    "                              update  error %        felt error %   shows %  limited vibration   latency\n"
+    "model                      n      ms    small  with K     held                     %      mm/s        ms\n";
+
+const char* const kHeading =
+    "                                           error %   error % | of the hard load's    | tangent  script lateral |"
+    "  update ms                        set-up      MB\n"
+    "model                      n  nodes    K N/m   small     hard |  model    mesh  solver |       %       %        % "
+    "|"
+    "       p50       p99       Hz        s\n";
+
+void write_row(std::ostream& out, const AccuracyPoint& p) {
+  const Accuracy& small = p.at_load[0];
+  const Accuracy& hard = p.at_load[1];
+  std::array<char, 220> line{};
+  std::snprintf(line.data(), line.size(),
+                "%-24s %3d %6zu %8.1f %+8.1f %+8.1f | %+6.1f %+7.1f %+7.2f | %7.1f %7.1f %8.2f | %9.4f %9.4f %8.0f "
+                "%8.2f %8.2f\n",
+                p.candidate.name().c_str(), p.candidate.n, p.size.nodes, small.k, 100 * small.total, 100 * hard.total,
+                100 * hard.model, 100 * hard.discretisation, 100 * hard.solver, 100 * hard.tangent,
+                100 * p.force_relative, 100 * p.lateral, p.update_ms_p50, p.update_ms_p99, 1e3 / p.update_ms_p50,
+                p.setup_s, static_cast<double>(p.size.bytes) / 1e6);
+  out << line.data();
+}
+
+void write_felt(std::ostream& out, const AccuracyPoint& p) {
+  std::array<char, 160> line{};
+  std::snprintf(line.data(), line.size(), "%-24s %3d %9.4f %+8.1f %8.1f %8.1f %8.0f %8.0f %9.2f %9.0f\n",
+                p.candidate.name().c_str(), p.candidate.n, p.update_ms_p50, 100 * p.at_load[0].total,
+                100 * p.felt->force_error, 100 * p.felt->held_error, 100 * p.felt->displayed,
+                100 * p.felt->limited_share, 1e3 * p.felt->vibration, 1e3 * p.felt->latency);
+  out << line.data();
+}
+
+std::string load_text(double newtons) { return shortest(newtons) + " N"; }
+
+std::string to_json(const AccuracyPoint& point, Truth& truth) {
+  JsonLine line;
+  line.add("model", point.candidate.name());
+  for (const auto& [name, value] : figures(point, truth)) line.add(name, value);
+  return line.add("commit", kCommit).str();
+}
+
+void write_truth(std::ostream& out, Truth& truth) {
+  const auto& loads = truth.block().loads;
+  out << "The truth: " << with_tenths(truth.limit(softbody::Law::kLinear, 0)->secant)
+      << " N/m while strains are small, " << with_tenths(truth.stiffness(0).secant) << " N/m under "
+      << load_text(loads[0]) << ", " << with_tenths(truth.stiffness(1).secant) << " N/m under " << load_text(loads[1])
+      << "; its own meshes leave " << with_tenths(100 * truth.uncertainty()) << " % open. Commit " << kCommit << "\n\n";
+}
+
+void write_exponents(std::ostream& out, const Ladders& ladders) {
+  out << "\nAn update takes as long as its unknowns to the power of\n";
+  for (const auto& ladder : ladders) {
+    if (ladder.size() < 2) continue;
+    std::array<char, 160> line{};
+    std::snprintf(line.data(), line.size(), "%-24s %5.2f   n = %d to %d, %zu to %zu unknowns, %.4f to %.4f ms\n",
+                  ladder.front().candidate.name().c_str(), cost_exponent(ladder), ladder.front().candidate.n,
+                  ladder.back().candidate.n, ladder.front().size.free, ladder.back().size.free,
+                  ladder.front().update_ms_p50, ladder.back().update_ms_p50);
+    out << line.data();
+  }
+}
+
+void write_answer(std::ostream& out, const AccuracyOptions& options, const std::optional<AccuracyPoint>& best,
+                  Truth& truth) {
+  if (options.json) {
+    JsonLine line;
+    line.add("budget_ms", *options.budget_ms).add("network", options.network->name);
+    if (best) {
+      line.add("model", best->candidate.name());
+      for (const auto& [name, value] : figures(*best, truth)) line.add(name, value);
+    } else {
+      line.add("model", std::optional<double>());
+    }
+    out << line.add("commit", kCommit).str() << "\n";
+  } else if (!best) {
+    out << "\nNo model and mesh is quick enough and leaves the hand quiet.\n";
+  } else {
+    out << "\nClosest to the truth at the hand, on this machine and behind " << options.network->name;
+    if (options.budget_ms) out << ", in " << shortest(*options.budget_ms) << " ms";
+    out << ": " << best->candidate.name() << " with n = " << best->candidate.n << ", "
+        << with_tenths(100 * best->felt->force_error) << " % off where its own error is "
+        << with_tenths(100 * best->at_load[0].total) << " %.\n";
+  }
+}
+
+}  // namespace tendon::lab
