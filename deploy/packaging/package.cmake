@@ -46,7 +46,7 @@ else()
 endif()
 
 # The client's library. Headers keep the names that they have here: #include "clients/cpp/run.h".
-set(libraries tendon_client tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
+set(libraries tendon_client tendon_server_name tendon_protocol tendon_address tendon_proto tendon_core tendon_core_design)
 foreach(library ${libraries})
   string(REPLACE tendon_ "" name ${library})
   set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})

@@ -111,6 +111,10 @@ TEST(BadInput, OfTheInjectorIsAnsweredWithWhatIsWrongAndExitCode2) {
            "tendon-inject",
            {"--listen", "127.0.0.1:0", "--to", "127.0.0.1:0"},
            {"--to", "port"}},
+          {"a host without a port",
+           "tendon-inject",
+           {"--listen", "127.0.0.1:0", "--to", "haptics"},
+           {"--to", "HOST:PORT"}},
           {"a count without a dry run", "tendon-inject", with("--count", "5"), {"--count", "--dry-run"}},
           {"unknown option", "tendon-inject", with("--lose", "2%"), {"--lose"}},
       });

@@ -3,16 +3,14 @@
 // A disk that is full stops the recording, not the run; with room again it goes on. The exit code says that something is
 // missing.
 #include <gtest/gtest.h>
-#include <sys/mount.h>
 
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <system_error>
 
+#include "tests/e2e/stage/small_disk.h"
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
 
@@ -20,32 +18,6 @@ namespace tendon::e2e {
 namespace {
 
 using testing::ScratchFolder;
-
-/// A file system of `size` in memory; needs the right to mount. Gone at the end of the test.
-class SmallDisk {
- public:
-  SmallDisk(std::filesystem::path path, const std::string& size) : path_(std::move(path)) {
-    std::filesystem::create_directory(path_);
-    if (::mount("tendon-test", path_.c_str(), "tmpfs", 0, ("size=" + size).c_str()) != 0) error_ = errno;
-  }
-  ~SmallDisk() {
-    // Lazily, so that it goes even when a program that was not stopped still writes to it.
-    if (error_ == 0) ::umount2(path_.c_str(), MNT_DETACH);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  const std::filesystem::path& path() const noexcept { return path_; }
-  int error() const noexcept { return error_; }
-  std::string why_not() const {
-    return "may not mount a small tmpfs here (" + std::system_category().message(error_) +
-           "); run as root to test what a full disk does";
-  }
-
- private:
-  std::filesystem::path path_;
-  int error_ = 0;
-};
 
 void expect_the_device_to_run_on(Server& server, Process& echo, std::uint64_t after_tick) {
   while (count_in(echo.wait_for_line(R"("tick")"), "tick") < after_tick + 500) {

@@ -79,6 +79,27 @@ TEST(Inject, ARecordedRunMeetsTheSameFatesOnceMore) {
   EXPECT_EQ(fates(injector::read_trace(folder.path() / "second.csv")), first);
 }
 
+TEST(Inject, AServerIsFoundByItsHostName) {
+  const ScratchFolder folder;
+  UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));
+  const std::string port = to_string(server.local_address()).substr(std::string("127.0.0.1").size());
+  // Neither numeric nor "localhost" as parse_address() reads them: /etc/hosts answers.
+  Service proxy("tendon-inject", with(kAnyReleaseError, {"--to", "LOCALHOST" + port, "--record", "run.csv"}),
+                folder.path(), "start", "listen");
+  send_through(server, proxy.address(), 3);
+  EXPECT_NE(proxy.process().out().find("LOCALHOST" + port + " (127.0.0.1" + port + ")"), std::string::npos)
+      << proxy.process().out();
+  proxy.stop();
+  EXPECT_EQ(fates(injector::read_trace(folder.path() / "run.csv")), "+++");
+}
+
+TEST(Inject, AHostThatNobodyKnowsIsNamedAndFails) {
+  const ScratchFolder folder;
+  Process proxy(program("tendon-inject"), {"--listen", "127.0.0.1:0", "--to", "haptics.invalid:47100"}, folder.path());
+  EXPECT_EQ(proxy.wait(), 1);
+  EXPECT_NE(proxy.err().find("cannot find haptics.invalid: "), std::string::npos) << proxy.err();
+}
+
 TEST(Inject, ARunThatCouldNotKeepUpIsInvalidAndFails) {
   const ScratchFolder folder;
   UdpBatch server = UdpBatch::listening(parse_address("127.0.0.1:0"));

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/json_line.h"
 
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -44,11 +42,6 @@ JsonLine& JsonLine::add_unsigned(std::string_view key, std::uint64_t value) {
 JsonLine& JsonLine::add_null(std::string_view key) { return put(*members_, key, nullptr), *this; }
 
 std::string JsonLine::str() const { return members_->dump(-1, ' ', false, ordered_json::error_handler_t::replace); }
-
-std::string shortest(double value) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 double with_decimals(double value, int decimals) {
   double scale = 1;

@@ -55,9 +55,6 @@ class JsonLine {
   std::unique_ptr<nlohmann::ordered_json> members_;
 };
 
-/// The shortest text that is read back as the same number, for tables and command lines: "0.1", "2", "inf", "nan".
-std::string shortest(double value);
-
 /// `value` with so many decimals and no more, as a figure for JsonLine.
 double with_decimals(double value, int decimals);
 

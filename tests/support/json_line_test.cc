@@ -28,7 +28,7 @@ TEST(JsonLine, MembersComeInTheOrderInWhichTheyWereAdded) {
                   R"("why":["one","two"],"none":null,"some":2})");
 }
 
-TEST(JsonLine, WhatIsNotFiniteIsNull) {
+TEST(JsonLine, ANumberThatIsNotFiniteIsNull) {
   const std::string text = JsonLine()
                                .add("nan", std::numeric_limits<double>::quiet_NaN())
                                .add("inf", -std::numeric_limits<double>::infinity())
@@ -47,9 +47,7 @@ TEST(JsonLine, AnyBytesGiveALineThatAParserTakes) {
 TEST(JsonLine, NumbersAreReadBackTheSame) {
   for (const double value : {0.1, 1e300, -5e-300, 1.0 / 3, 123456789.0}) {
     EXPECT_EQ(nlohmann::json::parse(JsonLine().add("x", value).str()).at("x"), value);
-    EXPECT_EQ(std::stod(shortest(value)), value);
   }
-  EXPECT_EQ(shortest(2), "2");
   EXPECT_EQ(with_decimals(1.23456, 2), 1.23);
 }
 

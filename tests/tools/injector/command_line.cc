@@ -5,6 +5,7 @@
 #include <charconv>
 #include <stdexcept>
 #include <system_error>
+#include <type_traits>
 
 #include "server/build_info.h"
 #include "tests/tools/injector/profile/named_profiles.h"
@@ -51,9 +52,15 @@ std::uint64_t parse_seed(const std::string& text) {
   return seed;
 }
 
-Address parse_option(const char* option, const std::string& text) {
+/// An Address, or a ServerName, which is not looked up here.
+template <class Where>
+Where parse_option(const char* option, const std::string& text) {
   try {
-    return parse_address(text);
+    if constexpr (std::is_same_v<Where, Address>) {
+      return parse_address(text);
+    } else {
+      return Where(text);
+    }
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(std::string(option) + ": " + error.what());
   }
@@ -103,6 +110,8 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
   verbs.control->add_option("PATH", said.control_path, "its socket")->required();
   verbs.control->add_option("COMMAND", said.control_words, "for example: up wifi-bad")->required();
 
+  verbs.control->footer("Example\n  tendon-inject control /tmp/inject.sock up wifi-bad");
+
   verbs.import = app.add_subcommand("import", "make a trace for --replay of what others have measured");
   verbs.import
       ->add_option("FORMAT", said.import.format,
@@ -124,8 +133,13 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
       ->check(between(1e-6, 1e9))
       ->capture_default_str();
 
+  verbs.import->footer(
+      "Example\n  ping -D -c 1000 -i 0.2 example.org >ping.txt\n  tendon-inject import ping ping.txt --out run.csv");
+
   verbs.export_delays = app.add_subcommand("export", "print the true one-way delays of a trace as CSV");
   verbs.export_delays->add_option("TRACE", said.trace, "a recorded or imported trace")->required();
+
+  verbs.export_delays->footer("Example\n  tendon-inject export run.csv >delays.csv");
 
   verbs.selftest = app.add_subcommand("selftest", "does it do what its profiles say? every model against its law");
   verbs.selftest->add_option("--count", said.selftest.count, "datagrams for each model")
@@ -136,6 +150,7 @@ Subcommands add_subcommands(CLI::App& app, Said& said) {
   verbs.selftest->add_option("--data", said.data, "a folder of measured histograms (*.csv): one more model each")
       ->type_name("FOLDER");
   verbs.selftest->add_flag("--json", said.json, "one JSON object per line");
+  verbs.selftest->footer("Example\n  tendon-inject selftest --count 100000 --json");
   return verbs;
 }
 
@@ -154,7 +169,7 @@ ImportTask import_task(Said said) {
 
 void add_options(CLI::App& app, Said& said) {
   app.add_option("--listen", said.listen, "where clients send to (port 0: any free one)")->type_name("HOST:PORT");
-  app.add_option("--to", said.to, "the server, anywhere")->type_name("HOST:PORT");
+  app.add_option("--to", said.to, "the server, anywhere: an address or a host name")->type_name("HOST:PORT");
   app.add_flag("--open-to-network", said.open_to_network,
                "let --listen be an address that other machines can reach: whoever does can send to the server through "
                "this proxy");
@@ -248,16 +263,12 @@ LiveTask live_task(Said said) {
   if (said.to.empty()) throw std::invalid_argument("--to is required");
   LiveTask task{.network = std::move(said.network), .run = {}};
   LiveRun& run = task.run;
-  run.listen = parse_option("--listen", said.listen);
-  run.server = parse_option("--to", said.to);
+  run.listen = parse_option<Address>("--listen", said.listen);
+  run.server = parse_option<ServerName>("--to", said.to);
   if (!is_loopback(run.listen) && !said.open_to_network) {
     throw std::invalid_argument("refusing to listen on " + said.listen +
                                 ": anyone on the network could send to the server through this proxy; use a loopback "
                                 "address (127.0.0.1 or [::1]), or say --open-to-network");
-  }
-  if (run.server.port == 0) throw std::invalid_argument("--to: expected a port other than 0, got " + said.to);
-  if (run.listen == run.server) {
-    throw std::invalid_argument("--to: expected another address than --listen, got " + said.to + " for both");
   }
   if (said.duration_s > 0) run.duration = from_seconds(said.duration_s);
   if (said.realtime > 0) run.realtime = said.realtime;

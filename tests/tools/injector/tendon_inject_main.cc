@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tendon-inject: a bad network that can be replayed, as a UDP proxy. What it can be asked for is in command_line.cc.
+// tendon-inject: a bad network that can be replayed, as a UDP proxy. command_line.cc has its options.
 #include <exception>
 #include <fstream>
 #include <iostream>

@@ -24,6 +24,7 @@
 #include "tests/tools/injector/proxy/real_time.h"
 #include "tests/tools/injector/proxy/terminal.h"
 #include "tests/tools/injector/proxy/terminal_view.h"
+#include "tests/tools/injector/proxy/udp_batch.h"
 #include "tests/tools/injector/traces/trace_recorder.h"
 
 namespace tendon::injector {
@@ -102,9 +103,31 @@ class DriverThread {
   std::thread thread_;
 };
 
-Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& options) {
+/// The first address of the server's name that this machine can send to.
+Address address_of(const LiveRun& options) {
+  const std::vector<Address> addresses = options.server.look_up();
+  if (addresses.front().port == 0) {
+    throw std::invalid_argument("--to: expected a port other than 0, got " + options.server.text());
+  }
+  std::string problem;
+  for (const Address& address : addresses) {
+    if (address == options.listen) {
+      throw std::invalid_argument("--to: expected another address than --listen, got " + options.server.text() +
+                                  " for both");
+    }
+    try {
+      UdpBatch::connected(address);
+      return address;
+    } catch (const std::runtime_error& error) {
+      if (problem.empty()) problem = error.what();
+    }
+  }
+  throw std::invalid_argument(problem);
+}
+
+Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& options, const Address& server) {
   return {.listen = options.listen,
-          .server = options.server,
+          .server = server,
           .proxy = {.networks = network.networks,
                     .timeline = network.timeline,
                     .replay = network.replay.get(),
@@ -119,9 +142,10 @@ Driver::Config driver_config(const PreparedNetwork& network, const LiveRun& opti
 /// What is said and heard while the driver runs.
 class Conversation {
  public:
-  Conversation(const PreparedNetwork& network, const LiveRun& options, Driver& driver, TraceRecorder* recorder)
+  Conversation(const PreparedNetwork& network, const LiveRun& options, const Address& server, Driver& driver,
+               TraceRecorder* recorder)
       : network_(network), options_(options), driver_(driver), recorder_(recorder) {
-    heading_ = {to_string(driver.local_address()), to_string(options.server), network.seed, network.text,
+    heading_ = {to_string(driver.local_address()), options.server.at(server), network.seed, network.text,
                 options.max_release_error};
     if (!options.control.empty()) control_.emplace(options.control);
     if (!options.json) terminal_ = Terminal::take();
@@ -286,13 +310,14 @@ std::string Conversation::execute(std::string_view line) {
 }  // namespace
 
 int live_run(const PreparedNetwork& network, const LiveRun& options) {
+  const Address server = address_of(options);
   std::optional<TraceRecorder> recorder;
   std::optional<Driver> driver;
   std::optional<Conversation> made;
   try {
     if (!options.record.empty()) recorder.emplace(options.record, network.header());
-    driver.emplace(driver_config(network, options), recorder ? &*recorder : nullptr);
-    made.emplace(network, options, *driver, recorder ? &*recorder : nullptr);
+    driver.emplace(driver_config(network, options, server), recorder ? &*recorder : nullptr);
+    made.emplace(network, options, server, *driver, recorder ? &*recorder : nullptr);
   } catch (const std::runtime_error& error) {  // addresses and files that cannot be used
     throw std::invalid_argument(error.what());
   }

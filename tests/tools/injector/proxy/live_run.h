@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "clients/cpp/server_name.h"
 #include "core/base/time.h"
 #include "protocol/link.h"
 #include "tests/tools/injector/proxy/prepared_network.h"
@@ -20,7 +21,7 @@ inline constexpr Duration kSpin = std::chrono::microseconds(50);
 /// The proxy between real programs.
 struct LiveRun {
   Address listen;
-  Address server;
+  ServerName server = Address{};  ///< the first of its addresses that this machine can send to
   std::optional<Duration> duration;
   std::size_t max_clients = 64;
   Duration max_release_error = kMaxReleaseError;
@@ -33,8 +34,9 @@ struct LiveRun {
 
 /// Runs until its duration is over, or SIGINT or SIGTERM comes: the driver in a thread of its own, and here all that
 /// must not delay it: terminal or reports, control socket, the making of tables. Returns the exit code: 1 for a run
-/// that was INVALID. Throws std::invalid_argument before it has begun, for addresses and files that cannot be used, and
-/// std::runtime_error after it for what went wrong on the way.
+/// that was INVALID. Looks the server's name up once, before it begins. Throws std::invalid_argument before it has
+/// begun, for addresses and files that cannot be used, and std::runtime_error for a name that has no address and for
+/// what went wrong on the way.
 int live_run(const PreparedNetwork& network, const LiveRun& options);
 
 }  // namespace tendon::injector

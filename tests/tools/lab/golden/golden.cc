@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/base/expect.h"
 #include "server/machine/regular_file.h"
 #include "tests/support/files.h"
 #include "tests/support/json_line.h"

@@ -76,7 +76,7 @@ TEST(Json, IsOneObjectWithTheUnitInEachKeyAndNullForWhatIsNotKnown) {
   EXPECT_EQ(json.back(), '}');
   EXPECT_EQ(json.find('\n'), std::string::npos);
   for (const char* text :
-       {R"("label":"a \"b\"\u000a\\")", R"("stable":false)", R"("operational_stiffness_n_per_m":null)",
+       {R"("label":"a \"b\"\n\\")", R"("stable":false)", R"("operational_stiffness_n_per_m":null)",
         R"("round_trip_p50_ms":null)", R"("limited_percent_by_reason":{"energy":0.0,)", R"("steps":6000)",
         R"("longest_interval_ms":1.0})", R"("energy_given_out_j":)", R"("passive":false)"})
     EXPECT_NE(json.find(text), std::string::npos) << text << " in " << json;

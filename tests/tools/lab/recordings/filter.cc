@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/expect.h"
 #include "server/scene/scene.h"
 #include "tests/support/json_line.h"
 

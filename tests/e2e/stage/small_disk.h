@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/mount.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace tendon::e2e {
+
+/// A file system of `size` in memory; needs the right to mount. Gone at the end of the test.
+class SmallDisk {
+ public:
+  SmallDisk(std::filesystem::path path, const std::string& size) : path_(std::move(path)) {
+    std::filesystem::create_directory(path_);
+    if (::mount("tendon-test", path_.c_str(), "tmpfs", 0, ("size=" + size).c_str()) != 0) error_ = errno;
+  }
+  ~SmallDisk() {
+    // Lazily, so that it goes even when a program that was not stopped still writes to it.
+    if (error_ == 0) ::umount2(path_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  const std::filesystem::path& path() const noexcept { return path_; }
+  int error() const noexcept { return error_; }
+  std::string why_not() const {
+    return "may not mount a small tmpfs here (" + std::system_category().message(error_) +
+           "); run as root to test what a full disk does";
+  }
+
+ private:
+  std::filesystem::path path_;
+  int error_ = 0;
+};
+
+}  // namespace tendon::e2e
