@@ -26,8 +26,8 @@ class SpscRing {
     if (!std::has_single_bit(capacity)) throw std::invalid_argument("capacity of a ring must be a power of two");
   }
 
-  /// Writer only: the place of the next value, or null when the ring is full. What is in it is some earlier value;
-  /// nobody else sees it until `push`. For values so large that they are written in place.
+  /// Writer only: the place of the next value, or null when the ring is full. It holds some earlier value. Nobody else
+  /// sees it until `push`. For values so large that they are written in place.
   T* back() {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;

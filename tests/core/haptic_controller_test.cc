@@ -75,7 +75,7 @@ TEST(HapticController, TheLedgerCountsTheForceAppliedNotTheForceWanted) {
   EXPECT_NEAR(full - half, 0.25 * 5e-4, 1e-15);  // 0.5 N against 0.25 N over 0.5 mm
 }
 
-TEST(HapticController, TheBoundAssumesTheLongestHoldAndTheLedgerTakesTheActualOne) {
+TEST(HapticController, TheBoundTakesTheLongestHoldTheLedgerTheActualOne) {
   HapticController::Config c = config();
   c.limiter.longest_hold = milliseconds(2);
   Bench bench(c);
@@ -104,7 +104,7 @@ Step after_a_pause(Bench& bench, Duration pause) {
   return bench.move_to(0.02 - follows, pause);
 }
 
-TEST(HapticController, AfterAnOverrunTheLedgerRecoversMonotonicallyWithFrictionForcesOnly) {
+TEST(HapticController, AfterAnOverrunTheLedgerNeverFallsAndRecovers) {
   Bench bench(config());
   const Step overrun = after_a_pause(bench, milliseconds(30));
   ASSERT_LT(overrun.energy, -1e-3);
@@ -168,7 +168,7 @@ TEST(HapticController, ABrokenAssumptionIsInTheStepThatSawIt) {
   EXPECT_FALSE(bench.move_to(7.8e-4).assumption_broken);
 }
 
-TEST(HapticController, APauseBeyondTheDevicesWatchdogIsChargedTheWorstAndNoMore) {
+TEST(HapticController, APauseBeyondTheWatchdogIsChargedTheWorstNoMore) {
   HapticController::Config c = config();
   c.watchdog = milliseconds(5);
   Bench bench(c);
@@ -181,7 +181,7 @@ TEST(HapticController, APauseBeyondTheDevicesWatchdogIsChargedTheWorstAndNoMore)
   EXPECT_NEAR(after.energy, before.energy - 5e-3 * std::pow(before.force.norm() - 0.05, 2) / (4 * 0.26), 1e-12);
 }
 
-TEST(HapticController, WithTheLongestHoldEqualToTheWatchdogNoPauseMakesTheLedgerNegative) {
+TEST(HapticController, LongestHoldEqualToWatchdogKeepsLedgerNonnegative) {
   HapticController::Config c = config();
   c.watchdog = milliseconds(5);
   c.limiter.longest_hold = milliseconds(5);
@@ -201,7 +201,7 @@ TEST(HapticController, NotANumberForceIsRefusedAndTheOneBeforeGoesOn) {
   EXPECT_EQ(bench.move_to(0.02).force.x(), before);
 }
 
-TEST(HapticController, NotANumberPositionGivesZeroForceFreezesTheLedgerAndLatchesAFault) {
+TEST(HapticController, ANanPositionZeroesForceFreezesLedgerLatchesFault) {
   Bench bench(config());
   bench.move_to(0);
   for (int i = 1; i <= 100; ++i) bench.move_to(i * 2e-4);
@@ -219,7 +219,7 @@ TEST(HapticController, NotANumberPositionGivesZeroForceFreezesTheLedgerAndLatche
   EXPECT_LE(seen.energy, energy);
 }
 
-TEST(HapticController, APositionThatNoHandComesToIsAFaultGivesZeroForceAndEarnsNothing) {
+TEST(HapticController, AnImpossiblePositionIsAFaultAndEarnsNothing) {
   HapticController::Config c = config();
   c.max_speed = 10;
   Bench bench(c);
@@ -253,7 +253,7 @@ TEST(HapticController, AFaultIsLeftOnlyByRearmAndForcesAreRampedInAgain) {
   EXPECT_TRUE(step.reasons.has(Reason::kRampIn));
 }
 
-TEST(HapticController, DisarmedItGivesNoForceFromTheNextStepOnThroughNoSlewLimitUntilRearmed) {
+TEST(HapticController, DisarmedItGivesNoForceAtOnceUntilRearmed) {
   HapticController::Config c = config();
   c.limiter.law = Law::kNone;
   c.max_slew = 100;
@@ -312,7 +312,7 @@ TEST(HapticController, ToDisarmIsNoFaultAndClearsNone) {
   EXPECT_TRUE(step.reasons.has(Reason::kDisarmed));
 }
 
-TEST(HapticController, ASilentDeviceGetsZeroForceAndIsAFaultAfterTwentyMisses) {
+TEST(HapticController, ASilentDeviceGetsZeroForceAndFaultsAfter20Misses) {
   Bench bench(config());
   bench.move_to(0);
   for (int i = 1; i <= 20; ++i) {
@@ -463,7 +463,7 @@ HapticController::Config tool_config() {
   return c;
 }
 
-TEST(HapticController, OfAdmittanceTypeItPushesTheHandleAfterTheToolThatTheHandPushes) {
+TEST(HapticController, AnAdmittanceDevicePushesTheHandleAfterTheTool) {
   HapticController controller(tool_config());
   controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3::Zero());
   const Vec3 push(3, 0, 0);
@@ -487,7 +487,7 @@ TEST(HapticController, OfAdmittanceTypeTheRemoteForceActsOnTheTool) {
   EXPECT_NEAR(step.force.x(), 0, 1e-12);
 }
 
-TEST(HapticController, OfAdmittanceTypeThereIsNoForceWithoutAMeasurementOfTheHand) {
+TEST(HapticController, AnAdmittanceDeviceGivesNoForceWithoutMeasurement) {
   HapticController controller(tool_config());
   controller.step({LocalTime(milliseconds(1)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero(), Vec3(3, 0, 0));
   const Step step = controller.step({LocalTime(milliseconds(2)), Vec3::Zero(), Vec3::Zero()}, Vec3::Zero());

@@ -40,7 +40,7 @@ Vec<N> worst_motion(const Vec<N>& force, const Friction& friction, Duration held
 template <int N>
 using World = std::function<Demand<N>(const Vec<N>& position)>;
 
-/// Of what a static world is made.
+/// The walls that make up a static world.
 struct Walls {
   std::size_t count = 3;   ///< 1 … 3
   double bilateral = 0.4;  ///< share of them that pull too

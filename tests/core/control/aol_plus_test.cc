@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -24,9 +23,6 @@ using std::chrono::milliseconds;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr Duration kPeriod = milliseconds(1);
 
-static_assert(StabilityController<Aol<1>, 1> && StabilityController<Aol<1, 3>, 3> && StabilityController<Aol<3>, 3>);
-static_assert(StabilityController<Aol<6>, 6> && StabilityController<Aol<2, 3>, 6>);
-static_assert(StabilityController<PerAxisAol<1>, 1> && StabilityController<PerAxisAol<3>, 3>);
 static_assert(StabilityController<AolPlus<1>, 1> && StabilityController<AolPlus<1, 3>, 3>);
 static_assert(StabilityController<AolPlus<3>, 3> && StabilityController<AolPlus<6>, 6>);
 static_assert(StabilityController<AolPlus<2, 3>, 6>);
@@ -394,7 +390,7 @@ TEST(AolPlus, AFlickeringCountCostsAMovingHandNoMoreThanTheFlicker) {
   EXPECT_NEAR(law.spendable(), 0.05 * 1000 * 30e-6, 0.05 * 2 * 30e-6);
 }
 
-TEST(AolPlus, TheKneeIsSmoothNeverAboveTheBoundAndSparesTheFirstEightyPercent) {
+TEST(AolPlus, TheKneeIsSmoothWithinTheBoundAndSparesTheFirstEightyPercent) {
   auto config = one_axis();
   config.parts.knee.emplace();
   AolPlus<1> law(config);
@@ -556,56 +552,6 @@ TEST(AolPlus, SaysWhichFieldOfWhichPartCannotBe) {
             "bounded_acceleration.shaping_viscous = 0.1: expected the viscous friction of 0.26 N·s/m or more");
   EXPECT_EQ(complaint({.latency_reserve = {{}}, .bounded_acceleration = {{.most = {300}, .shaping_viscous = {0.3}}}}),
             "bounded_acceleration is not proved for forces that are held late: not together with latency_reserve");
-}
-
-TEST(Aol, TheJointFormIsTheSameInEveryFrameAndTheBoxFormAllowsAllThatAxesAllow) {
-  Dice dice(3);
-  for (int trial = 0; trial < 200; ++trial) {
-    const Friction friction{dice.decades(-3, -1), dice.decades(-2, 0)};
-    Aol<1, 3> here({.friction = {friction}, .longest_hold = kPeriod});
-    Aol<1, 3> there({.friction = {friction}, .longest_hold = kPeriod});
-    Aol<3> box({.friction = {friction, friction, friction}, .longest_hold = kPeriod});
-    PerAxisAol<3> axes({.friction = friction, .longest_hold = kPeriod});
-    const Mat3 turn = Eigen::HouseholderQR<Mat3>(Mat3::Random()).householderQ();
-    for (int n = 0; n < 20; ++n) {
-      const Vec3 dx = dice.direction() * dice.decades(-6, -3);
-      here.observe({.applied = Vec3::Zero(), .dx = dx, .held = kPeriod});
-      there.observe({.applied = Vec3::Zero(), .dx = turn * dx, .held = kPeriod});
-      box.observe({.applied = Vec3::Zero(), .dx = dx, .held = kPeriod});
-      axes.observe({.applied = Vec3::Zero(), .dx = dx, .held = kPeriod});
-    }
-    const Vec3 wanted = dice.direction() * dice.decades(-1, 2);
-    const Vec3 joint = here.limit({.force = wanted}).force;
-    EXPECT_LT((turn * joint - there.limit({.force = turn * wanted}).force).norm(), 1e-9 * joint.norm());
-    EXPECT_LT(joint.cross(wanted).norm(), 1e-9 * joint.norm() * wanted.norm());
-    // Whatever the axes allow by themselves is within the box form's set, so it lets it through unchanged.
-    const Vec3 by_axes = axes.limit({.force = wanted}).force;
-    EXPECT_LT((box.limit({.force = by_axes}).force - by_axes).norm(), 1e-9 * by_axes.norm());
-  }
-}
-
-TEST(Aol, ThePaperFormLosesALateralForceThatTheJointFormKeeps) {
-  // control.md 8.5: motion along x only, wanted (−35.9, −2) N. In a frame at 45° the axes end up alike, and the
-  // lateral force is gone.
-  const auto lateral = [](double angle, bool joint) {
-    const Friction friction{0.0, 0.26};
-    Mat3 frame = Mat3::Identity();
-    frame.topLeftCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
-    Aol<1, 3> one({.friction = {friction}, .longest_hold = kPeriod});
-    PerAxisAol<3> each({.friction = friction, .longest_hold = kPeriod});
-    for (int n = 0; n < 100; ++n) {
-      const Interval<3> interval{.applied = Vec3::Zero(), .dx = frame * Vec3(3e-4, 0, 0), .held = kPeriod};
-      one.observe(interval);
-      each.observe(interval);
-    }
-    const Demand<3> wanted{.force = frame * Vec3(-35.9, -2, 0)};
-    const Vec3 force = frame.transpose() * (joint ? one.limit(wanted).force : each.limit(wanted).force);
-    return force.y() / force.x() / (2 / 35.9);
-  };
-  const double eighth_turn = 3.14159265358979 / 4;
-  EXPECT_NEAR(lateral(0, true), 1, 1e-9);
-  EXPECT_NEAR(lateral(eighth_turn, true), 1, 1e-9);
-  EXPECT_LT(std::abs(lateral(eighth_turn, false)), 0.2);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TEST(ForceBounding, KeepsTheCommonPromises) {
 }
 
 // Lee & Lee 2009 eq. (8) with f_c = 0, written out.
-TEST(ForceBounding, WithoutCoulombFrictionAndWithinOneContactItIsTheAdjustingOutputLimiter) {
+TEST(ForceBounding, WithoutCoulombFrictionItIsTheAdjustingOutputLimiter) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Dice dice(seed);
     const Friction friction{0, dice.decades(-2, 0)};
@@ -59,7 +59,7 @@ TEST(ForceBounding, ForgetsWhatFreeMotionEarnedButNeverADebt) {
   EXPECT_EQ(law.limit({Vec<1>(9.0)}).permitted, 0);
 }
 
-TEST(MemorylessForceBounding, PermitsTheForceBeforePlusTwoBOverTTimesTheMotion) {
+TEST(MemorylessForceBounding, PermitsTheLastForcePlusTwoBOverTTimesMotion) {
   MemorylessForceBounding<3> law({kFriction, milliseconds(1)});
   const Vec3 force(0.3, -0.2, 0.1);
   const Vec3 dx(1e-4, 2e-4, -3e-4);
@@ -67,7 +67,7 @@ TEST(MemorylessForceBounding, PermitsTheForceBeforePlusTwoBOverTTimesTheMotion) 
   EXPECT_NEAR(law.limit({Vec3(9, 9, 9)}).permitted, (force - 520 * dx).norm(), 1e-14);
 }
 
-TEST(MemorylessForceBounding, AHoldLongerThanAgreedIsCreditedWithWhatFrictionTookInIt) {
+TEST(MemorylessForceBounding, AHoldLongerThanAgreedIsCreditedWithItsFriction) {
   MemorylessForceBounding<1> law({kFriction, milliseconds(1)});
   law.observe({Vec<1>(0.0), Vec<1>(1e-3), milliseconds(4)});
   EXPECT_NEAR(law.limit({Vec<1>(9.0)}).permitted, 2 * std::sqrt(260 * 0.26 * 1e-6 / 4e-3), 1e-12);

@@ -39,7 +39,7 @@ TEST(PassiveSynthesis, LeavesASoftFieldAlone) {
   EXPECT_TRUE(limited.reasons.empty());
 }
 
-TEST(PassiveSynthesis, NeverForgetsTheSteepestSlopeAndStartsFromTheConfiguredOne) {
+TEST(PassiveSynthesis, StartsFromTheConfiguredSlopeAndKeepsTheSteepest) {
   PassiveSynthesis<1> law({kFriction, milliseconds(1), {}, 1040});
   EXPECT_DOUBLE_EQ(law.limit({Vec<1>(2.0), Mat<1>(100.0)}).force[0], 1);
   EXPECT_DOUBLE_EQ(law.limit({Vec<1>(2.0), Mat<1>(2080.0)}).force[0], 0.5);

@@ -33,7 +33,7 @@ TEST(PassivityController, KeepsTheCommonPromises) {
   }
 }
 
-// What a law observes of a plain spring on random motion, and what there was to observe.
+// The energy that a law observes of a plain spring on random motion, and the energy that the ledger shows.
 struct Seen {
   double worst_of_sum = 0;  // J, |observed − (K x²/2 ± K/2 Σ Δx²)|
   double least_observed = 0;
@@ -65,7 +65,7 @@ Seen watch_a_spring(Law law, double sign_of_leak) {
   return seen;
 }
 
-TEST(PassivityController, AsPublishedItNeverSeesTheLeakOfASampledSpringAndNeverActs) {
+TEST(PassivityController, AsPublishedItNeverSeesTheLeakOfASampledSpring) {
   const Seen seen = watch_a_spring(PassivityController<1>({kFriction, kSameSample, kInf}), +1);
   EXPECT_LT(seen.worst_of_sum, 1e-9);
   EXPECT_GE(seen.least_observed, 0);
@@ -95,7 +95,7 @@ TEST(PassivityController, DampsAsMuchAsIsMissing) {
   EXPECT_TRUE(limited.reasons.has(Reason::kEnergy));
 }
 
-TEST(PassivityController, NeitherDividesByASpeedOfNothingNorDampsMoreThanItMay) {
+TEST(PassivityController, NeitherDividesByZeroSpeedNorDampsMoreThanItMay) {
   PassivityController<1> law({kFriction, kZohExact, 5, 1e-3});
   law.observe({Vec<1>(100.0), Vec<1>(0.99e-6), milliseconds(1)});
   EXPECT_EQ(law.limit({Vec<1>(1.0)}).force[0], 1);
@@ -105,13 +105,13 @@ TEST(PassivityController, NeitherDividesByASpeedOfNothingNorDampsMoreThanItMay) 
   EXPECT_EQ(series_damping(1, 1, Duration::zero(), 0, kInf), 0);
 }
 
-TEST(PassivityController, AsPublishedAStiffWallThrowsTheHandOffAsIfItWereNotThere) {
+TEST(PassivityController, AsPublishedAStiffWallStillThrowsTheHandOff) {
   const Press published = press(PassivityController<1>({kPressFriction, kSameSample, kInf}), 20000);
   EXPECT_GT(published.unrest, 0.5);
   EXPECT_LT(published.least_work, -0.1);
 }
 
-TEST(PassivityController, ZohExactWithADamperWellBelowTwoMOverTItShowsStiffWallsAsTheyAre) {
+TEST(PassivityController, ZohExactWithAModestDamperItShowsStiffWallsTruly) {
   for (const double wall : {800.0, 3000.0, 20000.0}) {
     const Press result = press(PassivityController<1>({kPressFriction, kZohExact, 100}), wall);
     EXPECT_NEAR(result.stiffness / wall, 1, 0.01) << wall;
@@ -120,7 +120,7 @@ TEST(PassivityController, ZohExactWithADamperWellBelowTwoMOverTItShowsStiffWalls
 }
 
 // 2m/T = 250 N·s/m for device and hand.
-TEST(PassivityController, ADamperWithoutLimitGivesBurstsUpToTheLimitOfTheDevice) {
+TEST(PassivityController, ADamperWithoutLimitGivesBurstsUpToMaxForce) {
   const Press result = press(PassivityController<1>({kPressFriction, kZohExact, kInf}), 20000);
   EXPECT_GT(result.peak_force, 50);
   EXPECT_GT(result.unrest, 0.02);
@@ -151,7 +151,7 @@ TEST(ParallelPassivityController, AsPublishedItIsAsBlindAsTheSeriesForm) {
   EXPECT_EQ(seen.interventions, 0);
 }
 
-TEST(ParallelPassivityController, AsPublishedItCountsTheEnvironmentsOwnMotionAndWhatItDissipated) {
+TEST(ParallelPassivityController, AsPublishedItCountsTheEnvironmentsMotion) {
   ParallelPassivityController<1> law({kFriction, kSameSample, kInf});
   law.observe({Vec<1>(0.0), Vec<1>(1e-3), milliseconds(1)});
   EXPECT_NEAR(law.limit({Vec<1>(4.0), Mat<1>(1000.0)}).force[0], 3, 1e-12);
@@ -161,7 +161,7 @@ TEST(ParallelPassivityController, AsPublishedItCountsTheEnvironmentsOwnMotionAnd
   EXPECT_NEAR(law.observed(), -4e-3 + 1 * (1e-3 + 1e-3) + 4e-3, 1e-15);
 }
 
-TEST(ParallelPassivityController, HandAndEnvironmentDriftApartUntilTheContactEnds) {
+TEST(ParallelPassivityController, HandDriftsFromEnvironmentUntilContactEnds) {
   ParallelPassivityController<1> law({kFriction, kZohExact, kInf});
   Vec<1> force(0);
   const auto move = [&](double dx, double x) {

@@ -31,7 +31,7 @@ double depth(int step) {
   return std::abs(8e-3 * std::sin(3 * t) + 2e-3 * std::sin(17 * t) + 1e-4 * std::sin(190 * t));
 }
 
-TEST(PortHamiltonian, ThePlainSpringsLedgerIsItsPotentialMinusTheLeapsPlusFriction) {
+TEST(PortHamiltonian, APlainSpringsLedgerIsPotentialMinusLeapsPlusFriction) {
   Unlimited<1> spring({kFriction});
   constexpr double kStiffness = 1500;
   double x = 0;

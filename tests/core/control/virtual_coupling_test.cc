@@ -61,7 +61,7 @@ int broken(double share_of_damping, int seeds, const Walls& walls) {
       seeds, walls);
 }
 
-TEST(VirtualCoupling, WithinColgatesRuleNoAdversaryDrawsEnergyFromAWallOrALinearWorld) {
+TEST(VirtualCoupling, WithinColgatesRuleNoAdversaryDrawsEnergy) {
   for (const Walls walls : {Walls{1, 0.4}, Walls{3, 1}}) {
     EXPECT_EQ(broken<1>(0, 200, walls), 0);
     EXPECT_EQ(broken<1>(0.4, 200, walls), 0);
@@ -73,7 +73,7 @@ TEST(VirtualCoupling, WithinColgatesRuleNoAdversaryDrawsEnergyFromAWallOrALinear
 
 // A spring pulls the hand into a wall. At the surface the demand says that the world is stiff, but the tool, ahead of
 // the hand or behind it, is outside.
-TEST(VirtualCoupling, WhereTheWorldIsStifferForTheHandThanForTheToolEnergyCanBeDrawn) {
+TEST(VirtualCoupling, AWorldStifferForTheHandThanForTheToolGivesEnergy) {
   const Friction friction{0, 0.26};
   VirtualCoupling<1> law({friction, milliseconds(1), 520});
   Vec<1> force(0);

@@ -78,7 +78,7 @@ TEST(RecursiveLeastSquares, EqualsBatchWeightedLeastSquaresInBothForms) {
   }
 }
 
-TEST(RecursiveLeastSquares, BothFormsAgreeThroughResetsProjectionsAndTheDeadZone) {
+TEST(RecursiveLeastSquares, BothFormsAgreeThroughResetProjectionAndDeadZone) {
   const LeastSquaresConfig config{.forgetting = 0.95, .prior_variance = 1e4, .dead_zone = 0.02};
   UdLeastSquares<3> ud(config);
   QrLeastSquares<3> qr(config);
@@ -107,7 +107,7 @@ TEST(RecursiveLeastSquares, BothFormsAgreeThroughResetsProjectionsAndTheDeadZone
   EXPECT_LT(taught, 4900);
 }
 
-TEST(RecursiveLeastSquares, TheTextbookUpdateIsIndefiniteInFloat32WhereBothFormsAreNot) {
+TEST(RecursiveLeastSquares, OnlyTheTextbookUpdateIsIndefiniteInFloat32) {
   constexpr int kSamples = 20000;
   Textbook<3, float> textbook{1e6F * Eigen::Matrix3f::Identity(), 0.999F};
   UdLeastSquares<3, float> ud({.forgetting = 0.999, .prior_variance = 1e6});

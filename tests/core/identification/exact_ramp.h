@@ -32,7 +32,7 @@ struct ExactRamp {
     for (int i = 0; std::abs(position(i * period)) <= travel; ++i) {
       const double t = i * period;
       const double x = position(t);
-      // What is held from here on has the mean of the ramp.
+      // The force is held for the period that follows; it is the mean of the ramp over that period.
       result.samples.push_back(
           {t, encoder_step > 0 ? std::round(x / encoder_step) * encoder_step : x, rate * (t + period / 2)});
     }

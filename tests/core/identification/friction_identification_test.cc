@@ -81,7 +81,7 @@ TEST(Identification, AConstantForceCancelsBetweenTheDirections) {
   EXPECT_TRUE(result.places.at(0).both_directions);
 }
 
-TEST(Identification, WarnsThatOneDirectionCannotTellAConstantForceFromFriction) {
+TEST(Identification, WarnsThatOneDirectionMixesAConstantForceAndFriction) {
   const std::vector<RampRun> runs = {ExactRamp{.bias = -0.02}.run()};
   const Identification result = identify_friction(runs, kConfig);
   EXPECT_NEAR(result.estimate.coulomb, 0.07, 1e-4);

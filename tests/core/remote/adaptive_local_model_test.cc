@@ -61,7 +61,7 @@ TEST(AdaptiveLocalModel, SpreadsAJumpOfForceOverTheNextSlowPeriod) {
   }
 }
 
-TEST(AdaptiveLocalModel, NothingJumpsAtTheInstantAnAnswerArrivesEvenInTheMiddleOfABlend) {
+TEST(AdaptiveLocalModel, NothingJumpsWhenAnAnswerArrivesEvenInABlend) {
   AdaptiveLocalModel model({});
   Dice dice(6);
   const Motion somewhere{at(0), Vec3(0.01, -0.02, 0.005), Vec3::Zero()};

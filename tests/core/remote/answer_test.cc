@@ -106,7 +106,7 @@ TEST(Answer, WhatRubsAcrossFadesWithWhatItIsPressedBy) {
   EXPECT_EQ(reconstruct(with_table(), deeper_by(-0.0045)).force, Vec3::Zero());
 }
 
-TEST(Answer, ATableIsFollowedAlongTheNormalInPlaceOfTheStiffnessAndEndsAtItsEnds) {
+TEST(Answer, ATableReplacesStiffnessAlongTheNormalWithinItsEnds) {
   const RemoteForce answer = with_table();
   const auto along = [&](double depth) { return reconstruct(answer, deeper_by(depth)); };
   EXPECT_NEAR(along(0).force.z(), 2, 1e-12);

@@ -167,7 +167,7 @@ TEST(HeldForce, BlendsNoModelOfABodyThatHasBeenCut) {
   EXPECT_EQ(held.wanted(at(milliseconds(1), Vec3(0.02, 0, 0))).force, cut.force);
 }
 
-TEST(HeldForce, NeitherStiffnessNorTableIsFollowedBeyondTheStiffestThatIsBelieved) {
+TEST(HeldForce, StiffnessAndTableAreFollowedUpToTheStiffestBelieved) {
   HeldForce::Config config = without_ramp();
   config.max_stiffness = 50;
   HeldForce held(config);
@@ -190,7 +190,7 @@ TEST(HeldForce, TellsTheLimiterHowStiffTheEnvironmentIsAndFadesThatToo) {
   EXPECT_NEAR(fading.stiffness(0, 0), 800 * std::exp(-1.0), 1e-9);
 }
 
-TEST(HeldForce, WithTheAdaptiveLocalModelANewStiffnessIsBlendedInButTheFirstAfterASafeStopIsNot) {
+TEST(HeldForce, BlendsInANewStiffnessExceptTheFirstAfterASafeStop) {
   HeldForce::Config config = without_ramp();
   config.adaptive_local_model.emplace();
   HeldForce held(config);
@@ -206,7 +206,7 @@ TEST(HeldForce, WithTheAdaptiveLocalModelANewStiffnessIsBlendedInButTheFirstAfte
   EXPECT_DOUBLE_EQ(held.wanted(at(milliseconds(2045), hand)).force.x(), -5);
 }
 
-TEST(HeldForce, WithTheOutputEstimatorASlowEnginesSpringIsFollowedAtTheLoopsRate) {
+TEST(HeldForce, TheEstimatorFollowsASlowEnginesSpringAtTheLoopsRate) {
   const auto error = [](bool estimate) {
     HeldForce::Config config = without_ramp();
     if (estimate) config.output_estimator.emplace();

@@ -40,7 +40,7 @@ std::string error_of(Call call) {
   return "no error";
 }
 
-TEST(ColgateSchenkel, WithoutDelayIsHalfAPeriodOfStiffnessPlusTheDamperOfEitherSign) {
+TEST(ColgateSchenkel, WithoutDelayIsHalfTKPlusTheDamperOfEitherSign) {
   EXPECT_NEAR(passive_viscous_friction(spring(500, 0, 0)), 0.25, 1e-12);
   EXPECT_NEAR(passive_viscous_friction(spring(500, 0.2, 0)), 0.45, 1e-12);
   EXPECT_NEAR(passive_viscous_friction(spring(500, -0.2, 0)), 0.45, 1e-12);

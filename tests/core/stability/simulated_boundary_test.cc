@@ -61,7 +61,7 @@ struct Loop {
 };
 class SampledSpringSimulated : public testing::TestWithParam<Loop> {};
 
-TEST_P(SampledSpringSimulated, DiesOutOnePercentBelowTheExactBoundaryAndGrowsOnePercentAbove) {
+TEST_P(SampledSpringSimulated, Dies1PercentBelowTheBoundaryGrows1PercentAbove) {
   SampledSpring spring{
       .mass = 0.075, .viscous = 0.26, .damping = GetParam().damping, .period = 1ms, .delay_samples = GetParam().delay};
   const double boundary = largest_stable_stiffness(spring);

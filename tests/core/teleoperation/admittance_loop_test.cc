@@ -110,8 +110,8 @@ TEST(AdmittanceLoop, TakesEnergyThatIsNotThereUnlessTheLimiterBoundsIt) {
   }
 }
 
-// Effective mass and damping that the hand feels at its own frequency: F = m a + b v, least squares. What is left of
-// the first second is the start.
+// Effective mass and damping that the hand feels at its own frequency: F = m a + b v, least squares. The fit
+// leaves out the first second, in which the motion starts.
 struct Felt {
   double mass, damping;
 };
@@ -140,7 +140,7 @@ TEST(AdmittanceLoop, TheHandFeelsTheToolsMassAndDampingWhenFrictionAllowsIt) {
 
 // To speed up a handle of m = 2 kg as if it were M = 0.3 kg the motors must put in ½ (m − M) v² ahead of what the hand
 // does. Only what the tool's damping has earned by then pays for it: nothing, for a tool without.
-TEST(AdmittanceLoop, AToolLighterThanTheDeviceIsClippedUnlessItsDampingHasEarnedTheDifference) {
+TEST(AdmittanceLoop, AToolLighterThanTheDeviceIsClippedUnlessDampingEarns) {
   const auto light = [](double damping, bool limited) {
     return run(
         {.tool = tool<3>(0.3, damping, 400, 4e3), .limited = limited, .wall = 0, .frequency = 2, .duration = 6s});
@@ -182,7 +182,7 @@ int steps_at_the_bound(double push, double then) {
   return steps;
 }
 
-TEST(AdmittanceLoop, TheForceLeavesItsBoundAsSoonAsTheErrorTurnsHoweverLongItWasClipped) {
+TEST(AdmittanceLoop, TheForceLeavesItsBoundAsSoonAsTheErrorTurns) {
   // The tool itself, 1 kg with 200 N·s/m, needs 1.4 ms to turn from 0.1 to −0.1 m/s under a push of −40 N.
   EXPECT_LE(steps_at_the_bound(20, -40), 4);
 }
@@ -277,7 +277,7 @@ TEST(AdmittanceLoop, WaitsWhileNobodySeesTheMotion) {
   EXPECT_EQ(loop.tool_velocity()[0], 0);
 }
 
-TEST(AdmittanceLoop, AMeasurementThatIsNotFiniteGivesNoForceAndLeavesTheToolAtRest) {
+TEST(AdmittanceLoop, ANonFiniteMeasurementGivesNoForceAndLeavesTheTool) {
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     for (int where = 0; where < 3; ++where) {
       AdmittanceLoop<3> loop(tool<3>(1, 1, 100, 1000));
@@ -354,7 +354,7 @@ double least_hand_work(bool credit, double a_max) {
   return least;
 }
 
-TEST(AdmittanceLoop, LendingOnTheKineticEnergyIsNotPassiveBecauseTheHandCanTakeThatBack) {
+TEST(AdmittanceLoop, LendingOnTheKineticEnergyIsNotPassive) {
   const double lent = least_hand_work(true, 10);
   std::cout << "hand work with the credit of control.md 1.5: " << lent << " J, without " << least_hand_work(false, 10)
             << " J\n";

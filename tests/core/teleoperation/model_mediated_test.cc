@@ -57,7 +57,7 @@ TEST(ModelMediated, NoUpdateOfTheModelPutsEnergyIn) {
 }
 
 // The same against the ledger: with K ≤ 2b/T and the budget that the account can spare the ledger pays everything.
-TEST(ModelMediated, WithTheSparePartOfTheAccountAsBudgetTheLedgerNeverGoesNegative) {
+TEST(ModelMediated, WithTheSpareEnergyAsBudgetTheLedgerIsNeverNegative) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Dice dice(seed);
     SurfaceRenderer<3> renderer;
@@ -80,7 +80,7 @@ TEST(ModelMediated, WithTheSparePartOfTheAccountAsBudgetTheLedgerNeverGoesNegati
   }
 }
 
-TEST(ModelMediated, ASurfaceThatWouldPushIsPutDeeperAndRisesAsTheHandWithdraws) {
+TEST(ModelMediated, APushingSurfaceIsPutDeeperAndRisesAsTheHandLeaves) {
   SurfaceRenderer<1> renderer;
   renderer.receive({1, Vec<1>(1), 0.0, 100});
   EXPECT_EQ(renderer.command(Vec<1>(-0.01), 0).demand.force[0], 0)
@@ -139,7 +139,7 @@ TEST(ModelMediated, FindsTheSurfaceThatTheToolTouches) {
   }
 }
 
-TEST(ModelMediated, TheSurfaceFoundFeelsLikeTheRealOneAtTheToolEvenBeforeItsStiffnessIsKnown) {
+TEST(ModelMediated, AFoundSurfaceFeelsRealBeforeItsStiffnessIsKnown) {
   SurfaceEstimator<3> estimator(kEstimator);
   const Vec3 x(0, 0.004, 0);
   const auto found = estimator.observe(x, Vec3(0, 1.7, 0));

@@ -65,7 +65,7 @@ Outcome attack(std::uint64_t seed, const typename PassiveSetPosition<N>::Config&
   return outcome;
 }
 
-TEST(PassiveSetPosition, IsPassiveAndNeverClippedHoweverIrregularTheSetPositions) {
+TEST(PassiveSetPosition, IsPassiveAndUnclippedWithIrregularSetPositions) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Dice dice(seed);
     const double most = 2 * kFriction.viscous / kT;
@@ -92,7 +92,7 @@ TEST(PassiveSetPosition, ASpringThatIsTenPercentTooStiffIsFoundOut) {
 }
 
 // What it is for: the same spring tied to the set position as it comes.
-TEST(PassiveSetPosition, TheSameSpringTiedToTheSetPositionsAsTheyComeIsNotPassive) {
+TEST(PassiveSetPosition, ASpringTiedToTheRawSetPositionsIsNotPassive) {
   const double stiffness = 2 * kFriction.viscous / kT;
   EnergyLedger ledger(kFriction);
   Dice dice(1);
@@ -130,7 +130,7 @@ TEST(PassiveSetPosition, BooksNoLessDissipationThanTheRecalledFormDoes) {
   }
 }
 
-TEST(PassiveSetPosition, FollowsTheSetPositionAsFarAsThereIsEnergyAndAllTheWayWhenThereIsEnough) {
+TEST(PassiveSetPosition, FollowsTheSetPositionAsFarAsEnergyLasts) {
   PassiveSetPosition<3> spring({100, kFriction, kPeriod});
   EXPECT_EQ(spring.command(Vec3::Zero()).force, Vec3::Zero()) << "before the first message";
   spring.receive({1, Vec3(0.01, 0, 0)});

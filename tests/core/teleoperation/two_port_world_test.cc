@@ -277,7 +277,7 @@ constexpr Network kConstant = {.delay = 60};
 constexpr Network kVariable = {.delay = 40, .jitter = 40, .loss = 0.1, .seed = 4};
 constexpr Network kHostile = {.delay = 100, .jitter = 300, .loss = 0.6, .seed = 9};
 
-TEST(TwoPortWorld, EveryMethodLeavesTheLimiterLessToDoThanForcesSentAsTheyAre) {
+TEST(TwoPortWorld, EveryMethodSparesTheLimiterWorkThatRawForcesMake) {
   for (const Network& network : {kConstant, kVariable}) {
     const Outcome direct = run(*make<Direct>(network));
     std::cout << "delay " << network.delay << " ms, jitter " << network.jitter << " ms, loss " << network.loss * 100
@@ -294,7 +294,7 @@ TEST(TwoPortWorld, EveryMethodLeavesTheLimiterLessToDoThanForcesSentAsTheyAre) {
   }
 }
 
-TEST(TwoPortWorld, WithoutTheLimiterForcesSentAsTheyAreMakeTheHandsPortActive) {
+TEST(TwoPortWorld, WithoutTheLimiterRawForcesMakeTheHandsPortActive) {
   EXPECT_LT(run(*make<Direct>(kConstant), false).least_hand_work, -1e-3);
 }
 
