@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <gtest/gtest.h>
-
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -20,39 +19,40 @@ struct Counted {
 
 /// Runs `program argument` under callgrind. The program calls its extern "C" function `function` twice for every line
 /// that it prints, at first for the shorter run; instructions are counted within that function alone.
+///
+/// Throws std::runtime_error when the program fails, or when there is no valgrind.
 inline std::vector<Counted> count_instructions(const std::string& program, const std::string& argument,
                                                const std::string& function) {
-  std::string folder = std::filesystem::temp_directory_path() / "tendon-proof-XXXXXX";
-  if (mkdtemp(folder.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  struct Folder {
+    std::string path = std::filesystem::temp_directory_path() / "tendon-proof-XXXXXX";
+    Folder() {
+      if (mkdtemp(path.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    }
+    ~Folder() {
+      std::error_code ignored;
+      std::filesystem::remove_all(path, ignored);
+    }
+  };
+  const Folder folder;
   const auto total = [&](std::size_t file) {
-    std::ifstream stream(folder + "/count." + std::to_string(file));
+    std::ifstream stream(folder.path + "/count." + std::to_string(file));
     for (std::string line; std::getline(stream, line);) {
       if (line.starts_with("totals: ") || line.starts_with("summary: ")) return std::stod(line.substr(line.find(' ')));
     }
-    ADD_FAILURE() << "callgrind's file " << file << " has no total";
-    return 0.0;
+    throw std::runtime_error("callgrind's file " + std::to_string(file) + " of " + program + " has no total");
   };
   const std::string command =
-      "cd " + folder +
+      "cd " + folder.path +
       " && OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 valgrind -q --tool=callgrind --toggle-collect=" + function +
       " --dump-after=" + function + " --callgrind-out-file=count " + program + " " + argument + " > lines";
-  EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  if (std::system(command.c_str()) != 0) throw std::runtime_error("this failed: " + command);
   std::vector<Counted> all;
-  std::ifstream lines(folder + "/lines");
+  std::ifstream lines(folder.path + "/lines");
   for (std::string line; std::getline(lines, line);) {
     const std::size_t before = 2 * all.size();
     all.push_back({line, total(before + 2) - total(before + 1)});
   }
-  std::filesystem::remove_all(folder);
   return all;
 }
-
-/// For tests that count instructions; they are skipped without valgrind.
-class InstructionTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (std::system("command -v valgrind > /dev/null") != 0) GTEST_SKIP() << "skipped: there is no valgrind";
-  }
-};
 
 }  // namespace tendon::testing

@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "tests/support/callgrind.h"
+#include "tests/support/instruction_test.h"
 
 namespace tendon {
 namespace {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "tests/support/callgrind.h"
+#include "tests/support/instruction_test.h"
 
 namespace tendon::softbody {
 namespace {

@@ -15,6 +15,7 @@
 #include "server/build_info.h"
 #include "tests/support/json_line.h"
 #include "tests/tools/lab/experiments/experiment.h"
+#include "tests/tools/lab/experiments/law_steps.h"
 #include "tests/tools/lab/experiments/meter.h"
 #include "tests/tools/lab/experiments/paper.h"
 #include "tests/tools/lab/pictures/gnuplot.h"
@@ -23,11 +24,11 @@
 namespace tendon::lab {
 namespace {
 
-constexpr Friction kFriction{.coulomb = 0.02, .viscous = 0.26};
-constexpr std::size_t kBatch = 1000;  // steps
-constexpr double kStiffness = 2000;   // N/m, of what is displayed
-constexpr double kSoft = 300;         // N/m, … behind an estimator: the limiter is not what costs force then
-constexpr Duration kRare = std::chrono::milliseconds(40);
+constexpr Friction kFriction = LawSteps::kFriction;
+constexpr std::size_t kBatch = LawSteps::kPeriod;
+constexpr double kStiffness = LawSteps::kStiffness;
+constexpr double kSoft = 300;  // N/m, behind an estimator: the limiter is not what costs force then
+constexpr Duration kRare = LawSteps::kEnvironmentDelay;
 
 /// Keeps the compiler from leaving out what nobody looks at.
 template <class T>
@@ -78,15 +79,6 @@ class Bench {
   int batches_;
 };
 
-LimiterConfig limiter(Law law) {
-  return {.law = law,
-          .friction = kFriction,
-          .longest_hold = std::chrono::milliseconds(1),
-          .max_force = kPaperMaxForce,
-          .environment_stiffness = kStiffness,
-          .environment_delay = kRare};
-}
-
 Experiment pressing(const LimiterConfig& config, double stiffness = kStiffness) {
   Experiment set;
   set.environment.force = [stiffness](double, const Vec3& x) { return Vec3(-stiffness * x); };
@@ -100,23 +92,14 @@ Experiment pressing(const LimiterConfig& config, double stiffness = kStiffness) 
 double force_error(const Experiment& set) { return outcome(run(set), set.period).force_error; }
 
 Line law_line(const Bench& bench, const std::string& kind, const std::string& name, const LimiterConfig& config) {
-  std::array<Vec3, kBatch> places;
-  const PrescribedMotion motion = paper_motion(kFriction, kPaperEncoder);
-  for (std::size_t i = 0; i < kBatch; ++i) places[i] = motion.position(static_cast<double>(i) * 4e-3);
-  Limiter law(config);
-  Vec3 applied = Vec3::Zero();
-  Line line = bench.measure(kind, name, [&](std::size_t i) {
-    const Vec3 dx = (places[i] - places[i == 0 ? kBatch - 1 : i - 1]) / 4;
-    law.observe({.applied = applied, .dx = dx, .held = std::chrono::milliseconds(1)});
-    applied = law.limit({.force = -kStiffness * places[i], .stiffness = kStiffness * Mat3::Identity()}).force;
-    keep(applied);
-  });
+  LawSteps law(config);
+  Line line = bench.measure(kind, name, [&](std::size_t i) { keep(law.step(i)); });
   line.force_error = force_error(pressing(config));
   return line;
 }
 
 double estimated(const std::optional<OutputEstimator::Config>& estimator) {
-  Experiment set = pressing(limiter(Law::kAolPlus), kSoft);
+  Experiment set = pressing(measured_limiter(Law::kAolPlus), kSoft);
   set.limiter.parts = default_parts(kPaperEncoder);
   set.environment.delay = kRare;
   set.estimator = estimator;
@@ -169,10 +152,10 @@ std::vector<Line> measure(const Bench& bench) {
   std::vector<Line> lines;
   lines.push_back(bench.measure("floor", "nothing", [](std::size_t i) { keep(i); }));
   for (const LawInfo& law : laws()) {
-    lines.push_back(law_line(bench, "law", std::string(law.name), limiter(law.law)));
+    lines.push_back(law_line(bench, "law", std::string(law.name), measured_limiter(law.law)));
   }
   const auto part = [&](const char* name, const auto& add) {
-    LimiterConfig config = limiter(Law::kAolPlus);
+    LimiterConfig config = measured_limiter(Law::kAolPlus);
     add(config.parts);
     lines.push_back(law_line(bench, "part", name, config));
   };

@@ -19,6 +19,7 @@
 #include "tests/tools/lab/experiments/compare.h"
 #include "tests/tools/lab/experiments/experiment.h"
 #include "tests/tools/lab/experiments/paper.h"
+#include "tests/tools/lab/golden/law_cost.h"
 
 namespace tendon::lab {
 namespace {
@@ -175,7 +176,43 @@ std::string to_text(const std::vector<GoldenDifference>& differences) {
   return text;
 }
 
+namespace {
+
+/// Writes `table` to a file that has such a table or none, whose first line begins with `beginning`.
+template <class Table>
+void replace(const std::filesystem::path& file, std::string_view beginning, const Table& table, std::ostream& out) {
+  expect_replaceable(file, {beginning});
+  std::ofstream stream(file);
+  write(stream, table);
+  stream.close();
+  if (!stream) throw std::runtime_error("cannot write " + file.string());
+  out << "written: " << file.string() << "\n";
+}
+
+bool golden_costs(const GoldenOptions& options, std::ostream& out) {
+  const std::filesystem::path file = options.folder / "cost.csv";
+  if (options.write) {
+    replace(file, "# counted with ", count_law_costs(options.law_cost), out);
+    return true;
+  }
+  const CostTable was = read_costs(file);
+  if (const std::string why = why_not_comparable(was, {.built_with = built_with(), .rows = {}}); !why.empty()) {
+    throw std::runtime_error(file.string() + ": " + why);
+  }
+  const CostTable is = count_law_costs(options.law_cost);
+  const std::string found = cost_differences(was, is);
+  if (found.empty()) {
+    out << is.rows.size() << " laws cost what " << file.string() << " says, within 2 %\n";
+  } else {
+    out << found;
+  }
+  return found.empty();
+}
+
+}  // namespace
+
 bool golden(const GoldenOptions& options, std::ostream& out) {
+  if (options.cost) return golden_costs(options, out);
   const std::filesystem::path file = options.folder / "laws.csv";
   const GoldenTable is = golden_laws();
   if (!options.write) {
@@ -187,12 +224,7 @@ bool golden(const GoldenOptions& options, std::ostream& out) {
     }
     return found.empty();
   }
-  expect_replaceable(file, {"law,situation,"});
-  std::ofstream stream(file);
-  write(stream, is);
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + file.string());
-  out << "written: " << file.string() << "\n";
+  replace(file, "law,situation,", is, out);
   return true;
 }
 

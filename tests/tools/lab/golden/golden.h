@@ -48,13 +48,17 @@ std::vector<GoldenDifference> differences(const GoldenTable& was, const GoldenTa
 /// One line each under a heading: law, situation, figure, was, is.
 std::string to_text(const std::vector<GoldenDifference>& differences);
 
-/// `tendon-lab golden`: compares what is with FOLDER/laws.csv, or writes that anew.
+/// `tendon-lab golden`: compares what is with FOLDER/laws.csv, or writes that anew. With `cost`: with FOLDER/cost.csv
+/// (law_cost.h), which it counts with `law_cost`, the program.
 struct GoldenOptions {
   std::filesystem::path folder = "tests/golden";
   bool write = false;
+  bool cost = false;
+  std::filesystem::path law_cost{};
 };
 
-/// Returns whether nothing differs. Throws std::runtime_error when the file cannot be read or written.
+/// Returns whether nothing differs. Throws std::runtime_error when the file cannot be read or written, or when another
+/// compiler counted the costs in it.
 bool golden(const GoldenOptions& options, std::ostream& out);
 
 }  // namespace tendon::lab

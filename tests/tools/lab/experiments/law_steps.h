@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+
+#include "core/control/limiter.h"
+
+namespace tendon::lab {
+
+/// The steps of a limiter that are measured: the hand moves as in the paper, 15 mm at 0.25 Hz, and a spring of 2000 N/m
+/// pulls it back. A thousand samples, 4 ms apart, make one period of the motion; each step moves a quarter of the way
+/// from one to the next, as in 1 ms.
+class LawSteps {
+ public:
+  static constexpr std::size_t kPeriod = 1000;  ///< steps
+  static constexpr double kStiffness = 2000;    ///< N/m
+  static constexpr Friction kFriction{.coulomb = 0.02, .viscous = 0.26};
+  static constexpr Duration kEnvironmentDelay = std::chrono::milliseconds(40);  ///< of a law that asks for it
+
+  explicit LawSteps(const LimiterConfig& config);
+
+  /// Step `i` of a period; i < kPeriod. Returns the force that is held, N.
+  const Vec3& step(std::size_t i) noexcept {
+    const Vec3 dx = (places_[i] - places_[i == 0 ? kPeriod - 1 : i - 1]) / 4;
+    law_.observe({.applied = applied_, .dx = dx, .held = std::chrono::milliseconds(1)});
+    applied_ = law_.limit({.force = -kStiffness * places_[i], .stiffness = kStiffness * Mat3::Identity()}).force;
+    return applied_;
+  }
+
+ private:
+  std::array<Vec3, kPeriod> places_;
+  Limiter law_;
+  Vec3 applied_ = Vec3::Zero();
+};
+
+/// The limiter whose step is measured: `law`, with LawSteps' friction. A law that has to know the environment is told
+/// LawSteps' stiffness and delay. AOL+ has no part.
+LimiterConfig measured_limiter(Law law);
+
+}  // namespace tendon::lab

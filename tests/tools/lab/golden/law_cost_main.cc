@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// law-cost: the program in which `tendon-lab golden --cost` counts the instructions of every law's step. It prints a
+// line for each law: its name. Callgrind counts within `step_law`, and writes a file each time that returns.
+#include <cstddef>
+#include <iostream>
+
+#include "tests/tools/lab/experiments/law_steps.h"
+#include "tests/tools/lab/experiments/paper.h"
+
+using namespace tendon;
+
+/// A name that callgrind finds: not inlined, not mangled.
+extern "C" [[gnu::noinline]] void step_law(lab::LawSteps& law, int periods) {
+  for (int period = 0; period < periods; ++period) {
+    for (std::size_t i = 0; i < lab::LawSteps::kPeriod; ++i) law.step(i);
+  }
+}
+
+int main() {
+  for (const LawInfo& law : laws()) {
+    LimiterConfig config = lab::measured_limiter(law.law);
+    config.parts = lab::default_parts(lab::kPaperEncoder);
+    for (const int periods : {1, 2}) {
+      lab::LawSteps steps(config);
+      step_law(steps, periods);
+    }
+    std::cout << law.name << "\n";
+  }
+}

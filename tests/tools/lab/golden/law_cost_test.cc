@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/golden/law_cost.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "core/control/limiter.h"
+#include "tests/support/instruction_test.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr const char* kTable = TENDON_GOLDEN "/cost.csv";
+
+using LawCost = testing::InstructionTest;
+
+TEST_F(LawCost, AStepOfEveryLawCostsWhatTheCommittedTableSays) {
+  const CostTable was = read_costs(kTable);
+  const std::string why = why_not_comparable(was, {.built_with = built_with(), .rows = {}});
+  if (!why.empty()) GTEST_SKIP() << "skipped: " << why;
+  const std::string found = cost_differences(was, count_law_costs(TENDON_LAW_COST));
+  EXPECT_TRUE(found.empty())
+      << found << "If the change is meant: tendon-lab golden --cost --write, and commit the table with it.";
+}
+
+TEST(LawCostTable, HasEveryLawInOrder) {
+  const CostTable table = read_costs(kTable);
+  ASSERT_EQ(table.rows.size(), laws().size());
+  for (std::size_t i = 0; i < table.rows.size(); ++i) EXPECT_EQ(table.rows[i].law, laws()[i].name);
+}
+
+TEST(LawCostTable, IsReadBackAsItWasWritten) {
+  std::ostringstream text;
+  write(text, read_costs(kTable));
+  std::ostringstream committed;
+  committed << std::ifstream(kTable).rdbuf();
+  EXPECT_EQ(text.str(), committed.str());
+}
+
+TEST(LawCostTable, ADifferenceOfMoreThanTwoPercentNamesTheLawAndBothFigures) {
+  const CostTable was{"gcc", {{"aol", 100}, {"aol+", 200}, {"clamp", 50}, {"gone", 9}}};
+  const CostTable is{"gcc", {{"aol", 101.9}, {"aol+", 210}, {"clamp", 48.5}, {"new", 7}}};
+  EXPECT_EQ(cost_differences(was, is),
+            "aol+: committed 200.0 instructions a step, 210.0 now, +5.0 %\n"
+            "clamp: committed 50.0 instructions a step, 48.5 now, -3.0 %\n"
+            "new: not in the table, 7.0 instructions a step now\n"
+            "gone: in the table, but no law now\n");
+  EXPECT_EQ(cost_differences(was, was), "");
+}
+
+TEST(LawCostTable, IsNotComparedWithThatOfAnotherCompiler) {
+  EXPECT_EQ(why_not_comparable({"GNU 12", {}}, {"GNU 12", {}}), "");
+  EXPECT_EQ(why_not_comparable({"GNU 12", {}}, {"GNU 13", {}}),
+            "the committed costs were counted with GNU 12; this build is of GNU 13");
+}
+
+}  // namespace
+}  // namespace tendon::lab
