@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <variant>
+
+#include "core/control/aol.h"
+#include "core/control/aol_plus.h"
+#include "core/control/energy_bounding.h"
+#include "core/control/force_bounding.h"
+#include "core/control/hard_clamp.h"
+#include "core/control/nonlinear_coupling.h"
+#include "core/control/passive_synthesis.h"
+#include "core/control/passivity_controller.h"
+#include "core/control/port_hamiltonian.h"
+#include "core/control/reference_energy.h"
+#include "core/control/unlimited.h"
+#include "core/control/virtual_coupling.h"
+#include "core/ledger/hold_bound.h"
+
+namespace tendon {
+
+// The catalogue of the laws: all that the rest of the house knows of a law by name. A new law is an enumerator and a row
+// here. Scenes, `tendon-lab`, the property tests and the golden numbers find it by laws().
+
+/// The stability controllers that a scene can choose; each has its file in core/control.
+enum class Law : std::uint8_t {
+  kNone,
+  kClamp,
+  kPassivityControllerPublished,
+  kPassivityController,
+  kParallelPassivityController,
+  kReferenceEnergy,
+  kVirtualCoupling,
+  kTwoPortCoupling,
+  kNonlinearCoupling,
+  kPassiveSynthesis,
+  kPortHamiltonian,
+  kEnergyBounding,
+  kForceBounding,
+  kMemorylessForceBounding,
+  kAolPerAxis,
+  kAol,
+  kAolBox,
+  kAolPlus,  ///< the last: the catalogue counts by it
+};
+
+/// The name of a law, and what a person needs to know to choose it.
+struct LawInfo {
+  Law law;
+  std::string_view name;  ///< in scenes, tables and command lines
+  std::string_view what;  ///< one line
+  /// Its own theory promises that the ledger is never negative, **whatever** the remote environment asks for. The others
+  /// are passive in some environments, or take back what they gave out.
+  bool passive;
+  bool needs_stiffness;  ///< of an environment that does not send its own
+};
+
+/// Every law, in the order in which tables list them.
+std::span<const LawInfo> laws() noexcept;
+const LawInfo& info(Law law) noexcept;
+std::optional<Law> law_named(std::string_view name) noexcept;
+
+/// Which law stands between the remote environment and the hand, and its parameters.
+struct LimiterConfig {
+  Law law = Law::kAolPlus;
+  Friction friction{};      ///< lower bounds of the device's friction (kAolPerAxis, kAolBox: of each axis by itself)
+  Duration longest_hold{};  ///< T_max; > 0
+  /// How the laws that are `passive` follow holds longer than T_max. Empty: they do not.
+  std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
+  AolPlus<1, 3>::Parts parts{};                   ///< of kAolPlus
+  double max_force = 0;                           ///< N, of kClamp
+  std::optional<double> environment_stiffness{};  ///< N/m, of an environment that does not send its own
+  Duration environment_delay{};  ///< t_d of kPassiveSynthesis: from a position to the force answering it
+  /// N·s/m, what the passivity controllers and kReferenceEnergy may inject at most; far below 2m/T, where a digital
+  /// damper is unstable. 20 is an eighth of that at 75 g and 1 kHz.
+  double max_damping = 20;
+};
+
+namespace catalogue {
+
+/// m/(N·s): 1 N gives way by at most 1 mm in each period at 1 kHz.
+inline constexpr double kMostMobility = 1;
+
+/// A law: what people read about it, and how it is built.
+template <class Make>
+struct LawRow {
+  LawInfo info;
+  Make make;  ///< LimiterConfig -> the law; throws what its constructor throws
+};
+template <class Make>
+LawRow(LawInfo, Make) -> LawRow<Make>;
+
+/// Row i is enumerator i of Law.
+inline constexpr std::tuple kRows{
+    LawRow{{Law::kNone, "none", "no law: shows what happens without one", false, false},
+           [](const LimiterConfig& c) { return Unlimited<3>({c.friction}); }},
+    LawRow{{Law::kClamp, "clamp", "no force is longer than max_force", false, false},
+           [](const LimiterConfig& c) { return HardClamp<3>({.friction = c.friction, .max_force = c.max_force}); }},
+    LawRow{{Law::kPassivityControllerPublished, "tdpa-2002",
+            "passivity observer and controller as published: blind to the energy that sampling itself gives out", false,
+            false},
+           [](const LimiterConfig& c) {
+             return PassivityController<3>(
+                 {.friction = c.friction, .observer = PassivityObserver::kSameSample, .max_damping = c.max_damping});
+           }},
+    LawRow{{Law::kPassivityController, "tdpa",
+            "passivity observer that counts the held force, and a damper against what it finds", false, false},
+           [](const LimiterConfig& c) {
+             return PassivityController<3>({.friction = c.friction, .max_damping = c.max_damping});
+           }},
+    LawRow{{Law::kParallelPassivityController, "tdpa-parallel",
+            "the same, but shows the environment less motion instead of the hand more force", false, false},
+           [](const LimiterConfig& c) {
+             return ParallelPassivityController<3>({.friction = c.friction, .max_mobility = kMostMobility});
+           }},
+    LawRow{{Law::kReferenceEnergy, "reference-energy",
+            "passivity controller that follows the energy the true environment would store", false, true},
+           [](const LimiterConfig& c) {
+             return ReferenceEnergyController<3>({.friction = c.friction,
+                                                  .stiffness = c.environment_stiffness.value_or(0),
+                                                  .max_damping = c.max_damping});
+           }},
+    LawRow{{Law::kVirtualCoupling, "virtual-coupling", "spring between hand and tool, Colgate's rule", false, false},
+           [](const LimiterConfig& c) {
+             return VirtualCoupling<3>({.friction = c.friction,
+                                        .longest_hold = c.longest_hold,
+                                        .stiffness = colgate_coupling(c.friction.viscous, c.longest_hold, 0)});
+           }},
+    LawRow{{Law::kTwoPortCoupling, "virtual-coupling-two-port",
+            "spring and damper between hand and tool, Adams and Hannaford's rule", false, false},
+           [](const LimiterConfig& c) {
+             const double viscous = c.friction.viscous;
+             return VirtualCoupling<3>({.friction = c.friction,
+                                        .longest_hold = c.longest_hold,
+                                        .stiffness = two_port_coupling(viscous, c.longest_hold, viscous),
+                                        .damping = viscous});
+           }},
+    LawRow{{Law::kNonlinearCoupling, "nonlinear-coupling",
+            "passes static laws no steeper than 2b/T, ties all others to such a spring", true, false},
+           [](const LimiterConfig& c) {
+             return NonlinearCoupling<3>({.friction = c.friction, .longest_hold = c.longest_hold});
+           }},
+    LawRow{{Law::kPassiveSynthesis, "passive-synthesis",
+            "softens the whole field until friction pays for sampling and delay", false, false},
+           [](const LimiterConfig& c) {
+             return PassiveSynthesis<3>({.friction = c.friction,
+                                         .longest_hold = c.longest_hold,
+                                         .delay = c.environment_delay,
+                                         .stiffness = c.environment_stiffness});
+           }},
+    LawRow{{Law::kPortHamiltonian, "port-hamiltonian", "a spring whose state is the energy that really went in", false,
+            true},
+           [](const LimiterConfig& c) {
+             return PortHamiltonian<3>({.friction = c.friction, .stiffness = c.environment_stiffness.value_or(0)});
+           }},
+    LawRow{{Law::kEnergyBounding, "energy-bounding", "bounds how fast the force may change with position", true, false},
+           [](const LimiterConfig& c) {
+             return EnergyBounding<3>({.friction = c.friction, .longest_hold = c.longest_hold});
+           }},
+    LawRow{{Law::kForceBounding, "force-bounding", "a ledger of viscous friction bounds the force", true, false},
+           [](const LimiterConfig& c) {
+             return ForceBounding<3>({.friction = c.friction, .longest_hold = c.longest_hold});
+           }},
+    LawRow{{Law::kMemorylessForceBounding, "force-bounding-memoryless",
+            "the last force and the last motion bound the next force", true, false},
+           [](const LimiterConfig& c) {
+             return MemorylessForceBounding<3>({.friction = c.friction, .longest_hold = c.longest_hold});
+           }},
+    LawRow{
+        {Law::kAolPerAxis, "aol-per-axis", "Adjusting Output-Limiter as in the paper, each axis by itself", true,
+         false},
+        [](const LimiterConfig& c) { return PerAxisAol<3>({.friction = c.friction, .longest_hold = c.longest_hold}); }},
+    LawRow{
+        {Law::kAol, "aol", "Adjusting Output-Limiter on one ledger; keeps the direction", true, false},
+        [](const LimiterConfig& c) { return Aol<1, 3>({.friction = {c.friction}, .longest_hold = c.longest_hold}); }},
+    LawRow{{Law::kAolBox, "aol-box", "Adjusting Output-Limiter on one ledger, friction of each axis by itself", true,
+            false},
+           [](const LimiterConfig& c) {
+             return Aol<3>({.friction = {c.friction, c.friction, c.friction}, .longest_hold = c.longest_hold});
+           }},
+    LawRow{{Law::kAolPlus, "aol+", "Adjusting Output-Limiter with the parts that are listed", true, false},
+           [](const LimiterConfig& c) {
+             return AolPlus<1, 3>({.friction = {c.friction}, .longest_hold = c.longest_hold, .parts = c.parts});
+           }},
+};
+
+template <class Variant, class L>
+struct With;
+template <class... Known, class L>
+struct With<std::variant<Known...>, L>
+    : std::conditional<(std::is_same_v<Known, L> || ...), std::variant<Known...>, std::variant<Known..., L>> {};
+
+template <class Variant, class... Rows>
+struct Union {
+  using Type = Variant;
+};
+template <class Variant, class Make, class... Rows>
+struct Union<Variant, LawRow<Make>, Rows...>
+    : Union<typename With<Variant, std::invoke_result_t<Make, const LimiterConfig&>>::type, Rows...> {};
+
+template <class Rows>
+struct Laws;
+template <class... Rows>
+struct Laws<const std::tuple<Rows...>> : Union<std::variant<>, Rows...> {};
+
+}  // namespace catalogue
+
+/// Any law of the catalogue; laws that are of one class are one alternative.
+using AnyLaw = catalogue::Laws<decltype(catalogue::kRows)>::Type;
+
+/// The law that `config` names. Throws what the law's constructor throws, and std::invalid_argument for a law that is
+/// none.
+AnyLaw make_law(const LimiterConfig& config);
+
+}  // namespace tendon
