@@ -14,6 +14,7 @@
 
 #include "core/base/mode.h"
 #include "core/base/motion.h"
+#include "core/base/reason.h"
 #include "core/base/time.h"
 #include "core/remote/channel_rule.h"
 #include "core/remote/remote_force.h"
@@ -58,7 +59,7 @@ struct DeviceState {
   Vec3 force_applied = Vec3::Zero();  ///< N, what the device really gives out from this step on
   double energy = 0;                  ///< J, the energy ledger at this step
   double permitted_force = 0;         ///< N, the limiter's bound at this step; +infinity when there is none
-  std::uint32_t reasons = 0;          ///< why the force is not what was asked for: core/base/reason.h
+  std::uint32_t reasons = 0;          ///< why the force is not what was asked for: bits of Reason
   std::uint64_t force_sequence = 0;   ///< ForceCommand rendered now; 0 = none
   Duration force_age{};               ///< its age since it arrived; 0 when none
   Mode mode = Mode::kIdle;
@@ -88,8 +89,18 @@ struct Delays {
   Duration p99{};
 };
 
+/// Forces that a receiver cannot use: the mistakes of an engine's author, by kind.
+struct RefusedForces {
+  std::uint64_t not_finite = 0;     ///< a number of the force, its model or its error is NaN or infinite
+  std::uint64_t out_of_bounds = 0;  ///< … or beyond its bound (WIRE.md); so are `valid_for` 0 and `sequence` 0
+  std::uint64_t unknown_tick = 0;   ///< `based_on_tick` never was, or was more than 4096 ticks ago
+  std::uint64_t old_sequence = 0;   ///< `sequence` has not grown, though the datagram is the newest
+  bool operator==(const RefusedForces&) const = default;
+};
+
 /// Server → client, unreliable, newest wins: what became of the client's forces and datagrams. Once in `span` while its
-/// forces come. Delays are absent where nothing was measured; those of one way are known ± `clock_error`.
+/// forces come, or are missing, or are refused. Delays are absent where nothing was measured; those of one way are
+/// known ± `clock_error`.
 struct LinkReport {
   std::uint64_t number = 0;  ///< 1, 2, 3 … per session
   PeerTime until{};          ///< end of the time it tells of, server clock
@@ -112,7 +123,10 @@ struct LinkReport {
   std::uint64_t lost = 0;
   std::uint64_t reordered = 0;
   std::uint64_t duplicated = 0;
-  std::string words;  ///< why forces were late, for people; empty when none was. At most 128 bytes
+  std::string words;  ///< why forces were late or refused, for people; empty when none was. At most 128 bytes
+  // In the time that it tells of:
+  std::uint64_t late_unknown = 0;  ///< late forces whose cause is not known yet: nothing is heard of the client
+  RefusedForces refused{};         ///< of all the client's channels together: some name none that can be read
 };
 
 /// Where a device stands between the plug and the force. Part of the wire: never renumber.
@@ -221,7 +235,7 @@ using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, G
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes
   ChannelRule rule = ChannelRule::kSum;
-  /// A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves.
+  /// A holder that sends no usable force for so long may be followed by another; 0 = it stays until it leaves.
   Duration lease{};
   std::string holder{};  ///< whose forces it takes; empty = nobody's; cut to 24 bytes
 };

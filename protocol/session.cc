@@ -135,18 +135,25 @@ struct Session::State {
   void observe(LocalTime now, PeerTime sent, const IncomingEcho& told);
   void count_lost_outgoing(const IncomingEcho& told);
 
-  void take(const DeviceState& state) { stats.stale += states_arrived.put_if_newer(state, state.tick) ? 0 : 1; }
-  void take(const ForceCommand& force) { stats.stale += forces_arrived.put_if_newer(force, force.sequence) ? 0 : 1; }
-  void take(const LinkReport& report);
-  void take(const DeviceReport& report) {
+  // A frame of a datagram that is the newest so far, or is not.
+  void take(const DeviceState& state, bool /*newest*/) {
+    stats.stale += states_arrived.put_if_newer(state, state.tick) ? 0 : 1;
+  }
+  void take(const ForceCommand& force, bool newest) {
+    if (forces_arrived.put_if_newer(force, force.sequence)) return;
+    ++stats.stale;
+    stats.refused_forces.old_sequence += newest ? 1 : 0;  // in an older datagram it is the network's doing
+  }
+  void take(const LinkReport& report, bool newest);
+  void take(const DeviceReport& report, bool /*newest*/) {
     stats.stale += device_reports_arrived.put_if_newer(report, report.number) ? 0 : 1;
   }
-  void take(const PeerReport& report) {
+  void take(const PeerReport& report, bool /*newest*/) {
     stats.stale += peer_reports_arrived.put_if_newer(report, report.link.number) ? 0 : 1;
   }
-  void take(const Control& control) { stats.invalid += answering.take(control) ? 0 : 1; }
-  void take(const ControlAck& ack) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
-  void take(const Bye& said);
+  void take(const Control& control, bool /*newest*/) { stats.invalid += answering.take(control) ? 0 : 1; }
+  void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
+  void take(const Bye& said, bool newest);
 
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
   bool something_to_say(LocalTime now) const noexcept {
@@ -231,6 +238,8 @@ std::optional<std::span<const std::byte>> Session::State::open_body(LocalTime no
 bool Session::State::accept(LocalTime now, std::uint64_t number, const DataContent& content) {
   ++stats.datagrams_received;
   stats.invalid += content.invalid;
+  stats.refused_forces.not_finite += content.forces_not_finite;
+  stats.refused_forces.out_of_bounds += content.forces_out_of_bounds;
   last_heard = now;
   const bool newest = seen.empty() || number > seen.highest();
   stats.reordered += newest ? 0 : 1;
@@ -241,7 +250,7 @@ bool Session::State::accept(LocalTime now, std::uint64_t number, const DataConte
   }
   if (content.echo) observe(now, content.sent, *content.echo);
   for (const Frame& frame : content.frames) {
-    std::visit([this](const auto& body) { take(body); }, frame);
+    std::visit([&](const auto& body) { take(body, newest); }, frame);
   }
   return newest;
 }
@@ -276,7 +285,7 @@ void Session::State::count_lost_outgoing(const IncomingEcho& told) {
   newest_echoed = told.packet_number;
 }
 
-void Session::State::take(const LinkReport& report) {
+void Session::State::take(const LinkReport& report, bool /*newest*/) {
   if (report.number <= newest_report) {
     ++stats.stale;
     return;
@@ -285,7 +294,7 @@ void Session::State::take(const LinkReport& report) {
   report_arrived = report;
 }
 
-void Session::State::take(const Bye& said) {
+void Session::State::take(const Bye& said, bool /*newest*/) {
   open = false;
   closed = Closed{.code = said.code, .reason = said.reason};
 }

@@ -35,6 +35,7 @@ struct LinkStats {
   std::uint64_t old_key = 0;             ///< suite 1: sealed with a key no longer or not yet held: dropped
   std::uint64_t invalid = 0;             ///< well-formed, with a value out of bounds (NaN, Inf …): frame dropped
   std::uint64_t stale = 0;               ///< state, force or report not newer than the newest one: frame dropped
+  RefusedForces refused_forces{};        ///< of `invalid` and `stale`, those that are an engine's mistake
   Duration round_trip{};                 ///< newest sample, (T4 − T1) − (T3 − T2); 0 = none yet
   Duration smoothed_round_trip{};        ///< RFC 6298 SRTT
   Duration round_trip_variation{};       ///< RFC 6298 RTTVAR

@@ -138,10 +138,14 @@ void print_json(const Server::Summary& summary) {
   add("forces", network.forces);
   add("denied", network.denied);
   add("unanswerable", network.unanswerable);
-  add("late", network.late_ours + network.late_network + network.late_engine);
+  add("late", network.late_ours + network.late_network + network.late_engine + network.late_unknown);
   add("late_server", network.late_ours);
   add("late_network", network.late_network);
   add("late_engine", network.late_engine);
+  add("late_unknown", network.late_unknown);
+  add("forces_not_finite", network.dropped.forces.not_finite);
+  add("forces_out_of_bounds", network.dropped.forces.out_of_bounds);
+  add("forces_old_sequence", network.dropped.forces.old_sequence);
   add("hopeless", network.hopeless);
   add("foretold", network.foretold);
   add("replaced", network.replaced);

@@ -2,12 +2,12 @@
 #include "server/network_loop.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "protocol/wire/header.h"
+#include "server/guests/requests.h"
 
 namespace tendon {
 
@@ -17,20 +17,8 @@ using enum DatagramSieve::Sender;
 
 constexpr std::size_t kMaxNotices = 64;
 
-/// What this server can do beyond the version's minimum.
-constexpr std::array<std::string_view, 3> kFeatures = {kFeatureLocalModel, kFeatureChannels, kFeatureDiagnostics};
-
 bool contains(const std::vector<std::string>& features, std::string_view feature) {
   return std::find(features.begin(), features.end(), feature) != features.end();
-}
-
-std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
-  std::vector<std::string> both;
-  for (const std::string_view feature : kFeatures) {
-    const bool not_for_it = feature == kFeatureDiagnostics && role != Role::kObserver;
-    if (contains(offered, feature) && !not_for_it) both.emplace_back(feature);
-  }
-  return both;
 }
 
 template <class... Ts>
@@ -47,32 +35,27 @@ void add(NetworkLoop::Dropped& sum, const LinkStats& link) {
   sum.old_key += link.old_key;
   sum.invalid += link.invalid;
   sum.stale += link.stale;
+  sum.forces.not_finite += link.refused_forces.not_finite;
+  sum.forces.out_of_bounds += link.refused_forces.out_of_bounds;
+  sum.forces.old_sequence += link.refused_forces.old_sequence;
 }
 
 }  // namespace
 
-NetworkLoop::NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes*> mail)
+NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mailboxes*>& mail)
     : config_(config),
       link_(link),
       sieve_(config.recorded),
+      devices_(served_devices(config.devices, mail)),
       doorman_({.secret = config.secret, .keys = config.keys}),
-      admission_({.keys = config.keys.size(), .max_observers = config.max_observers}, devices_, guests_),
-      leases_(devices_, config.takeover),
-      reports_(devices_, guests_),
+      admission_({.keys = config.keys.size(), .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id) {
   half_open_.reserve(config.max_half_open);
   config_.secret = {};  // the doorman has what it needs of it
-  check_devices(config.devices);
-  if (mail.size() != config.devices.size()) throw std::invalid_argument("expected mailboxes for each device");
-  for (std::size_t i = 0; i < mail.size(); ++i) {
-    ServedDevice& device = devices_.emplace_back(ServedDevice{.about = config.devices[i], .mail = mail[i]});
-    device.about.device = static_cast<std::uint32_t>(i);
-    device.channels.resize(device.about.channels.size());
-  }
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
-  // What is newest leaves before anything else is looked at: a state waits for no system call.
+  // The newest states leave first: a state waits for no system call.
   publish(now);
   const bool more = drain(now);
   report(now);
@@ -132,6 +115,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
       ++stats_.roamed;
     }
     if (newest) measure(now, *guest);
+    take_refused(*guest);
     take_events(now, *guest);  // a force waits for no further system call
   } else if (const auto waiting = std::find_if(half_open_.begin(), half_open_.end(), is_meant);
              waiting != half_open_.end()) {
@@ -161,8 +145,8 @@ DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest) const 
   return guest.key != nullptr || config_.keys.empty() ? kGuest : kStranger;
 }
 
-/// Our answer was lost and the guest asks again: the same answer. In suite 1 it may come from anywhere, it is of
-/// use to one who holds the ephemeral key only.
+/// Sends the same answer again to a guest that asks again because the first one was lost. In suite 1 it may ask from
+/// anywhere: the answer is of use only to the holder of the ephemeral key.
 bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest) {
   for (const auto* list : {&guests_, &half_open_}) {
     for (const Guest& present : *list) {
@@ -175,58 +159,42 @@ bool NetworkLoop::answer_again(LocalTime now, const Address& from, const Doorman
   return false;
 }
 
+void NetworkLoop::refuse(LocalTime now, const Address& from, const Doorman::Guest& guest, Refusal refusal) {
+  std::array<std::byte, kMaxDatagram> answer;
+  ++stats_.refused;
+  notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal.reason);
+  const Refused refused{refusal.code, std::move(refusal.reason), kProtocolVersion, kProtocolVersion};
+  const auto size = doorman_.refuse(guest, refused, answer).size;
+  send(now, sender_of(guest), from, std::span(answer).first(size));
+}
+
 void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest& guest) {
   if (answer_again(now, from, guest)) return;
+  if (guest.version == 0) return refuse(now, from, guest, {Code::kUnsupported, "no protocol version in common"});
+  auto claimed = Admission::seats_of(guest.hello, devices_);
+  if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) return refuse(now, from, guest, std::move(*cannot_be));
+  auto& seats = std::get<std::vector<Seat>>(claimed);
+  if (auto refusal = admission_.reason_to_refuse(from, guest.key, seats, devices_, guests_)) {
+    return refuse(now, from, guest, std::move(*refusal));
+  }
 
-  std::array<std::byte, kMaxDatagram> answer;
   const Role role = guest.hello.role;
-  auto claimed = admission_.seats_of(guest.hello);
-  std::optional<Refusal> refusal;
-  if (guest.version == 0) {
-    refusal = Refusal{Code::kUnsupported, "no protocol version in common"};
-  } else if (auto* const cannot_be = std::get_if<Refusal>(&claimed)) {
-    refusal = std::move(*cannot_be);
-  } else {
-    refusal = admission_.reason_to_refuse(from, guest.key, std::get<std::vector<Seat>>(claimed));
-  }
-  if (refusal) {
-    ++stats_.refused;
-    notice(true, "refused \"" + guest.hello.name + "\" at " + to_string(from) + ": " + refusal->reason);
-    const Refused refused{refusal->code, std::move(refusal->reason), kProtocolVersion, kProtocolVersion};
-    const auto size = doorman_.refuse(guest, refused, answer).size;
-    return send(now, sender_of(guest), from, std::span(answer).first(size));
-  }
-  const auto& seats = std::get<std::vector<Seat>>(claimed);
-
   Session::Config session;
   session.connection_id = next_connection_id_++;
   if (next_connection_id_ == 0) next_connection_id_ = 1;  // 0 means none
   session.timeout = role == Role::kController ? config_.controller_timeout : config_.observer_timeout;
   session.rekey = config_.rekey;
   session.life = config_.session_life;
-  Welcome welcome;
-  welcome.version = guest.version;
-  welcome.features = in_common(guest.hello.features, role);
-  welcome.role = role;
-  const DeviceDescription& first = devices_[seats.front().device].about;
-  welcome.device_name = first.model;
-  welcome.max_force = first.max_force;
-  welcome.position_resolution = first.position_resolution;
-  welcome.loop_hz = first.loop_hz;
+  Welcome welcome = Admission::welcome_for(guest, from, seats, devices_, guests_);
   welcome.timeout = session.timeout;
   welcome.server = config_.server_name;
-  welcome.grants = admission_.grants_of(from, guest.key, seats);
-  std::vector<View> views;
-  for (const Seat& seat : seats) {
-    const bool seen =
-        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == seat.device; });
-    if (!seen) views.push_back({.device = seat.device});
-  }
+  std::array<std::byte, kMaxDatagram> answer;
   const Doorman::Answered answered = doorman_.welcome(guest, session.connection_id, welcome, answer);
   if (answered.size == 0) return;
   const auto bytes = std::span(answer).first(answered.size);
   send(now, sender_of(guest), from, bytes);
 
+  std::vector<View> views = Admission::views_of(seats);
   Guest arrived{from,
                 guest.random,
                 guest.key,
@@ -234,7 +202,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 role,
                 contains(welcome.features, kFeatureChannels),
                 contains(welcome.features, kFeatureDiagnostics),
-                seats,
+                std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},
                 answered.keys ? Session(session, *answered.keys, now) : Session(session, now),
@@ -248,8 +216,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
 
 /// From here on the guest is one of ours.
 void NetworkLoop::open(LocalTime now, Guest guest) {
-  // While it was half-open somebody else may have come.
-  if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats)) {
+  // Somebody else may have come while it was half-open.
+  if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats, devices_, guests_)) {
     ++stats_.refused;
     notice(true, "refused \"" + guest.name + "\" at " + to_string(guest.address) + ": " + refusal->reason);
     guest.session.close(refusal->code, refusal->reason);
@@ -277,37 +245,32 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
   Guest& arrived = guests_.back();
   for (const Seat& seat : arrived.seats) {
     if (seat.role != Role::kController) continue;
-    const Guest* const holder = holder_of(guests_, devices_[seat.device].channels[seat.channel]);
+    const Guest* const holder = guest_of(guests_, leases_.holder(seat.device, seat.channel));
     if (holder == nullptr) {
-      leases_.hold(now, arrived, seat.device, seat.channel);
-    } else if (arrived.can_lose) {  // to one that was half-open for a while, this may be news
+      leases_.hold(now, seat.device, seat.channel, arrived);
+    } else if (arrived.can_lose) {  // news, when somebody has come while it was half-open
       arrived.session.request(LeaseLost{.device = seat.device, .channel = seat.channel, .to = holder->name});
     }
   }
 }
 
-/// The guest with the connection id `loser` has lost a channel to the guest of the name `to`.
-void NetworkLoop::dispossess(LocalTime now, std::uint32_t loser, const TakeLease& lost, const std::string& to) {
-  const auto guest =
-      std::find_if(guests_.begin(), guests_.end(), [&](const Guest& one) { return !one.gone && one.id() == loser; });
-  if (guest == guests_.end()) return;
-  const DeviceDescription& about = devices_[lost.device].about;
-  notice(false, "\"" + to + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
-                    guest->name + "\"");
-  const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = to};
-  if (guest->can_lose && guest->session.request(news)) return;
-  // It cannot be told otherwise, or does not answer.
-  guest->session.close(Code::kReplaced, "\"" + to + "\" has taken this place");
-  send_all(now, *guest);
-  ++stats_.replaced;
-  leave(*guest, "replaced by \"" + to + "\"");
+bool NetworkLoop::may_take_over(const Guest& guest) const {
+  const std::string& name = guest.key != nullptr ? guest.key->name : guest.name;
+  return std::find(config_.takeover.begin(), config_.takeover.end(), name) != config_.takeover.end();
 }
 
-void NetworkLoop::take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted) {
-  const Guest* const holder = holder_of(guests_, devices_[wanted.device].channels[wanted.channel]);
-  const Leases::Answer answer = leases_.take(now, guest, holder, wanted);
-  if (answer.loser != 0) dispossess(now, answer.loser, wanted, guest.name);
-  guest.session.answer(id, answer.code, answer.reason, answer.wait);
+/// Tells the loser of a lease, or ends its session when it cannot be told.
+void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost) {
+  const DeviceDescription& about = devices_[lost.device].about;
+  notice(false, "\"" + winner.name + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
+                    loser.name + "\"");
+  const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = winner.name};
+  if (loser.can_lose && loser.session.request(news)) return;
+  // It does not know the request, or does not answer.
+  loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");
+  send_all(now, loser);
+  ++stats_.replaced;
+  leave(loser, "replaced by \"" + winner.name + "\"");
 }
 
 void NetworkLoop::adapt(LocalTime now, Guest& guest) {
@@ -328,14 +291,16 @@ void NetworkLoop::adapt(LocalTime now, Guest& guest) {
 }
 
 void NetworkLoop::measure(LocalTime now, Guest& guest) {
+  const auto& exchange = guest.session.newest_exchange();
+  const bool has_echo = exchange && exchange->answered_at == now;  // this datagram
+  const auto sent = has_echo ? std::optional(exchange->answered) : std::nullopt;
   for (const Seat& seat : guest.seats) {
     ServedChannel& channel = devices_[seat.device].channels[seat.channel];
-    if (channel.holder == guest.id()) channel.lateness.heard(now);
+    if (channel.holder == guest.id()) channel.lateness.heard(now, sent, guest.session.stats().lost);
   }
   if (guest.meter) {
     guest.meter->heard(now);
-    const auto& exchange = guest.session.newest_exchange();
-    if (exchange && exchange->answered_at == now) {  // this datagram had an echo
+    if (has_echo) {
       if (const auto clock = guest.session.peer_clock()) guest.meter->observe(*exchange, *clock);
     }
   }
@@ -343,11 +308,12 @@ void NetworkLoop::measure(LocalTime now, Guest& guest) {
 }
 
 void NetworkLoop::report(LocalTime now) {
-  Reports::News news = reports_.turn(now);
-  stats_.late_ours += news.late_ours;
-  stats_.late_network += news.late_network;
-  stats_.late_engine += news.late_engine;
-  for (std::string& warning : news.warnings) notice(true, std::move(warning));
+  Reports::Told told = reports_.turn(now, devices_, guests_);
+  stats_.late_ours += told.late_ours;
+  stats_.late_network += told.late_network;
+  stats_.late_engine += told.late_engine;
+  stats_.late_unknown += told.late_unknown;
+  for (std::string& warning : told.warnings) notice(true, std::move(warning));
 }
 
 void NetworkLoop::publish(LocalTime now) {
@@ -355,7 +321,7 @@ void NetworkLoop::publish(LocalTime now) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
-    // What an engine asks for is bounded, what a device's loop makes of it need not be: no frame is lost for that.
+    // Engines ask for bounded forces; the device's loop may make an unbounded one of them, which no frame can carry.
     DeviceState diagnosed = *state;
     if (diagnosed.force_wanted && !(diagnosed.force_wanted->array().abs() <= limits::kMaxValue).all()) {
       diagnosed.force_wanted.reset();
@@ -363,9 +329,8 @@ void NetworkLoop::publish(LocalTime now) {
     DeviceState plain = *state;
     plain.force_wanted.reset();
     for (Guest& guest : guests_) {
-      const auto view =
-          std::find_if(guest.views.begin(), guest.views.end(), [&](const View& seen) { return seen.device == number; });
-      if (view == guest.views.end()) continue;
+      View* const view = view_of(guest, number);
+      if (view == nullptr) continue;
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
       if (view->deadband && !view->deadband->passes(*state)) {
@@ -405,7 +370,7 @@ void NetworkLoop::send_all(LocalTime now, Guest& guest) {
 
 void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& command) {
   const bool there = command.device < devices_.size() && command.channel < devices_[command.device].channels.size();
-  if (!there || devices_[command.device].channels[command.channel].holder != guest.id()) {
+  if (!there || leases_.holder(command.device, command.channel) != guest.id()) {
     ++stats_.denied;
     return;
   }
@@ -414,15 +379,15 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   const auto answered = device.sampled.find(command.based_on_tick);
   if (!answered) {
     ++stats_.unanswerable;
-    channel.lateness.refuse(Lateness::Refused::kTick);
+    ++guest.refused.unknown_tick;
+    channel.lateness.refused(Lateness::Cause::kUnknownTick, 1);
     return;
   }
   if (guest.adaptation && guest.adaptation->hopeless()) {
     ++stats_.hopeless;
     return;
   }
-  // Only a force that the hand can feel keeps the lease.
-  channel.renewed = now;
+  leases_.renew(now, command.device, command.channel);
   const double bound = device.about.max_force;  // N; 0: the device has not said it
   if (bound > 0 && command.force.squaredNorm() > bound * bound) channel.lateness.cut();
   const LinkStats& link = guest.session.stats();
@@ -449,74 +414,38 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   ++stats_.forces;
 }
 
-/// To arm or to disarm a device is for those who control it, whether they hold its channel now or not.
-void NetworkLoop::order(Guest& guest, std::uint32_t id, std::uint32_t device, HapticOrder::Kind kind) {
-  const std::string verb = kind == HapticOrder::Kind::kDisarm ? "disarm" : "rearm";
-  const bool controls = std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
-    return seat.device == device && seat.role == Role::kController;
-  });
-  if (!controls) {
-    ++stats_.denied;
-    return guest.session.answer(id, Code::kDenied, "only a controller may " + verb);
+/// Notices what the session has refused of the guest's forces. Such a force names no channel, so it counts for all that
+/// the guest holds.
+void NetworkLoop::take_refused(Guest& guest) {
+  const RefusedForces& all = guest.session.stats().refused_forces;
+  const auto take = [&](std::uint64_t RefusedForces::*count, Lateness::Cause cause) {
+    if (const std::uint64_t before = std::exchange(guest.refused.*count, all.*count); before != all.*count) {
+      blame(guest, cause, all.*count - before);
+    }
+  };
+  take(&RefusedForces::not_finite, Lateness::Cause::kNotFinite);
+  take(&RefusedForces::out_of_bounds, Lateness::Cause::kOutOfBounds);
+  take(&RefusedForces::old_sequence, Lateness::Cause::kOldSequence);
+}
+
+void NetworkLoop::blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count) {
+  for (const Seat& seat : guest.seats) {
+    ServedChannel& channel = devices_[seat.device].channels[seat.channel];
+    if (channel.holder == guest.id()) channel.lateness.refused(cause, count);
   }
-  if (!devices_[device].mail->orders.try_push({kind})) return guest.session.answer(id, Code::kBusy, {});
-  notice(true, verb + "ed by \"" + guest.name + "\"");
-  guest.session.answer(id, Code::kOk, {});
 }
 
 void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request) {
-  const auto no_such_device = [&] {
-    guest.session.answer(id, Code::kInvalid, "there are " + std::to_string(devices_.size()) + " devices");
-  };
-  std::visit(Overloaded{
-                 [&](const SetStateRate& rate) {
-                   if (rate.hz == 0) return guest.session.answer(id, Code::kInvalid, "a state rate must be above zero");
-                   const auto view = std::find_if(guest.views.begin(), guest.views.end(),
-                                                  [&](const View& seen) { return seen.device == rate.device; });
-                   if (view == guest.views.end())
-                     return guest.session.answer(id, Code::kInvalid, "that device is not claimed");
-                   const auto loop_hz = static_cast<double>(devices_[rate.device].about.loop_hz);
-                   view->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
-                   guest.session.answer(id, Code::kOk, {});
-                 },
-                 [&](const SetStateDeadband& asked) {
-                   const std::string objection = StateDeadband::objection(asked);
-                   if (!objection.empty()) return guest.session.answer(id, Code::kInvalid, objection);
-                   for (View& view : guest.views) {
-                     view.deadband.reset();
-                     if (asked.max_silence > Duration::zero()) view.deadband.emplace(asked);
-                   }
-                   guest.session.answer(id, Code::kOk, {});
-                 },
-                 [&](const Rearm& rearm) { order(guest, id, rearm.device, HapticOrder::Kind::kRearm); },
-                 [&](const Disarm& disarm) { order(guest, id, disarm.device, HapticOrder::Kind::kDisarm); },
-                 [&](const Describe& describe) {
-                   if (describe.device >= devices_.size()) return no_such_device();
-                   const ServedDevice& device = devices_[describe.device];
-                   DeviceDescription about = device.about;
-                   for (std::size_t i = 0; i < device.channels.size(); ++i) {
-                     const Guest* const holder = holder_of(guests_, device.channels[i]);
-                     about.channels[i].holder = holder != nullptr ? holder->name : std::string();
-                   }
-                   guest.session.answer(id, std::move(about));
-                 },
-                 [&](const TakeLease& wanted) {
-                   if (guest.sits_on(wanted.device, wanted.channel)) return take_lease(now, guest, id, wanted);
-                   ++stats_.denied;
-                   guest.session.answer(id, Code::kDenied, "only for one that has claimed it as a controller");
-                 },
-                 [&](const GiveLease& given) {
-                   if (!guest.sits_on(given.device, given.channel)) {
-                     ++stats_.denied;
-                     return guest.session.answer(id, Code::kDenied, "only for one that has claimed it as a controller");
-                   }
-                   const bool holds = devices_[given.device].channels[given.channel].holder == guest.id();
-                   if (holds) leases_.free(given.device, given.channel);
-                   guest.session.answer(id, Code::kOk, {});
-                 },
-                 [&](const LeaseLost&) { guest.session.answer(id, Code::kUnsupported, "that is the server's to say"); },
-             },
-             request);
+  const Asker asker{
+      .guest = guest, .may_take_over = may_take_over(guest), .devices = devices_, .guests = guests_, .leases = leases_};
+  Outcome outcome = tendon::answer(now, asker, request);
+  if (outcome.code == Code::kDenied) ++stats_.denied;
+  if (!outcome.warning.empty()) notice(true, std::move(outcome.warning));
+  if (Guest* const loser = guest_of(guests_, outcome.loser)) {
+    dispossess(now, *loser, guest, std::get<TakeLease>(request));
+  }
+  if (outcome.device) return guest.session.answer(id, std::move(*outcome.device));
+  guest.session.answer(id, outcome.code, std::move(outcome.detail), outcome.wait);
 }
 
 void NetworkLoop::leave(Guest& guest, const std::string& how) {
@@ -524,7 +453,7 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
   add(stats_.dropped, guest.session.stats());
   notice(guest.role == Role::kController,
          "\"" + guest.name + "\" at " + to_string(guest.address) + " has left: " + how);
-  leases_.free_all(guest);
+  leases_.give_all(guest.id());
   if (guest.role == Role::kController) stats_.controller_clock = guest.session.peer_clock();
 }
 
@@ -545,7 +474,7 @@ NetworkLoop::Stats NetworkLoop::stats() const {
   for (const ServedDevice& device : devices_) {
     for (std::size_t i = 0; i < device.channels.size(); ++i) {
       const ServedChannel& channel = device.channels[i];
-      const Guest* const holder = holder_of(guests_, channel);
+      const Guest* const holder = guest_of(guests_, channel.holder);
       stats.channels.push_back({.device = device.about.name,
                                 .channel = device.about.channels[i].name,
                                 .holder = holder != nullptr ? holder->name : std::string(),

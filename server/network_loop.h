@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "protocol/handshake.h"
@@ -21,22 +23,24 @@
 
 namespace tendon {
 
-/// The other half of the world: lets guests in, hands their forces to the haptic loops and the devices'
-/// states to them.
+/// One half of the server: lets guests in, hands their forces to the haptic loops, and the devices' states to the
+/// guests.
 ///
-/// One thread calls `turn` when a datagram has come, when the haptic loop has made a step, or when the
-/// time that the last turn returned has come; it does nothing else but wait and read the clock.
+/// One thread calls `turn` when a datagram has come, when a haptic loop has made a step, or when the time that the last
+/// turn returned has come. That thread does nothing else, except wait and read the clock.
 ///
-/// Observers that ask for it (kFeatureDiagnostics) are told once a second how the devices' loops and the engines do.
+/// Each channel takes the forces of one controller; with a lease, several controllers may share it in turn (SESSION.md).
+/// There are up to `max_observers` observers. Those that ask for it (kFeatureDiagnostics) are told once a second how
+/// the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind something old. Of
+/// forces the newest wins; every request is answered.
 ///
-/// One controller for each channel, who may have to share it with others in turn (a lease, SESSION.md), and up to
-/// `max_observers` observers. The link is drained in every turn, so nothing
-/// waits behind what is old; forces are newest-wins, every request is answered.
+/// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only. A guest is
+/// half-open until its first authentic Data, and until then nothing changes for anybody else. Its address is the one
+/// its newest authentic datagram came from. A controller that comes again with its key takes its own place.
 ///
-/// Without keys guests speak in the clear, from this machine only. With keys they speak suite 1 only: a guest
-/// is half-open until its first authentic Data, and until then nothing changes for anybody else; its address
-/// is where its newest authentic datagram came from; a controller that comes again with its key takes its own
-/// place.
+/// The files of guests/ decide: who comes in (admission.h), who holds which channel (leases.h), what a request does
+/// (requests.h), why a force is late (lateness.h), what is told once a second (reports.h). This class moves datagrams,
+/// and lets them act on its guests.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class NetworkLoop {
@@ -55,21 +59,21 @@ class NetworkLoop {
     std::size_t max_observers = 8;
     Duration controller_timeout = std::chrono::seconds(2);
     Duration observer_timeout = std::chrono::seconds(10);
-    /// Handshakes answered whose guest has not shown yet that it holds the keys: anybody may have replayed its
-    /// Hello. 16 are more than start within a round trip; the oldest gives way.
+    /// Most handshakes answered and not yet confirmed by an authentic datagram: anybody can replay a Hello. 16 are more
+    /// than start within a round trip; the oldest gives way.
     std::size_t max_half_open = 16;
     Duration half_open_timeout = std::chrono::seconds(5);
     Rekey rekey{};  ///< of the sessions of suite 1, as their `life`
     Duration session_life = Session::Config{}.life;
-    /// States leave more rarely where the way to a guest is full, see RateAdaptation; where even the lowest rate loses
-    /// a tenth, forces are not handed on, and the device comes to its safe stop.
+    /// Sends fewer states to a guest whose link is full (RateAdaptation). Where even the lowest rate loses a tenth,
+    /// forces are not handed on, and the device comes to its safe stop.
     bool adapt_state_rate = false;
-    /// Datagrams taken in one turn; a flood must not keep states from being sent. A 1 kHz engine sends 1 per turn.
+    /// Datagrams taken in one turn: a flood must not keep states from being sent. A 1 kHz engine sends one per turn.
     std::size_t max_datagrams = 256;
     DatagramSieve::Config recorded{};  ///< of the datagrams in and out
   };
 
-  /// What guests' links have dropped, of all guests that were and are; see LinkStats.
+  /// What was dropped of all guests' datagrams since the server's start; see LinkStats.
   struct Dropped {
     std::uint64_t duplicated = 0;
     std::uint64_t malformed = 0;
@@ -77,6 +81,7 @@ class NetworkLoop {
     std::uint64_t old_key = 0;
     std::uint64_t invalid = 0;
     std::uint64_t stale = 0;
+    RefusedForces forces{};  ///< of `invalid` and `stale`; unknown_tick is Stats::unanswerable
   };
 
   struct Stats {
@@ -91,12 +96,14 @@ class NetworkLoop {
     Doorman::Stats hellos;                 ///< Hellos that did not lead to an Answer
     std::uint64_t forces = 0;              ///< handed to the haptic loop
     std::uint64_t denied = 0;              ///< forces and requests that only the holder of a channel may send
-    std::uint64_t unanswerable = 0;        ///< forces that answer a step which never was, or long ago
-    std::uint64_t late_ours = 0;           ///< forces that came when the one before had outlived its validity: by us,
-    std::uint64_t late_network = 0;        ///< … the network,
-    std::uint64_t late_engine = 0;         ///< … and the engine; see Lateness
-    std::uint64_t foretold = 0;            ///< states left out because their client can foretell them
-    std::uint64_t hopeless = 0;            ///< forces not handed on, over a link of no use
+    std::uint64_t unanswerable = 0;        ///< forces that answer a tick which never was, or was long ago
+    // Forces that came when the one before had outlived its validity, by the part to blame; see Lateness:
+    std::uint64_t late_ours = 0;
+    std::uint64_t late_network = 0;
+    std::uint64_t late_engine = 0;
+    std::uint64_t late_unknown = 0;
+    std::uint64_t foretold = 0;  ///< states left out because their client can foretell them
+    std::uint64_t hopeless = 0;  ///< forces not handed on, because their link loses too much
     Dropped dropped;
     struct Channel {
       std::string device;
@@ -117,9 +124,11 @@ class NetworkLoop {
     std::string text;
   };
 
-  /// One of `mail` for each device; datagrams go to the first. They and `link` must outlive the loop. Throws
-  /// std::invalid_argument when there are as many devices or channels as cannot be, or two of one name.
-  NetworkLoop(const Config& config, Link& link, std::vector<Mailboxes*> mail);
+  /// One of `mail` for each device; datagrams are recorded in the first. They and `link` must outlive the loop. Throws
+  /// what served_devices() does.
+  NetworkLoop(const Config& config, Link& link, const std::vector<Mailboxes*>& mail);
+  NetworkLoop(const NetworkLoop&) = delete;  // its leases look at its devices
+  NetworkLoop& operator=(const NetworkLoop&) = delete;
 
   /// One round. Returns when the next one is due at the latest.
   LocalTime turn(LocalTime now);
@@ -133,18 +142,20 @@ class NetworkLoop {
   std::vector<Notice> take_notices();
 
  private:
-  bool drain(LocalTime& now);  ///< `now` goes on with what it takes
+  bool drain(LocalTime& now);  ///< `now` grows with each datagram taken
   void receive(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void greet(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   void admit(LocalTime now, const Address& from, const Doorman::Guest& guest);
   bool answer_again(LocalTime now, const Address& from, const Doorman::Guest& guest);
+  void refuse(LocalTime now, const Address& from, const Doorman::Guest& guest, Refusal refusal);
   void open(LocalTime now, Guest guest);
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
+  void take_refused(Guest& guest);
+  void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
-  void order(Guest& guest, std::uint32_t id, std::uint32_t device, HapticOrder::Kind kind);
-  void take_lease(LocalTime now, Guest& guest, std::uint32_t id, const TakeLease& wanted);
-  void dispossess(LocalTime now, std::uint32_t loser, const TakeLease& lost, const std::string& to);
+  void dispossess(LocalTime now, Guest& loser, const Guest& winner, const TakeLease& lost);
+  bool may_take_over(const Guest& guest) const;
   void leave(Guest& guest, const std::string& how);
   void send_all(LocalTime now, Guest& guest);
   void publish(LocalTime now);
@@ -162,10 +173,10 @@ class NetworkLoop {
   DatagramSieve sieve_;
   std::vector<ServedDevice> devices_;
   Doorman doorman_;
-  std::vector<Guest> guests_;
   Admission admission_;
-  Leases leases_;
+  Leases leases_{devices_};
   Reports reports_;
+  std::vector<Guest> guests_;
   std::vector<Guest> half_open_;  ///< oldest first
   std::uint32_t next_connection_id_;
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <filesystem>
 #include <span>
+#include <stdexcept>
+#include <system_error>
 #include <utility>
 #include <variant>
 
@@ -110,9 +112,22 @@ std::unique_ptr<PartRecorder> recorder_of(const std::vector<Scene>& scenes, Loca
   return std::make_unique<PartRecorder>(config);
 }
 
+std::string haptic_name(const Scene& scene) { return "haptic-" + std::to_string(scene.loop.device); }
+
+/// Throws std::runtime_error, a sentence for the operator, when the system refuses the thread.
+template <class Run>
+std::thread thread_of(const std::string& name, Run run) {
+  try {
+    return std::thread(std::move(run));
+  } catch (const std::system_error& refused) {
+    throw std::runtime_error("cannot start the thread " + name + ": " + refused.code().message());
+  }
+}
+
 }  // namespace
 
-Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capacities, Guardian* guardian)
+Server::DeviceRuntime::DeviceRuntime(const Scene& the_scene, const Mailboxes::Capacities& capacities,
+                                     Guardian* guardian)
     : scene(the_scene),
       device(make_device(scene, guardian)),
       safe(scene.safety ? std::make_unique<SafeDevice>(*scene.safety, *device) : nullptr),
@@ -120,32 +135,33 @@ Server::Lane::Lane(const Scene& the_scene, const Mailboxes::Capacities& capaciti
       haptic(scene.loop, safe ? *safe : *device, mail),
       meter(scene.loop.period) {}
 
-Server::Lanes Server::lanes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
-  Lanes lanes;
+Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
+  DeviceRuntimes devices;
   for (const Scene& scene : scenes) {
     Mailboxes::Capacities capacities;
-    if (!lanes.empty()) capacities.datagrams = 1;  // all go to the first
-    lanes.push_back(std::make_unique<Lane>(scene, capacities, guardian));
+    if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
+    devices.push_back(std::make_unique<DeviceRuntime>(scene, capacities, guardian));
   }
-  return lanes;
+  return devices;
 }
 
-std::vector<Mailboxes*> Server::mail_of(const Lanes& lanes) {
+std::vector<Mailboxes*> Server::mail_of(const DeviceRuntimes& devices) {
   std::vector<Mailboxes*> mail;
-  for (const auto& lane : lanes) mail.push_back(&lane->mail);
+  for (const auto& runtime : devices) mail.push_back(&runtime->mail);
   return mail;
 }
 
-NetworkLoop::Config Server::network_config(const Lanes& lanes) {
-  const Scene& scene = lanes.front()->scene;
+NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
+  const Scene& scene = devices.front()->scene;
   NetworkLoop::Config config;
   fill_random(config.secret);
   fill_random(std::as_writable_bytes(std::span(&config.first_connection_id, 1)));
   config.first_connection_id |= 1;  // never 0
   if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
   config.server_name = "tendond " + std::string(kVersion);
-  for (const auto& lane : lanes) {
-    config.devices.push_back(description_of(lane->scene, lane->safe ? lane->safe->info() : lane->device->info()));
+  for (const auto& runtime : devices) {
+    config.devices.push_back(
+        description_of(runtime->scene, runtime->safe ? runtime->safe->info() : runtime->device->info()));
   }
   config.takeover = scene.network.takeover;
   config.max_observers = scene.network.max_observers;
@@ -159,9 +175,9 @@ NetworkLoop::Config Server::network_config(const Lanes& lanes) {
 Server::Server(const std::vector<Scene>& scenes)
     : started_(clock::now()),
       guardian_(make_guardian(scenes)),
-      lanes_(lanes_of(scenes, guardian_.get())),
+      devices_(runtimes_of(scenes, guardian_.get())),
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
-      network_(network_config(lanes_), link_, mail_of(lanes_)),
+      network_(network_config(devices_), link_, mail_of(devices_)),
       tell_next_(started_ + kTellPeriod) {
   recorder_ = recorder_of(scenes, started_);  // last: what is refused before leaves no file behind
 }
@@ -170,36 +186,52 @@ std::optional<std::filesystem::path> Server::recording() const {
   return recorder_ ? std::optional(recorder_->status().path) : std::nullopt;
 }
 
-std::string Server::prefix(const Lane& lane) const { return lanes_.size() == 1 ? "" : lane.scene.name + ": "; }
-
-Server::~Server() {
-  if (network_thread_.joinable()) stop();
+std::string Server::prefix(const DeviceRuntime& runtime) const {
+  return devices_.size() == 1 ? "" : runtime.scene.name + ": ";
 }
+
+Server::~Server() { end_threads(); }
 
 void Server::start(std::optional<Duration> run_for) {
   run_for_ = run_for;
   if (const auto& refused = wakeful_.emplace().refused()) log::warn(*refused);
-  log_thread_ = std::thread([this] { run_log(); });
-  network_thread_ = std::thread([this] { run_network(); });
-  for (auto& lane : lanes_) lane->thread = std::thread([this, &lane = *lane] { run_haptic(lane); });
+  try {
+    log_thread_ = thread_of("log", [this] { run_log(); });
+    network_thread_ = thread_of("network", [this] { run_network(); });
+    for (auto& runtime : devices_) {
+      runtime->thread = thread_of(haptic_name(runtime->scene), [this, &runtime = *runtime] { run_haptic(runtime); });
+    }
+  } catch (...) {
+    end_threads();
+    throw;
+  }
+}
+
+void Server::end_threads() {
+  const auto join = [](std::thread& thread) {
+    if (thread.joinable()) thread.join();
+  };
+  stop_haptic_.store(true, std::memory_order_release);
+  for (auto& runtime : devices_) join(runtime->thread);
+  stop_network_.store(true, std::memory_order_release);
+  stepped_.ring();
+  join(network_thread_);
+  stop_log_.store(true, std::memory_order_release);
+  join(log_thread_);
+  wakeful_.reset();
 }
 
 Server::Summary Server::stop() {
-  stop_haptic_.store(true, std::memory_order_release);
-  for (auto& lane : lanes_) lane->thread.join();
-  stop_network_.store(true, std::memory_order_release);
-  stepped_.ring();
-  network_thread_.join();
-  stop_log_.store(true, std::memory_order_release);
-  log_thread_.join();
-  wakeful_.reset();
+  end_threads();
 
   Summary summary;
-  for (const auto& lane : lanes_) {
-    DeviceSummary& device = summary.devices.emplace_back(DeviceSummary{
-        .name = lane->scene.name, .haptic = lane->haptic.stats(), .safety = std::nullopt, .counts = std::nullopt});
-    if (lane->safe) device.safety = lane->safe->status();
-    if (!lane->scene.driver().ids.empty()) device.counts = lane->device->counts();
+  for (const auto& runtime : devices_) {
+    DeviceSummary& device = summary.devices.emplace_back(DeviceSummary{.name = runtime->scene.name,
+                                                                       .haptic = runtime->haptic.stats(),
+                                                                       .safety = std::nullopt,
+                                                                       .counts = std::nullopt});
+    if (runtime->safe) device.safety = runtime->safe->status();
+    if (!runtime->scene.driver().ids.empty()) device.counts = runtime->device->counts();
   }
   summary.network = network_.stats();
   if (recorder_) summary.recording = recorder_->status();
@@ -209,31 +241,31 @@ Server::Summary Server::stop() {
 
 bool Server::turning() {
   bool all = true;
-  for (auto& lane : lanes_) {
-    const std::uint64_t steps = lane->haptic.stats().steps;
-    all = std::exchange(lane->steps_seen, steps) != steps && all;
+  for (auto& runtime : devices_) {
+    const std::uint64_t steps = runtime->haptic.stats().steps;
+    all = std::exchange(runtime->steps_seen, steps) != steps && all;
   }
   return all;
 }
 
-void Server::run_haptic(Lane& lane) {
-  name_thread("haptic-" + std::to_string(lane.scene.loop.device));
-  const bool first = &lane == lanes_.front().get();
+void Server::run_haptic(DeviceRuntime& runtime) {
+  name_thread(haptic_name(runtime.scene));
+  const bool first = &runtime == devices_.front().get();
   for (const std::string& refused : enter_realtime(kHapticPriority)) {
     if (first) log::warn(refused);  // to all of them alike
-    lane.not_realtime.store(true, std::memory_order_relaxed);
+    runtime.not_realtime.store(true, std::memory_order_relaxed);
   }
-  if (lane.scene.cpu) {
-    if (const auto refused = stay_on(*lane.scene.cpu)) log::warn(prefix(lane) + *refused);
+  if (runtime.scene.cpu) {
+    if (const auto refused = stay_on(*runtime.scene.cpu)) log::warn(prefix(runtime) + *refused);
   }
   LocalTime due = clock::now();
   const LocalTime end = run_for_ ? due + *run_for_ : LocalTime::max();
   while (!stop_haptic_.load(std::memory_order_acquire) && due < end) {
-    due = lane.haptic.step(clock::now());
+    due = runtime.haptic.step(clock::now());
     stepped_.ring();
     clock::sleep_until(due);
   }
-  lane.haptic.stop();
+  runtime.haptic.stop();
 }
 
 void Server::run_network() {
@@ -257,9 +289,9 @@ void Server::run_log() {
     last = stop_log_.load(std::memory_order_acquire);
     const LocalTime now = clock::now();
     drain_to_recorder(now);
-    for (auto& lane : lanes_) report_health(now, *lane);
+    for (auto& runtime : devices_) report_health(now, *runtime);
     if (now >= tell_next_ || last) {
-      for (auto& lane : lanes_) report_trouble(*lane);
+      for (auto& runtime : devices_) report_trouble(*runtime);
       record_left_out(now);
       tell_next_ = now + kTellPeriod;
     }
@@ -273,16 +305,16 @@ void Server::run_log() {
 
 void Server::drain_to_recorder(LocalTime now) {
   std::uint64_t steps_lost = 0;
-  for (std::size_t device = 0; device < lanes_.size(); ++device) {
-    Lane& lane = *lanes_[device];
-    while (const StepRecord* step = lane.mail.steps.front()) {
-      lane.meter.observe(*step);
+  for (std::size_t device = 0; device < devices_.size(); ++device) {
+    DeviceRuntime& runtime = *devices_[device];
+    while (const StepRecord* step = runtime.mail.steps.front()) {
+      runtime.meter.observe(*step);
       if (recorder_) recorder_->record(*step, device);
-      lane.mail.steps.pop();
+      runtime.mail.steps.pop();
     }
-    steps_lost += news(lane.mail.steps_lost, lane.told_steps_lost);
+    steps_lost += news(runtime.mail.steps_lost, runtime.told_steps_lost);
   }
-  Mailboxes& first = lanes_.front()->mail;
+  Mailboxes& first = devices_.front()->mail;
   while (const DatagramRecord* datagram = first.datagrams.front()) {
     if (recorder_) recorder_->record(*datagram);
     first.datagrams.pop();
@@ -301,7 +333,7 @@ void Server::drain_to_recorder(LocalTime now) {
 /// What the network thread has left out of the recording since the last call.
 void Server::record_left_out(LocalTime now) {
   if (!recorder_) return;
-  Mailboxes& mail = lanes_.front()->mail;
+  Mailboxes& mail = devices_.front()->mail;
   if (const std::uint64_t strangers = news(mail.strangers_left_out, told_strangers_); strangers > 0) {
     recorder_->lost({.at = now, .cause = LossRecord::Cause::kSample, .strangers = strangers});
   }
@@ -318,82 +350,83 @@ void Server::tell_of_recording() {
 }
 
 /// To the network thread, for observers that ask.
-void Server::report_health(LocalTime now, Lane& lane) {
-  Health health = lane.meter.counted();
+void Server::report_health(LocalTime now, DeviceRuntime& runtime) {
+  Health health = runtime.meter.counted();
   health.at = now;
-  const HapticLoop::Stats haptic = lane.haptic.stats();
+  const HapticLoop::Stats haptic = runtime.haptic.stats();
   if (haptic.fault != HapticController::Fault::kNone) health.fault = describe(haptic.fault);
-  if (lane.safe) {
-    const SafeDevice::Status safety = lane.safe->status();
+  if (runtime.safe) {
+    const SafeDevice::Status safety = runtime.safe->status();
     health.safety = on_the_wire(safety.state);
     if (safety.state == SafetyState::kFault) health.fault = to_string(safety.last_fault);
   } else {
     const bool ready = haptic.device == Device::State::kHomed;
     health.safety = ready ? Safety::kUnguarded : on_the_wire(static_cast<SafetyState>(haptic.device));
   }
-  health.device = lane.device->counts();
-  health.not_realtime = lane.not_realtime.load(std::memory_order_relaxed);
+  health.device = runtime.device->counts();
+  health.not_realtime = runtime.not_realtime.load(std::memory_order_relaxed);
   health.recording_ended = recording_stopped_;
-  lane.mail.health.put(health);
+  health.unsent = link_.send_failures();
+  runtime.mail.health.put(health);
 }
 
-void Server::report_safety(Lane& lane) {
-  if (!lane.safe) return;
-  const SafeDevice::Status now = lane.safe->status();
-  if (now.faults > lane.told_safety.faults) {
-    log::error(prefix(lane) + "no force any more: " + std::string(to_string(now.last_fault)));
+void Server::report_safety(DeviceRuntime& runtime) {
+  if (!runtime.safe) return;
+  const SafeDevice::Status now = runtime.safe->status();
+  if (now.faults > runtime.told_safety.faults) {
+    log::error(prefix(runtime) + "no force any more: " + std::string(to_string(now.last_fault)));
   }
   const bool armed = now.state == SafetyState::kArmed;
-  const bool was_armed = lane.told_safety.state == SafetyState::kArmed;
-  if (armed && !was_armed) log::info(prefix(lane) + "the device is armed");
-  if (was_armed && now.state < SafetyState::kArmed) log::info(prefix(lane) + "the device is no longer armed");
-  lane.told_safety = now;
+  const bool was_armed = runtime.told_safety.state == SafetyState::kArmed;
+  if (armed && !was_armed) log::info(prefix(runtime) + "the device is armed");
+  if (was_armed && now.state < SafetyState::kArmed) log::info(prefix(runtime) + "the device is no longer armed");
+  runtime.told_safety = now;
 }
 
 /// The counters of its driver that mean trouble, when they have risen.
-void Server::report_counts(Lane& lane) {
-  const DeviceCounts now = lane.device->counts();
-  const DeviceCounts before = std::exchange(lane.told_counts, now);
+void Server::report_counts(DeviceRuntime& runtime) {
+  const DeviceCounts now = runtime.device->counts();
+  const DeviceCounts before = std::exchange(runtime.told_counts, now);
   for (const DeviceCounter& row : kDeviceCounters) {
     if (row.degraded.empty() || now[row.count] == before[row.count]) continue;
-    log::warn(prefix(lane) + std::string(row.name) + ": " + std::to_string(now[row.count] - before[row.count]) +
-              " more (" + std::string(row.meaning) + ")");
+    log::warn(prefix(runtime) + std::string(row.name) + ": " +
+              std::to_string(now[row.count] - before[row.count]) + " more (" + std::string(row.meaning) + ")");
   }
 }
 
-void Server::report_trouble(Lane& lane) {
-  report_safety(lane);
-  report_counts(lane);
-  const HapticLoop::Stats now = lane.haptic.stats();
-  if (now.overruns > lane.told.overruns) {
-    log::warn(prefix(lane) + std::to_string(now.overruns - lane.told.overruns) +
+void Server::report_trouble(DeviceRuntime& runtime) {
+  report_safety(runtime);
+  report_counts(runtime);
+  const HapticLoop::Stats now = runtime.haptic.stats();
+  if (now.overruns > runtime.told.overruns) {
+    log::warn(prefix(runtime) + std::to_string(now.overruns - runtime.told.overruns) +
               " overruns in the last second; longest interval so far " +
               std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(now.longest_interval).count()) +
               " µs");
   }
-  if (now.device != lane.told.device) log::info(prefix(lane) + describe(now.device, lane.scene));
+  if (now.device != runtime.told.device) log::info(prefix(runtime) + describe(now.device, runtime.scene));
   // Each fault freezes it once, and saving thaws it: the controller's, and the safety layer's, which report_safety
   // names.
-  if (lane.mail.flight.frozen()) {
+  if (runtime.mail.flight.frozen()) {
     if (now.fault != HapticController::Fault::kNone) {
-      log::error(prefix(lane) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");
+      log::error(prefix(runtime) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");
     }
-    save_flight(lane);
+    save_flight(runtime);
   }
-  lane.told = now;
+  runtime.told = now;
 }
 
-void Server::save_flight(Lane& lane) {
+void Server::save_flight(DeviceRuntime& runtime) {
   try {
-    const auto& recording = lanes_.front()->scene.recording;
+    const auto& recording = devices_.front()->scene.recording;
     const auto sink = open_flight(recording ? std::optional(recording->path) : std::nullopt,
-                                  lanes_.size() == 1 ? "" : lane.scene.name);
-    write_flight(lane.mail.flight, {.scene = scene_record(lane.scene), .started = started_}, *sink);
+                                  devices_.size() == 1 ? "" : runtime.scene.name);
+    write_flight(runtime.mail.flight, {.scene = scene_record(runtime.scene), .started = started_}, *sink);
     log::error("the steps before the fault are in " + sink->path().string());
   } catch (const std::exception& problem) {
     log::error(std::string("the steps before the fault are lost: ") + problem.what());
   }
-  lane.mail.flight.thaw();
+  runtime.mail.flight.thaw();
 }
 
 }  // namespace tendon

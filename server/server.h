@@ -58,7 +58,8 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Starts the threads. With `run_for` each haptic thread ends by itself, with zero force, so long after its first
+  /// Starts the threads. Throws std::runtime_error, a sentence for the operator, when the system refuses one; those that
+  /// had begun have ended then. With `run_for` each haptic thread ends by itself, with zero force, so long after its first
   /// step: it takes run_for / period steps, or fewer when some came too late.
   void start(std::optional<Duration> run_for = std::nullopt);
 
@@ -76,8 +77,8 @@ class Server {
 
  private:
   /// A device and what it needs to itself.
-  struct Lane {
-    Lane(const Scene& scene, const Mailboxes::Capacities& capacities, Guardian* guardian);
+  struct DeviceRuntime {
+    DeviceRuntime(const Scene& scene, const Mailboxes::Capacities& capacities, Guardian* guardian);
     Scene scene;
     std::unique_ptr<Device> device;
     std::unique_ptr<SafeDevice> safe;  ///< around it; null when the scene lists none
@@ -94,28 +95,29 @@ class Server {
     DeviceCounts told_counts;
     std::uint64_t told_steps_lost = 0;
   };
-  using Lanes = std::vector<std::unique_ptr<Lane>>;
+  using DeviceRuntimes = std::vector<std::unique_ptr<DeviceRuntime>>;
 
-  static Lanes lanes_of(const std::vector<Scene>& scenes, Guardian* guardian);
-  static NetworkLoop::Config network_config(const Lanes& lanes);
-  static std::vector<Mailboxes*> mail_of(const Lanes& lanes);
+  static DeviceRuntimes runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian);
+  static NetworkLoop::Config network_config(const DeviceRuntimes& devices);
+  static std::vector<Mailboxes*> mail_of(const DeviceRuntimes& devices);
   /// "left: ", where there is more than one.
-  std::string prefix(const Lane& lane) const;
-  void run_haptic(Lane& lane);
+  std::string prefix(const DeviceRuntime& runtime) const;
+  void end_threads();  ///< those that run: the haptic ones first, with zero force
+  void run_haptic(DeviceRuntime& runtime);
   void run_network();
   void run_log();
   void drain_to_recorder(LocalTime now);
   void record_left_out(LocalTime now);
   void tell_of_recording();
-  void report_health(LocalTime now, Lane& lane);
-  void report_counts(Lane& lane);
-  void report_trouble(Lane& lane);
-  void report_safety(Lane& lane);
-  void save_flight(Lane& lane);
+  void report_health(LocalTime now, DeviceRuntime& runtime);
+  void report_counts(DeviceRuntime& runtime);
+  void report_trouble(DeviceRuntime& runtime);
+  void report_safety(DeviceRuntime& runtime);
+  void save_flight(DeviceRuntime& runtime);
 
   LocalTime started_;
   std::unique_ptr<Guardian> guardian_;  ///< of real devices; null when there are none
-  Lanes lanes_;
+  DeviceRuntimes devices_;
   UdpLink link_;
   Doorbell stepped_;
   NetworkLoop network_;

@@ -328,6 +328,7 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
   }
   if (!in_bounds(command)) {
     ++stats_.forces_unusable;
+    stats_.unusable = objection(command);
     return;
   }
   if (deadband_ && !deadband_->passes(now, touch.force) && !touch.topology_changed) {

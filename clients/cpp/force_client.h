@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/cpp/connection.h"
@@ -146,6 +147,7 @@ class ForceClient {
     std::uint64_t states_skipped = 0;   ///< of these, replaced by a newer one before a callback was due
     std::uint64_t forces = 0;           ///< forces sent
     std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
+    std::string_view unusable{};        ///< what was wrong with the newest of them; empty: none
     std::uint64_t forces_alike = 0;     ///< forces not sent: a hand cannot tell them from the previous one
     std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
     std::string lease_lost_to;          ///< name of the client that took the channel from us; empty: nobody

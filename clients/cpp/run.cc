@@ -114,6 +114,12 @@ void print_report(const LinkReport& report, const Options& options) {
                  {"late_server", report.late_server},
                  {"late_network", report.late_network},
                  {"late_engine", report.late_engine},
+                 {"late_unknown", report.late_unknown},
+                 {"refused",
+                  {{"not_finite", report.refused.not_finite},
+                   {"out_of_bounds", report.refused.out_of_bounds},
+                   {"unknown_tick", report.refused.unknown_tick},
+                   {"old_sequence", report.refused.old_sequence}}},
                  {"worst_late_ms", milliseconds(report.worst_late)},
                  {"longest_gap_ms", milliseconds(report.longest_gap)}};
     const auto add = [&](const char* name, const std::optional<Delays>& d) {
@@ -162,6 +168,7 @@ int run_with(const Options& options, Callback callback) {
     ForceClient client(transport, transport.server(), config, std::move(callback), start);
 
     std::string said;
+    std::string_view unusable;  // the newest reason that was said
     ForceClient::Phase phase = client.phase();
     PeerTime reported{};
     LocalTime now = start;
@@ -169,6 +176,9 @@ int run_with(const Options& options, Callback callback) {
       const LocalTime next = std::min(client.turn(now), end);
       const std::string text = sentence(client, transport.server(), options);
       if (!text.empty() && text != said) say(said = text);
+      if (const auto why = client.stats().unusable; !why.empty() && why != unusable) {
+        say("a force is not sent: " + std::string(unusable = why));
+      }
       if (const auto& report = client.report()) {
         if (std::exchange(reported, report->until) != report->until) print_report(*report, options);
       }

@@ -89,6 +89,11 @@ void Board::observe(const PeerReport& report) {
   engine.late_server += report.link.late_server;
   engine.late_network += report.link.late_network;
   engine.late_engine += report.link.late_engine;
+  engine.late_unknown += report.link.late_unknown;
+  engine.refused.not_finite += report.link.refused.not_finite;
+  engine.refused.out_of_bounds += report.link.refused.out_of_bounds;
+  engine.refused.unknown_tick += report.link.refused.unknown_tick;
+  engine.refused.old_sequence += report.link.refused.old_sequence;
   engine.silent_for = 0;
 }
 

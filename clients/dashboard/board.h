@@ -50,6 +50,8 @@ class Board {
     std::uint64_t late_server = 0;
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
+    std::uint64_t late_unknown = 0;
+    RefusedForces refused{};
     /// Reports of the device since this engine's last one: the reports on an engine end when it leaves.
     std::uint64_t silent_for = 0;
   };

@@ -187,6 +187,15 @@ void add_engines(Exposition& out, const Board& board) {
     out.add(with(labels, "cause", "server"), engine.late_server);
     out.add(with(labels, "cause", "network"), engine.late_network);
     out.add(with(labels, "cause", "engine"), engine.late_engine);
+    out.add(with(labels, "cause", "unknown"), engine.late_unknown);
+  });
+  out.begin("tendon_engine_forces_unusable_total", MetricType::Counter,
+            "Forces of the engine, on all its channels, that could not be used, by what is wrong with them.");
+  engines([&](const Labels& labels, const Engine& engine) {
+    out.add(with(labels, "cause", "not_finite"), engine.refused.not_finite);
+    out.add(with(labels, "cause", "out_of_bounds"), engine.refused.out_of_bounds);
+    out.add(with(labels, "cause", "unknown_tick"), engine.refused.unknown_tick);
+    out.add(with(labels, "cause", "old_sequence"), engine.refused.old_sequence);
   });
   out.begin("tendon_engine_datagrams_received", MetricType::Gauge, "Datagrams of the engine's present session.");
   engines([&](const Labels& labels, const Engine& engine) { out.add(labels, engine.newest.link.received); });

@@ -11,8 +11,6 @@ namespace {
 
 /// States per second: the session lasts a few round trips, and nobody looks at them.
 constexpr std::uint32_t kStateHz = 20;
-/// Of DeviceState::reasons (protocol/WIRE.md).
-constexpr std::uint32_t kDisarmed = 8192;
 
 const ChannelDescription* channel_of(const Board::Device& device, const std::string& name) {
   if (!device.about) return nullptr;
@@ -143,7 +141,7 @@ void Operator::look(LocalTime now) {
       device != nullptr && device->newest && device->newest->sampled > answered_ ? &*device->newest : nullptr;
   const DeviceReport* const report =
       device != nullptr && device->report && device->report->until > answered_ ? &*device->report : nullptr;
-  const bool disarmed = state != nullptr && (state->reasons & kDisarmed) != 0;
+  const bool disarmed = state != nullptr && Reasons::from_bits(state->reasons).has(Reason::kDisarmed);
   if (order_ == Order::kDisarm) {
     if (disarmed && state->force_applied.isZero(0)) {
       finish(now, true, "Disarmed: no force until it is armed again.");

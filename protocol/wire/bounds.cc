@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 #include "core/base/arithmetic.h"
@@ -35,6 +36,31 @@ bool in_bounds(const LocalModel& model) noexcept {
 bool in_bounds(const ForceCommand& command) noexcept {
   return all_bounded(command.force) && (!command.model || in_bounds(*command.model)) &&
          (!command.error || (bounded(*command.error) && *command.error >= 0));
+}
+
+bool is_finite(const ForceCommand& command) noexcept {
+  const auto contact_is_finite = [](const Contact& contact) {
+    if (!contact.normal.allFinite() || !std::isfinite(contact.gap)) return false;
+    if (!contact.table) return true;
+    const ForceTable& table = *contact.table;
+    const auto size = std::min<std::size_t>(table.size, table.force.size());
+    return std::isfinite(table.first) && std::isfinite(table.step) &&
+           std::all_of(table.force.begin(), table.force.begin() + static_cast<std::ptrdiff_t>(size),
+                       [](double f) { return std::isfinite(f); });
+  };
+  const auto model_is_finite = [&](const LocalModel& model) {
+    return model.at.allFinite() && model.stiffness.allFinite() && !std::isnan(model.valid_radius) &&
+           (!model.contact || contact_is_finite(*model.contact));
+  };
+  return command.force.allFinite() && (!command.model || model_is_finite(*command.model)) &&
+         (!command.error || std::isfinite(*command.error));
+}
+
+std::string_view objection(const ForceCommand& command) noexcept {
+  if (in_bounds(command)) return {};
+  if (!command.force.allFinite()) return "the force is not finite (NaN or infinity)";
+  if (!all_bounded(command.force)) return "the force is beyond 1e12 N";
+  return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md";
 }
 
 }  // namespace tendon

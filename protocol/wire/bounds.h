@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <string_view>
 
 #include "protocol/limits.h"
 #include "protocol/messages.h"
@@ -18,5 +19,11 @@ inline bool bounded(double value) noexcept { return std::abs(value) <= limits::k
 /// Whether a receiver accepts what `command` says of the force: `force`, `model` and `error` are within their bounds
 /// (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
+
+/// Whether `command` holds no NaN, and no infinity except as a model's `valid_radius`.
+bool is_finite(const ForceCommand& command) noexcept;
+
+/// Why `command` is not in bounds, for the author of the engine that it comes from; empty when it is. Of static storage.
+std::string_view objection(const ForceCommand& command) noexcept;
 
 }  // namespace tendon

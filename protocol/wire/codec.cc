@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <array>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
 #include "protocol/limits.h"
+#include "protocol/wire/bounds.h"
 #include "protocol/wire/fields.h"
 #include "protocol/wire/frame_codec.h"
 
@@ -29,6 +31,9 @@ template <class Value, class Message>
 void take(const Message& from, DataContent& content) {
   Frame& frame = content.frames.emplace_back(std::in_place_type<Value>);
   if (wire::read(from, std::get<Value>(frame))) return;
+  if constexpr (std::is_same_v<Value, ForceCommand>) {
+    ++(is_finite(std::get<Value>(frame)) ? content.forces_out_of_bounds : content.forces_not_finite);
+  }
   content.frames.pop_back();
   ++content.invalid;
 }
@@ -150,6 +155,8 @@ const DataContent* DataReader::read(std::span<const std::byte> body) {
 
   content.frames.clear();
   content.invalid = 0;
+  content.forces_not_finite = 0;
+  content.forces_out_of_bounds = 0;
   content.echo.reset();
   if (datagram.has_echo() && !read_echo(datagram.echo(), content.echo.emplace())) {
     content.echo.reset();

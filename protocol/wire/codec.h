@@ -68,6 +68,9 @@ struct DataContent {
   std::optional<IncomingEcho> echo;
   std::vector<Frame> frames;  ///< in the order of the datagram, every value within bounds
   std::uint32_t invalid = 0;  ///< frames (and echoes) left out because a value was out of bounds
+  // Of these, the forces:
+  std::uint32_t forces_not_finite = 0;
+  std::uint32_t forces_out_of_bounds = 0;
 };
 
 /// Reads one Data datagram after the other. Keeps its memory.

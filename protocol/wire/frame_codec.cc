@@ -352,6 +352,11 @@ bool read(const pb::LinkReport& from, LinkReport& to) {
   to.late_server = from.late_server();
   to.late_network = from.late_network();
   to.late_engine = from.late_engine();
+  to.late_unknown = from.late_unknown();
+  to.refused = {.not_finite = from.refused_not_finite(),
+                .out_of_bounds = from.refused_out_of_bounds(),
+                .unknown_tick = from.refused_unknown_tick(),
+                .old_sequence = from.refused_old_sequence()};
   to.clock_offset = Duration{from.clock_offset_ns()};
   to.clock_drift_ppm = from.clock_drift_ppm();
   to.received = from.received();
@@ -380,6 +385,11 @@ void write(const LinkReport& from, pb::LinkReport& to) {
   to.set_late_server(from.late_server);
   to.set_late_network(from.late_network);
   to.set_late_engine(from.late_engine);
+  to.set_late_unknown(from.late_unknown);
+  to.set_refused_not_finite(from.refused.not_finite);
+  to.set_refused_out_of_bounds(from.refused.out_of_bounds);
+  to.set_refused_unknown_tick(from.refused.unknown_tick);
+  to.set_refused_old_sequence(from.refused.old_sequence);
   to.set_worst_late_ns(unsigned_ns(from.worst_late));
   to.set_longest_gap_ns(unsigned_ns(from.longest_gap));
   if (from.round_trip) delays(*from.round_trip, *to.mutable_round_trip());

@@ -2,80 +2,71 @@
 #include "server/guests/admission.h"
 
 #include <algorithm>
-#include <stdexcept>
+#include <array>
+#include <string_view>
 
 namespace tendon {
+
 namespace {
 
-/// The place of the one of that name; the first, when `name` is empty.
-template <class Named>
-std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
-  if (name.empty()) return 0;
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
-  if (found == all.end()) return std::nullopt;
-  return static_cast<std::uint32_t>(found - all.begin());
+/// What this server can do beyond the version's minimum.
+constexpr std::array<std::string_view, 3> kFeatures = {kFeatureLocalModel, kFeatureChannels, kFeatureDiagnostics};
+
+std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
+  std::vector<std::string> both;
+  for (const std::string_view feature : kFeatures) {
+    const bool not_for_it = feature == kFeatureDiagnostics && role != Role::kObserver;
+    const bool is_offered = std::find(offered.begin(), offered.end(), feature) != offered.end();
+    if (is_offered && !not_for_it) both.emplace_back(feature);
+  }
+  return both;
+}
+
+/// Whether a key lets its holder have that role.
+bool may(const ClientKey* key, Role role) {
+  return key == nullptr || key->role == Role::kController || role == Role::kObserver;
 }
 
 const std::string& name_of(const ServedDevice& device) { return device.about.name; }
 const std::string& name_of(const ChannelDescription& channel) { return channel.name; }
 
+/// The place of the one of that name; the first, when none is named.
 template <class Named>
-std::string names_of(const std::vector<Named>& all) {
-  std::string names;
-  for (const Named& one : all) names += (names.empty() ? "\"" : ", \"") + name_of(one) + "\"";
-  return names;
-}
-
-/// Whether the holder of `key` may have `role`.
-bool may(const ClientKey* key, Role role) {
-  return key == nullptr || key->role == Role::kController || role == Role::kObserver;
-}
-
-bool has_controller(const std::vector<Seat>& seats) {
-  return std::any_of(seats.begin(), seats.end(), [](const Seat& seat) { return seat.role == Role::kController; });
+std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
+  if (name.empty()) return 0;
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return name_of(one) == name; });
+  if (found == all.end()) return std::nullopt;
+  return static_cast<std::uint32_t>(found - all.begin());
 }
 
 template <class Named>
-void check_names(const std::vector<Named>& all, std::size_t most, const std::string& what) {
-  if (all.empty() || all.size() > most) {
-    throw std::invalid_argument("expected 1 to " + std::to_string(most) + " " + what + "s, got " +
-                                std::to_string(all.size()));
-  }
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (place_of(all, all[i].name) != i) throw std::invalid_argument("two " + what + "s have one name: " + all[i].name);
-  }
+Refusal not_there(const std::string& what, const std::string& name, const std::vector<Named>& all) {
+  std::string reason = "there is no " + what + " \"" + name + "\", only";
+  for (const Named& one : all) reason += (&one == &all.front() ? " \"" : ", \"") + name_of(one) + "\"";
+  return {Code::kInvalid, reason};
 }
+
+bool is_controller(const Seat& seat) { return seat.role == Role::kController; }
 
 }  // namespace
 
-void check_devices(const std::vector<DeviceDescription>& devices) {
-  check_names(devices, limits::kMaxDevices, "device");
-  for (const DeviceDescription& device : devices) check_names(device.channels, limits::kMaxChannels, "channel");
-}
-
-std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello) const {
+std::variant<std::vector<Seat>, Refusal> Admission::seats_of(const Hello& hello,
+                                                             const std::vector<ServedDevice>& devices) {
   if (hello.claims.empty()) return std::vector<Seat>{{.device = 0, .channel = 0, .role = hello.role}};
   std::vector<Seat> seats;
   Role highest = Role::kObserver;
   for (const Claim& claim : hello.claims) {
-    const auto found = std::find_if(devices_.begin(), devices_.end(), [&](const ServedDevice& device) {
-      return claim.device.empty() || device.about.name == claim.device;
-    });
-    if (found == devices_.end()) {
-      return Refusal{Code::kInvalid, "there is no device \"" + claim.device + "\", only " + names_of(devices_)};
-    }
-    const auto device = static_cast<std::uint32_t>(found - devices_.begin());
-    const auto& channels = found->about.channels;
+    const auto device = place_of(devices, claim.device);
+    if (!device) return not_there("device", claim.device, devices);
+    const auto& channels = devices[*device].about.channels;
     const auto channel = claim.role == Role::kController ? place_of(channels, claim.channel) : 0;
-    if (!channel) {
-      return Refusal{Code::kInvalid, "there is no channel \"" + claim.channel + "\", only " + names_of(channels)};
-    }
+    if (!channel) return not_there("channel", claim.channel, channels);
     const bool twice = std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-      return seat.device == device && seat.channel == *channel && seat.role == claim.role;
+      return seat.device == *device && seat.channel == *channel && seat.role == claim.role;
     });
     if (twice) return Refusal{Code::kInvalid, "the same is claimed twice"};
     highest = std::max(highest, claim.role);
-    seats.push_back({.device = device, .channel = *channel, .role = claim.role, .by_name = true});
+    seats.push_back({.device = *device, .channel = *channel, .role = claim.role, .by_name = true});
   }
   if (highest != hello.role) return Refusal{Code::kInvalid, "the role is not the highest of the claims'"};
   return seats;
@@ -86,63 +77,83 @@ bool Admission::takes_the_place_of(const Guest& present, const Address& from, co
   if (key != present.key) return false;
   if (present.address == from) return true;
   return key != nullptr && std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-           return seat.role == Role::kController && present.sits_on(seat.device, seat.channel);
+           return is_controller(seat) && sits_on(present, seat.device, seat.channel);
          });
 }
 
 std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const ClientKey* key,
-                                                   const std::vector<Seat>& seats) const {
+                                                   const std::vector<Seat>& seats,
+                                                   const std::vector<ServedDevice>& devices,
+                                                   const std::vector<Guest>& guests) const {
   if (key == nullptr && config_.keys > 0) {
     return Refusal{Code::kDenied, "this server lets in those who have a key: --key FILE"};
   }
-  const bool controls = has_controller(seats);
+  const bool controls = std::any_of(seats.begin(), seats.end(), is_controller);
   if (!may(key, controls ? Role::kController : Role::kObserver)) {
     return Refusal{Code::kDenied, "the key \"" + key->name + "\" is an observer's"};
   }
   for (const Seat& seat : seats) {
-    const ServedDevice& device = devices_[seat.device];
+    const ServedDevice& device = devices[seat.device];
     const bool can_wait = seat.by_name && device.about.channels[seat.channel].lease > Duration::zero();
-    const Guest* const holder = holder_of(guests_, device.channels[seat.channel]);
-    if (seat.role != Role::kController || holder == nullptr || can_wait) continue;
+    const Guest* const holder = guest_of(guests, device.channels[seat.channel].holder);
+    if (!is_controller(seat) || holder == nullptr || can_wait) continue;
     if (takes_the_place_of(*holder, from, key, seats)) continue;
     return Refusal{Code::kBusy, "the device is controlled by \"" + holder->name + "\" at " +
                                     to_string(holder->address) + "; observers are welcome"};
   }
-  const auto stays = [&](const Guest& guest) { return !guest.gone && !takes_the_place_of(guest, from, key, seats); };
-  const auto observers = static_cast<std::size_t>(std::count_if(
-      guests_.begin(), guests_.end(), [&](const Guest& g) { return g.role == Role::kObserver && stays(g); }));
-  // A guest that waits for a lease is no observer, yet it is sent states.
-  const auto guests = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), stays));
-  std::size_t channels = 0;
-  for (const ServedDevice& device : devices_) channels += device.channels.size();
-  if (!controls && observers >= config_.max_observers) {
+  const auto count = [&](auto counts) {
+    return static_cast<std::size_t>(std::count_if(guests.begin(), guests.end(), [&](const Guest& guest) {
+      return !guest.gone && counts(guest) && !takes_the_place_of(guest, from, key, seats);
+    }));
+  };
+  const auto observes = [](const Guest& guest) { return guest.role == Role::kObserver; };
+  if (const std::size_t observers = count(observes); !controls && observers >= config_.max_observers) {
     return Refusal{Code::kBusy, "there are " + std::to_string(observers) + " observers already"};
   }
   if (!controls && config_.keys > 1) {
-    const auto of_key = static_cast<std::size_t>(std::count_if(guests_.begin(), guests_.end(), [&](const Guest& g) {
-      return g.role == Role::kObserver && g.key == key && stays(g);
-    }));
+    const std::size_t of_key = count([&](const Guest& guest) { return observes(guest) && guest.key == key; });
     // Half of the places, at least one: no key can keep all the others out.
     if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {
       return Refusal{Code::kBusy, "the key \"" + key->name + "\" has " + std::to_string(of_key) + " observers already"};
     }
   }
-  if (guests >= config_.max_observers + channels) {
-    return Refusal{Code::kBusy, "there are " + std::to_string(guests) + " guests already"};
+  std::size_t channels = 0;
+  for (const ServedDevice& device : devices) channels += device.channels.size();
+  // A controller that waits for a lease is no observer, and costs as many states as one.
+  const std::size_t all = count([](const Guest&) { return true; });
+  if (all >= config_.max_observers + channels) {
+    return Refusal{Code::kBusy, "there are " + std::to_string(all) + " guests already"};
   }
   return std::nullopt;
 }
 
-std::vector<Grant> Admission::grants_of(const Address& from, const ClientKey* key,
-                                        const std::vector<Seat>& seats) const {
-  std::vector<Grant> grants;
+Welcome Admission::welcome_for(const Doorman::Guest& guest, const Address& from, const std::vector<Seat>& seats,
+                               const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests) {
+  Welcome welcome;
+  welcome.version = guest.version;
+  welcome.features = in_common(guest.hello.features, guest.hello.role);
+  welcome.role = guest.hello.role;
+  const DeviceDescription& first = devices[seats.front().device].about;
+  welcome.device_name = first.model;
+  welcome.max_force = first.max_force;
+  welcome.position_resolution = first.position_resolution;
+  welcome.loop_hz = first.loop_hz;
   for (const Seat& seat : seats) {
-    if (!seat.by_name) continue;
-    const Guest* const holder = holder_of(guests_, devices_[seat.device].channels[seat.channel]);
-    const bool free = holder == nullptr || takes_the_place_of(*holder, from, key, seats);
-    grants.push_back({seat.device, seat.channel, free ? seat.role : Role::kObserver});
+    const Guest* const holder = guest_of(guests, devices[seat.device].channels[seat.channel].holder);
+    const bool free = holder == nullptr || takes_the_place_of(*holder, from, guest.key, seats);
+    if (seat.by_name) welcome.grants.push_back({seat.device, seat.channel, free ? seat.role : Role::kObserver});
   }
-  return grants;
+  return welcome;
+}
+
+std::vector<View> Admission::views_of(const std::vector<Seat>& seats) {
+  std::vector<View> views;
+  for (const Seat& seat : seats) {
+    const bool seen =
+        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.device == seat.device; });
+    if (!seen) views.push_back({.device = seat.device});
+  }
+  return views;
 }
 
 }  // namespace tendon

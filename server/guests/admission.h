@@ -12,48 +12,47 @@
 
 namespace tendon {
 
+/// Why somebody does not come in.
 struct Refusal {
   Code code;
   std::string reason;
 };
 
-/// Decides who may come in, and to which seats. It changes nothing: NetworkLoop acts on its answers.
+/// Decides who comes in, and which seats they get (SESSION.md, "Opening"). It changes nothing.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Admission {
  public:
   struct Config {
-    std::size_t keys = 0;           ///< how many there are; above zero, guests without a key are refused
-    std::size_t max_observers = 8;  ///< of one key at most half, rounded up, where there are several keys
+    std::size_t keys = 0;           ///< of the server; 0: it lets in whoever comes, in the clear
+    std::size_t max_observers = 8;  ///< where there are several keys, one key has at most half of them, rounded up
   };
 
-  /// `devices` and `guests` must outlive it.
-  Admission(const Config& config, const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests)
-      : config_(config), devices_(devices), guests_(guests) {}
+  explicit Admission(const Config& config) : config_(config) {}
 
-  /// The numbers of the devices and channels that `hello` claims by name, or why there are no such seats.
-  std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello) const;
+  /// The seats that a Hello claims, by number; refused when it claims what is not there, the same twice, or a role that
+  /// is not the highest among its claims.
+  static std::variant<std::vector<Seat>, Refusal> seats_of(const Hello& hello,
+                                                           const std::vector<ServedDevice>& devices);
 
-  /// Why a guest with these seats may not come in now; empty when it may.
-  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key,
-                                          const std::vector<Seat>& seats) const;
+  /// Why a guest at `from` with `key` (null: none) may not take these seats now; empty: it may.
+  std::optional<Refusal> reason_to_refuse(const Address& from, const ClientKey* key, const std::vector<Seat>& seats,
+                                          const std::vector<ServedDevice>& devices,
+                                          const std::vector<Guest>& guests) const;
 
-  /// Whether `present` is the same program, started again: it has the same key and the same address, or the same key
-  /// and one of the seats as a controller.
+  /// Whether somebody at `from` with `key` is the same program as `present`, started again.
   static bool takes_the_place_of(const Guest& present, const Address& from, const ClientKey* key,
                                  const std::vector<Seat>& seats);
 
-  /// What each seat is granted now: a held channel only as an observer. Seats that were not claimed by name are left out.
-  std::vector<Grant> grants_of(const Address& from, const ClientKey* key, const std::vector<Seat>& seats) const;
+  /// What a guest is told that may come in.
+  static Welcome welcome_for(const Doorman::Guest& guest, const Address& from, const std::vector<Seat>& seats,
+                             const std::vector<ServedDevice>& devices, const std::vector<Guest>& guests);
+
+  /// One view of each device among the seats.
+  static std::vector<View> views_of(const std::vector<Seat>& seats);
 
  private:
   Config config_;
-  const std::vector<ServedDevice>& devices_;
-  const std::vector<Guest>& guests_;
 };
-
-/// Throws std::invalid_argument when there is no device, more than limits::kMaxDevices, a device without a channel or
-/// with more than limits::kMaxChannels, or when two of them share a name.
-void check_devices(const std::vector<DeviceDescription>& devices);
 
 }  // namespace tendon

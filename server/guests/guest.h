@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -15,15 +13,17 @@
 #include "protocol/narrow/link_meter.h"
 #include "protocol/narrow/rate_adaptation.h"
 #include "protocol/session.h"
+#include "server/guests/health.h"
 #include "server/guests/lateness.h"
 #include "server/guests/sampled_steps.h"
 #include "server/mailboxes.h"
 
-// The values that the network thread's parts share: guests with their seats, devices with their channels.
+// What the network thread knows of its guests, and of the devices that they come for. These are values; NetworkLoop,
+// Admission, Leases and Reports act on them.
 
 namespace tendon {
 
-/// What a guest has claimed.
+/// A place that a guest has claimed.
 struct Seat {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
@@ -31,7 +31,7 @@ struct Seat {
   bool by_name = false;  ///< it may wait for the lease
 };
 
-/// A device that a guest sees.
+/// A device whose states a guest gets.
 struct View {
   std::uint32_t device = 0;
   std::uint64_t state_every = 1;  ///< haptic steps
@@ -39,6 +39,7 @@ struct View {
   std::optional<StateDeadband> deadband{};
 };
 
+/// Somebody with a session.
 struct Guest {
   Address address;
   ClientRandom random;   ///< of its Hello: the same one again is the same attempt
@@ -46,56 +47,62 @@ struct Guest {
   std::string name;
   Role role;
   bool can_lose;            ///< it can be told that it has lost a lease
-  bool diagnoses;           ///< it was granted kFeatureDiagnostics
+  bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
-  std::vector<std::byte> answer;  ///< its handshake's, in case the first copy was lost
+  std::vector<std::byte> answer;  ///< to its Hello, for when it was lost
   Session session;
   LocalTime arrived;
   std::optional<RateAdaptation> adaptation{};
   std::optional<LinkMeter> meter{};  ///< of a controller
   std::uint64_t reports = 0;         ///< sent to it
   std::uint64_t lost = 0;            ///< datagrams, either way, as of the newest force
-  std::uint64_t invalid = 0;         ///< its refused frames, as of the last report
+  RefusedForces refused{};           ///< since its session opened
+  RefusedForces refused_told{};      ///< … as of the newest report
   bool hopeless = false;             ///< as it was told to the operator
-  bool gone = false;                 ///< erased at the end of the turn; until then nobody hears it
+  bool gone = false;                 ///< it has left, and is forgotten at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
-  /// Whether it has claimed this channel as a controller.
-  bool sits_on(std::uint32_t device, std::uint32_t channel) const noexcept {
-    return std::any_of(seats.begin(), seats.end(), [&](const Seat& seat) {
-      return seat.device == device && seat.channel == channel && seat.role == Role::kController;
-    });
-  }
 };
 
+/// Whether the guest has claimed the channel as a controller.
+bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel);
+
+/// Whether the guest has claimed a channel of the device as a controller.
+bool controls(const Guest& guest, std::uint32_t device);
+
+/// The guest's view of the device; null when it has none.
+View* view_of(Guest& guest, std::uint32_t device);
+
+/// The present guest of that connection id; null when there is none.
+Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id);
+const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id);
+
+/// Where the forces of one engine come in.
 struct ServedChannel {
-  std::uint32_t holder = 0;  ///< connection id; 0 = nobody
-  LocalTime renewed{};       ///< by the newest force that was handed on, or when its holder came
+  std::uint32_t holder = 0;  ///< connection id of the guest whose forces it takes; 0 = nobody's
+  LocalTime renewed{};       ///< by the newest force that was handed on, or when the holder came
   std::uint64_t forces = 0;
   std::uint64_t handovers = 0;
   std::uint64_t late = 0;
-  Lateness lateness{};
-  Lateness::Report newest{};  ///< of `lateness`
+  Lateness lateness;
+  Lateness::Report newest;    ///< of it
   std::uint64_t reports = 0;  ///< of its engine, to observers
 };
 
+/// A device, as guests meet it.
 struct ServedDevice {
   DeviceDescription about;
-  Mailboxes* mail = nullptr;
+  Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
-  std::optional<Health> told{};  ///< to observers, last; empty before the first
+  std::optional<Health> told{};  ///< to observers, last; empty before there was any
   std::uint64_t reports = 0;     ///< told so far
 };
 
-/// The present guest that holds `channel`; null: nobody. `guests` is a container of Guest, const or not.
-template <class Guests>
-auto holder_of(Guests& guests, const ServedChannel& channel) -> decltype(&*guests.begin()) {
-  if (channel.holder == 0) return nullptr;
-  const auto found = std::find_if(guests.begin(), guests.end(),
-                                  [&](const Guest& guest) { return !guest.gone && guest.id() == channel.holder; });
-  return found == guests.end() ? nullptr : &*found;
-}
+/// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of
+/// devices or channels is out of range, two of them share a name, or there are not as many mailboxes as devices.
+std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
+                                         const std::vector<Mailboxes*>& mail);
 
 }  // namespace tendon

@@ -42,10 +42,11 @@ DeviceReport report(const Health& before, const Health& now) {
     if (true_now) report.degraded += (report.degraded.empty() ? "" : "; ") + std::string(words);
   };
   const auto counted = std::accumulate(report.lateness.begin(), report.lateness.end(), std::uint64_t{0});
-  // Short, because all five sentences have to fit (limits::kMaxDetail).
-  say(now.not_realtime, "the kernel refused real time");
+  // Short, because the sentences have to fit (limits::kMaxDetail).
+  say(now.not_realtime, "no real time");
   say(counted < report.steps, "the log thread does not follow");
   say(now.recording_ended, "recording has stopped");
+  say(now.unsent > before.unsent, "unsent datagrams");
   // Harder than limiter.bounded_acceleration allows.
   say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
   const auto worst = std::ranges::find_if(kDeviceCounters, [&](const DeviceCounter& row) {

@@ -30,6 +30,7 @@ struct Health {
   // What the server does less of:
   bool not_realtime = false;  ///< the kernel refused the haptic thread something, see enter_realtime
   bool recording_ended = false;
+  std::uint64_t unsent = 0;  ///< datagrams that the system did not take; of the whole server
 };
 
 /// Counts what a loop's steps tell of it, in the order in which they were taken; some may be missing.

@@ -7,8 +7,8 @@
 namespace tendon {
 namespace {
 
-/// Moves the median by at most 1/16 of itself towards each sample: it settles in about a hundred forces and, unlike a
-/// mean, is not dragged by one outlier.
+/// Moves the median towards each sample, by at most a sixteenth of itself. It settles in about a hundred forces, and
+/// unlike a mean it is not dragged by one outlier.
 void track_median(Duration& median, Duration sample) noexcept {
   const Duration step = std::max<Duration>(median / 16, std::chrono::microseconds(20));
   if (sample > median) median += std::min(step, sample - median);
@@ -22,65 +22,81 @@ std::string milliseconds_text(Duration d) {
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ms";
 }
 
-std::string times(std::uint64_t n) { return n == 1 ? "once" : std::to_string(n) + " times"; }
-std::string forces(std::uint64_t n) { return n == 1 ? "1 force was" : std::to_string(n) + " forces were"; }
+/// Why forces are refused; null for the other causes.
+const char* refusal(Lateness::Cause cause) {
+  switch (cause) {
+    case Lateness::Cause::kNotFinite:
+      return "its forces are not finite: NaN or infinity";
+    case Lateness::Cause::kOutOfBounds:
+      return "its forces are out of the bounds of WIRE.md";
+    case Lateness::Cause::kUnknownTick:
+      return "its forces answer unknown or forgotten ticks";
+    case Lateness::Cause::kOldSequence:
+      return "its sequence numbers do not grow";
+    default:
+      return nullptr;
+  }
+}
 
-std::string to_blame(const Lateness::Report& report) {
+std::string times(std::uint64_t count) { return count == 1 ? "once" : std::to_string(count) + " times"; }
+
+std::string describe(const Lateness::Report& report) {
+  if (report.late() == 0) {
+    if (report.refused == 0) return {};
+    const char* const why = refusal(report.refused_for);
+    return "forces were refused " + times(report.refused) + ": the engine (" + (why != nullptr ? why : "") + ")";
+  }
+  std::string text =
+      "forces were late " + times(report.late()) + ", by up to " + milliseconds_text(report.worst) + ": ";
   const auto part = [](Duration now, Duration usual) {
     return milliseconds_text(now) + ", usually " + milliseconds_text(usual) + ")";
   };
   switch (report.cause) {
     case Lateness::Cause::kStateWaited:
-      return "the server's threads (a state waited " + part(report.ours, report.usual_ours);
+      return text + "the server's threads (a state waited " + part(report.ours, report.usual_ours);
     case Lateness::Cause::kRoundTrip:
-      return "the network (round trip " + part(report.network, report.usual_network);
+      return text + "the network (round trip " + part(report.network, report.usual_network);
     case Lateness::Cause::kLost:
-      return "the network (datagrams were lost)";
+      return text + "the network (datagrams were lost)";
     case Lateness::Cause::kUnheard:
-      return "the network (nothing is heard of the engine's machine)";
+      return text + "the engine stands still, or the network is down (nothing is heard)";
     case Lateness::Cause::kEngineTook:
-      return "the engine (it took " + part(report.engine, report.usual_engine);
+      return text + "the engine (it took " + part(report.engine, report.usual_engine);
     case Lateness::Cause::kEngineMissing:
-      return "the engine (it is heard, but sends no force)";
+      return text + "the engine (it is heard, but sends no usable force)";
+    case Lateness::Cause::kEngineStood:
+      return text + "the engine (its program stood still for " + milliseconds_text(report.stood_still) + ")";
     case Lateness::Cause::kEngineSilent:
-      return "the engine (it is on this machine and sends nothing: it blocks, sleeps or has died)";
-    case Lateness::Cause::kEngineRefused:
-      return "the engine (its forces are refused)";
+      return text + "the engine (nothing is heard of its program on this machine)";
+    case Lateness::Cause::kNotFinite:
+    case Lateness::Cause::kOutOfBounds:
+    case Lateness::Cause::kUnknownTick:
+    case Lateness::Cause::kOldSequence:
+      return text + "the engine (" + refusal(report.cause) + ")";
     case Lateness::Cause::kNone:
       break;
   }
-  return "not known why";
-}
-
-std::string describe(const Lateness::Report& report) {
-  std::string text;
-  const auto add = [&](const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; };
-  if (report.late() > 0) {
-    add("forces were late " + times(report.late()) + ", by up to " + milliseconds_text(report.worst) + ": " +
-        to_blame(report));
-  }
-  if (report.refused_values > 0) {
-    add(forces(report.refused_values) + " refused: not finite, or out of bounds");
-  }
-  if (report.refused_ticks > 0) {
-    add(forces(report.refused_ticks) + " refused: the tick answered never was, or is too old");
-  }
-  return text;
+  return text + "not known why";
 }
 
 std::string advise(const Lateness::Report& report) {
   if (report.cut == 0) return report.text;
-  return report.text + (report.text.empty() ? "" : "; ") + forces(report.cut) +
-         " above the device's bound, and cut to it";
+  const std::string forces = report.cut == 1 ? "1 force was" : std::to_string(report.cut) + " forces were";
+  return report.text + (report.text.empty() ? "" : "; ") + forces + " above the device's bound, and cut to it";
 }
 
 }  // namespace
 
-void Lateness::begin(LocalTime now) noexcept {
+void Lateness::begin(LocalTime now, bool same_machine) noexcept {
   attending_ = true;
+  same_machine_ = same_machine;
   usual_known_ = false;
   heard_ = now;
+  sent_.reset();
+  lost_ = 0;
   valid_until_ = LocalTime::max();  // before the first force nothing is late
+  stood_still_ = {};
+  refused_for_ = Cause::kNone;
 }
 
 Lateness::Part Lateness::part(Cause cause) noexcept {
@@ -89,12 +105,17 @@ Lateness::Part Lateness::part(Cause cause) noexcept {
       return Part::kOurs;
     case Cause::kRoundTrip:
     case Cause::kLost:
-    case Cause::kUnheard:
       return Part::kNetwork;
+    case Cause::kUnheard:
+      return Part::kUnknown;
     case Cause::kEngineTook:
     case Cause::kEngineMissing:
+    case Cause::kEngineStood:
     case Cause::kEngineSilent:
-    case Cause::kEngineRefused:
+    case Cause::kNotFinite:
+    case Cause::kOutOfBounds:
+    case Cause::kUnknownTick:
+    case Cause::kOldSequence:
       return Part::kEngine;
     case Cause::kNone:
       break;
@@ -102,16 +123,42 @@ Lateness::Part Lateness::part(Cause cause) noexcept {
   return Part::kNone;
 }
 
+void Lateness::heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept {
+  heard_ = now;
+  const bool all_came = std::exchange(lost_, lost) >= lost;
+  if (!sent) return;
+  if (sent_ && all_came && *sent - *sent_ > kStandsStill) stood_still_ = std::max(stood_still_, *sent - *sent_);
+  sent_ = sent;
+}
+
+void Lateness::refused(Cause cause, std::uint64_t count) noexcept {
+  report_.refused += count;
+  report_.refused_for = refused_for_ = cause;
+}
+
 void Lateness::blame(Duration late_by, Cause cause, const Parts& parts) noexcept {
   report_.late_ours += part(cause) == Part::kOurs ? 1 : 0;
   report_.late_network += part(cause) == Part::kNetwork ? 1 : 0;
   report_.late_engine += part(cause) == Part::kEngine ? 1 : 0;
+  report_.late_unknown += part(cause) == Part::kUnknown ? 1 : 0;
   if (late_by <= report_.worst) return;
   report_.worst = late_by;
   report_.cause = cause;
   report_.ours = parts.ours;
   report_.network = parts.network;
   report_.engine = parts.engine;
+  report_.stood_still = stood_still_;
+}
+
+Lateness::Cause Lateness::cause_of(const Way& way, const Parts& parts, Duration late_by) const noexcept {
+  if (refused_for_ != Cause::kNone) return refused_for_;
+  if (2 * stood_still_ >= late_by && stood_still_ > kStandsStill) return Cause::kEngineStood;
+  const Duration ours = parts.ours - usual_.ours;
+  const Duration network = parts.network - usual_.network;
+  const Duration engine = parts.engine - usual_.engine;
+  if (2 * std::max({ours, network, engine}) < late_by) return way.lost ? Cause::kLost : Cause::kEngineMissing;
+  if (ours >= network && ours >= engine) return Cause::kStateWaited;
+  return network >= engine ? Cause::kRoundTrip : Cause::kEngineTook;
 }
 
 void Lateness::observe(const Way& way) noexcept {
@@ -122,16 +169,8 @@ void Lateness::observe(const Way& way) noexcept {
   parts.engine = std::max(way.received - way.sent - parts.network, Duration::zero());
 
   if (way.received > valid_until_ && usual_known_) {
-    const Duration ours = parts.ours - usual_.ours;
-    const Duration network = parts.network - usual_.network;
-    const Duration engine = parts.engine - usual_.engine;
     const Duration late_by = way.received - valid_until_;
-    const Cause cause = 2 * std::max({ours, network, engine}) < late_by
-                            ? (way.lost ? Cause::kLost : Cause::kEngineMissing)
-                        : ours >= network && ours >= engine ? Cause::kStateWaited
-                        : network >= engine                 ? Cause::kRoundTrip
-                                                            : Cause::kEngineTook;
-    blame(late_by, cause, parts);
+    blame(late_by, cause_of(way, parts, late_by), parts);
   } else if (!usual_known_) {
     usual_ = parts;
     usual_known_ = true;
@@ -142,10 +181,8 @@ void Lateness::observe(const Way& way) noexcept {
   }
   heard_ = std::max(heard_, way.received);
   valid_until_ = way.received + way.valid_for;
-}
-
-void Lateness::refuse(Refused why, std::uint64_t forces) noexcept {
-  (why == Refused::kValue ? report_.refused_values : report_.refused_ticks) += forces;
+  stood_still_ = {};
+  refused_for_ = Cause::kNone;
 }
 
 void Lateness::Report::add(const Report& other) {
@@ -154,25 +191,21 @@ void Lateness::Report::add(const Report& other) {
   sum.late_ours = late_ours + other.late_ours;
   sum.late_network = late_network + other.late_network;
   sum.late_engine = late_engine + other.late_engine;
-  sum.refused_values = refused_values + other.refused_values;
-  sum.refused_ticks = refused_ticks + other.refused_ticks;
+  sum.late_unknown = late_unknown + other.late_unknown;
+  sum.refused = refused + other.refused;
+  sum.refused_for = other.refused_for != Cause::kNone ? other.refused_for : refused_for;
   sum.cut = cut + other.cut;
   sum.text = describe(sum);
   sum.advice = advise(sum);
   *this = std::move(sum);
 }
 
-Lateness::Report Lateness::report(LocalTime now, bool same_machine) {
+Lateness::Report Lateness::report(LocalTime now) {
   if (attending_ && now > valid_until_) {
-    // Five keep-alives have not come: see SESSION.md.
-    const bool silent = now - heard_ > std::chrono::milliseconds(250);
-    const bool refused = report_.refused_values + report_.refused_ticks > 0;
-    blame(now - valid_until_,
-          refused                  ? Cause::kEngineRefused
-          : silent && same_machine ? Cause::kEngineSilent
-          : silent                 ? Cause::kUnheard
-                                   : Cause::kEngineMissing,
-          {});
+    const bool silent = now - heard_ > kSilent;
+    const Cause unheard = same_machine_ ? Cause::kEngineSilent : Cause::kUnheard;
+    const Cause heard = refused_for_ != Cause::kNone ? refused_for_ : Cause::kEngineMissing;
+    blame(now - valid_until_, silent ? unheard : heard, {});
   }
   Report report = std::exchange(report_, {});
   report.usual_ours = usual_.ours;

@@ -2,49 +2,61 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/base/time.h"
 
 namespace tendon {
 
-/// Why forces are missing, late or refused: our own threads, the network, or the physics engine. Needs no clock but ours.
+/// Why forces come late: our own threads, the network, or the physics engine. Its clock is ours; of the engine's clock
+/// it uses only how far apart two of its time stamps are.
 ///
 /// The way of a force, from the sample it answers to its arrival, has three parts that add up:
 ///
-///     received − sampled  =  (state sent − sampled)  +  round trip  +  (the rest)
-///                            server                     network        engine: waiting for its period, and computing
+///     received − sampled  =  (state sent − sampled)  +  round trip  +  (what remains)
+///                            ours                       network        engine: waiting for its period, and computing
 ///
-/// The round trip is that of the datagram which brought the force: its echo tells how long the peer had held ours. A
-/// force is late when the one before had outlived its validity. The part that exceeds its usual length (the median of
-/// the forces that were in time) by most is to blame. When no part exceeds it by even half the missing time, this force
-/// was quick and an earlier one is missing: the network's fault where datagrams were lost meanwhile, else the engine
-/// sent none.
+/// The round trip is that of the datagram which brought the force: the echo in it tells how long the peer had held
+/// ours. A force is late when the one before had outlived its validity. These are asked in this order:
 ///
-/// A force that is still missing is the engine's fault while the engine is heard, and also when it is silent on this
-/// machine, where no network can be cut: a client that computes in its only thread sends nothing meanwhile. Silence of
-/// another machine for 250 ms is put down to the network, until the next force tells better. Where forces came and were
-/// refused, that is the cause.
+/// 1. Were forces refused since the one before, and for what? Then the engine is to blame.
+/// 2. Did the engine's program stand still? It did when two of its datagrams with successive numbers carry time stamps
+///    further apart than kStandsStill: a peer sends something every 50 ms (SESSION.md), and nothing was lost in between.
+///    Then the engine is to blame, when that explains half of the time that was missing. The round trip proves
+///    nothing then: what a program does not read waits in its socket, and looks like a slow network.
+/// 3. Which part of the way exceeds its usual length (the median of the forces that were in time) by most? That part is
+///    to blame, when it exceeds it by half the time that was missing.
+/// 4. Otherwise this force was quick, and one before it is missing. The network is to blame when datagrams were lost
+///    meanwhile, else the engine has sent none.
 ///
-/// Thread-safe: no. Realtime-safe: yes, except for report().
+/// A force that is still missing is the engine's fault while the engine is heard. After 250 ms of silence nobody can
+/// know whether a remote engine stands still or the network is down: the cause is unknown until it is heard again. On
+/// this machine it is the engine.
+///
+/// Thread-safe: no. Realtime-safe: yes, except report().
 class Lateness {
  public:
-  enum class Part : std::uint8_t { kNone, kOurs, kNetwork, kEngine };
+  /// Two keep-alives of a peer.
+  static constexpr Duration kStandsStill = std::chrono::milliseconds(100);
+  /// Five keep-alives.
+  static constexpr Duration kSilent = std::chrono::milliseconds(250);
+
+  enum class Part : std::uint8_t { kNone, kOurs, kNetwork, kEngine, kUnknown };
   enum class Cause : std::uint8_t {
     kNone,
     kStateWaited,    ///< ours
     kRoundTrip,      ///< the network: was longer than usual
     kLost,           ///< the network: datagrams were lost
-    kUnheard,        ///< the network: nothing comes from the engine's machine
+    kUnheard,        ///< unknown: nothing is heard of the engine's machine
     kEngineTook,     ///< the engine: longer than usual
-    kEngineMissing,  ///< the engine: is heard, and nothing is lost, yet it sends no force
-    kEngineSilent,   ///< the engine: is on this machine, and nothing comes from it
-    kEngineRefused,  ///< the engine: its forces come and are refused
-  };
-  /// Why a force is refused.
-  enum class Refused : std::uint8_t {
-    kValue,  ///< not finite, or out of the wire's bounds (WIRE.md)
-    kTick,   ///< it answers a tick that never was, or one older than SampledSteps remembers
+    kEngineMissing,  ///< the engine: is heard, and nothing is lost, but no force comes that can be used
+    kEngineStood,    ///< the engine: its program stood still
+    kEngineSilent,   ///< the engine: its program is on this machine, and nothing is heard of it
+    kNotFinite,      ///< the engine: its forces are refused, see RefusedForces (messages.h)
+    kOutOfBounds,    ///< …
+    kUnknownTick,    ///< …
+    kOldSequence,    ///< …
   };
   static Part part(Cause cause) noexcept;
 
@@ -60,46 +72,48 @@ class Lateness {
   /// What has happened since the last report.
   struct Report {
     std::uint64_t forces = 0;
-    std::uint64_t late_ours = 0;  ///< by the part to blame
+    std::uint64_t refused = 0;         ///< forces that could not be used
+    Cause refused_for = Cause::kNone;  ///< the newest of them
+    std::uint64_t late_ours = 0;       ///< by the part to blame
     std::uint64_t late_network = 0;
     std::uint64_t late_engine = 0;
+    std::uint64_t late_unknown = 0;
+    std::uint64_t cut = 0;       ///< forces above the device's bound, which it cuts
     Duration worst{};            ///< how long the device was without a valid force, at most
     Cause cause = Cause::kNone;  ///< of the worst of them
     Duration ours{};             ///< its parts, and what is usual
     Duration network{};
     Duration engine{};
+    Duration stood_still{};  ///< the engine's program, at most
     Duration usual_ours{};
     Duration usual_network{};
     Duration usual_engine{};
-    std::uint64_t refused_values = 0;  ///< forces, by Refused
-    std::uint64_t refused_ticks = 0;
-    std::uint64_t cut = 0;  ///< forces above the device's bound, which it cuts
-    std::uint64_t late() const noexcept { return late_ours + late_network + late_engine; }
+    std::uint64_t late() const noexcept { return late_ours + late_network + late_engine + late_unknown; }
     /// Of both together: the counts are added, the rest is that of the worse.
     void add(const Report& other);
-    /// For the operator: "forces were late 3 times, by up to 85 ms: the network (round trip 131 ms, usually 41 ms)".
-    /// Empty when all is well.
+    /// For the operator: "forces were late 3 times, by up to 85 ms: the network (round trip
+    /// 131 ms, usually 41 ms)". Empty when all is well. At most 128 bytes.
     std::string text;
     /// For the engine's author: `text`, and how many forces the device cuts.
     std::string advice;
   };
 
-  /// An engine has come: nobody is late before its first force.
-  void begin(LocalTime now) noexcept;
+  /// An engine has come: nobody is late before its first force. `same_machine`: it came from a loopback address.
+  void begin(LocalTime now, bool same_machine) noexcept;
   /// It has gone, and nobody is late.
   void end() noexcept { attending_ = false; }
 
-  /// Any authentic datagram of the engine.
-  void heard(LocalTime now) noexcept { heard_ = now; }
+  /// A datagram of the engine that is authentic and the newest so far. `sent`: when, by the engine's clock, when known;
+  /// `lost`: how many of the engine's datagrams have not come so far.
+  void heard(LocalTime now, std::optional<PeerTime> sent, std::uint64_t lost) noexcept;
   void observe(const Way& way) noexcept;
-  /// Forces of the engine came and were not handed on.
-  void refuse(Refused why, std::uint64_t forces = 1) noexcept;
   /// The newest force is above the device's bound.
   void cut() noexcept { ++report_.cut; }
+  /// `count` forces came that cannot be used, for one of the last four causes.
+  void refused(Cause cause, std::uint64_t count) noexcept;
 
-  /// Since the last call. A force that is still missing counts as late too. `same_machine`: the engine's address is one
-  /// of this machine.
-  Report report(LocalTime now, bool same_machine);
+  /// What happened since the last call. A force that is still missing counts as late, too.
+  Report report(LocalTime now);
 
  private:
   struct Parts {
@@ -107,13 +121,20 @@ class Lateness {
     Duration network{};
     Duration engine{};
   };
+  Cause cause_of(const Way& way, const Parts& parts, Duration late_by) const noexcept;
   void blame(Duration late_by, Cause cause, const Parts& parts) noexcept;
 
   bool attending_ = false;
+  bool same_machine_ = false;
   bool usual_known_ = false;
   LocalTime heard_{};
+  std::optional<PeerTime> sent_;  ///< its newest time stamp
+  std::uint64_t lost_ = 0;        ///< of its datagrams
   LocalTime valid_until_{};
   Parts usual_;
+  // Since the newest force:
+  Duration stood_still_{};
+  Cause refused_for_ = Cause::kNone;
   Report report_;
 };
 

@@ -2,47 +2,53 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <optional>
 #include <vector>
 
+#include "core/base/time.h"
 #include "server/guests/guest.h"
 
 namespace tendon {
 
-/// Keeps who holds which channel (SESSION.md, "Channels and leases"). A guest that loses a channel is returned: to tell
-/// it, and to end its session, is NetworkLoop's.
+/// Who holds which channel: one guest at a time, for as long as the channel's lease says (SESSION.md, "Channels and
+/// leases"). It knows holders by their connection ids; who loses a channel is told so by others.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Leases {
  public:
-  /// `takeover`: names of clients that need not wait for the end of a lease: of their keys, without keys their own.
-  /// `devices` must outlive it.
-  Leases(std::vector<ServedDevice>& devices, std::vector<std::string> takeover);
+  /// `devices` must outlive this.
+  explicit Leases(std::vector<ServedDevice>& devices) : devices_(devices) {}
 
-  /// `guest` holds the channel, which is free, from now on.
-  void hold(LocalTime now, const Guest& guest, std::uint32_t device, std::uint32_t channel);
+  /// Connection id; 0 = nobody.
+  std::uint32_t holder(std::uint32_t device, std::uint32_t channel) const {
+    return devices_[device].channels[channel].holder;
+  }
 
-  /// Nobody holds the channel any more; the haptic thread lets its last force go (HapticOrder::kRelease).
-  void free(std::uint32_t device, std::uint32_t channel);
+  /// The channel is the guest's from now on. It was free.
+  void hold(LocalTime now, std::uint32_t device, std::uint32_t channel, const Guest& guest);
 
-  /// Frees each channel that `guest` holds.
-  void free_all(const Guest& guest);
+  /// The holder has sent a force that the hand can feel.
+  void renew(LocalTime now, std::uint32_t device, std::uint32_t channel) {
+    devices_[device].channels[channel].renewed = now;
+  }
 
-  struct Answer {
-    Code code = Code::kOk;
-    std::string reason;
-    Duration wait{};          ///< kBusy: until the lease is over; zero: not known
-    std::uint32_t loser = 0;  ///< connection id of the guest that has lost the channel by this; 0: nobody has
+  /// The channel is nobody's when it was the guest's, and its force is fresh no longer.
+  void give(std::uint32_t device, std::uint32_t channel, std::uint32_t guest);
+  /// … all channels of the guest.
+  void give_all(std::uint32_t guest);
+
+  struct Taken {
+    bool granted = false;
+    std::uint32_t loser = 0;   ///< granted: who held it before; 0 = nobody else
+    std::uint32_t holder = 0;  ///< not granted: who holds it
+    Duration wait{};           ///< not granted: when the lease may be over; 0 = nobody knows
   };
-  /// `guest` wants the channel, whose holder is `holder` (null: nobody). It gets it when the channel is free, the
-  /// holder's lease is over, or `guest` may take over; else the answer is kBusy and nothing changes.
-  Answer take(LocalTime now, const Guest& guest, const Guest* holder, const TakeLease& wanted);
+  /// The guest wants the channel. It gets one that is free or its own already, and another one's when the lease is over
+  /// or, where there is a lease, `may_take_over`.
+  Taken take(LocalTime now, std::uint32_t device, std::uint32_t channel, const Guest& guest, bool may_take_over);
 
  private:
-  bool may_take_over(const Guest& guest) const;
-
   std::vector<ServedDevice>& devices_;
-  std::vector<std::string> takeover_;
 };
 
 }  // namespace tendon

@@ -72,7 +72,7 @@ UdpLink::~UdpLink() = default;
 void UdpLink::send(const Address& to, std::span<const std::byte> datagram) {
   asio::error_code error;
   socket_->udp.send_to(asio::buffer(datagram.data(), datagram.size()), to_endpoint(to), 0, error);
-  if (error) ++send_failures_;
+  if (error) send_failures_.add();
 }
 
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {

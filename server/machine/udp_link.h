@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/base/time.h"
+#include "core/exchange/counter.h"
 #include "protocol/link.h"
 #include "server/machine/doorbell.h"
 
@@ -50,8 +51,8 @@ class UdpLink : public Link {
   /// Where peers can reach this socket; the port is the real one.
   Address local_address() const;
 
-  /// Datagrams that send() could not hand to the system.
-  std::uint64_t send_failures() const noexcept { return send_failures_; }
+  /// Datagrams that send() could not hand to the system. From any thread.
+  std::uint64_t send_failures() const noexcept { return send_failures_.value(); }
 
   /// The socket's file descriptor, for whoever polls several links at once.
   int fd() const noexcept;
@@ -59,7 +60,7 @@ class UdpLink : public Link {
  private:
   struct Socket;  // keeps Asio out of this header
   std::unique_ptr<Socket> socket_;
-  std::uint64_t send_failures_ = 0;
+  Counter send_failures_;
 };
 
 }  // namespace tendon

@@ -147,6 +147,8 @@ void print(Line& line, const LinkReport& report) {
   line << report.clock_offset << report.clock_drift_ppm << report.clock_error << report.received << report.lost
        << report.reordered << report.duplicated;
   line.put_text(report.words);
+  line << report.late_unknown << report.refused.not_finite << report.refused.out_of_bounds
+       << report.refused.unknown_tick << report.refused.old_sequence;
 }
 
 void print(Line& line, const DeviceReport& report) {

@@ -81,7 +81,7 @@ class SealedServer : public testing::Test {
   void run(Duration length, std::vector<Client*> clients, OnTheWay on_the_way) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       DeviceState state;
-      state.tick = ++tick_;
+      state.tick = tick_ += tick_step_;
       state.sampled = PeerTime(now_.time_since_epoch());
       state.force_wanted = wanted_;
       mail_->state.put(state);
@@ -112,6 +112,54 @@ class SealedServer : public testing::Test {
     run(length, std::move(clients), [](Datagram&) { return true; });
   }
   void deliver(const Address& from, const Bytes& bytes) { server_.inbox.push_back({from, server_.self, bytes}); }
+  /// A controller of another make, in the clear, runs for `length`: it answers each state with what `spoil` makes of a
+  /// good force, and does nothing at all while `sleeps` says so. Returns the newest report that it got.
+  template <class Spoil, class Sleeps>
+  std::optional<LinkReport> run_foreign(Duration length, Spoil spoil, Sleeps sleeps) {
+    End end(wire_, parse_address("127.0.0.1:4000"));
+    ClientHandshake handshake({.hello = {.role = Role::kController, .name = "foreign", .features = {}}}, now_);
+    std::optional<Session> session;
+    std::optional<LinkReport> report;
+    std::uint64_t sequence = 0;
+    std::array<std::byte, kMaxDatagram> buffer;
+    const auto say = [&](auto& mine) {
+      while (const std::size_t size = mine.next_datagram(now_, buffer)) {
+        deliver(end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size)));
+      }
+    };
+    for (const LocalTime start = now_; now_ - start < length;) {
+      const bool awake = !sleeps(now_ - start);
+      if (awake) session ? say(*session) : say(handshake);
+      run(milliseconds(1), {});
+      count_ = 0;
+      const Wire arrived = std::exchange(wire_, {});
+      if (!awake) continue;  // and its socket overflows
+      for (const Datagram& datagram : arrived) {
+        session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
+      }
+      if (!session && handshake.outcome()) {
+        const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
+        session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
+      }
+      while (const auto event = session ? session->next_event() : std::nullopt) {
+        if (const auto* told = std::get_if<Session::ReportArrived>(&*event)) report = told->report;
+        const auto* seen = std::get_if<Session::StateArrived>(&*event);
+        if (seen == nullptr) continue;
+        ForceCommand force;
+        force.sequence = ++sequence;
+        force.based_on_tick = seen->state.tick;
+        force.force = Vec3(1, 0, 0);
+        force.valid_for = milliseconds(20);
+        spoil(force);
+        session->send(force);
+      }
+    }
+    return report;
+  }
+  template <class Spoil>
+  std::optional<LinkReport> run_foreign(Duration length, Spoil spoil) {
+    return run_foreign(length, spoil, [](Duration) { return false; });
+  }
   /// An observer that asks for all there is; `seen` is the newest state that it saw, if it matters.
   Client diagnosing(const std::optional<ClientKey>& key, const std::string& address, const std::string& device = {},
                     DeviceState* seen = nullptr) {
@@ -140,6 +188,7 @@ class SealedServer : public testing::Test {
   std::unique_ptr<Mailboxes> second_;  ///< of a second device
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
+  std::uint64_t tick_step_ = 1;
   std::uint64_t steps_a_turn_ = 1;  ///< more: the network thread is late, and sees only the newest of them
   std::optional<Vec3> wanted_;      ///< as the device's loop says
   bool measured_ = false;           ///< the log thread tells how the loops do
@@ -270,6 +319,15 @@ TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
   Client c = controller(std::nullopt, "127.0.0.1:4001");
   run(milliseconds(500), {&c});
   EXPECT_EQ(phase(c), Phase::kOpen);
+}
+
+TEST_F(SealedServer, DatagramsOfAGuestThatHasLeftAreNobodysAtOnce) {
+  restart({});
+  Client a = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(500), {&a});
+  a.client->stop(now_);  // three Byes, in one turn of the server
+  run(milliseconds(2), {&a});
+  EXPECT_EQ(loop_->stats().unknown_connection, 2U);
 }
 
 TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
@@ -443,6 +501,20 @@ TEST_F(TwoDevices, ALeaseIsTakenFromAHolderThatHasFallenSilentAndNotBefore) {
   EXPECT_EQ(tissue().holder, "wall");
 }
 
+TEST_F(TwoDevices, ForcesThatTheHandNeverFeelsDoNotRenewALease) {
+  Client first = controller_of(other_, "192.0.2.1:4000", "right", "tissue");
+  run(milliseconds(300), {&first});
+  Client second = controller_of(wall_, "192.0.2.2:4000", "right", "tissue", true);
+  run(seconds(2), {&first, &second});
+  ASSERT_TRUE(first.client->holds());
+  tick_step_ = 4096;  // each state takes the place of the one before, so that every force answers a forgotten one
+  const std::uint64_t forces = first.client->stats().forces;
+  run(seconds(1), {&first, &second});
+  EXPECT_GT(first.client->stats().forces, forces + 400);
+  EXPECT_GT(loop_->stats().unanswerable, 400U);
+  EXPECT_TRUE(second.client->holds());
+}
+
 TEST_F(TwoDevices, WhoMayTakeOverNeedNotWait) {
   Client first = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
   run(milliseconds(300), {&first});
@@ -469,7 +541,7 @@ TEST_F(TwoDevices, AGivenLeaseIsFree) {
   EXPECT_TRUE(first.client->holds());
 }
 
-TEST_F(TwoDevices, WhoGivesALeaseBackBeforeItHasHeardOfItDoesNotThinkThatItHoldsIt) {
+TEST_F(TwoDevices, ALeaseGivenBackBeforeItsAnswerCameIsNotHeld) {
   Client first = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
   run(milliseconds(300), {&first});
   EXPECT_TRUE(first.client->give_lease());
@@ -481,7 +553,7 @@ TEST_F(TwoDevices, WhoGivesALeaseBackBeforeItHasHeardOfItDoesNotThinkThatItHolds
   EXPECT_FALSE(first.client->holds()) << "what was asked before is answered after";
 }
 
-TEST_F(TwoDevices, ArmsAndDisarmsTheDeviceOfAControllerAlsoWhenAnotherHoldsTheLease) {
+TEST_F(TwoDevices, AControllerArmsAndDisarmsWhileAnotherHoldsTheLease) {
   Client holder = controller_of(wall_, "192.0.2.1:4000", "right", "tissue");
   run(milliseconds(300), {&holder});
   Client second = controller_of(other_, "192.0.2.2:4000", "right", "tissue");
@@ -536,7 +608,7 @@ TEST_F(TwoDevices, AChannelWithoutALeaseIsNotTakenFromItsHolder) {
   EXPECT_TRUE(first.client->holds());
 }
 
-TEST_F(SealedServer, TellsAControllerOnceASecondHowItsForcesFareAndAnObserverNothing) {
+TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
   Client a = controller(wall_, "192.0.2.1:4000");
   Client b = observer(screen_, "192.0.2.2:4000");
   run(milliseconds(3500), {&a, &b});
@@ -613,6 +685,87 @@ TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
   EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [&](const auto& n) { return n.text == report.words; }));
 }
 
+struct BadForces {
+  const char* name;
+  void (*spoil)(ForceCommand&);
+  std::uint64_t RefusedForces::*count;
+  const char* words;
+};
+void PrintTo(const BadForces& bad, std::ostream* out) { *out << bad.name; }
+class BadForcesTest : public SealedServer, public testing::WithParamInterface<BadForces> {};
+
+TEST_P(BadForcesTest, TheirAuthorIsToldWhatIsWrongWithThem) {
+  restart({});
+  const auto report = run_foreign(milliseconds(2500), GetParam().spoil);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_NE(report->words.find(GetParam().words), std::string::npos) << report->words;
+  EXPECT_GT(report->refused.*GetParam().count, 900U);
+  EXPECT_EQ(report->late_network + report->late_server + report->late_unknown, 0U);
+  const auto notices = loop_->take_notices();
+  EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [&](const auto& n) { return n.text == report->words; }));
+}
+
+TEST_P(BadForcesTest, ThatFollowGoodOnesAreNamedAsTheCauseOfLateness) {
+  restart({});
+  const LocalTime turns_bad = now_ + milliseconds(1500);
+  const auto report = run_foreign(milliseconds(2500), [&](ForceCommand& force) {
+    if (now_ > turns_bad) GetParam().spoil(force);
+  });
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->words.find("forces were late once, by up to "), 0U) << report->words;
+  EXPECT_NE(report->words.find(GetParam().words), std::string::npos) << report->words;
+  EXPECT_EQ(report->late_engine, 1U);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, BadForcesTest,
+    testing::Values(BadForces{"NotFinite", [](ForceCommand& f) { f.force.y() = NAN; }, &RefusedForces::not_finite,
+                              "the engine (its forces are not finite: NaN or infinity)"},
+                    BadForces{"NotFiniteModel",
+                              [](ForceCommand& f) { f.model = LocalModel{.stiffness = Mat3::Constant(-INFINITY)}; },
+                              &RefusedForces::not_finite, "the engine (its forces are not finite: NaN or infinity)"},
+                    BadForces{"OutOfBounds", [](ForceCommand& f) { f.force.x() = 2e12; }, &RefusedForces::out_of_bounds,
+                              "the engine (its forces are out of the bounds of WIRE.md)"},
+                    BadForces{"NeverValid", [](ForceCommand& f) { f.valid_for = {}; }, &RefusedForces::out_of_bounds,
+                              "the engine (its forces are out of the bounds of WIRE.md)"},
+                    BadForces{"UnknownTick", [](ForceCommand& f) { f.based_on_tick += 100'000; },
+                              &RefusedForces::unknown_tick,
+                              "the engine (its forces answer unknown or forgotten ticks)"},
+                    BadForces{"OldSequence", [](ForceCommand& f) { f.sequence = 1; }, &RefusedForces::old_sequence,
+                              "the engine (its sequence numbers do not grow)"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST_F(SealedServer, AnEngineOnThisMachineThatSleepsIsBlamedWhileItSleeps) {
+  restart({});
+  const auto sleeps = [](Duration t) { return t > milliseconds(1500) && t < milliseconds(3200); };
+  run_foreign(
+      milliseconds(3100), [](ForceCommand&) {}, sleeps);
+  EXPECT_EQ(loop_->stats().late_engine, 2U);
+  EXPECT_EQ(loop_->stats().late_network + loop_->stats().late_unknown + loop_->stats().late_ours, 0U);
+}
+
+TEST_F(SealedServer, AnEngineThatSleptIsBlamedThoughItsRoundTripLooksLong) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(1200), {&a});
+  const std::size_t asleep = wire_.size();
+  run(milliseconds(700), {});
+  // Its socket has kept the oldest datagrams; the newest ones found it full.
+  for (std::size_t i = asleep; i < asleep + 300; ++i) a.end->inbox.push_back(wire_[i]);
+  run(milliseconds(900), {&a});
+  ASSERT_TRUE(a.client->report().has_value());
+  EXPECT_NE(a.client->report()->words.find("the engine (its program stood still for 7"), std::string::npos)
+      << a.client->report()->words;
+  EXPECT_EQ(loop_->stats().late_network, 0U);
+}
+
+TEST_F(SealedServer, NobodyIsBlamedForTheSilenceOfARemoteEngineBeforeItIsHeard) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(1500), {&a});
+  run(milliseconds(1000), {});
+  EXPECT_EQ(loop_->stats().late_unknown, 1U);
+  EXPECT_EQ(loop_->stats().late_network + loop_->stats().late_engine, 0U);
+}
+
 TEST_F(SealedServer, AControllerThatHasSentNoForceIsToldNothingAboutItsForces) {
   Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
   a.client = std::make_unique<ForceClient>(
@@ -626,7 +779,7 @@ std::uint64_t sum(const LatenessHistogram& lateness) {
   return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
 }
 
-TEST_F(SealedServer, TellsAnObserverThatAsksWhatIsWantedAndOnceASecondHowTheLoopAndTheEngineDo) {
+TEST_F(SealedServer, TellsAnObserverThatAsksHowTheLoopAndTheEngineDo) {
   Client a = controller(wall_, "192.0.2.1:4000");
   DeviceState seen;
   Client b = diagnosing(screen_, "192.0.2.2:4000", {}, &seen);
@@ -817,7 +970,7 @@ TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
   EXPECT_GT(states, 2000U);
 }
 
-TEST_F(TwoDevices, AnObserverIsToldOfTheDeviceThatItWatchesAndOfEachOfItsChannelsWithAnEngine) {
+TEST_F(TwoDevices, AnObserverIsToldOfItsDeviceAndOfEachEngineThere) {
   Client left = controller_of(wall_, "192.0.2.1:4000", "left", "main");
   Client right = controller_of(other_, "192.0.2.2:4000", "right", "tissue", true);
   Client waits = controller_of(wall_, "192.0.2.5:4000", "right", "tissue");  // holds nothing: nobody is told of it

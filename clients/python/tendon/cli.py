@@ -186,6 +186,13 @@ def _in_words(report: LinkReport) -> dict[str, object]:
         "late_server": report.late_server,
         "late_network": report.late_network,
         "late_engine": report.late_engine,
+        "late_unknown": report.late_unknown,
+        "refused": {
+            "not_finite": report.refused_not_finite,
+            "out_of_bounds": report.refused_out_of_bounds,
+            "unknown_tick": report.refused_unknown_tick,
+            "old_sequence": report.refused_old_sequence,
+        },
         "worst_late_ms": report.worst_late_ns / 1e6,
         "longest_gap_ms": report.longest_gap_ns / 1e6,
         "round_trip_ms": delays(report.round_trip),

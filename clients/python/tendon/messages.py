@@ -308,7 +308,14 @@ class LinkReport:
     lost: int
     reordered: int
     duplicated: int
-    words: str  # why forces were late, for people; empty when none was
+    words: str  # why forces were late or refused, for people; empty when none was
+    # In the time that it tells of:
+    late_unknown: int = 0  # late forces whose cause is not known yet: nothing is heard of this client
+    # Forces of this client, on all its channels, that could not be used:
+    refused_not_finite: int = 0  # a number is NaN or infinite
+    refused_out_of_bounds: int = 0  # … or beyond its bound
+    refused_unknown_tick: int = 0  # the tick that it answers never was, or was more than 4096 ticks ago
+    refused_old_sequence: int = 0  # the sequence number has not grown, though the datagram is the newest
 
 
 class Safety(IntEnum):

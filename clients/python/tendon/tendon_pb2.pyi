@@ -352,7 +352,7 @@ class LeaseLost(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., to: _Optional[str] = ...) -> None: ...
 
 class LinkReport(_message.Message):
-    __slots__ = ["clock_drift_ppm", "clock_error_ns", "clock_offset_ns", "duplicated", "forces", "late_engine", "late_network", "late_server", "longest_gap_ns", "lost", "number", "received", "reordered", "round_trip", "span_ns", "to_client", "to_server", "until_ns", "words", "worst_late_ns"]
+    __slots__ = ["clock_drift_ppm", "clock_error_ns", "clock_offset_ns", "duplicated", "forces", "late_engine", "late_network", "late_server", "late_unknown", "longest_gap_ns", "lost", "number", "received", "refused_not_finite", "refused_old_sequence", "refused_out_of_bounds", "refused_unknown_tick", "reordered", "round_trip", "span_ns", "to_client", "to_server", "until_ns", "words", "worst_late_ns"]
     CLOCK_DRIFT_PPM_FIELD_NUMBER: _ClassVar[int]
     CLOCK_ERROR_NS_FIELD_NUMBER: _ClassVar[int]
     CLOCK_OFFSET_NS_FIELD_NUMBER: _ClassVar[int]
@@ -361,10 +361,15 @@ class LinkReport(_message.Message):
     LATE_ENGINE_FIELD_NUMBER: _ClassVar[int]
     LATE_NETWORK_FIELD_NUMBER: _ClassVar[int]
     LATE_SERVER_FIELD_NUMBER: _ClassVar[int]
+    LATE_UNKNOWN_FIELD_NUMBER: _ClassVar[int]
     LONGEST_GAP_NS_FIELD_NUMBER: _ClassVar[int]
     LOST_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     RECEIVED_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_NOT_FINITE_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_OLD_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_OUT_OF_BOUNDS_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_UNKNOWN_TICK_FIELD_NUMBER: _ClassVar[int]
     REORDERED_FIELD_NUMBER: _ClassVar[int]
     ROUND_TRIP_FIELD_NUMBER: _ClassVar[int]
     SPAN_NS_FIELD_NUMBER: _ClassVar[int]
@@ -381,10 +386,15 @@ class LinkReport(_message.Message):
     late_engine: int
     late_network: int
     late_server: int
+    late_unknown: int
     longest_gap_ns: int
     lost: int
     number: int
     received: int
+    refused_not_finite: int
+    refused_old_sequence: int
+    refused_out_of_bounds: int
+    refused_unknown_tick: int
     reordered: int
     round_trip: Delays
     span_ns: int
@@ -393,7 +403,7 @@ class LinkReport(_message.Message):
     until_ns: int
     words: str
     worst_late_ns: int
-    def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., forces: _Optional[int] = ..., late_server: _Optional[int] = ..., late_network: _Optional[int] = ..., late_engine: _Optional[int] = ..., worst_late_ns: _Optional[int] = ..., longest_gap_ns: _Optional[int] = ..., round_trip: _Optional[_Union[Delays, _Mapping]] = ..., to_server: _Optional[_Union[Delays, _Mapping]] = ..., to_client: _Optional[_Union[Delays, _Mapping]] = ..., clock_offset_ns: _Optional[int] = ..., clock_drift_ppm: _Optional[float] = ..., clock_error_ns: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., reordered: _Optional[int] = ..., duplicated: _Optional[int] = ..., words: _Optional[str] = ...) -> None: ...
+    def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., forces: _Optional[int] = ..., late_server: _Optional[int] = ..., late_network: _Optional[int] = ..., late_engine: _Optional[int] = ..., worst_late_ns: _Optional[int] = ..., longest_gap_ns: _Optional[int] = ..., round_trip: _Optional[_Union[Delays, _Mapping]] = ..., to_server: _Optional[_Union[Delays, _Mapping]] = ..., to_client: _Optional[_Union[Delays, _Mapping]] = ..., clock_offset_ns: _Optional[int] = ..., clock_drift_ppm: _Optional[float] = ..., clock_error_ns: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., reordered: _Optional[int] = ..., duplicated: _Optional[int] = ..., words: _Optional[str] = ..., late_unknown: _Optional[int] = ..., refused_not_finite: _Optional[int] = ..., refused_out_of_bounds: _Optional[int] = ..., refused_unknown_tick: _Optional[int] = ..., refused_old_sequence: _Optional[int] = ...) -> None: ...
 
 class LocalModel(_message.Message):
     __slots__ = ["at_m", "contact", "stiffness_npm", "valid_radius_m"]

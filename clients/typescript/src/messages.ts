@@ -202,8 +202,18 @@ export interface LinkReport {
   readonly lost: bigint;
   readonly reordered: bigint;
   readonly duplicated: bigint;
-  /** Why forces were late, for people; empty when none was. */
+  /** Why forces were late or refused, for people; empty when none was. */
   readonly words: string;
+  /** Late forces of that time whose cause is not known yet: nothing is heard of this client. */
+  readonly lateUnknown: bigint;
+  /** Forces of this client in that time, on all its channels, that could not be used: a number is NaN or infinite. */
+  readonly refusedNotFinite: bigint;
+  /** A number is beyond its bound. */
+  readonly refusedOutOfBounds: bigint;
+  /** The tick that it answers never was, or was more than 4096 ticks ago. */
+  readonly refusedUnknownTick: bigint;
+  /** The sequence number has not grown, though the datagram is the newest. */
+  readonly refusedOldSequence: bigint;
 }
 
 /**

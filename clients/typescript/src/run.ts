@@ -60,7 +60,13 @@ function printReport(report: LinkReport, { name, json }: Options): void {
   console.log(JSON.stringify({
     report: {
       number: Number(report.number), forces: Number(report.forces), late_server: Number(report.lateServer),
-      late_network: Number(report.lateNetwork), late_engine: Number(report.lateEngine), worst_late_ms: ms(report.worstLateNs),
+      late_network: Number(report.lateNetwork), late_engine: Number(report.lateEngine),
+      late_unknown: Number(report.lateUnknown),
+      refused: {
+        not_finite: Number(report.refusedNotFinite), out_of_bounds: Number(report.refusedOutOfBounds),
+        unknown_tick: Number(report.refusedUnknownTick), old_sequence: Number(report.refusedOldSequence),
+      },
+      worst_late_ms: ms(report.worstLateNs),
       longest_gap_ms: ms(report.longestGapNs), round_trip_ms: delays(report.roundTrip), to_server_ms: delays(report.toServer),
       to_client_ms: delays(report.toClient), clock_error_ms: ms(report.clockErrorNs), received: Number(report.received),
       lost: Number(report.lost), reordered: Number(report.reordered), duplicated: Number(report.duplicated),

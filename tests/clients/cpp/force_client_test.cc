@@ -270,10 +270,29 @@ TEST(ForceClient, DoesNotSendAForceThatIsNoForce) {
   world.run(2 * kSecond);
   const ForceClient::Stats stats = world.a->stats();
   EXPECT_EQ(stats.forces + stats.forces_unusable, static_cast<std::uint64_t>(calls));
+  EXPECT_FALSE(stats.unusable.empty());
   EXPECT_NEAR(static_cast<double>(stats.forces), calls / 5.0, 1);
   EXPECT_NEAR(static_cast<double>(world.z->forces.size()), static_cast<double>(stats.forces), 1);
   for (const auto& [at, command] : world.z->forces) EXPECT_TRUE(command.force.allFinite());
   EXPECT_EQ(world.z->forces.back().second.sequence, world.z->forces.size()) << "what is not sent takes no number";
+}
+
+TEST(ForceClient, SaysWhyAnAnswerIsNotSent) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  const auto reason = [](const Touch& touch) {
+    World world(28, kFineWeather);
+    world.connect({.rate_hz = 100}, [&](const DeviceState&) { return touch; });
+    world.run(kSecond);
+    EXPECT_GT(world.a->stats().forces_unusable, 50U);
+    EXPECT_TRUE(world.z->forces.empty());
+    return world.a->stats().unusable;
+  };
+  EXPECT_EQ(reason(Vec3(0, kNan, 0)), "the force is not finite (NaN or infinity)");
+  EXPECT_EQ(reason(Vec3(0, 0, -2e12)), "the force is beyond 1e12 N");
+  Touch stiff = Vec3(1, 0, 0);
+  stiff.stiffness = Mat3::Constant(kInf);
+  EXPECT_EQ(reason(stiff), "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md");
 }
 
 TEST(ForceClient, ADeadbandLeavesOutForcesThatFeelAlikeInTime) {

@@ -61,6 +61,8 @@ def _report(report: LinkReport) -> list[object]:
         words += ["-"] if delays is None else ["measured", delays.median_ns, delays.p99_ns]
     words += [report.clock_offset_ns, _double(report.clock_drift_ppm), report.clock_error_ns]
     words += [report.received, report.lost, report.reordered, report.duplicated, _text(report.words)]
+    words += [report.late_unknown, report.refused_not_finite, report.refused_out_of_bounds]
+    words += [report.refused_unknown_tick, report.refused_old_sequence]
     return words
 
 

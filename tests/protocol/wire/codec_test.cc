@@ -186,6 +186,11 @@ LinkReport any_report() {
   in.reordered = *rc::gen::arbitrary<std::uint64_t>();
   in.duplicated = *rc::gen::arbitrary<std::uint64_t>();
   in.words = any_text(limits::kMaxDetail);
+  in.late_unknown = *rc::gen::arbitrary<std::uint64_t>();
+  in.refused = {.not_finite = *rc::gen::arbitrary<std::uint64_t>(),
+                .out_of_bounds = *rc::gen::arbitrary<std::uint64_t>(),
+                .unknown_tick = *rc::gen::arbitrary<std::uint64_t>(),
+                .old_sequence = *rc::gen::arbitrary<std::uint64_t>()};
   return in;
 }
 
@@ -210,6 +215,8 @@ void assert_same(const LinkReport& out, const LinkReport& in) {
   RC_ASSERT(out.reordered == in.reordered);
   RC_ASSERT(out.duplicated == in.duplicated);
   RC_ASSERT(out.words == in.words);
+  RC_ASSERT(out.late_unknown == in.late_unknown);
+  RC_ASSERT((out.refused == in.refused));
 }
 
 /// As it is after a way there; `in` is the only frame.
@@ -343,7 +350,8 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {
 TEST(Codec, TheLargestReportsFitIntoASealedDatagramOfTheirOwn) {
   constexpr std::uint64_t kMost = ~std::uint64_t{0};
   LinkReport link;
-  link.number = link.forces = link.late_server = link.late_network = link.late_engine = kMost;
+  link.number = link.forces = link.late_server = link.late_network = link.late_engine = link.late_unknown = kMost;
+  link.refused = {.not_finite = kMost, .out_of_bounds = kMost, .unknown_tick = kMost, .old_sequence = kMost};
   link.until = PeerTime{limits::kMaxTime};
   link.span = link.worst_late = link.longest_gap = limits::kMaxTime;
   link.round_trip = link.to_server = link.to_client = Delays{-limits::kMaxTime, -limits::kMaxTime};

@@ -156,17 +156,26 @@ TEST(Health, IsToldAsWhatHasHappenedBetween) {
   EXPECT_EQ(told.degraded, "");
 }
 
+TEST(Health, DatagramsThatTheSystemDidNotTakeDegradeTheirOwnReportOnly) {
+  Health before;
+  before.unsent = 3;
+  Health now = before;
+  now.unsent = 5;
+  EXPECT_EQ(report(before, now).degraded, "unsent datagrams");
+  EXPECT_EQ(report(now, now).degraded, "");
+}
+
 TEST(Health, SaysAllThatTheServerDoesLessOfWithinTheBoundOfAText) {
   Health now;
   now.steps = 1;
   now.not_realtime = now.recording_ended = true;
   now.broken_assumptions = 1;
+  now.unsent = 1;
   now.device.values[static_cast<std::size_t>(DeviceCount::kSilences)] = 1;  // the longest words of a counter
   const std::string degraded = report({}, now).degraded;
-  EXPECT_EQ(
-      degraded,
-      "the kernel refused real time; the log thread does not follow; recording has stopped; accelerates too hard; "
-      "device fell silent");
+  EXPECT_EQ(degraded,
+            "no real time; the log thread does not follow; recording has stopped; unsent datagrams; "
+            "accelerates too hard; device fell silent");
   EXPECT_LE(degraded.size(), limits::kMaxDetail);
 }
 

@@ -3,19 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include "protocol/limits.h"
+
 namespace tendon {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr bool kElsewhere = false;
-constexpr bool kHere = true;
-
 /// An engine at 100 Hz behind a round trip of 40 ms, whose forces are valid for 30 ms.
 class Engine {
  public:
-  Engine() { lateness.begin(now_); }
+  explicit Engine(bool same_machine = false) { lateness.begin(now_, same_machine); }
 
   /// The next force; the parts are longer than usual by so much.
   void answer(Duration ours = {}, Duration network = {}, Duration engine = {}, bool lost = false) {
@@ -44,7 +43,7 @@ class Engine {
 TEST(Lateness, SaysNothingWhenForcesComeInTime) {
   Engine engine;
   engine.answer_times(200);
-  const auto report = engine.lateness.report(engine.now(), kElsewhere);
+  const auto report = engine.lateness.report(engine.now());
   EXPECT_EQ(report.forces, 200U);
   EXPECT_EQ(report.late(), 0U);
   EXPECT_EQ(report.text, "");
@@ -54,7 +53,7 @@ TEST(Lateness, BlamesThePartThatIsLongerThanUsualByMost) {
   Engine engine;
   engine.answer_times(200);
   engine.answer({}, milliseconds(90), milliseconds(5));
-  auto report = engine.lateness.report(engine.now(), kElsewhere);
+  auto report = engine.lateness.report(engine.now());
   EXPECT_EQ(report.late_network, 1U);
   EXPECT_EQ(report.late(), 1U);
   EXPECT_EQ(report.worst, milliseconds(75));
@@ -64,14 +63,14 @@ TEST(Lateness, BlamesThePartThatIsLongerThanUsualByMost) {
   engine.answer_times(10);
   engine.answer({}, milliseconds(5), milliseconds(90));
   engine.answer({}, {}, milliseconds(40));
-  report = engine.lateness.report(engine.now(), kElsewhere);
+  report = engine.lateness.report(engine.now());
   EXPECT_EQ(report.cause, Lateness::Cause::kEngineTook);
   EXPECT_EQ(report.late_engine, 2U);
   EXPECT_EQ(report.text, "forces were late 2 times, by up to 75 ms: the engine (it took 95 ms, usually 5.0 ms)");
 
   engine.answer_times(10);
   engine.answer(milliseconds(50), {}, {});
-  report = engine.lateness.report(engine.now(), kElsewhere);
+  report = engine.lateness.report(engine.now());
   EXPECT_EQ(report.cause, Lateness::Cause::kStateWaited);
   EXPECT_EQ(report.late_ours, 1U);
   EXPECT_EQ(report.late(), 1U);
@@ -79,17 +78,100 @@ TEST(Lateness, BlamesThePartThatIsLongerThanUsualByMost) {
             "forces were late once, by up to 30 ms: the server's threads (a state waited 51 ms, usually 1.0 ms)");
 }
 
-TEST(Lateness, SilenceFromElsewhereIsTheNetworksFaultAndElseTheEngines) {
-  Engine silent;
-  silent.answer_times(50);
-  EXPECT_EQ(silent.lateness.report(silent.now() + seconds(1), kElsewhere).text,
-            "forces were late once, by up to 970 ms: the network (nothing is heard of the engine's machine)");
-
+TEST(Lateness, AForceThatIsStillMissingIsTheEnginesFaultWhileItIsHeard) {
   Engine busy;
   busy.answer_times(50);
-  busy.lateness.heard(busy.now() + milliseconds(950));
-  EXPECT_EQ(busy.lateness.report(busy.now() + seconds(1), kElsewhere).text,
-            "forces were late once, by up to 970 ms: the engine (it is heard, but sends no force)");
+  busy.lateness.heard(busy.now() + milliseconds(950), std::nullopt, 0);
+  const auto report = busy.lateness.report(busy.now() + seconds(1));
+  EXPECT_EQ(report.late_engine, 1U);
+  EXPECT_EQ(report.text, "forces were late once, by up to 970 ms: the engine (it is heard, but sends no usable force)");
+}
+
+TEST(Lateness, SilenceOfARemoteEngineHasNoKnownCause) {
+  Engine silent;
+  silent.answer_times(50);
+  const auto report = silent.lateness.report(silent.now() + seconds(1));
+  EXPECT_EQ(report.late_unknown, 1U);
+  EXPECT_EQ(report.late(), 1U);
+  EXPECT_EQ(report.text,
+            "forces were late once, by up to 970 ms: the engine stands still, or the network is down (nothing is "
+            "heard)");
+}
+
+TEST(Lateness, SilenceOfAnEngineOnThisMachineIsTheEngines) {
+  Engine silent(true);
+  silent.answer_times(50);
+  const auto report = silent.lateness.report(silent.now() + seconds(1));
+  EXPECT_EQ(report.late_engine, 1U);
+  EXPECT_EQ(report.text,
+            "forces were late once, by up to 970 ms: the engine (nothing is heard of its program on this machine)");
+}
+
+/// Two datagrams of successive numbers whose time stamps are `apart`, and then a force with a long round trip.
+Lateness::Report after_silence(Duration apart, std::uint64_t lost) {
+  Engine engine;
+  engine.answer_times(200);
+  const PeerTime before(seconds(77));
+  engine.lateness.heard(engine.now(), before, 0);
+  engine.lateness.heard(engine.now() + milliseconds(600), before + apart, lost);
+  engine.answer({}, milliseconds(590));
+  return engine.lateness.report(engine.now());
+}
+
+TEST(Lateness, AProgramThatStoodStillIsBlamedWhateverTheRoundTripSays) {
+  const auto report = after_silence(milliseconds(598), 0);
+  EXPECT_EQ(report.late_engine, 1U);
+  EXPECT_EQ(report.text, "forces were late once, by up to 570 ms: the engine (its program stood still for 598 ms)");
+}
+
+TEST(Lateness, ASilenceInWhichDatagramsWereLostIsNoStandstill) {
+  EXPECT_EQ(after_silence(milliseconds(598), 3).late_network, 1U);
+}
+
+TEST(Lateness, AStandstillThatExplainsLittleOfTheDelayIsNotBlamed) {
+  EXPECT_EQ(after_silence(milliseconds(150), 0).late_network, 1U);
+}
+
+TEST(Lateness, RefusedForcesAreNamedEvenWhenNoneEverCame) {
+  Engine engine;
+  engine.lateness.refused(Lateness::Cause::kNotFinite, 3);
+  const auto report = engine.lateness.report(engine.now() + seconds(1));
+  EXPECT_EQ(report.late(), 0U);
+  EXPECT_EQ(report.text, "forces were refused 3 times: the engine (its forces are not finite: NaN or infinity)");
+  EXPECT_EQ(engine.lateness.report(engine.now() + seconds(2)).text, "");
+}
+
+TEST(Lateness, ForcesThatTheDeviceCutsAreToldToTheEngineNotToTheOperator) {
+  Engine engine;
+  engine.answer_times(10);
+  for (int i = 0; i < 3; ++i) engine.lateness.cut();
+  const auto report = engine.lateness.report(engine.now());
+  EXPECT_EQ(report.text, "");
+  EXPECT_EQ(report.advice, "3 forces were above the device's bound, and cut to it");
+}
+
+TEST(Lateness, TheReportOfTwoChannelsCountsBoth) {
+  Engine one;
+  one.lateness.refused(Lateness::Cause::kOutOfBounds, 2);
+  one.lateness.cut();
+  Engine other;
+  other.lateness.refused(Lateness::Cause::kOutOfBounds, 3);
+  auto sum = one.lateness.report(one.now());
+  sum.add(other.lateness.report(other.now()));
+  EXPECT_EQ(
+      sum.advice,
+      "forces were refused 5 times: the engine (its forces are out of the bounds of WIRE.md); 1 force was above the "
+      "device's bound, and cut to it");
+}
+
+TEST(Lateness, WordsFitIntoTheirFieldOnTheWire) {
+  for (int cause = 1; cause <= static_cast<int>(Lateness::Cause::kOldSequence); ++cause) {
+    Engine engine;
+    engine.answer_times(2);
+    engine.lateness.refused(static_cast<Lateness::Cause>(cause), UINT64_MAX);
+    engine.lateness.heard(engine.now() + std::chrono::hours(24), std::nullopt, 0);
+    EXPECT_LE(engine.lateness.report(engine.now() + std::chrono::hours(24)).text.size(), limits::kMaxDetail) << cause;
+  }
 }
 
 TEST(Lateness, AQuickForceAfterAGapMeansThatOneBeforeItWasLostOrNeverSent) {
@@ -97,77 +179,29 @@ TEST(Lateness, AQuickForceAfterAGapMeansThatOneBeforeItWasLostOrNeverSent) {
   engine.answer_times(200);
   engine.pause(milliseconds(80));
   engine.answer({}, milliseconds(2), milliseconds(3), true);
-  EXPECT_EQ(engine.lateness.report(engine.now(), kElsewhere).text,
+  EXPECT_EQ(engine.lateness.report(engine.now()).text,
             "forces were late once, by up to 65 ms: the network (datagrams were lost)");
   engine.answer_times(10);
   engine.pause(milliseconds(80));
   engine.answer({}, milliseconds(2), milliseconds(3), false);
-  EXPECT_EQ(engine.lateness.report(engine.now(), kElsewhere).text,
-            "forces were late once, by up to 65 ms: the engine (it is heard, but sends no force)");
+  EXPECT_EQ(engine.lateness.report(engine.now()).text,
+            "forces were late once, by up to 65 ms: the engine (it is heard, but sends no usable force)");
 }
 
 TEST(Lateness, NobodyIsLateBeforeTheFirstForceOrWithoutAController) {
   Engine engine;
-  EXPECT_EQ(engine.lateness.report(engine.now() + seconds(9), kElsewhere).late(), 0U);
+  EXPECT_EQ(engine.lateness.report(engine.now() + seconds(9)).late(), 0U);
   engine.answer_times(5);
   engine.lateness.end();
-  engine.lateness.report(engine.now(), kElsewhere);
-  EXPECT_EQ(engine.lateness.report(engine.now() + seconds(9), kElsewhere).late(), 0U);
+  engine.lateness.report(engine.now());
+  EXPECT_EQ(engine.lateness.report(engine.now() + seconds(9)).late(), 0U);
 }
 
 TEST(Lateness, OneLateForceDoesNotChangeWhatIsUsual) {
   Engine engine;
   engine.answer_times(200);
   for (int i = 0; i < 5; ++i) engine.answer({}, seconds(1), {});
-  EXPECT_EQ(engine.lateness.report(engine.now(), kElsewhere).usual_network, milliseconds(40));
-}
-
-TEST(Lateness, SilenceOnThisMachineIsNeverTheNetworksFault) {
-  Engine asleep;
-  asleep.answer_times(50);
-  const auto report = asleep.lateness.report(asleep.now() + milliseconds(2500), kHere);
-  EXPECT_EQ(report.late_engine, 1U);
-  EXPECT_EQ(report.late_network, 0U);
-  EXPECT_EQ(report.text,
-            "forces were late once, by up to 2470 ms: the engine (it is on this machine and sends nothing: it blocks, "
-            "sleeps or has died)");
-}
-
-TEST(Lateness, AnEngineWhoseForcesAreRefusedIsToBlameAndIsToldWhy) {
-  Engine engine;
-  engine.answer_times(50);
-  engine.lateness.refuse(Lateness::Refused::kValue, 100);
-  engine.lateness.heard(engine.now() + milliseconds(990));
-  auto report = engine.lateness.report(engine.now() + seconds(1), kHere);
-  EXPECT_EQ(report.cause, Lateness::Cause::kEngineRefused);
-  EXPECT_EQ(report.text,
-            "forces were late once, by up to 970 ms: the engine (its forces are refused); 100 forces were refused: not "
-            "finite, or out of bounds");
-
-  engine.answer_times(50);
-  engine.lateness.refuse(Lateness::Refused::kTick);
-  report = engine.lateness.report(engine.now(), kElsewhere);
-  EXPECT_EQ(report.text, "1 force was refused: the tick answered never was, or is too old")
-      << "also where no force was late";
-}
-
-TEST(Lateness, ForcesThatTheDeviceCutsAreToldToTheEngineNotToTheOperator) {
-  Engine engine;
-  engine.answer_times(10);
-  for (int i = 0; i < 3; ++i) engine.lateness.cut();
-  const auto report = engine.lateness.report(engine.now(), kElsewhere);
-  EXPECT_EQ(report.text, "");
-  EXPECT_EQ(report.advice, "3 forces were above the device's bound, and cut to it");
-}
-
-TEST(Lateness, TheReportOfTwoChannelsCountsBoth) {
-  Engine one;
-  one.lateness.refuse(Lateness::Refused::kValue, 2);
-  Engine other;
-  other.lateness.refuse(Lateness::Refused::kValue, 3);
-  auto sum = one.lateness.report(one.now(), kElsewhere);
-  sum.add(other.lateness.report(other.now(), kElsewhere));
-  EXPECT_EQ(sum.advice, "5 forces were refused: not finite, or out of bounds");
+  EXPECT_EQ(engine.lateness.report(engine.now()).usual_network, milliseconds(40));
 }
 
 }  // namespace

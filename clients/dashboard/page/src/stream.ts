@@ -75,6 +75,7 @@ export interface EngineReport {
   readonly late_server: number;
   readonly late_network: number;
   readonly late_engine: number;
+  readonly late_unknown: number;
   readonly worst_late_ms: number;
   readonly longest_gap_ms: number;
   readonly round_trip_ms: Delays | null;

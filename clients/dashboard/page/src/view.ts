@@ -153,7 +153,7 @@ export class View {
 }
 
 function card(engine: EngineReport): HTMLElement {
-  const late = engine.late_server + engine.late_network + engine.late_engine;
+  const late = engine.late_server + engine.late_network + engine.late_engine + engine.late_unknown;
   const lost = engine.lost / Math.max(engine.lost + engine.received, 1);
   const ms = (delays: { median: number; p99: number } | null): string => (delays ? duration(delays.median / 1e3) : "–");
   const p99 = (delays: { median: number; p99: number } | null): string => (delays ? `99\u00a0%: ${duration(delays.p99 / 1e3)}` : "");
@@ -162,8 +162,9 @@ function card(engine: EngineReport): HTMLElement {
     h("tr", {}, h("th", { scope: "row", text: name }), h("td", { text: value }), h("td", { class: "note", text: note }));
   const rate = engine.span_s > 0 ? engine.forces / engine.span_s : 0;
   const why = [
-    [engine.late_server, "server"], [engine.late_network, "network"], [engine.late_engine, "engine"],
-  ].filter(([n]) => (n as number) > 0).map(([n, cause]) => `${n} by the ${cause}`).join(", ");
+    [engine.late_server, "by the server"], [engine.late_network, "by the network"], [engine.late_engine, "by the engine"],
+    [engine.late_unknown, "for a cause not known yet"],
+  ].filter(([n]) => (n as number) > 0).map(([n, cause]) => `${n} ${cause}`).join(", ");
   return h("div", { class: "engine", "data-level": level },
     h("div", { class: "name" }, h("b", { text: engine.name }), h("span", { class: "quiet", text: ` on channel ${engine.channel}` })),
     h("table", {},

@@ -270,6 +270,11 @@ def _read_report(message: pb.LinkReport) -> LinkReport:
         reordered=message.reordered,
         duplicated=message.duplicated,
         words=fields.text(message.words, limits.MAX_DETAIL),
+        late_unknown=message.late_unknown,
+        refused_not_finite=message.refused_not_finite,
+        refused_out_of_bounds=message.refused_out_of_bounds,
+        refused_unknown_tick=message.refused_unknown_tick,
+        refused_old_sequence=message.refused_old_sequence,
     )
 
 
@@ -299,6 +304,11 @@ def _write_report(report: LinkReport) -> pb.LinkReport:
         reordered=report.reordered,
         duplicated=report.duplicated,
         words=fields.clip(report.words, limits.MAX_DETAIL),
+        late_unknown=report.late_unknown,
+        refused_not_finite=report.refused_not_finite,
+        refused_out_of_bounds=report.refused_out_of_bounds,
+        refused_unknown_tick=report.refused_unknown_tick,
+        refused_old_sequence=report.refused_old_sequence,
     )
 
 

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/guests/guest.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace tendon {
+
+namespace {
+
+template <class Named>
+void check_names(const std::vector<Named>& all, std::size_t most, const std::string& what) {
+  if (all.empty() || all.size() > most) {
+    throw std::invalid_argument("expected 1 to " + std::to_string(most) + " " + what + "s, got " +
+                                std::to_string(all.size()));
+  }
+  for (auto one = all.begin(); one != all.end(); ++one) {
+    const bool twice = std::any_of(all.begin(), one, [&](const Named& before) { return before.name == one->name; });
+    if (twice) throw std::invalid_argument("two " + what + "s have one name: " + one->name);
+  }
+}
+
+template <class Guests>
+auto* find_guest(Guests& guests, std::uint32_t id) {
+  const auto found =
+      std::find_if(guests.begin(), guests.end(), [&](const Guest& guest) { return !guest.gone && guest.id() == id; });
+  return found == guests.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+bool sits_on(const Guest& guest, std::uint32_t device, std::uint32_t channel) {
+  return std::any_of(guest.seats.begin(), guest.seats.end(), [&](const Seat& seat) {
+    return seat.device == device && seat.channel == channel && seat.role == Role::kController;
+  });
+}
+
+bool controls(const Guest& guest, std::uint32_t device) {
+  return std::any_of(guest.seats.begin(), guest.seats.end(),
+                     [&](const Seat& seat) { return seat.device == device && seat.role == Role::kController; });
+}
+
+View* view_of(Guest& guest, std::uint32_t device) {
+  const auto view =
+      std::find_if(guest.views.begin(), guest.views.end(), [&](const View& seen) { return seen.device == device; });
+  return view == guest.views.end() ? nullptr : &*view;
+}
+
+Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
+const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
+
+std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
+                                         const std::vector<Mailboxes*>& mail) {
+  check_names(about, limits::kMaxDevices, "device");
+  if (mail.size() != about.size()) throw std::invalid_argument("expected mailboxes for each device");
+  std::vector<ServedDevice> devices;
+  for (std::size_t i = 0; i < mail.size(); ++i) {
+    ServedDevice& device = devices.emplace_back(ServedDevice{.about = about[i], .mail = mail[i]});
+    check_names(device.about.channels, limits::kMaxChannels, "channel");
+    device.about.device = static_cast<std::uint32_t>(i);
+    device.channels.resize(device.about.channels.size());
+  }
+  return devices;
+}
+
+}  // namespace tendon

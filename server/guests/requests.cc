@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/guests/requests.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+namespace tendon {
+
+namespace {
+
+Outcome set_state_rate(LocalTime /*now*/, const Asker& asker, const SetStateRate& rate) {
+  if (rate.hz == 0) return {.code = Code::kInvalid, .detail = "a state rate must be above zero"};
+  View* const view = view_of(asker.guest, rate.device);
+  if (view == nullptr) return {.code = Code::kInvalid, .detail = "that device is not claimed"};
+  const auto loop_hz = static_cast<double>(asker.devices[rate.device].about.loop_hz);
+  view->state_every = static_cast<std::uint64_t>(std::max(1.0, std::round(loop_hz / rate.hz)));
+  return {};
+}
+
+Outcome set_state_deadband(LocalTime /*now*/, const Asker& asker, const SetStateDeadband& wanted) {
+  std::string objection = StateDeadband::objection(wanted);
+  if (!objection.empty()) return {.code = Code::kInvalid, .detail = std::move(objection)};
+  for (View& view : asker.guest.views) {
+    view.deadband.reset();
+    if (wanted.max_silence > Duration::zero()) view.deadband.emplace(wanted);
+  }
+  return {};
+}
+
+Outcome order(const Asker& asker, std::uint32_t device, HapticOrder::Kind kind, const char* done) {
+  if (!asker.devices[device].mail->orders.try_push({kind})) return {.code = Code::kBusy};
+  return {.warning = std::string(done) + " by \"" + asker.guest.name + "\""};
+}
+
+Outcome rearm(LocalTime /*now*/, const Asker& asker, const Rearm& wanted) {
+  return order(asker, wanted.device, HapticOrder::Kind::kRearm, "rearmed");
+}
+
+Outcome disarm(LocalTime /*now*/, const Asker& asker, const Disarm& wanted) {
+  return order(asker, wanted.device, HapticOrder::Kind::kDisarm, "disarmed");
+}
+
+Outcome describe(LocalTime /*now*/, const Asker& asker, const Describe& wanted) {
+  if (wanted.device >= asker.devices.size()) {
+    return {.code = Code::kInvalid, .detail = "there are " + std::to_string(asker.devices.size()) + " devices"};
+  }
+  const ServedDevice& device = asker.devices[wanted.device];
+  DeviceDescription about = device.about;
+  for (std::size_t i = 0; i < device.channels.size(); ++i) {
+    const Guest* const holder = guest_of(asker.guests, device.channels[i].holder);
+    about.channels[i].holder = holder != nullptr ? holder->name : std::string();
+  }
+  return {.device = std::move(about)};
+}
+
+Outcome take_lease(LocalTime now, const Asker& asker, const TakeLease& wanted) {
+  const Leases::Taken taken = asker.leases.take(now, wanted.device, wanted.channel, asker.guest, asker.may_take_over);
+  if (taken.granted) return {.loser = taken.loser};
+  const Guest* const holder = guest_of(asker.guests, taken.holder);
+  const std::string name = holder != nullptr ? holder->name : std::string();
+  return {.code = Code::kBusy, .detail = "\"" + name + "\" holds it", .wait = taken.wait};
+}
+
+Outcome give_lease(LocalTime /*now*/, const Asker& asker, const GiveLease& given) {
+  asker.leases.give(given.device, given.channel, asker.guest.id());
+  return {};
+}
+
+Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /*news*/) {
+  return {.code = Code::kUnsupported, .detail = "that is the server's to say"};
+}
+
+/// Who may ask.
+enum class From : std::uint8_t {
+  kAnybody,
+  kControllers,  ///< of the request's device: those who have claimed a channel of it, whoever holds that now
+  kClaimants,    ///< of the request's channel, as controllers
+};
+
+struct Row {
+  std::size_t index;  ///< of the request's type in the variant
+  std::string_view name;
+  From from;
+  bool (*may)(const Guest& guest, const Request& request);
+  Outcome (*handle)(LocalTime now, const Asker& asker, const Request& request);
+};
+
+template <class Wanted, std::size_t kIndex = 0>
+constexpr std::size_t index_of() {
+  if constexpr (std::is_same_v<std::variant_alternative_t<kIndex, Request>, Wanted>) {
+    return kIndex;
+  } else {
+    return index_of<Wanted, kIndex + 1>();
+  }
+}
+
+template <class Wanted, From kFrom>
+bool may(const Guest& guest, const Request& request) {
+  const auto& wanted = std::get<Wanted>(request);
+  if constexpr (kFrom == From::kControllers) {
+    return controls(guest, wanted.device);
+  } else if constexpr (kFrom == From::kClaimants) {
+    return sits_on(guest, wanted.device, wanted.channel);
+  } else {
+    static_cast<void>(guest);
+    static_cast<void>(wanted);
+    return true;
+  }
+}
+
+template <class Wanted, From kFrom, Outcome (*kHandler)(LocalTime, const Asker&, const Wanted&)>
+constexpr Row row(std::string_view name) {
+  return {index_of<Wanted>(), name, kFrom, &may<Wanted, kFrom>,
+          [](LocalTime now, const Asker& asker, const Request& request) {
+            return kHandler(now, asker, std::get<Wanted>(request));
+          }};
+}
+
+/// In the order of the variant. A new request is a row here, and its handler above.
+constexpr std::array kRequests = {
+    row<SetStateRate, From::kAnybody, set_state_rate>("set the state rate"),
+    row<Rearm, From::kControllers, rearm>("rearm"),
+    row<Disarm, From::kControllers, disarm>("disarm"),
+    row<Describe, From::kAnybody, describe>("describe a device"),
+    row<TakeLease, From::kClaimants, take_lease>("take a lease"),
+    row<GiveLease, From::kClaimants, give_lease>("give a lease"),
+    row<LeaseLost, From::kAnybody, lease_lost>("lose a lease"),
+    row<SetStateDeadband, From::kAnybody, set_state_deadband>("set the state deadband"),
+};
+static_assert(kRequests.size() == std::variant_size_v<Request>);
+constexpr bool in_order() {
+  for (std::size_t i = 0; i < kRequests.size(); ++i) {
+    if (kRequests[i].index != i) return false;
+  }
+  return true;
+}
+static_assert(in_order());
+
+}  // namespace
+
+Outcome answer(LocalTime now, const Asker& asker, const Request& request) {
+  const Row& row = kRequests[request.index()];
+  if (row.may(asker.guest, request)) return row.handle(now, asker, request);
+  const char* const who =
+      row.from == From::kControllers ? "only a controller may " : "only a controller of the channel may ";
+  return {.code = Code::kDenied, .detail = who + std::string(row.name)};
+}
+
+}  // namespace tendon

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Preloaded into a program: its n-th call of pthread_create is refused, n being in TENDON_REFUSED_THREAD.
+#include <dlfcn.h>
+#include <pthread.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+
+extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*begin)(void*),
+                              void* argument) {
+  static std::atomic<int> calls{0};
+  const char* const refused = std::getenv("TENDON_REFUSED_THREAD");
+  if (refused != nullptr && ++calls == std::atoi(refused)) return EAGAIN;
+  const auto next = reinterpret_cast<decltype(&pthread_create)>(dlsym(RTLD_NEXT, "pthread_create"));
+  return next(thread, attributes, begin, argument);
+}
