@@ -3,6 +3,7 @@
 // A server that the system refuses a thread.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <string>
 
 #include "tests/e2e/stage/process.h"
@@ -11,7 +12,7 @@
 namespace tendon::e2e {
 namespace {
 
-class NoThread : public testing::TestWithParam<const char*> {};
+class NoThread : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(NoThread, AServerWithoutIsStoppedInOrderAndSaysWhich) {
   const tendon::testing::ScratchFolder folder;
@@ -20,14 +21,14 @@ TEST_P(NoThread, AServerWithoutIsStoppedInOrderAndSaysWhich) {
   Process server(std::filesystem::path(TENDON_PROGRAMS) / "tendond",
                  {scenes + "/left.toml", scenes + "/right.toml", "--listen", "127.0.0.1:0", "--record", "/dev/null"},
                  folder.path(), {"LD_PRELOAD=" TENDON_NO_THREAD, "TENDON_REFUSED_THREAD=" + std::to_string(number)});
-  EXPECT_EQ(server.wait(), 1);
+  EXPECT_EQ(server.wait(), 2);
   const std::string sentence =
       "cannot start the thread " + std::string(GetParam()) + ": Resource temporarily unavailable";
   EXPECT_NE(server.err().find(sentence), std::string::npos) << server.err();
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, NoThread, testing::Values("log", "network", "haptic-0"), [](const auto& test) {
-  const std::string name = test.param;
+INSTANTIATE_TEST_SUITE_P(Of, NoThread, ::testing::Values("log", "network", "haptic-0"), [](const auto& instance) {
+  const std::string name = instance.param;
   return name.substr(0, name.find('-'));
 });
 
