@@ -24,7 +24,7 @@ constexpr std::array kRunMode = {latency(1), divisor(2), k8N1, kNoFlowControl, f
 /// A device with firmware answers within 2 ms; libnifalcon asks some hundred times before it believes that it has none.
 constexpr Duration kProbing = 300ms;
 /// Then the plug is looked at again: somebody may have switched the device's own supply on.
-constexpr Duration kRest = 2s;
+constexpr Duration kGiveUpAfter = 2s;
 /// 16 bytes each way at 1.5 Mbaud take 0.2 ms.
 constexpr usb::Dialogue::Patience kPatience{.most_under_way = 1, .answer = 5ms};
 
@@ -171,7 +171,7 @@ void FalconDevice::advance() noexcept {
       break;
     case State::kFirmware:
       if (resting_) {
-        if (here >= kRest) give_up();
+        if (here >= kGiveUpAfter) give_up();
         break;
       }
       switch (loader_.step(dialogue_.now(), dialogue_.pipe())) {

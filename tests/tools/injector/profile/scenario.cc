@@ -12,13 +12,12 @@
 #include "server/machine/regular_file.h"
 #include "tests/tools/injector/profile/named_profiles.h"
 #include "tests/tools/injector/profile/units.h"
+#include "tests/tools/injector/profile/words.h"
 
 namespace tendon::injector {
 namespace {
 
 constexpr std::size_t kMaxScenarioBytes = std::size_t{32} << 20;  // profiles may bring their tables along
-
-std::string in_quotes(std::string_view text) { return '"' + std::string(text) + '"'; }
 
 /// Sets what `key` (up, down or both) of a change speaks of.
 void set_profiles(Change& change, std::string_view key, std::string_view profile) {
@@ -178,9 +177,7 @@ struct Words {
   std::string_view first, rest;
 };
 Words split(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n";
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  text.remove_suffix(text.size() - std::min(text.find_last_not_of(kBlanks) + 1, text.size()));
+  text = trimmed(text);
   const std::string_view first = text.substr(0, text.find_first_of(kBlanks));
   text.remove_prefix(first.size());
   text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));

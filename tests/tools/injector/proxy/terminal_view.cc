@@ -24,7 +24,7 @@ format(const char* form, ...) {
 }
 
 double ms(Duration d) { return static_cast<double>(d.count()) / 1e6; }
-double us(Duration d) { return static_cast<double>(d.count()) / 1e3; }
+double in_us(Duration d) { return static_cast<double>(d.count()) / 1e3; }
 
 const char* name_of(Direction direction) { return direction == Direction::kUp ? "up" : "down"; }
 
@@ -98,12 +98,12 @@ std::string terminal_view(const Heading& heading, const Status& now, const Statu
                            name_of(direction), rate_per_s(now, before, direction), ms(delay.quantile(0.5)),
                            ms(delay.quantile(0.95)), ms(delay.quantile(0.99)), ms(delay.max()),
                            percent(all.counters.lost() - old.counters.lost(), received),
-                           percent(all.counters.duplicated - old.counters.duplicated, received), us(late.quantile(0.5)),
-                           us(late.quantile(0.99)), us(late.max())));
+                           percent(all.counters.duplicated - old.counters.duplicated, received),
+                           in_us(late.quantile(0.5)), in_us(late.quantile(0.99)), in_us(late.max())));
   }
   lines.push_back(format("%-65s%6.0f  %6.0f   %6.0f", "the machine's own timer, for comparison",
-                         us(now.timer_floor.quantile(0.5)), us(now.timer_floor.quantile(0.99)),
-                         us(now.timer_floor.max())));
+                         in_us(now.timer_floor.quantile(0.5)), in_us(now.timer_floor.quantile(0.99)),
+                         in_us(now.timer_floor.max())));
   lines.emplace_back();
   for (const Direction direction : {Direction::kUp, Direction::kDown}) {
     const ProxyCounters& n = now.of(direction).counters;
@@ -142,7 +142,7 @@ std::string log_line(const Status& now, const Status& before) {
     line += format("; %s %.0f/s, %.2f ms (p99 %.2f), %.2f %% lost, late p99 %.0f us", name_of(direction),
                    rate_per_s(now, before, direction), ms(delay.quantile(0.5)), ms(delay.quantile(0.99)),
                    percent(all.counters.lost() - old.counters.lost(), all.counters.received - old.counters.received),
-                   us(all.release_error.since(old.release_error).quantile(0.99)));
+                   in_us(all.release_error.since(old.release_error).quantile(0.99)));
   }
   return line;
 }
@@ -164,11 +164,11 @@ std::string end_text(const Heading& heading, const Status& end) {
                     unit(of.quantile(0.99)), unit(of.max()), name);
     };
     text += quantiles("one-way delay", measured.delay, ms, "ms");
-    text += quantiles("released late by", measured.release_error, us, "us");
+    text += quantiles("released late by", measured.release_error, in_us, "us");
   }
   text += format("  the machine's own timer was late by p50 %.2f, p99 %.2f, max %.2f us (n = %llu)\n",
-                 us(end.timer_floor.quantile(0.5)), us(end.timer_floor.quantile(0.99)), us(end.timer_floor.max()),
-                 static_cast<unsigned long long>(end.timer_floor.count()));
+                 in_us(end.timer_floor.quantile(0.5)), in_us(end.timer_floor.quantile(0.99)),
+                 in_us(end.timer_floor.max()), static_cast<unsigned long long>(end.timer_floor.count()));
   const std::vector<std::string> why = why_invalid(end, heading.max_release_error);
   for (const std::string& reason : why) text += "  INVALID: " + reason + "\n";
   if (why.empty()) text += "  valid: the network was the one that was asked for\n";

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tests/tools/injector/profile/units.h"
+#include "tests/tools/injector/profile/words.h"
 
 namespace tendon::injector {
 namespace {
@@ -31,7 +32,7 @@ struct Fates {
   throw std::runtime_error(name + ':' + std::to_string(line) + ": " + sentence);
 }
 
-std::string in_quotes(std::string_view text) { return '"' + std::string(text.substr(0, 60)) + '"'; }
+std::string start_of(std::string_view text) { return in_quotes(text.substr(0, 60)); }
 
 void need_shared(const std::string& name, const ImportOptions& options) {
   if (options.share == Share::kMeasured) {
@@ -179,7 +180,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
     auto sequence = whole_after(line, "icmp_seq=");
     if (!sequence) sequence = whole_after(line, ": seq=");
     if (!sequence || *sequence > 0xffff) {
-      if (answer) refuse(name, number, "expected icmp_seq=0 to 65535 in " + in_quotes(line));
+      if (answer) refuse(name, number, "expected icmp_seq=0 to 65535 in " + start_of(line));
       return;
     }
     // 16 bits, which a long run goes through several times: the number that is nearest to the one before.
@@ -194,7 +195,7 @@ PingLog read_ping(std::istream& from, const std::string& name) {
     const auto text = number_after(line, "time=");
     const auto ms = text ? parse_number(*text) : std::nullopt;
     const auto round_trip = ms ? to_duration(*ms, 1e6) : std::nullopt;
-    if (!round_trip) refuse(name, number, "expected time=… ms in " + in_quotes(line));
+    if (!round_trip) refuse(name, number, "expected time=… ms in " + start_of(line));
     // Of a duplicate the first one counts.
     log.answers.try_emplace(index, PingLog::Answer{*round_trip, time_stamp(line)});
     const std::string_view counted =
@@ -422,7 +423,7 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
       if (fields[column].empty()) return std::nullopt;
       const auto value = parse_number(fields[column]);
       if (!value || std::abs(*value) > most) {
-        refuse(name, number, "expected milliseconds, found " + in_quotes(fields[column]));
+        refuse(name, number, "expected milliseconds, found " + start_of(fields[column]));
       }
       return Duration(std::llround(*value * 1e6));
     };
@@ -438,7 +439,7 @@ Trace import_csv(std::istream& from, const std::string& name, const ImportOption
     if (columns->dir) {
       if (*columns->dir >= fields.size()) refuse(name, number, "expected a direction");
       const std::string_view dir = fields[*columns->dir];
-      if (dir != "up" && dir != "down") refuse(name, number, "dir is " + in_quotes(dir) + ", expected up or down");
+      if (dir != "up" && dir != "down") refuse(name, number, "dir is " + start_of(dir) + ", expected up or down");
       share = dir == "up" ? Share::kUp : Share::kDown;
     }
     Duration& newest = before[columns->dir && share == Share::kDown ? 1 : 0];

@@ -72,12 +72,12 @@ void write_text(std::ostream& to, std::string_view key, std::string_view text) {
 
 // ---- Reading --------------------------------------------------------------------------------------------------------
 
-std::string in_quotes(std::string_view text) {
+/// In quotes, cut, and without what would do things to the terminal: a trace may be any file.
+std::string shown(std::string_view text) {
   constexpr std::size_t kShown = 40;
-  std::string shown(text.substr(0, kShown));
-  // What is not text would do things to the terminal.
-  for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';
-  return '"' + shown + (text.size() > kShown ? "…\"" : "\"");
+  std::string start(text.substr(0, kShown));
+  for (char& c : start) c = c >= ' ' && c <= '~' ? c : '?';
+  return '"' + start + (text.size() > kShown ? "…\"" : "\"");
 }
 
 template <class Integer>
@@ -93,7 +93,7 @@ class Reader {
   Reader(std::istream& from, const std::string& name) : from_(from), name_(name) {}
 
   Trace read() {
-    if (!next_line() || line_ != kVersion) fail("expected the first line of a trace, " + in_quotes(kVersion));
+    if (!next_line() || line_ != kVersion) fail("expected the first line of a trace, " + shown(kVersion));
     for (;;) {
       if (!next_line()) fail("the trace ends before its column names");
       if (!line_.starts_with('#')) break;
@@ -134,7 +134,7 @@ class Reader {
   }
 
   void header(std::string_view line) {
-    if (!line.starts_with("# ")) fail("expected \"# KEY VALUE\", found " + in_quotes(line));
+    if (!line.starts_with("# ")) fail("expected \"# KEY VALUE\", found " + shown(line));
     line.remove_prefix(2);
     // The key of a benign delay has two words, all others one.
     const std::size_t from = line.starts_with("benign ") ? 7 : 0;
@@ -158,10 +158,10 @@ class Reader {
       tables(value);
     } else if (key == "benign up" || key == "benign down") {
       const Duration delay = time(key, value) - LocalTime{};
-      if (delay < Duration::zero()) fail(key + " is " + in_quotes(value) + ", expected a delay of 0 ns or more");
+      if (delay < Duration::zero()) fail(key + " is " + shown(value) + ", expected a delay of 0 ns or more");
       trace_.benign[key == "benign up" ? 0 : 1] = delay;
     } else {
-      fail("# " + in_quotes(key) +
+      fail("# " + shown(key) +
            " is not known, expected seed, start, up, down, tables, build, benign up or benign down");
     }
   }
@@ -192,19 +192,19 @@ class Reader {
                  flipped_bit, truncated_to, rebinds] = fields;
 
     TraceRecord record;
-    if (dir != kDirections[0] && dir != kDirections[1]) fail("dir is " + in_quotes(dir) + ", expected up or down");
+    if (dir != kDirections[0] && dir != kDirections[1]) fail("dir is " + shown(dir) + ", expected up or down");
     record.direction = dir == kDirections[0] ? Direction::kUp : Direction::kDown;
     record.link = number<std::uint32_t>("link", link, "a whole number");
     record.index = number<std::uint64_t>("index", index, "a whole number");
-    if (record.index > kMaxTraceIndex) fail("index is " + in_quotes(index) + ", expected less than 2^62");
+    if (record.index > kMaxTraceIndex) fail("index is " + shown(index) + ", expected less than 2^62");
     record.arrival = time("t_in_ns", t_in);
     record.size = number<std::uint32_t>("bytes", bytes, "a whole number");
     if (!hash.empty()) record.payload_hash = hexadecimal("hash", hash);
     const auto known_verdict = parse_verdict(verdict);
-    if (!known_verdict) fail("verdict is " + in_quotes(verdict) + ", expected pass, drop or dup");
+    if (!known_verdict) fail("verdict is " + shown(verdict) + ", expected pass, drop or dup");
     record.verdict = *known_verdict;
     const auto known_cause = parse_cause(cause);
-    if (!known_cause) fail("cause is " + in_quotes(cause) + ", which is none that this program knows");
+    if (!known_cause) fail("cause is " + shown(cause) + ", which is none that this program knows");
     record.cause = *known_cause;
     record.release = later("t_out_ns", t_out, record.arrival);
     if (!t_actual.empty()) record.actual = time("t_actual_ns", t_actual);
@@ -213,7 +213,7 @@ class Reader {
     if (!stale.empty()) {
       const auto back = number<std::uint32_t>("stale_back", stale_back, "a whole number");
       if (back < 1 || back > kMaxReplayDepth) {
-        fail("stale_back is " + in_quotes(stale_back) + ", expected 1 to " + std::to_string(kMaxReplayDepth));
+        fail("stale_back is " + shown(stale_back) + ", expected 1 to " + std::to_string(kMaxReplayDepth));
       }
       record.stale = {later("stale_ns", stale, record.arrival), back};
     }
@@ -271,14 +271,14 @@ class Reader {
   template <class Integer>
   Integer number(std::string_view field, std::string_view text, std::string_view expected) const {
     const auto value = whole<Integer>(text);
-    if (!value) fail(std::string(field) + " is " + in_quotes(text) + ", expected " + std::string(expected));
+    if (!value) fail(std::string(field) + " is " + shown(text) + ", expected " + std::string(expected));
     return *value;
   }
 
   std::uint64_t hexadecimal(std::string_view field, std::string_view text) const {
     const auto value = whole<std::uint64_t>(text, 16);
     if (!value || text.size() != 16) {
-      fail(std::string(field) + " is " + in_quotes(text) + ", expected 16 hexadecimal digits");
+      fail(std::string(field) + " is " + shown(text) + ", expected 16 hexadecimal digits");
     }
     return *value;
   }
@@ -286,7 +286,7 @@ class Reader {
   LocalTime time(std::string_view field, std::string_view text) const {
     const Duration at(number<std::int64_t>(field, text, "whole nanoseconds"));
     if (at > kMaxTraceTime || at < -kMaxTraceTime) {
-      fail(std::string(field) + " is " + in_quotes(text) + ", expected a time within 73 years of zero");
+      fail(std::string(field) + " is " + shown(text) + ", expected a time within 73 years of zero");
     }
     return LocalTime(at);
   }
