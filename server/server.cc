@@ -389,8 +389,8 @@ void Server::report_counts(DeviceRuntime& runtime) {
   const DeviceCounts before = std::exchange(runtime.told_counts, now);
   for (const DeviceCounter& row : kDeviceCounters) {
     if (row.degraded.empty() || now[row.count] == before[row.count]) continue;
-    log::warn(prefix(runtime) + std::string(row.name) + ": " +
-              std::to_string(now[row.count] - before[row.count]) + " more (" + std::string(row.meaning) + ")");
+    log::warn(prefix(runtime) + std::string(row.name) + ": " + std::to_string(now[row.count] - before[row.count]) +
+              " more (" + std::string(row.meaning) + ")");
   }
 }
 
