@@ -11,7 +11,7 @@
 namespace tendon::falcon {
 namespace {
 
-using namespace usb::ftdi;  // NOLINT(google-build-using-namespace): the requests below are all its
+using namespace usb::ftdi;  // NOLINT(google-build-using-namespace): all requests below are from it
 
 constexpr std::size_t kLeastBytes = 4096;
 constexpr std::size_t kMostBytes = 65536;
@@ -22,7 +22,7 @@ struct KnownFile {
   std::string_view sha256;
 };
 
-/// As they lie in a checkout of libnifalcon.
+/// The files of a checkout of libnifalcon.
 constexpr std::array kKnownFiles = {
     KnownFile{"nvent_firmware.bin", "1119e39c39fab1f37678ea62dfc715b23dd86ee7f13d78f88f707d9f09b896a1"},
     KnownFile{"test_firmware.bin", "b2700d5cd5ca217e48565fb4de5a502a636c53f6e01ebd0cad193e9f84856c6a"},
@@ -41,14 +41,15 @@ std::string sha256_of(std::span<const std::uint8_t> bytes) {
 constexpr std::array kResetToLoader = {kPurgeOne,      kPurgeOther, latency(16), divisor(0x4138), k8N1,
                                        kNoFlowControl, kRtsLow,     kDtrLow,     kDtrHigh};
 constexpr std::array<std::uint8_t, 3> kGreeting = {0x0A, 0x43, 0x0D};
-/// The first byte is there now and then.
+/// The first byte is sometimes missing.
 constexpr std::array<std::uint8_t, 5> kAnswer = {0x00, 0x0A, 0x44, 0x2C, 0x0D};
 constexpr int kMostGreetings = 100;
 
 constexpr std::array kFaster = {kDtrLow, divisor(0x15)};
 constexpr std::array<std::uint8_t, 1> kAutobaudLetter = {'A'};
 
-/// What an IN packet has room for besides the status: the echo comes back in one piece and at once.
+/// The room that an IN packet has beside the status bytes: the echo of so many bytes comes back in one piece and at
+/// once.
 constexpr std::size_t kChunkBytes = usb::kPacketSize - kStatusBytes;
 
 /// The slowest answer, four bytes at 9600 baud and the latency timer, takes 20 ms.

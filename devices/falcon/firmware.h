@@ -14,25 +14,26 @@
 #include "devices/usb/ftdi.h"
 #include "devices/usb/pipe.h"
 
-/// The Falcon forgets its firmware when it loses power; the host gives it anew. Novint's licence lets nobody pass the
-/// firmware on, so Tendon has none: the user names a file that came with the device.
+/// The Falcon forgets its firmware when it loses power; the host then loads it again. Novint's licence lets nobody pass
+/// the firmware on, so Tendon contains none: the user names a file that came with the device.
 namespace tendon::falcon {
 
-/// What to do with a file that looks like firmware but is none of the known ones.
+/// Whether to accept a file that looks like firmware but is not one of the known files.
 enum class UnknownFirmware : std::uint8_t { kRefuse, kAccept };
 
-/// The firmware in `bytes`: 4 to 64 KiB that begin with AA 08, the key of TI's boot loader, and have the SHA-256 of one
-/// of the files that libnifalcon's users have loaded (the hashes are in firmware.cc). Throws std::runtime_error with a
-/// sentence that begins with `name`, says what was found and what was expected.
+/// Returns `bytes` when they are firmware: 4 to 64 KiB that begin with AA 08, the key of TI's boot loader, and have the
+/// SHA-256 of one of the files that libnifalcon's users have loaded (the hashes are in firmware.cc). kAccept leaves out
+/// the comparison of the SHA-256. Otherwise throws std::runtime_error with a sentence that begins with `name` and says
+/// what was found and what was expected.
 std::vector<std::uint8_t> check_firmware(std::vector<std::uint8_t> bytes, const std::string& name,
                                          UnknownFirmware unknown);
 
-/// The same for the content of a file, of which no more than is needed is read.
+/// The same for the content of a file. Reads at most one byte more than firmware may have.
 std::vector<std::uint8_t> read_firmware(std::istream& file, const std::string& name, UnknownFirmware unknown);
 
-/// Gives a Falcon its firmware without ever waiting. The device's processor starts its boot loader, which echoes what
-/// it gets; each echo is compared with what was sent. Source: libnifalcon, FalconCommLibUSB.cpp (setFirmwareMode) and
-/// FalconFirmware.cpp. Some 2 s for 8 KiB.
+/// Loads the firmware into a Falcon; no call waits. A reset starts the boot loader of the device's processor, which
+/// echoes every byte; each echo is compared with the bytes that were sent. 8 KiB take some 2 s. Source: libnifalcon,
+/// FalconCommLibUSB.cpp (setFirmwareMode) and FalconFirmware.cpp.
 ///
 ///     reset ─▶ greet (9600 baud; again until answered, at most 100 times) ─▶ "A" (142 857 baud) ─▶ 62 bytes at a time
 ///
@@ -44,13 +45,13 @@ class FirmwareLoader {
   /// `image` must outlive the loader.
   explicit FirmwareLoader(std::span<const std::uint8_t> image) noexcept : image_(image) {}
 
-  /// From the beginning.
+  /// Begins again with the reset. Call it before the first `step`.
   void restart() noexcept;
 
-  /// What the device has said: serial data, without the chip's status bytes.
+  /// Takes serial data from the device, without the chip's status bytes.
   void receive(std::span<const std::uint8_t> bytes) noexcept;
 
-  /// Sends what is to be sent next. After kDone the chip still has the loader's settings.
+  /// Sends the next bytes when it is their turn. After kDone the serial chip still has the loader's settings.
   Progress step(LocalTime now, usb::Pipe& pipe) noexcept;
 
  private:
@@ -64,13 +65,13 @@ class FirmwareLoader {
   std::span<const std::uint8_t> image_;
   Stage stage_ = Stage::kFailed;
   usb::ftdi::Setup setup_{{}};
-  std::size_t sent_ = 0;  ///< bytes of the image that came back as they should
+  std::size_t sent_ = 0;  ///< bytes of the image that were sent and echoed correctly
   int greetings_ = 0;
-  bool said_ = false;  ///< and waits for the answer since:
+  bool said_ = false;  ///< something was sent, at since_, and its answer is awaited
   LocalTime since_{};
   std::array<std::uint8_t, usb::kPacketSize> heard_{};
   std::size_t heard_size_ = 0;
-  bool too_much_ = false;  ///< heard more than any answer has
+  bool too_much_ = false;  ///< more bytes came than any answer has
 };
 
 }  // namespace tendon::falcon

@@ -12,7 +12,7 @@
 namespace tendon::falcon {
 namespace {
 
-// m; the letters are Stamper's, the numbers FalconGeometry.h's.
+// m. The letters are from Stamper, the numbers from FalconGeometry.h.
 constexpr double kThigh = 0.060;          // a
 constexpr double kShin = 0.1025;          // b
 constexpr double kGripOut = 0.01443;      // c
@@ -25,7 +25,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kAtZero = 35 * kDegree;
 constexpr double kPerCount = 2 * std::numbers::pi * (14.25 / 110.0) / 1280;
 
-/// N·m at the joint for each count: the sign is that of the firmware.
+/// N·m at the joint for each count. The firmware has this sign.
 constexpr double kTorquePerCount = -1e-4;
 
 /// Rows: the unit vectors along U, V, W in the device's frame.
@@ -43,7 +43,7 @@ const std::array<Mat3, 3> kLegs = {frame_of_leg((90 + 15) * kDegree), frame_of_l
 // Newton's method.
 constexpr int kMostSteps = 25;
 constexpr int kMostHalvings = 12;
-constexpr double kLongestStep = 0.015;  // m: a quarter of a thigh; beyond it the linear model says little
+constexpr double kLongestStep = 0.015;  // m: a quarter of a thigh; for longer steps the linear model is poor
 constexpr double kClose = 1e-12;        // m: a step this short is the last one
 
 }  // namespace
@@ -65,7 +65,7 @@ std::optional<Pose> pose_at(const Vec3& position) noexcept {
     const double square = u * u + w * w;
     const double bend = (square + kThigh * kThigh - reach * reach) / (2 * kThigh * std::sqrt(square));
     const double theta1 = std::atan2(w, u) - std::acos(bend);
-    // Of the direction from knee to grip, which is as long as `reach`.
+    // Cosine and sine of the direction from the knee to the grip, whose distance is `reach`.
     const double cos2 = (u - kThigh * std::cos(theta1)) / reach;
     const double sin2 = (w - kThigh * std::sin(theta1)) / reach;
     const double lever = kThigh * sin3 * (sin2 * std::cos(theta1) - cos2 * std::sin(theta1));

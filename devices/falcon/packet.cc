@@ -7,7 +7,7 @@ namespace tendon::falcon {
 namespace {
 
 constexpr std::uint8_t kZero = 0x41;
-constexpr std::size_t kNibbles = 4;  ///< of a count
+constexpr std::size_t kNibbles = 4;  ///< in a count
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::optional<Reply> decode(std::span<const std::uint8_t, kPacketBytes> bytes) n
   for (std::size_t leg = 0; leg < reply.encoders.size(); ++leg) {
     unsigned count = 0;
     for (std::size_t i = 0; i < kNibbles; ++i) {
-      const unsigned nibble = bytes[1 + kNibbles * leg + i] - unsigned{kZero};  // of a smaller byte: a huge number
+      const unsigned nibble = bytes[1 + kNibbles * leg + i] - unsigned{kZero};  // huge for a byte below kZero
       if (nibble > 15) return std::nullopt;
       count |= nibble << (4 * i);
     }

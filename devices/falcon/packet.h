@@ -8,9 +8,9 @@
 #include <span>
 
 /// The packets between the Falcon's firmware and the host: 16 bytes, `<` p1 … p14 `>`, with each p = 0x41 + a
-/// nibble. Source: libnifalcon, FalconFirmwareNovintSDK.cpp. There is neither a checksum nor a number: a reply counts
-/// as one when its frame and each of its nibbles are possible, and the encoders' steps are checked besides
-/// (`FalconDevice`).
+/// nibble. Source: libnifalcon, FalconFirmwareNovintSDK.cpp. A packet has neither a checksum nor a sequence number: 16
+/// bytes are taken for a reply when their frame and each nibble are valid. `FalconDevice` also checks the steps of the
+/// encoders.
 namespace tendon::falcon {
 
 inline constexpr std::size_t kPacketBytes = 16;
@@ -23,9 +23,9 @@ using Counts = std::array<std::int16_t, 3>;
 /// Host to device.
 struct Command {
   Counts torque{};  ///< −10⁴ · N·m at the joint; bytes 1-4, 5-8, 9-12: two's complement, least nibble first
-  /// Byte 13, bit 0. The device homes, and keeps its home, while every packet has it.
+  /// Byte 13, bit 0. The device homes, and stays homed, while this bit is set in every packet.
   bool homing = true;
-  /// Byte 13, bits 1-3: green 2, blue 4, red 8. (The comments of libnifalcon name other bits than its code.)
+  /// Byte 13, bits 1-3: green 2, blue 4, red 8, as in libnifalcon's code; its comments name other bits.
   std::uint8_t lamps = 0;
 };
 inline constexpr std::uint8_t kGreen = 2;
@@ -49,23 +49,24 @@ struct Reply {
 /// The reply in these 16 bytes; empty when the frame is missing or a byte is no nibble. Byte 14 is ignored.
 std::optional<Reply> decode(std::span<const std::uint8_t, kPacketBytes> bytes) noexcept;
 
-/// Finds replies in a stream in which bytes may be lost, garbled or added. Bytes that cannot begin a reply are dropped
-/// one at a time, so a whole reply is found whatever stands before it. The beginning of a reply is kept until the rest
+/// Finds replies in a stream in which bytes may be lost, garbled or added. It drops bytes that cannot begin a reply one
+/// at a time, so it finds a whole reply whatever stands before it. It keeps the beginning of a reply until the rest
 /// comes.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class ReplyParser {
  public:
-  /// Takes as many of `bytes` as there is room for and returns how many: all of them, up to 64, once `next` is empty.
+  /// Takes as many of `bytes` as there is room for, and returns how many. There is room for 64 once `next` has returned
+  /// empty.
   std::size_t feed(std::span<const std::uint8_t> bytes) noexcept;
 
-  /// The oldest reply in what was fed; empty when there is none.
+  /// Takes the oldest reply out of the bytes that were fed; empty when there is none.
   std::optional<Reply> next() noexcept;
 
-  /// Bytes that were in no reply, so far.
+  /// How many bytes so far belonged to no reply.
   std::uint64_t left_out() const noexcept { return left_out_; }
 
-  /// Forgets the beginning that it keeps.
+  /// Forgets the beginning of a reply that it keeps.
   void clear() noexcept { size_ = 0; }
 
  private:

@@ -29,7 +29,7 @@ namespace {
 constexpr int kTries = 5;
 constexpr unsigned kTryTime_ms = 10;
 
-/// What the server tells its guardian; with a descriptor beside it, unless the device is to be forgotten.
+/// The server's message to its guardian. It carries a descriptor, unless the device is to be forgotten.
 struct Order {
   std::size_t device;
   ZeroPacket zero;
@@ -54,14 +54,14 @@ bool send_order(int socket, const Order& order, int fd) noexcept {
   return sendmsg(socket, &message, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof(order));
 }
 
-/// What the guardian keeps of a device.
+/// A device as the guardian knows it.
 struct Charge {
   int fd = -1;
   std::optional<ZeroPacket> zero;
 };
 
-/// The next order, which `flags` may say not to wait for. False when there is none: at the end nobody can give any
-/// more.
+/// Takes the next order; waits for it unless `flags` has MSG_DONTWAIT. False when there is none: without the flag, this
+/// means that the server is gone.
 bool take_order(int socket, std::array<Charge, Guardian::kDevices>& charges, int flags = 0) noexcept {
   alignas(Order) std::array<std::byte, sizeof(Order)> bytes{};
   iovec part{.iov_base = bytes.data(), .iov_len = bytes.size()};
@@ -94,7 +94,8 @@ void end_forces(const std::array<Charge, Guardian::kDevices>& charges) noexcept 
   }
 }
 
-/// Blocks all signals of the calling thread and of what it starts; for good, or as long as it lives.
+/// While it exists, blocks all signals of the calling thread. Threads and processes started meanwhile inherit this and
+/// keep it.
 class NoSignals {
  public:
   NoSignals() noexcept {
@@ -110,17 +111,17 @@ class NoSignals {
   sigset_t before_;
 };
 
-/// What the kernel sends to the guardian when its parent, a thread of the server, is dead.
+/// The kernel sends this signal to the guardian when its parent, a thread of the server, is dead.
 constexpr int kParentDied = SIGUSR1;
-/// What the guardian says once it will hear of that.
+/// The guardian sends this byte as soon as it is certain to get that signal.
 constexpr char kStandsGuard = 'g';
 
-// All signals are blocked.
+// The caller has blocked all signals.
 [[noreturn]] void stand_guard(int socket) noexcept {
   setsid();
   prctl(PR_SET_PDEATHSIG, kParentDied);
   prctl(PR_SET_NAME, "tendon-guardian", 0UL, 0UL, 0UL);
-  // Whoever reads what the server says is to see its end; and nothing of the server's is to be kept open.
+  // A reader of the server's output must see it end with the server, and no other file of the server may stay open.
   if (const int null = open("/dev/null", O_RDWR | O_CLOEXEC); null >= 0) {
     for (const int standard : {0, 1, 2}) dup2(null, standard);
   }
@@ -140,8 +141,8 @@ constexpr char kStandsGuard = 'g';
     if (signalfd_siginfo info{}; told[1].revents != 0 && read(parent.fd, &info, sizeof info) > 0) {
       while (take_order(socket, charges, MSG_DONTWAIT)) {
       }
-      // The parent alone: other threads may be about to die, one of them in the middle of a last command. So once more
-      // at the end, when there are none.
+      // Only the parent is known to be dead. Other threads may still be dying, one of them in the middle of a last
+      // command. So the packets are written again at the end, when no thread is left.
       end_forces(charges);
     } else if (told[0].revents != 0) {
       server_lives = take_order(socket, charges);
@@ -196,7 +197,7 @@ Guardian::Guardian(const std::function<void()>& on_start) {
     }
     const int error = errno;
     close(ends[1]);
-    forked.set_value(guardian > 0 ? guardian : -error);  // the last look at what the constructor owns
+    forked.set_value(guardian > 0 ? guardian : -error);  // the constructor's variables may be gone after this line
     while (guardian > 0 && waitpid(guardian, nullptr, 0) < 0 && errno == EINTR) {
     }
   };

@@ -17,10 +17,11 @@ class ZeroPacket {
  public:
   static constexpr std::size_t kMost = 64;  ///< bytes: one full-speed bulk transfer, one HID report
 
-  /// Through an open usbfs node (/dev/bus/usb/…) whose interface has been claimed: ioctl USBDEVFS_BULK, to a bulk or
-  /// interrupt endpoint. The claim belongs to the open file, not to the process: whoever shares it may write.
+  /// A packet for an open usbfs node (/dev/bus/usb/…) whose interface has been claimed. It is sent with ioctl
+  /// USBDEVFS_BULK to a bulk or interrupt endpoint. The claim belongs to the open file, not to the process: every
+  /// process that shares the file may write.
   static ZeroPacket usb(std::uint8_t endpoint, std::span<const std::byte> bytes);
-  /// Through anything that write(2) writes to: a serial line, hidraw, a socket.
+  /// A packet for any descriptor that write(2) accepts: a serial line, hidraw, a socket.
   static ZeroPacket written(std::span<const std::byte> bytes);
 
   /// Writes the packet to `fd`. While the device is busy it tries again, for up to about 50 ms. False when the device
@@ -38,13 +39,13 @@ class ZeroPacket {
 };
 
 /// A separate process that ends the forces when this process dies, however it dies: even by SIGKILL, by the kernel's
-/// out-of-memory killer or by a crash, which no handler sees. It is needed because motors hold their last command: the
+/// out-of-memory killer or by a crash that no handler sees. It is needed because motors hold their last command: the
 /// Novint Falcon documents no watchdog.
 ///
-/// The guardian shares with this process the open files of the devices, and one end of a socket. Its parent is a thread
-/// that only waits. When that thread dies, the kernel signals the guardian (PR_SET_PDEATHSIG, prctl(2)), and the
-/// guardian writes the zero packet of each device. The kernel may deliver this once per dying parent thread; the
-/// packets are written each time. When the last thread is dead and the memory is freed, which takes tens of
+/// The guardian shares the open files of the devices with this process, and holds one end of a socket pair. Its parent
+/// is a thread that only waits. When that thread dies, the kernel signals the guardian (PR_SET_PDEATHSIG, prctl(2)),
+/// and the guardian writes the zero packet of each device. The kernel may deliver this signal once per dying parent
+/// thread; the packets are written each time. When the last thread is dead and the memory is freed, which takes tens of
 /// milliseconds under load, the other end of the socket closes. Then the guardian writes the packets once more, after
 /// anything that a dying thread may still have sent, and exits. It also does this on a clean exit: an extra zero is
 /// harmless, and a path that runs only in a disaster is a path that nobody has tested.
@@ -53,26 +54,26 @@ class ZeroPacket {
 /// it. It cannot survive SIGKILL to itself (systemd sends it to a whole unit after TimeoutStopSec), or a power cut.
 ///
 /// Measured with a real kernel's usbfs, in an emulated machine (deploy/test-usb-kernel, commit 916cd72, n = 20): the
-/// device had the zero packet 2.9 ms (p50), 5.5 ms (p90), at most 7.4 ms after the SIGKILL, where a bare packet and its
-/// reply took 0.6 ms (p50). The whole server: see devices/falcon/README.md. From process to process:
-/// tests/e2e/guardian_test.cc prints it.
+/// device had the zero packet 2.9 ms (p50), 5.5 ms (p90), at most 7.4 ms after the SIGKILL. On the same machine one
+/// packet and its reply took 0.6 ms (p50). devices/falcon/README.md has the figures of the whole server;
+/// tests/e2e/guardian_test.cc prints the time from process to process.
 ///
 /// Thread-safe: yes. Realtime-safe: no.
 class Guardian {
  public:
   static constexpr std::size_t kDevices = 16;
 
-  /// Forks. After the fork the child calls only async-signal-safe functions. The parent thread calls `on_start` first:
-  /// the guardian inherits the priority that it asks for, which decides how soon both run on a busy machine. Throws
-  /// std::system_error when the system refuses.
+  /// Forks. After the fork the child calls only async-signal-safe functions. Before the fork the parent thread calls
+  /// `on_start`: the guardian inherits the priority that `on_start` asks for, and this priority decides how soon both
+  /// run on a busy machine. Throws std::system_error when the system refuses.
   explicit Guardian(const std::function<void()>& on_start = {});
   /// Waits until the guardian has written the packets and exited.
   ~Guardian();
   Guardian(const Guardian&) = delete;
   Guardian& operator=(const Guardian&) = delete;
 
-  /// From now on, until the next call for the same `device` (below kDevices): `fd` is the device, and `zero` ends its
-  /// force. The guardian gets its own descriptor. False when the guardian is dead.
+  /// From now on, until the next call for the same `device` (below kDevices), the guardian writes `zero` to `fd` when
+  /// the forces have to end. It gets its own copy of the descriptor. False when the guardian is dead.
   bool guard(std::size_t device, int fd, const ZeroPacket& zero) noexcept;
   /// `device` is gone: nothing more is written to it.
   bool forget(std::size_t device) noexcept;

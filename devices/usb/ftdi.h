@@ -7,8 +7,8 @@
 
 #include "devices/usb/pipe.h"
 
-/// The serial chips of FTDI (FT232R), as vendor requests and as packets: the numbers of libftdi's `ftdi.h` and of
-/// Linux' `ftdi_sio.h`.
+/// The vendor requests and the packets of FTDI's serial chips (FT232R). The numbers are those of libftdi's `ftdi.h` and
+/// of Linux' `ftdi_sio.h`.
 namespace tendon::usb::ftdi {
 
 /// Every IN packet begins with two bytes of modem and line status. An idle chip sends them alone, once per latency
@@ -20,7 +20,7 @@ constexpr std::span<const std::uint8_t> payload(std::span<const std::uint8_t> pa
   return packet.size() > kStatusBytes ? packet.subspan(kStatusBytes) : std::span<const std::uint8_t>{};
 }
 
-/// Both directions: older documents have the names of the two the wrong way round.
+/// Each empties the chip's buffer of one direction. Older documents confuse the two, so always send both.
 inline constexpr Request kPurgeOne{0, 1};
 inline constexpr Request kPurgeOther{0, 2};
 inline constexpr Request kDtrLow{1, 0x0100};
@@ -29,15 +29,15 @@ inline constexpr Request kRtsLow{1, 0x0200};
 inline constexpr Request kNoFlowControl{2, 0};
 inline constexpr Request k8N1{4, 8};
 
-/// 3 MHz / divisor; the two upper bits are eighths (0x4138 is 312.5: 9600 baud).
+/// Sets the rate to 3 MHz / divisor; the two upper bits are eighths (0x4138 is 312.5: 9600 baud).
 constexpr Request divisor(std::uint16_t divisor) noexcept { return {3, divisor}; }
 
-/// The chip sends what it has at once when it receives `character`, and does not wait for the latency timer.
+/// When the chip receives `character`, it sends its buffer at once and does not wait for the latency timer.
 constexpr Request flush_at(std::uint8_t character) noexcept {
   return {6, static_cast<std::uint16_t>(0x100U | character)};
 }
 
-/// The chip sends what it has, be it nothing, when so many ms have passed since it last did.
+/// The chip sends its buffer, even an empty one, when `ms` ms have passed since it last did.
 constexpr Request latency(std::uint8_t ms) noexcept { return {9, ms}; }
 
 /// Sends a list of requests as fast as the pipe takes them.

@@ -9,32 +9,32 @@
 
 #include "devices/usb/pipe.h"
 
-/// Real USB devices, by libusb. A build without libusb has these functions too; they throw a sentence that says so.
+/// Real USB devices, through libusb. In a build without libusb these functions throw, and the message says so.
 namespace tendon::usb {
 
-/// Something that is plugged in.
+/// A device that is plugged in.
 struct PluggedIn {
   Id id;
   std::string port;       ///< as the kernel names it: "1-2.3" is port 3 of the hub at port 2 of bus 1
   std::string node;       ///< "/dev/bus/usb/001/007"
-  bool has_node = true;   ///< false in a container that has not been given it: there is nothing to open
+  bool has_node = true;   ///< false in a container that was not given the node: nothing can be opened
   bool may_open = false;  ///< this process may read and write the node
 };
 
-/// All that is plugged in. Throws std::runtime_error with a sentence when this machine has no USB, or this build no
-/// libusb.
+/// All devices that are plugged in. Throws std::runtime_error with a sentence when this machine has no USB, or this
+/// build no libusb.
 std::vector<PluggedIn> plugged_in();
 
 struct PipeConfig {
   std::vector<Id> ids{};   ///< a device with any of these ids is opened
-  std::string port{};      ///< as in `PluggedIn`; empty: the first matching device that nobody uses
+  std::string port{};      ///< as in `PluggedIn`; empty: the first matching device that is free
   std::uint8_t in = 0x81;  ///< endpoints, of interface 0
   std::uint8_t out = 0x02;
   enum class Transfers : std::uint8_t { kBulk, kInterrupt };
   Transfers transfers = Transfers::kBulk;  ///< of both endpoints
 
-  /// The pipe's own thread calls this first: it asks for a real-time priority above that of the thread that uses the
-  /// pipe.
+  /// The pipe's own thread calls this first. It is the place to ask for a real-time priority, above that of the thread
+  /// that uses the pipe.
   std::function<void()> on_start{};
   /// Called from that thread with a sentence, each time there is a new reason why no device is open.
   std::function<void(const std::string&)> tell{};

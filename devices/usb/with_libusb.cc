@@ -24,7 +24,7 @@ constexpr std::size_t kInTransfers = 4;
 constexpr std::size_t kOutTransfers = 4;
 constexpr unsigned kTransferTimeout_ms = 100;
 constexpr int kLookAgain_ms = 200;
-/// Of the haptic thread, which empties it each period: a quarter of a second of an idle FTDI chip's packets.
+/// The haptic thread empties this ring each period. It holds a quarter of a second of an idle FTDI chip's packets.
 constexpr std::size_t kInPackets = 256;
 constexpr std::size_t kOutPackets = 16;
 
@@ -45,7 +45,7 @@ Context make_context() {
   return Context(context);
 }
 
-/// Devices of the moment.
+/// The devices that are plugged in at this moment.
 class List {
  public:
   explicit List(libusb_context* context) { size_ = std::max<ssize_t>(0, libusb_get_device_list(context, &devices_)); }
@@ -122,10 +122,10 @@ class LibusbPipe final : public Pipe {
     bool under_way = false;
   };
 
-  // Of the user's thread
+  // Called by the user's thread
   void wake() noexcept;
 
-  // Of the pipe's thread
+  // Called by the pipe's thread
   void run();
   bool open();
   int open_node();
@@ -151,17 +151,17 @@ class LibusbPipe final : public Pipe {
   SpscRing<Packet> packets_{kInPackets};
   std::atomic<std::uint32_t> connection_{0};
   std::atomic<std::uint32_t> to_end_{0};  ///< the connection that the user wants closed
-  std::atomic<std::uint64_t> done_{0};    ///< orders that came to an end
+  std::atomic<std::uint64_t> done_{0};    ///< orders that have ended, well or badly
   std::atomic<bool> stop_{false};
 
-  // Of the user's thread
+  // Used by the user's thread only
   std::uint32_t seen_ = 0;
   std::uint64_t accepted_ = 0;
 
-  // Of the pipe's thread
+  // Used by the pipe's thread only
   int node_ = -1;  ///< open while handle_ is
   Handle handle_;
-  std::uint32_t number_ = 0;  ///< of the connection, or of the last one
+  std::uint32_t number_ = 0;  ///< of this connection; of the last one while there is none
   bool broken_ = false;       ///< a transfer has failed
   bool closing_ = false;
   std::string told_;
@@ -174,7 +174,7 @@ class LibusbPipe final : public Pipe {
 };
 
 LibusbPipe::LibusbPipe(const PipeConfig& config) : config_(config) {
-  // Also where there is no /dev/bus/usb: the node comes from elsewhere.
+  // The node comes from elsewhere, so this works without /dev/bus/usb too.
   if (config_.node) libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
   context_ = make_context();
   bell_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -198,12 +198,11 @@ LibusbPipe::~LibusbPipe() {
   ::close(bell_);
 }
 
-// --- The user's thread
-// ------------------------------------------------------------------------------------------------
+// --- The user's thread ----------------------------------------------------------------------------------------------
 
 void LibusbPipe::wake() noexcept {
   const std::uint64_t one = 1;
-  // Fails only when the bell has rung 2^64 - 2 times and nobody came.
+  // This fails only when the bell has rung 2^64 - 2 times without being answered.
   [[maybe_unused]] const ssize_t rung = ::write(bell_, &one, sizeof one);
 }
 
@@ -243,8 +242,7 @@ std::size_t LibusbPipe::read(std::span<std::uint8_t, kPacketSize> packet) noexce
   return 0;
 }
 
-// --- The pipe's thread
-// ------------------------------------------------------------------------------------------------
+// --- The pipe's thread ----------------------------------------------------------------------------------------------
 
 void LibusbPipe::run() {
   if (config_.on_start) config_.on_start();
@@ -269,12 +267,12 @@ void LibusbPipe::tell(const std::string& why) {
 
 int LibusbPipe::open_node() {
   if (config_.node) return config_.node();
-  // Each look is a new one: a list that is kept learns of the plugs from udevd, which not every container or small
-  // system has.
+  // Each look uses a new context. A context that is kept learns of new devices only from udevd, which is missing in
+  // some containers and small systems.
   libusb_context* looking = nullptr;
   if (libusb_init(&looking) != LIBUSB_SUCCESS) return -1;
   const Context look(looking);
-  std::string why;  // empty: it is not plugged in, which is nothing to complain of
+  std::string why;  // empty: the device is not plugged in, which is no fault
   for (libusb_device* device : List(look.get())) {
     const PluggedIn plugged = describe(device);
     if (std::ranges::find(config_.ids, plugged.id) == config_.ids.end()) continue;
@@ -294,7 +292,8 @@ bool LibusbPipe::open() {
   int error = libusb_wrap_sys_device(context_.get(), node_, &handle);
   handle_.reset(handle);
   if (error == LIBUSB_SUCCESS) {
-    // That of a SpaceMouse is usbhid; FTDI's does not know the Falcon, but a user may have taught it.
+    // A SpaceMouse belongs to the kernel driver usbhid. FTDI's driver does not know the Falcon, but a user may have
+    // added its id.
     libusb_set_auto_detach_kernel_driver(handle, 1);
     error = libusb_claim_interface(handle, 0);
   }
@@ -324,7 +323,7 @@ void LibusbPipe::close_node() {
 
 void LibusbPipe::fill(Slot& slot, std::uint8_t endpoint, std::size_t size, libusb_transfer_cb_fn then,
                       unsigned timeout) noexcept {
-  // The two differ in nothing but the type.
+  // Bulk and interrupt transfers differ only in the type.
   libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), endpoint, slot.bytes.data(), static_cast<int>(size),
                             then, &slot, timeout);
   if (config_.transfers == PipeConfig::Transfers::kInterrupt) slot.transfer->type = LIBUSB_TRANSFER_TYPE_INTERRUPT;
@@ -339,7 +338,7 @@ bool LibusbPipe::sending() const noexcept { return control_.under_way || std::ra
 
 bool LibusbPipe::under_way() const noexcept { return sending() || std::ranges::any_of(in_, &Slot::under_way); }
 
-// A control transfer and a bulk transfer know no order between them: neither starts before the other is over.
+// Control transfers and bulk transfers are not ordered among each other, so neither starts before the other has ended.
 void LibusbPipe::obey() {
   while (const Order* order = orders_.front()) {
     if (broken_ || order->packet.connection != number_) {
@@ -363,7 +362,7 @@ void LibusbPipe::obey() {
       submit(*slot);
     }
     orders_.pop();
-    if (broken_) done_.fetch_add(1, std::memory_order_release);  // nobody calls back for it
+    if (broken_) done_.fetch_add(1, std::memory_order_release);  // no callback will count it
   }
 }
 
@@ -377,7 +376,7 @@ void LibusbPipe::discard() {
 void LibusbPipe::close() {
   connection_.store(0, std::memory_order_release);
   closing_ = true;
-  // The last thing that was accepted may be the zero force.
+  // The last packet that was accepted may be the zero force.
   while (!broken_ && (orders_.front() != nullptr || sending())) {
     obey();
     if (!broken_ && sending()) wait(-1);
@@ -405,7 +404,7 @@ void LibusbPipe::look_at_descriptors() {
   libusb_free_pollfds(all);
 }
 
-// libusb's own wait knows no other descriptors than its own: this one also wakes for the bell.
+// libusb's own wait watches only libusb's descriptors; this one also wakes for the bell.
 void LibusbPipe::wait(int most_ms) {
   timeval due{};
   if (libusb_get_next_timeout(context_.get(), &due) == 1) {

@@ -66,7 +66,7 @@ std::optional<Pose> pose_at(const Model& model, const Vec3& position) noexcept {
   const double height = at.z() - model.joints[0].length;
   const double bend =
       (upper * upper + lower * lower - radius * radius - height * height) / (2 * upper * lower);  // cos e
-  if (!(radius > 0) || !(std::abs(bend) < 1)) return std::nullopt;                                // NaN, too
+  if (!(radius > 0) || !(std::abs(bend) < 1)) return std::nullopt;                                // so is NaN
   const double elbow = std::acos(bend);
   const double b = std::atan2(radius, height) - std::atan2(lower * std::sin(elbow), upper - lower * bend);
   Pose pose = pose_with(model, {std::atan2(at.y(), at.x()), b, elbow - b});
