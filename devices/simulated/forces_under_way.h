@@ -9,9 +9,10 @@
 
 namespace tendon {
 
-/// Commands between the loop that gives them and the motors that follow them: each arrives so much later, in order.
+/// Force commands on their way from the loop to the motors: each arrives after a constant delay, in order.
 ///
-/// Room for one each 100 µs; of more at once the newest take each other's place. The room is taken in the constructor.
+/// There is room for one command every 100 µs; when they come faster and the room is full, a new command replaces the
+/// newest one. The constructor allocates the room.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class ForcesUnderWay {
@@ -21,7 +22,7 @@ class ForcesUnderWay {
     Vec3 force = Vec3::Zero();  ///< N
   };
 
-  /// `delay` ≥ 0, of each command.
+  /// `delay` ≥ 0 is the delay of each command.
   explicit ForcesUnderWay(Duration delay) : delay_(delay), ring_(static_cast<std::size_t>(delay / kClosest) + 2) {}
 
   void send(Duration now, const Vec3& force) noexcept {
@@ -31,7 +32,7 @@ class ForcesUnderWay {
     newest() = {arrives, force};
   }
 
-  /// The one that arrives next; null when none is under way.
+  /// The command that arrives next; null when none is under way.
   const Command* next() const noexcept { return count_ > 0 ? &ring_[first_] : nullptr; }
 
   void pop() noexcept {

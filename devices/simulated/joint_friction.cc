@@ -15,17 +15,17 @@
 namespace tendon {
 namespace {
 
-/// Of each joint: it turns this way (−1, 1) or stands (0).
+/// For each joint: the way it turns (−1 or 1), or 0 when it stands.
 using Turns = std::array<int, 3>;
 
 struct Grip {
   Turns turns;
   Vec3 impulse;  ///< of friction on each joint
   double wrong =
-      std::numeric_limits<double>::infinity();  ///< how far its law is missed, as a velocity; ≤ 0: not at all
+      std::numeric_limits<double>::infinity();  ///< how far its law is violated, as a velocity; ≤ 0: it is kept
 };
 
-/// Friction of joints of which each turns or stands as said: velocity = free − coupling · impulse.
+/// The friction when each joint turns or stands as `turns` says: velocity = free − coupling · impulse.
 Grip gripping(const Turns& turns, const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known) {
   Mat3 equations = Mat3::Identity();
   Vec3 right;
@@ -48,8 +48,9 @@ Grip gripping(const Turns& turns, const Mat3& coupling, const Vec3& free, const 
   return grip;
 }
 
-/// The one impulse with |impulseᵢ| ≤ mostᵢ, and = mostᵢ against the velocity where there is one. Of which joints the
-/// turning is `known` (not 0), there it is. It is one of 27 cases; of several that rounding leaves, the least wrong.
+/// The only impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, against the velocity, at each joint that turns. A joint
+/// that is not 0 in `known` is taken to turn that way. The answer is one of 27 cases; rounding may leave several, and
+/// then it is the least wrong one.
 Grip grip_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
   Grip best;
   const auto holds = [&](Turns turns) {
@@ -61,7 +62,7 @@ Grip grip_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Tur
     return grip.wrong <= 0;
   };
   const auto sign = [](double x) { return (x > 0 ? 1 : 0) - (x < 0 ? 1 : 0); };
-  if (holds({sign(free[0]), sign(free[1]), sign(free[2])})) return best;  // so it is while the handle slides
+  if (holds({sign(free[0]), sign(free[1]), sign(free[2])})) return best;  // the usual case while the handle slides
   if (holds({})) return best;
   for (int code = 0; code < 27; ++code) {
     const auto digit = [code](int place) { return code / place % 3 - 1; };
@@ -70,7 +71,7 @@ Grip grip_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Tur
   return best;
 }
 
-/// The nearest velocity to `v` in which the joints that stand do.
+/// The velocity nearest to `v` at which the joints that stand according to `turns` have no speed.
 Vec3 standing(const Turns& turns, const Mat3& jacobian, const Vec3& v) {
   if (turns == Turns{}) return Vec3::Zero();
   const Mat3 coupling = jacobian * jacobian.transpose();
@@ -117,7 +118,7 @@ Friction JointFriction::least_at(const Vec3& position) const noexcept {
 Vec3 JointFriction::torques(const Mechanism::Kind& mechanism, double coulomb) {
   const Vec3 levers = Mechanism(mechanism).levers();
   Vec3 torques = coulomb * levers;
-  for (Eigen::Index i = 0; i < 3; ++i) {  // not less for the rounding: whoever counts on `coulomb` is right to
+  for (Eigen::Index i = 0; i < 3; ++i) {  // rounding must not make it less: others count on at least `coulomb`
     while (torques[i] / levers[i] < coulomb) torques[i] = std::nextafter(torques[i], HUGE_VAL);
   }
   return torques;

@@ -11,13 +11,13 @@
 namespace tendon {
 namespace {
 
-/// Of the ball that falcon::kCentre promises, and what a leg by itself moves the grip in it at most: 0.091685 m/rad of
-/// three million places (0.0672 at the centre, 0.0314 at the least), rounded up.
+/// The radius of the ball that falcon::kCentre promises, and the furthest that one leg alone moves the grip in it. The
+/// largest of three million positions had 0.091685 m/rad, rounded up here; the centre has 0.0672, the smallest 0.0314.
 constexpr double kFalconReach = 0.05;    // m
 constexpr double kFalconLever = 0.0917;  // m/rad
 
-/// Of the way from the middle of an arm's workspace to the nearest place at which its Jacobian is not finite. Friction
-/// grows beyond all bounds there, and no device is used so far out.
+/// The share of the distance from the middle of an arm's workspace to the nearest position without a finite Jacobian.
+/// There friction grows beyond all bounds, and no device is used so far out.
 constexpr double kShareOfArmsReach = 0.8;
 
 double reach_of(const Mechanism::Arm& arm) {
@@ -52,12 +52,13 @@ Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
 Mechanism::Mechanism(const Kind& kind) : kind_(kind), reach_(kFalconReach), levers_(Vec3::Constant(kFalconLever)) {
   const auto* arm = std::get_if<Arm>(&kind);
   if (arm == nullptr) return;
-  // Shorter or longer is no haptic device, and far from what doubles can square.
+  // No haptic device is shorter or longer, and the squares of these lengths are far from the limits of a double.
   const auto sound = [](double length) { return length >= 0.01 && length <= 10; };
   expect(sound(arm->upper_arm), "upper_arm", arm->upper_arm, "0.01 to 10 m");
   expect(sound(arm->forearm), "forearm", arm->forearm, "0.01 to 10 m");
   reach_ = reach_of(*arm);
-  // q₁ moves the handle by r, which is l_u in the middle; q₂ and q₃ by the lengths of what they turn, everywhere.
+  // For each radian, q₁ moves the handle by r, which is l_u in the middle of the workspace; q₂ and q₃ always move it
+  // by the length of the arm that they turn.
   levers_ = Vec3(arm->upper_arm + reach_, arm->upper_arm, arm->forearm);
 }
 

@@ -7,12 +7,13 @@
 
 namespace tendon {
 
-/// The three joints that a handle hangs on, as far as friction in them goes: how fast each turns when the handle moves,
+/// The three joints that carry a handle. For their friction it is enough to know how fast each turns when the handle
+/// moves:
 ///
 ///     dq/dt = J(x) dx/dt,      J in rad/m, x in m in the device base frame, from the middle of the workspace
 ///
-/// The workspace is a ball in which J is finite and smooth. Beyond it J is that of the nearest point of the ball: a
-/// simulated hand may pull a handle further than its legs are long.
+/// The workspace is a ball in which J is finite and smooth. Outside it, J is taken at the nearest point of the ball,
+/// because a simulated hand may pull a handle further than the mechanism reaches.
 ///
 /// Thread-safe: yes, it never changes. Realtime-safe: all but the constructor.
 class Mechanism {
@@ -20,14 +21,14 @@ class Mechanism {
   /// A Novint Falcon: the three thighs of a delta robot (devices/falcon/kinematics.h), around falcon::kCentre.
   struct Falcon {};
 
-  /// A Phantom, and the Touch after it: a turntable q₁ that bears an upper arm q₂ and a forearm q₃; all motors are in
-  /// the base (a parallelogram drives the forearm), so that q₂ and q₃ are each counted from the base:
+  /// A Phantom or its successor Touch: a turntable q₁ that carries an upper arm q₂ and a forearm q₃. All motors are in
+  /// the base (a parallelogram drives the forearm), so q₂ and q₃ are both measured against the base:
   ///
   ///     x = r sin q₁,  y = l_f − l_f cos q₃ + l_u sin q₂,  z = r cos q₁ − l_u,      r = l_u cos q₂ + l_f sin q₃
   ///
-  /// x to the right, y up, z towards the user; at q = 0 the upper arm lies level and the forearm hangs. After
-  /// Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002. The workspace is four fifths of the way to the nearest place
-  /// where the arm is stretched, folded, or over its turntable.
+  /// x to the right, y up, z towards the user; at q = 0 the upper arm is level and the forearm hangs down. After
+  /// Çavuşoğlu, Feygin and Tendick, Presence 11(6), 2002. The radius of the workspace is four fifths of the distance to
+  /// the nearest position at which the arm is stretched, folded, or above its turntable.
   struct Arm {
     double upper_arm = 0;  ///< l_u, m, > 0
     double forearm = 0;    ///< l_f, m, > 0
@@ -44,7 +45,8 @@ class Mechanism {
   /// m, radius of the workspace.
   double reach() const noexcept { return reach_; }
 
-  /// m/rad, of each joint: by itself it moves the handle no further than this, ‖J⁻¹ eᵢ‖, anywhere in the workspace.
+  /// m/rad, for each joint: an upper bound of ‖J⁻¹ eᵢ‖ in the workspace, the way of the handle when only this joint
+  /// turns.
   const Vec3& levers() const noexcept { return levers_; }
 
  private:

@@ -6,14 +6,14 @@
 
 namespace tendon {
 
-/// The operator's hand on the handle: a mass that is one with the handle, tied by a spring and a
-/// damper to the point s(t) where the operator wants to be:
+/// The operator's hand on the handle: a mass that moves with the handle, tied by a spring and a damper to the point
+/// s(t) where the operator wants to be:
 ///
 ///     F_hand = k (s − x) + c (ṡ − v) − m_hand dv/dt        (N, on the handle)
 ///
-/// The second-order model with a moving equilibrium point of Hajian and Howe (J. Biomech. Eng.
-/// 119:109, 1997) and Kuchenbecker, Park and Niemeyer (IMECE 2003). Numbers of a fingertip, of a hand with a
-/// stylus and of an arm: OperatorProfile.
+/// This is the second-order model with a moving equilibrium point of Hajian and Howe (J. Biomech. Eng. 119:109, 1997)
+/// and Kuchenbecker, Park and Niemeyer (IMECE 2003). OperatorProfile has the numbers of a fingertip, of a hand with a
+/// stylus and of an arm.
 ///
 /// Thread-safe: yes, it never changes. Realtime-safe: all but the constructor.
 class OperatorHand {
@@ -28,8 +28,8 @@ class OperatorHand {
   /// Throws std::invalid_argument naming the field, its value and what was expected.
   explicit OperatorHand(Config config);
 
-  /// k (s(t) − x) + c ṡ(t): all of the force that does not depend on the handle's velocity or
-  /// acceleration. Whoever integrates handles those two implicitly.
+  /// k (s(t) − x) + c ṡ(t), the part of the force that does not depend on the handle's velocity or acceleration. The
+  /// caller integrates the other two parts implicitly.
   Vec3 drive(double t, const Vec3& x) const noexcept;
 
   /// Where the hand wants to be `t` seconds after the start.

@@ -16,9 +16,9 @@ constexpr std::string_view kDiolaiti = "Diolaiti et al., IEEE T-RO 22(2), 2006, 
 constexpr std::string_view kPhantomSheet = "SensAble PHANToM Premium 1.0/1.5 data sheet";
 constexpr std::string_view kTouchSheet = "Geomagic/3D Systems Touch data sheet";
 
-/// 5 ms is five haptic periods at 1 kHz: it outlives the late wake-ups of a healthy loop (0.2 ms at p99
-/// without real-time priority, periods of up to 2 ms in our own tests) and cuts the force off before a hand at
-/// 1 m/s has moved 5 mm against it.
+/// 5 ms is five haptic periods at 1 kHz. That is longer than the late wake-ups of a healthy loop (0.2 ms at p99 without
+/// real-time priority, periods of up to 2 ms in our own tests), and it ends the force before a hand at 1 m/s has moved
+/// 5 mm against it.
 constexpr KnownNumber kAssumedWatchdog = {0.005, kAssumed, "5 haptic periods at 1 kHz; not documented"};
 
 constexpr std::array kProfiles = {
@@ -54,7 +54,7 @@ constexpr std::array kProfiles = {
         .encoder_step = {0.043e-3, kQuoted, "computed at the centre from libnifalcon's geometry and gears"},
         .max_force = {8.0, kQuoted, "CHAI3D, device specification"},
         .amplifier_bandwidth = {200, kAssumed, "lower end of 200-500 Hz"},
-        .watchdog = std::nullopt,  // its firmware documents none
+        .watchdog = std::nullopt,  // none is documented
         .viscous_bound = {0.5, kAssumed, "half the value, which is itself assumed"},
         .coulomb_bound = {0.3, kAssumed, "lower end of 0.3-0.5 N"},
     },
@@ -87,7 +87,7 @@ constexpr std::array kOperators = {
     },
 };
 
-/// One line of a table for each number: what, value with unit, provenance, source.
+/// Adds the line of one number: its name, value with unit, provenance, source.
 template <class Known>
 void add_line(std::ostream& table, std::string_view what, const std::string& value, const Known& number) {
   table << "  " << std::left << std::setw(28) << what << std::setw(15) << value << std::setw(10)

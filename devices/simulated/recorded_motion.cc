@@ -19,7 +19,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-/// The cell of that number, from 0; empty when the line has fewer.
+/// The cell with this number, from 0; empty when the line has fewer cells.
 std::optional<std::string_view> cell(std::string_view line, std::size_t number) {
   for (; number > 0; --number) {
     const auto comma = line.find(',');
@@ -69,7 +69,7 @@ class Reader {
     throw std::runtime_error(file_.path.string() + ":" + std::to_string(line_number_) + ": " + what);
   }
 
-  /// Blank lines are passed over: many programs end a file with one.
+  /// Skips blank lines: many programs end a file with one.
   bool next_line() {
     while (stream_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()))) {
       ++line_number_;
@@ -84,7 +84,7 @@ class Reader {
     return false;
   }
 
-  /// With the header as the current line.
+  /// The number of a column. The header must be the current line.
   std::size_t number_of(const RecordedMotionFile::Column& column) const {
     if (const auto* number = std::get_if<std::size_t>(&column)) return *number;
     const auto& name = std::get<std::string>(column);
@@ -106,8 +106,8 @@ class Reader {
 
   const RecordedMotionFile& file_;
   std::istream& stream_;
-  std::vector<char> buffer_ = std::vector<char>(kMaxRecordedLine + 1);  ///< with the end of the string
-  std::string_view line_;                                               ///< in it
+  std::vector<char> buffer_ = std::vector<char>(kMaxRecordedLine + 1);  ///< with room for the closing zero
+  std::string_view line_;                                               ///< in buffer_
   std::size_t line_number_ = 0;
   std::size_t time_ = 0;
   std::size_t position_ = 0;

@@ -11,11 +11,11 @@
 
 namespace tendon {
 
-/// A motion recorded in a CSV file, and how to read it: commas between the cells, `.` as decimal
-/// point, no quotes, one line per sample.
+/// A motion recorded in a CSV file, and how to read it: commas between the cells, `.` as decimal point, no quotes, one
+/// line per sample.
 struct RecordedMotionFile {
-  /// A column by its name in the header line, or by its number, from 0. A file of which both columns
-  /// are given by number has no header line.
+  /// A column by its name in the header line, or by its number, from 0. When both columns are given by number, the file
+  /// has no header line.
   using Column = std::variant<std::string, std::size_t>;
 
   std::filesystem::path path;        ///< where it is; errors begin with it
@@ -27,11 +27,11 @@ struct RecordedMotionFile {
   ScriptedMotion::Recorded::AtEnd at_end = ScriptedMotion::Recorded::AtEnd::kHold;
 };
 
-/// The most samples that a recording may have: 33 minutes at 2 kHz, 64 MB. A limit, because a wrong
-/// path may lead to anything.
+/// The most samples that a recording may have: 33 minutes at 2 kHz, 64 MB. The limit protects against a path to a file
+/// of another kind.
 inline constexpr std::size_t kMaxRecordedSamples = 4'000'000;
 
-/// No line of a recorded motion is longer, in bytes.
+/// The longest line that a recorded motion may have, in bytes.
 inline constexpr std::size_t kMaxRecordedLine = 65'536;
 
 /// Reads a whole recorded motion from `csv`, the content of `file.path`, before the loop runs. Memory: the samples and

@@ -9,11 +9,11 @@
 
 namespace tendon {
 
-/// Where the operator wants the hand to be, as a function of the time since the start: the moving
-/// equilibrium point of OperatorHand. m and m/s, device base frame.
+/// Where the operator wants the hand to be, as a function of the time since the start: the moving equilibrium point of
+/// OperatorHand. m and m/s, device base frame.
 ///
-/// Built before the loop runs; an impossible script throws std::invalid_argument that names the
-/// field, its value and what was expected.
+/// Built before the loop runs; an impossible script throws std::invalid_argument that names the field, its value and
+/// what was expected.
 ///
 /// Thread-safe: yes, it never changes. Realtime-safe: `at` is.
 class ScriptedMotion {
@@ -31,9 +31,8 @@ class ScriptedMotion {
     Vec3 direction = Vec3::UnitX();  ///< its length does not count
   };
 
-  /// At constant speed from `from` to `to`; there it holds still. With `hold` it goes to and fro for
-  /// ever and holds for that long at both ends. The velocity steps at the corners.
-  /// `from == to` is a hand that holds still from the start.
+  /// Moves from `from` to `to` at constant speed and stays there. With `hold` it goes to and fro for ever, and stays at
+  /// each end for that long. The velocity steps at the corners. With `from == to` the hand stands still from the start.
   struct RampHold {
     Vec3 from = Vec3::Zero();
     Vec3 to = Vec3::Zero();
@@ -50,11 +49,10 @@ class ScriptedMotion {
     bool back_and_forth = true;       ///< for ever; false: stays at the last point
   };
 
-  /// A motion that was measured: position = origin + direction · x(t), where x runs through the
-  /// samples on cubic Hermite pieces with Fritsch and Butland's slopes (SIAM J. Sci. Stat. Comput.
-  /// 5(2):300, 1984). The velocity is continuous, and between two samples x never leaves the range
-  /// they span: quantised recordings do not overshoot. The slope at both ends is zero, so that
-  /// neither holding nor repeating makes the velocity step.
+  /// A measured motion: position = origin + direction · x(t). x passes through the samples on cubic Hermite pieces with
+  /// Fritsch and Butland's slopes (SIAM J. Sci. Stat. Comput. 5(2):300, 1984). The velocity is continuous, and between
+  /// two samples x stays in the range that they span: quantised recordings do not overshoot. The slope at both ends is
+  /// zero, so the velocity does not step when the motion holds or repeats.
   struct Recorded {
     struct Sample {
       double t;  ///< s, strictly increasing; the first one is the start
@@ -62,7 +60,7 @@ class ScriptedMotion {
     };
     enum class AtEnd {
       kHold,    ///< stays at the last sample
-      kRepeat,  ///< from the first sample again: the position jumps when the ends differ
+      kRepeat,  ///< begins again with the first sample: the position jumps when the ends differ
     };
     std::vector<Sample> samples;  ///< 2 or more
     Vec3 origin = Vec3::Zero();

@@ -22,8 +22,8 @@ void expect_effect(const std::optional<double>& value, std::string_view field) {
          "a number above 0 (left out when there is no such effect)");
 }
 
-/// `force` cut down to the norm `limit` in its own direction. Through its largest component, because the
-/// square of a mad but finite force overflows.
+/// `force`, shortened to the norm `limit` in its own direction. It divides by the largest component first, because the
+/// square of a huge but finite force overflows.
 Vec3 saturated(const Vec3& force, double limit) {
   const double largest = force.lpNorm<Eigen::Infinity>();
   if (!(largest > 0)) return force;
@@ -141,7 +141,7 @@ void SimulatedDevice::advance(Duration gap) noexcept {
   live(gap);
 }
 
-/// What is left of the gap after the last of the forces that reach the motors in it.
+/// Lives through the gap up to the last force that reaches the motors in it. Returns the rest of the gap.
 Duration SimulatedDevice::live_to_last_arrival(Duration gap) noexcept {
   const Duration end = lived_ + gap;
   for (const auto* next = under_way_->next(); next != nullptr && next->arrives <= end; next = under_way_->next()) {
@@ -187,8 +187,8 @@ SimulatedDevice::Substeps SimulatedDevice::substeps_with(const Effects& effects)
   return kAll.at(effects.number());
 }
 
-/// `mean`: the half-step momentum, from which it becomes the mean velocity; `velocity`: v₀, from which it becomes v₁.
-/// By reference, because copies of vectors are what a substep costs.
+/// `mean` is the half-step momentum before the call and the mean velocity after it; `velocity` is v₀ before and v₁
+/// after. They are references because copies of vectors are most of the cost of a substep.
 template <SimulatedDevice::Rub kRub>
 void SimulatedDevice::slide(Vec3& mean, Vec3& velocity, const Side& side, const Vec3& push, const Vec3& position,
                             double h) const noexcept {
@@ -228,7 +228,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
     coupling = h / 2 * (config_.structural_mode->damping + h / 2 * config_.structural_mode->stiffness);
     handle.resistance += coupling;
     motor.mass = config_.mass - config_.structural_mode->handle_mass;
-    // With the handle's velocity eliminated.
+    // The handle's velocity is eliminated from the equations.
     motor.resistance = motor.mass + viscous + coupling - coupling * coupling / handle.resistance;
   }
   Lag lag;
@@ -279,8 +279,8 @@ Vec3 SimulatedDevice::force_over(const Lag& lag) noexcept {
   return command_ - missing * (lag.reached / lag.h_over_tau);
 }
 
-/// The hand's mass moves with the handle: what it has gained in kinetic energy did not go through the
-/// port between the two.
+/// The hand's mass moves with the handle: the kinetic energy that this mass has gained did not pass the port between
+/// hand and handle.
 void SimulatedDevice::settle_energies() noexcept {
   const double half_v2 = truth_.velocity.squaredNorm() / 2;
   truth_.kinetic_energy = config_.mass * half_v2;
