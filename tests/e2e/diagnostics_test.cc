@@ -101,6 +101,44 @@ TEST(Diagnostics, AnObserverSeesWantedForcesTheLoopAndTheNetwork) {
   server.stop();
 }
 
+// In virtual time, with each way in which a force can be wrong: tests/server (BadForces, SealedServer).
+TEST(Diagnostics, AnEngineThatSleepsOnThisMachineIsBlamedAndNeverTheNetwork) {
+  const ScratchFolder folder;
+  Server server(folder.path(), write(folder.path() / "scene.toml", kPressingHand));
+  Guest watcher(server.address(), [](const DeviceState&, const LinkStats&) {});
+  Guest engine(server.address(), [](const DeviceState& hand) { return Touch(Vec3(-1000 * hand.position.x(), 0, 0)); });
+
+  // A machine that pauses for a moment may be taken for a slow network; one that pauses for half a second is none.
+  constexpr Duration kAsleep = std::chrono::milliseconds(500);
+  std::uint64_t last = 0;
+  int told = 0;
+  const auto read = [&] {
+    const auto& peers = watcher.client().peer_reports();
+    if (peers.empty() || peers[0].link.number == last) return;
+    const LinkReport& report = peers[0].link;
+    last = report.number;
+    if (report.worst_late < kAsleep) return;
+    ++told;
+    EXPECT_GT(report.late_engine, 0U) << report.words;
+    EXPECT_NE(report.words.find("the engine"), std::string::npos) << report.words;
+    EXPECT_EQ(report.words.find("the network"), std::string::npos) << report.words;
+  };
+  ASSERT_TRUE(turn_until({&engine, &watcher}, [&] { return engine.client().stats().forces > 1000; }));
+
+  const LocalTime wakes = clock::now() + std::chrono::milliseconds(2500);  // the server ends its session meanwhile
+  ASSERT_TRUE(turn_until({&watcher}, [&] {
+    read();
+    return clock::now() > wakes;
+  }));
+  const std::uint64_t before = engine.client().stats().forces;
+  ASSERT_TRUE(turn_until({&engine, &watcher}, [&] {
+    read();
+    return engine.client().stats().forces > before + 1500;
+  }));
+  EXPECT_GT(told, 0);
+  server.stop();
+}
+
 TEST(Diagnostics, AnObserverSeesArmingAndFaultAndStepsBeforeItAreKept) {
   const ScratchFolder folder;
   // A hand that rests for seconds, long enough to be armed, and then moves faster than is allowed.

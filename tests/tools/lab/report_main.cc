@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-report: recorded runs side by side. A program of its own, so that deploy/demo need not build the lab.
 #include <CLI/CLI.hpp>
-#include <exception>
 #include <iostream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "server/build_info.h"
+#include "tests/support/run_tool.h"
 #include "tests/tools/lab/recordings/report.h"
 
 int main(int argc, char** argv) {
-  constexpr int kFailed = 1;
-  constexpr int kWrongUsage = 2;
-
   tendon::lab::ReportOptions options;
   std::vector<std::string> recordings;
   std::string picture;
@@ -33,23 +29,10 @@ int main(int argc, char** argv) {
       "  tendon-report off.mcap on.mcap --label \"limiter off\" --label \"limiter on\" --out runs.svg\n"
       "\nExit: 0 done; 1 a recording is corrupt or gnuplot failed; 2 wrong usage.");
 
-  const auto complain = [](const std::exception& error, int code) {
-    std::cerr << "tendon-report: " << error.what() << (code == kWrongUsage ? " (see --help)\n" : "\n");
-    return code;
-  };
-  try {
-    app.parse(argc, argv);
+  return tendon::run_tool(app, argc, argv, [&] {
     options.recordings.assign(recordings.begin(), recordings.end());
     if (!picture.empty()) options.picture = picture;
     tendon::lab::report(options, std::cout);
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return complain(error, kWrongUsage);
-  } catch (const std::invalid_argument& error) {
-    return complain(error, kWrongUsage);
-  } catch (const std::exception& error) {
-    return complain(error, kFailed);
-  }
-  return 0;
+    return 0;
+  });
 }

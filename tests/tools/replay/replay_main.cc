@@ -3,21 +3,15 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <exception>
 #include <iostream>
-#include <stdexcept>
 #include <string>
 
 #include "core/control/limiter.h"
 #include "server/build_info.h"
-#include "server/scene/scene.h"
+#include "tests/support/run_tool.h"
 #include "tests/tools/replay/replay.h"
 
 int main(int argc, char** argv) {
-  constexpr int kDone = 0;
-  constexpr int kFailed = 1;
-  constexpr int kWrongUsage = 2;
-
   std::string names;
   for (const tendon::LawInfo& law : tendon::laws()) names += (names.empty() ? "" : "|") + std::string(law.name);
 
@@ -57,12 +51,7 @@ int main(int argc, char** argv) {
       "  tendon-replay run.mcap --law aol --out both.png  what would the law of 2009 have permitted?\n"
       "\nExit: 0 done; 1 a step differs (it is named), or a file cannot be read or written; 2 wrong usage.");
 
-  const auto complain = [](const std::exception& error, int code) {
-    std::cerr << "tendon-replay: " << error.what() << (code == kWrongUsage ? " (see --help)\n" : "\n");
-    return code;
-  };
-  try {
-    app.parse(argc, argv);
+  return tendon::run_tool(app, argc, argv, [&] {
     options.recording = recording;
     options.more_parts.assign(parts.begin(), parts.end());
     options.files = files;
@@ -70,16 +59,7 @@ int main(int argc, char** argv) {
     if (!csv.empty()) options.csv = csv;
     if (!picture.empty()) options.picture = picture;
     options.progress = isatty(STDERR_FILENO) != 0;
-    return tendon::replay::replay(options, std::cout) ? kDone : kFailed;
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return complain(error, kWrongUsage);
-  } catch (const std::invalid_argument& error) {
-    return complain(error, kWrongUsage);
-  } catch (const tendon::SceneError& error) {
-    return complain(error, kWrongUsage);
-  } catch (const std::exception& error) {
-    return complain(error, kFailed);
-  }
+    constexpr int kDiffers = 1;
+    return tendon::replay::replay(options, std::cout) ? 0 : kDiffers;
+  });
 }

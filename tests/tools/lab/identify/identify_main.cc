@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-identify: the friction of a device from runs in which its force rises until it moves. Its command line.
 #include <CLI/CLI.hpp>
-#include <exception>
 #include <iostream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "server/build_info.h"
+#include "tests/support/run_tool.h"
 #include "tests/tools/lab/identify/identify.h"
 
 namespace tendon::lab {
 namespace {
-
-constexpr int kDone = 0;
-constexpr int kFailed = 1;
-constexpr int kWrongUsage = 2;
-
-int complain(const std::exception& error, int code) {
-  std::cerr << "tendon-identify: " << error.what() << (code == kWrongUsage ? " (see --help)\n" : "\n");
-  return code;
-}
 
 int main(int argc, char** argv) {
   CLI::App app("Viscous and Coulomb friction of a haptic device, as lower bounds for the limiter.", "tendon-identify");
@@ -61,24 +51,15 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "of the simulation's noise")->type_name("N");
   app.add_flag("--json", options.json, "one JSON object for each run and a last one for the result");
 
-  try {
-    app.parse(argc, argv);
+  return run_tool(app, argc, argv, [&] {
     options.files.assign(files.begin(), files.end());
     if (!profile.empty()) options.profile = profile;
     if (!friction.empty()) options.simulated_friction = Friction{.coulomb = friction[1], .viscous = friction[0]};
     if (*mass_option) options.mass = mass;
     if (*step_option) options.encoder_step = encoder_step;
     identify(options, std::cout);
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return complain(error, kWrongUsage);
-  } catch (const std::invalid_argument& error) {
-    return complain(error, kWrongUsage);
-  } catch (const std::exception& error) {
-    return complain(error, kFailed);
-  }
-  return kDone;
+    return 0;
+  });
 }
 
 }  // namespace
