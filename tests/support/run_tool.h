@@ -12,7 +12,7 @@ namespace tendon {
 
 /// How each tool ends: 0 done; 1 something failed; 2 wrong usage.
 ///
-/// Parses the command line and calls `body`, which returns the exit code. What is wrong is one line on stderr that begins
+/// Parses the command line and calls `body`, which returns the exit code. A complaint is one line on stderr that begins
 /// with the tool's name. A value or a scene that cannot be is wrong usage.
 template <class Body>
 int run_tool(CLI::App& app, int argc, char** argv, const Body& body) {
