@@ -22,7 +22,7 @@ namespace {
 /// Above the haptic thread, which waits for it.
 constexpr int kUsbPriority = kHapticPriority + 5;
 
-/// Tells the guardian which device to guard while one is open, and that there is none when it is closed.
+/// Tells the guardian which device to guard when a device opens, and to forget it when the device closes.
 std::function<void(int)> tell_guardian(Guardian& guardian, const Scene& scene, const Driver& driver) {
   static_assert(limits::kMaxDevices <= Guardian::kDevices);
   const ZeroPacket zero = ZeroPacket::usb(driver.out, std::as_bytes(std::span(driver.zero_packet)));

@@ -70,8 +70,8 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
     if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
   }
-  // The last force of a source that has gone may have lain in its box until now: it must not count as fresh. Releasing
-  // twice does no harm, because a source's number is never given again.
+  // The last force of a source that has gone may still lie in its box, and must not count as fresh. Releasing twice
+  // does no harm, because the number of a source is never used again.
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
 }
 
@@ -112,7 +112,7 @@ void HapticLoop::watch_device() noexcept {
 
 void HapticLoop::rearm() noexcept {
   controller_.rearm();
-  if (disarmed_) controller_.disarm();  // the device's doing, not the operator's
+  if (disarmed_) controller_.disarm();  // the device disarmed it, not the operator
   rearmed_ = true;
 }
 

@@ -74,7 +74,7 @@ std::string wait_for_the_end(const sigset_t& signals, double duration_s, Server&
   }
 }
 
-/// Of all devices together.
+/// The counts of all devices together.
 HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   HapticLoop::Stats sum;
   for (const auto& [name, haptic, safety, counts] : devices) {
@@ -87,7 +87,7 @@ HapticLoop::Stats total(const std::vector<Server::DeviceSummary>& devices) {
   return sum;
 }
 
-/// Of each device, with its channels.
+/// The counts of each device, with its channels.
 Json by_device(const Server::Summary& summary) {
   Json devices = Json::array();
   for (const auto& [name, haptic, safety, counts] : summary.devices) {
@@ -151,7 +151,7 @@ void print_json(const Server::Summary& summary) {
   add("replaced", network.replaced);
   add("roamed", network.roamed);
   add("half_open_forgotten", network.half_open_forgotten);
-  // What was dropped, and why.
+  // The dropped datagrams, by cause.
   add("malformed", network.malformed + network.hellos.malformed + network.dropped.malformed);
   add("unknown_connection", network.unknown_connection);
   add("retries", network.hellos.retries);
@@ -196,7 +196,7 @@ int run(const std::vector<Scene>& scenes, double duration_s, bool json) {
   // Every thread inherits this mask, so that signals come to sigwait only.
   const sigset_t signals = signals_to_end();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  // What ends a recording or closes a log must not end the device loop.
+  // A signal that ends a recording or closes a log must not end the device loop.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 
@@ -260,7 +260,7 @@ int list_devices(const OptionalPath& firmware, bool accept_unknown_firmware, boo
   }
 }
 
-/// What the command line says of the Falcon, in each scene that has one.
+/// Applies the command line's Falcon options to each scene that has a Falcon.
 void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool accept_unknown_firmware) {
   bool any = false;
   for (Scene& scene : scenes) {

@@ -51,7 +51,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
       admission_({.keys = config.keys.size(), .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id) {
   half_open_.reserve(config.max_half_open);
-  config_.secret = {};  // the doorman has what it needs of it
+  config_.secret = {};  // the doorman has taken what it needs
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
@@ -140,7 +140,7 @@ void NetworkLoop::greet(LocalTime now, const Address& from, std::span<const std:
   if (reply.size > 0) send(now, sender, from, std::span(answer).first(reply.size));
 }
 
-/// Where there are keys, only who has one is no stranger.
+/// With keys configured, a guest without a key is a stranger.
 DatagramSieve::Sender NetworkLoop::sender_of(const Doorman::Guest& guest) const {
   return guest.key != nullptr || config_.keys.empty() ? kGuest : kStranger;
 }
@@ -214,7 +214,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
   half_open_.push_back(std::move(arrived));
 }
 
-/// From here on the guest is one of ours.
+/// From here on the guest counts as connected.
 void NetworkLoop::open(LocalTime now, Guest guest) {
   // Somebody else may have come while it was half-open.
   if (const auto refusal = admission_.reason_to_refuse(guest.address, guest.key, guest.seats, devices_, guests_)) {
@@ -248,7 +248,7 @@ void NetworkLoop::open(LocalTime now, Guest guest) {
     const Guest* const holder = guest_of(guests_, leases_.holder(seat.device, seat.channel));
     if (holder == nullptr) {
       leases_.hold(now, seat.device, seat.channel, arrived);
-    } else if (arrived.can_lose) {  // news, when somebody has come while it was half-open
+    } else if (arrived.can_lose) {  // needed only when somebody has come while it was half-open
       arrived.session.request(LeaseLost{.device = seat.device, .channel = seat.channel, .to = holder->name});
     }
   }
@@ -266,7 +266,7 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
                     loser.name + "\"");
   const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = winner.name};
   if (loser.can_lose && loser.session.request(news)) return;
-  // It does not know the request, or does not answer.
+  // The guest does not know the request, or does not answer.
   loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");
   send_all(now, loser);
   ++stats_.replaced;
@@ -321,7 +321,7 @@ void NetworkLoop::publish(LocalTime now) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
-    // Engines ask for bounded forces; the device's loop may make an unbounded one of them, which no frame can carry.
+    // Engines ask for bounded forces, but their combination in the device's loop may exceed what a frame can carry.
     DeviceState diagnosed = *state;
     if (diagnosed.force_wanted && !(diagnosed.force_wanted->array().abs() <= limits::kMaxValue).all()) {
       diagnosed.force_wanted.reset();
@@ -355,7 +355,7 @@ void NetworkLoop::take_events(LocalTime now, Guest& guest) {
                      if (closed.code == Code::kTimedOut) ++stats_.timed_out;
                      leave(guest, closed.reason);
                    },
-                   [](const auto&) {},  // states and answers are not a server's to receive
+                   [](const auto&) {},  // a server receives no states and no answers
                },
                *event);
   }
@@ -414,8 +414,8 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   ++stats_.forces;
 }
 
-/// Notices what the session has refused of the guest's forces. Such a force names no channel, so it counts for all that
-/// the guest holds.
+/// Notices the forces that the session has refused. A refused force names no channel, so it counts for every channel
+/// that the guest holds.
 void NetworkLoop::take_refused(Guest& guest) {
   const RefusedForces& all = guest.session.stats().refused_forces;
   const auto take = [&](std::uint64_t RefusedForces::*count, Lateness::Cause cause) {
@@ -496,7 +496,7 @@ void NetworkLoop::send(LocalTime now, DatagramSieve::Sender partner, const Addre
   tap(now, DatagramRecord::Direction::kOut, partner, to, datagram, datagram.size());
 }
 
-/// Into the recording, unless the sieve leaves it out. `partner` is the one at the other end.
+/// Puts the datagram into the recording unless the sieve leaves it out. `partner` is the other end's address.
 void NetworkLoop::tap(LocalTime now, DatagramRecord::Direction direction, DatagramSieve::Sender partner,
                       const Address& peer, std::span<const std::byte> datagram, std::size_t size) {
   Mailboxes& mail = *devices_.front().mail;

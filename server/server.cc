@@ -24,7 +24,7 @@ namespace tendon {
 namespace {
 
 constexpr auto kLogPeriod = std::chrono::milliseconds(20);
-/// Trouble is told at most this often, with how much of it there was.
+/// Trouble is logged at most this often, with its count.
 constexpr auto kTellPeriod = std::chrono::seconds(1);
 
 DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
@@ -63,7 +63,7 @@ Safety on_the_wire(SafetyState state) noexcept {
   return static_cast<Safety>(static_cast<int>(state) + 1);
 }
 
-/// What the operator is told when a real device comes to this state.
+/// The operator's message when a real device enters this state.
 std::string describe(Device::State state, const Scene& scene) {
   switch (state) {
     case Device::State::kAbsent:
@@ -84,7 +84,7 @@ std::string describe(Device::State state, const Scene& scene) {
   return "unknown";
 }
 
-/// How far a counter has come since the last look at it.
+/// How far a counter has risen since it was last read.
 std::uint64_t news(const std::atomic<std::uint64_t>& counter, std::uint64_t& told) {
   const std::uint64_t now = counter.load(std::memory_order_relaxed);
   return now - std::exchange(told, now);
@@ -179,7 +179,7 @@ Server::Server(const std::vector<Scene>& scenes)
       link_(scenes.front().network.listen, scenes.front().network.keys ? Reach::kAnywhere : Reach::kThisMachine),
       network_(network_config(devices_), link_, mail_of(devices_)),
       tell_next_(started_ + kTellPeriod) {
-  recorder_ = recorder_of(scenes, started_);  // last: what is refused before leaves no file behind
+  recorder_ = recorder_of(scenes, started_);  // last, so that a refusal before it leaves no file behind
 }
 
 std::optional<std::filesystem::path> Server::recording() const {
@@ -285,7 +285,7 @@ void Server::run_log() {
   name_thread("log");
   bool last = false;
   while (!last) {
-    // What was pushed before this flag was set is drained below: nothing is left behind.
+    // Everything pushed before this flag was set is drained below, so nothing is lost.
     last = stop_log_.load(std::memory_order_acquire);
     const LocalTime now = clock::now();
     drain_to_recorder(now);
@@ -330,7 +330,7 @@ void Server::drain_to_recorder(LocalTime now) {
   tell_of_recording();
 }
 
-/// What the network thread has left out of the recording since the last call.
+/// Records how much the network thread has left out of the recording since the last call.
 void Server::record_left_out(LocalTime now) {
   if (!recorder_) return;
   Mailboxes& mail = devices_.front()->mail;
@@ -349,7 +349,7 @@ void Server::tell_of_recording() {
   recording_stopped_ = !recorder_->status().error.empty();
 }
 
-/// To the network thread, for observers that ask.
+/// Hands the device's health to the network thread, for observers that ask.
 void Server::report_health(LocalTime now, DeviceRuntime& runtime) {
   Health health = runtime.meter.counted();
   health.at = now;
@@ -383,7 +383,7 @@ void Server::report_safety(DeviceRuntime& runtime) {
   runtime.told_safety = now;
 }
 
-/// The counters of its driver that mean trouble, when they have risen.
+/// Logs each of the driver's trouble counters that has risen.
 void Server::report_counts(DeviceRuntime& runtime) {
   const DeviceCounts now = runtime.device->counts();
   const DeviceCounts before = std::exchange(runtime.told_counts, now);
@@ -405,8 +405,8 @@ void Server::report_trouble(DeviceRuntime& runtime) {
               " µs");
   }
   if (now.device != runtime.told.device) log::info(prefix(runtime) + describe(now.device, runtime.scene));
-  // Each fault freezes it once, and saving thaws it: the controller's, and the safety layer's, which report_safety
-  // names.
+  // Each fault of the controller or of the safety layer freezes the flight recorder once, and saving thaws it.
+  // report_safety names the faults of the safety layer.
   if (runtime.mail.flight.frozen()) {
     if (now.fault != HapticController::Fault::kNone) {
       log::error(prefix(runtime) + "fault: " + describe(now.fault) + "; force is zero until a controller rearms");

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr std::size_t kWakeUps = 1000;
 
-/// The text of a small file, without white space at its end; empty when there is none, or none to read.
+/// The text of a small file without trailing white space; empty when the file is missing or cannot be read.
 std::string text_of(const fs::path& file) {
   std::ifstream stream(file);
   std::string text(std::istreambuf_iterator<char>(stream), {});
@@ -43,7 +43,7 @@ std::optional<std::int64_t> number_of(const std::string& text) {
   return number;
 }
 
-/// The word after the first line's beginning `start`: of "key value" and "key=value" files.
+/// The word that follows `start` on the first line that begins with it, in a "key value" or "key=value" file.
 std::string value_after(const std::string& text, std::string_view start) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -130,9 +130,9 @@ Finding isolation(const fs::path& root) {
   return {"isolated_cpus", isolated + (some ? ", without tick " + without_tick : ""), ""};
 }
 
-/// How long the deepest sleep takes to wake from, which a server may forbid for as long as it runs.
+/// How long the processor takes to wake from its deepest sleep. A server may forbid that sleep while it runs.
 Finding sleep(const fs::path& root) {
-  constexpr std::int64_t kNoticed = 20;  // µs: what a thread on an ordinary kernel wakes late anyway
+  constexpr std::int64_t kNoticed = 20;  // µs: an ordinary kernel wakes a thread this late anyway
   std::optional<std::int64_t> deepest;
   std::error_code none;
   for (const auto& state : fs::directory_iterator(root / "sys/devices/system/cpu/cpu0/cpuidle", none)) {
@@ -194,7 +194,7 @@ Diagnosis::WakeUps measure_wake_ups(const WakeUpClock& clock, Duration period, s
     clock.sleep_until(due);
     const LocalTime now = clock.now();
     one = now - due;
-    due = std::max(due, now - period);  // after a pause not one wake-up for each period of it
+    due = std::max(due, now - period);  // after a pause, do not catch up on the missed wake-ups
   }
   std::sort(late.begin(), late.end());
   return {count, late[count / 2], late[count * 99 / 100], late.back()};

@@ -18,14 +18,14 @@
 namespace tendon {
 namespace {
 
-constexpr int kSteps = 200;     ///< of a round
-constexpr int kSamples = 2000;  ///< that stand in for the device
+constexpr int kSteps = 200;     ///< steps in one round
+constexpr int kSamples = 2000;  ///< recorded samples that stand in for the device
 
-/// Something that a scene lists or does not.
+/// A part that a scene may list.
 struct Listable {
   std::string key;
   std::string_view what;
-  std::function<bool(Scene&)> drop;  ///< takes it out of the scene; whether it was there
+  std::function<bool(Scene&)> drop;  ///< takes it out of the scene; true if it was there
 };
 
 template <class T>
@@ -35,7 +35,7 @@ bool drop(std::optional<T>& part) {
   return there;
 }
 
-/// A test holds this list against the scenes' reference: a part that is declared there and not here is found.
+/// A test compares this list with the scenes' reference and fails when a part declared there is missing here.
 std::vector<Listable> make_listables() {
   std::vector<Listable> list;
   const auto add = [&list](std::string key, std::string_view what, std::function<bool(Scene&)> drop_it) {
@@ -104,7 +104,7 @@ const std::vector<Listable>& listables() {
   return kList;
 }
 
-/// Keeps what another device gives.
+/// Records the samples that another device gives.
 class Tape final : public Device {
  public:
   Tape(const SimulatedDevice::Config& config, std::vector<PositionSample>& samples)
@@ -123,7 +123,7 @@ class Tape final : public Device {
   std::vector<PositionSample>& samples_;
 };
 
-/// A device that costs next to nothing: gives what another one has given, to and fro for ever, and takes every force.
+/// A device that costs next to nothing: plays recorded samples forwards and backwards for ever; takes every force.
 class Playback final : public Device {
  public:
   Playback(DeviceInfo info, std::vector<PositionSample> samples)
@@ -154,7 +154,7 @@ class Trial {
         period_(scene.loop.period) {}
   explicit Trial(const Scene& scene) : Trial(scene, std::make_unique<SimulatedDevice>(scene.simulated())) {}
 
-  /// ns of a step, mean of kSteps.
+  /// Duration of one step in ns, averaged over kSteps.
   double steps(const std::function<Duration()>& processor_time) {
     const Duration before = processor_time();
     for (int i = 0; i < kSteps; ++i) {
@@ -171,7 +171,7 @@ class Trial {
 
   static double per_step(Duration total) { return static_cast<double>(total.count()) / kSteps; }
 
-  /// Armed as soon as may be: what is to be measured is what its parts cost at work.
+  /// Arms the device as soon as it can, so that the parts are measured at work.
   static std::unique_ptr<SafeDevice> made_safe(const Scene& scene, Device& device) {
     if (!scene.safety) return nullptr;
     SafeDevice::Config config = *scene.safety;
@@ -212,7 +212,8 @@ std::unique_ptr<Device> playback_of(const Scene& scene) {
   return std::make_unique<Playback>(SimulatedDevice(scene.simulated()).info(), std::move(samples));
 }
 
-/// The least of several measurements, and how far it can be trusted: what the odd ones and the even ones differ by.
+/// The least of several measurements, and its uncertainty: the difference between the least of the odd measurements
+/// and the least of the even ones.
 class Least {
  public:
   void add(double value) {
@@ -244,7 +245,8 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
   Explanation out;
   Scene scene = listed;
   scene.device = listed.simulated();
-  // The whole scene, the same again, the same with a device that costs nothing, and one without each part it lists.
+  // The whole scene; the same scene again; the same with a device that costs nothing; then one scene for each listed
+  // part, without that part.
   std::vector<std::unique_ptr<Trial>> trials;
   trials.push_back(std::make_unique<Trial>(scene));
   trials.push_back(std::make_unique<Trial>(scene));

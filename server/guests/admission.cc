@@ -9,7 +9,7 @@ namespace tendon {
 
 namespace {
 
-/// What this server can do beyond the version's minimum.
+/// The features that this server supports beyond the version's minimum.
 constexpr std::array<std::string_view, 3> kFeatures = {kFeatureLocalModel, kFeatureChannels, kFeatureDiagnostics};
 
 std::vector<std::string> in_common(const std::vector<std::string>& offered, Role role) {
@@ -30,7 +30,7 @@ bool may(const ClientKey* key, Role role) {
 const std::string& name_of(const ServedDevice& device) { return device.about.name; }
 const std::string& name_of(const ChannelDescription& channel) { return channel.name; }
 
-/// The place of the one of that name; the first, when none is named.
+/// The index of the entry with that name; the first entry when the name is empty.
 template <class Named>
 std::optional<std::uint32_t> place_of(const std::vector<Named>& all, const std::string& name) {
   if (name.empty()) return 0;
@@ -112,14 +112,14 @@ std::optional<Refusal> Admission::reason_to_refuse(const Address& from, const Cl
   }
   if (!controls && config_.keys > 1) {
     const std::size_t of_key = count([&](const Guest& guest) { return observes(guest) && guest.key == key; });
-    // Half of the places, at least one: no key can keep all the others out.
+    // One key gets at most half of the places (at least one), so that it cannot keep all the others out.
     if (of_key >= std::max<std::size_t>((config_.max_observers + 1) / 2, 1)) {
       return Refusal{Code::kBusy, "the key \"" + key->name + "\" has " + std::to_string(of_key) + " observers already"};
     }
   }
   std::size_t channels = 0;
   for (const ServedDevice& device : devices) channels += device.channels.size();
-  // A controller that waits for a lease is no observer, and costs as many states as one.
+  // A controller that waits for a lease does not count as an observer, but it costs as many states as one.
   const std::size_t all = count([](const Guest&) { return true; });
   if (all >= config_.max_observers + channels) {
     return Refusal{Code::kBusy, "there are " + std::to_string(all) + " guests already"};

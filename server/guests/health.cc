@@ -42,12 +42,12 @@ DeviceReport report(const Health& before, const Health& now) {
     if (true_now) report.degraded += (report.degraded.empty() ? "" : "; ") + std::string(words);
   };
   const auto counted = std::accumulate(report.lateness.begin(), report.lateness.end(), std::uint64_t{0});
-  // Short, because the sentences have to fit (limits::kMaxDetail).
+  // Short, so that the sentences fit (limits::kMaxDetail).
   say(now.not_realtime, "no real time");
   say(counted < report.steps, "the log thread does not follow");
   say(now.recording_ended, "recording has stopped");
   say(now.unsent > before.unsent, "unsent datagrams");
-  // Harder than limiter.bounded_acceleration allows.
+  // The hand accelerated more than limiter.bounded_acceleration allows.
   say(now.broken_assumptions > before.broken_assumptions, "accelerates too hard");
   const auto worst = std::ranges::find_if(kDeviceCounters, [&](const DeviceCounter& row) {
     return !row.degraded.empty() && now.device[row.count] > before.device[row.count];

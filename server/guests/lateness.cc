@@ -17,7 +17,7 @@ void track_median(Duration& median, Duration sample) noexcept {
 
 std::string milliseconds_text(Duration d) {
   const std::int64_t tenths = d.count() / 100'000;
-  // Above 10 ms nobody reads the tenth.
+  // Above 10 ms a tenth of a millisecond does not matter.
   if (tenths >= 100) return std::to_string(tenths / 10) + " ms";
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ms";
 }

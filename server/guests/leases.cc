@@ -13,8 +13,8 @@ void Leases::hold(LocalTime now, std::uint32_t device, std::uint32_t channel, co
 void Leases::give(std::uint32_t device, std::uint32_t channel, std::uint32_t guest) {
   ServedChannel& held = devices_[device].channels[channel];
   if (held.holder != guest) return;
-  // A full ring means that 16 orders wait: the haptic thread stands still, and the force's age does the same a little
-  // later.
+  // A full ring means that 16 orders wait because the haptic thread stands still. The age of the force then has the
+  // same effect a little later.
   devices_[device].mail->orders.try_push({HapticOrder::Kind::kRelease, channel, guest});
   held.holder = 0;
   held.lateness.end();

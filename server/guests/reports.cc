@@ -23,7 +23,7 @@ void tell_observers(std::uint32_t device, const Report& report, std::vector<Gues
   }
 }
 
-/// Of a device about which the log thread has said nothing new, there is nothing to tell.
+/// Skips a device whose health the log thread has not renewed.
 void tell_of_devices(std::vector<ServedDevice>& devices, std::vector<Guest>& guests) {
   for (ServedDevice& device : devices) {
     const Health* const health = device.mail->health.take();

@@ -79,8 +79,8 @@ Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /
 /// Who may ask.
 enum class From : std::uint8_t {
   kAnybody,
-  kControllers,  ///< of the request's device: those who have claimed a channel of it, whoever holds that now
-  kClaimants,    ///< of the request's channel, as controllers
+  kControllers,  ///< clients that have claimed a channel of the request's device, whoever holds it now
+  kClaimants,    ///< clients that have claimed the request's channel as controllers
 };
 
 struct Row {

@@ -17,7 +17,7 @@ namespace tendon {
 
 namespace {
 
-// Faults in the part of the stack that the loop will use, so that it never does so in a step.
+// Touches the part of the stack that the loop will use, so that no step causes a page fault.
 void touch_stack() {
   constexpr std::size_t kBytes = 128 * 1024;
   constexpr std::size_t kPage = 4096;

@@ -20,7 +20,7 @@ namespace {
 
 using asio::ip::udp;
 
-/// What we ask of the kernel for datagrams that nobody has read yet. The virtual machines we tested
+/// Size of the kernel's buffer for datagrams that nobody has read yet. The virtual machines we tested
 /// on pause for up to 36 ms; ten clients at 1 kHz send 360 datagrams in that time, and the kernel
 /// books up to 2.3 kB for each. The system grants at most net.core.rmem_max, without an error.
 constexpr int kReceiveBufferBytes = 1 << 20;
@@ -76,7 +76,7 @@ void UdpLink::send(const Address& to, std::span<const std::byte> datagram) {
 }
 
 std::size_t UdpLink::receive(Address& from, std::span<std::byte> buffer) {
-  // Not through Asio: it has no way to tell the full size of a datagram that was cut.
+  // Asio cannot tell the full size of a truncated datagram, so this calls the system directly.
   udp::endpoint endpoint;
   for (int i = 0; i < kMaxEmptyDatagrams; ++i) {
     auto length = static_cast<socklen_t>(endpoint.capacity());

@@ -25,7 +25,7 @@ bool MemorySink::append(std::span<const std::byte> bytes) {
   return true;
 }
 
-/// Opens a file to which nobody has written yet. Below 0: there is something in it, or another sink writes to it.
+/// Opens a file that is still empty. Returns a value below 0 when it has content or another sink writes to it.
 FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   const auto fail = [&path](const std::string& why) {
     throw std::runtime_error("cannot write recording " + path.string() + ": " + why);
@@ -48,7 +48,7 @@ FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   if (descriptor < 0) fail(reason(error));
   if (!known) give_up(reason(errno));
   if (S_ISCHR(status.st_mode)) return {descriptor, false};
-  // Looked at again once it is ours: another sink may have written to it meanwhile.
+  // Checked again once the file is ours: another sink may have written to it meanwhile.
   const bool busy = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
   if (!busy && ::fstat(descriptor, &status) == 0 && status.st_size == 0) return {descriptor, true};
   ::close(descriptor);

@@ -136,7 +136,7 @@ bool McapReader::next_record() {
   return true;
 }
 
-/// At the footer: what must be true of a whole file.
+/// At the footer: checks what holds for every complete file.
 void McapReader::check_end() {
   finished_ = true;
   Fields footer(*this, content_);

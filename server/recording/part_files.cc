@@ -57,7 +57,7 @@ struct Part {
   std::uint64_t bytes;
 };
 
-/// The regular files that have the name of a part; none where the folder cannot be read.
+/// The regular files that have the name of a part; none when the folder cannot be read.
 std::vector<Part> parts_of(const fs::path& path) {
   std::vector<Part> parts;
   std::error_code error;
@@ -72,7 +72,7 @@ std::vector<Part> parts_of(const fs::path& path) {
   return parts;
 }
 
-/// Whether an existing file is a recording, or the beginning of one. Where it cannot be read it counts as one.
+/// Whether an existing file is a recording or the beginning of one. An unreadable file counts as one.
 bool looks_like_a_recording(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return true;
@@ -83,7 +83,7 @@ bool looks_like_a_recording(const fs::path& path) {
                     [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
 }
 
-/// Whether its Scene says that it may be deleted for a budget.
+/// Whether the file's Scene says that the file may be deleted to keep a budget.
 bool has_a_budget(const fs::path& path) {
   try {
     RecordingReader reader(path);
@@ -95,7 +95,7 @@ bool has_a_budget(const fs::path& path) {
   }
 }
 
-/// Whether a server still writes to it.
+/// Whether a server still writes to the file.
 bool is_in_use(const fs::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return true;

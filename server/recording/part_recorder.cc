@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostChunks = 65'536;
 
-/// Longer than its file's share by its last chunk and its index: some of the budget is kept for these.
+/// A part exceeds its share by its last chunk and its index; some of the budget is kept for these.
 std::uint64_t part_of_budget(std::uint64_t budget) { return budget / 4 - budget / 32; }
 
 std::string count_of(std::uint64_t steps, std::uint64_t datagrams) {
@@ -92,7 +92,7 @@ PartRecorder::Status PartRecorder::status() const {
 
 std::vector<PartRecorder::Notice> PartRecorder::take_notices() { return std::exchange(notices_, {}); }
 
-/// False: it could not be written to, and recording has stopped.
+/// False: the file could not be written, and recording has stopped.
 bool PartRecorder::open_part(LocalTime now) {
   if (config_.budget_bytes > 0) {
     for (const auto& gone : delete_oldest_parts(config_.path, config_.budget_bytes - config_.budget_bytes / 4)) {
@@ -132,7 +132,7 @@ void PartRecorder::look_after(LocalTime now) {
   }
 }
 
-/// Takes the open part's account, whatever has become of it.
+/// Adds the open part's counts to the totals, even when the part has failed.
 void PartRecorder::finish_part() {
   const Recorder::Status part = recorder_->status();
   closed_.bytes += part.bytes;
@@ -141,7 +141,7 @@ void PartRecorder::finish_part() {
   missing_.steps += part.lost_steps - told_.steps;
   missing_.datagrams += part.lost_datagrams - told_.datagrams;
   recorder_.reset();
-  // Not even its scene could be written: no such file.
+  // Not even the scene could be written: the file is removed.
   const bool empty = sink_->is_file() && sink_->size() == 0;
   std::error_code ignored;
   if (empty) std::filesystem::remove(sink_->path(), ignored);

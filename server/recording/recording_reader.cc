@@ -51,7 +51,7 @@ std::optional<RecordingReader::Record> RecordingReader::next() {
   return std::nullopt;
 }
 
-/// At the end: a file that has channels, or is whole, must be a recording of ours.
+/// At the end: a file that has channels, or is complete, must be a recording of Tendon.
 void RecordingReader::check_ours() const {
   const auto& channels = mcap_.channels();
   if (channels.empty() && mcap_.truncated()) return;

@@ -23,7 +23,7 @@ struct UsbPort {
   static std::string expected(const Unit&) { return "a port as `tendond devices` names it, like \"1-2.3\""; }
 
   static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
-    constexpr std::size_t kLongestPort = 32;  // 7 tiers of hubs are the most there can be
+    constexpr std::size_t kLongestPort = 32;  // USB allows at most 7 tiers of hubs
     const auto* text = node.as_string();
     const auto in_a_port = [](char c) { return (c >= '0' && c <= '9') || c == '-' || c == '.'; };
     const bool good = text != nullptr && !(*text)->empty() && (*text)->size() <= kLongestPort &&

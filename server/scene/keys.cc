@@ -167,7 +167,7 @@ Names<OutputEstimator::Model> estimator_models() {
   return {{{"polynomial", kPolynomial}, {"spring-and-bias", kSpringAndBias}, {"output-error", kOutputError}}};
 }
 
-/// How the force follows the hand between two arrivals, when not by the engine's own model. One table or none.
+/// How the force follows the hand between two arrivals without the engine's own model. At most one table.
 template <class Table>
 void declare_between(Table& force, HeldForce::Config& hold) {
   force.part("adaptive_local_model", hold.adaptive_local_model, [](Table& keys, AdaptiveLocalModel::Config& config) {
@@ -191,7 +191,7 @@ void declare_between(Table& force, HeldForce::Config& hold) {
   });
 }
 
-/// The keys of some laws only.
+/// The keys that only some laws have.
 template <class Table>
 void declare_law(Table& limiter, Draft& draft) {
   LimiterConfig& config = draft.scene.loop.control.limiter;
@@ -224,9 +224,9 @@ void declare_law(Table& limiter, Draft& draft) {
 /// 250 Hz to 10 kHz. At 250 Hz the stiffest wall that felt clean was 0.325 N/mm (Choi and Tan, IROS 2004); 100 µs is
 /// about what an ordinary kernel wakes a thread too late.
 constexpr Number kPeriod{.least = 100, .most = 4000};
-/// What fits into the kernel's set.
+/// The CPU numbers that fit into the kernel's set.
 constexpr Count kProcessor{1023};
-/// The wire tells timeouts in whole ms.
+/// The wire carries timeouts in whole ms.
 constexpr Number kTimeout{.least = 1, .most = limits::kMaxTimeout / std::chrono::milliseconds(1)};
 /// Each costs 250 bytes per haptic step: 1000 are 2 Gbit/s at 1 kHz.
 constexpr Count kObservers{1000};

@@ -28,7 +28,7 @@ toml::table parse_toml(std::string_view text, const std::string& name) {
   }
 }
 
-/// "TABLE.KEY=VALUE" → the table's key has that value; "TABLE.KEY=" → it is not there.
+/// "TABLE.KEY=VALUE" sets the table's key to that value; "TABLE.KEY=" removes the key.
 void apply_setting(toml::table& file, const std::string& setting) {
   const auto refuse = [&setting](const std::string& why) {
     throw SceneError("setting " + scene_file::in_quotes(setting) + ": " + why);
@@ -61,7 +61,7 @@ void apply_setting(toml::table& file, const std::string& setting) {
   }
 }
 
-/// With all digits of each number.
+/// Writes each number with all its digits.
 std::string text_of(const toml::table& file) {
   std::ostringstream text;
   text << toml::toml_formatter(file, toml::toml_formatter::default_flags & ~toml::format_flags::indentation) << '\n';

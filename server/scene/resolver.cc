@@ -25,9 +25,9 @@
 namespace tendon::scene_file {
 namespace {
 
-/// N. Bounds the forces of engines that nobody feels; large enough that recordings hold them as they came.
+/// N. Bounds engines' forces on a device that renders none; large enough that recordings hold them unchanged.
 constexpr double kUnfelt = 10;
-/// After so long without a reading it is a fault; libfranka allows the same.
+/// Silence of a device for this long is a fault; libfranka allows the same.
 constexpr Duration kMostMissed = std::chrono::milliseconds(20);
 
 /// Turns a draft into a scene: settles the values that depend on several keys.
@@ -63,8 +63,8 @@ class SceneResolver {
   }
 
  private:
-  /// Throws. The line is that of the first of `places` that the file has; if it has none, that of the innermost table
-  /// around the key.
+  /// Throws. The message names the line of the first of `places` that the file has; without one, the line of the
+  /// innermost table around the key.
   [[noreturn]] void blame(std::string_view key, std::initializer_list<std::string_view> places,
                           const std::string& sentence) const {
     Place place;
@@ -282,7 +282,7 @@ class SceneResolver {
     resolve_places(control);
   }
 
-  /// The bounds by place may not be above the true friction either.
+  /// The bounds by place must not exceed the true friction either.
   void resolve_places(HapticController::Config& control) const {
     if (!control.limiter.parts.adaptive_friction) return;
     const std::string table = "limiter.adaptive_friction";
@@ -302,7 +302,7 @@ class SceneResolver {
       }
     };
     if (!draft_.scene.driver().moves_a_hand &&
-        draft_.scene.driver().exerts_force) {  // whose true friction nobody knows here
+        draft_.scene.driver().exerts_force) {  // its true friction is not known here
       check("coulomb_friction_n", draft_.place_coulomb, &Friction::coulomb);
       check("viscous_friction_n_s_per_m", draft_.place_viscous, &Friction::viscous);
     }

@@ -7,7 +7,7 @@
 namespace tendon {
 namespace {
 
-/// Found by its argument: a member function has the same name.
+/// Calls the free function `driver`, which a member function of the same name would hide.
 template <class Device>
 const Driver& row_of(const Device& device) {
   return driver(device);
