@@ -25,8 +25,8 @@ class Client(AnyClient):
             async for hand in client.states():
                 client.send(hand, force)
 
-    The session is kept alive for as long as the event loop turns. One task at a time asks for states. Making a client
-    looks a host name up, and waits for that.
+    The session stays alive as long as the event loop runs. Only one task at a time may ask for states. The
+    constructor looks the host name up, and blocks meanwhile.
     """
 
     def __init__(self, server: str, config: Config = Config()) -> None:
@@ -48,13 +48,13 @@ class Client(AnyClient):
             state = core.next_state(now)
             if state is not None:
                 yield state
-                await asyncio.sleep(0)  # however fast states come, the other tasks get their turn
+                await asyncio.sleep(0)  # the other tasks get their turn, however fast states come
             else:
                 await self._wait_until(min(core.next_state_due(), end))
             now = time.monotonic_ns()
 
     async def drive(self, physics: Physics, duration_s: float | None = None) -> None:
-        """Answers every state with what `physics` makes of it. Raises RefusedForGood, and what `physics` raises."""
+        """Answers every state with the result of `physics`. Raises RefusedForGood, and whatever `physics` raises."""
         async for hand in self.states(duration_s):
             self.send(hand, await physics(hand))
 
@@ -78,14 +78,14 @@ class Client(AnyClient):
         loop.add_reader(new, self._turn)
 
     def _turn(self) -> None:
-        """Whenever something has come in or is due, whoever waits for a state looks for himself."""
+        """Runs when something has come in or is due, and wakes the task that waits for a state."""
         self._guest.turn(time.monotonic_ns())
         if self._waiter is not None and not self._waiter.done():
             self._waiter.set_result(None)
         self._set_timer()
 
     async def _wait_until(self, instant: Instant) -> None:
-        """Until then, or until something happens."""
+        """Waits until `instant`, or until something happens."""
         self._wake_at = instant
         self._waiter = asyncio.get_running_loop().create_future()
         self._set_timer()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a session's datagrams are wrapped in: nothing (suite 0), or ChaCha20-Poly1305 with keys that are renewed (suite 1)."""
+"""Protects a session's datagrams: not at all (suite 0), or by ChaCha20-Poly1305 with renewed keys (suite 1)."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from .codec import Suite
 RENEW_AFTER_DATAGRAMS = 1 << 20
 RENEW_AFTER_NS = 600_000_000_000
 OVERLAP_NS = 2_000_000_000
-"""For so long after the peer has renewed its key, datagrams under the one before are still opened."""
+"""How long datagrams under the previous key are still opened after the peer has renewed its key."""
 
 
 class Forged(Exception):
-    """Not sealed with the key of its epoch: forged, or damaged under way."""
+    """The datagram is not sealed with the key of its epoch: it is forged, or damaged in transit."""
 
 
 class OldKey(Exception):
-    """Of an epoch whose key we do not hold: over, or more than one ahead."""
+    """We do not hold the key of the datagram's epoch: it has expired, or is more than one ahead."""
 
 
 class Cipher(Protocol):
     suite: Suite
     overhead: int
-    """Bytes that `seal` adds."""
+    """Number of bytes that `seal` adds."""
 
     def next_epoch(self, now: int) -> int:
-        """Key epoch of the next datagram to be sealed; renews the key when it is time."""
+        """Key epoch of the next datagram to be sealed; renews the key when that is due."""
 
     def seal(self, number: int, header: bytes, body: bytes) -> bytes:
-        """The body as it travels."""
+        """The body in the form in which it is sent."""
 
     def open(self, now: int, epoch: int, number: int, header: bytes, body: bytes) -> bytes:
         """The body in the clear. Raises Forged or OldKey."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line that all guests share, and run(), which is all that a program of one callback needs."""
+"""The command line that all guests share, and run(), the main function of a program with one callback."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def _key(text: str) -> bytes:
 
 
 def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.ArgumentParser:
-    """--server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json and --help; add what your program has
-    besides."""
+    """--server, --key, --device, --channel, --take-lease, --rate-hz, --duration-s, --json and --help.
+    Add the options of your program."""
     example = f"Example: {name} --server 127.0.0.1:47100 --duration-s 10"
     line = argparse.ArgumentParser(name, description=purpose, epilog=example)
     line.add_argument(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plain client: one thread, which waits."""
+"""The blocking client: one thread, which waits for states."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Client(AnyClient):
             for hand in client.states():
                 client.send(hand, force)
 
-    The server may start later or be restarted: the client finds it again, with a back-off, and logs what
-    happens ("tendon" of `logging`). It keeps the session alive only while it is asked for states: an engine
-    that computes for 2 s between two states is taken for dead. (`tendon.aio` has no such limit.)
+    The server may start later or be restarted: the client reconnects, with a back-off, and logs what
+    happens ("tendon" of `logging`). It keeps the session alive only while it is asked for states: the server
+    takes an engine that computes for 2 s between two states for dead. (`tendon.aio` has no such limit.)
     """
 
     def states(self, duration_s: float | None = None) -> Iterator[DeviceState]:
@@ -50,7 +50,7 @@ class Client(AnyClient):
             now = time.monotonic_ns()
 
     def drive(self, physics: Physics, duration_s: float | None = None) -> None:
-        """Answers every state with what `physics` makes of it. Raises RefusedForGood, and what `physics` raises."""
+        """Answers every state with the result of `physics`. Raises RefusedForGood, and whatever `physics` raises."""
         for hand in self.states(duration_s):
             self.send(hand, physics(hand))
 

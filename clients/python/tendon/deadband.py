@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What need not be sent: forces that a hand cannot tell apart, and states that their receiver can foretell (SESSION.md)."""
+"""Deadbands drop forces that a hand cannot tell apart, and states that their receiver can predict (SESSION.md)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class ForceDeadband:
     share: float = 0.10
     """0 … 1; the just noticeable difference of force is 7 to 15 %."""
     floor: float = 0.05
-    """N: below it everything counts as nothing."""
+    """N: a smaller change is never sent."""
     longest_silence_s: float = 0.02
-    """So that a force that was lost does not stay wrong."""
+    """Bounds how long the device renders an old force after a loss."""
 
     def __post_init__(self) -> None:
         expect(0 <= self.share <= 1, "deadband.share", self.share, "0 to 1")
@@ -29,7 +29,7 @@ class ForceDeadband:
 
 
 class Deadband:
-    """Of one session."""
+    """The deadband of forces in one session."""
 
     def __init__(self, config: ForceDeadband) -> None:
         self._config = config
@@ -47,7 +47,7 @@ class Deadband:
 
 
 def foretell(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceState:
-    """Where the device is `later_ns` after `sent`, on the line that it was on, in whole haptic periods."""
+    """The device's position `later_ns` after `sent` at constant velocity, in whole haptic periods."""
     periods = max(later_ns // haptic_period_ns, 0)
     time_s = periods * haptic_period_ns / 1e9
     x, y, z = (at + speed * time_s for at, speed in zip(sent.position, sent.velocity))
@@ -57,7 +57,7 @@ def foretell(sent: DeviceState, later_ns: int, haptic_period_ns: int) -> DeviceS
 
 
 def check_state_deadband(asked: SetStateDeadband) -> None:
-    """Raises ValueError when no server grants it."""
+    """Raises ValueError when no server grants this deadband."""
     if asked.max_silence_us == 0:
         return
     expect(0 <= asked.share <= 0.5, "state_deadband.share", asked.share, "0 to 0.5")

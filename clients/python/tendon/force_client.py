@@ -67,7 +67,7 @@ _MIN_VALID_FOR_NS = 20_000_000
 _MAX_OBSERVED_PERIOD_NS = 100_000_000
 
 _ASK_LEASE_AGAIN_NS = 50_000_000
-"""A lease is asked for again when it may be over, but not at a higher rate than this: the holder renews it all the time."""
+"""Shortest time between two requests for a lease that may be over: its holder renews it all the time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,13 +158,13 @@ class Stats:
     attempts: int = 0
     sessions: int = 0  # of these, answered with a Welcome
     states: int = 0  # states that came in
-    states_foretold: int = 0  # handed out without that they came in
-    states_skipped: int = 0  # of these that came in, replaced by a newer one before they were due
+    states_foretold: int = 0  # predicted and handed out
+    states_skipped: int = 0  # states that came in and were replaced by a newer one before they were due
     forces: int = 0  # forces sent
     forces_unusable: int = 0  # forces not sent: not finite, out of bounds, or to a state that did not come
     unusable: str = ""  # what was wrong with the newest of them; empty: none
-    forces_alike: int = 0  # forces not sent: a hand could not have told them from the one before
-    lease_lost_to: str = ""  # name of the one that has taken the channel from us; empty: nobody
+    forces_alike: int = 0  # forces not sent: a hand could not tell them from the one before
+    lease_lost_to: str = ""  # name of the client that has taken the channel from us; empty: nobody
 
 
 _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
@@ -172,7 +172,7 @@ _WAITING = (Phase.UNANSWERED, Phase.REFUSED, Phase.LOST)
 
 class ForceClient:
     """Use: `receive` what arrives; then, and whenever `next_turn()` is due, `tick`, and send what
-    `next_datagram` gives until it is None. When `next_state` gives one, `send` what the physics says to it.
+    `next_datagram` gives until it is None. When `next_state` gives a state, `send` the answer of the physics.
 
     Instants are nanoseconds of a monotonic clock; `now` never goes back.
     """
@@ -180,24 +180,24 @@ class ForceClient:
     def __init__(self, config: Config, now: int, random: Callable[[int], bytes] = os.urandom) -> None:
         """`random(n)`: n bytes from a cryptographic source. The first Hello is due at once."""
         self.welcome: Welcome | None = None
-        """What the server said of itself and its device when the newest session opened."""
+        """The server's description of itself and its device at the opening of the newest session."""
         self.description: DeviceDescription | None = None
         """Description of the device, once we have named a device or a channel and the server has answered."""
         self.holds = False
         """Whether the channel takes our forces. While it does not, a controller is handed no states."""
         self.report: LinkReport | None = None
-        """The server's newest word on how our forces fare, once a second while they come. Of the present session."""
+        """The server's newest report on our forces in the present session; one comes each second while forces come."""
         self.device_report: DeviceReport | None = None
-        """With Config.diagnostics, the newest word on how the device's loop does. Of the present session."""
+        """With Config.diagnostics, the newest report on the device's loop in the present session."""
         self.peer_reports: dict[int, PeerReport] = {}
-        """… and by channel on the engine that it has, or had last."""
+        """With Config.diagnostics, the newest report on the engine of each channel, even one that has gone."""
         self.config = config
         self._random = random
         self._period = _ns(1 / config.rate_hz) if config.rate_hz > 0 else 0
         self._stats = Stats()
         self._handshake: ClientHandshake | None = None
         self._session: Session | None = None
-        self._ended: Session | None = None  # the last one, while it has a Bye to say
+        self._ended: Session | None = None  # the previous session while it still has a Bye to send
         self._place = Grant(config.role)  # the numbers of our device and channel
         self._asked_lease: int | None = None  # the request that waits for its answer
         self._ask_lease: Instant = NEVER  # when to ask (again)
@@ -208,11 +208,11 @@ class ForceClient:
         self._newest: DeviceState | None = None  # newest state, handed out or not
         self._newest_arrived = now
         self._seen_tick = 0  # newest tick handed out
-        self._deadband_request: int | None = None  # … of the states
+        self._deadband_request: int | None = None  # the request for the deadband of states
         self._foretell = False  # the server leaves states out
         self._deadband: Deadband | None = None
         self._next_call = now
-        self._sequence = 0  # of the newest force
+        self._sequence = 0  # sequence number of the newest force
         self._answered_tick = 0  # the tick it answers
         self._greet(now)
 
@@ -228,7 +228,7 @@ class ForceClient:
             self._take_events(now)
 
     def tick(self, now: int) -> None:
-        """Does what is due by time."""
+        """Does everything that is due at `now`."""
         if self._session is not None:
             self._session.tick(now)
             self._take_events(now)
@@ -248,7 +248,7 @@ class ForceClient:
         stiffness: tuple[Vec3, Vec3, Vec3] | None,
         contact: Contact | None,
     ) -> str:
-        """Why an answer cannot be used; empty: it can."""
+        """Why an answer cannot be used; empty when it can."""
         if not 0 < hand.tick <= max(self._seen_tick, self._newest.tick if self._newest else 0):
             return f"it answers tick {hand.tick}, which has not come"
         if not all(map(math.isfinite, force)):
@@ -267,7 +267,8 @@ class ForceClient:
     def send(self, hand: DeviceState, touch: Touch) -> None:
         """Answers a state. An answer with a number that is not finite or out of bounds, or to a state that did not
         come in this session, is counted and not sent (`stats.unusable` says why); the server then treats this client
-        as one that is late. While another one holds the channel, nothing is sent. Raises ValueError when it has a wrong shape, PermissionError for an observer.
+        as late. While another client holds the channel, nothing is sent. Raises ValueError when an answer has a wrong
+        shape, PermissionError for an observer.
 
         Take a fresh `now` before the next call: the datagram's time stamp must not be older than the physics' work.
         """
@@ -310,7 +311,7 @@ class ForceClient:
         self._stats.forces += 1
 
     def rearm(self) -> bool:
-        """Asks the server to clear a latched fault, and to take a disarm back. False when there is no session to ask in,
+        """Asks the server to clear a latched fault, and to take a disarm back. False when there is no session,
         or too many requests are open. Controllers only: the server refuses an observer."""
         return self._session is not None and self._session.request(Rearm(self._place.device)) is not None
 
@@ -319,8 +320,8 @@ class ForceClient:
         return self._session is not None and self._session.request(Disarm(self._place.device)) is not None
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, once more when it is lost before the answer; what became of it `holds` says. False as
-        for rearm()."""
+        """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.
+        False as for rearm()."""
         wanted = TakeLease(self._place.device, self._place.channel)
         asked = None if self._session is None else self._session.request(wanted)
         if asked is None:
@@ -329,12 +330,12 @@ class ForceClient:
         return True
 
     def give_lease(self) -> bool:
-        """Gives it up, and asks for it no more. False as for rearm()."""
+        """Gives the lease up, and stops asking for it. False as for rearm()."""
         self._ask_lease = NEVER
         given = GiveLease(self._place.device, self._place.channel)
         if self._session is None or self._session.request(given) is None:
             return False
-        self._asked_lease = None  # whatever the answer is, it is older than this
+        self._asked_lease = None  # any answer is older than this release
         self.holds = False
         return True
 
@@ -360,7 +361,7 @@ class ForceClient:
         return None if self._handshake is None else self._handshake.next_datagram(now)
 
     def next_state(self, now: int) -> DeviceState | None:
-        """The newest state, when it is due and was not handed out before."""
+        """The newest state, if it is due and was not handed out before."""
         if now < self._next_call or self._waits_for_lease():
             return None
         state = self._foretold(now) if self._foretell else self._unseen
@@ -385,7 +386,7 @@ class ForceClient:
         return self._retry if self.phase in _WAITING else NEVER
 
     def next_state_due(self) -> Instant:
-        """When `next_state` gives one; NEVER = not before another has come in, or the channel is ours."""
+        """When `next_state` gives a state; NEVER until another state has come in, or the channel is ours."""
         if self._waits_for_lease():
             return NEVER
         if not self._foretell:
@@ -429,7 +430,7 @@ class ForceClient:
         self._stats.attempts += 1
 
     def _settle(self, now: int) -> None:
-        """Acts on the server's answer, once it is there."""
+        """Acts on the server's answer once it has come."""
         outcome = None if self._handshake is None else self._handshake.outcome
         if outcome is None:
             return
@@ -460,7 +461,7 @@ class ForceClient:
         self._seen_tick = 0
         self.report = self.device_report = None
         self.peer_reports = {}
-        # What another session was sent, this one was not.
+        # This session has not received what another session was sent.
         self._deadband = Deadband(self.config.deadband) if self.config.deadband else None
         self._sequence = 0
         self._stats.phase = Phase.OPEN
@@ -498,7 +499,7 @@ class ForceClient:
             elif isinstance(event, Control):
                 self._take_request(now, self._session, event)
             elif isinstance(event, Closed):
-                taken_over = event.code is Code.REPLACED  # to come back would be to take turns for ever
+                taken_over = event.code is Code.REPLACED  # two programs with one key would replace each other for ever
                 self._end(now, Phase.STOPPED if taken_over else Phase.LOST, event.code, event.reason)
 
     def _take_answer(self, now: int, answer: ControlAck) -> None:
@@ -510,7 +511,7 @@ class ForceClient:
             return
         self._asked_lease = None
         self._ask_lease = NEVER
-        if answer.code is not Code.UNSUPPORTED:  # else it knows no leases
+        if answer.code is not Code.UNSUPPORTED:  # otherwise the server knows no leases
             self.holds = answer.code is Code.OK
         if self.holds:
             self._stats.lease_lost_to = ""
@@ -527,7 +528,7 @@ class ForceClient:
             return
         self.holds = False
         self._stats.lease_lost_to = lost.to
-        # What we have asked before may be answered before this or after it; what we ask now, after it.
+        # A request still in flight may cross this message. One sent now is answered after it.
         if self._asked_lease is not None and self.take_lease():
             return
         if self.config.take_lease:
@@ -540,12 +541,12 @@ class ForceClient:
         return 1000 * self.config.state_deadband.max_silence_us if self.config.state_deadband else 0
 
     def _foretold(self, now: int) -> DeviceState | None:
-        """The state of now; None when there is nothing new, or nothing has come for too long."""
+        """The state predicted for now; None when nothing is new, or nothing has come for too long."""
         newest, age = self._newest, now - self._newest_arrived
         if newest is None or age > self._silence_ns():
             return None
         state = foretell(newest, age, self._haptic_period())
-        if state.tick <= self._seen_tick:  # the one before was on its way for less time
+        if state.tick <= self._seen_tick:  # the state before it spent less time on its way
             return None
         self._stats.states_foretold += state.tick > newest.tick
         return state

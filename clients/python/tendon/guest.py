@@ -47,7 +47,7 @@ def parse_address(text: str) -> tuple[str, int]:
 
 
 class Guest:
-    """`turn(now)` does all there is to do. One thread, or one event loop, at a time."""
+    """`turn(now)` does everything that is due. Only one thread or event loop may use a guest at a time."""
 
     def __init__(self, server: str, config: Config, now: int, clock: Callable[[], int] = time.monotonic_ns) -> None:
         """Raises ValueError when `server` is no HOST:PORT, OSError when there is no such host or the system cannot
@@ -57,7 +57,7 @@ class Guest:
         self._place = _look_up(server)[0]
         self.socket = _connected(self.server, self._place)
         self.moved: Callable[[socket.socket, socket.socket], None] = lambda old, new: None
-        """Called when the socket is another one now, before the old one is closed."""
+        """Called when the socket has been replaced, before the old one is closed."""
         self._found: list[Place] = []
         self._waited = False
         self.core = ForceClient(config, now)
@@ -73,7 +73,7 @@ class Guest:
             datagram = self._receive()
             if datagram is None:
                 break
-            # It may have come since the turn began, and must not be taken for older than it is.
+            # The datagram may have come since the turn began, so its time of arrival is taken now.
             now = max(now, self.clock())
             self.core.receive(now, datagram)
         self.core.tick(now)
@@ -86,7 +86,7 @@ class Guest:
             try:
                 self.socket.send(datagram)
             except OSError:
-                pass  # lost: the network does that too
+                pass  # the datagram counts as lost, as on the network
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
         """Answers a state: a force alone, or a Touch with the stiffness too."""
@@ -136,7 +136,7 @@ class Guest:
         try:
             new = _connected(self.server, place)
         except OSError:
-            return  # no way there: the present one stays
+            return  # the address cannot be reached: the present socket stays
         old, self.socket, self._place = self.socket, new, place
         self.moved(old, new)
         old.close()
@@ -149,7 +149,7 @@ class Guest:
             except BlockingIOError:
                 return None
             except OSError:
-                pass  # what ICMP has told: no server is up, no way there. Each report comes once
+                pass  # an ICMP error: no server listens, or no route. Each error is reported once
         return None
 
     def _say(self) -> None:
@@ -189,7 +189,7 @@ class AnyClient:
         self._guest = Guest(server, config, time.monotonic_ns())
 
     def send(self, hand: DeviceState, touch: Touch | Sequence[float]) -> None:
-        """Sends at once what the hand is to feel there: a force in N on the hand, or a Touch with the stiffness too."""
+        """Sends the answer to a state at once: a force in N on the hand, or a Touch with the stiffness too."""
         self._guest.send(hand, touch)
         self._guest.flush(time.monotonic_ns())
 
@@ -198,12 +198,12 @@ class AnyClient:
         return self._ask(self._guest.core.rearm)
 
     def disarm(self) -> bool:
-        """Asks the server for no force of its device until somebody rearms. False when there is no session to ask in."""
+        """Asks the server for no force of its device until somebody rearms. False when there is no session."""
         return self._ask(self._guest.core.disarm)
 
     def take_lease(self) -> bool:
-        """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result. False
-        when there is no session to ask in."""
+        """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.
+        False when there is no session."""
         return self._ask(self._guest.core.take_lease)
 
     def give_lease(self) -> bool:
@@ -216,7 +216,7 @@ class AnyClient:
 
     @property
     def welcome(self) -> Welcome | None:
-        """What the server said of itself and its device when the newest session opened; None before that."""
+        """The server's description of itself and its device at the opening of the newest session; None before that."""
         return self._guest.core.welcome
 
     @property
@@ -241,7 +241,7 @@ class AnyClient:
 
     @property
     def peer_reports(self) -> dict[int, PeerReport]:
-        """With Config.diagnostics, the newest report on the engine of each channel; the last one stays when it has gone."""
+        """With Config.diagnostics, the newest report on the engine of each channel, even one that has gone."""
         return self._guest.core.peer_reports
 
     def _ask(self, request: Callable[[], bool]) -> bool:
@@ -251,7 +251,7 @@ class AnyClient:
 
 
 Place = tuple[int, int, Any]
-"""Where a server is, as the system says: family, protocol and address."""
+"""A server's address as the system gives it: family, protocol and address."""
 
 
 def _is_numeric(server: str) -> bool:
@@ -274,7 +274,7 @@ def _look_up(server: str) -> list[Place]:
 
 
 def _connected(server: str, place: Place) -> socket.socket:
-    """From a port that the system chooses, and connected, so the kernel drops what others send to it."""
+    """A socket on a port that the system chooses. It is connected, so the kernel drops datagrams from other senders."""
     family, protocol, address = place
     connected = socket.socket(family, socket.SOCK_DGRAM, protocol)
     try:

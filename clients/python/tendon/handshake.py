@@ -26,7 +26,7 @@ Outcome = Union[Accepted, Refused]
 
 
 def key_id(key: bytes) -> bytes:
-    """Tells the server which key to try; it says nothing else."""
+    """Tells the server which key to try, and nothing else."""
     return sha256(b"tendon-key-id" + key).digest()[:8]
 
 
@@ -38,7 +38,7 @@ def prologue(header: bytes, identity: bytes, random: bytes) -> bytes:
 class ClientHandshake:
     """Says Hello until a Retry brings a cookie, says Hello with the cookie until it is answered.
 
-    It never gives up; its owner may. What is malformed, not authentic, or not about this attempt is ignored.
+    It never gives up; its owner may. It ignores datagrams that are malformed, not authentic, or of another attempt.
     """
 
     def __init__(self, hello: Hello, random: bytes, now: int, *, key: bytes | None = None, ephemeral: bytes = b""):
@@ -66,7 +66,7 @@ class ClientHandshake:
         retry = codec.decode_retry(datagram)
         if retry is not None:
             if retry.random == self._random and retry.suite == self._suite:
-                if self._cookie is None:  # a later one is no reason to hurry: no ping-pong
+                if self._cookie is None:  # only the first cookie is answered at once: no ping-pong
                     self._next_hello = now
                 self._cookie = retry.cookie
             return

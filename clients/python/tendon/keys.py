@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Key files: what `tendond keygen` writes, and both ends of a conversation have."""
+"""Key files. `tendond keygen` writes them, and both ends of a conversation have the same one."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def read_key(file: Path | str) -> bytes:
     """The 32 bytes in a key file: one line, `controller` or `observer` and 64 hexadecimal digits; empty lines and
     those that begin with # are comments.
 
-    Raises ValueError with a sentence (never with the key) when it is no key file or the key is weak, OSError when it cannot
-    be read or is a folder or a pipe, PermissionError when others may read it.
+    Raises ValueError with a sentence (never with the key) when it is no key file or the key is weak, OSError when it
+    cannot be read or is a folder or a pipe, PermissionError when others may read it.
     """
     if not stat.S_ISREG(os.stat(file).st_mode):  # before it is opened: a pipe would wait for ever
         raise OSError(f"{file}: cannot read this key: it is not a regular file")
@@ -36,7 +36,7 @@ def read_key(file: Path | str) -> bytes:
 
 
 def _weak(key: bytes) -> bool:
-    """A few bytes again and again, bytes that count, or text that somebody has typed. Of random keys, fewer than one
-    in 10⁹ are called so."""
+    """Whether a key repeats a few bytes, counts up, or is typed text. Fewer than one in 10⁹ random keys are called
+    weak."""
     steps = {(after - before) % 256 for before, after in zip(key, key[1:])}
     return min(len(set(key)), len(steps)) < _FEWEST_DIFFERENT or all(0x20 <= byte < 0x7F for byte in key)

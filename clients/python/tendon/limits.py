@@ -10,12 +10,12 @@ MAX_VALUE = 1e12
 MAX_TIME_NS = 1 << 60
 """Largest distance of any clock reading from its zero."""
 UNIT_TOLERANCE = 1e-3
-"""Of a normal's length."""
+"""Tolerance of the length of a unit normal."""
 MIN_TABLE = 2
 MAX_TABLE = 16
 """Entries of a table of forces."""
 MAX_VALID_FOR_US = 10_000_000
-"""A force cannot be promised for longer."""
+"""Longest validity of a force."""
 MAX_FRAMES = 64
 """Frames in one datagram."""
 REQUEST_WINDOW = 16
@@ -34,12 +34,12 @@ MAX_DETAIL = 128
 """Bytes of UTF-8 in the sentence of a refusal, an answer or a Bye."""
 MAX_LOOP_HZ = 1_000_000
 LATENESS_BUCKETS = 24
-"""Of the histogram of a loop's lateness."""
+"""Buckets in the histogram of a loop's lateness."""
 MAX_ONE_IN = 1000
-"""The rarest that a state is sent to an engine, one in so many."""
+"""A server sends an engine at least one state in this many."""
 MAX_TIMEOUT_MS = 3_600_000
 BYES = 3
-"""How often a Bye is said."""
+"""How many times a Bye is sent."""
 PACKET_NUMBERS = 1 << 60
 """Packet numbers are below this: a nonce is never used twice."""
 LIFE_NS = 24 * 3600 * 1_000_000_000

@@ -28,7 +28,7 @@ FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
 
 FEATURE_DIAGNOSTICS = "diagnostics"
-"""An observer is told what the engines ask for, and how loops and engines do (DeviceReport, PeerReport)."""
+"""An observer is told the forces asked for, and the state of loops and engines (DeviceReport, PeerReport)."""
 
 
 class Role(IntEnum):
@@ -51,7 +51,7 @@ class Code(IntEnum):
 
 
 class Mode(IntEnum):
-    """What becomes of the remote force at the device."""
+    """How the device renders the remote force."""
 
     IDLE = 1  # no force has come yet, or none since the last safe stop
     ACTIVE = 2  # a fresh force is rendered
@@ -102,8 +102,8 @@ class DeviceState:
 
 @dataclass(frozen=True, slots=True)
 class ForceTable:
-    """The force along a contact's normal at other depths: entry i with the tool `first + i · step` deeper than where it is
-    answered, that is at `at − depth · normal`; a line in between, beyond the ends as at the ends."""
+    """The force along a contact's normal at other depths. Entry i is for the tool `first + i · step` deeper than
+    `at`, that is at `at − depth · normal`. Linear between entries; constant beyond the ends."""
 
     first: float  # m; below 0: nearer to the hand
     step: float  # m, above 0
@@ -115,7 +115,7 @@ class Contact:
     """A surface that the tool touches or is about to. It only pushes, unless a table says otherwise."""
 
     normal: Sequence[float]  # unit vector, out of the body, to the hand
-    gap: float  # m, from the surface to the tool along the normal; below 0: so deep is it pressed in
+    gap: float  # m, from the surface to the tool along the normal; below 0: the tool is that deep in the body
     table: ForceTable | None = None
 
 
@@ -140,8 +140,8 @@ class ForceCommand:
     model: LocalModel | None = None
     device: int = 0
     channel: int = 0
-    topology_changed: bool = False  # cut or torn since the answer before: neither's model is relied on
-    error: float | None = None  # N, what the engine thinks that `force` may be wrong by
+    topology_changed: bool = False  # cut or torn since the previous answer: the server uses the model of neither
+    error: float | None = None  # N, the engine's estimate of the error of `force`
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,14 +168,14 @@ class Disarm:
 
 @dataclass(frozen=True, slots=True)
 class Describe:
-    """Client → server, reliable: what a device is and can do; answered with a DeviceDescription."""
+    """Client → server, reliable: asks for the description of a device; answered with a DeviceDescription."""
 
     device: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class TakeLease:
-    """Client → server, reliable: I want to be the one whose forces this channel takes."""
+    """Client → server, reliable: asks for the channel's lease, so that it takes this client's forces."""
 
     device: int = 0
     channel: int = 0
@@ -183,7 +183,7 @@ class TakeLease:
 
 @dataclass(frozen=True, slots=True)
 class GiveLease:
-    """Client → server, reliable: I do not want to be it any more."""
+    """Client → server, reliable: gives the channel's lease up."""
 
     device: int = 0
     channel: int = 0
@@ -191,16 +191,16 @@ class GiveLease:
 
 @dataclass(frozen=True, slots=True)
 class LeaseLost:
-    """Server → client, reliable: you are not it any more."""
+    """Server → client, reliable: the client has lost the channel's lease."""
 
     device: int = 0
     channel: int = 0
-    to: str = ""  # name of the one that is
+    to: str = ""  # name of the new holder
 
 
 @dataclass(frozen=True, slots=True)
 class SetStateDeadband:
-    """Client → server, reliable: leave out the states that this client can foretell (`foretell`).
+    """Client → server, reliable: leave out the states that this client can predict (`foretell`).
 
     After a state with velocity v the next one that is sent is the first whose velocity differs from v by more than
     max(share · ‖v‖, floor), whose mode is another, or which comes `max_silence_us` later.
@@ -226,7 +226,7 @@ class ChannelDescription:
     name: str
     rule: ChannelRule
     lease_ms: int = 0  # a holder that sends no force for so long may be followed by another; 0 = it stays until it leaves
-    holder: str = ""  # whose forces it takes; empty = nobody's
+    holder: str = ""  # name of the client whose forces it takes; empty = nobody
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +333,7 @@ class Safety(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class DeviceReport:
-    """Server → client, newest wins for each device: how its loop does. Numbers of things are of the time that it tells of."""
+    """Server → client, newest wins for each device: how its loop does. Counts are of the reported time."""
 
     number: int  # 1, 2, 3 … of the device
     until_ns: int  # end of the time it tells of, server clock
@@ -341,7 +341,7 @@ class DeviceReport:
     device: int
     steps: int  # haptic steps
     missed: int  # periods without a step, because the one before came so late
-    overruns: int  # steps so long after the one before that it is a reason
+    overruns: int  # steps so late after the one before that Reason.OVERRUN is set
     unseen: int  # steps in which the device gave no position
     # Steps by how late the loop woke: [0] at most 1 µs, [i] later than 2^(i−1) µs and at most 2^i µs, [23] all later ones.
     # Zeros at the end are left out; together at most `steps`.
@@ -353,13 +353,13 @@ class DeviceReport:
 
 @dataclass(frozen=True, slots=True)
 class PeerReport:
-    """Server → client, newest wins for each device and channel: how the engine does whose forces the channel takes."""
+    """Server → client, newest wins for each device and channel: the engine whose forces the channel takes."""
 
     device: int
     channel: int
     name: str  # of the engine
-    state_one_in: int  # of the states that it wants, it is sent one in so many: its way is full
-    forces_refused: bool  # its forces are not taken: its way loses too much
+    state_one_in: int  # it is sent one in so many of the states it wants, because its link is full
+    forces_refused: bool  # its forces are not used, because its link loses too much
     link: LinkReport  # number: 1, 2, 3 … of the channel; the forces are the channel's
 
 
@@ -439,8 +439,8 @@ class Touch:
     stiffness: Stiffness | None = None
     valid_radius: float = inf  # m, how far from the state's position the stiffness holds
     contact: Contact | None = None  # the surface, with the force at other depths in a table where that is known
-    topology_changed: bool = False  # cut or torn since the answer before: neither's stiffness and table are relied on
-    error: float | None = None  # N, what the engine thinks that the force may be wrong by
+    topology_changed: bool = False  # cut or torn since the previous answer: neither answer's stiffness and table are used
+    error: float | None = None  # N, the engine's estimate of the error of the force
 
 
 @dataclass(slots=True)

@@ -34,7 +34,7 @@ def seal(key: bytes, number: int, associated: bytes, plain: bytes) -> bytes:
 
 def unseal(key: bytes, number: int, associated: bytes, sealed: bytes) -> bytes | None:
     """None when it is not authentic."""
-    if len(sealed) < TAG_SIZE:  # PyNaCl does not expect that
+    if len(sealed) < TAG_SIZE:  # PyNaCl does not check this
         return None
     try:
         return bytes(sodium.crypto_aead_chacha20poly1305_ietf_decrypt(sealed, associated, _nonce(number), key))
@@ -43,7 +43,7 @@ def unseal(key: bytes, number: int, associated: bytes, sealed: bytes) -> bytes |
 
 
 def renewed(key: bytes) -> bytes:
-    """REKEY(key) of Noise: the next key, from which this one cannot be found again."""
+    """REKEY(key) of Noise: the next key, from which this one cannot be computed."""
     return seal(key, 2**64 - 1, b"", bytes(KEY_SIZE))[:KEY_SIZE]
 
 
@@ -52,7 +52,7 @@ def public_key(secret: bytes) -> bytes:
 
 
 def shared_key(secret: bytes, point: bytes) -> bytes | None:
-    """None when the point is of low order: the shared secret would be one that everybody knows."""
+    """None when the point is of low order: everybody could compute the shared secret."""
     try:
         return bytes(sodium.crypto_scalarmult(secret, point))
     except (CryptoError, RuntimeError):  # depends on PyNaCl's version
@@ -61,15 +61,18 @@ def shared_key(secret: bytes, point: bytes) -> bytes | None:
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """What a handshake ends with, the same at both ends."""
+    """The result of a handshake, the same at both ends."""
 
     initiator_to_responder: bytes
     responder_to_initiator: bytes
-    handshake_hash: bytes  # of all that was said
+    handshake_hash: bytes  # hash of the whole handshake
 
 
 class SymmetricState:
-    """What both ends have mixed so far. In this pattern a new key precedes every encryption: the nonce is always 0."""
+    """The symmetric state of Noise: the hash and key that both ends have mixed so far.
+
+    In this pattern a new key precedes every encryption, so the nonce is always 0.
+    """
 
     def __init__(self, prologue: bytes) -> None:
         self.hash = sha256(_PROTOCOL).digest()  # the name is longer than a hash

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which packet numbers have arrived: a packet is let in once."""
+"""Remembers which packet numbers have arrived, so that each packet is accepted once."""
 
 
 class ReplayWindow:
-    """Ask with `contains` before anything is believed of a packet, `insert` once it has proved good, so
-    that a forged one cannot use up the number of a real one.
+    """Ask `contains` before using a packet, and `insert` it once it is authentic, so that a forged packet cannot
+    use up the number of a real one.
     """
 
     REMEMBERED = 1984

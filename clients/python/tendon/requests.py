@@ -45,7 +45,7 @@ class OutgoingRequests:
         return [asked.control for asked in self._open.values() if asked.answer is None and asked.due <= now]
 
     def sent(self, number: int, now: int, timeout: int) -> None:
-        """It is due again after `timeout`, doubled for every time it was sent before."""
+        """The request is due again after `timeout`, doubled for every earlier transmission."""
         asked = self._open[number]
         asked.due = now + min(timeout << min(asked.times_sent, 32), _MAX_WAIT)
         asked.times_sent += 1
@@ -54,7 +54,7 @@ class OutgoingRequests:
         return min((asked.due for asked in self._open.values() if asked.answer is None), default=NEVER)
 
     def acknowledge(self, ack: ControlAck) -> bool:
-        """False when it answers what was never asked."""
+        """False when the answer belongs to no request."""
         asked = self._open.get(ack.id)
         if asked is None:
             return ack.id < self._next  # repeated, or never asked

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long to and fro takes, and how long to wait for an answer before asking again (RFC 6298)."""
+"""The round trip's time, and how long to wait for an answer before asking again (RFC 6298)."""
 
 
 class RoundTrip:

@@ -31,7 +31,7 @@ from .requests import IncomingRequests, OutgoingRequests
 from .round_trip import RoundTrip
 
 KEEP_ALIVE_NS = 50_000_000
-"""Longest silence we leave: five are lost before a server comes to its 250 ms safe stop."""
+"""Longest time between two of our datagrams: five in a row are lost before a server's 250 ms safe stop."""
 TIMEOUT_NS = 2_000_000_000
 """Silence of the peer after which it is gone: longer than a Wi-Fi roam, shorter than patience."""
 MIN_RESEND_NS = 20_000_000
@@ -62,7 +62,7 @@ class Session:
     `next_datagram` until they are empty. `now` never goes back.
 
     Nothing queues without a bound: there is room for one state, one force, one report (on each device and channel) and
-    limits.REQUEST_WINDOW requests each way; what was not taken out is replaced by a newer one of its kind.
+    limits.REQUEST_WINDOW requests each way; a newer one replaces one of its kind that was not taken out.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
@@ -95,7 +95,7 @@ class Session:
         self._newest_sequence: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_report = 0
         self._newest_diagnosis: dict[tuple[int, int], int] = {}  # by _stream
-        self._newest_echoed = -1  # newest packet of ours that the peer has told of
+        self._newest_echoed = -1  # newest packet of ours that the peer has echoed
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
         # To tell.
@@ -108,13 +108,13 @@ class Session:
     # ---- In ----
 
     def receive(self, now: int, datagram: bytes) -> None:
-        """Takes any bytes. What is not a good datagram of this conversation is counted and dropped."""
+        """Takes any bytes. A datagram that is malformed, or of another conversation, is counted and dropped."""
         self.latest = now
         if not self.open:
             return
         header = codec.decode_header(datagram)
         if header is not None and header.type is not DatagramType.DATA:
-            self.stats.duplicated += 1  # a copy of the handshake that took its time
+            self.stats.duplicated += 1  # a late copy of the handshake
             return
         if (
             header is None
@@ -146,7 +146,7 @@ class Session:
         self._accept(now, number, content)
 
     def send(self, frame: DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport) -> None:
-        """Replaces what has not left yet."""
+        """Queues a frame in place of the one of its kind that has not left yet."""
         if isinstance(frame, ForceCommand):
             self._force_to_send = frame
         elif isinstance(frame, LinkReport):
@@ -163,18 +163,18 @@ class Session:
     def answer(
         self, number: int, code: Code, detail: str, wait_ms: int = 0, device: DeviceDescription | None = None
     ) -> None:
-        """Answers a Control that has arrived. Every one must be answered; an id that waits for none is ignored."""
+        """Answers a Control that has arrived. Every one must be answered; an id that waits for no answer is ignored."""
         self._answering.answer(ControlAck(number, code, detail, wait_ms, device))
 
     def close(self, code: Code, reason: str) -> None:
-        """Says Bye and closes. What was not sent yet is dropped. No Closed comes: the owner knows."""
+        """Says Bye and closes. Frames not sent yet are dropped. No Closed event follows, because the owner knows."""
         if self.open:
             self.open = False
             self._bye = Bye(code, reason)
             self._byes_left = limits.BYES
 
     def tick(self, now: int) -> None:
-        """Notices the silence of the peer, and our age."""
+        """Notices the silence of the peer and the age of the session."""
         self.latest = now
         if not self.open:
             return
@@ -198,7 +198,7 @@ class Session:
         return self._seal(now, self._fill(now))
 
     def next_event(self) -> Event | None:
-        """The next thing to tell; Closed is the last."""
+        """The next event; Closed is the last."""
         event: Event | None = self._answering.next() or self._asked.next_answer()
         if event is None:
             event, self._force_arrived = self._force_arrived, None
@@ -289,7 +289,7 @@ class Session:
             return
         self._count_lost_outgoing(told)
         sample = (now - told.sent_ns) - (sent_ns - told.received_ns)
-        if sample < 0:  # two clocks of different rates, and a peer that held the echo for long
+        if sample < 0:  # the clocks' rates differ, and the peer held the echo for long
             return
         self._round_trip.observe(sample)
         self.stats.round_trip_ns = self._round_trip.newest
@@ -325,7 +325,7 @@ class Session:
         return codec.write_data_head(now, echo)
 
     def _fill(self, now: int) -> bytes:
-        """As much as fits, what ages fastest first. The rest stays due and goes into the next datagram."""
+        """Writes as many frames as fit, those that age fastest first. The rest goes into the next datagram."""
         body = bytearray(self._head(now))
 
         def add(frame: Frame) -> bool:

@@ -15,10 +15,10 @@ from . import fields, frames
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """The newest datagram that one end has received from the other, told back to it."""
+    """The newest datagram that one end has received, reported back to its sender."""
 
-    sent_ns: int  # T1: when it was sent, on the clock of the one who sent it
-    received_ns: int  # T2: when it arrived, on the clock of the one who tells
+    sent_ns: int  # T1: when it was sent, on its sender's clock
+    received_ns: int  # T2: when it arrived, on its receiver's clock
     packet_number: int
     received_mask: int = 0  # bit i: packet (packet_number − 1 − i) has arrived too
 
@@ -34,7 +34,7 @@ class DataContent:
 
 
 def write_data_head(sent_ns: int, echo: Echo | None) -> bytes:
-    """The front of a Data datagram's body: what write_frame() gives follows, as often as wanted.
+    """The front of a Data datagram's body. Any number of results of write_frame() may follow it.
 
     (Protobuf defines the concatenation of two messages as their merge.)
     """

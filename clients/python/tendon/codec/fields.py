@@ -49,7 +49,7 @@ def time(ns: int) -> int:
 
 
 def length(ns: int) -> int:
-    """Of time, which is never below zero."""
+    """A length of time in ns, which is never below zero."""
     return whole(ns, 0, limits.MAX_TIME_NS)
 
 
@@ -113,8 +113,9 @@ def parsed(message: _Message, body: bytes) -> _Message:
 
 
 def _is_whole(body: bytes) -> bool:
-    """Some versions of protobuf, Debian's among them, take a field 0, and the end of a group that has not begun, for the
-    end of the message, and do not look at what follows. Raises IndexError when that is nothing like protobuf."""
+    """Whether the whole body is one message. Some versions of protobuf, Debian's among them, end the message at a
+    field 0 or at the end of a group that has not begun, and ignore the rest. Raises IndexError when
+    that is not protobuf."""
     at, groups = 0, 0
     while at < len(body):
         tag, at = _varint(body, at)

@@ -64,7 +64,7 @@ def is_radius(metres: float) -> bool:
 
 
 def is_contact(contact: Contact) -> bool:
-    """Whether a peer takes it: every number is within its bounds."""
+    """Whether a peer accepts the contact: every number is within its bounds."""
     table = contact.table
     numbers = [*contact.normal, contact.gap]
     if table is not None:
@@ -117,7 +117,7 @@ def _read_model(message: pb.LocalModel) -> LocalModel:
 
 
 def _write_model(model: LocalModel) -> pb.LocalModel:
-    """The shortest of the three forms that says the same."""
+    """Writes the shortest of the three equivalent forms."""
     (a, b, c), (d, e, f), (g, h, i) = model.stiffness
     entries: list[float] = [a, b, c, d, e, f, g, h, i]
     if not any((b, c, d, f, g, h)):

@@ -26,7 +26,7 @@ _RETRY_SIZE = 48
 
 @dataclass(frozen=True, slots=True)
 class HelloDatagram:
-    """As it travels. `body` is in suite 0 what write_hello() gives, in suite 1 that and what the handshake adds."""
+    """A Hello as it is sent. In suite 0 `body` is the result of write_hello(); in suite 1 the handshake adds to it."""
 
     random: bytes  # chosen by the client; ties Retry and Answer to one attempt
     body: bytes
