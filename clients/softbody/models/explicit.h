@@ -9,14 +9,15 @@
 
 namespace tendon::softbody {
 
-/// Newton's second law in explicit steps: nothing is solved, an answer is one evaluation of the forces. With lumped
-/// masses m, and a force F of the tool on its patch w that keeps the patch where the tool is:
+/// Newton's second law in explicit time steps: no system is solved, and an answer is one evaluation of the forces. With
+/// lumped masses m, and a force F of the tool on its patch w that keeps the patch at the tool:
 ///
 ///     v ← (v + dt (F w − ∂energy/∂u + weight) / m) / (1 + rate dt),   u ← u + dt v
 ///
-/// (symplectic Euler). Stable for dt < 2/ω, ω the fastest swing of the body at rest; a body that is pressed together
-/// has faster ones. Of the linear law it keeps the tensors between nodes, which is the tensor-mass method (Cotin,
-/// Delingette & Ayache 2000); of the others what the shape functions are at rest, which is TLED (Miller et al. 2007).
+/// (symplectic Euler). Stable for dt < 2/ω, where ω is the highest natural frequency of the body at rest; a compressed
+/// body has higher ones. For the linear law the model stores the tensors between nodes, which is the tensor-mass method
+/// (Cotin, Delingette & Ayache 2000); for the other laws it stores the shape functions' gradients at rest, which is
+/// TLED (Miller et al. 2007).
 class ExplicitModel : public Model {
  public:
   /// Throws std::invalid_argument without `effects.inertia`, with viscosity (it would make ω larger; damping does not),
@@ -38,7 +39,7 @@ class ExplicitModel : public Model {
   Vec3 normal_;
   double dt_;
   double slowing_;                          ///< 1/(1 + rate dt); 1 without damping
-  std::optional<SymmetricMatrix> tensors_;  ///< of the linear law
+  std::optional<SymmetricMatrix> tensors_;  ///< for the linear law only
   VectorXd per_mass_;                       ///< 1/kg, all nodes; 0 where they are held
   VectorXd weight_;                         ///< N, all nodes; empty without gravity
   VectorXd u_;                              ///< m, all nodes
@@ -46,7 +47,7 @@ class ExplicitModel : public Model {
   VectorXd rest_;                           ///< m, the shape at rest under the weight; empty without gravity
 };
 
-/// 2/ω, s, of the body at rest: a longer explicit step is not stable.
+/// 2/ω of the body at rest, s: a longer explicit step is not stable.
 double largest_step(const Elastic& elastic, double density);
 
 }  // namespace tendon::softbody

@@ -118,7 +118,7 @@ CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, 
       alone.weights = VectorXd::Ones(1);
       loads.col(j) = solid.to_free(patch_load(solid, surface.normal(), alone));
     }
-    // The same functional reads the depth that wrote the load: the table is symmetric by its making.
+    // The functional that reads the depth is the one that wrote the load, so the table is symmetric.
     const MatrixXd solution = factor.solve(loads);
     for (Eigen::Index j = 0; j < some; ++j) {
       VectorXd all = VectorXd::Zero(solid.size());

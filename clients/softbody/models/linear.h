@@ -7,8 +7,8 @@
 
 namespace tendon::softbody {
 
-/// Linear elasticity, K u = f, at rest at every instant: the factor of K is kept, an answer is one solution with it.
-/// Effects that act on all of the body add to K and f; an answer is then two solutions. Right for small strains and
+/// Linear elasticity, K u = f, at rest at every instant: the factor of K is kept, and an answer is one solution with
+/// it. Effects that act on the whole body add to K and f; an answer is then two solutions. Valid for small strains and
 /// rotations.
 class LinearModel : public Model {
  public:
@@ -37,15 +37,16 @@ class LinearModel : public Model {
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
 };
 
-/// The reaction of a linear body, from how deep each node of the patch is under 1 N on it.
+/// The reaction of a linear body, from the depth of each node of the patch under 1 N on the patch.
 Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value);
 
-/// The same answers from a table: how far each touchable node gives way along the normal when another is pushed with 1
-/// N (a discrete Green's function; James & Pai 1999). What lies below the surface costs no time any more: an answer is
-/// wᵀ G w over the patch.
+/// The same answers from a table G: how far each touchable node gives way along the normal when another node is pushed
+/// with 1 N (a discrete Green's function; James & Pai 1999). An answer is wᵀ G w over the patch, so the inside of the
+/// body costs no time.
 class CondensedModel : public Model {
  public:
-  /// The table of `nodes` (TouchSurface::nodes_of_patches). Solves once for each; neither solid nor surface is kept.
+  /// Makes the table of `nodes` (TouchSurface::nodes_of_patches), by one solution for each. Keeps neither the solid nor
+  /// the surface.
   CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes);
 
   /// Throws std::out_of_range when the patch has a node that is not in the table.
@@ -60,7 +61,7 @@ class CondensedModel : public Model {
   std::vector<int> nodes_;
   std::vector<int> row_of_;  ///< by node; −1 = not in the table
   MatrixXd table_;
-  std::vector<int> rows_;  ///< of the present patch
+  std::vector<int> rows_;  ///< rows of the present patch
 };
 
 }  // namespace tendon::softbody

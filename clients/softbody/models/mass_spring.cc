@@ -11,7 +11,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// Of a spring's length at rest: where both ends are in one place, no way is the spring's.
+/// The share of its length at rest below which a spring has no direction, because its ends are in one place.
 constexpr double kShortest = 1e-9;
 
 }  // namespace
@@ -74,7 +74,7 @@ void SpringNet::stiffness(const VectorXd& u, Curvature curvature, SymmetricMatri
     const Vec3 x = along(spring, u);
     const double length = std::max(x.norm(), kShortest * spring.length);
     const Vec3 way = x / length;
-    double across = 1 - spring.length / length;  // a spring that is pressed together gives way aside
+    double across = 1 - spring.length / length;  // below 0: a compressed spring buckles sideways
     if (curvature == Curvature::kWithoutNegative) across = std::max(0.0, across);
     const Mat3 k = spring.stiffness * ((1 - across) * way * way.transpose() + across * Mat3::Identity());
     for (int j = 0; j < 6; ++j) {

@@ -8,13 +8,13 @@
 
 namespace tendon::softbody {
 
-/// A spring along every edge of a mesh of tetrahedra, as stiff as the volume around it (van Gelder 1998; the factor
-/// that a tetrahedron's stretching asks for): with V the volumes of the tetrahedra that share the edge, and L its
-/// length,
+/// A spring along every edge of a mesh of tetrahedra. Its stiffness follows the volume around the edge (van Gelder
+/// 1998, with the factor that makes a stretched tetrahedron correct). V are the volumes of the tetrahedra that share
+/// the edge, L is its length at rest, l its present length:
 ///
 ///     energy ½ k (l − L)²,   k = E Σ V / L²
 ///
-/// It knows no Poisson ratio, and nothing keeps a tetrahedron from being pressed flat: for comparison.
+/// It has no Poisson ratio, and nothing keeps a tetrahedron from being pressed flat. It is here for comparison.
 class SpringNet : public Elastic {
  public:
   /// Throws std::invalid_argument when the mesh is not of tetrahedra.
@@ -40,10 +40,10 @@ class SpringNet : public Elastic {
   std::vector<int> slots_;  ///< where each entry of a spring's 6 × 6 matrix goes; −1: nowhere
 };
 
-/// The springs, at rest at every instant or with effects, by the same Newton's method as the finite elements.
+/// The springs, at rest at every instant or with effects, solved by the same Newton's method as the finite elements.
 class MassSpringModel : public Model {
  public:
-  /// The springs of the solid's mesh and Young's modulus; the solid is not kept.
+  /// Takes the mesh and Young's modulus from the solid; does not keep the solid.
   MassSpringModel(const Solid& solid, const TouchSurface& surface, const QuasiStaticModel::Config& config,
                   const EffectsConfig& effects = {});
 

@@ -10,7 +10,7 @@
 namespace tendon::softbody {
 namespace {
 
-/// A shape counts as a combination of the others when at most this share of its elastic energy is left over.
+/// A shape counts as a combination of the others when at most this share of its elastic energy remains without them.
 constexpr double kNew = 1e-6;
 
 }  // namespace
@@ -25,7 +25,8 @@ ModalModel::ModalModel(const Solid& solid, const TouchSurface& surface, const Co
   for (const Vec2& middle : config.patches) {
     const auto patch = surface.patch(middle);
     if (!patch) throw std::invalid_argument("a static mode's patch is not on the body");
-    // What the others do not have of it, twice for the rounding that the first time leaves (Gram and Schmidt).
+    // The part of the shape that the others do not have (Gram and Schmidt). The second pass removes the rounding errors
+    // of the first.
     VectorXd shape = linear.displacements(*patch);
     shape /= std::sqrt(shape.dot(stiffness.times(shape)));
     for (int i = 0; i < 2; ++i) shape -= shapes * (shapes.transpose() * stiffness.times(shape));

@@ -8,18 +8,19 @@
 
 namespace tendon::softbody {
 
-/// Linear elasticity within a few shapes (Pentland & Williams 1989): the slowest swings of the body, of which local
-/// contact needs far too many, and if wanted what a force on the patch does at rest (static modes). At rest at every
-/// instant: an answer is |Bᵀw|², B the shapes on the surface, scaled so that each has the stiffness 1. For comparison.
+/// Linear elasticity within a few shapes (Pentland & Williams 1989): the slowest vibration modes of the body, and on
+/// request the static displacements under a force on a patch (static modes). Local contact needs far too many vibration
+/// modes. At rest at every instant: an answer is |Bᵀw|², with B the shapes on the surface, each scaled to the stiffness
+/// 1. It is here for comparison.
 class ModalModel : public Model {
  public:
   struct Config {
     int swings = 30;
-    /// Middles of patches, across, whose static displacements are shapes too.
+    /// The static displacements of patches around these middles (m, across) become shapes too.
     std::vector<Vec2> patches;
   };
-  /// The density is the same everywhere, so that its value changes nothing. Throws std::invalid_argument when the
-  /// solid's law is not linear or it has not so many swings. Neither solid nor surface is kept.
+  /// The density is the same everywhere, so its value does not matter. Throws std::invalid_argument when the law of the
+  /// solid is not linear, or the solid has fewer modes than `swings`. Keeps neither the solid nor the surface.
   ModalModel(const Solid& solid, const TouchSurface& surface, const Config& config);
 
   Reaction press(const Patch& patch, Given given, double value) override;

@@ -9,7 +9,7 @@ namespace tendon::softbody {
 namespace {
 
 constexpr double kApart = 0.01;  // s, between the answers that are compared
-constexpr int kAlike = 10;       // so many in a row: one alone could be the turning point of a slow swing
+constexpr int kAlike = 10;       // in a row: a single one could be the turning point of a slow oscillation
 
 }  // namespace
 

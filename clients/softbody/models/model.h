@@ -11,29 +11,29 @@ namespace tendon::softbody {
 struct Division;
 struct EffectsConfig;
 
-/// Which of depth and force is given; the other is asked for.
+/// Whether the depth or the force is given; the answer has the other one.
 enum class Given : std::uint8_t {
-  kDepth,       ///< m, how deep the mean of the patch is held; the force is asked for, and may pull
-  kLeastDepth,  ///< m, how deep it is at least: the tool pushes, but does not pull
-  kForce,       ///< N, on the body; the depth is asked for
+  kDepth,       ///< m, the mean depth at which the patch is held; the force may pull
+  kLeastDepth,  ///< m, the least mean depth: the tool pushes but does not pull
+  kForce,       ///< N, on the body
 };
 
 /// A body's answer to a patch that presses into it, against the surface's normal.
 struct Reaction {
   double force = 0;  ///< N, of the body on the tool, along the normal
-  double depth = 0;  ///< m, mean over the patch, from where the mesh has its surface
-  /// N/m, ∂force/∂depth. Of a body with time the force for each metre from its shape at rest: what inertia would add
-  /// within one step is not felt by a hand that moves on evenly.
+  double depth = 0;  ///< m, mean over the patch, below the surface of the mesh
+  /// N/m, ∂force/∂depth. For a body with time it is the force for each metre from the shape at rest: a hand that moves
+  /// evenly does not feel the stiffness that inertia adds within one step.
   double stiffness = 0;
   Vec2 slope = Vec2::Zero();  ///< ∂depth/∂(place of the patch) with the body held as it is: the mean tilt below it
-  double error = 0;           ///< N, how far the solver may still be from its own mesh's answer; not the mesh's error
+  double error = 0;           ///< N, the distance that may remain to the mesh's exact answer; not the mesh's own error
 };
 
-/// The force that a tool needs for what is given, when without it the depth were `untouched` and each newton adds
-/// `compliance` (m/N).
+/// The force (N) with which a tool reaches the given depth or force, when the depth without it is `untouched` (m) and
+/// each newton adds `compliance` (m/N).
 double constrained_force(Given given, double value, double untouched, double compliance);
 
-/// Reaction::stiffness of a body with time, which at rest and untouched would have the depth `rest`.
+/// Reaction::stiffness of a body with time whose depth is `rest` (m) when it is at rest and untouched.
 double secant(const Reaction& reaction, double rest);
 
 /// A body that can be pressed. Each model is a file of this folder.
@@ -46,28 +46,27 @@ class Model {
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
-  /// The body's answer to one patch; a model with a state goes on from where the last call left it, by one step of
-  /// time if it has time. A patch without nodes is a tool that is elsewhere.
+  /// The body's answer to one patch. A model with a state continues from the state of the last call; a model with time
+  /// advances by one step. A patch without nodes means that the tool is elsewhere.
   virtual Reaction press(const Patch& patch, Given given, double value) = 0;
 
-  /// To be called after the solid has been cut in place. Continues from the current displacements, and reuses the
-  /// factor of the system where it can. Throws std::logic_error where ModelInfo::may does not have
-  /// kCutting.
+  /// Call it after the solid has been cut in place. Continues from the current displacements, and reuses the factor of
+  /// the system where it can. Throws std::logic_error when the model's ModelInfo::may lacks kCutting.
   virtual void cut(const Division& division, const EffectsConfig& effects);
 
-  /// s, how long a press lasts. 0: the body is at rest at every instant.
+  /// The time that one press simulates, s. 0: the body is at rest at every instant.
   virtual double step() const noexcept { return 0; }
 
-  /// Whether the body has the shape of its mesh when nothing touches it; then it need not be asked.
+  /// True when the body always has the shape of its mesh while nothing touches it: then it need not be asked.
   virtual bool still() const noexcept { return true; }
 
-  /// Bytes of its matrices and its state.
+  /// Bytes of the model's matrices and state.
   virtual std::size_t bytes() const noexcept = 0;
 };
 
-/// Presses until two answers, of bodies with time a hundredth of a second apart, differ by less than `tolerance`
-/// (relative, in force and depth), or `most` seconds have gone by. The last answer; what it may still lack is added to
-/// its error.
+/// Presses until two answers differ by less than `tolerance` (relative, in force and depth), or `most` seconds have
+/// passed. For a body with time the two answers are a hundredth of a second apart. Returns the last answer; its error
+/// includes the change that may still come.
 Reaction settle(Model& model, const Patch& patch, Given given, double value, double tolerance = 1e-4, double most = 5);
 
 }  // namespace tendon::softbody

@@ -9,15 +9,15 @@
 namespace tendon::softbody {
 namespace {
 
-/// Two stretches of a body that is the right way round have a sum of about 2; where one that is turned inside out has
-/// them cancel, how it turns is not defined, and this takes the place of 0.
+/// The least sum of two principal stretches. In an element that is not inverted the sum is about 2. In an inverted one
+/// two stretches may cancel, and the rotation is undefined; this value then replaces 0.
 constexpr double kLeastSum = 0.02;
 
 Mat3 sym(const Mat3& a) { return 0.5 * (a + a.transpose()); }
 
 Mat3 deviator(const Mat3& a) { return a - a.trace() / 3 * Mat3::Identity(); }
 
-/// The stretch S of F = R S, and what turns changes of FᵀF = S² into such of S: X of S X + X S = Y.
+/// The stretch S of F = R S. It turns changes of FᵀF = S² into changes of S: the X with S X + X S = Y.
 class Stretch {
  public:
   explicit Stretch(const Mat3& f) : stretch_(sym(nearest_rotation(f).transpose() * f)), axes_(stretch_) {
@@ -51,11 +51,11 @@ void check(const Yield& yield) {
   want_positive(yield.hardening, "`plasticity.hardening`: expected a modulus above 0 Pa");
 }
 
-/// What a step does at one point.
+/// The plastic flow of one step at one point.
 struct PlasticSolid::Flow {
-  Mat3 plastic;       ///< p, at the end
+  Mat3 plastic;       ///< p at the end of the step
   double lost = 0;    ///< J/m³
-  Mat3 way;           ///< unit, that of p − p₀
+  Mat3 way;           ///< unit direction of p − p₀
   double onward = 0;  ///< ∂p/∂ε along `way`, and across it
   double sideways = 0;
 

@@ -9,40 +9,41 @@
 
 namespace tendon::softbody {
 
-/// From where on a material keeps a dent: von Mises' yield with linear kinematic hardening (Prager). A bar that is
-/// drawn gives way with E up to `stress`, from there on with E·H/(E + H), back with E again, and after 2·`stress` of it
-/// yields the other way.
+/// The stress at which a material begins to keep a dent: von Mises' yield with linear kinematic hardening (Prager). A
+/// stretched bar has the modulus E up to `stress` and E·H/(E + H) beyond it. When it is released it has E again, and
+/// after 2·`stress` it yields the other way.
 struct Yield {
-  double stress = 0;     ///< σ, Pa, above 0: of a bar that is drawn or pressed
-  double hardening = 0;  ///< H, Pa, above 0: what each unit of plastic strain adds to that
+  double stress = 0;     ///< σ, Pa, above 0: yield stress of a bar in tension or compression
+  double hardening = 0;  ///< H, Pa, above 0: stress that each unit of plastic strain adds
 };
 
 /// Throws std::invalid_argument that names the field.
 void check(const Yield& yield);
 
-/// A solid that keeps a plastic strain p, symmetric and without a trace, at every point of integration. With the strain
-/// ε of its law (linear: sym(F − I); corotational: RᵀF − I, so that p turns with the material) its stress is that of
-/// ε − p, and a step from the plastic strain p₀ has the energy
+/// A solid that keeps a plastic strain p, symmetric and traceless, at every point of integration. With the strain ε of
+/// its law (linear: sym(F − I); corotational: RᵀF − I, so that p turns with the material) its stress is that of ε − p.
+/// A step from the plastic strain p₀ has the energy
 ///
 ///     min over p:  Ψ(ε − p) + ⅓ H |p|² + √⅔ σ |p − p₀|
 ///
-/// stored, stored by hardening, and lost. The minimum is the radial return (Wilkins 1964; Simo & Hughes 1998, box 3.1);
-/// that a step has an energy (Ortiz & Stainier 1999) is what lets Newton's method search along a line as it does in an
-/// elastic body. Until it has yielded it answers bit by bit as the solid that it is made of.
+/// The three terms are stored elastically, stored by hardening, and lost. The minimum is the radial return (Wilkins
+/// 1964; Simo & Hughes 1998, box 3.1). Because a step has an energy (Ortiz & Stainier 1999), Newton's method can search
+/// along a line as it does in an elastic body. Until the first yield the forces are bit for bit those of the solid that
+/// it was made from.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class PlasticSolid : public Solid {
  public:
-  /// Throws std::invalid_argument when the law is neither linear nor corotational, and what check() does.
+  /// Throws std::invalid_argument when the law is neither linear nor corotational, and whatever check() throws.
   PlasticSolid(const Solid& solid, const Yield& yield);
 
-  /// Of a step from where advance() was called last.
+  /// The energy of a step that begins at the u of the last advance().
   double energy(const VectorXd& u) const override { return forces(u).energy; }
   Forces forces(const VectorXd& u) const override;
   void stiffness(const VectorXd& u, Curvature curvature, SymmetricMatrix& to) const override;
 
   void advance(const VectorXd& u);                    ///< a step ends at u; the next begins there
-  bool yielded() const noexcept { return yielded_; }  ///< somewhere, ever
+  bool yielded() const noexcept { return yielded_; }  ///< at any point, at any time
   const Mat3& plastic_strain(int element, int point) const {
     return plastic_[at(element * points_per_element() + point)];
   }

@@ -6,9 +6,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// Σ 2µV ∇N ∇Nᵀ, the same for each axis: three matrices that do not know of each other.
+/// Σ 2µV ∇N ∇Nᵀ, the same for each axis: three matrices that are not coupled.
 SymmetricMatrix matrix_of(const Solid& solid) {
-  // Only where row and column are of the same axis; the others would only fill the factor.
+  // Only entries whose row and column have the same axis. The others are zero and would only make the factor larger.
   const SymmetricMatrix& all = solid.pattern();
   std::vector<int> axis_of(static_cast<std::size_t>(all.size));
   for (int i = 0; i < solid.size(); ++i) {
@@ -54,7 +54,7 @@ Factor factor_of(const Solid& solid, const Effects& effects) {
   return factor;
 }
 
-constexpr int kRoundsToRest = 1000;  // at the beginning, under its weight: enough for 1e-6 of it in the README's block
+constexpr int kRoundsToRest = 1000;  // at the start, under its weight: reaches 1e-6, relative, in the README's block
 
 }  // namespace
 

@@ -9,12 +9,12 @@
 
 namespace tendon::softbody {
 
-/// Projective dynamics (Bouaziz et al. 2014) of elements that are as rigid as possible: energy µ V |F − R|², R the
-/// rotation next to F. A round finds the rotation of every point of the mesh, and then all displacements by one
-/// solution with a matrix that never changes, because |F − R|² with R held is the same quadratic for each axis. A round
-/// takes a part of what is left; an answer is a few rounds, on from the last one.
+/// Projective dynamics (Bouaziz et al. 2014) of elements that are as rigid as possible: energy µ V |F − R|², with R the
+/// rotation nearest to F. A round finds the rotation at every point of integration, and then all displacements by one
+/// solution. The matrix never changes, because |F − R|² with R fixed is the same quadratic for each axis. A round
+/// removes only part of the error; an answer is a few rounds, which continue from the last answer.
 ///
-/// The material is that of Law::kCorotational with λ = 0: it knows no Poisson ratio. For comparison.
+/// The material is that of Law::kCorotational with λ = 0: it has no Poisson ratio. It is here for comparison.
 class ProjectiveModel : public Model {
  public:
   /// Throws std::invalid_argument when iterations < 1 or with viscosity, which would tie the axes together. The solid
@@ -27,7 +27,7 @@ class ProjectiveModel : public Model {
   std::size_t bytes() const noexcept override;
 
  private:
-  VectorXd rotation_force() const;  ///< N, free: what the rotations of the present shape pull with
+  VectorXd rotation_force() const;  ///< N, free: the forces of the present shape's rotations
 
   const Solid& solid_;
   Vec3 normal_;

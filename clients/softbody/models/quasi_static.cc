@@ -15,24 +15,24 @@ namespace {
 constexpr double kDecrease = 1e-4;
 constexpr double kShortest = 1.0 / 1024;
 
-/// A factor serves as long as each step with it leaves so much of the energy that is to be lost: a quarter of the
-/// error.
+/// A factor serves while each step with it leaves at most this share of the energy that has still to be lost, which is
+/// a quarter of the error.
 constexpr double kSlow = 1.0 / 16;
 
-/// Of the stiffness that goes with an answer: what the next round takes off is a part of it.
+/// The precision, relative, of the stiffness that goes with an answer.
 constexpr double kTangentPrecision = 2e-3;
 constexpr int kTangentRounds = 5;
 
-/// m, to measure a slope of the force with: of a body of some mm the next derivative is then 1e-4 of it.
+/// m, the step with which a slope of the force is measured: for a body of some mm the next derivative adds 1e-4 of it.
 constexpr double kNudge = 1e-7;
 
-/// How often the sides that press on each other are looked up for one answer, and the part of their forces that may
-/// then still change.
+/// How often at most the neighbouring sides are looked up for one answer, and the relative change of their forces that
+/// ends this.
 constexpr int kLooks = 10;
 constexpr double kParted = 1e-3;
 
-/// m: an error of the force that so small a change of depth would explain counts as none, even where there is no force
-/// to compare it with.
+/// m: an error of the force that so small a change of depth explains counts as zero, even when there is no force to
+/// compare it with.
 constexpr double kUnseen = 1e-12;
 
 }  // namespace
@@ -79,7 +79,8 @@ void QuasiStaticModel::factorize() {
   stiffness(Elastic::Curvature::kExact);
   if (factor_.factorize(stiffness_)) return;
   stiffness(Elastic::Curvature::kWithoutNegative);
-  // Where points are crushed flat nothing may be left in some direction: a millionth of the largest entry is.
+  // Where points are crushed flat, no stiffness may be left in some direction; a millionth of the largest entry is then
+  // added.
   for (double shift = 0; !factor_.factorize(stiffness_);) {
     double largest = 0;
     for (const double value : stiffness_.values) largest = std::max(largest, std::abs(value));
@@ -160,7 +161,7 @@ double QuasiStaticModel::newton(const VectorXd& load, Given given, double value,
   double error = std::numeric_limits<double>::infinity();
   double before = std::numeric_limits<double>::infinity();
   double enough = 0;
-  bool exact = false;  // the factor is that of the present shape
+  bool exact = false;  // true when the factor is that of the present shape
   VectorXd by_tool;
   Elastic::Forces now = forces();
   for (iterations_ = 0; iterations_ < config_.max_iterations;) {
@@ -177,7 +178,7 @@ double QuasiStaticModel::newton(const VectorXd& load, Given given, double value,
     reaction.force = constrained_force(given, value, depth + load.dot(step.by_itself), compliance);
     by_tool = step.by_tool;
     const VectorXd move = step.by_itself + reaction.force * step.by_tool;
-    // −slope = moveᵀ K move: twice the energy that is still to be lost, which a force error of √(… K) would explain.
+    // −slope = moveᵀ K move is twice the energy that has still to be lost; a force error of √(… K) would explain it.
     const double slope = (now.force - reaction.force * load).dot(move);
     error = std::sqrt(std::max(0.0, -slope) * reaction.stiffness);
     enough = config_.tolerance * std::abs(reaction.force) + kUnseen * reaction.stiffness;
@@ -232,7 +233,7 @@ void QuasiStaticModel::cut(const Division& division, const EffectsConfig& effect
   effects_ = effects_at_rest(effects, elastic_);
   if (self_collision_) self_collision_ = std::make_unique<SelfCollision>(elastic_, *config_.self_collision, u_);
   stiffness_ = elastic_.pattern();
-  factor_ = Factor(stiffness_);  // a split one would not serve: under load the shape is another after the first step
+  factor_ = Factor(stiffness_);  // a split factor would not serve: under load the shape changes in the first step
   stale_ = true;
 }
 

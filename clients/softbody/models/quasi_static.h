@@ -11,21 +11,22 @@
 namespace tendon::softbody {
 
 /// Large rotations and strains, at rest at every instant: Newton's method on the elastic energy, with the tool's depth
-/// as a constraint. It begins where the last answer ended. Without inertia: no velocity, no mass. Effects that act on
-/// all of the body add their energies; with inertia that is the implicit Euler method, solved to the end.
+/// as a constraint. It begins with the shape of the last answer. Without the effect inertia there is no velocity and no
+/// mass. Effects that act on the whole body add their energies; with inertia this is the implicit Euler method, solved
+/// to convergence.
 ///
-/// A step solves with a factor that is kept from step to step and from answer to answer, and made anew where it no
-/// longer serves: a hand moves little between two answers, and a factor costs as much as twenty steps. It is made of
-/// the exact second derivative; where that is not positive definite, of the one whose negative eigenvalues are taken
-/// out of every point of integration. A line search keeps the energy going down, so that a body that was turned inside
-/// out finds its way back (Law::kCorotational), or at least to a rest with every element the right way round: the
-/// neo-Hookean energy has others, in which an edge of the body is wound around itself (kNeoHookean).
+/// The factor is kept from step to step and from answer to answer, and made anew only when it no longer serves: a hand
+/// moves little between two answers, and a factor costs as much as twenty steps. It is the factor of the exact second
+/// derivative; where that is not positive definite, the negative eigenvalues are removed at every point of integration.
+/// A line search makes the energy fall in every step. So a body that was turned inside out returns to its shape
+/// (Law::kCorotational), or at least comes to rest with no element inverted (kNeoHookean): the neo-Hookean energy has
+/// further minima, in which an edge of the body is wound around itself.
 class QuasiStaticModel : public Model {
  public:
   struct Config {
-    int max_iterations = 30;                    ///< of an answer; what is then missing is Reaction::error
+    int max_iterations = 30;                    ///< for an answer; the rest is in Reaction::error
     double tolerance = 1e-6;                    ///< of the force, relative
-    std::optional<double> self_collision = {};  ///< Pa/m, see there
+    std::optional<double> self_collision = {};  ///< Pa/m: the bed c of SelfCollision
   };
   /// `elastic` must outlive this. It begins at rest, under its weight if it has any.
   QuasiStaticModel(const Elastic& elastic, const TouchSurface& surface, const Config& config,
@@ -37,8 +38,8 @@ class QuasiStaticModel : public Model {
   bool still() const noexcept override { return effects_.empty(); }
   std::size_t bytes() const noexcept override;
 
-  int iterations() const noexcept { return iterations_; }  ///< of the last answer
-  int factors() const noexcept { return factors_; }        ///< made since the beginning
+  int iterations() const noexcept { return iterations_; }  ///< in the last answer
+  int factors() const noexcept { return factors_; }        ///< made since construction
   const VectorXd& displacements() const noexcept { return u_; }
   const SelfCollision* self_collision() const noexcept { return self_collision_.get(); }  ///< null: not simulated
   /// Puts the nodes elsewhere, m; the fixed ones too.
@@ -46,7 +47,7 @@ class QuasiStaticModel : public Model {
     u_ = u;
     stale_ = true;
   }
-  /// Lets go of the tool and finds the shape at rest, or after a step of time. The energy that is left, J.
+  /// Takes the tool away and finds the shape at rest, or after one step of time. Returns the remaining energy, J.
   double release();
 
  private:
@@ -60,13 +61,13 @@ class QuasiStaticModel : public Model {
   void foresee(const VectorXd& internal, const VectorXd& load, Given given, double value);
   MatrixXd solve(const MatrixXd& forces) const;
   Step solve(const VectorXd& internal, const VectorXd& load) const;
-  /// Goes along `step` as far as the energy less the tool's work goes down. False when it does not. `now` is what acts
-  /// before and after.
+  /// Goes along `step` as far as the energy minus the tool's work falls. False when it does not fall. `now` has the
+  /// forces before the call, and those of the new shape after it.
   bool go(const VectorXd& step, const VectorXd& load, double force, double slope, Elastic::Forces& now);
   double tangent(const VectorXd& load, const VectorXd& by_tool, const Elastic::Forces& now);
-  /// The error, N; with the sides of the body that are next to each other as they were last looked up.
+  /// Solves with the neighbouring sides of the body as they were last looked up. Returns the error, N.
   double newton(const VectorXd& load, Given given, double value, Reaction& reaction);
-  /// Looks them up, and goes on until they stay the same. The error, N.
+  /// Looks up the neighbouring sides and solves again, until they stay the same. Returns the error, N.
   double part_sides(const VectorXd& load, Given given, double value, Reaction& reaction);
 
   const Elastic& elastic_;
@@ -84,7 +85,8 @@ class QuasiStaticModel : public Model {
   bool stale_ = true;  ///< the factor no longer serves
 };
 
-/// Where a body that nothing touches is at rest, m, all nodes: `loads` counts, what has time does not.
+/// The displacements at rest of a body that nothing touches, m, all nodes. The loads in `loads` count; its effects with
+/// time do not.
 VectorXd shape_at_rest(const Elastic& elastic, const TouchSurface& surface, EffectsConfig loads);
 
 }  // namespace tendon::softbody

@@ -10,11 +10,11 @@
 
 namespace tendon::softbody {
 
-/// How Young's modulus goes over time: times its value in the material, straight from each point to the next; before
-/// the first and after the last as there.
+/// Young's modulus over time, as a factor of the material's value: linear between the points, constant before the first
+/// and after the last one.
 struct StiffnessOverTime {
   std::vector<double> at;      ///< s, ascending
-  std::vector<double> factor;  ///< above 0, as many
+  std::vector<double> factor;  ///< one for each time, above 0
 
   double factor_at(double time) const;
 };
@@ -22,16 +22,16 @@ struct StiffnessOverTime {
 /// Throws std::invalid_argument that names the field.
 void check(const StiffnessOverTime& law);
 
-/// A body whose Young's modulus changes while it is touched: muscle that is tensed, a graft that cures. For models that
-/// have no other load than the tool and whose energy is proportional to the modulus: with `factor` times the modulus
-/// every force is `factor` times what it was in the same shape, so the shape under a given depth is the same. The kept
-/// factor of the system, or the table, goes on to serve: a force is scaled, nothing is solved again.
+/// A body whose Young's modulus changes while it is touched: a muscle that tenses, a graft that cures. It wraps models
+/// whose only load is the tool and whose energy is proportional to the modulus: with `factor` times the modulus every
+/// force in the same shape is `factor` times as large, so a given depth has the same shape. The factor of the system,
+/// or the table, stays valid: forces are scaled, and nothing is solved again.
 ///
-/// Energy: at rest under a tool held still the stored energy goes from E to E·factor, and what raises it is not the
-/// hand. Such a body is not passive; the server's limiter is what keeps the hand safe from it.
+/// Energy: under a tool that is held still, the stored energy changes from E to E·factor, and the hand does not supply
+/// the difference. Such a body is not passive; the server's limiter keeps the hand safe from it.
 class StiffeningModel : public Model {
  public:
-  /// Throws what check() does. It begins with the modulus of time 0.
+  /// Begins with the modulus of time 0. Throws whatever check() throws.
   StiffeningModel(std::unique_ptr<Model> model, StiffnessOverTime law);
 
   void tick(double time) { factor_ = law_.factor_at(time); }  ///< s

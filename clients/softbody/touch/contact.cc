@@ -57,7 +57,7 @@ Feel PatchContact::at(const Vec3& tool) {
   const Vec3 steepest = n + surface_.from_across(2 * reaction.slope - height_slope);
   feel.stiffness = reaction.stiffness * steepest * steepest.transpose();
   feel.error = reaction.error;
-  feel.valid_radius = surface_.radius() / 4;  // across, a patch is another one there
+  feel.valid_radius = surface_.radius() / 4;  // further away, across, the patch has other nodes
   if (friction_) rub(surface_.across(tool), reaction.force, feel);
   return feel;
 }

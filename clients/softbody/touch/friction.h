@@ -11,14 +11,14 @@ namespace tendon::softbody {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Dry friction between a tool and the patch below it, after Coulomb with a little give (Hayward & Armstrong 2000): a
-/// spring across the surface from the tool to an anchor, which is dragged along so that the spring never pulls with
-/// more than
+/// Dry friction between a tool and the patch below it: Coulomb's, with a little elasticity (Hayward & Armstrong 2000).
+/// A spring runs across the surface from the tool to an anchor. The anchor is dragged along, so that the spring never
+/// pulls with more than
 ///
 ///     |f| ≤ µ F
 ///
-/// F the force along the normal. The spring's stiffness is constant and its energy only ever lost to the dragging, so
-/// on any closed way it takes energy and gives none. The body's own shape does not follow it aside.
+/// where F is the force along the normal. The spring's stiffness is constant, and its energy is only lost, by dragging,
+/// so on any closed path it takes energy and gives none. The body's shape does not follow it sideways.
 ///
 /// Thread-safe: no.
 class Friction {
@@ -29,9 +29,9 @@ class Friction {
   struct Drag {
     Vec2 force = Vec2::Zero();  ///< N, on the tool, across
     double stiffness = 0;       ///< N/m, −∂force/∂place; 0 while it slides
-    double until_slip = 0;      ///< m, how far the tool may go before it slides; 0 while it does
+    double until_slip = 0;      ///< m, how far the tool may go before it slides; 0 while it slides
   };
-  /// The tool is at `place` (m, across), pressed with `normal_force` N; where that is 0 or less it has let go.
+  /// Moves the tool to `place` (m, across), pressed with `normal_force` N. At 0 or less the tool has let go.
   Drag move(const Vec2& place, double normal_force);
   void let_go() { anchor_.reset(); }
 
@@ -43,7 +43,8 @@ class Friction {
   std::optional<Vec2> anchor_;
 };
 
-/// What a half space gives way aside under a disc of `radius` m that does not slip: 8 G a/(2 − ν), N/m (Mindlin 1949).
+/// The sideways stiffness, N/m, of a half space under a disc of `radius` a (m) that does not slip: 8 G a/(2 − ν)
+/// (Mindlin 1949).
 double sideways_stiffness(const Material& material, double radius);
 
 }  // namespace tendon::softbody

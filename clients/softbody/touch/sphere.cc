@@ -10,8 +10,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// Rounds in which all nodes that are wrong change sides. Should that go round in circles, one changes at a time, the
-/// one that is most wrong: the energy then falls in every round, and the end is sure (Lawson & Hanson 1974).
+/// In the first rounds all wrong nodes change sides. That may go round in circles; in later rounds only the most wrong
+/// node changes, so the energy falls in every round and the search is sure to end (Lawson & Hanson 1974).
 constexpr int kQuickRounds = 20;
 constexpr int kMostRounds = 1000;
 
@@ -80,7 +80,7 @@ Feel SphereContact::at(const Vec3& q) {
     }
     factor.compute(table(set, set));
     push = factor.solve(depth(set));
-    // Wrong is one that is pushed and pulls, and one that is not and lies in the sphere.
+    // A pushed node is wrong when it pulls; any other node is wrong when it lies in the sphere.
     const VectorXd left = depth - table(Eigen::all, set) * push;
     std::vector<std::pair<double, std::size_t>> wrong;
     for (std::size_t k = 0; k < set.size(); ++k) {
@@ -102,7 +102,7 @@ Feel SphereContact::at(const Vec3& q) {
     const Overlap& node = inside[static_cast<std::size_t>(set[k])];
     ways.col(static_cast<Eigen::Index>(k)) = node.way;
     pushed_[static_cast<std::size_t>(node.row)] = true;
-    // |r|/√(R² − |r|²) is the tangent of the angle at which the sphere leans there.
+    // |r|/√(R² − |r|²) is the tangent of the angle between the sphere's surface there and the plane across.
     const double lean = (node.way - surface_.normal()).norm();
     contact_radius_ = std::max(contact_radius_, radius_ * lean / std::sqrt(1 + lean * lean));
   }
