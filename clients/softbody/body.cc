@@ -142,11 +142,11 @@ constexpr bool each_is_at_its_kind(const std::array<Info, kCount>& rows) {
   }
   return true;
 }
-// info() indexes by the kind.
+// info() uses the kind as the index.
 static_assert(each_is_at_its_kind(kEffects) && kEffects.back().kind == kSelfCollision);
 static_assert(each_is_at_its_kind(kModels) && kModels.back().kind == ModelKind::kModal);
 
-/// A model, and what is known of it where it is of a kind that has more to offer.
+/// A model, and typed pointers to it for kinds that offer more than Model.
 struct Made {
   std::unique_ptr<Model> model;
   const CondensedModel* condensed = nullptr;
@@ -200,7 +200,7 @@ Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& 
   return made;
 }
 
-/// No effect may be in a config and be left out silently.
+/// Checks that every effect of a config is simulated: none may be left out silently.
 const BodyConfig& checked(const BodyConfig& config) {
   const ModelInfo& model = info(config.model);
   const EffectSet simulated = effects_of(config);
@@ -276,7 +276,7 @@ struct Body::Parts {
         contact(model, surface, config.tool_radius, config.side, friction_of(config)),
         patch(middle_patch(surface, config.middle)),
         knows_turns(info(config.model).always.has(kGeometricNonlinearity)) {
-    // checked() has seen to it that a sphere's model is condensed.
+    // checked() has made sure that a sphere's model is condensed.
     if (config.tool == BodyConfig::Tool::kSphere) sphere.emplace(*made.condensed, surface, config.tool_radius);
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
@@ -284,7 +284,7 @@ struct Body::Parts {
   void cut(PlannedCut::When when, double value);
   void note(Feel& feel);
 
-  /// Cuts that are yet to be made, and what they will need.
+  /// The cuts that are still to be made, and the values that they need.
   struct Planned {
     Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed, const TouchSurface& surface);
     Cutting cuts;
@@ -303,7 +303,7 @@ struct Body::Parts {
   std::unique_ptr<Planned> cutting;
 };
 
-/// Makes the cuts once on the mesh alone: a plan that goes wrong is refused before anything is touched.
+/// Makes the cuts once, on a mesh only: so a plan that cannot work is refused before anything is touched.
 Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const Fixed& fixed,
                               const TouchSurface& surface)
     : cuts(config.cuts), effects(config.effects), middle(config.middle) {
@@ -330,7 +330,7 @@ void Body::Parts::cut(PlannedCut::When when, double value) {
     surface = TouchSurface(solid.mesh(), surface.normal(), surface.radius());
     patch = middle_patch(surface, cutting->middle);
     model.cut(division, cutting->effects);
-    if (when == PlannedCut::When::kForce) return;  // the force on what is left is not known yet
+    if (when == PlannedCut::When::kForce) return;  // the force on the cut body is not known yet
   }
 }
 
@@ -369,7 +369,7 @@ double Body::linear_up_to() const {
   const TouchSurface& surface = parts_->surface;
   const VectorXd load = solid.to_free(patch_load(solid, surface.normal(), parts_->patch));
   const VectorXd per_newton = LinearModel(solid, surface).displacements(parts_->patch);
-  const double depth = 1e-6 * surface.radius();  // so little that the turn grows with it
+  const double depth = 1e-6 * surface.radius();  // so small that the rotation is proportional to it
   VectorXd u = VectorXd::Zero(solid.size());
   solid.add_free(depth / load.dot(per_newton) * per_newton, u);
   return depth * kLargestTurn / solid.largest_turn(u);

@@ -57,12 +57,12 @@ struct EffectInfo {
   EffectKind kind;
   std::string_view name;
   std::string_view what;  ///< one line
-  EffectSet not_with;     ///< is not simulated together with these
+  EffectSet not_with;     ///< effects with which it cannot be simulated
 };
 std::span<const EffectInfo> effects() noexcept;  ///< in the order of their kinds
 const EffectInfo& info(EffectKind kind) noexcept;
 
-/// The models that a scene can choose, each a file of this folder.
+/// The models that a scene can choose; folder models/ has a file for each family.
 enum class ModelKind : std::uint8_t {
   kLinear,
   kCondensed,
@@ -82,11 +82,11 @@ struct ModelInfo {
   Law law;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  EffectSet always;       ///< simulates these, whatever is listed
-  EffectSet may;          ///< simulates these when they are listed
-  bool tetrahedra;        ///< wants a mesh of tet4
+  EffectSet always;       ///< always simulated
+  EffectSet may;          ///< simulated when they are listed
+  bool tetrahedra;        ///< needs a mesh of tet4
 
-  bool has_time() const noexcept { return always.has(EffectKind::kInertia); }  ///< even when nothing is listed
+  bool has_time() const noexcept { return always.has(EffectKind::kInertia); }  ///< even when no effect is listed
 };
 
 /// Every model, in the order in which tables list them.
@@ -109,80 +109,81 @@ struct FileShape {
   double scale;  ///< from the file's units to m
 };
 
-/// A soft body that a tool touches, as plain values. Blocks and cylinders stand on z = 0.
+/// The description of a soft body that a tool touches, as plain values. Blocks and cylinders stand on z = 0.
 struct BodyConfig {
   std::variant<BlockShape, CylinderShape, FileShape> shape;
   Element element = Element::kHex8Sri;
   Material material;
   ModelKind model = ModelKind::kCondensed;
-  int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< of those that end when they are done
-  int iterations = 10;                                             ///< of those that always do so many
-  int swings = 30;                                                 ///< kModal
-  int static_modes = 0;   ///< kModal: so many patches along each axis of a square of 2 `reach`; 1: the middle's alone
-  EffectsConfig effects;  ///< what acts on all of the body
+  int max_iterations = QuasiStaticModel::Config{}.max_iterations;  ///< for models that iterate until they converge
+  int iterations = 10;                                             ///< for models with a fixed number of iterations
+  int swings = 30;                                                 ///< kModal: vibration modes
+  int static_modes = 0;   ///< kModal: patches along each axis of a square of 2 `reach`; 1: only the one in the middle
+  EffectsConfig effects;  ///< effects that act on the whole body
   std::optional<double> friction;  ///< coefficient
-  std::vector<PlannedCut> cuts;    ///< in their order
+  std::vector<PlannedCut> cuts;    ///< in the order in which they are made
   std::optional<StiffnessOverTime> stiffening;
   std::optional<Yield> plasticity;
-  std::optional<double>
-      self_collision;        ///< m: so deep are two sides in each other where they press with Young's modulus
-  double clamped_below = 0;  ///< m; nodes up to so far above the lowest one are held. The lowest ones always are
+  std::optional<double> self_collision;  ///< m: the overlap at which two sides press on each other with Young's modulus
+  double clamped_below = 0;  ///< m; nodes up to this height above the lowest ones are held. The lowest always are
 
   Vec3 towards_tool = Vec3::UnitZ();  ///< unit vector, body frame
   double patch_radius = 0;            ///< m
-  /// m, how far from `middle` it can be touched (kCondensed, kModal); empty: anywhere, and no further than a patch for
-  /// static modes.
+  /// m, how far from `middle` the body can be touched (kCondensed, kModal). Empty: anywhere; static modes then reach no
+  /// further than a patch.
   std::optional<double> reach;
-  Vec3 middle = Vec3::Zero();  ///< m; its place across `towards_tool` counts
+  Vec3 middle = Vec3::Zero();  ///< m; only its position across `towards_tool` counts
   double tool_radius = 0;      ///< m; 0: a point
-  /// What touches: a patch of fixed size, or a rigid sphere of `tool_radius` whose contact grows (kCondensed alone).
+  /// The tool presses a patch of fixed size, or is a rigid sphere of `tool_radius` whose contact grows (kCondensed
+  /// only).
   enum class Tool : std::uint8_t { kPatch, kSphere };
   Tool tool = Tool::kPatch;
   PatchContact::Side side = PatchContact::Side::kUnilateral;
 };
 
-/// The effects that `config` simulates, those of its model included.
+/// The effects that `config` simulates, including those of its model.
 EffectSet effects_of(const BodyConfig& config);
 
 /// Mesh, model and contact of one body, built from a BodyConfig. Thread-safe: no. Realtime-safe: no.
 class Body {
  public:
-  /// Throws std::invalid_argument with a sentence when the values make no body, or their cuts leave none to be touched.
+  /// Throws std::invalid_argument with a sentence when the values describe no possible body, or when the cuts leave
+  /// nothing to touch.
   explicit Body(const BodyConfig& config);
   ~Body();
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// The force on a tool there. A body with time goes on by one step. A cut that waits for this answer's force is made
-  /// after the answer: the next one is that of the cut body, and says so.
+  /// The force on a tool with its middle at `tool`. A body with time advances by one step. A cut that waits for this
+  /// answer's force is made after the answer: the next answer is that of the cut body, and says so.
   Feel touch(const Vec3& tool);
 
-  /// `time` s have gone by since the scene began: Young's modulus becomes that of then, and cuts that are due are made.
-  /// No cut is undone by an earlier time.
+  /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
+  /// earlier time undoes no cut.
   void tick(double time);
-  bool has_clock() const noexcept;  ///< whether tick() is of any use
+  bool has_clock() const noexcept;  ///< true when tick() changes anything
 
-  /// The model under a patch around the middle: stiffness and force of scripted presses. A body with time goes on by
-  /// one step; `settle` waits until it is at rest, and a model that is never done until it is done.
+  /// Presses the model with a patch around the middle, for scripted tests of stiffness and force. A body with time
+  /// advances by one step; `settle` repeats until the body is at rest, or until an iterative model has converged.
   Reaction press(Given given, double value);
   Reaction settle(Given given, double value);
 
-  /// m, how deep the middle may be pressed before the material turns somewhere by more than kLargestTurn. Beyond that a
-  /// model without geometric nonlinearity takes turns for strains (of 1 − cos), and gives forces that are not there; ∞
-  /// for the others. Makes a factor for it.
+  /// m, how deep the middle may be pressed before the material rotates anywhere by more than kLargestTurn. Beyond that,
+  /// a model without geometric nonlinearity mistakes rotations for strains (of 1 − cos) and gives wrong forces; ∞ for
+  /// the other models. Each call makes a factor.
   double linear_up_to() const;
   static constexpr double kLargestTurn = 0.1;  ///< rad; B1's force is then 5 to 7 % above corotational's
 
-  double step() const noexcept;  ///< s, that an answer lasts; 0: at rest at every instant
+  double step() const noexcept;  ///< s, the time that an answer simulates; 0: at rest at every instant
 
-  /// The point of the surface at rest above `middle`, and the way to the tool there; body frame.
+  /// The point of the surface at rest above `middle`, and the direction from there to the tool; body frame.
   Vec3 touch_point() const;
   const Vec3& normal() const;
 
   struct Size {
     std::size_t nodes;
     std::size_t elements;
-    std::size_t free;       ///< displacements to be found
+    std::size_t free;       ///< unknown displacements
     std::size_t touchable;  ///< nodes
     std::size_t bytes;      ///< kept by the model, effects included
   };

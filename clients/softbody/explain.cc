@@ -78,7 +78,8 @@ std::string milliseconds(double s, double resolution) {
 
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time) {
   Body body(scene.body);
-  // So little that it is linear, and by force: under its weight the surface is not where the mesh has it.
+  // The push is so small that the answer is linear. It is a force because the weight moves the surface away from the
+  // mesh's.
   const double push = 1e-3 * scene.body.material.young * scene.body.patch_radius * scene.body.patch_radius;
   Explanation out{.parts = {},
                   .all = {},
@@ -87,7 +88,7 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
                   .stiffness = body.settle(Given::kForce, push).stiffness,
                   .linear_up_to = body.linear_up_to()};
 
-  std::vector<BodyConfig> bodies{scene.body, scene.body};  // the second to see how far the first can be trusted
+  std::vector<BodyConfig> bodies{scene.body, scene.body};  // the second shows how far the first can be trusted
   const EffectSet simulated = effects_of(scene.body);
   const EffectSet always = info(scene.body.model).always;
   for (const EffectInfo& effect : effects()) {

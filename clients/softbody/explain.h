@@ -16,11 +16,11 @@ namespace tendon::softbody {
 ///
 /// Costs are measured on this machine, now: the processor time of an answer, averaged over a tool that presses 3 mm
 /// into the middle and comes back. The bodies take turns, and each cost is the least of up to 4 rounds. The cost of an
-/// effect is the difference to the same scene without it. It is below 0 where the other effects have more to do then.
+/// effect is the difference to the same scene without it. It is below 0 when the other effects cost more without it.
 struct Explanation {
   struct Cost {
     double answer_s = 0;     ///< s of processor time
-    std::int64_t bytes = 0;  ///< that the model keeps
+    std::int64_t bytes = 0;  ///< kept by the model
   };
   struct Part {
     EffectKind kind;
@@ -29,7 +29,7 @@ struct Explanation {
   };
   std::vector<Part> parts;  ///< every effect
   Cost all;
-  double resolution_s = 0;  ///< by which two measurements of one thing differed; smaller costs mean nothing
+  double resolution_s = 0;  ///< the difference of two measurements of the same body; smaller costs mean nothing
   Body::Size size;
   double step = 0;          ///< s, the time step of an answer; 0: the body is at rest at every instant
   double stiffness = 0;     ///< N/m, at first touch
@@ -39,7 +39,7 @@ struct Explanation {
 /// `processor_time` of the calling thread, s.
 Explanation explain(const Scene& scene, const std::function<double()>& processor_time);
 
-/// For people, with the warnings that concern the scene; and a JSON object in one line.
+/// The explanation for people, with the warnings about the scene; and as a JSON object in one line.
 std::string in_words(const Scene& scene, const Explanation& explanation);
 std::string in_json(const Scene& scene, const Explanation& explanation);
 

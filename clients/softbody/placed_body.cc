@@ -54,7 +54,7 @@ std::optional<ForceTable> PlacedBody::table(const Vec3& position, double gap) {
     try {
       table.force[table.size] = normal_.dot(touch(position - depth * normal_).force);
     } catch (const std::out_of_range&) {
-      break;  // so deep it would touch more than was condensed
+      break;  // at this depth the tool would touch more than the condensed part
     }
   }
   return table.size >= ForceTable::kMinEntries ? std::optional(table) : std::nullopt;
@@ -73,7 +73,7 @@ Feel PlacedBody::follow(const DeviceState& hand) {
   bool changed = false;
   for (auto i = steps; i > 0; --i) {
     owed -= step;
-    const double share = past > Duration(0) ? std::min(1.0, seconds(owed) / seconds(past)) : 0;  // still ahead
+    const double share = past > Duration(0) ? std::min(1.0, seconds(owed) / seconds(past)) : 0;  // of the way, ahead
     followed_->feel = touch(hand.position + share * (from - hand.position));
     changed = changed || followed_->feel.topology_changed;
   }

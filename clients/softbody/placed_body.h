@@ -9,27 +9,29 @@
 
 namespace tendon::softbody {
 
-/// A body where a scene has put it: between the device's frame and the body's own.
+/// A body in its place in a scene. It converts between the device's frame and the body's own.
 class PlacedBody {
  public:
-  /// Throws std::invalid_argument when the scene makes no body.
+  /// Throws std::invalid_argument when the scene describes no possible body.
   explicit PlacedBody(const Scene& scene);
 
-  /// The force on the hand at `position` (m, device frame); all vectors in the device frame. A body with time goes
-  /// on by one step.
+  /// The force on the hand at `position` (m, device frame); all vectors are in the device frame. A body with time
+  /// advances by one step.
   Feel touch(const Vec3& position);
 
-  /// The same as an answer to the server: with the stiffness and how far it holds, the solver's error and, where a tool
-  /// does not stick, the surface; with Scene::table the force at other depths too, from the surface on, or from half of
-  /// the table above the tool where that is deeper. A body with time goes on from the hand's last place to
-  /// this one, by as many steps as went by between the two samples; when that is none, the answer is the last one.
-  /// After more than `kMostBehind`, or when the server's clock is set back, it takes one step instead: a pause is not
-  /// made up for. What a scene plans over time counts from the first answer's sample.
+  /// The same as an answer to the server. It has the stiffness and how far that holds, the solver's error and, unless
+  /// the tool sticks, the surface. With Scene::table it has the force at other depths too: the table begins at the
+  /// surface, or half a table's depth above the tool where that is deeper.
+  ///
+  /// A body with time moves the tool from the hand's last position to this one, in the steps that fit between the two
+  /// samples; when none fits, the last answer is repeated. After more than `kMostBehind`, or when the server's clock is
+  /// set back, it takes a single step: a pause is not caught up. The times that a scene plans count from the sample of
+  /// the first answer.
   Touch answer(const DeviceState& hand);
   static constexpr Duration kMostBehind = std::chrono::milliseconds(200);
 
-  double linear_up_to() const { return body_.linear_up_to(); }  ///< as Body's
-  double deepest() const noexcept { return deepest_; }          ///< m, that the tool has been in the body
+  double linear_up_to() const { return body_.linear_up_to(); }  ///< see Body
+  double deepest() const noexcept { return deepest_; }          ///< m, the greatest depth of the tool so far
 
  private:
   void tick(PeerTime sampled);
@@ -38,7 +40,7 @@ class PlacedBody {
   struct Followed {
     PeerTime sampled;
     Vec3 position;
-    Duration owed;  ///< less than a step, that is yet to be simulated
+    Duration owed;  ///< time still to be simulated, less than a step
     Feel feel;
   };
 
@@ -47,8 +49,8 @@ class PlacedBody {
   Vec3 origin_;  ///< of the body's frame, in the device's
   Vec3 normal_;  ///< towards the hand
   bool only_pushes_;
-  double depths_;                  ///< m, of the table
-  std::optional<PeerTime> first_;  ///< when the hand was where it was answered first; of bodies with a clock
+  double depths_;                  ///< m, the depth of the table
+  std::optional<PeerTime> first_;  ///< the time of the first sample that was answered; for bodies with a clock
   std::optional<Followed> followed_;
   double deepest_ = 0;
 };

@@ -18,9 +18,9 @@
 namespace tendon::softbody {
 namespace {
 
-/// toml++ recurses, so that a small file of brackets could overflow the stack.
+/// toml++ recurses: even a small file of brackets could overflow the stack.
 constexpr std::uintmax_t kMaxSceneBytes = 16'384;
-constexpr double kMaxLength = 1e3;  // m: whoever writes more has mistaken the unit
+constexpr double kMaxLength = 1e3;  // m: a larger value is a mistaken unit
 constexpr std::int64_t kMaxCells = 200;
 
 template <class Infos>
@@ -30,7 +30,7 @@ std::string names(const Infos& infos) {
   return all;
 }
 
-/// A table of a scene. Every key that is asked for is known; at the end, those that were never asked for are wrong.
+/// A table of a scene. Keys become known by being asked for; at the end, keys that were never asked for are errors.
 class Table {
  public:
   Table(const toml::table& table, std::string path, const std::string& file)
@@ -147,7 +147,7 @@ class Table {
     return all;
   }
 
-  /// Where this table is.
+  /// An error at the line of this table.
   [[noreturn]] void fail(const std::string& what) const { fail(table_, "", what); }
 
   /// Numbers above `least` (or equal to it, with `or_equal`).
@@ -299,8 +299,8 @@ double read_self_collision(Table table) {
   return layer;
 }
 
-/// The effects that are listed must be those that the model simulates: all that it always does, and no others than it
-/// can.
+/// Reads the list of effects. It must have all effects that the model always simulates, and only effects that the model
+/// can simulate.
 void read_effects(Table& root, const ModelInfo& model, BodyConfig& body) {
   const toml::node& node = root.need("effects", "a list of effects");
   const auto* list = node.as_array();

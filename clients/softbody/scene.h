@@ -11,12 +11,12 @@
 
 namespace tendon::softbody {
 
-/// The body that tendon-softbody simulates, and where it lies in front of the device.
+/// The body that tendon-softbody simulates, and its place in front of the device.
 struct Scene {
   BodyConfig body;
-  Vec3 at = Vec3::Zero();             ///< m, device frame: where the touch point of the body at rest is
-  Vec3 towards_hand = Vec3::UnitZ();  ///< unit vector, device frame: the body's way to the tool
-  double table = 0;                   ///< m, the depths that an answer's table of forces covers; 0: it has none
+  Vec3 at = Vec3::Zero();             ///< m, device frame: the touch point of the body at rest
+  Vec3 towards_hand = Vec3::UnitZ();  ///< unit vector, device frame: the direction from the body to the tool
+  double table = 0;                   ///< m, the depths that an answer's table of forces covers; 0: no table
 };
 
 /// An error in a scene: "FILE:LINE: KEY: expected …, found …".
@@ -25,21 +25,21 @@ class SceneError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Reads a scene file (TOML); `scene_reference()` lists its keys. Nothing is simulated that is not listed in `effects`,
-/// and an effect that the model does not simulate, or one that it does and that is not listed, is an error. Throws
-/// SceneError.
+/// Reads a scene file (TOML); `scene_reference()` lists its keys. Only the effects listed in `effects` are simulated. A
+/// listed effect that the model does not simulate is an error, and so is an effect that the model always simulates when
+/// it is not listed. Throws SceneError.
 Scene read_scene(const std::filesystem::path& file);
 
-/// The same for text in memory. `name` is what errors call it; a mesh is looked for relative to `directory`.
+/// The same for text in memory. Errors call it `name`; the path of a mesh is relative to `directory`.
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory);
 
 /// Every key that a scene may have, and every name that a value may have.
 std::string scene_reference();
 
-/// Warnings that a person should read before trusting this body.
+/// Warnings to read before trusting this body.
 std::vector<std::string> warnings(const BodyConfig& body);
 
-/// The same, once the tool is deeper than Body::linear_up_to(), m.
+/// The warning for a tool that is deeper than Body::linear_up_to(), m.
 std::string turned_too_far(double linear_up_to);
 
 }  // namespace tendon::softbody

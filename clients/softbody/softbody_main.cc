@@ -15,7 +15,7 @@ using namespace tendon;
 
 namespace {
 
-/// What a self-test presses a body by: 3 mm, and as far aside, so that it stays on the surface that a scene has.
+/// A self-test presses 3 mm deep and slides 3 mm sideways, so that it stays on the surface of a scene.
 constexpr double kWay = 0.003;
 
 int test(const softbody::Scene& scene, const Options& options) {

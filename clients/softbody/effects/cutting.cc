@@ -15,11 +15,11 @@
 namespace tendon::softbody {
 namespace {
 
-/// Of the distance between two middles: a plane that goes through one is seen on its far side wherever it is rounded
-/// to.
+/// A share of the distance between two elements' middles. A middle this close to the plane counts as on its far side,
+/// whichever way it was rounded.
 constexpr double kOnPlane = 1e-6;
 
-/// Things that hang together, by their numbers (union-find).
+/// Groups of connected things, by their numbers (union-find).
 class Groups {
  public:
   explicit Groups(std::size_t size) : of_(size) { std::iota(of_.begin(), of_.end(), 0); }
@@ -56,8 +56,8 @@ bool between(const Cut& cut, const Vec3& from, const Vec3& to) {
   return s >= -kOnPlane && s <= 1 + kOnPlane && t >= -kOnPlane && t <= 1 + kOnPlane;
 }
 
-/// Gives each group of elements that hang together around a node, but not through one of the faces that are opened, a
-/// node of its own.
+/// Gives every group of elements around a node its own copy of the node. Elements belong to one group when faces that
+/// are not opened connect them.
 void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed, Division& to) {
   const int per = nodes_of(mesh.shape);
   const auto place_of = [&](int element, int node) {
@@ -101,7 +101,7 @@ void part_nodes(const Mesh& mesh, std::span<const Cut> cuts, const Fixed& fixed,
   }
 }
 
-/// Takes out the pieces that three held nodes, not on one line, do not keep from moving as a whole.
+/// Removes the pieces that can move as a whole, because they lack three held nodes that are not on one line.
 void drop_loose(Division& to) {
   Mesh& mesh = to.mesh;
   Groups pieces(mesh.nodes.size());

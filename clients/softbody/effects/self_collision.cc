@@ -17,19 +17,19 @@ namespace {
 
 using Box = Eigen::AlignedBox3d;
 
-/// In sizes of a facet: how far behind it a node is pushed back from, and how far before it a node is kept in mind.
+/// In sizes of a facet: how far behind it a node is still pushed back, and how far in front of it a node is watched.
 constexpr double kBehind = 0.5;
 constexpr double kBefore = 1;
 
-/// How far beside a triangle, in shares of its corners, a node is still at it. With less, a node at the rim of a side
-/// would be sent to and fro between one plane and none.
+/// How far beside a triangle, in shares of its corners, a node still belongs to it. With less, a node at the rim of a
+/// side would alternate between one plane and none.
 constexpr double kBeside = 0.15;
 
-/// Rounds of Gauss and Seidel, and of the largest force the change in one that ends them.
+/// The most rounds of Gauss and Seidel; they end when a round changes forces by less than this share of the largest.
 constexpr int kMostRounds = 2000;
 constexpr double kSettled = 1e-8;
 
-/// What Eigen's tree asks: which boxes a place lies in.
+/// The query for Eigen's tree: which boxes contain a place.
 template <class Visit>
 struct Around {
   const Vec3& place;
@@ -47,9 +47,9 @@ struct Around {
 
 struct SelfCollision::Flat {
   std::array<Vec3, 3> corners;
-  Vec3 out;  ///< of the body, m²: twice the area
+  Vec3 out;  ///< points out of the body; its length is twice the area, m²
 
-  /// The shares of the corners in the point that `place` is above or below; none where that is too far beside it.
+  /// The shares of the corners in the point above or below which `place` lies; empty when it is too far beside.
   std::optional<Vec3> across(const Vec3& place) const {
     Vec3 shares;
     for (int i = 0; i < 3; ++i) {
@@ -151,7 +151,7 @@ std::vector<SelfCollision::Flat> SelfCollision::lie(const VectorXd& u) const {
   return flats;
 }
 
-/// For every node of the mesh; 0 within the body.
+/// The normal at every node of the mesh; 0 inside the body.
 std::vector<Vec3> SelfCollision::node_normals(const std::vector<Flat>& flats) const {
   std::vector<Vec3> normals(elastic_.mesh().nodes.size(), Vec3::Zero());
   for (const Side& side : sides_) {
@@ -255,7 +255,7 @@ double SelfCollision::foresee(const Factor& factor, const VectorXd& u, const Vec
   MatrixXd right(b.size(), count + 2);
   right << along, b, held != nullptr ? *held : VectorXd::Zero(b.size());
   const MatrixXd solution = factor.solve(right);
-  VectorXd gaps = along.transpose() * solution.col(count);  // at the end of the step that no bed is in the way of
+  VectorXd gaps = along.transpose() * solution.col(count);  // at the end of the step without a bed
   MatrixXd matrix = along.transpose() * solution.leftCols(count);
   for (Eigen::Index i = 0; i < count; ++i) {
     gaps[i] += pairs[static_cast<std::size_t>(i)]->gap(u);

@@ -61,7 +61,7 @@ void set_product(ShapeValues& values, int node, const Vec3& at, const Vec3& plac
   values.gradient.col(node) << x.slope * y.value * z.value, x.value * y.slope * z.value, x.value * y.value * z.slope;
 }
 
-/// Serendipity: an edge's node takes (1 − x²)(1 ± y)(1 ± z) / 4, a corner what the edges leave of its product.
+/// Serendipity: an edge's node has (1 − x²)(1 ± y)(1 ± z) / 4, a corner its product minus the share of the edges.
 void set_serendipity(ShapeValues& values, const Vec3& at) {
   for (int node = 0; node < 8; ++node) set_product(values, node, at, hex_node(node), linear);
   for (int node = 8; node < 20; ++node) {

@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kMaxCount = 10'000'000;
 
-/// The words of a text, and the line that each is on.
+/// The words of a text, each with its line.
 class Words {
  public:
   Words(std::string_view text, std::string_view name) : rest_(text), name_(name) {}
@@ -44,7 +44,7 @@ class Words {
     if (found != keyword) fail("expected " + std::string(keyword) + ", found \"" + std::string(found) + '"');
   }
 
-  /// Goes on behind the line that is `keyword`. False when there is none.
+  /// Continues behind the line that is `keyword`. False when there is none.
   bool seek(std::string_view keyword) {
     for (;;) {
       const std::string_view found = next();
@@ -87,7 +87,7 @@ class Words {
   int line_ = 1;
 };
 
-/// gmsh's number of an element's type: how many nodes it has, and its shape when it is a volume of ours.
+/// An element type by gmsh's number: how many nodes it has, and its shape when Tendon reads it.
 struct Type {
   int number;
   int nodes;
@@ -107,7 +107,7 @@ struct FileElement {
   std::vector<std::int64_t> nodes;
 };
 
-/// What a file has, in its own numbers.
+/// The content of a file, in its own numbers.
 struct Content {
   std::unordered_map<std::int64_t, Vec3> nodes;
   std::vector<FileElement> elements;

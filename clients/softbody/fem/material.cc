@@ -35,8 +35,8 @@ Mat3 isotropic(const Mat3& strain, double mu, double lambda) {
 Mat9 corotational_tangent(const Mat3& f, double mu, double lambda) {
   const Mat3 r = nearest_rotation(f);
   const Mat3 s = r.transpose() * f;
-  // dR = R [ω]×, with (tr S · I − S) ω the axis of RᵀdF − dFᵀR. Singular where two stretches cancel, which only a body
-  // that is turned inside out has: there any ω will do, the step is line-searched.
+  // dR = R [ω]×, with (tr S · I − S) ω the axis of RᵀdF − dFᵀR. It is singular where two stretches cancel, which only
+  // an inverted element has; any ω will do there, because a line search follows.
   Mat3 turn = s.trace() * Mat3::Identity() - sym(s);
   if (std::abs(turn.determinant()) < 1e-9) turn += 1e-3 * Mat3::Identity();
   const Mat3 solve = turn.inverse();
@@ -62,7 +62,7 @@ void check(const Material& material) {
 }
 
 Mat3 nearest_rotation(const Mat3& f) {
-  // Newton's iteration (Higham 1986) where it is safe: it squares the distance with every step.
+  // Newton's iteration (Higham 1986) where it is safe: every step squares the distance.
   if (f.determinant() > 0.1) {
     Mat3 r = f;
     for (int i = 0; i < 12; ++i) {
@@ -74,7 +74,7 @@ Mat3 nearest_rotation(const Mat3& f) {
   }
   const Eigen::JacobiSVD<Mat3> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Mat3 u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // the shortest stretch is the one turned over
+  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;  // turns over the axis of least stretch
   return u * svd.matrixV().transpose();
 }
 

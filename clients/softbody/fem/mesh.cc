@@ -17,8 +17,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// A plane figure of quadrilaterals, counterclockwise, which is drawn up into a body. Tetrahedra begin at
-/// the node of the lowest rank of each prism; of equal ranks the lower number counts.
+/// A plane figure of counterclockwise quadrilaterals, which is extruded into a body. Tetrahedra begin at the node with
+/// the lowest rank of each prism; among equal ranks the lower number wins.
 struct Outline {
   std::vector<Eigen::Vector2d> nodes;
   std::vector<std::array<int, 4>> quads;
@@ -42,8 +42,8 @@ Mesh draw_up_hexahedra(const Outline& outline, std::span<const double> zs) {
   return mesh;
 }
 
-/// Cuts each quadrilateral along the diagonal of its lowest rank, and each prism above a triangle into three tetrahedra
-/// (Kuhn): with one order of the nodes for all prisms, faces of neighbours meet.
+/// Cuts each quadrilateral along the diagonal through its lowest rank, and each prism above a triangle into three
+/// tetrahedra (Kuhn). All prisms use the same order of nodes, so the faces of neighbours match.
 Mesh draw_up_tetrahedra(const Outline& outline, std::span<const double> zs) {
   Mesh mesh = draw_up_hexahedra(outline, zs);
   mesh.shape = Shape::kTet4;
@@ -75,7 +75,7 @@ Mesh draw_up_tetrahedra(const Outline& outline, std::span<const double> zs) {
   return mesh;
 }
 
-/// Hexahedra with nodes on their edges too, and in their faces and middles.
+/// Quadratic hexahedra: with nodes on their edges and, for Hex27, in their faces and middles.
 Mesh quadratic(const Mesh& mesh, Shape shape) {
   Mesh fine{.shape = shape, .nodes = mesh.nodes, .elements = {}};
   std::map<std::vector<int>, int> between;  // the corners that a node lies between
@@ -87,7 +87,7 @@ Mesh quadratic(const Mesh& mesh, Shape shape) {
       std::vector<int> key;
       Vec3 middle = Vec3::Zero();
       for (int corner = 0; corner < 8; ++corner) {
-        // A corner takes part in a coordinate that is not 0 only on its own side.
+        // A node lies between the corners that have its coordinates, apart from those that are 0.
         const Vec3 side = node_at(shape, corner);
         if ((place.array() == 0 || place.array() == side.array()).all()) {
           key.push_back(corners[at(corner)]);
@@ -135,8 +135,8 @@ double longest_edge(const Mesh& mesh, std::span<const int> element) {
   return longest;
 }
 
-/// Calls `use(shape functions, Jacobian's determinant, weight)` at points that integrate a polynomial of an element's
-/// own order squared.
+/// Calls `use(shape functions, Jacobian's determinant, weight)` at points that integrate the square of a polynomial of
+/// the element's order.
 template <class Use>
 void for_points(const Mesh& mesh, int element, Use use) {
   const auto nodes = mesh.element(element);
@@ -160,7 +160,7 @@ std::vector<int> corners_on(const Mesh& mesh, const Facet& facet) {
   return nodes;
 }
 
-/// The faces of all elements, by what `name` calls their corners.
+/// The faces of all elements, grouped by the name that `name` makes of their corners.
 template <class Name>
 auto faces_by(const Mesh& mesh, Name name) {
   std::map<std::vector<std::decay_t<decltype(name(0))>>, std::vector<Facet>> sharing;
@@ -175,7 +175,7 @@ auto faces_by(const Mesh& mesh, Name name) {
   return sharing;
 }
 
-/// Those of which there is one, in the order of their elements.
+/// The faces whose name belongs to no other face, in the order of their elements.
 template <class Name>
 std::vector<Facet> alone(const std::map<Name, std::vector<Facet>>& sharing) {
   std::vector<Facet> alone;
@@ -224,7 +224,7 @@ Mesh cylinder(Shape shape, double radius, double height, int across, int up) {
   if (!(radius > 0) || across < 2 || across % 2 != 0) {
     throw std::invalid_argument("a cylinder has a radius above 0 and an even number of cells across, 2 or more");
   }
-  // The core's corners at 0.6 of the radius: its outermost cells and the rings around it are then about equally wide.
+  // The core's corners are at 0.6 of the radius, so its outermost cells and the rings around it have about one width.
   const double half = 0.6 * radius * std::numbers::sqrt2 / 2;
   const int rings = across / 2;
   const int around = 4 * across;

@@ -12,14 +12,13 @@
 namespace tendon::softbody {
 namespace {
 
-constexpr double kLeastFacing = 0.2588;  // cos 75°: steeper facets have next to no area across
+constexpr double kLeastFacing = 0.2588;  // cos 75°: steeper facets have almost no area across
 
-/// Pieces are a tenth of the patch's radius: with a fifth, the compliance of the pressed block of the README changes by
-/// 2e-4 as the patch moves over a facet, with a tenth by 1e-5.
+/// Pieces are a tenth of the patch's radius wide: the compliance of the README's pressed block then changes by 1e-5 as
+/// the patch moves over a facet; with a fifth it changes by 2e-4.
 constexpr double kPiece = 0.1;
 
-/// Facets that are wider than three patches are cut no finer: they are far from where such a body is meant to be
-/// touched.
+/// Facets wider than three patches are not cut finer than this: they are far from the part that is meant to be touched.
 constexpr int kMostCuts = 32;
 
 constexpr int kMostFacetNodes = 9;
@@ -31,7 +30,7 @@ TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double ra
   if (!(std::abs(normal_.norm() - 1) < 1e-9))
     throw std::invalid_argument("the way to the tool: expected a unit vector");
   if (!(radius > 0) || !std::isfinite(radius)) throw std::invalid_argument("the patch's radius: expected more than 0");
-  // The first axis across is the x axis where it can be.
+  // The first axis across is the x axis where that is possible.
   const Vec3 start = std::abs(normal_.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
   const Vec3 first = (start - start.dot(normal_) * normal_).normalized();
   across_ << first.transpose(), normal_.cross(first).transpose();

@@ -11,8 +11,8 @@
 namespace tendon::softbody {
 namespace {
 
-/// Multiplications and additions of a solution for each entry of the factor: 4, which take as long as 6 of those that
-/// make one (tendon-bench-softbody, 7803 unknowns).
+/// A solution needs 4 multiplications and additions for each entry of the factor. They take as long as 6 of those that
+/// make a factor (tendon-bench-softbody, 7803 unknowns).
 constexpr double kWorkPerEntry = 6;
 
 using View = Eigen::Map<const Eigen::SparseMatrix<double>>;
@@ -43,7 +43,7 @@ std::size_t SymmetricMatrix::bytes() const noexcept {
 struct Factor::Cholmod {
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> llt;
   void analyze(const SymmetricMatrix& pattern) {
-    llt.cholmod().print = 0;  // what is not definite is an answer, not a message
+    llt.cholmod().print = 0;  // a matrix that is not definite is a result, not a reason for a message
     llt.analyzePattern(view(pattern));
     if (llt.info() != Eigen::Success) throw std::runtime_error("CHOLMOD cannot analyse the matrix");
   }
@@ -51,7 +51,7 @@ struct Factor::Cholmod {
 
 struct Factor::Split {
   std::vector<int> twin_of;
-  Eigen::SparseMatrix<double> coupling;  // TᵀAC: of the unknowns that there were to the twins
+  Eigen::SparseMatrix<double> coupling;  // TᵀAC: couples the old unknowns to the twins
   MatrixXd follows;                      // (TᵀAT)⁻¹ TᵀAC
   Eigen::LLT<MatrixXd> openings;         // of S
 };

@@ -19,7 +19,8 @@ constexpr double kShortest = 1.0 / 1024;
 /// a quarter of the error.
 constexpr double kSlow = 1.0 / 16;
 
-/// The precision, relative, of the stiffness that goes with an answer.
+/// The rounds for an answer's stiffness end when one lowers it by at most this share; another would remove only a part
+/// of that.
 constexpr double kTangentPrecision = 2e-3;
 constexpr int kTangentRounds = 5;
 
