@@ -6,10 +6,11 @@
 namespace tendon::dash {
 namespace {
 
-/// An engine is told of once a second as its device is. One report may be lost on the way.
+/// Reports on the device after which a silent engine is forgotten. Both are reported once a second, and a report may be
+/// lost on the way.
 constexpr std::uint64_t kForgetAfter = 3;
 
-/// What the page shows of a device does not depend on numbers that go up all the time.
+/// True when the page would show the same: numbers that grow all the time are not compared.
 bool same(const DeviceDescription& a, const DeviceDescription& b) {
   if (a.name != b.name || a.model != b.model || a.loop_hz != b.loop_hz || a.max_force != b.max_force ||
       a.channels.size() != b.channels.size()) {
@@ -81,7 +82,7 @@ void Board::observe(const PeerReport& report) {
   auto& engines = devices_[report.device].engines;
   if (const auto known = engines.find(report.channel);
       known != engines.end() && known->second.newest.name != report.name) {
-    engines.erase(known);  // another one sits there now: its sums begin at zero
+    engines.erase(known);  // another engine holds the channel now: its sums begin at zero
   }
   Engine& engine = engines[report.channel];
   engine.newest = report;

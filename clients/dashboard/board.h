@@ -31,7 +31,7 @@ struct Press {
   std::string words;  ///< for people
 };
 
-/// All that is known of a server at this instant, as values. The Observer writes them, the page is told them, and
+/// All that is known of a server at this instant, as values. The Observer writes them, Feed tells them to the page, and
 /// /metrics exports them. Counters never shrink while this object lives, even when the server restarts.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -52,7 +52,7 @@ class Board {
     std::uint64_t late_engine = 0;
     std::uint64_t late_unknown = 0;
     RefusedForces refused{};
-    /// Reports of the device since this engine's last one: the reports on an engine end when it leaves.
+    /// Reports on the device since the last report on this engine. Reports on an engine end when it leaves.
     std::uint64_t silent_for = 0;
   };
 
@@ -94,7 +94,7 @@ class Board {
 
   /// Grows when the contact, a press, the devices or what they are has changed.
   std::uint64_t version() const noexcept { return version_; }
-  /// Takes out the states of a device that wait; empty for a device that is not there.
+  /// Takes out the waiting states of a device; empty for a device that does not exist.
   std::vector<DeviceState> take_states(std::uint32_t device);
 
  private:

@@ -37,7 +37,7 @@ struct BridgeCounts {
 class BridgeGate {
  public:
   struct Config {
-    double max_rate_hz = 4000;  ///< datagrams a page may send in a second: four engines' at 1 kHz
+    double max_rate_hz = 4000;  ///< datagrams that a page may send in a second: those of four engines at 1 kHz
     /// Datagrams that wait for a page: some 60 ms of states at 1 kHz. Older ones are of no use to a hand.
     std::size_t max_waiting = 16 * 1024;
   };
@@ -46,11 +46,11 @@ class BridgeGate {
   BridgeGate(const Config& config, bool local, BridgeCounts& counts, LocalTime now)
       : config_(config), local_(local), counts_(counts), rate_(config.max_rate_hz, now) {}
 
-  /// True when a message of the page goes to the server. Each message counts as exactly one of to_server, malformed,
-  /// plain, too_fast.
+  /// True when a message from the page may go to the server. Each message counts as exactly one of to_server,
+  /// malformed, plain, too_fast.
   bool passes(LocalTime now, std::span<const std::byte> message, bool binary);
 
-  /// Takes a datagram of the server for the page. Drops one when the page does not keep up.
+  /// Takes a datagram from the server for the page. Drops the oldest ones when the page does not keep up.
   void offer(std::span<const std::byte> datagram);
   /// The next datagram to send to the page; empty when none waits.
   std::optional<std::vector<std::byte>> next();

@@ -30,7 +30,7 @@
 namespace tendon::dash {
 namespace {
 
-/// 128 bits, for one run.
+/// A new pass of 128 bits, for one run.
 std::string new_pass() {
   const Seed seed = seed_from_system();
   std::string pass;
@@ -53,7 +53,7 @@ struct Options {
   bool json = false;
 };
 
-/// Reads the command line into `options`; an exit code when there is no more to do.
+/// Reads the command line into `options`. Returns an exit code when there is nothing more to do.
 std::optional<int> parse(int argc, char** argv, Options& options) {
   CLI::App app(
       "A web page that shows what a Tendon server does, live and recorded; /metrics for Prometheus, and /bridge for "
@@ -121,7 +121,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;  // prints the help, or what is wrong
+    return app.exit(error) == 0 ? 0 : 2;  // prints the help or the error
   }
   options.server = server;
   options.web.listen = parse_address(listen);
@@ -151,7 +151,7 @@ int run(const Options& options) {
   Board board;
   WebCounts counts;
   BridgeCounts bridge;
-  // The Observer's address is another guest's.
+  // The operator needs an address of its own, because to the server one address is one guest.
   std::optional<UdpTransport> operator_link;
   std::optional<Operator> operates;
   Abilities abilities{.server = options.server.text(), .recordings = recordings.has_value()};

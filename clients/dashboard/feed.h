@@ -15,12 +15,12 @@
 
 namespace tendon::dash {
 
-/// Tells every open page what is new on the Board. It has no socket: lines of a page go in, texts for it come out.
+/// Tells every open page the news of the Board. It has no socket: lines from a page go in, texts for it come out.
 ///
-/// A page watches one device, at first the server's first one. With the line "watch N" it changes to device N.
+/// A page watches one device, at first the server's first one. The line "watch N" changes to device N.
 ///
-/// With every tick it is told the new states of its device, and once a second how the loop and the engines do. Each
-/// text is made once for all pages that watch the same device.
+/// Every tick the page gets the new states of its device, and once a second the reports on the loop and the engines.
+/// Each text is made once for all pages that watch the same device.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Feed {
@@ -49,7 +49,7 @@ class Feed {
  private:
   struct Page {
     std::uint32_t device = 0;
-    std::uint64_t version = 0;  ///< of the board, that it was told of
+    std::uint64_t version = 0;  ///< the board's version that the page knows
     bool reports_due = true;
     PagePost post;
     RateLimit lines;

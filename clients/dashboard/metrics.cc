@@ -20,10 +20,10 @@ using prometheus::MetricFamily;
 using prometheus::MetricType;
 using Labels = std::vector<ClientMetric::Label>;
 
-/// Families in the order in which they were begun.
+/// Families of samples, in the order in which they began.
 class Exposition {
  public:
-  /// Later samples are of this family.
+  /// Begins a family; the samples that follow belong to it.
   void begin(const char* name, MetricType type, const char* help) {
     families_.emplace_back();
     families_.back().name = name;

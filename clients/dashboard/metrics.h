@@ -17,9 +17,9 @@ struct WebCounts {
   std::uint64_t states_skipped = 0;  ///< not told to a page that did not keep up
 };
 
-/// All of it for Prometheus, in its text format 0.0.4. Names follow its conventions: base units (seconds, meters,
-/// newtons, joules), `_total` on counters. Unknown values are not exported. README.md of this folder lists
-/// them; so does the test that reads deploy/monitoring.
+/// All these values for Prometheus, in its text format 0.0.4. Names follow its conventions: base units (seconds,
+/// meters, newtons, joules), `_total` on counters. Unknown values are not exported. The test that reads
+/// deploy/monitoring lists the names.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 std::string metrics_text(const Board& board, const WebCounts& web, const BridgeCounts& bridge);

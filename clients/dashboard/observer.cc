@@ -120,7 +120,7 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
     describe_at_ = now;
     if (next_describe_ < limits::kMaxDevices) return;
   }
-  // There are no more.
+  // There are no more devices.
   next_describe_ = 0;
   describe_at_ = now + config_.describe_every;
   if (!counted_) board_.counted(static_cast<std::uint32_t>(names_.size()));
@@ -129,13 +129,13 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
   greet(now);
 }
 
-/// Asks what is due to be asked, one thing at a time of each kind.
+/// Sends the requests that are due, one of each kind at a time.
 void Observer::ask(LocalTime now) {
   Session* const session = connection_.session();
   if (session == nullptr) return;
   const bool describing = std::ranges::any_of(asked_, [](const auto& asked) { return asked.second.describe; });
   if (!describing && now >= describe_at_) {
-    // Once we know how many devices there are, the question after the last one need not be asked.
+    // Once the number of devices is known, there is no need to ask beyond the last one.
     if (counted_ && next_describe_ >= names_.size()) {
       next_describe_ = 0;
       describe_at_ = now + config_.describe_every;

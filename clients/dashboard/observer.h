@@ -14,18 +14,18 @@
 
 namespace tendon::dash {
 
-/// Watches every device of a Tendon server in one session and writes the news on a Board. It is an observer, has no
-/// socket, clock or thread, and never sends a force.
+/// Watches every device of a Tendon server in one session and writes all news on a Board. It is an observer and never
+/// sends a force. It has no socket, clock or thread.
 ///
 ///     Observer observer(link, server, config, board, now);
 ///     for (;;) wait for a datagram, at most until observer.turn(now);
 ///
-/// A guest sees the devices that it has claimed by name, and learns their names by asking (Describe) for device 0, 1, 2
-/// … until there is none. So a server with several is greeted twice: the first session asks, the second one claims them
-/// all.
+/// A guest sees only the devices that it has claimed by name, and learns their names by asking (Describe) for device 0,
+/// 1, 2 … until there is none. So a server with several devices is greeted twice: the first session asks, the second
+/// one claims all of them.
 ///
-/// * **Reconnection.** It tries for ever, as Connection says, so a server that comes back is found.
-/// * **Holders.** Each device is described anew once in `describe_every`, because engines come and go.
+/// * **Reconnection.** It tries for ever (see Connection), so it finds a server that comes back.
+/// * **Holders.** It asks for each device's description again every `describe_every`, because engines come and go.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Observer {
@@ -41,7 +41,7 @@ class Observer {
     /// Datagrams taken from the link in one turn: a quarter of a second of states at 1 kHz.
     int max_datagrams = 256;
   };
-  /// States per second and device: all while somebody looks; while nobody does, enough for /metrics.
+  /// States per second and device while nobody looks: enough for /metrics. While somebody looks it gets all states.
   static constexpr std::uint32_t kIdleStateHz = 20;
 
   /// `link` and `board` must outlive this object. The first Hello leaves with the first turn.

@@ -9,7 +9,7 @@
 namespace tendon::dash {
 namespace {
 
-/// States per second: the session lasts a few round trips, and nobody looks at them.
+/// States per second: few, because the session lasts a few round trips and nobody looks at the states.
 constexpr std::uint32_t kStateHz = 20;
 
 const ChannelDescription* channel_of(const Board::Device& device, const std::string& name) {
@@ -51,7 +51,7 @@ std::string Operator::objection(std::uint32_t number) const {
     return "This device has no channel \"" + config_.channel + "\", which --arm names, but " +
            names_of(device->second.about->channels) + ".";
   }
-  // Our own name stays there for a moment after we have left.
+  // The operator's own name stays there for a moment after its session has ended.
   if (!channel->holder.empty() && channel->holder != config_.name) return held_by(*channel);
   return {};
 }
@@ -93,7 +93,7 @@ void Operator::turn(LocalTime now) {
   }
 }
 
-/// As far as the server's answer.
+/// The part of a press up to the server's answer.
 void Operator::ask(LocalTime now) {
   const bool arm = order_ == Order::kArm;
   client_->turn(now);
@@ -127,13 +127,13 @@ void Operator::ask(LocalTime now) {
     asked_ = arm ? client_->rearm() : client_->disarm();
     client_->turn(now);
   } else if (const auto& about = client_->description()) {
-    // Somebody has come since the Board was told.
+    // A client has taken the channel since the Board's last description.
     const auto channel = std::ranges::find(about->channels, config_.channel, &ChannelDescription::name);
     finish(now, false, "Not done: " + (channel != about->channels.end() ? held_by(*channel) : "the channel is gone."));
   }
 }
 
-/// What the device does.
+/// The part of a press after the server's answer: watches what the device does.
 void Operator::look(LocalTime now) {
   const auto found = board_.devices().find(device_);
   const Board::Device* const device = found != board_.devices().end() ? &found->second : nullptr;

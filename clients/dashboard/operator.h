@@ -12,7 +12,7 @@
 
 namespace tendon::dash {
 
-/// Arms and disarms devices for whoever presses the page's buttons, without socket, clock or thread.
+/// Arms and disarms devices for the person who presses the page's buttons. It has no socket, clock or thread.
 ///
 /// Each press is a session of its own, beside the Observer's: a controller with the operator's key that claims one
 /// channel of the device, holds it, sends Rearm or Disarm and never a force, and leaves at the answer. Between two

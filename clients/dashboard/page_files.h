@@ -14,7 +14,7 @@ struct PageFile {
   std::string_view gzip;  ///< the same, compressed
 };
 
-/// All of them; made by embed.cmake when tendon-dash is built. Without Node it is one page that says what is missing.
+/// All files of the page, from embed.cmake. In a build without Node it is one page that says what is missing.
 std::span<const PageFile> page_files();
 
 }  // namespace tendon::dash

@@ -109,7 +109,7 @@ Json engine_json(const std::string& channel, const PeerReport& peer) {
           {"words", link.words}};
 }
 
-/// The number that is written as `number` with seven digits, which are what a plot shows.
+/// `number`, rounded to seven digits: a plot shows no more.
 double plotted(double number) {
   std::array<char, 32> digits;
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), static_cast<float>(number)).ptr;
@@ -135,7 +135,7 @@ Json columns(std::span<const DeviceState> states, Of of) {
   return axes;
 }
 
-/// Bytes that are no UTF-8 become U+FFFD; what JSON has no number for (NaN, infinities) becomes null.
+/// The text of a JSON value. Bytes that are not UTF-8 become U+FFFD; NaN and infinities become null.
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 }  // namespace

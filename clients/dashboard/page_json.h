@@ -16,7 +16,7 @@
 
 namespace tendon::dash {
 
-/// The sentence of a tendon-dash that may not arm: what it lacks.
+/// The sentence that a tendon-dash without permission to arm shows: what it lacks.
 inline constexpr std::string_view kArmingNeeds =
     "This page only looks on. To arm and disarm from here start tendon-dash with --key FILE, a controller's key, and "
     "--arm CHANNEL.";
@@ -32,14 +32,14 @@ struct Abilities {
   };
 };
 
-/// {"type":"server",…}: the contact, the devices and their descriptions. Told when it changes.
+/// {"type":"server",…}: the contact, the devices and their descriptions. Sent when it changes.
 std::string server_json(const Board& board, const Abilities& abilities);
 
 /// {"type":"states",…}: all states received of one device, in columns and in order. Missing ticks were lost on the way,
 /// or the page did not keep up.
 std::string states_json(std::uint32_t device, std::span<const DeviceState> states);
 
-/// {"type":"reports",…}: how a device's loop and its engines do. Told once a second.
+/// {"type":"reports",…}: the state of a device's loop and of its engines. Sent once a second.
 std::string reports_json(std::uint32_t device, const Board& board);
 
 /// [{"name":…,"size_bytes":…,"modified_unix_s":…}, …]

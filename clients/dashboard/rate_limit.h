@@ -7,7 +7,7 @@
 
 namespace tendon::dash {
 
-/// Lets `rate` things a second pass, and at once as many as a tenth of that, at least one:
+/// Lets `rate` things a second pass, and at most a tenth of that, but at least one, at once:
 ///
 ///     left ← min(left + rate · Δt, max(rate / 10, 1)),      a thing takes 1 of it
 ///

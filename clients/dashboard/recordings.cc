@@ -66,7 +66,7 @@ Recordings::Recordings(std::filesystem::path folder) : folder_(std::move(folder)
 
 std::vector<Recordings::Entry> Recordings::list() const {
   std::vector<Entry> entries;
-  std::error_code gone;  // a file may vanish under our hands
+  std::error_code gone;  // a file may vanish in the meantime
   for (auto file = std::filesystem::directory_iterator(folder_, gone); file != std::filesystem::directory_iterator();
        file.increment(gone)) {
     std::string name = file->path().filename().string();
@@ -106,7 +106,7 @@ std::variant<WholeFile, ByteRange, Unsatisfiable> parse_range(std::string_view h
   const auto first = number(before);
   const auto last = number(after);
   if ((!before.empty() && !first) || (!after.empty() && !last) || (!first && !last)) return WholeFile{};
-  if (!first) {  // the last so many
+  if (!first) {  // "-N": the last N bytes
     if (*last == 0 || size == 0) return Unsatisfiable{};
     const std::uint64_t count = std::min(*last, size);
     return ByteRange{size - count, count};

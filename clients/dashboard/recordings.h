@@ -29,7 +29,7 @@ class OpenFile {
   std::uint64_t size_;
 };
 
-/// The recordings (*.mcap) of one folder, and of nothing below, above or beside it.
+/// The recordings (*.mcap) of one folder, without its subfolders. No name leads out of the folder.
 ///
 /// Thread-safe: no. Realtime-safe: no (files).
 class Recordings {
@@ -48,8 +48,8 @@ class Recordings {
   /// The newest first.
   std::vector<Entry> list() const;
 
-  /// Empty when `name` does not name a recording: it has a slash, is hidden, is not *.mcap, or is a symbolic link or
-  /// not a regular file.
+  /// Opens a recording. Empty when `name` has a slash, is hidden, is not *.mcap, or names a symbolic link or no regular
+  /// file.
   std::optional<OpenFile> open(std::string_view name) const;
 
  private:

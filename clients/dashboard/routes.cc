@@ -11,7 +11,7 @@
 namespace tendon::dash {
 namespace {
 
-/// Scripts, styles and connections of our own and nothing else, in no frame. A data: image is the page's icon.
+/// Allows only the page's own scripts, styles and connections, and no frame around it. The icon is a data: image.
 constexpr std::string_view kContentSecurity =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -72,7 +72,7 @@ std::string_view host_name(std::string_view host) {
   return port.empty() || (port[0] == ':' && digits) ? host.substr(0, end) : std::string_view();
 }
 
-/// 127.0.0.0/8 in four decimal numbers: a browser writes it so, whatever was typed.
+/// 127.0.0.0/8 in four decimal numbers: a browser writes addresses this way, however they were typed.
 bool is_ipv4_loopback(std::string_view name) {
   int parts = 0;
   for (std::string_view rest = name; !rest.empty() || parts == 0; ++parts) {
@@ -247,7 +247,7 @@ Reply Routes::file(const Request& request, std::string_view path) const {
   const auto found = std::ranges::find(sources_.page, path, &PageFile::path);
   if (found == sources_.page.end()) return plain(404, "there is nothing here");
   Reply reply = begin(200, found->type);
-  // The names of the parts change with what is in them.
+  // The names of the parts change with their content.
   set(reply, "Cache-Control", path.starts_with("/assets/") ? "public, max-age=31536000, immutable" : "no-cache");
   set(reply, "Vary", "Accept-Encoding");
   const bool gzip = request.accept_encoding.find("gzip") != std::string_view::npos && !found->gzip.empty();

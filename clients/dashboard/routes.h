@@ -62,18 +62,19 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 ///     GET /metrics             for Prometheus
 ///     GET /api/recordings      the list of recordings
 ///     GET /recordings/NAME     the bytes of one; Range is understood
-///     POST /api/arm?device=N, POST /api/disarm?device=N     begins it; /live tells what becomes of it
+///     POST /api/arm?device=N, POST /api/disarm?device=N     begins it; /live tells the result
 ///
 /// Any page that is open in a browser on this machine could send these requests. Therefore:
 /// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts. Another name that has been
 ///   made to point here (DNS rebinding) is refused: 421.
-/// * **Origin** of a WebSocket must be that very host for /live, and for /bridge a page of this machine or one of
-///   Config::origins; otherwise 403. A program that is no browser sends none. Other origins can read nothing else: no
-///   CORS header is ever sent.
-/// * **Arming** moves a machine, so it is for this page in a browser on this machine alone; otherwise 403. It is
-///   refused from another machine, through a proxy, with another Origin, and from a program that sends no Origin. A
-///   form or a script of another page cannot send ours. Other people may use this machine too: `Authorization: Bearer
-///   PASS` must be the pass that was told to the person who started the program. 202: begun; 409: not now, and why.
+/// * **Origin** of a WebSocket must be that same host for /live, and a page of this machine or one of Config::origins
+///   for /bridge; otherwise 403. A program that is no browser sends no Origin. Other origins cannot read anything else,
+///   because no CORS header is ever sent.
+/// * **Arming** moves a machine, so only this page in a browser on this machine may do it; otherwise 403. It is refused
+///   from another machine, through a proxy, with another Origin, and from a program that sends no Origin. A form or a
+///   script of another page cannot send this page's Origin. Other people may use this machine too, so `Authorization:
+///   Bearer PASS` must have the pass that was printed for the person who started the program. 202: begun; 409: not now,
+///   with the reason.
 /// * Everything else takes GET and HEAD only: 405. A path that is not listed above is 404. The only name that is looked
 ///   up in a file system is the plain name of a recording.
 ///
@@ -89,9 +90,10 @@ class Routes {
     std::span<const PageFile> page;
     const Recordings* recordings = nullptr;
     std::function<std::string()> metrics;
-    /// Begins an order; returns why it does not. Empty: nobody may.
+    /// Begins an order. Returns why it does not begin; an empty string when it does. A function that is not set: nobody
+    /// may arm.
     std::function<std::string(std::uint32_t device, Operator::Order order)> press{};
-    std::string pass{};  ///< for `press`; of characters that a header and an address may have
+    std::string pass{};  ///< for `press`; only characters that a header and an address may have
   };
 
   Routes(Config config, Sources sources) : config_(std::move(config)), sources_(std::move(sources)) {}

@@ -39,18 +39,19 @@ using asio::ip::udp;
 using boost::system::error_code;
 using Bytes = std::span<const std::byte>;
 
-/// Datagrams of the server are taken in lots: a haptic loop's thousand wake-ups a second would be ours too, on the
-/// processors that it runs on. A round trip of our own looks longer by as much; nobody computes with it.
+/// Datagrams from the server are taken in batches. Otherwise tendon-dash would wake a thousand times a second, on the
+/// processors of the haptic loop. Its own measured round trip is longer by this time; nothing is computed from it.
 constexpr Duration kGather = std::chrono::milliseconds(3);
-/// Datagrams taken from a socket of the bridge before others have their turn.
+/// Datagrams taken from a socket of the bridge before other sockets have their turn.
 constexpr int kMaxDrained = 64;
 /// Times that one receive skips an empty datagram or an error report (ICMP "port unreachable").
 constexpr int kMaxSkips = 64;
-/// Of a file, in one write.
+/// Bytes of a file in one write.
 constexpr std::size_t kPiece = 64 * 1024;
-/// Connections that are being refused; beyond these a new one is closed without a word.
+/// The most connections that are being refused at one time; a further one is closed without an answer.
 constexpr std::size_t kMaxRefusals = 64;
-/// A refused connection is read for so long, and so far, before it is closed: a reset would take the answer away.
+/// The time for which a refused connection is still read before it is closed, and the bytes: a reset would destroy the
+/// answer.
 constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMaxLingered = 64 * 1024;
 /// Longest message of a page that looks on: "watch 15".
@@ -69,14 +70,15 @@ Address address_of(const Endpoint& endpoint) {
   return {v6.to_bytes(), endpoint.port()};
 }
 
-/// What one machine can easily have many of counts as one address: the hosts of an IPv6 network.
+/// The addresses that count as one. One machine can easily have many addresses of an IPv6 network, so all of them are
+/// one.
 std::array<std::uint8_t, 16> network_of(const Address& address) {
   auto ip = address.ip;
   if (!is_ipv4(address)) std::fill(ip.begin() + 8, ip.end(), std::uint8_t{0});
   return ip;
 }
 
-/// Waits are of a clock of Asio's own.
+/// Timers use Asio's own clock.
 auto waiting_time(Duration d) {
   return std::chrono::duration_cast<asio::steady_timer::duration>(std::max(d, Duration::zero()));
 }
@@ -129,7 +131,7 @@ class ServerSocket : public Link {
 
 class Connection;
 
-/// What all connections share.
+/// The things that all connections share.
 struct Shared {
   const WebServer::Config& config;
   const Routes& routes;
@@ -143,8 +145,7 @@ struct Shared {
 
 /// One connection of a browser, from its first request until it is closed: requests, or a WebSocket.
 ///
-/// It is deleted when it is closed and none of its operations is under way (`pending_`): handlers may then use `this`
-/// as they like.
+/// It is deleted only when it is closed and none of its operations is pending (`pending_`), so handlers may use `this`.
 class Connection {
  public:
   Connection(Shared& shared, tcp::socket socket)
@@ -164,7 +165,7 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
 
   void start() { read_request(); }
-  /// Says that there is no place, and closes.
+  /// Answers that there is no place, and closes.
   void refuse() {
     refused_ = true;
     write_reply(Routes::plain(503, "too many connections"));
@@ -172,7 +173,7 @@ class Connection {
   bool refused() const noexcept { return refused_; }
   bool closed() const noexcept { return closed_; }
   const std::array<std::uint8_t, 16>& network() const noexcept { return network_; }
-  /// Since when it has been waiting for a whole request; LocalTime::max() while it does anything else.
+  /// The time since which it waits for a whole request; LocalTime::max() while it does anything else.
   LocalTime waits_since() const noexcept { return waits_since_; }
   bool done() const noexcept { return closed_ && pending_ == 0; }
 
@@ -185,7 +186,7 @@ class Connection {
     server_.reset();
   }
 
-  /// Sends what waits for the page, where nothing is being sent.
+  /// Sends the next waiting text to the page, unless one is being sent.
   void pump() {
     if (closed_ || !web_socket_ || !open_ || std::exchange(writing_, true)) return;
     if (page_) {
@@ -308,7 +309,7 @@ class Connection {
                           const std::uint64_t left = file->range.count - sent_;
                           text_ = file->file.read(file->range.first + sent_, std::min<std::uint64_t>(left, kPiece));
                           if (text_.empty())
-                            return close();  // it has become shorter: the browser sees that some is missing
+                            return close();  // the file is shorter now: the browser sees that bytes are missing
                           sent_ += text_.size();
                           return write_piece();
                         }
@@ -446,7 +447,7 @@ struct WebServer::State {
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) {  // out of descriptors: they come back as others leave
+      if (error) {  // out of descriptors: some become free when other connections end
         accept_again.expires_after(waiting_time(std::chrono::milliseconds(100)));
         return accept_again.async_wait([this](error_code) { accept(); });
       }
@@ -471,7 +472,8 @@ struct WebServer::State {
     }
   }
 
-  /// Whether there is a place for one more; the connection that has waited longest for a request may lose its own.
+  /// True when there is a place for one more; for this, the connection that has waited longest for a request may be
+  /// closed.
   bool make_room(const Connection& newcomer) {
     std::size_t all = 0;
     std::size_t near = 0;  // from the newcomer's address
@@ -511,7 +513,7 @@ struct WebServer::State {
       if (cancelled) return;
       const LocalTime now = shared.clock();
       const LocalTime next = turn(now);
-      // The wait that is under way, if one is, ends here.
+      // This cancels the pending wait, if there is one.
       schedule_turn(std::min(next - now, Duration(std::chrono::seconds(1))));
       wait_for_server();
     });

@@ -18,12 +18,13 @@ namespace tendon::dash {
 /// BridgeGate what crosses the bridge. Only the source file behind this header knows Boost.Beast and Boost.Asio.
 ///
 /// * A connection that has not sent a whole request within `request_patience` is closed, and so is one that reads no
-///   answer for `patience`. A WebSocket that is silent for `patience` is asked (ping) whether it is there; one of the
-///   bridge is not asked, its page says something every 50 ms.
+///   answer for `patience`. A WebSocket that is silent for `patience` gets a ping. A WebSocket of the bridge gets none,
+///   because its page sends something every 50 ms.
 /// * There are at most `max_connections`, and at most `max_per_address` from one address (one IPv6 network of 64 bits).
-///   When they are used up, a new connection takes the place of the one that has waited longest for a request; when
-///   none is waiting, it is answered 503 at once. So connections that send nothing, or send it slowly, lock nobody out.
-/// * Nothing queues without a bound. PagePost keeps the newest of what a page does not read; BridgeGate drops it.
+///   When all are in use, a new connection takes the place of the one that has waited longest for a request; when none
+///   is waiting, it is answered 503 at once. So connections that send nothing, or send slowly, lock nobody out.
+/// * No queue grows without bound: for a page that does not read, PagePost keeps only the newest messages, and
+///   BridgeGate drops datagrams.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class WebServer {
@@ -33,11 +34,11 @@ class WebServer {
     Address server = parse_address("127.0.0.1:47100");    ///< tendond
     std::size_t max_connections = 256;                    ///< of all kinds
     std::size_t max_per_address = 64;                     ///< all pages and bridges of one machine, and their requests
-    std::size_t max_pages = 16;                           ///< that look on: each costs 150 kB/s of JSON
+    std::size_t max_pages = 16;                           ///< pages that look on: each costs 150 kB/s of JSON
     std::size_t max_bridges = 32;                         ///< as many as a server takes observers
     std::size_t max_request = 16 * 1024;                  ///< bytes of a request's headers
     Duration request_patience = std::chrono::seconds(5);  ///< for a whole request, counted from when it may begin
-    Duration patience = std::chrono::seconds(30);         ///< for whoever reads, and for WebSockets
+    Duration patience = std::chrono::seconds(30);         ///< for readers of answers, and for WebSockets
     BridgeGate::Config bridge{};
   };
   using Clock = LocalTime (*)();
@@ -48,14 +49,14 @@ class WebServer {
             Clock clock);
   ~WebServer();
 
-  /// Where it listens.
+  /// The address at which it listens.
   Address address() const;
-  /// The way to the server, for the Observer. What is sent there leaves at once.
+  /// The link to the server, for the Observer. Datagrams are sent at once.
   Link& link();
 
-  /// Runs until SIGINT or SIGTERM, or until `duration` is over when that is above zero. `turn(now)` is called when a
-  /// datagram has come over link(), and at the latest when it asked for; `tick(now)` once in Feed::kTick, before the
-  /// pages are told.
+  /// Runs until SIGINT or SIGTERM, or until `duration` is over when that is above zero. It calls `turn(now)` when a
+  /// datagram has arrived over link(), and at the latest at the time that the last `turn` returned. It calls
+  /// `tick(now)` once every Feed::kTick, before the pages get their news.
   void run(Duration duration, const std::function<LocalTime(LocalTime)>& turn,
            const std::function<void(LocalTime)>& tick);
 
