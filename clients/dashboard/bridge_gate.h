@@ -50,7 +50,7 @@ class BridgeGate {
   /// malformed, plain, too_fast.
   bool passes(LocalTime now, std::span<const std::byte> message, bool binary);
 
-  /// Takes a datagram from the server for the page. Drops the oldest ones when the page does not keep up.
+  /// Takes a datagram from the server for the page. Drops this datagram when the page does not keep up.
   void offer(std::span<const std::byte> datagram);
   /// The next datagram to send to the page; empty when none waits.
   std::optional<std::vector<std::byte>> next();
