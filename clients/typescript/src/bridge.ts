@@ -24,7 +24,7 @@ export const kBridgeDefaults: BridgeConfig = {
   listen: "127.0.0.1:47180", to: "127.0.0.1:47100", origins: [], maxPeers: 32, maxRateHz: 4000,
 };
 
-/** What has passed, and what has not. */
+/** Counts of what the bridge has passed on and dropped. */
 export interface BridgeCounts {
   /** WebSockets open now. */
   peers: number;
@@ -34,7 +34,7 @@ export interface BridgeCounts {
   refusedFull: number;
   toServer: number;
   toPage: number;
-  /** Not passed on: no datagram of Tendon. */
+  /** Not passed on: not a datagram of Tendon. */
   malformed: number;
   /** Not passed on: not encrypted, and from another machine. */
   plain: number;
@@ -46,7 +46,7 @@ export interface BridgeCounts {
 
 /** Waiting in a WebSocket: some 60 ms of states at 1 kHz. */
 const kMaxWaitingBytes = 16 * 1024;
-/** A page that has said nothing for so long is gone; a session says something every 50 ms. */
+/** A page that has been silent for this long is gone; a session sends something every 50 ms. */
 const kIdleMs = 30_000;
 
 /**
@@ -75,7 +75,7 @@ export class Bridge {
     this.#http.on("upgrade", (request: IncomingMessage, socket: Duplex, head: Buffer) => this.#meet(request, socket, head));
   }
 
-  /** Throws a sentence when an address is none, or the system refuses it. */
+  /** Throws a sentence when an address is invalid, or the system refuses it. */
   static async open(config: Partial<BridgeConfig> = {}): Promise<Bridge> {
     const bridge = new Bridge({ ...kBridgeDefaults, ...config });
     await lookUp(parseServer(bridge.#config.to).host);
@@ -122,7 +122,7 @@ export class Bridge {
     }
   }
 
-  /** A program that is no browser sends no origin. It could as well use UDP. */
+  /** A program that is not a browser sends no origin. It could use UDP as well. */
   #isWelcome(origin: string | undefined): boolean {
     if (origin === undefined || this.#config.origins.includes(origin)) return true;
     return URL.canParse(origin) && isLoopbackName(new URL(origin).hostname);
@@ -163,7 +163,7 @@ export class Bridge {
   }
 }
 
-/** So many a second, and as many at once as a tenth of that. */
+/** A rate limit: that many per second, and at most a tenth of that at once. */
 class RateLimit {
   #left: number;
   #then = 0;

@@ -10,11 +10,11 @@ import type {
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
-/** The newest datagram received from the peer, told back to it. */
+/** The newest datagram received from the peer, reported back to it. */
 export interface Echo {
-  /** T1: when it was sent, on the clock of the one who sent it. */
+  /** T1: when it was sent, on its sender's clock. */
   readonly sent: Nanoseconds;
-  /** T2: when it arrived, on the clock of the one who tells. */
+  /** T2: when it arrived, on its receiver's clock. */
   readonly received: Nanoseconds;
   readonly packetNumber: bigint;
   /** Bit i: packet (packetNumber − 1 − i) has arrived too. */
@@ -323,7 +323,7 @@ export function isContact({ normal, gap, table }: Contact): boolean {
   return isVec3(normal) && Math.abs(Math.hypot(normal.x, normal.y, normal.z) - 1) <= limits.kUnitTolerance &&
     isBounded(gap) && isTable;
 }
-/** Infinity is as good as absent. */
+/** Infinity means the same as absent. */
 export const isRadius = (metres: number | undefined): boolean =>
   metres === undefined || metres === Infinity || isMagnitude(metres);
 export const isError = (newtons: number | undefined): boolean => newtons === undefined || isMagnitude(newtons);

@@ -3,7 +3,7 @@ import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Phys
 import type { DeviceDescription, DeviceReport, LinkReport, PeerReport, Welcome } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
-/** Where datagrams to one server leave. */
+/** The way of datagrams to one server. */
 export interface Transport {
   /** Sends one datagram, or loses it. */
   send(datagram: Uint8Array): void;
@@ -46,7 +46,7 @@ export interface Guest {
   /** Asks for the channel's lease, once more when it is lost before the answer; or gives it up. */
   takeLease(): boolean;
   giveLease(): boolean;
-  /** Says Bye and ends. */
+  /** Sends Bye and ends. */
   stop(): void;
   /** Resolves at the end; rejects with what a callback threw, or when there is no such host. */
   readonly ended: Promise<void>;
@@ -231,7 +231,7 @@ class RealTimeGuest implements Guest {
     this.#onReport?.(report);
   }
 
-  /** A timer that fires too early costs less than setting it anew with every datagram. */
+  /** A timer that fires too early costs less than resetting it for every datagram. */
   #arm(now: Nanoseconds, next: Nanoseconds): void {
     if (this.#timer !== undefined && this.#timerDue <= next) return;
     clearTimeout(this.#timer);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What need not be sent: forces that a hand cannot tell apart, and states that their receiver can foretell
+// Deadbands drop forces that a hand cannot tell apart, and states that their receiver can predict
 // (protocol/SESSION.md, "Deadbands").
 import { expect } from "./expect.js";
 import type { DeviceState, StateDeadband, Vec3 } from "./messages.js";
@@ -12,9 +12,9 @@ import { fromMilliseconds, type Nanoseconds } from "./time.js";
 export interface ForceDeadband {
   /** 0 … 1; the just noticeable difference of force is 7 to 15 %: 0.1. */
   readonly share: number;
-  /** N, below it everything counts as nothing: 0.05. */
+  /** N, a smaller change is never sent: 0.05. */
   readonly floor: number;
-  /** So that a force that was lost does not stay wrong: 20. */
+  /** Bounds how long the device renders an old force after a loss: 20. */
   readonly longestSilenceMs: number;
 }
 
@@ -34,7 +34,7 @@ export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband
   expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
-/** Of one session. */
+/** The deadband of forces in one session. */
 export class Deadband {
   readonly #config: ForceDeadband;
   #sent: { readonly at: Nanoseconds; readonly value: Vec3 } | undefined;
@@ -56,7 +56,7 @@ export class Deadband {
   }
 }
 
-/** Where the device is `later` after `sent`, on the line that it was on, in whole haptic periods. */
+/** The device's position `later` after `sent` at constant velocity, in whole haptic periods. */
 export function foretell(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
   const periods = later > 0n ? later / hapticPeriod : 0n;
   const seconds = Number(periods * hapticPeriod) / 1e9;

@@ -27,9 +27,9 @@ export interface Touch {
   readonly validRadius?: number | undefined;
   /** The surface, with the force at other depths in a table where that is known. */
   readonly contact?: Contact | undefined;
-  /** The body has been cut or torn since the answer before: neither's stiffness and table are relied on. */
+  /** The body has been cut or torn since the previous answer: neither answer's stiffness and table are used. */
   readonly topologyChanged?: boolean | undefined;
-  /** N, what the engine thinks that the force may be wrong by. */
+  /** N, the engine's estimate of the error of the force. */
   readonly error?: number | undefined;
 }
 
@@ -46,7 +46,7 @@ export interface ClientConfig {
   readonly device?: string;
   readonly channel?: string;
   /**
-   * Where another controller holds the channel's lease: ask for it until we have it. It is asked again when the server says
+   * When another controller holds the channel's lease: keep asking until we have it. We ask again when the server says
    * that the lease may be over.
    */
   readonly takeLease?: boolean;
@@ -65,15 +65,15 @@ export interface ClientConfig {
   /** Forces that a hand cannot tell from the last one sent are not sent. Absent: every force is. */
   readonly deadband?: ForceDeadband | undefined;
   /**
-   * States that we can foretell are not sent to us. With rateHz = r the callback is then called at multiples of 1/r with the
-   * state as it is foretold for that instant, its tick and time of sampling included; it never sees a tick twice, nor an
-   * older one, and nothing is foretold for longer than maxSilenceUs. With rateHz = 0 it sees only those that come. Absent:
-   * every state is asked for.
+   * The server leaves out states that we can predict. With rateHz = r the callback is called at multiples of 1/r with
+   * the state predicted for that instant, tick and sampling time included. It never sees a tick twice, nor an older
+   * one, and nothing is predicted for longer than maxSilenceUs. With rateHz = 0 it sees only the states that come.
+   * Absent: we ask for every state.
    */
   readonly stateDeadband?: StateDeadband | undefined;
   /**
-   * Of an observer: to be told what the engines ask for (DeviceState.forceWanted), and once a second how the device's loop and
-   * its engines do. A server that knows nothing of this leaves it out.
+   * For an observer: ask for the forces that the engines want (DeviceState.forceWanted), and once a second for reports on
+   * the device's loop and its engines. A server that does not know this feature leaves them out.
    */
   readonly diagnostics?: boolean;
   /** The Hellos of one attempt go unanswered for so long before it is given up. */
@@ -82,7 +82,7 @@ export interface ClientConfig {
   readonly retryMinMs?: number;
   /** Longest wait before the next attempt. */
   readonly retryMaxMs?: number;
-  /** So many random bytes, for the handshakes; the system's by itself. */
+  /** Gives that many random bytes for the handshakes; by default the system's. */
   readonly random?: (size: number) => Uint8Array;
 }
 
@@ -105,9 +105,9 @@ export interface ClientStats {
   sessions: number;
   /** States that came in. */
   states: number;
-  /** States that the callback saw without that they came. */
+  /** States that were predicted and that the callback saw. */
   statesForetold: number;
-  /** Of those that came in, replaced by a newer one before a callback was due. */
+  /** States that came in and were replaced by a newer one before a callback was due. */
   statesSkipped: number;
   /** Forces sent. */
   forces: number;
@@ -115,9 +115,9 @@ export interface ClientStats {
   forcesUnusable: number;
   /** What was wrong with the newest of them; empty: none. */
   unusable: string;
-  /** Forces not sent: a hand could not have told them from the one before. */
+  /** Forces not sent: a hand could not tell them from the one before. */
   forcesAlike: number;
-  /** Name of the one that has taken the channel from us; empty: nobody. */
+  /** Name of the client that has taken the channel from us; empty: nobody. */
   leaseLostTo: string;
 }
 
@@ -133,7 +133,7 @@ const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband
   patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
 };
 
-/** What those have who name no device and no channel. */
+/** The numbers of a client that names no device and no channel. */
 const kFirstPlace: Omit<Grant, "role"> = { device: 0, channel: 0 };
 
 function checked(config: ClientConfig): Required<ClientConfig> {
@@ -182,7 +182,7 @@ export class ForceClient {
   readonly #physics: Physics | undefined;
   readonly #watch: Watch | undefined;
   readonly #send: (datagram: Uint8Array) => void;
-  /** Of the callback; 0 = none. */
+  /** Period of the callback; 0 = none. */
   readonly #period: Nanoseconds;
 
   #handshake: ClientHandshake | undefined;
@@ -210,7 +210,7 @@ export class ForceClient {
   #newestArrived: Nanoseconds;
   /** Newest tick that the callback has seen. */
   #seenTick = 0n;
-  /** … for the deadband of states. */
+  /** The request for the deadband of states that waits for its answer. */
   #deadbandRequest: number | undefined;
   /** The server leaves states out. */
   #foretells = false;
@@ -219,7 +219,7 @@ export class ForceClient {
   #deviceReport: DeviceReport | undefined;
   #peerReports: ReadonlyMap<number, PeerReport> = new Map();
   #nextCall: Nanoseconds;
-  /** Of the newest force. */
+  /** Sequence number of the newest force. */
   #sequence = 0n;
   /** The tick that it answers. */
   #answeredTick = 0n;
@@ -262,8 +262,8 @@ export class ForceClient {
   }
 
   /**
-   * Does all there is to do at `now` and returns when it wants to be called again at the latest; a datagram is a reason to
-   * call it earlier. What the callback throws passes through, after a Bye to the server.
+   * Does everything that is due at `now` and returns the latest instant of the next call; call it earlier when a datagram
+   * comes. An exception of the callback passes through, after a Bye to the server.
    */
   turn(now: Nanoseconds): Nanoseconds {
     if (this.phase === "stopped") return kNever;
@@ -300,7 +300,7 @@ export class ForceClient {
     const { device, channel } = this.#place;
     this.#askLease = kNever;
     if (this.#session?.request({ kind: "giveLease", device, channel }) === undefined) return false;
-    this.#askedLease = undefined; // what is answered to that is older than this
+    this.#askedLease = undefined; // any answer is older than this release
     this.#holds = false;
     return true;
   }
@@ -313,7 +313,7 @@ export class ForceClient {
     this.#end(now, "stopped", Code.OK, "stopped");
   }
 
-  /** As it is now; it does not change any more. */
+  /** A copy that does not change any more. */
   stats(): ClientStats {
     const link = this.#session?.stats ?? this.#stats.link;
     return { ...this.#stats, link: link && { ...link } };
@@ -321,7 +321,7 @@ export class ForceClient {
   get phase(): Phase {
     return this.#stats.phase;
   }
-  /** What the server said of itself and its device when the newest session opened. */
+  /** The server's description of itself and its device at the opening of the newest session. */
   get welcome(): Welcome | undefined {
     return this.#welcome;
   }
@@ -330,16 +330,16 @@ export class ForceClient {
     return this.#description;
   }
 
-  /** The server's newest word on how our forces fare, once a second while they come. Of the present session. */
+  /** The server's newest report on our forces in the present session; one comes each second while forces come. */
   get report(): LinkReport | undefined {
     return this.#report;
   }
 
-  /** With `diagnostics`, the newest word on how the device's loop does, once a second. Of the present session. */
+  /** With `diagnostics`, the newest report on the device's loop in the present session, once a second. */
   get deviceReport(): DeviceReport | undefined {
     return this.#deviceReport;
   }
-  /** … and by channel on the engine that it has, or had last. It does not change any more. */
+  /** With `diagnostics`, a copy of the newest report on the engine of each channel, even one that has gone. */
   get peerReports(): ReadonlyMap<number, PeerReport> {
     return this.#peerReports;
   }
@@ -364,7 +364,7 @@ export class ForceClient {
     ++this.#stats.attempts;
   }
 
-  /** Acts on the server's answer, once it is there. */
+  /** Acts on the server's answer once it has come. */
   #settle(now: Nanoseconds): void {
     const outcome = this.#handshake?.outcome;
     if (!outcome) return;
@@ -396,7 +396,7 @@ export class ForceClient {
     this.#seenTick = 0n;
     this.#report = this.#deviceReport = undefined;
     this.#peerReports = new Map();
-    this.#deadband = deadband && new Deadband(deadband); // what another session was sent, this one was not
+    this.#deadband = deadband && new Deadband(deadband); // this session was not sent what another was
     this.#sequence = 0n;
     this.#stats.phase = "open";
     ++this.#stats.sessions;
@@ -412,7 +412,7 @@ export class ForceClient {
     this.#backOff = earliest(2n * this.#backOff, fromMilliseconds(this.#config.retryMaxMs));
   }
 
-  /** What is due by time. */
+  /** Does everything that is due by time. */
   #tick(now: Nanoseconds): void {
     if (this.#session) {
       this.#session.tick(now);
@@ -461,7 +461,7 @@ export class ForceClient {
     if (id !== this.#askedLease) return;
     this.#askedLease = undefined;
     this.#askLease = kNever;
-    if (code !== Code.UNSUPPORTED) this.#holds = code === Code.OK; // else it knows no leases
+    if (code !== Code.UNSUPPORTED) this.#holds = code === Code.OK; // otherwise the server knows no leases
     if (this.#holds) {
       this.#stats.leaseLostTo = "";
     } else if (this.#config.takeLease && code === Code.BUSY) {
@@ -478,7 +478,7 @@ export class ForceClient {
     if (request.device !== this.#place.device || request.channel !== this.#place.channel) return;
     this.#holds = false;
     this.#stats.leaseLostTo = request.to;
-    // What we have asked before may be answered before this or after it; what we ask now, after it.
+    // A request still in flight may cross this message. One sent now is answered after it.
     if (this.#askedLease !== undefined && this.takeLease()) return;
     if (this.#config.takeLease) this.#askLease = now + kAskLeaseAgain;
   }
@@ -509,12 +509,12 @@ export class ForceClient {
     }
   }
 
-  /** The state of now; undefined when there is nothing new, or nothing has come for too long. */
+  /** The state predicted for now; undefined when nothing is new, or nothing has come for too long. */
   #foretold(now: Nanoseconds): DeviceState | undefined {
     const age = now - this.#newestArrived;
     if (!this.#newest || age > this.#silence()) return undefined;
     const state = foretell(this.#newest, age, this.#hapticPeriod());
-    if (state.tick <= this.#seenTick) return undefined; // the one before was on its way for less time
+    if (state.tick <= this.#seenTick) return undefined; // the state before it spent less time on its way
     if (state.tick > this.#newest.tick) ++this.#stats.statesForetold;
     return state;
   }

@@ -31,8 +31,8 @@ export class ClientHandshake {
   #outcome: Outcome | undefined;
 
   /**
-   * `random` gives so many bytes from a cryptographic source. With a `key` of 32 bytes the conversation is of suite 1,
-   * and whoever answers has proved to know it.
+   * `random` gives that many bytes from a cryptographic source. With a `key` of 32 bytes the conversation is of suite 1,
+   * and whoever answers has proved that it knows the key.
    */
   constructor(hello: Hello, key: Uint8Array | undefined, random: (size: number) => Uint8Array, now: Nanoseconds) {
     this.#hello = hello;
@@ -51,7 +51,7 @@ export class ClientHandshake {
     }
   }
 
-  /** Takes any bytes; what is not an answer to this attempt changes nothing. */
+  /** Takes any bytes; anything but an answer to this attempt changes nothing. */
   receive(now: Nanoseconds, datagram: Uint8Array): void {
     if (this.#outcome) return;
     const retry = decodeRetry(datagram);

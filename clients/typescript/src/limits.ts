@@ -7,12 +7,12 @@ export const kMaxDatagram = 1200;
 export const kMaxValue = 1e12;
 /** ns; largest distance of any clock reading from its zero. */
 export const kMaxTime = 1n << 60n;
-/** Of a normal's length. */
+/** Tolerance of the length of a unit normal. */
 export const kUnitTolerance = 1e-3;
 /** Entries of a table of forces. */
 export const kMinTable = 2;
 export const kMaxTable = 16;
-/** ms; a force cannot be promised for longer. */
+/** ms; longest validity of a force. */
 export const kMaxValidForMs = 10_000;
 /** Packet numbers are below this: a nonce never comes near the one that renews a key. */
 export const kMaxPacketNumber = 1n << 60n;
@@ -34,10 +34,10 @@ export const kMaxFeature = 32;
 /** Bytes of UTF-8 in one sentence: the reason of a refusal, an answer or a Bye. */
 export const kMaxDetail = 128;
 export const kMaxLoopHz = 1_000_000;
-/** Of the histogram of a loop's lateness. */
+/** Buckets in the histogram of a loop's lateness. */
 export const kLatenessBuckets = 24;
-/** The rarest that a state is sent to an engine, one in so many. */
+/** A server sends an engine at least one state in this many. */
 export const kMaxOneIn = 1000;
 export const kMaxTimeoutMs = 3_600_000;
-/** How often a Bye is said. */
+/** How many times a Bye is sent. */
 export const kByes = 3;

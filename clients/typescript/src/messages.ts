@@ -58,8 +58,8 @@ export interface DeviceState {
 }
 
 /**
- * The force along a contact's normal at other depths: entry i with the tool `first + i · step` deeper than where it is
- * answered, that is at `at − depth · normal`; a line in between, beyond the ends as at the ends.
+ * The force along a contact's normal at other depths. Entry i is for the tool `first + i · step` deeper than `at`, that
+ * is at `at − depth · normal`. Linear between entries; constant beyond the ends.
  */
 export interface ForceTable {
   /** m; below 0: nearer to the hand. */
@@ -74,7 +74,7 @@ export interface ForceTable {
 export interface Contact {
   /** Unit vector, out of the body, to the hand. */
   readonly normal: Vec3;
-  /** m, from the surface to the tool along the normal; below 0: so deep is it pressed in. */
+  /** m, from the surface to the tool along the normal; below 0: the tool is that deep in the body. */
   readonly gap: number;
   readonly table?: ForceTable | undefined;
 }
@@ -102,16 +102,16 @@ export interface ForceCommand {
   readonly validForUs: number;
   readonly device: number;
   readonly channel: number;
-  /** Cut or torn since the answer before: neither's model is relied on. */
+  /** Cut or torn since the previous answer: the model of neither is used. */
   readonly topologyChanged?: boolean | undefined;
-  /** N, what the engine thinks that the force may be wrong by. */
+  /** N, the engine's estimate of the error of the force. */
   readonly error?: number | undefined;
 }
 
 /**
- * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the first
- * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode is another, or which comes maxSilenceUs
- * later.
+ * Leave out the states that this client can predict. After a state with velocity v, the next state sent is the first
+ * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode is another, or which comes
+ * maxSilenceUs later.
  */
 export interface StateDeadband {
   /** Of the speed: 0 … 0.5. */
@@ -123,8 +123,8 @@ export interface StateDeadband {
 }
 
 /**
- * Reliable. Client → server: how many states of a device per second it wants; clear a latched fault; no force until
- * then; what is this device; my forces are to be this channel's, or no longer; which states to leave out. Server → client: they no longer are.
+ * Reliable. Client → server: set the rate of a device's states; clear a latched fault; no force until then;
+ * describe the device; take or give up a channel's lease; set the deadband of states. Server → client: a lease is lost.
  */
 export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
@@ -138,7 +138,7 @@ export interface ChannelDescription {
   readonly rule: ChannelRule;
   /** A holder that sends no force for so long may be followed by another; 0 = it stays until it leaves. */
   readonly leaseMs: number;
-  /** Whose forces it takes; empty = nobody's. */
+  /** Name of the client whose forces it takes; empty = nobody. */
   readonly holder: string;
 }
 
@@ -171,8 +171,8 @@ export interface Delays {
 }
 
 /**
- * Why forces were late, and what the network did: from the server, once a second while forces come. A delay is absent where
- * nothing was measured; those of one way are known ± clockErrorNs.
+ * Why forces were late, and what the network did: from the server, once a second while forces come. A delay is
+ * absent where nothing was measured; one-way delays are known ± clockErrorNs.
  */
 export interface LinkReport {
   /** 1, 2, 3 … per session. */
@@ -217,8 +217,8 @@ export interface LinkReport {
 }
 
 /**
- * How a device's loop does. Only to an observer that named the feature "diagnostics". Numbers of things are of the time that
- * it tells of.
+ * How a device's loop does. Only to an observer that named the feature "diagnostics". Counts are of the
+ * reported time.
  */
 export interface DeviceReport {
   /** 1, 2, 3 … of the device. */
@@ -231,7 +231,7 @@ export interface DeviceReport {
   readonly steps: bigint;
   /** Periods without a step, because the one before came so late. */
   readonly missed: bigint;
-  /** Steps so long after the one before that it is a reason. */
+  /** Steps so late after the one before that the overrun reason is set. */
   readonly overruns: bigint;
   /** Steps in which the device gave no position. */
   readonly unseen: bigint;
@@ -253,9 +253,9 @@ export interface PeerReport {
   readonly channel: number;
   /** Of the engine. */
   readonly name: string;
-  /** Of the states that it wants, it is sent one in so many: its way is full. */
+  /** It is sent one in so many of the states it wants, because its link is full. */
   readonly stateOneIn: number;
-  /** Its forces are not taken: its way loses too much. */
+  /** Its forces are not used, because its link loses too much. */
   readonly forcesRefused: boolean;
   /** Its number counts those of the channel, and the forces are the channel's. */
   readonly link: LinkReport;

@@ -36,14 +36,14 @@ export function decrypt(key: Uint8Array, number: bigint, header: Uint8Array, sea
   }
 }
 
-/** The key that follows `key`; nobody comes back from it. */
+/** The key that follows `key`, from which `key` cannot be computed. */
 export const rekey = (key: Uint8Array): Uint8Array =>
   encrypt(key, kMaxNonce, kNothing, new Uint8Array(kKeySize)).slice(0, kKeySize);
 
 /** Tells the server which key to try, and nothing else: 8 bytes. */
 export const keyId = (key: Uint8Array): Uint8Array => sha256(concat(ascii("tendon-key-id"), key)).slice(0, 8);
 
-/** What a handshake mixes into both ends' view of it. Immutable, so that a message which does not open changes nothing. */
+/** The hash and key that both ends have mixed so far. Immutable, so a message that does not open changes nothing. */
 export class SymmetricState {
   private constructor(
     readonly hash: Uint8Array,

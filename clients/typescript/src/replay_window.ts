@@ -5,11 +5,11 @@ const kWords = 32n;
 const kRemembered = (kWords - 1n) * 64n;
 
 /**
- * Which packet numbers have arrived, as far back as it matters: a packet is let in once. A ring of bits as in RFC 6479:
+ * Remembers which recent packet numbers have arrived, so that each packet is accepted once. A ring of bits as in RFC 6479:
  * a number's bit never moves, advancing clears the words it runs over.
  *
- * Ask with `contains` before anything is believed of a packet, `insert` once it has proved good, so that a forged one
- * cannot use up the number of a real one.
+ * Ask `contains` before using a packet, and `insert` it once it is authentic, so that a forged packet cannot use up the
+ * number of a real one.
  */
 export class ReplayWindow {
   readonly #words = new BigUint64Array(Number(kWords));

@@ -51,7 +51,7 @@ export class OutgoingRequests {
     return this.#asked.reduce((next, { due, answer }) => (answer ? next : earliest(next, due ?? 0n)), kNever);
   }
 
-  /** Takes an answer. False when it answers what was never asked. */
+  /** Takes an answer. False when the answer belongs to no request. */
   acknowledge(ack: ControlAck): boolean {
     const asked = this.#find(ack.id);
     if (!asked) return ack.id < this.#next; // repeated

@@ -49,7 +49,7 @@ function printSummary(stats: ClientStats, seconds: number, { name, json }: Optio
   }
 }
 
-/** What the server says of our forces, each time that it says it. */
+/** Prints each of the server's reports on our forces. */
 function printReport(report: LinkReport, { name, json }: Options): void {
   if (!json) {
     if (report.words) console.error(`${name}: the server says: ${report.words}`);

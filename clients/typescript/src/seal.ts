@@ -30,9 +30,9 @@ export class PlainSeal implements Seal {
 
 /** Suite 1: ChaCha20-Poly1305 with the packet number as nonce and the header as associated data. */
 export class NoiseSeal implements Seal {
-  /** The sender renews its key after so many datagrams or so much time, whichever comes first. */
+  /** The sender renews its key after this many datagrams or this much time, whichever comes first. */
   static readonly kRenewAfter = { datagrams: 1n << 20n, time: 600n * kSecond };
-  /** The key before is still good for so long after moving on. */
+  /** How long the previous key stays valid after a renewal. */
   static readonly kOverlap = 2n * kSecond;
 
   readonly suite = CipherSuite.Noise;

@@ -59,7 +59,7 @@ function streamOf({ kind, value }: Diagnosis): string {
 function numberOf({ kind, value }: Diagnosis): bigint {
   return kind === "deviceReport" ? value.number : value.link.number;
 }
-/** Takes out the one that was put in first. */
+/** Removes and returns the entry that was put in first. */
 function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
   for (const [key, value] of from) {
     from.delete(key);
@@ -68,7 +68,7 @@ function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
   return undefined;
 }
 
-/** What can be told to the owner of a session. */
+/** An event for the owner of a session. */
 export type SessionEvent =
   | { readonly kind: "state"; readonly state: DeviceState }
   | { readonly kind: "force"; readonly command: ForceCommand }
@@ -82,7 +82,7 @@ export type SessionEvent =
 export interface SessionConfig {
   readonly connectionId: number;
   readonly seal?: Seal;
-  /** Longest silence that we leave. */
+  /** Longest time between two of our datagrams. */
   readonly keepAlive?: Nanoseconds;
   /** Silence of the peer after which it is gone. */
   readonly timeout?: Nanoseconds;
@@ -132,7 +132,7 @@ export class Session {
   readonly #newestSequence = new Map<string, bigint>();
   #newestReport = 0n;
   readonly #newestDiagnosis = new Map<string, bigint>();
-  /** Newest packet of ours that the peer has told of. */
+  /** Newest packet of ours that the peer has echoed. */
   #newestEchoed = -1n;
   readonly #answering = new IncomingRequests();
   readonly #roundTrip = new RoundTrip();
@@ -165,7 +165,7 @@ export class Session {
     if (!this.#open) return;
     const header = decodeHeader(datagram);
     if (header && header.type !== DatagramType.Data) {
-      ++this.stats.duplicated; // a copy of the handshake that took its time
+      ++this.stats.duplicated; // a late copy of the handshake
       return;
     }
     const { connectionId, seal } = this.#config;
@@ -215,14 +215,14 @@ export class Session {
   answer(answer: ControlAck): void {
     this.#answering.answer(answer);
   }
-  /** Says Bye and closes; what was not sent yet is dropped. No event comes: the owner knows. */
+  /** Says Bye and closes; frames not sent yet are dropped. No event follows, because the owner knows. */
   close(code: Code, reason: string): void {
     if (!this.#open) return;
     this.#open = false;
     this.#bye = { kind: "bye", value: { code, reason } };
     this.#byesLeft = kByes;
   }
-  /** Notices the silence of the peer, and our age. */
+  /** Notices the silence of the peer and the age of the session. */
   tick(now: Nanoseconds): void {
     this.#latest = now;
     const { timeout, life, seal } = this.#config;
@@ -249,7 +249,7 @@ export class Session {
     return this.#open && this.#somethingToSay(now) ? this.#write(now) : undefined;
   }
 
-  /** The next thing to tell. */
+  /** The next event. */
   nextEvent(): SessionEvent | undefined {
     const request = this.#answering.next();
     if (request) return { kind: "request", ...request };
@@ -305,7 +305,7 @@ export class Session {
     }
     this.#countLostOutgoing(told);
     const sample = now - told.sent - (sent - told.received);
-    if (sample < 0n) return; // two clocks of different rates, and a peer that held the echo for long
+    if (sample < 0n) return; // the clocks' rates differ, and the peer held the echo for long
     this.#roundTrip.observe(sample);
     this.stats.roundTripMs = toMilliseconds(sample);
     this.stats.smoothedRoundTripMs = toMilliseconds(this.#roundTrip.smoothed);
@@ -381,8 +381,8 @@ export class Session {
   }
 
   /**
-   * As much as fits, what ages fastest first. The rest stays due and goes into the next datagram; state and force always
-   * fit together.
+   * Writes as many frames as fit, those that age fastest first. The rest goes into the next datagram; state and force
+   * always fit together.
    */
   #write(now: Nanoseconds): Uint8Array {
     const { connectionId, seal, minResend } = this.#config;

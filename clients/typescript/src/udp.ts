@@ -25,7 +25,7 @@ export function parseAddress(text: string): Address {
 
 export const addressText = ({ host, port }: Address): string => `${isIPv6(host) ? `[${host}]` : host}:${port}`;
 
-/** 127.0.0.0/8 and ::1: datagrams to it never leave this machine. False for what is no numeric address. */
+/** 127.0.0.0/8 and ::1: datagrams to it never leave this machine. False when it is not a numeric address. */
 export function isLoopback(host: string): boolean {
   const ip = host.replace(/^::ffff:/i, "");
   return isIPv4(ip) ? ip.startsWith("127.") : ip === "::1";
@@ -52,12 +52,12 @@ export async function lookUp(host: string): Promise<readonly string[]> {
   }
 }
 
-/** Datagrams that wait for the socket; of more the newest are kept. */
+/** Most datagrams that wait for the socket; beyond that the newest are kept. */
 const kMostWaiting = 16;
 
 /**
  * A UDP socket that talks to one server, from a port that the system chooses. It is connected, so that the kernel drops
- * what others send to it. What the system does not take is lost. A host name is looked up at the start, and again before each
+ * what others send to it. Datagrams that the system does not take are lost. A host name is looked up at the start, and again before each
  * further attempt; a guest whose server's name nobody knows at the start ends with NoSuchHost.
  */
 export function udp(server: string): OpenTransport {

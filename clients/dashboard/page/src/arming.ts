@@ -12,12 +12,12 @@ export function takePass(pass: string): void {
   location.replace("#/live");
 }
 
-/** So long a success is told: later the device may be something else, which its state says. A failure stays. */
+/** How long a success is shown: later the device's state may have changed. A failure stays. */
 const kToldMs = 8000;
 
 /**
- * The device's safety in words, and the two buttons. What a press leads to is told by the server of this page, to every page that looks
- * on: this one only begins it.
+ * The device's safety in words, and the two buttons. A press only starts an order; the server of this page tells its
+ * result to every page that looks on.
  */
 export class Arming {
   readonly element: HTMLElement;
@@ -54,7 +54,7 @@ export class Arming {
       this.#toldAt = this.#told === undefined ? -Infinity : performance.now();
       this.#told = told;
     }
-    // Nor is it news that it was armed, when it is no longer.
+    // Nor is an arming shown when the device is no longer armed.
     const over = server?.press?.order === "arm" && state.level !== "good";
     const old = server?.press?.state === "done" && (over || performance.now() - this.#toldAt > kToldMs);
     const press = server?.press?.device === device && !old ? server.press : undefined;

@@ -26,13 +26,13 @@ export interface ChartSpec {
   readonly lines: readonly Line[];
   /** The axis begins at zero. */
   readonly positive?: boolean;
-  /** … and shows at least this much. */
+  /** The axis shows at least this much. */
   readonly least: number;
-  /** Lines that the axis need not show whole: what is far beyond the others would flatten them. */
+  /** Lines that may leave the axis: values far beyond the others would flatten them. */
   readonly mayLeave?: Column;
 }
 
-/** What a hand on a chart asks for. */
+/** The requests of a user who drags or scrolls a chart. */
 export interface ChartEvents {
   zoom(from: number, to: number): void;
   reset(): void;

@@ -28,7 +28,7 @@ function apply(element: Element, attributes: Attributes): void {
   }
 }
 
-/** Sets a text where it is another one: the browser lays nothing out for nothing. */
+/** Sets a text only when it differs, to spare the browser a layout. */
 export function say(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }

@@ -8,7 +8,7 @@ const kFloor = 92;
 /** Half a label. */
 const kMargin = 12;
 
-/** How late the haptic loop woke: counts by powers of two of a microsecond, on a logarithmic axis, or the tail would not be seen. */
+/** How late the haptic loop woke: counts by powers of two of a microsecond, on a logarithmic axis, so that the tail is visible. */
 export class Histogram {
   readonly element: HTMLElement;
   readonly #words = h("p", { class: "words" });

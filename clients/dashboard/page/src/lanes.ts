@@ -27,7 +27,7 @@ export class Lanes {
   draw(track: Track, from: number, to: number): void {
     const { share, any, n } = shares(track, from, to, kLimiting);
     say(this.#sentence, n === 0 ? "No states in this time." : sentence(share, any, to - from));
-    // A lane that has been there stays: rows that come and go cannot be read.
+    // A lane stays once it has been shown: rows that come and go cannot be read.
     const now = kReasons.filter((reason) => share.has(reason.bit) || this.#seen.includes(reason));
     if (now.length !== this.#seen.length) {
       this.#seen = now;

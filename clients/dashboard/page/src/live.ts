@@ -10,10 +10,10 @@ import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety, moment } fro
 /** Steps that are kept: two minutes at 1 kHz. */
 const kKept = 120_000;
 const kWindows = [0.5, 2, 5, 20, 60] as const;
-/** Pictures per second: a hand is not faster, and a phone's battery is grateful. */
+/** Frames per second: enough for a hand's motion, and it spares a phone's battery. */
 const kFrameMs = 33;
 
-/** What a server does now. */
+/** The view of a running server. */
 export class Live {
   readonly element: HTMLElement;
   readonly #track = new Track(kKept);

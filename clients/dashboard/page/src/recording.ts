@@ -220,7 +220,7 @@ async function openFile(url: string): Promise<Readable> {
   if (!head.ok) throw new Error(head.status === 404 ? "There is no such recording." : `The server says ${head.status}.`);
   const size = Number(head.headers.get("Content-Length"));
   if (size <= kWhole) {
-    // Not a byte more than it had just now, should it grow.
+    // Reads no byte beyond the present size, because the file may grow.
     const all = size === 0 ? new Uint8Array() : await fetchRange(url, 0, size);
     return { size: async () => BigInt(all.length), read: async (offset, length) => all.subarray(Number(offset), Number(offset + length)) };
   }

@@ -117,7 +117,7 @@ export class Track {
   }
 }
 
-/** What a plot of `columns` pixels can show of steps: of more than that the least and the most of each pixel; gaps are null. */
+/** What a plot of `columns` pixels can show of steps: with more steps than that, the least and the most in each pixel; gaps are null. */
 export function thin(
   track: Track, names: readonly Column[], from: number, to: number, columns: number, scale: number,
 ): [number[], ...(number | null)[][]] {
@@ -141,7 +141,7 @@ export function thin(
     }
     return [times, ...values];
   }
-  // On a grid that stands still while time goes by, or the picture would shimmer.
+  // The grid stands still while time goes by; otherwise the picture would shimmer.
   const width = Math.max((to - from) / columns, 1e-9);
   const lows = sources.map(() => 0);
   const highs = sources.map(() => 0);

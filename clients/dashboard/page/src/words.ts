@@ -56,7 +56,7 @@ export const kSafety: Readonly<Record<string, StateWords>> = {
   unguarded: { name: "Gives forces", meaning: "its scene lists no safety layer: there is nothing to arm", level: "good" },
 };
 
-/** Bit 13 of the reasons: whatever the safety layer was last reported to be, there is no force. */
+/** Bit 13 of the reasons: there is no force, whatever state the safety layer last reported. */
 export const kDisarmedBit = 1 << 13;
 export const kDisarmed: StateWords = { name: "Disarmed", meaning: "gives no force until it is armed again", level: "notice" };
 
