@@ -45,6 +45,7 @@ inline std::vector<Counted> count_instructions(const std::string& program, const
       "cd " + folder.path +
       " && OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 valgrind -q --tool=callgrind --toggle-collect=" + function +
       " --dump-after=" + function + " --callgrind-out-file=count " + program + " " + argument + " > lines";
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): one thread
   if (std::system(command.c_str()) != 0) throw std::runtime_error("this failed: " + command);
   std::vector<Counted> all;
   std::ifstream lines(folder.path + "/lines");

@@ -3,11 +3,15 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "core/base/expect.h"
 #include "server/build_info.h"
@@ -20,18 +24,20 @@ namespace {
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 /// All that is known of a point, in the order of the columns of the CSV and the members of the JSON.
-using Figures = std::vector<std::pair<const char*, double>>;
+using Figure = std::variant<std::int64_t, double>;
+using Figures = std::vector<std::pair<const char*, Figure>>;
+std::int64_t count(std::size_t n) { return static_cast<std::int64_t>(n); }
 Figures figures(const AccuracyPoint& p, Truth& truth) {
   const Accuracy& small = p.at_load[0];
   const Accuracy& hard = p.at_load[1];
   const auto& loads = truth.block().loads;
   Figures all{{"n", p.candidate.n},
-              {"nodes", static_cast<double>(p.size.nodes)},
+              {"nodes", count(p.size.nodes)},
               {"k_n_per_m", small.k},
               {"error_percent", 100 * small.total},
               {"update_ms_p50", p.update_ms_p50},
               {"setup_s", p.setup_s},
-              {"bytes", static_cast<double>(p.size.bytes)},
+              {"bytes", count(p.size.bytes)},
               {"load_n", loads[0]},
               {"error_n", loads[0] * small.total},
               {"model_percent", 100 * small.model},
@@ -54,8 +60,8 @@ Figures figures(const AccuracyPoint& p, Truth& truth) {
               {"hz", 1e3 / p.update_ms_p50},
               {"step_ms", p.step_ms},
               {"instructions", p.instructions.value_or(kNoNumber)},
-              {"elements", static_cast<double>(p.size.elements)},
-              {"free", static_cast<double>(p.size.free)},
+              {"elements", count(p.size.elements)},
+              {"free", count(p.size.free)},
               {"truth_k_n_per_m", truth.stiffness(0).secant},
               {"truth_uncertainty_percent", 100 * truth.uncertainty()}};
   if (p.felt) {
@@ -67,6 +73,10 @@ Figures figures(const AccuracyPoint& p, Truth& truth) {
                            {"felt_latency_ms", 1e3 * p.felt->latency}});
   }
   return all;
+}
+
+void add(JsonLine& line, const char* name, const Figure& figure) {
+  std::visit([&](auto value) { line.add(name, value); }, figure);
 }
 
 /// "420.2"
@@ -89,7 +99,8 @@ void write_csv(const std::filesystem::path& file, const std::vector<AccuracyPoin
   for (const AccuracyPoint& point : points) {
     csv << point.candidate.name();
     for (const auto& [name, value] : figures(point, truth)) {
-      csv << ',' << (std::isfinite(value) ? shortest(value) : std::string());
+      const double number = std::visit([](auto v) { return static_cast<double>(v); }, value);
+      csv << ',' << (std::isfinite(number) ? shortest(number) : std::string());
     }
     csv << ',' << kCommit << '\n';
   }
@@ -135,7 +146,7 @@ std::string load_text(double newtons) { return shortest(newtons) + " N"; }
 std::string to_json(const AccuracyPoint& point, Truth& truth) {
   JsonLine line;
   line.add("model", point.candidate.name());
-  for (const auto& [name, value] : figures(point, truth)) line.add(name, value);
+  for (const auto& [name, value] : figures(point, truth)) add(line, name, value);
   return line.add("commit", kCommit).str();
 }
 
@@ -167,7 +178,7 @@ void write_answer(std::ostream& out, const AccuracyOptions& options, const std::
     line.add("budget_ms", *options.budget_ms).add("network", options.network->name);
     if (best) {
       line.add("model", best->candidate.name());
-      for (const auto& [name, value] : figures(*best, truth)) line.add(name, value);
+      for (const auto& [name, value] : figures(*best, truth)) add(line, name, value);
     } else {
       line.add("model", std::optional<double>());
     }
