@@ -109,7 +109,7 @@ struct Pushed {
 
 using Kind = HapticOrder::Kind;
 
-TEST(HapticLoop, ADisarmedDeviceWithASafetyLayerIsHomedInThatVeryStepAndArmedAgainByAnOrderOnly) {
+TEST(HapticLoop, ADisarmedDeviceIsHomedAtOnceAndArmedAgainByAnOrderOnly) {
   Handle handle;
   SafeDevice::Config safety;
   safety.arming.by = SafeDevice::Arming::By::kStart;

@@ -5,12 +5,8 @@
     name      a test's name has at most 70 characters: in C++ suite, dot and name; in TypeScript and JavaScript the title
               of each test or group; in Python the function's name
     cleft     no sentence of a page or a comment begins with "Of what", or is of the form "What … is …."
-
-remaining.txt lists what still breaks a rule, as "RULE COUNT PATH". Its counts only shrink: the test fails when a file has
-more than is listed there. `language_test.py ROOT --write` writes the list anew.
 """
 
-import collections
 import pathlib
 import re
 import subprocess
@@ -19,7 +15,6 @@ import sys
 sys.dont_write_bytecode = True
 import wrap  # noqa: E402
 
-REMAINING = pathlib.Path(__file__).with_name("remaining.txt")
 NOT_PROSE = ("CHANGELOG.md", "tests/tools/bench/RESULTS.md")  # what was said then; written by a program
 TEST = re.compile(r"^\s*(?:TEST|TEST_F|TEST_P|TYPED_TEST|TYPED_TEST_P|RC_GTEST_PROP)\(\s*(\w+),\s*(\w+)", re.M)
 TITLE = re.compile(r"(?<![.\w])(?:test|it|describe)(?:\.(?:only|skip|todo))?\(\s*([\"'`])((?:(?!\1)[^\\]|\\.)*)\1")
@@ -128,23 +123,13 @@ def main():
     check_the_rules()
     root = pathlib.Path(sys.argv[1])
     listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout.split("\n")
-    found = collections.defaultdict(list)
+    bad = []
     for path in listed:
         if pathlib.PurePath(path).suffix not in (".md", *COMMENT) or not (root / path).is_file():
             continue
-        for rule, line, words in broken(path, (root / path).read_text(encoding="utf-8")):
-            found[rule, path].append(f"{path}:{line}: {words}")
-    if "--write" in sys.argv:
-        rows = [f"{rule} {len(lines)} {path}\n" for (rule, path), lines in sorted(found.items())]
-        REMAINING.write_text("".join(rows), encoding="utf-8")
-    allowed = {}
-    for row in REMAINING.read_text(encoding="utf-8").splitlines():
-        rule, count, path = row.split(" ", 2)
-        allowed[rule, path] = int(count)
-    bad = [line for key, lines in found.items() if len(lines) > allowed.get(key, 0) for line in lines]
-    print("\n".join(bad))
-    left, now = sum(allowed.values()), sum(map(len, found.values()))
-    print(f"{now} breaks of the rules are left; remaining.txt allows {left}" + ("; shrink it" if now < left else ""))
+        text = (root / path).read_text(encoding="utf-8")
+        bad += [f"{path}:{line}: {words}" for _, line, words in broken(path, text)]
+    print("\n".join([*bad, f"{len(bad)} breaks of the rules"]))
     return 1 if bad else 0
 
 
