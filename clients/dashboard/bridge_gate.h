@@ -38,7 +38,7 @@ class BridgeGate {
  public:
   struct Config {
     double max_rate_hz = 4000;  ///< datagrams that a page may send in a second: those of four engines at 1 kHz
-    /// Datagrams that wait for a page: some 60 ms of states at 1 kHz. Older ones are of no use to a hand.
+    /// Bytes of the datagrams that wait for a page: some 60 ms of states at 1 kHz. One that does not fit is dropped.
     std::size_t max_waiting = 16 * 1024;
   };
 

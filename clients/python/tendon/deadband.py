@@ -18,7 +18,7 @@ class ForceDeadband:
     share: float = 0.10
     """0 … 1; the just noticeable difference of force is 7 to 15 %."""
     floor: float = 0.05
-    """N: a smaller change is never sent."""
+    """N: a smaller change is left out until the longest silence."""
     longest_silence_s: float = 0.02
     """Bounds how long the device renders an old force after a loss."""
 

@@ -12,7 +12,7 @@ import { fromMilliseconds, type Nanoseconds } from "./time.js";
 export interface ForceDeadband {
   /** 0 … 1; the just noticeable difference of force is 7 to 15 %: 0.1. */
   readonly share: number;
-  /** N, a smaller change is never sent: 0.05. */
+  /** N; a smaller change is left out until the longest silence: 0.05. */
   readonly floor: number;
   /** Bounds how long the device renders an old force after a loss: 20. */
   readonly longestSilenceMs: number;
