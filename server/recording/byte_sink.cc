@@ -55,10 +55,10 @@ FileSink::Opened FileSink::open(const std::filesystem::path& path) {
   return {-1, true};
 }
 
-FileSink::FileSink(std::filesystem::path path, const Opened& opened)
-    : path_(std::move(path)), descriptor_(opened.descriptor), is_file_(opened.is_file) {}
+FileSink::FileSink(const std::filesystem::path& path, const Opened& opened)
+    : path_(path), descriptor_(opened.descriptor), is_file_(opened.is_file) {}
 
-FileSink::FileSink(std::filesystem::path path) : FileSink(path, open(path)) {
+FileSink::FileSink(const std::filesystem::path& path) : FileSink(path, open(path)) {
   if (descriptor_ < 0) {
     throw std::runtime_error("cannot write recording " + path_.string() + ": there is a file of that name already");
   }

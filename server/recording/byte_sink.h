@@ -46,7 +46,7 @@ class FileSink final : public ByteSink {
  public:
   /// Makes the file; takes over an empty one that no other sink writes to. Throws std::runtime_error with path and
   /// reason when there is something in it already, or it cannot be written to.
-  explicit FileSink(std::filesystem::path path);
+  explicit FileSink(const std::filesystem::path& path);
   ~FileSink() override;
   FileSink(const FileSink&) = delete;
   FileSink& operator=(const FileSink&) = delete;
@@ -67,7 +67,7 @@ class FileSink final : public ByteSink {
     int descriptor;
     bool is_file;
   };
-  FileSink(std::filesystem::path path, const Opened& opened);
+  FileSink(const std::filesystem::path& path, const Opened& opened);
   static Opened open(const std::filesystem::path& path);
 
   std::filesystem::path path_;
