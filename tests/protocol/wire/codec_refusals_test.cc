@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/wire/codec.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "protocol/limits.h"
+#include "tests/protocol/examples.h"
+#include "tests/protocol/wire/read_back.h"
+
+namespace tendon {
+namespace {
+
+using examples::data;
+
+struct BadState {
+  const char* what;
+  void (*spoil)(DeviceState&);
+};
+
+TEST(Codec, AStateOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadState cases[] = {
+      {"NaN position", [](DeviceState& s) { s.position.y() = kNan; }},
+      {"infinite velocity", [](DeviceState& s) { s.velocity.z() = kInf; }},
+      {"huge force", [](DeviceState& s) { s.force_applied.x() = -1.001e12; }},
+      {"infinite energy", [](DeviceState& s) { s.energy = -kInf; }},
+      {"NaN bound", [](DeviceState& s) { s.permitted_force = kNan; }},
+      {"negative bound", [](DeviceState& s) { s.permitted_force = -1; }},
+      {"late sample", [](DeviceState& s) { s.sampled = PeerTime{limits::kMaxTime + Duration{1}}; }},
+      {"negative age", [](DeviceState& s) { s.force_age = Duration{-1}; }},
+      {"mode 0", [](DeviceState& s) { s.mode = Mode{0}; }},
+      {"mode 7", [](DeviceState& s) { s.mode = Mode{7}; }},
+      {"NaN wanted", [](DeviceState& s) { s.force_wanted = Vec3(0, 0, kNan); }},
+  };
+  for (const BadState& bad : cases) {
+    DeviceState state = examples::state();
+    bad.spoil(state);
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, state, examples::force()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    EXPECT_TRUE(std::holds_alternative<ForceCommand>(content->frames[0])) << bad.what;
+  }
+}
+
+struct BadForce {
+  const char* what;
+  void (*spoil)(ForceCommand&);
+};
+
+TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadForce cases[] = {
+      {"NaN force", [](ForceCommand& f) { f.force.x() = kNan; }},
+      {"infinite force", [](ForceCommand& f) { f.force.z() = -kInf; }},
+      {"NaN stiffness", [](ForceCommand& f) { f.model->stiffness(1, 2) = kNan; }},
+      {"infinite stiffness", [](ForceCommand& f) { f.model->stiffness(2, 2) = kInf; }},
+      {"infinite position", [](ForceCommand& f) { f.model->at.x() = kInf; }},
+      {"NaN radius", [](ForceCommand& f) { f.model->valid_radius = kNan; }},
+      {"negative radius", [](ForceCommand& f) { f.model->valid_radius = -0.001; }},
+      {"NaN normal", [](ForceCommand& f) { f.model->contact->normal.y() = kNan; }},
+      {"no normal", [](ForceCommand& f) { f.model->contact->normal.setZero(); }},
+      {"a normal that is no unit vector", [](ForceCommand& f) { f.model->contact->normal *= 1.0011; }},
+      {"NaN gap", [](ForceCommand& f) { f.model->contact->gap = kNan; }},
+      {"NaN depth", [](ForceCommand& f) { f.model->contact->table->first = kNan; }},
+      {"no step", [](ForceCommand& f) { f.model->contact->table->step = 0; }},
+      {"negative step", [](ForceCommand& f) { f.model->contact->table->step = -0.001; }},
+      {"infinite step", [](ForceCommand& f) { f.model->contact->table->step = kInf; }},
+      {"NaN in the table", [](ForceCommand& f) { f.model->contact->table->force[2] = kNan; }},
+      {"a table of one", [](ForceCommand& f) { f.model->contact->table->size = 1; }},
+      {"negative error", [](ForceCommand& f) { f.error = -0.1; }},
+      {"NaN error", [](ForceCommand& f) { f.error = kNan; }},
+      {"sequence 0", [](ForceCommand& f) { f.sequence = 0; }},
+      {"valid for nothing", [](ForceCommand& f) { f.valid_for = Duration{}; }},
+      {"valid for less than nothing", [](ForceCommand& f) { f.valid_for = Duration{-1}; }},
+      {"valid for too long", [](ForceCommand& f) { f.valid_for = limits::kMaxValidFor + Duration{1}; }},
+      {"valid for 2³² µs + 1 s", [](ForceCommand& f) { f.valid_for = std::chrono::microseconds(4'295'967'296); }},
+  };
+  for (const BadForce& bad : cases) {
+    ForceCommand force = examples::force_with_all();
+    bad.spoil(force);
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, force, examples::state()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
+  }
+}
+
+struct BadReport {
+  const char* what;
+  void (*spoil)(LinkReport&);
+};
+
+TEST(Codec, AReportOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadReport cases[] = {
+      {"number 0", [](LinkReport& r) { r.number = 0; }},
+      {"from beyond all clocks", [](LinkReport& r) { r.until = PeerTime{-limits::kMaxTime - Duration{1}}; }},
+      {"a span below zero", [](LinkReport& r) { r.span = Duration{-1}; }},
+      {"an endless span", [](LinkReport& r) { r.span = limits::kMaxTime + Duration{1}; }},
+      {"early by less than zero", [](LinkReport& r) { r.worst_late = Duration{-1}; }},
+      {"a gap below zero", [](LinkReport& r) { r.longest_gap = Duration{-1}; }},
+      {"an endless median", [](LinkReport& r) { r.round_trip->median = limits::kMaxTime + Duration{1}; }},
+      {"an endless p99", [](LinkReport& r) { r.to_server->p99 = limits::kMaxTime + Duration{1}; }},
+      {"a p99 from before all time", [](LinkReport& r) { r.to_client->p99 = -limits::kMaxTime - Duration{1}; }},
+      {"an endless offset", [](LinkReport& r) { r.clock_offset = limits::kMaxTime + Duration{1}; }},
+      {"NaN drift", [](LinkReport& r) { r.clock_drift_ppm = kNan; }},
+      {"infinite drift", [](LinkReport& r) { r.clock_drift_ppm = -kInf; }},
+      {"an error below zero", [](LinkReport& r) { r.clock_error = Duration{-1}; }},
+  };
+  for (const BadReport& bad : cases) {
+    LinkReport report = examples::report();
+    bad.spoil(report);
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, report, examples::state()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+    EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << bad.what;
+  }
+  LinkReport wordy = examples::report();
+  wordy.words.assign(limits::kMaxDetail + 1, 'w');  // ours are cut; a stranger's are refused
+  DataReader reader;
+  EXPECT_EQ(read(reader, data(1, {}, wordy))->frames.size(), 1U);
+  const RawProtobuf report = RawProtobuf().varint(1, 1).text(20, wordy.words);
+  EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(6, report)))->invalid, 1U);
+}
+
+/// `report` is left out and counted, and the state beside it is read.
+void expect_left_out(const auto& report, const std::string& what) {
+  DataReader reader;
+  const auto* content = read(reader, data(1, {}, report, examples::state()));
+  ASSERT_NE(content, nullptr) << what;
+  EXPECT_EQ(content->invalid, 1U) << what;
+  ASSERT_EQ(content->frames.size(), 1U) << what;
+  EXPECT_TRUE(std::holds_alternative<DeviceState>(content->frames[0])) << what;
+}
+
+/// How many of frames with `report` in field `field` are read: 0 or 1.
+std::size_t read_raw(unsigned field, const RawProtobuf& report) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(RawProtobuf().message(field, report)));
+  if (content == nullptr) return 99;
+  EXPECT_EQ(content->frames.size() + content->invalid, 1U);
+  return content->frames.size();
+}
+
+struct BadDeviceReport {
+  const char* what;
+  void (*spoil)(DeviceReport&);
+};
+
+TEST(Codec, AReportOnADeviceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadDeviceReport cases[] = {
+      {"number 0", [](DeviceReport& r) { r.number = 0; }},
+      {"from beyond all clocks", [](DeviceReport& r) { r.until = PeerTime{limits::kMaxTime + Duration{1}}; }},
+      {"a span below zero", [](DeviceReport& r) { r.span = Duration{-1}; }},
+      {"an endless span", [](DeviceReport& r) { r.span = limits::kMaxTime + Duration{1}; }},
+      {"device 16", [](DeviceReport& r) { r.device = limits::kMaxDevices; }},
+      {"more late steps than steps", [](DeviceReport& r) { r.steps = 986; }},
+      {"counts that overflow", [](DeviceReport& r) { r.lateness[1] = r.lateness[2] = std::uint64_t{1} << 63; }},
+      {"more overruns than steps", [](DeviceReport& r) { r.overruns = r.steps + 1; }},
+      {"more unseen than steps", [](DeviceReport& r) { r.unseen = r.steps + 1; }},
+      {"safety 0", [](DeviceReport& r) { r.safety = Safety{0}; }},
+      {"safety 9", [](DeviceReport& r) { r.safety = Safety{9}; }},
+  };
+  for (const BadDeviceReport& bad : cases) {
+    DeviceReport report = examples::device_report();
+    bad.spoil(report);
+    expect_left_out(report, bad.what);
+  }
+  const auto good = [] { return RawProtobuf().varint(1, 1).varint(10, 6); };
+  const std::string wordy(limits::kMaxDetail + 1, 'w');  // ours are cut; a stranger's are refused
+  EXPECT_EQ(there(DeviceReport{.number = 1, .fault = wordy, .degraded = wordy}).degraded.size(), limits::kMaxDetail);
+  EXPECT_EQ(read_raw(7, good()), 1U);
+  EXPECT_EQ(read_raw(7, good().text(11, wordy)), 0U);
+  EXPECT_EQ(read_raw(7, good().text(12, wordy)), 0U);
+  EXPECT_EQ(read_raw(7, RawProtobuf().varint(1, 1)), 0U) << "no safety";
+  const std::string zeros(limits::kLatenessBuckets, '\0');  // each byte is an entry
+  EXPECT_EQ(read_raw(7, good().text(9, zeros)), 1U);
+  EXPECT_EQ(read_raw(7, good().text(9, zeros + '\0')), 0U) << "25 buckets";
+}
+
+TEST(Codec, ZerosAtTheEndOfAHistogramDoNotTravel) {
+  DeviceReport report = examples::device_report();
+  const std::size_t before = data(1, {}, report).size();
+  std::swap(report.lateness[13], report.lateness[12]);
+  EXPECT_EQ(data(1, {}, report).size(), before - 1);
+  report.lateness = {};
+  EXPECT_EQ(data(1, {}, report).size(), before - 2 - 15);  // key and length, 14 entries, one of two bytes
+}
+
+TEST(Codec, ABucketEndsWithItsPowerOfTwo) {
+  using std::chrono::microseconds;
+  EXPECT_EQ(lateness_bucket(-std::chrono::seconds(1)), 0U);
+  EXPECT_EQ(lateness_bucket(Duration{0}), 0U);
+  EXPECT_EQ(lateness_bucket(microseconds(1)), 0U);
+  EXPECT_EQ(lateness_bucket(microseconds(1) + Duration{1}), 1U);
+  for (std::size_t i = 1; i + 1 < limits::kLatenessBuckets; ++i) {
+    const Duration end = microseconds(std::int64_t{1} << i);
+    EXPECT_EQ(lateness_bucket(end), i);
+    EXPECT_EQ(lateness_bucket(end + Duration{1}), i + 1);
+  }
+  EXPECT_EQ(lateness_bucket(Duration::max()), limits::kLatenessBuckets - 1);
+}
+
+struct BadPeerReport {
+  const char* what;
+  void (*spoil)(PeerReport&);
+};
+
+TEST(Codec, AReportOnAnEngineOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  const BadPeerReport cases[] = {
+      {"device 16", [](PeerReport& r) { r.device = limits::kMaxDevices; }},
+      {"channel 8", [](PeerReport& r) { r.channel = limits::kMaxChannels; }},
+      {"one state in none", [](PeerReport& r) { r.state_one_in = 0; }},
+      {"one state in 1001", [](PeerReport& r) { r.state_one_in = limits::kMaxOneIn + 1; }},
+      {"a link out of bounds", [](PeerReport& r) { r.link.number = 0; }},
+      {"NaN drift", [](PeerReport& r) { r.link.clock_drift_ppm = kNan; }},
+  };
+  for (const BadPeerReport& bad : cases) {
+    PeerReport report = examples::peer_report();
+    bad.spoil(report);
+    expect_left_out(report, bad.what);
+  }
+  const auto good = [] { return RawProtobuf().varint(4, 1).message(6, RawProtobuf().varint(1, 1)); };
+  EXPECT_EQ(read_raw(8, good()), 1U);
+  EXPECT_EQ(read_raw(8, good().text(3, std::string(limits::kMaxName + 1, 'n'))), 0U);
+  EXPECT_EQ(read_raw(8, RawProtobuf().varint(4, 1)), 0U) << "no link";
+}
+
+TEST(Codec, ADeadbandOfNaNIsLeftOutAndASenselessOneIsForTheServer) {
+  const auto read_back = [](const SetStateDeadband& asked) -> std::optional<SetStateDeadband> {
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, Control{.id = 1, .request = asked}));
+    if (content->frames.empty()) return {};
+    return std::get<SetStateDeadband>(*std::get<Control>(content->frames[0]).request);
+  };
+  EXPECT_FALSE(read_back({.share = kNan}).has_value());
+  EXPECT_FALSE(read_back({.floor = kInf}).has_value());
+  const auto silly = read_back({.share = -7, .floor = 9, .max_silence = std::chrono::milliseconds(20)});
+  EXPECT_EQ(silly->share, -7);
+  EXPECT_EQ(silly->floor, 9);
+  EXPECT_EQ(silly->max_silence, std::chrono::milliseconds(20));
+  for (const Duration impossible : {Duration{-1}, limits::kMaxStateSilence + Duration{1}, Duration::max()}) {
+    EXPECT_GT(read_back({.max_silence = impossible})->max_silence, limits::kMaxStateSilence);
+  }
+}
+
+TEST(Codec, StiffnessHasOneThreeOrNineEntries) {
+  for (std::size_t entries = 0; entries <= 10; ++entries) {
+    DataReader reader;
+    const auto datagram = datagram_with(raw_force(
+        [&](RawProtobuf& force) { force.message(4, RawProtobuf().packed(2, std::vector<double>(entries, 2.0))); }));
+    const auto* content = reader.read(datagram);
+    ASSERT_NE(content, nullptr);
+    EXPECT_EQ(content->frames.size(), entries == 1 || entries == 3 || entries == 9 ? 1U : 0U) << entries;
+  }
+}
+
+TEST(Codec, NineStiffnessEntriesAreRowByRow) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(raw_force([](RawProtobuf& force) {
+    force.message(4, RawProtobuf().packed(2, {0, 1, 2, 3, 4, 5, 6, 7, 8}));
+  })));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).model->stiffness(1, 0), 3.0);
+}
+
+TEST(Codec, AStiffnessTravelsInItsShortestForm) {
+  ForceCommand force = examples::force();
+  const auto size = [&](const Mat3& stiffness) {
+    force.model->stiffness = stiffness;
+    return data(1, {}, force).size();
+  };
+  const std::size_t isotropic = size(2000 * Mat3::Identity());
+  EXPECT_EQ(size(Vec3(1, 2, 3).asDiagonal()), isotropic + 16);
+  EXPECT_GE(size(Mat3::Constant(1)), isotropic + 64);
+}
+
+TEST(Codec, FramesAndRequestsOfANewerPeerAreNoError) {
+  DataReader reader;
+  const auto* content = reader.read(datagram_with(RawProtobuf().text(100, "what we do not know")));
+  ASSERT_NE(content, nullptr);
+  EXPECT_EQ(content->invalid, 0U);
+  EXPECT_TRUE(content->frames.empty());
+
+  content = reader.read(datagram_with(RawProtobuf().message(3, RawProtobuf().varint(1, 5).text(100, "new"))));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<Control>(content->frames[0]).id, 5U);
+  EXPECT_FALSE(std::get<Control>(content->frames[0]).request.has_value());
+}
+
+TEST(Codec, TooManyFramesMakeADatagramMalformed) {
+  RawProtobuf many;
+  many.fixed64(1, 1);
+  for (int i = 0; i < limits::kMaxFrames; ++i) many.text(3, "");
+  DataReader reader;
+  EXPECT_NE(reader.read(many.bytes()), nullptr);
+  many.text(3, "");
+  EXPECT_EQ(reader.read(many.bytes()), nullptr);
+}
+
+TEST(Codec, ADatagramFromBeyondAllClocksIsMalformed) {
+  DataReader reader;
+  EXPECT_NE(reader.read(RawProtobuf().fixed64(1, std::uint64_t{1} << 60U).bytes()), nullptr);
+  EXPECT_EQ(reader.read(RawProtobuf().fixed64(1, (std::uint64_t{1} << 60U) + 1).bytes()), nullptr);
+}
+
+TEST(Codec, TextThatIsNotUtf8MakesADatagramMalformedWithoutAWord) {
+  testing::internal::CaptureStderr();
+  DataReader reader;
+  EXPECT_EQ(reader.read(datagram_with(RawProtobuf().message(5, RawProtobuf().varint(1, 1).text(2, "\xFF")))), nullptr);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Codec, OurOwnTextIsCutToSizeAtACharacterAndWhereItIsNotUtf8) {
+  const auto reason = [](const std::string& text) {
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, Bye{.code = Code::kOk, .reason = text}));
+    return content && content->frames.size() == 1 ? std::get<Bye>(content->frames[0]).reason : "refused";
+  };
+  const std::string full(limits::kMaxDetail, 'x');
+  EXPECT_EQ(reason(full), full);
+  EXPECT_EQ(reason(full + "y"), full);
+  EXPECT_EQ(reason(full.substr(1) + "ä"), full.substr(1));
+  EXPECT_EQ(reason("10 µm → ∞ 🙂"), "10 µm → ∞ 🙂");
+  EXPECT_EQ(reason("good\xC0\x80"), "good");          // overlong
+  EXPECT_EQ(reason("good\xED\xA0\x80"), "good");      // surrogate
+  EXPECT_EQ(reason("good\xF4\x90\x80\x80"), "good");  // beyond U+10FFFF
+  EXPECT_EQ(reason("good\xE2\x82"), "good");          // cut in two
+}
+
+TEST(Codec, AForceIsValidForWholeMicrosecondsRoundedUp) {
+  ForceCommand force = examples::force();
+  force.valid_for = Duration{1};
+  DataReader reader;
+  const auto* content = read(reader, data(1, {}, force));
+  ASSERT_EQ(content->frames.size(), 1U);
+  EXPECT_EQ(std::get<ForceCommand>(content->frames[0]).valid_for, std::chrono::microseconds(1));
+}
+
+}  // namespace
+}  // namespace tendon

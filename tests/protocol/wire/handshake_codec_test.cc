@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/wire/handshake_codec.h"
+#include "protocol/wire/codec.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "protocol/limits.h"
+#include "protocol/secrets/client_key.h"
+#include "protocol/secrets/noise.h"
+#include "tests/protocol/examples.h"
+#include "tests/protocol/wire/read_back.h"
+
+namespace tendon {
+namespace {
+
+using examples::Bytes;
+using examples::data;
+
+RC_GTEST_PROP(Codec, AHeaderComesOutAsItWentIn, ()) {
+  Header header;
+  header.suite = *rc::gen::element(Suite::kPlain, Suite::kNoise);
+  if (header.suite == Suite::kNoise) header.epoch = *rc::gen::arbitrary<std::uint8_t>();
+  header.connection_id = *rc::gen::arbitrary<std::uint32_t>();
+  header.packet_number = *rc::gen::arbitrary<std::uint64_t>();
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(buffer, header, LocalTime{}, {});
+  RC_ASSERT((decode_header(std::span(buffer).first(writer.size())) == header));
+}
+
+TEST(Codec, TheFullestHelloAndWelcomeFit) {
+  const std::vector<std::string> features(limits::kMaxFeatures + 1, std::string(limits::kMaxFeature + 1, 'f'));
+  const std::string name(limits::kMaxName + 1, 'n');
+  const Hello hello{
+      .version_min = ~0U, .version_max = ~0U, .role = Role::kController, .name = name, .features = features};
+  const std::size_t suite_1 = sizeof(KeyId) + kNoiseOverhead;
+  EXPECT_LE(write_body(hello).size() + suite_1, kMaxHandshakeBody);
+  const auto out = read_hello(write_body(hello));
+  ASSERT_TRUE(out.has_value());
+  EXPECT_EQ(out->name.size(), limits::kMaxName);
+  EXPECT_EQ(out->features.size(), static_cast<std::size_t>(limits::kMaxFeatures));
+
+  const Welcome welcome{.version = ~0U,
+                        .features = features,
+                        .role = Role::kController,
+                        .device_name = name,
+                        .max_force = 1,
+                        .position_resolution = 1,
+                        .loop_hz = limits::kMaxLoopHz,
+                        .timeout = limits::kMaxTimeout,
+                        .server = name,
+                        .grants = std::vector<Grant>(limits::kMaxClaims + 1, {15, 7, Role::kController})};
+  const Bytes bytes = examples::answer_datagram(1, welcome);
+  EXPECT_LE(bytes.size(), 874U);  // as limits.h says
+  EXPECT_LE(write_body(welcome).size() + suite_1, kMaxHandshakeBody);
+  EXPECT_TRUE(read_answer(decode_answer(bytes)->body).has_value());
+}
+
+TEST(Codec, ClaimsAndGrantsComeOutAsTheyWentIn) {
+  const auto hello = read_hello(write_body(examples::hello_with_claims()));
+  ASSERT_TRUE(hello.has_value());
+  ASSERT_EQ(hello->claims.size(), 2U);
+  EXPECT_EQ(hello->claims[1].device, "right");
+  EXPECT_EQ(hello->claims[1].channel, "tissue");
+  EXPECT_EQ(hello->claims[1].role, Role::kController);
+  const auto answer = read_answer(write_body(Answer(examples::welcome_with_grants())));
+  ASSERT_TRUE(answer.has_value());
+  const auto& grants = std::get<Welcome>(*answer).grants;
+  ASSERT_EQ(grants.size(), 2U);
+  EXPECT_EQ(grants[0].role, Role::kObserver);
+  EXPECT_EQ(grants[1].device, 1U);
+  EXPECT_EQ(grants[1].channel, 1U);
+}
+
+TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
+  const std::string name(limits::kMaxName, 'n');
+  const Vec3 most = Vec3::Constant(limits::kMaxValue);
+  ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
+  answer.device = DeviceDescription{.device = 15,
+                                    .name = name,
+                                    .model = name,
+                                    .workspace = DeviceDescription::Box{-most, most},
+                                    .max_force = 1,
+                                    .continuous_force = 1,
+                                    .max_stiffness = 1,
+                                    .position_resolution = 1,
+                                    .loop_hz = limits::kMaxLoopHz};
+  answer.device->channels.resize(
+      limits::kMaxChannels + 1,
+      {.name = name, .rule = ChannelRule::kPriority, .lease = limits::kMaxTimeout, .holder = name});
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
+               examples::echo());
+  ASSERT_TRUE(writer.add(answer));
+  DataReader reader;
+  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  const auto& device = std::get<ControlAck>(content->frames[0]).device;
+  ASSERT_TRUE(device.has_value());
+  EXPECT_EQ(device->channels.size(), limits::kMaxChannels);
+  EXPECT_EQ(device->name.size(), limits::kMaxLabel);
+}
+
+TEST(Codec, ADeviceOrChannelThatCannotBeIsRefused) {
+  const auto refused = [](const RawProtobuf& frame) {
+    DataReader reader;
+    const DataContent* content = reader.read(datagram_with(frame));
+    return content != nullptr && content->frames.empty() && content->invalid == 1;
+  };
+  const auto lease = [](std::uint64_t device, std::uint64_t channel) {
+    return RawProtobuf().message(
+        3, RawProtobuf().varint(1, 1).message(5, RawProtobuf().varint(1, device).varint(2, channel)));
+  };
+  EXPECT_FALSE(refused(raw_force([](RawProtobuf& f) { f.varint(6, 15).varint(7, 7); })));
+  EXPECT_TRUE(refused(raw_force([](RawProtobuf& f) { f.varint(6, 16); })));
+  EXPECT_TRUE(refused(raw_force([](RawProtobuf& f) { f.varint(7, 8); })));
+  EXPECT_FALSE(refused(lease(15, 7)));
+  EXPECT_TRUE(refused(lease(16, 7)));
+  EXPECT_TRUE(refused(lease(15, 8)));
+  EXPECT_TRUE(refused(RawProtobuf().message(1, RawProtobuf().varint(11, 2).varint(12, 16))));
+  EXPECT_TRUE(refused(RawProtobuf().message(1, RawProtobuf().varint(11, 2).varint(13, 8))));
+}
+
+TEST(Codec, TheSixtyFifthFrameDoesNotFit) {
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(buffer, {}, LocalTime{}, {});
+  const Control small{.id = 1, .request = Rearm{}};
+  for (int i = 0; i < limits::kMaxFrames; ++i) ASSERT_TRUE(writer.add(small));
+  EXPECT_FALSE(writer.add(small));
+  writer.begin(buffer, {}, LocalTime{}, {});
+  EXPECT_TRUE(writer.add(small)) << "the next datagram is empty again";
+}
+
+TEST(Codec, AHelloWithAnythingInItsPaddingIsRefused) {
+  Bytes bytes = examples::datagrams()[0].bytes;
+  ASSERT_TRUE(decode_hello(bytes).has_value());
+  bytes.back() = std::byte{1};
+  EXPECT_FALSE(decode_hello(bytes).has_value());
+}
+
+TEST(Codec, AHelloThatMakesNoSenseIsRefused) {
+  const auto accepted = [](auto spoil) {
+    Hello hello = examples::hello();
+    spoil(hello);
+    return read_hello(write_body(hello)).has_value();
+  };
+  EXPECT_TRUE(accepted([](Hello&) {}));
+  EXPECT_FALSE(accepted([](Hello& h) { h.version_min = 0; }));
+  EXPECT_FALSE(accepted([](Hello& h) { h.version_min = 2; }));
+  EXPECT_FALSE(accepted([](Hello& h) { h.role = Role{0}; }));
+  EXPECT_FALSE(accepted([](Hello& h) { h.role = Role{3}; }));
+}
+
+TEST(Codec, AWelcomeThatMakesNoSenseIsRefused) {
+  const auto accepted = [](auto spoil) {
+    Welcome welcome = examples::welcome();
+    spoil(welcome);
+    return read_answer(write_body(welcome)).has_value();
+  };
+  EXPECT_TRUE(accepted([](Welcome&) {}));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.version = 0; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.max_force = kNan; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.position_resolution = -1; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.loop_hz = 0; }));
+  EXPECT_FALSE(accepted([](Welcome& w) { w.timeout = Duration{}; }));
+}
+
+}  // namespace
+}  // namespace tendon

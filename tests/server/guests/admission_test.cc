@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/server/guests/sealed_server.h"
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+TEST_F(SealedServer, LetsAClientWithAKeyInFromAnywhereAndItsForcesArrive) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(1), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_EQ(loop_->stats().welcomed, 1U);
+  EXPECT_GT(loop_->stats().forces, 500U);
+  EXPECT_EQ(loop_->stats().dropped.forged, 0U);
+}
+
+TEST_F(SealedServer, IsSilentForAKeyItDoesNotHave) {
+  Client a = controller(key_of("stranger", Role::kController, 99), "192.0.2.1:4000");
+  run(seconds(5), {&a});
+  EXPECT_NE(phase(a), Phase::kOpen);
+  EXPECT_EQ(a.client->stats().sessions, 0U);
+  EXPECT_GT(loop_->stats().hellos.unknown_key, 10U);
+  for (const Datagram& datagram : wire_) {
+    EXPECT_TRUE(datagram.from != server_.self || datagram.bytes.size() == 48);  // Retries
+  }
+}
+
+TEST_F(SealedServer, IsSilentForPlaintextFromAnotherMachine) {
+  Client a = controller(std::nullopt, "192.0.2.1:4000");
+  run(seconds(3), {&a});
+  EXPECT_EQ(server_.sent, 0U);
+  EXPECT_GT(loop_->stats().hellos.plain, 10U);
+}
+
+TEST_F(SealedServer, TellsAPlainClientOnThisMachineThatItWantsAKey) {
+  Client a = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(50), {&a});
+  EXPECT_EQ(phase(a), Phase::kRefused);
+  EXPECT_EQ(a.client->stats().code, Code::kDenied);
+  EXPECT_EQ(a.client->stats().reason, "this server lets in those who have a key: --key FILE");
+}
+
+TEST_F(SealedServer, AnObserversKeyDoesNotControl) {
+  Client a = controller(screen_, "192.0.2.1:4000");
+  Client b = observer(screen_, "192.0.2.2:4000");
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(phase(a), Phase::kRefused);
+  EXPECT_EQ(a.client->stats().code, Code::kDenied);
+  EXPECT_EQ(phase(b), Phase::kOpen);
+}
+
+TEST_F(SealedServer, ASecondControllerIsRefusedAndSaysWhoControls) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(100), {&a});
+  Client b = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_EQ(phase(b), Phase::kRefused);
+  EXPECT_NE(b.client->stats().reason.find("controlled by \"wall\""), std::string::npos);
+}
+
+TEST_F(SealedServer, TheSameKeyTakesItsPlaceAtOnceAndTheOneBeforeStaysAway) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(100), {&a});
+  Client b = controller(wall_, "192.0.2.2:4000");
+  run(milliseconds(100), {&a, &b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(phase(a), Phase::kStopped);
+  EXPECT_EQ(a.client->stats().code, Code::kReplaced);
+  EXPECT_EQ(loop_->stats().replaced, 1U);
+  run(seconds(30), {&a, &b});
+  EXPECT_EQ(b.client->stats().sessions, 1U);
+}
+
+TEST_F(SealedServer, AReplayedHelloTakesNothingFromAnybody) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(500), {&a});
+  // From its own address, where its cookie is good, and after the server has forgotten this attempt's Answer.
+  Bytes hello;
+  for (const Datagram& datagram : wire_) {
+    if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;
+  }
+  a.client->stop(now_);
+  run(milliseconds(10), {&a});
+  Client b = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(500), {&b});
+  const auto before = loop_->stats();
+  const std::uint64_t sessions = b.client->stats().sessions;
+  for (int i = 0; i < 10; ++i) {
+    deliver(a.end->self, hello);
+    run(milliseconds(100), {&b});
+  }
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(b.client->stats().sessions, sessions);
+  EXPECT_EQ(loop_->stats().welcomed, before.welcomed);
+  EXPECT_EQ(loop_->stats().replaced, 0U);
+}
+
+/// In suite 0 anybody on this machine may say an old Hello again, and the network may, from where it came.
+TEST_F(SealedServer, AReplayedPlainHelloTakesNothingFromWhoCameAfterIt) {
+  restart({});
+  Client a = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(500), {&a});
+  Bytes hello;
+  for (const Datagram& datagram : wire_) {
+    if (datagram.to == server_.self && datagram.bytes.size() == kMaxDatagram) hello = datagram.bytes;
+  }
+  a.client->stop(now_);
+  run(milliseconds(10), {&a});
+  Client b = controller(std::nullopt, "127.0.0.1:4000");  // begun again, at the same address
+  run(milliseconds(500), {&b});
+  const std::uint64_t welcomed = loop_->stats().welcomed;
+  const std::uint64_t forces = loop_->stats().forces;
+  for (int i = 0; i < 10; ++i) {
+    deliver(a.end->self, hello);  // its cookie is good for two minutes
+    run(milliseconds(100), {&b});
+  }
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(b.client->stats().sessions, 1U);
+  EXPECT_EQ(loop_->stats().welcomed, welcomed);
+  EXPECT_GT(loop_->stats().forces, forces + 950);
+  // Nor does it keep the device from anybody once b has gone.
+  b.client->stop(now_);
+  run(milliseconds(10), {&b});
+  deliver(a.end->self, hello);
+  Client c = controller(std::nullopt, "127.0.0.1:4001");
+  run(milliseconds(500), {&c});
+  EXPECT_EQ(phase(c), Phase::kOpen);
+}
+
+TEST_F(SealedServer, DatagramsOfAGuestThatHasLeftAreNobodysAtOnce) {
+  restart({});
+  Client a = controller(std::nullopt, "127.0.0.1:4000");
+  run(milliseconds(500), {&a});
+  a.client->stop(now_);  // three Byes, in one turn of the server
+  run(milliseconds(2), {&a});
+  EXPECT_EQ(loop_->stats().unknown_connection, 2U);
+}
+
+TEST_F(SealedServer, AHalfOpenSessionIsToldNothingTakesNothingAndIsForgotten) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  // The Answer never arrives.
+  const auto no_answers = [&](Datagram& d) { return d.from != server_.self || d.bytes.size() == 48; };
+  run(milliseconds(300), {&a}, no_answers);
+  EXPECT_EQ(loop_->stats().welcomed, 0U);
+  std::set<std::size_t> sizes;
+  for (const Datagram& d : wire_) {
+    if (d.from == server_.self) sizes.insert(d.bytes.size());
+  }
+  EXPECT_EQ(sizes.size(), 2U);  // Retries, and one Answer again and again: no state
+  Client b = controller(other_, "192.0.2.2:4000");
+  run(milliseconds(100), {&b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  run(seconds(6), {&b});
+  EXPECT_EQ(loop_->stats().half_open_forgotten, 1U);
+}
+
+TEST_F(SealedServer, ManyHalfOpenSessionsDoNotKeepANewOneOut) {
+  for (int i = 0; i < 100; ++i) {
+    Client a = controller(wall_, "192.0.2." + std::to_string(1 + i % 50) + ":" + std::to_string(4000 + i));
+    run(milliseconds(5), {&a}, [&](Datagram& d) { return d.from != server_.self || d.bytes.size() == 48; });
+  }
+  EXPECT_GE(loop_->stats().half_open_forgotten, 80U);
+  Client b = controller(wall_, "192.0.2.200:4000");
+  run(milliseconds(100), {&b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+}
+
+TEST_F(SealedServer, FollowsAClientWhoseAddressChanges) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(1), {&a});
+  a.end->self = parse_address("198.51.100.7:61000");
+  const std::uint64_t states = a.client->stats().states;
+  run(seconds(1), {&a});
+  EXPECT_EQ(loop_->stats().roamed, 1U);
+  EXPECT_EQ(a.client->stats().sessions, 1U);
+  EXPECT_GT(a.client->stats().states, states + 900);
+}
+
+TEST_F(SealedServer, AReplayFromElsewhereDoesNotLeadItsAnswersAway) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(1), {&a});
+  const Address thief = parse_address("203.0.113.9:9");
+  const std::size_t heard = wire_.size();
+  for (std::size_t i = 0; i < heard; ++i) {
+    if (wire_[i].to == server_.self) deliver(thief, wire_[i].bytes);
+  }
+  run(seconds(1), {&a});
+  EXPECT_EQ(loop_->stats().roamed, 0U);
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  std::size_t to_thief = 0;
+  for (std::size_t i = heard; i < wire_.size(); ++i) {
+    if (wire_[i].to == thief) to_thief += wire_[i].bytes.size() > 48 ? 1U : 0U;
+  }
+  EXPECT_EQ(to_thief, 0U);
+}
+
+TEST_F(SealedServer, OneKeyCannotTakeAllObserversPlaces) {
+  std::vector<Client> crowd;
+  for (int i = 0; i < 8; ++i) crowd.push_back(observer(screen_, "192.0.2.1:" + std::to_string(4000 + i)));
+  std::vector<Client*> all;
+  for (Client& client : crowd) all.push_back(&client);
+  run(milliseconds(100), all);
+  EXPECT_EQ(std::count_if(crowd.begin(), crowd.end(), [](const Client& c) { return phase(c) == Phase::kOpen; }), 4);
+  EXPECT_EQ(crowd.back().client->stats().code, Code::kBusy);
+  EXPECT_EQ(crowd.back().client->stats().reason, "the key \"screen\" has 4 observers already");
+  Client another = observer(other_, "192.0.2.9:4000");
+  all.push_back(&another);
+  run(milliseconds(100), all);
+  EXPECT_EQ(phase(another), Phase::kOpen);
+}
+
+TEST_F(SealedServer, TheOnlyKeyHasAllObserversPlaces) {
+  NetworkLoop::Config config;
+  config.keys = {wall_};
+  restart(config);
+  std::vector<Client> crowd;
+  for (int i = 0; i < 8; ++i) crowd.push_back(observer(wall_, "192.0.2.1:" + std::to_string(4000 + i)));
+  std::vector<Client*> all;
+  for (Client& client : crowd) all.push_back(&client);
+  run(milliseconds(100), all);
+  EXPECT_TRUE(std::all_of(crowd.begin(), crowd.end(), [](const Client& c) { return phase(c) == Phase::kOpen; }));
+}
+
+TEST_F(SealedServer, ASessionThatHasReachedItsAgeIsBegunAgainByItsClient) {
+  NetworkLoop::Config config;
+  config.keys = {wall_};
+  config.rekey = {.datagrams = 500, .age = seconds(3)};
+  config.session_life = seconds(20);
+  restart(config);
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(seconds(50), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_EQ(a.client->stats().sessions, 3U);
+  EXPECT_EQ(loop_->stats().timed_out, 0U);
+  EXPECT_EQ(loop_->stats().dropped.forged + loop_->stats().dropped.old_key, 0U);
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/server/guests/sealed_server.h"
+
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+std::uint64_t sum(const LatenessHistogram& lateness) {
+  return std::accumulate(lateness.begin(), lateness.end(), std::uint64_t{0});
+}
+
+TEST_F(SealedServer, TellsAnObserverThatAsksHowTheLoopAndTheEngineDo) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  DeviceState seen;
+  Client b = diagnosing(screen_, "192.0.2.2:4000", {}, &seen);
+  wanted_ = Vec3(3, 0, -4);
+  measured_ = true;
+  health_.steps = health_.lateness[2] = 1'000'000;  // since long before
+  health_.safety = Safety::kArmed;
+  run(milliseconds(1500), {&a, &b});
+  ASSERT_TRUE(b.client->device_report().has_value());
+  EXPECT_EQ(b.client->device_report()->number, 1U);
+  health_.safety = Safety::kFault;
+  health_.fault = "the handle was faster than a hand";
+  health_.missed = 7;
+  health_.overruns = 2;
+  health_.unseen = 3;
+  health_.recording_ended = true;
+  run(milliseconds(1000), {&a, &b});
+
+  ASSERT_TRUE(seen.force_wanted.has_value());
+  EXPECT_EQ(*seen.force_wanted, Vec3(3, 0, -4));
+  const DeviceReport& report = *b.client->device_report();
+  EXPECT_EQ(report.number, 2U);
+  EXPECT_EQ(report.span, seconds(1));
+  EXPECT_EQ(report.steps, 1000U);
+  EXPECT_EQ(sum(report.lateness), report.steps);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(report.lateness[i], 100U) << i;
+  EXPECT_EQ(report.missed, 7U);
+  EXPECT_EQ(report.overruns, 2U);
+  EXPECT_EQ(report.unseen, 3U);
+  EXPECT_EQ(report.safety, Safety::kFault);
+  EXPECT_EQ(report.fault, "the handle was faster than a hand");
+  EXPECT_EQ(report.degraded, "recording has stopped");
+
+  ASSERT_EQ(b.client->peer_reports().size(), 1U);
+  const PeerReport& peer = b.client->peer_reports().front();
+  EXPECT_EQ(peer.name, "wall");
+  EXPECT_EQ(peer.state_one_in, 1U);
+  EXPECT_FALSE(peer.forces_refused);
+  // What the engine itself is told.
+  ASSERT_TRUE(a.client->report().has_value());
+  const LinkReport& own = *a.client->report();
+  EXPECT_EQ(peer.link.until, own.until);
+  EXPECT_EQ(peer.link.forces, own.forces);
+  EXPECT_EQ(peer.link.received, own.received);
+  ASSERT_TRUE(peer.link.round_trip.has_value());
+  EXPECT_EQ(peer.link.round_trip->median, own.round_trip->median);
+  EXPECT_EQ(peer.link.words, own.words);
+}
+
+TEST_F(SealedServer, AnObserverSeesWhatAnEnginesLinkHasLostAndForHowLong) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  run(milliseconds(1500), {&a, &b});
+  run(milliseconds(60), {&a, &b}, [&](Datagram& d) { return d.from != a.end->self && d.to != a.end->self; });
+  run(milliseconds(600), {&a, &b});
+  ASSERT_EQ(b.client->peer_reports().size(), 1U);
+  const LinkReport& link = b.client->peer_reports().front().link;
+  EXPECT_GE(link.lost, 1U);
+  EXPECT_GT(link.longest_gap, milliseconds(55));
+  EXPECT_EQ(link.late_network, 1U);
+  EXPECT_NE(link.words.find("the network (datagrams were lost)"), std::string::npos) << link.words;
+  EXPECT_EQ(b.client->stats().link.invalid, 0U);
+}
+
+TEST_F(SealedServer, AnObserverIsToldOfAnEngineThatSendsNoForceToo) {
+  Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+  a.client = std::make_unique<ForceClient>(
+      *a.end, server_.self, config_of(wall_, 5), [](const DeviceState&) { return Touch(Vec3::Constant(NAN)); }, now_);
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  run(milliseconds(2500), {&a, &b});
+  ASSERT_EQ(b.client->peer_reports().size(), 1U);
+  const LinkReport& link = b.client->peer_reports().front().link;
+  EXPECT_EQ(link.number, 2U);
+  EXPECT_EQ(link.forces, 0U);
+  EXPECT_GT(link.received, 0U);
+  EXPECT_TRUE(link.round_trip.has_value());
+}
+
+TEST_F(SealedServer, WhatAnObserverWasToldGoesWithItsSession) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  measured_ = true;
+  run(milliseconds(2500), {&a, &b});
+  EXPECT_TRUE(b.client->device_report().has_value());
+  EXPECT_FALSE(b.client->peer_reports().empty());
+  loop_->close(now_);
+  measured_ = false;
+  run(milliseconds(500), {&b});
+  EXPECT_EQ(phase(b), Phase::kOpen);
+  EXPECT_EQ(b.client->stats().sessions, 2U);
+  EXPECT_FALSE(b.client->device_report().has_value());
+  EXPECT_TRUE(b.client->peer_reports().empty());
+}
+
+TEST_F(SealedServer, WhoDoesNotAskIsToldNothingOfIt) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  DeviceState seen;
+  Client b{std::make_unique<End>(wire_, parse_address("192.0.2.2:4000")), nullptr};
+  b.client = std::make_unique<ForceClient>(
+      *b.end, server_.self, config_of(screen_, 5), [&](const DeviceState& state, const LinkStats&) { seen = state; },
+      now_);
+  Client c = diagnosing(screen_, "192.0.2.3:4000");
+  wanted_ = Vec3(3, 0, -4);
+  measured_ = true;
+  run(milliseconds(2500), {&a, &b, &c});
+  EXPECT_GT(seen.tick, 2000U);
+  EXPECT_FALSE(seen.force_wanted.has_value());
+  EXPECT_FALSE(b.client->device_report().has_value());
+  EXPECT_TRUE(b.client->peer_reports().empty());
+  EXPECT_TRUE(c.client->device_report().has_value());
+  EXPECT_TRUE(c.client->peer_reports().size() == 1);
+  EXPECT_FALSE(a.client->device_report().has_value());
+}
+
+TEST_F(SealedServer, AnEngineReceivesNotOneByteMoreWhereOthersDiagnose) {
+  const auto to_engine = [&](bool others_diagnose) {
+    wire_.clear();
+    count_ = 0;
+    now_ = LocalTime(seconds(1000));
+    tick_ = 0;
+    seed_ = 10;
+    health_ = {};
+    mail_ = std::make_unique<Mailboxes>();
+    NetworkLoop::Config config;
+    restart(config);
+    wanted_ = others_diagnose ? std::optional(Vec3(3, 0, -4)) : std::nullopt;
+    measured_ = others_diagnose;
+    Client a = controller({}, "127.0.0.1:4000");
+    run(milliseconds(100), {&a});
+    Client b = others_diagnose ? diagnosing({}, "127.0.0.1:5000") : observer({}, "127.0.0.1:5000");
+    run(milliseconds(2500), {&a, &b});
+    EXPECT_EQ(phase(a), Phase::kOpen);
+    EXPECT_EQ(b.client->device_report().has_value(), others_diagnose);
+    std::vector<Bytes> datagrams;
+    for (const Datagram& datagram : wire_) {
+      if (datagram.to == a.end->self) datagrams.push_back(datagram.bytes);
+    }
+    return datagrams;
+  };
+  const auto before = to_engine(false);
+  EXPECT_GT(before.size(), 2500U);
+  EXPECT_TRUE(to_engine(true) == before);
+}
+
+/// What a controller gets that offers the feature all the same, which ours refuses to.
+TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
+  NetworkLoop::Config server;
+  restart(server);
+  wanted_ = Vec3(3, 0, -4);
+  measured_ = true;
+  End end(wire_, parse_address("127.0.0.1:4000"));
+  ClientHandshake handshake(
+      {.hello = {.role = Role::kController,
+                 .name = "curious",
+                 .features = {std::string(kFeatureLocalModel), std::string(kFeatureDiagnostics)}}},
+      now_);
+  std::optional<Session> session;
+  std::uint64_t states = 0;
+  std::array<std::byte, kMaxDatagram> buffer;
+  const auto say = [&](auto& mine) {
+    while (const std::size_t size = mine.next_datagram(now_, buffer)) {
+      server_.inbox.push_back({end.self, server_.self, {buffer.begin(), buffer.begin() + static_cast<int>(size)}});
+    }
+  };
+  for (int i = 0; i < 2500; ++i) {
+    session ? say(*session) : say(handshake);
+    run(milliseconds(1), {});
+    for (const Datagram& datagram : std::exchange(wire_, {})) {
+      if (session) {
+        session->receive(now_, datagram.bytes);
+      } else {
+        handshake.receive(now_, datagram.bytes);
+      }
+    }
+    count_ = 0;
+    if (!session && handshake.outcome()) {
+      const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
+      EXPECT_EQ(accepted.welcome.features, std::vector<std::string>{std::string(kFeatureLocalModel)});
+      session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
+    }
+    while (const auto event = session ? session->next_event() : std::nullopt) {
+      const auto* arrived = std::get_if<Session::StateArrived>(&*event);
+      ASSERT_NE(arrived, nullptr);
+      EXPECT_FALSE(arrived->state.force_wanted.has_value());
+      ++states;
+    }
+  }
+  EXPECT_GT(states, 2000U);
+}
+
+TEST_F(TwoDevices, AnObserverIsToldOfItsDeviceAndOfEachEngineThere) {
+  Client left = controller_of(wall_, "192.0.2.1:4000", "left", "main");
+  Client right = controller_of(other_, "192.0.2.2:4000", "right", "tissue", true);
+  Client waits = controller_of(wall_, "192.0.2.5:4000", "right", "tissue");  // holds nothing: nobody is told of it
+  Client watches_left = diagnosing(screen_, "192.0.2.3:4000", "left");
+  Client watches_right = diagnosing(screen_, "192.0.2.4:4000", "right");
+  measured_ = true;
+  run(milliseconds(500), {&left, &right});
+  run(milliseconds(2500), {&left, &right, &waits, &watches_left, &watches_right});
+  EXPECT_TRUE(right.client->holds());
+  EXPECT_EQ(phase(waits), Phase::kOpen);
+  EXPECT_FALSE(waits.client->holds());
+  ASSERT_TRUE(watches_left.client->device_report() && watches_right.client->device_report());
+  EXPECT_EQ(watches_left.client->device_report()->device, 0U);
+  EXPECT_EQ(watches_right.client->device_report()->device, 1U);
+  ASSERT_EQ(watches_left.client->peer_reports().size(), 1U);
+  ASSERT_EQ(watches_right.client->peer_reports().size(), 1U);
+  EXPECT_EQ(watches_left.client->peer_reports()[0].name, "wall");
+  const PeerReport& tissue = watches_right.client->peer_reports()[0];
+  EXPECT_EQ(tissue.name, "other");
+  EXPECT_EQ(tissue.device, 1U);
+  EXPECT_EQ(tissue.channel, 1U);
+  EXPECT_EQ(watches_left.client->stats().link.invalid + watches_right.client->stats().link.invalid, 0U);
+}
+
+TEST_F(SealedServer, AForceThatIsNoNumberIsNotToldAndCostsNoState) {
+  DeviceState seen;
+  Client b = diagnosing(screen_, "192.0.2.2:4000", {}, &seen);
+  wanted_ = Vec3(NAN, 0, 0);
+  run(milliseconds(500), {&b});
+  EXPECT_GT(seen.tick, 400U);
+  EXPECT_FALSE(seen.force_wanted.has_value());
+  wanted_ = Vec3(0, 2e12, 0);
+  run(milliseconds(100), {&b});
+  EXPECT_GT(seen.tick, 500U);
+  EXPECT_FALSE(seen.force_wanted.has_value());
+  EXPECT_EQ(b.client->stats().link.invalid, 0U);
+}
+
+TEST_F(SealedServer, WhereTheLogThreadSaysNothingThereIsNoReportOnADevice) {
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  measured_ = true;
+  run(milliseconds(1500), {&b});
+  ASSERT_TRUE(b.client->device_report().has_value());
+  measured_ = false;
+  run(seconds(3), {&b});
+  EXPECT_EQ(b.client->device_report()->number, 2U);  // what it had said before it fell silent
+  health_.steps += 100;                              // it could not count what was lost meanwhile
+  measured_ = true;
+  run(seconds(1), {&b});
+  const DeviceReport& report = *b.client->device_report();
+  EXPECT_EQ(report.number, 3U);
+  EXPECT_GT(report.span, seconds(3));
+  EXPECT_EQ(report.steps, sum(report.lateness) + 100);
+  EXPECT_EQ(report.degraded, "the log thread does not follow");
+}
+
+TEST_F(SealedServer, SaysThatAnEnginesWayIsFullAndThatItsForcesAreNotTaken) {
+  NetworkLoop::Config config;
+  config.keys = {wall_, screen_};
+  config.adapt_state_rate = true;
+  restart(config);
+  Client a = controller(wall_, "192.0.2.1:4000");
+  Client b = diagnosing(screen_, "192.0.2.2:4000");
+  std::uint64_t n = 0;
+  run(milliseconds(500), {&a, &b});
+  run(seconds(15), {&a, &b}, [&](Datagram& d) { return d.to != a.end->self || ++n % 2 == 0; });
+  ASSERT_EQ(b.client->peer_reports().size(), 1U);
+  EXPECT_EQ(b.client->peer_reports().front().state_one_in, 20U);
+  EXPECT_TRUE(b.client->peer_reports().front().forces_refused);
+}
+
+}  // namespace
+}  // namespace tendon

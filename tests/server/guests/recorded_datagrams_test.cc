@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/server/guests/sealed_server.h"
+
+#include <cstddef>
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+struct Recorded {
+  std::size_t strangers = 0;
+  std::size_t guests = 0;
+};
+Recorded take_recorded(Mailboxes& mail, const Address& guest) {
+  Recorded recorded;
+  for (; const DatagramRecord* datagram = mail.datagrams.front(); mail.datagrams.pop()) {
+    ++(datagram->peer == guest ? recorded.guests : recorded.strangers);
+  }
+  return recorded;
+}
+
+TEST_F(SealedServer, AFloodOfStrangersIsASampleAndACountAndGuestsAreWhole) {
+  Client client = controller(wall_, "198.51.100.1:1000");
+  run(milliseconds(500), {&client});
+  take_recorded(*mail_, client.end->self);
+  const Bytes junk(1200, std::byte{0x5a});
+  const Bytes hello = wire_.front().bytes;  // its first, without a cookie
+  Bytes forged;                             // a datagram of the client's session, with its end changed
+  const std::size_t before = wire_.size();
+  run(milliseconds(100), {&client});
+  for (std::size_t i = before; i < wire_.size(); ++i) {
+    if (wire_[i].to == server_.self) forged = wire_[i].bytes;
+  }
+  ASSERT_FALSE(forged.empty());
+  forged.back() ^= std::byte{1};
+  take_recorded(*mail_, client.end->self);
+
+  const std::size_t on_the_wire = wire_.size();
+  constexpr int kFlood = 39;  // a millisecond, each of three kinds
+  run(seconds(1), {&client}, [&](Datagram& datagram) {
+    if (datagram.from != client.end->self) return true;
+    for (int i = 0; i < kFlood / 3; ++i) {
+      deliver(parse_address("203.0.113.7:9"), junk);
+      deliver(parse_address("203.0.113.7:9"), hello);
+      deliver(parse_address("203.0.113.7:9"), forged);
+    }
+    return true;
+  });
+  std::size_t guests = 0;
+  for (std::size_t i = on_the_wire; i < wire_.size(); ++i) {
+    guests += wire_[i].from == client.end->self || wire_[i].to == client.end->self ? 1U : 0U;
+  }
+  const Recorded recorded = take_recorded(*mail_, client.end->self);
+  EXPECT_EQ(recorded.guests, guests);
+  EXPECT_GE(recorded.strangers, 16U);
+  EXPECT_LE(recorded.strangers, 2 * 16U) << "seconds begin where datagrams do";
+  EXPECT_EQ(mail_->datagrams_lost, 0U);
+  EXPECT_EQ(mail_->datagrams_over_budget, 0U);
+  EXPECT_GT(mail_->strangers_left_out, 39'000U);
+}
+
+TEST_F(SealedServer, AGuestThatSendsMoreThanTheBudgetIsCountedAndNotRecorded) {
+  NetworkLoop::Config config;
+  config.keys = {wall_};
+  config.recorded.bytes_per_s = 20'000;
+  restart(config);
+  Client client = controller(wall_, "198.51.100.1:1000");
+  run(seconds(3), {&client});
+  std::size_t bytes = 0;
+  for (; const DatagramRecord* datagram = mail_->datagrams.front(); mail_->datagrams.pop()) bytes += datagram->size;
+  EXPECT_LE(bytes, 4 * 20'000U);
+  EXPECT_GE(bytes, 2 * 20'000U);
+  EXPECT_GT(mail_->datagrams_over_budget, 1000U);
+}
+
+}  // namespace
+}  // namespace tendon

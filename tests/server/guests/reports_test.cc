@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/server/guests/sealed_server.h"
+
+#include <algorithm>
+#include <deque>
+#include <string>
+#include <utility>
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+TEST_F(SealedServer, TellsControllersAloneOnceASecondHowTheirForcesFare) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  Client b = observer(screen_, "192.0.2.2:4000");
+  run(milliseconds(3500), {&a, &b});
+  ASSERT_TRUE(a.client->report().has_value());
+  const LinkReport& report = *a.client->report();
+  EXPECT_EQ(report.number, 3U);
+  EXPECT_EQ(report.span, seconds(1));
+  EXPECT_GT(report.forces, 900U);
+  EXPECT_EQ(report.late_server + report.late_network + report.late_engine, 0U);
+  EXPECT_EQ(report.words, "");
+  EXPECT_EQ(report.lost, 0U);
+  EXPECT_GT(report.received, 2900U);
+  ASSERT_TRUE(report.round_trip && report.to_server && report.to_client);
+  EXPECT_LE(report.round_trip->p99, milliseconds(2));
+  // Both ways and the clocks: one time here, so the offset is within its bound of 0.
+  EXPECT_LE(std::chrono::abs(report.clock_offset), report.clock_error);
+  EXPECT_LE(std::chrono::abs(report.to_server->median + report.to_client->median - report.round_trip->median),
+            milliseconds(1));
+  EXPECT_FALSE(b.client->report().has_value());
+}
+
+/// 20 ms each way, and one of the two ends loses its processor for 36 ms, once, in the middle of a turn: what has come
+/// meanwhile it takes by the time at which the turn began.
+class InterruptedTurn : public SealedServer, public testing::WithParamInterface<bool> {};
+
+TEST_P(InterruptedTurn, MakesNoWayLookShort) {
+  const bool of_server = GetParam();
+  Client a = controller(wall_, "192.0.2.1:4000");
+  std::deque<std::pair<LocalTime, Datagram>> under_way;
+  const LocalTime begins = now_ + milliseconds(2000);
+  const LocalTime goes_on = begins + milliseconds(36);
+  for (const LocalTime end = now_ + milliseconds(5500); now_ < end; now_ += milliseconds(1)) {
+    DeviceState state;
+    state.tick = ++tick_;
+    state.sampled = PeerTime(now_.time_since_epoch());
+    mail_->state.put(state);
+    for (; !under_way.empty() && under_way.front().first <= now_; under_way.pop_front()) {
+      const Datagram& datagram = under_way.front().second;
+      (datagram.to == server_.self ? server_ : *a.end).inbox.push_back(datagram);
+    }
+    const bool interrupted = now_ >= begins && now_ < goes_on;
+    const LocalTime told = now_ == goes_on ? begins : now_;
+    End& end_of_it = of_server ? server_ : *a.end;
+    end_of_it.taken = now_;
+    if (!(interrupted && of_server)) loop_->turn(of_server ? told : now_);
+    if (!(interrupted && !of_server)) a.client->turn(of_server ? now_ : told);
+    for (; count_ < wire_.size(); ++count_) under_way.emplace_back(now_ + milliseconds(20), wire_[count_]);
+  }
+  ASSERT_TRUE(a.client->report() && a.client->report()->to_server && a.client->report()->to_client);
+  for (const auto& way : {a.client->report()->to_server, a.client->report()->to_client}) {
+    EXPECT_GE(way->median, milliseconds(18));
+    EXPECT_LE(way->median, milliseconds(22));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(OfTheServerAndOfTheClient, InterruptedTurn, testing::Bool());
+
+TEST_F(SealedServer, SaysByNumbersAndInWordsThatTheNetworkWasLate) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(1500), {&a});
+  run(milliseconds(60), {&a}, [](Datagram&) { return false; });
+  run(milliseconds(600), {&a});
+  ASSERT_TRUE(a.client->report().has_value());
+  const LinkReport& report = *a.client->report();
+  EXPECT_EQ(report.number, 2U);
+  EXPECT_GT(report.longest_gap, milliseconds(55));
+  EXPECT_GE(report.lost, 1U);
+  EXPECT_EQ(report.late_network, 1U);
+  EXPECT_EQ(report.late_engine + report.late_server, 0U);
+  EXPECT_NEAR(tendon::seconds(report.worst_late), 40e-3, 4e-3);  // valid for 20 ms
+  EXPECT_NE(report.words.find("the network (datagrams were lost)"), std::string::npos) << report.words;
+  EXPECT_EQ(loop_->stats().late_network, 1U);
+  const auto notices = loop_->take_notices();
+  EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [&](const auto& n) { return n.text == report.words; }));
+}
+
+struct BadForces {
+  const char* name;
+  void (*spoil)(ForceCommand&);
+  std::uint64_t RefusedForces::*count;
+  const char* words;
+};
+void PrintTo(const BadForces& bad, std::ostream* out) { *out << bad.name; }
+class BadForcesTest : public SealedServer, public testing::WithParamInterface<BadForces> {};
+
+TEST_P(BadForcesTest, TheirAuthorIsToldWhatIsWrongWithThem) {
+  restart({});
+  const auto report = run_foreign(milliseconds(2500), GetParam().spoil);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_NE(report->words.find(GetParam().words), std::string::npos) << report->words;
+  EXPECT_GT(report->refused.*GetParam().count, 900U);
+  EXPECT_EQ(report->late_network + report->late_server + report->late_unknown, 0U);
+  const auto notices = loop_->take_notices();
+  EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [&](const auto& n) { return n.text == report->words; }));
+}
+
+TEST_P(BadForcesTest, ThatFollowGoodOnesAreNamedAsTheCauseOfLateness) {
+  restart({});
+  const LocalTime turns_bad = now_ + milliseconds(1500);
+  const auto report = run_foreign(milliseconds(2500), [&](ForceCommand& force) {
+    if (now_ > turns_bad) GetParam().spoil(force);
+  });
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->words.find("forces were late once, by up to "), 0U) << report->words;
+  EXPECT_NE(report->words.find(GetParam().words), std::string::npos) << report->words;
+  EXPECT_EQ(report->late_engine, 1U);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, BadForcesTest,
+    testing::Values(BadForces{"NotFinite", [](ForceCommand& f) { f.force.y() = NAN; }, &RefusedForces::not_finite,
+                              "the engine (its forces are not finite: NaN or infinity)"},
+                    BadForces{"NotFiniteModel",
+                              [](ForceCommand& f) { f.model = LocalModel{.stiffness = Mat3::Constant(-INFINITY)}; },
+                              &RefusedForces::not_finite, "the engine (its forces are not finite: NaN or infinity)"},
+                    BadForces{"OutOfBounds", [](ForceCommand& f) { f.force.x() = 2e12; }, &RefusedForces::out_of_bounds,
+                              "the engine (its forces are out of the bounds of WIRE.md)"},
+                    BadForces{"NeverValid", [](ForceCommand& f) { f.valid_for = {}; }, &RefusedForces::out_of_bounds,
+                              "the engine (its forces are out of the bounds of WIRE.md)"},
+                    BadForces{"UnknownTick", [](ForceCommand& f) { f.based_on_tick += 100'000; },
+                              &RefusedForces::unknown_tick,
+                              "the engine (its forces answer unknown or forgotten ticks)"},
+                    BadForces{"OldSequence", [](ForceCommand& f) { f.sequence = 1; }, &RefusedForces::old_sequence,
+                              "the engine (its sequence numbers do not grow)"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST_F(SealedServer, AnEngineOnThisMachineThatSleepsIsBlamedWhileItSleeps) {
+  restart({});
+  const auto sleeps = [](Duration t) { return t > milliseconds(1500) && t < milliseconds(3200); };
+  run_foreign(
+      milliseconds(3100), [](ForceCommand&) {}, sleeps);
+  EXPECT_EQ(loop_->stats().late_engine, 2U);
+  EXPECT_EQ(loop_->stats().late_network + loop_->stats().late_unknown + loop_->stats().late_ours, 0U);
+}
+
+TEST_F(SealedServer, AnEngineThatSleptIsBlamedThoughItsRoundTripLooksLong) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(1200), {&a});
+  const std::size_t asleep = wire_.size();
+  run(milliseconds(700), {});
+  // Its socket has kept the oldest datagrams; the newest ones found it full.
+  for (std::size_t i = asleep; i < asleep + 300; ++i) a.end->inbox.push_back(wire_[i]);
+  run(milliseconds(900), {&a});
+  ASSERT_TRUE(a.client->report().has_value());
+  EXPECT_NE(a.client->report()->words.find("the engine (its program stood still for 7"), std::string::npos)
+      << a.client->report()->words;
+  EXPECT_EQ(loop_->stats().late_network, 0U);
+}
+
+TEST_F(SealedServer, NobodyIsBlamedForTheSilenceOfARemoteEngineBeforeItIsHeard) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(1500), {&a});
+  run(milliseconds(1000), {});
+  EXPECT_EQ(loop_->stats().late_unknown, 1U);
+  EXPECT_EQ(loop_->stats().late_network + loop_->stats().late_engine, 0U);
+}
+
+TEST_F(SealedServer, AControllerThatHasSentNoForceIsToldNothingAboutItsForces) {
+  Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+  a.client = std::make_unique<ForceClient>(
+      *a.end, server_.self, config_of(wall_, 5), [](const DeviceState&) { return Touch(Vec3::Constant(NAN)); }, now_);
+  run(seconds(3), {&a});
+  EXPECT_EQ(phase(a), Phase::kOpen);
+  EXPECT_FALSE(a.client->report().has_value());
+}
+
+}  // namespace
+}  // namespace tendon
