@@ -5,14 +5,13 @@ state, sends the force that comes back, and begins again when the server is gone
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import cast
 
-from . import codec, limits
+from . import limits
+from .answer import Answer, read_touch
 from .deadband import Deadband, ForceDeadband, check_state_deadband, foretell
 from .expect import expect
 from .handshake import ClientHandshake
@@ -21,10 +20,8 @@ from .messages import (
     FEATURE_DIAGNOSTICS,
     FEATURE_LOCAL_MODEL,
     NEVER,
-    ZERO,
     Claim,
     Code,
-    Contact,
     Control,
     ControlAck,
     Describe,
@@ -33,7 +30,6 @@ from .messages import (
     DeviceState,
     Disarm,
     ForceCommand,
-    ForceTable,
     GiveLease,
     Grant,
     Hello,
@@ -41,18 +37,14 @@ from .messages import (
     LeaseLost,
     LinkReport,
     LinkStats,
-    LocalModel,
-    Mat3,
     PeerReport,
     Rearm,
     Refused,
     Role,
     SetStateDeadband,
     SetStateRate,
-    Stiffness,
     TakeLease,
     Touch,
-    Vec3,
     Welcome,
 )
 from .noise import KEY_SIZE
@@ -240,29 +232,11 @@ class ForceClient:
         elif self.phase in _WAITING and now >= self._retry:
             self._greet(now)
 
-    def _objection(
-        self,
-        hand: DeviceState,
-        touch: Touch,
-        force: Vec3,
-        stiffness: tuple[Vec3, Vec3, Vec3] | None,
-        contact: Contact | None,
-    ) -> str:
+    def _objection(self, hand: DeviceState, answer: Answer) -> str:
         """Why an answer cannot be used; empty when it can."""
         if not 0 < hand.tick <= max(self._seen_tick, self._newest.tick if self._newest else 0):
             return f"it answers tick {hand.tick}, which has not come"
-        if not all(map(math.isfinite, force)):
-            return "the force is not finite (NaN or infinity)"
-        if not _usable(force):
-            return f"the force is beyond {limits.MAX_VALUE:g} N"
-        if (
-            (stiffness is not None and not all(map(_usable, stiffness)))
-            or (contact is not None and not codec.is_contact(contact))
-            or not codec.is_radius(touch.valid_radius)
-            or (touch.error is not None and not 0 <= touch.error <= limits.MAX_VALUE)
-        ):
-            return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md"
-        return ""
+        return answer.objection()
 
     def send(self, hand: DeviceState, touch: Touch) -> None:
         """Answers a state. An answer with a number that is not finite or out of bounds, or to a state that did not
@@ -274,24 +248,20 @@ class ForceClient:
         """
         if self.config.role is not Role.CONTROLLER:
             raise PermissionError("an observer sends no force: role=Role.CONTROLLER")
-        force = _vector(touch.force)
-        stiffness = None if touch.stiffness is None else _matrix(touch.stiffness)
-        contact = None if touch.contact is None else _contact(touch.contact)
+        answer = read_touch(touch)
         session = self._session
         if session is None or self.welcome is None or not self.holds:
             return
-        objection = self._objection(hand, touch, force, stiffness, contact)
+        objection = self._objection(hand, answer)
         if objection:
             self._stats.forces_unusable += 1
             self._stats.unusable = objection
             return
-        alike = self._deadband is not None and not self._deadband.passes(session.latest, force)
-        if alike and not touch.topology_changed:
+        alike = self._deadband is not None and not self._deadband.passes(session.latest, answer.force)
+        if alike and not answer.topology_changed:
             self._stats.forces_alike += 1
             return
-        model = None
-        if (stiffness is not None or contact is not None) and FEATURE_LOCAL_MODEL in self.welcome.features:
-            model = LocalModel(hand.position, stiffness or (ZERO, ZERO, ZERO), touch.valid_radius, contact)
+        model = answer.local_model(hand.position) if FEATURE_LOCAL_MODEL in self.welcome.features else None
         valid_for_us = self._valid_for_us(hand.tick, self.welcome.loop_hz)
         self._sequence += 1
         self._answered_tick = hand.tick
@@ -299,13 +269,13 @@ class ForceClient:
             ForceCommand(
                 self._sequence,
                 hand.tick,
-                force,
+                answer.force,
                 valid_for_us,
                 model,
                 self._place.device,
                 self._place.channel,
-                topology_changed=touch.topology_changed,
-                error=touch.error,
+                topology_changed=answer.topology_changed,
+                error=answer.error,
             )
         )
         self._stats.forces += 1
@@ -565,37 +535,3 @@ class ForceClient:
 
 def _ns(seconds: float) -> int:
     return round(seconds * 1e9)
-
-
-def _usable(vector: Vec3) -> bool:
-    return all(abs(component) <= limits.MAX_VALUE for component in vector)  # nor is NaN
-
-
-def _vector(numbers: Sequence[float], expected: str = "a force of three numbers") -> Vec3:
-    try:
-        x, y, z = map(float, numbers)
-    except (TypeError, ValueError):
-        raise ValueError(f"expected {expected}, got {numbers!r}") from None
-    return (x, y, z)
-
-
-def _matrix(stiffness: Stiffness) -> Mat3:
-    """3 × 3 from any of the forms that Touch.stiffness may have."""
-    expected = "a stiffness of one number, three, or 3 × 3"
-    if not hasattr(stiffness, "__len__"):
-        k = float(stiffness)
-        return ((k, 0.0, 0.0), (0.0, k, 0.0), (0.0, 0.0, k))
-    rows = cast("Sequence[Sequence[float]]", stiffness)
-    if len(rows) == 3 and all(hasattr(row, "__len__") for row in rows):
-        a, b, c = (_vector(row, expected) for row in rows)
-        return (a, b, c)
-    x, y, z = _vector(cast("Sequence[float]", stiffness), expected)
-    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
-
-
-def _contact(contact: Contact) -> Contact:
-    """The same in Python's own numbers."""
-    table = contact.table
-    if table is not None:
-        table = ForceTable(float(table.first), float(table.step), tuple(map(float, table.force)))
-    return Contact(_vector(contact.normal, "a normal of three numbers"), float(contact.gap), table)

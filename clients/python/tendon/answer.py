@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a haptic function returns, in Python's own numbers, and why it cannot be sent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+from . import codec, limits
+from .messages import ZERO, Contact, ForceTable, LocalModel, Mat3, Stiffness, Touch, Vec3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """A Touch whose shapes are right. Its numbers may still be impossible: see objection()."""
+
+    force: Vec3
+    stiffness: Mat3 | None
+    valid_radius: float
+    contact: Contact | None
+    topology_changed: bool
+    error: float | None
+
+    def objection(self) -> str:
+        """Why this answer cannot be used; empty when it can."""
+        if not all(map(math.isfinite, self.force)):
+            return "the force is not finite (NaN or infinity)"
+        if not _usable(self.force):
+            return f"the force is beyond {limits.MAX_VALUE:g} N"
+        if (
+            (self.stiffness is not None and not all(map(_usable, self.stiffness)))
+            or (self.contact is not None and not codec.is_contact(self.contact))
+            or not codec.is_radius(self.valid_radius)
+            or (self.error is not None and not 0 <= self.error <= limits.MAX_VALUE)
+        ):
+            return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md"
+        return ""
+
+    def local_model(self, at: Vec3) -> LocalModel | None:
+        """The model around `at`; None when the engine told neither stiffness nor contact."""
+        if self.stiffness is None and self.contact is None:
+            return None
+        return LocalModel(at, self.stiffness or (ZERO, ZERO, ZERO), self.valid_radius, self.contact)
+
+
+def read_touch(touch: Touch) -> Answer:
+    """Raises ValueError when a force, stiffness or normal has a wrong shape."""
+    return Answer(
+        force=_vector(touch.force),
+        stiffness=None if touch.stiffness is None else _matrix(touch.stiffness),
+        valid_radius=touch.valid_radius,
+        contact=None if touch.contact is None else _contact(touch.contact),
+        topology_changed=touch.topology_changed,
+        error=touch.error,
+    )
+
+
+def _usable(vector: Vec3) -> bool:
+    return all(abs(component) <= limits.MAX_VALUE for component in vector)  # nor is NaN
+
+
+def _vector(numbers: Sequence[float], expected: str = "a force of three numbers") -> Vec3:
+    try:
+        x, y, z = map(float, numbers)
+    except (TypeError, ValueError):
+        raise ValueError(f"expected {expected}, got {numbers!r}") from None
+    return (x, y, z)
+
+
+def _matrix(stiffness: Stiffness) -> Mat3:
+    """3 × 3 from any of the forms that Touch.stiffness may have."""
+    expected = "a stiffness of one number, three, or 3 × 3"
+    if not hasattr(stiffness, "__len__"):
+        k = float(stiffness)
+        return ((k, 0.0, 0.0), (0.0, k, 0.0), (0.0, 0.0, k))
+    rows = cast("Sequence[Sequence[float]]", stiffness)
+    if len(rows) == 3 and all(hasattr(row, "__len__") for row in rows):
+        a, b, c = (_vector(row, expected) for row in rows)
+        return (a, b, c)
+    x, y, z = _vector(cast("Sequence[float]", stiffness), expected)
+    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
+
+
+def _contact(contact: Contact) -> Contact:
+    """The same in Python's own numbers."""
+    table = contact.table
+    if table is not None:
+        table = ForceTable(float(table.first), float(table.step), tuple(map(float, table.force)))
+    return Contact(_vector(contact.normal, "a normal of three numbers"), float(contact.gap), table)
