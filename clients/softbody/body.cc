@@ -310,7 +310,7 @@ Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const 
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
     const std::span<const Cut> made = trial.make_next();
-    const std::string which = "`cutting`: cut " + std::to_string(made.size());
+    const std::string which = "cutting: cut " + std::to_string(made.size());
     if (divide(mesh, fixed, made.last(1)).opened == 0) {
       throw std::invalid_argument(which + " lies between no two elements of the body");
     }

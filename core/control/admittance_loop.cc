@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 
@@ -14,10 +15,7 @@ namespace {
 template <int N>
 void check(const Vec<N>& values, const char* name, double above) {
   for (const double value : values) {
-    if (!(std::isfinite(value) && value >= 0 && value >= above)) {
-      throw std::invalid_argument(std::string(name) + " = " + std::to_string(value) + ": expected a finite number " +
-                                  (above > 0 ? "above 0" : "of 0 or more"));
-    }
+    above > 0 ? expect_above_zero(value, name) : expect_not_negative(value, name);
   }
 }
 

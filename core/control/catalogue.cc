@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -48,7 +49,7 @@ std::optional<Law> law_named(std::string_view name) noexcept {
 
 AnyLaw make_law(const LimiterConfig& config) {
   const auto i = static_cast<std::size_t>(config.law);
-  if (i >= kCount) throw std::invalid_argument("law = " + std::to_string(i) + ": expected one of laws()");
+  expect(i < kCount, "law", static_cast<double>(i), "one of laws()");
   return kMakers[i](config);
 }
 

@@ -7,6 +7,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include "core/base/expect.h"
+
 namespace tendon {
 
 /// Keeps the last values of a loop that must not stop to write to a file. A fault freezes it; then another thread can
@@ -19,9 +21,7 @@ class FlightRecorder {
  public:
   /// Keeps the last `capacity` values. Throws std::invalid_argument unless it is a power of two.
   explicit FlightRecorder(std::size_t capacity) : values_(std::make_unique<T[]>(capacity)), capacity_(capacity) {
-    if (!std::has_single_bit(capacity)) {
-      throw std::invalid_argument("capacity of a flight recorder must be a power of two");
-    }
+    expect(std::has_single_bit(capacity), "capacity", static_cast<double>(capacity), "a power of two");
   }
 
   /// Recording thread. Does nothing while frozen.

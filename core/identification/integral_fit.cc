@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <Eigen/QR>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -108,9 +109,7 @@ double IntegralFit::force_noise() const noexcept {
 }
 
 IntegralFit integral_fit(const Slide& slide, std::optional<double> mass) {
-  if (mass && (!(*mass > 0) || !std::isfinite(*mass))) {
-    throw std::invalid_argument("mass = " + std::to_string(*mass) + ": expected a finite number > 0, in kg");
-  }
+  if (mass) expect_above_zero(*mass, "mass");
   const Regression r = regression_of(slide, mass);
   const VectorXd scale = r.a.colwise().norm().cwiseMax(1e-300);
   const MatrixXd a = r.a * scale.cwiseInverse().asDiagonal();

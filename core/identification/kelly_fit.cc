@@ -3,11 +3,12 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 
 #include <Eigen/Core>
 #include <Eigen/QR>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -17,9 +18,7 @@ constexpr double kFittedShare = 0.4;
 }  // namespace
 
 KellyFit kelly_fit(const Slide& slide, double mass) {
-  if (!(mass > 0) || !std::isfinite(mass)) {
-    throw std::invalid_argument("mass = " + std::to_string(mass) + ": expected a finite number > 0, in kg");
-  }
+  expect_above_zero(mass, "mass");
   const Ramp ramp = ramp_of(slide);
   const auto& samples = slide.samples;
   const double end = samples.back().t;

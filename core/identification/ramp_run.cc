@@ -28,9 +28,7 @@ template <typename... Parts>
 }
 
 void check(const RampRun& run, double encoder_step) {
-  if (!(encoder_step >= 0) || !std::isfinite(encoder_step)) {
-    refuse("encoder_step = ", encoder_step, ": expected a finite number ≥ 0, in m");
-  }
+  expect_not_negative(encoder_step, "encoder_step");
   const auto& samples = run.samples;
   if (samples.size() < kFewestSamples) {
     refuse("expected a run of ", kFewestSamples, " samples or more, found ", samples.size());

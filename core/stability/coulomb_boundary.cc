@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -15,7 +16,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double abbott_okamura_stiffness(const SampledSpring& spring) {
   check_without_damper(spring);
-  if (spring.delay_samples != 0) throw std::invalid_argument("delay_samples: expected 0, this law knows no delay");
+  expect(spring.delay_samples == 0, "delay_samples", spring.delay_samples, "0: this law knows no delay");
   const double held = 2 * spring.viscous / seconds(spring.period);
   return spring.encoder_step == 0 ? held : std::min(held, 2 * spring.coulomb / spring.encoder_step);
 }

@@ -5,8 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 #include <string>
+
+#include "core/base/expect.h"
 
 namespace tendon {
 namespace {
@@ -56,8 +57,8 @@ double passive_viscous_friction(const SampledSpring& spring) {
 
 double passive_viscous_friction(const std::function<std::complex<double>(std::complex<double>)>& environment,
                                 Duration period, int points) {
-  if (!(period > Duration::zero())) throw std::invalid_argument("period: expected more than 0 s");
-  if (points < 2) throw std::invalid_argument("points = " + std::to_string(points) + ": expected 2 or more");
+  expect_above_zero(seconds(period), "period");
+  expect(points >= 2, "points", points, "2 or more");
   double most = -std::numeric_limits<double>::infinity();
   for (int i = 1; i <= points; ++i) {
     const double theta = kPi * i / points;
@@ -65,9 +66,7 @@ double passive_viscous_friction(const std::function<std::complex<double>(std::co
     const double sine = std::sin(theta / 2);
     // 1 − cos θ = 2 sin²(θ/2)
     const double here = seconds(period) / (4 * sine * sine) * ((1.0 - 1.0 / z) * environment(z)).real();
-    if (!std::isfinite(here)) {
-      throw std::invalid_argument("environment: expected a finite value at θ = " + std::to_string(theta));
-    }
+    expect(std::isfinite(here), "environment", here, "a finite value at θ = " + shortest(theta));
     most = std::max(most, here);
   }
   return most;
@@ -97,9 +96,8 @@ double passive_viscous_friction_of_field(double steepest, Duration period, int d
 }
 
 double felt_stiffness(double coupling, double environment) {
-  if (!(coupling > 0) || !(environment >= 0) || !std::isfinite(coupling)) {
-    throw std::invalid_argument("felt_stiffness: expected a finite coupling > 0 and an environment ≥ 0, in N/m");
-  }
+  expect_above_zero(coupling, "coupling");
+  expect(environment >= 0, "environment", environment, "a stiffness of 0 N/m or more");
   return std::isinf(environment) ? coupling : coupling * environment / (coupling + environment);
 }
 

@@ -7,12 +7,14 @@
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
+#include "core/base/expect.h"
+
 namespace tendon {
 namespace {
 
 void check_with_mass(const SampledSpring& spring) {
   check(spring);
-  if (spring.mass == 0) throw std::invalid_argument("mass = 0: expected more, in kg");
+  expect_above_zero(spring.mass, "mass");
 }
 
 }  // namespace
@@ -76,7 +78,7 @@ double largest_stable_stiffness(const SampledSpring& spring) {
 double jury_stiffness(const SampledSpring& spring) {
   check_with_mass(spring);
   check_without_damper(spring);
-  if (spring.delay_samples != 0) throw std::invalid_argument("delay_samples: expected 0, this form knows no delay");
+  expect(spring.delay_samples == 0, "delay_samples", spring.delay_samples, "0: this form knows no delay");
   const double b = spring.viscous;
   const double t = seconds(spring.period);
   const double u = b * t / spring.mass;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "core/base/expect.h"
 #include "core/base/portable_math.h"
@@ -28,9 +27,8 @@ SurfaceEstimator<N>::SurfaceEstimator(const Config& config) : config_(config) {
   expect_above_zero(config.max_stiffness, "max_stiffness");
   expect_above_zero(config.least_travel, "least_travel");
   expect_above_zero(config.memory, "memory");
-  if (config.max_stiffness < config.first_stiffness) {
-    throw std::invalid_argument("max_stiffness: expected no less than first_stiffness");
-  }
+  expect(config.max_stiffness >= config.first_stiffness, "max_stiffness", config.max_stiffness,
+         "no less than first_stiffness, " + shortest(config.first_stiffness) + " N/m");
 }
 
 template <int N>

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 #include "core/base/expect.h"
@@ -15,10 +14,8 @@ PassiveSetPosition<N>::PassiveSetPosition(const Config& config) : config_(config
   expect_above_zero(config.stiffness, "stiffness");
   expect_above_zero(seconds(config.longest_hold), "longest_hold");
   const double most = 2 * config.friction.viscous / seconds(config.longest_hold);
-  if (config.stiffness > most * (1 + 1e-12)) {  // 2b/T itself, however it was rounded
-    throw std::invalid_argument("stiffness = " + std::to_string(config.stiffness) +
-                                ": expected at most 2 b / T_max = " + std::to_string(most));
-  }
+  expect(config.stiffness <= most * (1 + 1e-12), "stiffness", config.stiffness,  // 2b/T itself, however it was rounded
+         "at most 2 b / T_max = " + shortest(most) + " N/m");
 }
 
 template <int N>

@@ -169,7 +169,7 @@ std::vector<int> twins(const Elastic& divided, const Division& division) {
 Cutting::Cutting(std::vector<PlannedCut> plan) : plan_(std::move(plan)) {
   for (std::size_t i = 0; i < plan_.size(); ++i) {
     const auto refuse = [&](const std::string& what) {
-      throw std::invalid_argument("`cutting`: cut " + std::to_string(i + 1) + ' ' + what);
+      throw std::invalid_argument("cutting: cut " + std::to_string(i + 1) + ' ' + what);
     };
     const Cut& cut = plan_[i].cut;
     if (!cut.corner.allFinite() || !(cut.along.cross(cut.deep).norm() > 0) ||

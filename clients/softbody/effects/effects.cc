@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "protocol/expect.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -14,10 +16,6 @@ std::size_t bytes_of(const VectorXd& vector) noexcept {
 
 void add_diagonal(const VectorXd& diagonal, SymmetricMatrix& to) {
   for (int i = 0; i < to.size; ++i) to.values[at(to.column_starts[at(i)])] += diagonal[i];  // the first of its column
-}
-
-void want_positive(double value, const std::string& name) {
-  if (!(value > 0) || !std::isfinite(value)) throw std::invalid_argument("`" + name + "`: expected more than 0");
 }
 
 }  // namespace
@@ -77,11 +75,11 @@ void Viscosity::add_stiffness(SymmetricMatrix& to) const {
 std::size_t Viscosity::bytes() const noexcept { return sizeof *this + resistance_.bytes() + bytes_of(start_); }
 
 void check(const EffectsConfig& config) {
-  if (config.gravity || config.inertia || config.damping) want_positive(config.density, "density");
-  if (config.has_time()) want_positive(config.step, "step");
-  if (config.damping) want_positive(*config.damping, "damping");
-  if (config.viscosity) want_positive(*config.viscosity, "viscosity");
-  if (config.gravity && !config.gravity->allFinite()) throw std::invalid_argument("`gravity`: expected finite numbers");
+  if (config.gravity || config.inertia || config.damping) expect_above_zero(config.density, "density");
+  if (config.has_time()) expect_above_zero(config.step, "step");
+  if (config.damping) expect_above_zero(*config.damping, "damping");
+  if (config.viscosity) expect_above_zero(*config.viscosity, "viscosity");
+  if (config.gravity) expect_finite(*config.gravity, "gravity");
 }
 
 void check_only_with_inertia(const EffectsConfig& config) {

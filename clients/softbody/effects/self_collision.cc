@@ -8,9 +8,10 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <stdexcept>
 #include <unsupported/Eigen/BVH>
 #include <utility>
+
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 namespace {
@@ -71,7 +72,7 @@ void SelfCollision::Pair::add(double force, VectorXd& to) const {
 }
 
 SelfCollision::SelfCollision(const Elastic& elastic, double bed, const VectorXd& u) : elastic_(elastic) {
-  if (!(bed > 0) || !std::isfinite(bed)) throw std::invalid_argument("`self_collision`: expected more than 0 Pa/m");
+  expect_above_zero(bed, "self_collision");
   const Mesh& mesh = elastic.mesh();
   for (const Facet& facet : sides(mesh)) add(facet);
 

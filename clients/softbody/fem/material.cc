@@ -6,7 +6,8 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <cmath>
-#include <stdexcept>
+
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 namespace {
@@ -53,12 +54,9 @@ Mat9 corotational_tangent(const Mat3& f, double mu, double lambda) {
 }  // namespace
 
 void check(const Material& material) {
-  if (!(material.young > 0) || !std::isfinite(material.young)) {
-    throw std::invalid_argument("`young`: expected a modulus above 0 Pa");
-  }
-  if (!(material.poisson >= 0 && material.poisson < 0.5)) {
-    throw std::invalid_argument("`poisson`: expected a ratio of 0 or more and below 0.5");
-  }
+  expect_above_zero(material.young, "young");
+  expect(material.poisson >= 0 && material.poisson < 0.5, "poisson", material.poisson,
+         "a number of 0 or more and below 0.5");
 }
 
 Mat3 nearest_rotation(const Mat3& f) {

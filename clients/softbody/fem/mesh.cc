@@ -112,13 +112,13 @@ Mesh draw_up(const Outline& outline, std::span<const double> zs, Shape shape) {
 
 void expect_ascending(std::span<const double> layers, std::string_view name) {
   if (layers.size() < 2 || !std::ranges::is_sorted(layers, std::less_equal<>())) {
-    throw std::invalid_argument("`" + std::string(name) + "`: expected two or more ascending numbers");
+    throw std::invalid_argument(std::string(name) + ": expected two or more ascending numbers");
   }
 }
 
 std::vector<double> steps(double from, double to, int count, std::string_view name) {
   if (count < 1 || !(to > from)) {
-    throw std::invalid_argument("`" + std::string(name) + "`: expected a length above 0 in 1 or more cells");
+    throw std::invalid_argument(std::string(name) + ": expected a length above 0 in 1 or more cells");
   }
   std::vector<double> at(static_cast<std::size_t>(count) + 1);
   for (int i = 0; i <= count; ++i) at[static_cast<std::size_t>(i)] = from + (to - from) * i / count;

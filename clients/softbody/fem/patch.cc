@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "protocol/expect.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -27,9 +29,8 @@ constexpr int kMostFacetNodes = 9;
 
 TouchSurface::TouchSurface(const Mesh& mesh, const Vec3& towards_tool, double radius)
     : normal_(towards_tool), radius_(radius) {
-  if (!(std::abs(normal_.norm() - 1) < 1e-9))
-    throw std::invalid_argument("the way to the tool: expected a unit vector");
-  if (!(radius > 0) || !std::isfinite(radius)) throw std::invalid_argument("the patch's radius: expected more than 0");
+  expect(std::abs(normal_.norm() - 1) < 1e-9, "norm of towards_tool", normal_.norm(), "1");
+  expect_above_zero(radius, "radius");
   // The first axis across is the x axis where that is possible.
   const Vec3 start = std::abs(normal_.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
   const Vec3 first = (start - start.dot(normal_) * normal_).normalized();

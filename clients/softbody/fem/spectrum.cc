@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "protocol/expect.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -59,10 +61,8 @@ double fastest_swing(const SymmetricMatrix& stiffness, const VectorXd& mass) {
 }
 
 Swings slowest_swings(const SymmetricMatrix& stiffness, const VectorXd& mass, int count) {
-  if (count < 1 || count > stiffness.size) {
-    throw std::invalid_argument("a body with " + std::to_string(stiffness.size) + " displacements has from 1 to " +
-                                std::to_string(stiffness.size) + " swings, not " + std::to_string(count));
-  }
+  expect(count >= 1 && count <= stiffness.size, "count", count,
+         "1 to " + std::to_string(stiffness.size) + ", the number of the body's displacements");
   const VectorXd root = mass.cwiseSqrt();
   const VectorXd scale = root.cwiseInverse();
   Swings swings;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "protocol/expect.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -44,11 +46,8 @@ class Stretch {
 }  // namespace
 
 void check(const Yield& yield) {
-  const auto want_positive = [](double value, const char* what) {
-    if (!(value > 0) || !std::isfinite(value)) throw std::invalid_argument(what);
-  };
-  want_positive(yield.stress, "`plasticity.yield`: expected a stress above 0 Pa");
-  want_positive(yield.hardening, "`plasticity.hardening`: expected a modulus above 0 Pa");
+  expect_above_zero(yield.stress, "plasticity.yield");
+  expect_above_zero(yield.hardening, "plasticity.hardening");
 }
 
 /// The plastic flow of one step at one point.

@@ -3,6 +3,8 @@
 
 #include <stdexcept>
 
+#include "protocol/expect.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -67,7 +69,7 @@ ProjectiveModel::ProjectiveModel(const Solid& solid, const TouchSurface& surface
       effects_(effects_at_rest(effects, solid)),
       factor_(factor_of(solid, effects_)),
       u_(VectorXd::Zero(solid.size())) {
-  if (iterations < 1) throw std::invalid_argument("`iterations`: expected 1 or more");
+  expect(iterations >= 1, "iterations", iterations, "1 or more");
   if (effects.viscosity) throw std::invalid_argument("this model does not simulate viscosity");
   const bool among_effects = effects.gravity || effects.has_time();
   if (!among_effects) return;

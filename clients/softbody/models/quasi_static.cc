@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "clients/softbody/effects/cutting.h"
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 namespace {
@@ -48,8 +49,8 @@ QuasiStaticModel::QuasiStaticModel(const Elastic& elastic, const TouchSurface& s
       u_(VectorXd::Zero(elastic.size())),
       step_(effects.has_time() ? effects.step : 0),
       effects_(effects_at_rest(effects, elastic)) {
-  if (config.max_iterations < 1) throw std::invalid_argument("`max_iterations`: expected 1 or more");
-  if (!(config.tolerance > 0)) throw std::invalid_argument("`tolerance`: expected more than 0");
+  expect(config.max_iterations >= 1, "max_iterations", config.max_iterations, "1 or more");
+  expect_above_zero(config.tolerance, "tolerance");
   if (config.self_collision) self_collision_ = std::make_unique<SelfCollision>(elastic, *config.self_collision, u_);
   stiffness(Elastic::Curvature::kExact);
   stale_ = !factor_.factorize(stiffness_);

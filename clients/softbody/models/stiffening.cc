@@ -20,11 +20,11 @@ double StiffnessOverTime::factor_at(double time) const {
 void check(const StiffnessOverTime& law) {
   if (law.at.empty() || !std::ranges::is_sorted(law.at, std::less_equal<>()) ||
       !std::ranges::all_of(law.at, [](double time) { return std::isfinite(time); })) {
-    throw std::invalid_argument("`stiffening.at`: expected ascending times, one or more");
+    throw std::invalid_argument("stiffening.at: expected ascending times, one or more");
   }
   if (law.factor.size() != law.at.size() ||
       !std::ranges::all_of(law.factor, [](double factor) { return factor > 0 && std::isfinite(factor); })) {
-    throw std::invalid_argument("`stiffening.factor`: expected a number above 0 for each time");
+    throw std::invalid_argument("stiffening.factor: expected a number above 0 for each time");
   }
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "clients/softbody/models/quasi_static.h"
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 
@@ -22,7 +23,7 @@ XpbdModel::XpbdModel(const Solid& solid, const TouchSurface& surface, int iterat
       velocity_(VectorXd::Zero(solid.size())) {
   check_only_with_inertia(effects);
   if (solid.mesh().shape != Shape::kTet4) throw std::invalid_argument("xpbd wants a mesh of tetrahedra");
-  if (iterations < 1) throw std::invalid_argument("`iterations`: expected 1 or more");
+  expect(iterations >= 1, "iterations", iterations, "1 or more");
   for (int e = 0; e < solid.mesh().element_count(); ++e) {
     const auto nodes = solid.mesh().element(e);
     tets_.push_back({{nodes[0], nodes[1], nodes[2], nodes[3]}, solid.gradient(e, 0), solid.point(e, 0).volume, 0, 0});

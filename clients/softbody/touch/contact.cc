@@ -4,19 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "core/base/arithmetic.h"
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 
 PatchContact::PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
                            std::unique_ptr<Friction> friction)
     : model_(model), surface_(surface), tool_radius_(tool_radius), side_(side), friction_(std::move(friction)) {
-  if (!(tool_radius >= 0) || !std::isfinite(tool_radius)) {
-    throw std::invalid_argument("the tool's radius: expected 0 or more");
-  }
+  expect_not_negative(tool_radius, "tool_radius");
 }
 
 Feel PatchContact::at(const Vec3& tool) {

@@ -2,15 +2,14 @@
 #include "clients/softbody/touch/friction.h"
 
 #include <cmath>
-#include <stdexcept>
+
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 
 Friction::Friction(double coefficient, double stiffness) : coefficient_(coefficient), stiffness_(stiffness) {
-  if (!(coefficient >= 0) || !std::isfinite(coefficient)) {
-    throw std::invalid_argument("`friction`: expected a coefficient of 0 or more");
-  }
-  if (!(stiffness > 0)) throw std::invalid_argument("friction: expected a stiffness above 0");
+  expect_not_negative(coefficient, "friction");
+  expect(stiffness > 0, "stiffness", stiffness, "a number above 0 N/m");
 }
 
 Friction::Drag Friction::move(const Vec2& place, double normal_force) {

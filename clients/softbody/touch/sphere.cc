@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "protocol/expect.h"
+
 namespace tendon::softbody {
 namespace {
 
@@ -19,7 +21,7 @@ constexpr int kMostRounds = 1000;
 
 SphereContact::SphereContact(const CondensedModel& body, const TouchSurface& surface, double radius)
     : body_(body), surface_(surface), radius_(radius), pushed_(body.nodes().size()) {
-  if (!(radius > 0) || !std::isfinite(radius)) throw std::invalid_argument("the tool's radius: expected more than 0");
+  expect_above_zero(radius, "radius");
   for (const int node : surface.nodes()) {
     places_.push_back(surface.place(node));
     const auto found = std::ranges::lower_bound(body.nodes(), node);

@@ -137,7 +137,7 @@ TEST(SoftbodyScene, WhatIsWrongWithAModulusOverTimeIsNamed) {
   EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [0, 1]\nfactor = [1, 0]\n")),
             "s.toml:17: stiffening.factor: expected a list of numbers above 0");
   EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [1, 0]\nfactor = [1, 2]\n")),
-            "s.toml:15: stiffening.: `stiffening.at`: expected ascending times, one or more");
+            "s.toml:15: stiffening.: stiffening.at: expected ascending times, one or more");
   EXPECT_EQ(refusal(listing("condensed", effects, "[stiffening]\nat_s = [0]\nfactor = [1]\nyoung = 3\n")),
             "s.toml:18: stiffening.young: unknown key; expected one of at_s, factor");
   EXPECT_EQ(refusal(listing("condensed", effects, "")), "s.toml: stiffening: expected a table, found nothing");

@@ -207,10 +207,10 @@ TEST(Effects, NonsenseIsRefusedByName) {
     }
     return std::string();
   };
-  EXPECT_EQ(refusal({.step = 1e-3, .inertia = true}), "`density`: expected more than 0");
-  EXPECT_EQ(refusal({.density = 1000, .inertia = true}), "`step`: expected more than 0");
-  EXPECT_EQ(refusal({.step = 1e-3, .viscosity = -1}), "`viscosity`: expected more than 0");
-  EXPECT_EQ(refusal({.density = 1, .gravity = Vec3(std::nan(""), 0, 0)}), "`gravity`: expected finite numbers");
+  EXPECT_EQ(refusal({.step = 1e-3, .inertia = true}), "density = 0: expected a finite number above 0");
+  EXPECT_EQ(refusal({.density = 1000, .inertia = true}), "step = 0: expected a finite number above 0");
+  EXPECT_EQ(refusal({.step = 1e-3, .viscosity = -1}), "viscosity = -1: expected a finite number above 0");
+  EXPECT_EQ(refusal({.density = 1, .gravity = Vec3(std::nan(""), 0, 0)}), "gravity.x = nan: expected a finite number");
   EXPECT_EQ(refusal({}), "");
 }
 

@@ -92,11 +92,11 @@ TEST(Stiffening, NonsenseIsRefusedByName) {
     return std::string();
   };
   EXPECT_EQ(refusal({.at = {0, 1}, .factor = {1, 2}}), "");
-  const std::string times = "`stiffening.at`: expected ascending times, one or more";
+  const std::string times = "stiffening.at: expected ascending times, one or more";
   EXPECT_EQ(refusal({.at = {}, .factor = {}}), times);
   EXPECT_EQ(refusal({.at = {1, 1}, .factor = {1, 2}}), times);
   EXPECT_EQ(refusal({.at = {0, std::nan("")}, .factor = {1, 2}}), times);
-  const std::string factors = "`stiffening.factor`: expected a number above 0 for each time";
+  const std::string factors = "stiffening.factor: expected a number above 0 for each time";
   EXPECT_EQ(refusal({.at = {0, 1}, .factor = {1}}), factors);
   EXPECT_EQ(refusal({.at = {0, 1}, .factor = {1, 0}}), factors);
   BodyConfig config = pressed_body(ModelKind::kLinear, Element::kHex8Sri, 4);
