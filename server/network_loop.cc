@@ -345,9 +345,7 @@ void NetworkLoop::publish(LocalTime now) {
 }
 
 void NetworkLoop::take_events(LocalTime now, Guest& guest) {
-  while (!guest.gone) {
-    const auto event = guest.session.next_event();
-    if (!event) return;
+  while (const auto event = guest.session.next_event()) {
     std::visit(Overloaded{
                    [&](const Session::ForceArrived& arrived) { take_force(now, guest, arrived.command); },
                    [&](const Session::RequestArrived& arrived) { answer(now, guest, arrived.id, arrived.request); },
