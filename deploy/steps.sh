@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# What deploy's scripts share: steps that say what they do, their place, how long they took and what is left. To be sourced.
+# What deploy's scripts share: steps that say what they do, their place, how long they took and what is left. To be
+# sourced.
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 logs=$root/build/log
 jobs=$(nproc)
@@ -11,9 +12,9 @@ cd "$root"
 
 say() { printf '[%4d s] %s\n' "$SECONDS" "$*"; }
 
-# plan NAME, with a line "seconds step" for each step on standard input: the steps in their order, and how long each usually
-# takes. The lengths of the last run that ended, which build/log remembers, are better: they are this machine's. Without a
-# plan a step does not know its place.
+# plan NAME, with a line "seconds step" for each step on standard input: the steps in their order, and how long each
+# usually takes. The lengths of the last run that ended, which build/log remembers, are better: they are this
+# machine's. Without a plan a step does not know its place.
 plan_names=() plan_lengths=() plan_lasted=() plan_file=
 plan() {
   local seconds name usual
@@ -33,9 +34,9 @@ place_of() {
   done
 }
 
-# seconds_left [INDEX [RUNNING]]: an estimate for the steps of the plan that have not ended, of which INDEX has run for RUNNING
-# seconds. The planned lengths, scaled by what the steps before took; one minute as planned is assumed beside them, so that a
-# short first step decides nothing.
+# seconds_left [INDEX [RUNNING]]: an estimate for the steps of the plan that have not ended, of which INDEX has run
+# for RUNNING seconds. The planned lengths, scaled by what the steps before took; one minute as planned is assumed
+# beside them, so that a short first step decides nothing.
 seconds_left() {
   local i planned=60 lasted=60 current=0 others=0
   for i in "${!plan_names[@]}"; do
@@ -86,8 +87,8 @@ ended() {
   fi
 }
 
-# follow STEP LOG: on a terminal, until it is killed: each second the step's line with what ninja or ctest has counted, and the
-# time left.
+# follow STEP LOG: on a terminal, until it is killed: each second the step's line with what ninja or ctest has
+# counted, and the time left.
 follow() {
   local started=$SECONDS place counted
   place=$(place_of "$1")
@@ -99,8 +100,8 @@ follow() {
   done
 }
 
-# step NAME COMMAND…: one line on the terminal, all that COMMAND prints in build/log. When it fails, the end of that too.
-# COMMAND stops at its first error: bash would overlook `set -e` in a condition, so it does not run in one.
+# step NAME COMMAND…: one line on the terminal, all that COMMAND prints in build/log. When it fails, the end of that
+# too. COMMAND stops at its first error: bash would overlook `set -e` in a condition, so it does not run in one.
 step() {
   local name=$1 started=$SECONDS log status follower=
   log=$logs/${name//[^a-zA-Z0-9]/-}.log
