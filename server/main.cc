@@ -347,11 +347,12 @@ int main(int argc, char** argv) {
   bool observer = false;
   auto* keygen = app.add_subcommand(
       "keygen", "Make a key for one client: `tendond keygen wall` writes wall.key, which only you may read");
-  keygen->add_option("name", key_name, "Of the client, as it is to be called here")->required();
+  keygen->add_option("name", key_name, "The client's name on this server")->required();
   keygen->add_option("--out", key_file, "Write to this file instead of NAME.key");
-  keygen->add_flag("--observer", observer, "A key that may look, but not send forces");
+  keygen->add_flag("--observer", observer, "A key whose owner may watch, but send no forces");
   auto* explainer = app.add_subcommand(
-      "explain", "What a scene runs, what not, and what each part adds to a haptic step: `tendond explain demo.toml`");
+      "explain",
+      "What a scene runs and leaves out, and what each part adds to a haptic step: `tendond explain demo.toml`");
   explainer->add_option("scene", scene_files, "Scene files")->required();
   explainer->add_flag("--json", json, "One JSON object per scene on stdout");
   auto* devices = app.add_subcommand(

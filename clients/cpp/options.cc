@@ -65,7 +65,7 @@ CommandLine::CommandLine(std::string purpose, Options& options)
     : parser_(new Parser{CLI::App(std::move(purpose), options.client.name), options}) {
   CLI::App& app = parser_->app;
   parser_->set_example("");
-  app.set_help_flag("-h,--help", "Print this and leave");
+  app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { options.server = text; },
@@ -78,16 +78,16 @@ CommandLine::CommandLine(std::string purpose, Options& options)
          "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
       ->type_name("FILE")
       ->check(CLI::Validator(check_key, ""));
-  app.add_option("--device", options.client.device, "Name of the device, of a server with several")->type_name("NAME");
-  app.add_option("--channel", options.client.channel, "Name of the device's channel that is to take the forces")
+  app.add_option("--device", options.client.device, "The device's name, for a server that has several")
       ->type_name("NAME");
-  app.add_flag("--take-lease", options.client.take_lease,
-               "Where another client holds the channel: ask for it until it is ours");
+  app.add_option("--channel", options.client.channel, "Name of the device's channel that takes the forces")
+      ->type_name("NAME");
+  app.add_flag("--take-lease", options.client.take_lease, "Ask for the channel until this client holds it");
   app.add_option("--rate-hz", options.client.rate_hz, "Times per second; 0 = for every device state that arrives")
       ->capture_default_str()
       ->check(number(ForceClient::kMinRateHz, ForceClient::kMaxRateHz));
   app.add_option_function<double>(
-         "--duration-s", [&](double s) { options.duration = from_seconds(s); }, "Leave after this time; 0 = at Ctrl-C")
+         "--duration-s", [&](double s) { options.duration = from_seconds(s); }, "Stop after this time; 0 = at Ctrl-C")
       ->default_str("0")
       ->check(number(0, kMaxDurationS));
   app.add_flag("--json", options.json, "One JSON object per line on stdout");

@@ -68,9 +68,9 @@ std::string sentence(const ForceClient& client, const Address& address, const Op
       return "no answer from " + server + "; is tendond running there" +
              (options.client.key ? ", and does it have this key" : "") + "? Trying on";
     case ForceClient::Phase::kRefused:
-      return server + " refuses: " + stats.reason + (is_final(stats.code) ? "" : "; trying on");
+      return server + " refuses: " + stats.reason + (is_final(stats.code) ? "" : "; trying again");
     case ForceClient::Phase::kLost:
-      return "lost " + server + ": " + stats.reason + "; trying on";
+      return "lost " + server + ": " + stats.reason + "; trying again";
     case ForceClient::Phase::kStopped:
       return stats.code == Code::kReplaced ? server + " has ended this: " + stats.reason : "";
     case ForceClient::Phase::kGreeting:

@@ -63,7 +63,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   app.footer(
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
       "then open http://127.0.0.1:8080 in a browser.");
-  app.set_help_flag("-h,--help", "Print this and leave");
+  app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   std::string server = options.server.text();
   std::string listen = to_string(options.web.listen);
@@ -114,7 +114,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       ->type_name("URL");
   app.add_option("--recordings", options.recordings, "Folder whose recordings (*.mcap) the page may open")
       ->type_name("FOLDER");
-  app.add_option("--duration-s", options.duration_s, "Leave after this time; 0 = at Ctrl-C")
+  app.add_option("--duration-s", options.duration_s, "Stop after this time; 0 = at Ctrl-C")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e9));
   app.add_flag("--json", options.json, "One JSON object per line on stdout: listening, stopped");

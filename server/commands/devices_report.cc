@@ -46,7 +46,7 @@ std::vector<PluggedDevice> report_devices(std::span<const usb::PluggedIn> plugge
     } else if (!one.may_open) {
       report.lacks.push_back(
           {"this user may not open " + one.node,
-           "copy deploy/udev/60-tendon.rules to /etc/udev/rules.d, run `udevadm control --reload`, plug the device out "
+           "copy deploy/udev/60-tendon.rules to /etc/udev/rules.d, run `udevadm control --reload`, unplug the device "
            "and in; who is not logged in at this machine itself has to be in the group plugdev"});
     }
     if (falcon && !firmware_problem) {

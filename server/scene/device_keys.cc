@@ -268,7 +268,7 @@ void declare(Table& keys, falcon::Config& device, Draft& /*draft*/) {
            "the file of your own Novint software, relative to this file; --falcon-firmware overrides it",
            Absent{.text = "none; only a device that has its firmware already can be used"});
   keys.key("accept_unknown_firmware", device.accept_unknown_firmware, YesNo{},
-           "accepts a file that is none of the known ones, too");
+           "accepts even a file that is not among the known ones");
 }
 
 template <class Table>

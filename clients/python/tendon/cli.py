@@ -66,14 +66,14 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         help="Where tendond listens: a host name or an address [%(default)s]",
     )
     line.add_argument(
-        "--key", type=_key, metavar="FILE", help="The key that tendond knows us by; without one only loopback is possible"
+        "--key", type=_key, metavar="FILE", help="The client's key; without one only a server on this machine can be reached"
     )
-    line.add_argument("--device", default="", metavar="NAME", help="Name of the device, of a server with several")
+    line.add_argument("--device", default="", metavar="NAME", help="The device's name, for a server that has several")
     line.add_argument(
-        "--channel", default="", metavar="NAME", help="Name of the device's channel that is to take the forces"
+        "--channel", default="", metavar="NAME", help="Name of the device's channel that takes the forces"
     )
     line.add_argument(
-        "--take-lease", action="store_true", help="Where another client holds the channel: ask for it until it is ours"
+        "--take-lease", action="store_true", help="Ask for the channel until this client holds it"
     )
     line.add_argument(
         "--rate-hz",
@@ -83,7 +83,7 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
         help="Times per second; 0 = for every device state that arrives [%(default)s]",
     )
     line.add_argument(
-        "--duration-s", type=number(0, 1e9), default=0.0, metavar="S", help="Leave after this time; 0 = at Ctrl-C"
+        "--duration-s", type=number(0, 1e9), default=0.0, metavar="S", help="Stop after this time; 0 = at Ctrl-C"
     )
     line.add_argument("--json", action="store_true", help="One JSON object per line on stdout")
     line.set_defaults(name=name)

@@ -101,14 +101,14 @@ export function commandLine<Extras extends Record<string, Extra> = Record<never,
 
 function help(purpose: string, { name, rateHz }: Shared, extras: Record<string, Extra>): string {
   const lines: [string, string][] = [
-    ["-h, --help", "Print this and leave"],
+    ["-h, --help", "Print this text and exit"],
     ["--server HOST:PORT", "Where tendond listens: a host name or an address [127.0.0.1:47100]"],
-    ["--key FILE", "Key file (see `tendond keygen`); needed unless the server is here and has no keys"],
-    ["--device NAME", "Name of the device, of a server with several"],
-    ["--channel NAME", "Name of the device's channel that is to take the forces"],
-    ["--take-lease", "Where another client holds the channel: ask for it until it is ours"],
+    ["--key FILE", "Key file (see `tendond keygen`); a server on this machine that has no keys needs none"],
+    ["--device NAME", "The device's name, for a server that has several"],
+    ["--channel NAME", "Name of the device's channel that takes the forces"],
+    ["--take-lease", "Ask for the channel until this client holds it"],
     ["--rate-hz NUMBER", `Times per second; 0 = for every device state that arrives [${rateHz}]`],
-    ["--duration-s NUMBER", "Leave after this time; 0 = at Ctrl-C [0]"],
+    ["--duration-s NUMBER", "Stop after this time; 0 = at Ctrl-C [0]"],
     ["--json", "One JSON object per line on stdout"],
     ...Object.entries(extras).map(([option, [value, meaning]]): [string, string] =>
       value === false ? [`--${option}`, meaning] : [`--${option} NUMBER`, `${meaning} [${value}]`]),

@@ -19,9 +19,9 @@ function sentence(guest: Guest, { server, key }: Options): string {
     case "unanswered":
       return `no answer from ${server}; is tendond running there${key ? ", and does it have this key" : ""}? Trying on`;
     case "refused":
-      return `${server} refuses: ${reason}${isFinal(code) ? "" : "; trying on"}`;
+      return `${server} refuses: ${reason}${isFinal(code) ? "" : "; trying again"}`;
     case "lost":
-      return `lost ${server}: ${reason}; trying on`;
+      return `lost ${server}: ${reason}; trying again`;
     case "stopped":
       return code === Code.OK ? "" : `${server} ends it: ${reason}`;
     case "greeting":

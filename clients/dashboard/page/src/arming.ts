@@ -58,14 +58,14 @@ export class Arming {
     const over = server?.press?.order === "arm" && state.level !== "good";
     const old = server?.press?.state === "done" && (over || performance.now() - this.#toldAt > kToldMs);
     const press = server?.press?.device === device && !old ? server.press : undefined;
-    const objection = server ? (server.devices.find((d) => d.number === device)?.arming_objection ?? "The server has not said which devices it has.") : "tendon-dash does not answer.";
+    const objection = server ? (server.devices.find((d) => d.number === device)?.arming_objection ?? "The server has not listed its devices yet.") : "tendon-dash does not answer.";
     const busy = server?.press?.state === "under_way" ? server.press : undefined;
     const withoutPass = server?.arms === true && sessionStorage.getItem(kPass) === null;
     this.#group.hidden = server?.arms !== true || withoutPass;
     this.#buttons.arm.disabled = objection !== "" || busy !== undefined;
     // It goes before an arming.
     this.#buttons.disarm.disabled = objection !== "" || busy?.order === "disarm";
-    say(this.#needs, withoutPass ? "To arm and disarm from here, open the address that tendon-dash said when it was started." : objection);
+    say(this.#needs, withoutPass ? "To arm and disarm here, open the address that tendon-dash printed when it started." : objection);
     this.#needs.hidden = !withoutPass && objection === "";
     const words = this.#refused ?? press?.words ?? "";
     say(this.#result, words);
@@ -79,7 +79,7 @@ export class Arming {
       const answer = await fetch(`/api/${order}?device=${this.#device}`, { method: "POST", headers: { authorization: `Bearer ${sessionStorage.getItem(kPass)}` } });
       if (!answer.ok) this.#refused = (await answer.text()).trim();
     } catch {
-      this.#refused = "Not done, as far as is known: tendon-dash does not answer.";
+      this.#refused = "tendon-dash does not answer. The request was probably not carried out.";
     }
   }
 }

@@ -24,7 +24,7 @@ export class Histogram {
   draw(buckets: readonly number[], what: string, more: string): void {
     const all = buckets.reduce((sum, n) => sum + n, 0);
     if (all === 0) {
-      say(this.#words, "Not known: the server tells it once a second to those who may see it.");
+      say(this.#words, "No report yet: the server sends one each second to clients that may see it.");
       this.#svg.replaceChildren();
       this.#svg.toggleAttribute("hidden", true);
       this.#drawn = "";

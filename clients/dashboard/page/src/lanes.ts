@@ -82,5 +82,5 @@ function sentence(share: Map<number, number>, any: number, span: number): string
   const time = span >= 1 ? `${Number(span.toPrecision(3))} s` : `${Number((1e3 * span).toPrecision(3))} ms`;
   if (any === 0) return `In these ${time} the hand felt what the engines asked for.`;
   const most = kReasons.filter((r) => r.limits && share.has(r.bit)).sort((a, b) => share.get(b.bit)! - share.get(a.bit)!)[0]!;
-  return `For ${percent(any)} of these ${time} it was less or other than asked for; most of all: ${most.meaning}.`;
+  return `For ${percent(any)} of these ${time} the hand did not feel what the engines asked for. The main reason: ${most.meaning}.`;
 }

@@ -127,7 +127,7 @@ export class Live {
   }
 
   #tell(): void {
-    this.told(this.#open ? this.#server : undefined, this.#open ? (this.#server?.words ?? "asking tendon-dash") : "tendon-dash does not answer; trying on");
+    this.told(this.#open ? this.#server : undefined, this.#open ? (this.#server?.words ?? "asking tendon-dash") : "tendon-dash does not answer; still trying");
   }
 
   #watch(device: number): void {
@@ -204,7 +204,7 @@ export class Live {
           ? { level: "bad", name: "Fault", meaning: loop.fault }
           : disarmed
             ? kDisarmed
-            : (words ?? { level: "off", name: "Not told", meaning: "the server has not said how the device is" }),
+            : (words ?? { level: "off", name: "Unknown", meaning: "the server has not reported the device's state" }),
       engines,
       noEngines: holders.length > 0 ? `${holders.map((c) => `${c.holder} on channel ${c.name}`).join(", ")}.` : "No engine sends forces.",
       delay: slowest

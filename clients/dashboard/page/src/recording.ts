@@ -60,7 +60,7 @@ export async function readRecording(url: string, name: string, from: number, pro
     }
     indexed = true;
   } catch (error) {
-    if (collected.began !== undefined) return collected.recording("It could be read up to here: " + String(error));
+    if (collected.began !== undefined) return collected.recording("The file can be read up to this point: " + String(error));
   }
   if (indexed) return collected.recording();
   // Without an index: the server was killed, or still records.
@@ -81,7 +81,7 @@ export async function readRecording(url: string, name: string, from: number, pro
   } catch (error) {
     if (collected.began === undefined) throw new Error(`${name} is no recording: ${String(error)}`);
   }
-  return collected.recording("It has no end: the server was killed, or it still records. This is all up to the last whole piece.");
+  return collected.recording("The recording has no end: the server was killed, or is still recording. Everything up to its last whole chunk is shown.");
 }
 
 /** What has been read so far. */

@@ -145,7 +145,7 @@ class Run {
     const when = new Date(Number(recording.began / 1_000_000n));
     const { from, next } = recording;
     const part = from > 0 || next !== undefined
-      ? h("div", { class: "alert part" }, `It is read in parts: this is ${moment(this.track.first)} to ${moment(this.track.last)}.`,
+      ? h("div", { class: "alert part" }, `This recording is shown in parts. This part: ${moment(this.track.first)} to ${moment(this.track.last)}.`,
         from > 0 && h("a", { href: address }, "From the beginning"), next !== undefined && h("a", { href: `${address}?from=${next}` }, `Go on from ${moment(next)}`))
       : undefined;
     const facts = [recording.began > 10n ** 17n ? when.toLocaleString() : "simulated", duration(this.track.last - this.track.first), `${count(this.track.length)} steps`, recording.scene?.version].filter(Boolean).join(" · ");

@@ -163,7 +163,7 @@ function card(engine: EngineReport): HTMLElement {
   const rate = engine.span_s > 0 ? engine.forces / engine.span_s : 0;
   const why = [
     [engine.late_server, "by the server"], [engine.late_network, "by the network"], [engine.late_engine, "by the engine"],
-    [engine.late_unknown, "for a cause not known yet"],
+    [engine.late_unknown, "for an unknown cause"],
   ].filter(([n]) => (n as number) > 0).map(([n, cause]) => `${n} ${cause}`).join(", ");
   return h("div", { class: "engine", "data-level": level },
     h("div", { class: "name" }, h("b", { text: engine.name }), h("span", { class: "quiet", text: ` on channel ${engine.channel}` })),
@@ -173,7 +173,7 @@ function card(engine: EngineReport): HTMLElement {
       row("to the engine", ms(engine.to_client_ms), p99(engine.to_client_ms)),
       row("lost", `${digits(100 * lost, 2)} %`, `${engine.lost} of ${engine.lost + engine.received}`),
       row("forces", `${Math.round(rate)} /s`, late > 0 ? `${late} late: ${why}` : "none late")),
-    engine.state_one_in > 1 && h("p", { class: "note", text: `Its way is full: it is sent one state in ${engine.state_one_in}.` }),
-    engine.forces_refused && h("p", { class: "note", text: "Its forces are not taken: its way loses too much." }),
+    engine.state_one_in > 1 && h("p", { class: "note", text: `Its network path is full: the server sends it one state in ${engine.state_one_in}.` }),
+    engine.forces_refused && h("p", { class: "note", text: "Its forces are not used: its network path loses too many datagrams." }),
     engine.words !== "" && h("p", { class: "note", text: `${engine.words[0]!.toUpperCase()}${engine.words.slice(1)}.` }));
 }

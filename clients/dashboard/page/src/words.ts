@@ -18,14 +18,14 @@ export const kReasons: readonly ReasonWords[] = [
   { bit: 6, name: "Safe stop", meaning: "no fresh force for too long: zero until one comes", limits: true },
   { bit: 5, name: "Fading", meaning: "no fresh force has come, and the last one fades", limits: true },
   { bit: 4, name: "Held", meaning: "the newest force has outlived its validity and is held", limits: true },
-  { bit: 0, name: "Energy limit", meaning: "more would give out energy that the device never got", limits: true },
+  { bit: 0, name: "Energy limit", meaning: "a larger force would give out energy that the device never took in", limits: true },
   { bit: 1, name: "Force limit", meaning: "the largest force of the device or the scene", limits: true },
   { bit: 2, name: "Growth limit", meaning: "the force may not grow that fast", limits: true },
   { bit: 3, name: "Ramp-in", meaning: "forces have just begun again", limits: true },
   { bit: 7, name: "Not a number", meaning: "NaN or infinity was asked for or measured", limits: true },
   { bit: 9, name: "Device clamp", meaning: "the device gave out less than it was told to", limits: true },
   { bit: 12, name: "Unseen", meaning: "the device gave no position, so it gives no force", limits: true },
-  { bit: 10, name: "Overrun", meaning: "a step came later than the control law reckons with", limits: false },
+  { bit: 10, name: "Overrun", meaning: "a step came later than the control law allows for", limits: false },
   { bit: 11, name: "Watchdog", meaning: "a step came so late that the device's own watchdog let go", limits: false },
 ];
 
