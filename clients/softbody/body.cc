@@ -309,12 +309,12 @@ Body::Parts::Planned::Planned(const BodyConfig& config, const Mesh& mesh, const 
     : cuts(config.cuts), effects(config.effects), middle(config.middle) {
   Division body{.mesh = mesh, .fixed = fixed, .node_before = {}};
   for (Cutting trial = cuts; trial.left() > 0;) {
-    const std::span<const Cut> made = trial.make_next();
-    const std::string which = "cutting: cut " + std::to_string(made.size());
-    if (divide(mesh, fixed, made.last(1)).opened == 0) {
+    const std::span<const Cut> done = trial.make_next();
+    const std::string which = "cutting: cut " + std::to_string(done.size());
+    if (divide(mesh, fixed, done.last(1)).opened == 0) {
       throw std::invalid_argument(which + " lies between no two elements of the body");
     }
-    body = divide(body.mesh, body.fixed, made);
+    body = divide(body.mesh, body.fixed, done);
     try {
       middle_patch(TouchSurface(body.mesh, surface.normal(), surface.radius()), middle);
     } catch (const std::invalid_argument& error) {

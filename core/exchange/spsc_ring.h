@@ -26,42 +26,43 @@ class SpscRing {
   /// Holds up to `capacity` values. Throws std::invalid_argument unless it is a power of two.
   explicit SpscRing(std::size_t capacity) : slots_(std::make_unique<T[]>(capacity)), mask_(capacity - 1) {
     expect(std::has_single_bit(capacity), "capacity", static_cast<double>(capacity), "a power of two");
+  }
 
-    /// Writer only: the place of the next value, or null when the ring is full. It holds some earlier value. Nobody else
-    /// sees it until `push`. For values so large that they are written in place.
-    T* back() {
-      const std::size_t head = head_.load(std::memory_order_relaxed);
-      if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;
-      return &slots_[head & mask_];
-    }
+  /// Writer only: the place of the next value, or null when the ring is full. It holds some earlier value. Nobody else
+  /// sees it until `push`. For values so large that they are written in place.
+  T* back() {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    if (head - tail_.load(std::memory_order_acquire) > mask_) return nullptr;
+    return &slots_[head & mask_];
+  }
 
-    /// Writer only, and only after `back` was not null.
-    void push() { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+  /// Writer only, and only after `back` was not null.
+  void push() { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
-    /// Writer only. False, and nothing is taken, when the ring is full.
-    bool try_push(const T& value) {
-      T* const slot = back();
-      if (slot == nullptr) return false;
-      *slot = value;
-      push();
-      return true;
-    }
+  /// Writer only. False, and nothing is taken, when the ring is full.
+  bool try_push(const T& value) {
+    T* const slot = back();
+    if (slot == nullptr) return false;
+    *slot = value;
+    push();
+    return true;
+  }
 
-    /// Reader only: the oldest value, or null when empty. Valid until `pop`.
-    const T* front() const {
-      const std::size_t tail = tail_.load(std::memory_order_relaxed);
-      if (tail == head_.load(std::memory_order_acquire)) return nullptr;
-      return &slots_[tail & mask_];
-    }
+  /// Reader only: the oldest value, or null when empty. Valid until `pop`.
+  const T* front() const {
+    const std::size_t tail = tail_.load(std::memory_order_relaxed);
+    if (tail == head_.load(std::memory_order_acquire)) return nullptr;
+    return &slots_[tail & mask_];
+  }
 
-    /// Reader only, and only after `front` was not null.
-    void pop() { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+  /// Reader only, and only after `front` was not null.
+  void pop() { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
-   private:
-    std::unique_ptr<T[]> slots_;
-    std::size_t mask_;
-    alignas(64) std::atomic<std::size_t> head_{0};  ///< next to write
-    alignas(64) std::atomic<std::size_t> tail_{0};  ///< next to read
-  };
+ private:
+  std::unique_ptr<T[]> slots_;
+  std::size_t mask_;
+  alignas(64) std::atomic<std::size_t> head_{0};  ///< next to write
+  alignas(64) std::atomic<std::size_t> tail_{0};  ///< next to read
+};
 
 }  // namespace tendon
