@@ -191,7 +191,7 @@ it("without leave to arm: no button, how to get one, closed to other pages", asy
   assert.equal(await post(open, { authorization, origin: open, "x-forwarded-for": "192.0.2.7" }), 403);
   assert.equal(await post(open, { origin: open }), 403, "somebody else who uses this machine");
   const onlooker = await visit(test, open);
-  await says(onlooker, ".arming .needs", "open the address that tendon-dash said when it was started");
+  await says(onlooker, ".arming .needs", "open the address that tendon-dash printed when it started");
   for (const button of ["#arm", "#disarm"]) assert.equal(await onlooker.locator(button).isVisible(), false, button);
   const late = await visit(test, open, { at: `${open}/#/operator/${"0".repeat(32)}` });
   await late.click("#arm");

@@ -69,7 +69,7 @@ it("opens recordings, scrubs them, and shows two side by side", async (test) => 
   assert.match(await right.locator("[data-tile=force] .note").textContent(), /no bound/);
 
   await page.goto(`${url}/#/recordings/torn.mcap`);
-  await says(page, ".run .alert", "It has no end");
+  await says(page, ".run .alert", "The recording has no end");
   assert.ok((await painted(page, "[data-chart=position] canvas")) > 500);
   await page.goto(`${url}/#/recordings/noise.mcap`);
   await says(page, "[role=alert]", "noise.mcap is no recording");
@@ -173,13 +173,13 @@ it("reads a recording over ten minutes in parts, only those that it shows", asyn
   const shown = () => page.locator(".run .head .quiet").textContent();
 
   await page.goto(`${url}/#/recordings/long.mcap`);
-  await says(page, ".run .part", "this is 0\u00a0s to 9\u00a0min 59\u00a0s");
+  await says(page, ".run .part", "This part: 0\u00a0s to 9\u00a0min 59\u00a0s");
   assert.match(await shown(), /· 600\ss · 600\u202f000 steps/);
   const began = (await shown()).split(" · ")[0];
 
   fetched = 0;
   await page.click("a:has-text('Go on from 10\u00a0min 0\u00a0s')");
-  await says(page, ".run .part", "this is 10\u00a0min 0\u00a0s to 10\u00a0min 59\u00a0s");
+  await says(page, ".run .part", "This part: 10\u00a0min 0\u00a0s to 10\u00a0min 59\u00a0s");
   assert.match(await shown(), /· 60\ss · 60\u202f000 steps/);
   assert.equal((await shown()).split(" · ")[0], began, "it is the same recording");
   assert.ok(fetched < size / 3, `${fetched} of ${size} bytes for an eleventh of the steps`);
@@ -189,7 +189,7 @@ it("reads a recording over ten minutes in parts, only those that it shows", asyn
   await until("all of the part is shown", async () => Number((await page.locator("[data-tile=state] .note").textContent()).replace(/\D/g, "")) > 59_000);
 
   await page.click("a:has-text('From the beginning')");
-  await says(page, ".run .part", "this is 0\u00a0s");
+  await says(page, ".run .part", "This part: 0\u00a0s");
   await page.goto(`${url}/#/recordings/long.mcap?from=3600`);
   await says(page, "[role=alert]", "long.mcap ends before 60\u00a0min 0\u00a0s.");
 });
