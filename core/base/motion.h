@@ -11,6 +11,17 @@ namespace tendon {
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
+/// A rotation as a unit quaternion, Hamilton's: w + x i + y j + z k. q and −q are the same rotation. These are plain
+/// numbers, as they travel; core/base/frames.h turns them into a matrix and back.
+struct Quat {
+  double w = 1;
+  double x = 0;
+  double y = 0;
+  double z = 0;
+
+  bool operator==(const Quat&) const = default;
+};
+
 /// Where the hand is, as the device saw it at one instant.
 struct Motion {
   LocalTime at{};                ///< when the position was sampled
