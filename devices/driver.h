@@ -22,13 +22,14 @@ namespace tendon {
 ///     SimulatedDevice::Config stand_in(const X&)            simulates it where the cost of a step is measured
 ///     std::unique_ptr<Device> make(const X&, FromOutside)   the device itself
 struct Driver {
-  std::string_view kind;                ///< in a scene: [device] kind
-  std::string_view name;                ///< of the hardware, for people
-  bool exerts_force = true;             ///< false: an input only; nobody feels the forces of engines
-  bool moves_a_hand = false;            ///< a real device with motors: it never runs without limiter and safety layer
-  std::uint32_t buttons = 0;            ///< how many a real device has
-  std::string_view buttons_in_words{};  ///< "one of a Falcon's, 0 to 3"; empty when it has none of its own
-  std::string_view homing{};            ///< what the operator has to do in kUnhomed: "homed: pull the grip …"
+  std::string_view kind;      ///< in a scene: [device] kind
+  std::string_view name;      ///< of the hardware, for people
+  bool exerts_force = true;   ///< false: an input only; nobody feels the forces of engines
+  bool moves_a_hand = false;  ///< a real device with motors: it never runs without limiter and safety layer
+  std::string_view axes{};    ///< "right=x up=y user=z", see core/base/frames.h; empty: not known
+  std::vector<std::string_view> buttons{};  ///< names, by their bit in PositionSample::buttons; empty: not known
+  std::string_view buttons_in_words{};      ///< "one of a Falcon's, 0 to 3"; empty when it has none of its own
+  std::string_view homing{};                ///< what the operator has to do in kUnhomed: "homed: pull the grip …"
 
   // With a plug. X then has `std::string port`.
   std::span<const usb::Id> ids{};  ///< empty: it has no plug

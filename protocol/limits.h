@@ -47,6 +47,8 @@ inline constexpr std::uint32_t kMaxChannels = 8;
 inline constexpr int kMaxClaims = 16;
 /// Bytes of the name of a device or a channel.
 inline constexpr std::size_t kMaxLabel = 24;
+/// Named buttons of a device.
+inline constexpr std::size_t kMaxButtons = 16;
 
 /// Bytes of UTF-8. With these the largest Hello without claims (674 bytes before padding) and the largest Welcome
 /// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) and

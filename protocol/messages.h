@@ -68,6 +68,9 @@ struct DeviceState {
   /// N, what the engines ask for at this step, after hold or local model and before any limit. Only to an observer that
   /// named kFeatureDiagnostics; empty: not told.
   std::optional<Vec3> force_wanted{};
+  /// Bit i is set while button i is held. Only to a client that named kFeatureHandle, else 0. A press that fell between
+  /// two states of a client is in the next state that it is sent.
+  std::uint32_t buttons = 0;
 };
 
 /// Client → server, unreliable, newest wins for each device and channel: the force that the physics engine wants.
@@ -206,9 +209,12 @@ struct Disarm {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: what a device is and can do; answered with a DeviceDescription.
+/// Client → server, reliable: what a device is and can do; answered with a DeviceDescription, or, when `handle` is asked
+/// for, with a HandleDescription. The latter only of a server that has agreed to kFeatureHandle: an older one does not
+/// know the difference.
 struct Describe {
   std::uint32_t device = 0;
+  bool handle = false;
 };
 
 /// Client → server, reliable: I want to be the one whose forces this channel takes. Only from one that claimed it.
@@ -260,10 +266,22 @@ struct DeviceDescription {
   std::vector<ChannelDescription> channels{};
 };
 
+/// What the handle of a device is and can do. It is a message of its own because it would not fit beside the longest
+/// DeviceDescription into one datagram.
+struct HandleDescription {
+  std::uint32_t device = 0;
+  /// Turns the base frame into the operator's, x right, y up, z to the user (core/base/frames.h); empty: not known.
+  std::optional<Quat> operator_from_device{};
+  std::vector<std::string> buttons{};  ///< names by bit of DeviceState::buttons; at most 16 of at most 24 bytes
+};
+
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.
 inline constexpr std::string_view kFeatureLocalModel = "local-model";
 /// A feature: the client claims devices and channels by name, and can be told that it has lost a lease.
 inline constexpr std::string_view kFeatureChannels = "channels";
+
+/// A feature: the client is told how the device lies before the operator, its buttons' names, and which are held.
+inline constexpr std::string_view kFeatureHandle = "handle";
 
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,
 /// PeerReport). A controller that names it is not granted it.

@@ -319,6 +319,12 @@ void Session::answer(std::uint32_t id, DeviceDescription device) {
   state_->answering.answer({.id = id, .code = Code::kOk, .detail = {}, .wait = {}, .device = std::move(device)});
 }
 
+void Session::answer(std::uint32_t id, HandleDescription handle) {
+  ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
+  ack.handle = std::move(handle);
+  state_->answering.answer(std::move(ack));
+}
+
 void Session::close(Code code, std::string reason) { state_->close(code, std::move(reason)); }
 
 void Session::State::close(Code code, std::string reason) {
@@ -404,7 +410,8 @@ std::optional<Session::Event> Session::next_event() {
                            .code = ack->code,
                            .detail = std::move(ack->detail),
                            .wait = ack->wait,
-                           .device = std::move(ack->device)};
+                           .device = std::move(ack->device),
+                           .handle = std::move(ack->handle)};
   }
   if (!my.forces_arrived.empty()) return ForceArrived{.command = my.forces_arrived.take()};
   if (my.report_arrived) return ReportArrived{.report = *std::exchange(my.report_arrived, std::nullopt)};

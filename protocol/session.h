@@ -119,6 +119,7 @@ class Session {
     std::string detail;
     Duration wait{};                            ///< after a TakeLease answered kBusy; 0 = not known
     std::optional<DeviceDescription> device{};  ///< after a Describe answered kOk
+    std::optional<HandleDescription> handle{};  ///< … that asked for the handle
   };
   struct Closed {
     Code code;  ///< the code of the peer's Bye; kTimedOut: it fell silent; kExpired: the session is too old
@@ -144,6 +145,7 @@ class Session {
   void answer(std::uint32_t id, Code code, std::string detail, Duration wait = {});
   /// Answers a Describe with kOk.
   void answer(std::uint32_t id, DeviceDescription device);
+  void answer(std::uint32_t id, HandleDescription handle);
   /// Says Bye (limits::kByes times, as `next_datagram` is pulled) and closes. Anything not sent yet is dropped. No
   /// Closed event follows, because the owner knows.
   void close(Code code, std::string reason);

@@ -27,6 +27,7 @@ DeviceState to_state(std::uint32_t device, const StepRecord& record) noexcept {
   state.force_age = record.force_age;
   state.mode = record.mode;
   state.force_wanted = record.wanted;
+  state.buttons = record.buttons;
   return state;
 }
 
@@ -84,6 +85,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   if (const auto sample = device_.read(now)) {
     const Motion hand{sample->at, sample->position, velocity_.observe(sample->at, sample->position)};
     static_cast<Step&>(record) = controller_.step(hand, applied_, sample->hand_force);
+    buttons_ = sample->buttons;
   } else {
     static_cast<Step&>(record) = controller_.step_unseen(now, applied_);
   }
@@ -94,6 +96,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   record.scheduled = due_;
   record.rearmed = std::exchange(rearmed_, false);
   record.disarmed = disarmed_;
+  record.buttons = buttons_;
   watch_device();
   publish(record);
 

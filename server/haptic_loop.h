@@ -65,8 +65,9 @@ class HapticLoop {
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
-  bool rearmed_ = false;   ///< since the last record
-  bool disarmed_ = false;  ///< by an order, which only an order ends
+  bool rearmed_ = false;       ///< since the last record
+  bool disarmed_ = false;      ///< by an order, which only an order ends
+  std::uint32_t buttons_ = 0;  ///< as the device last said
   std::uint32_t device_faults_ = 0;
 
   Counter steps_;

@@ -46,7 +46,7 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
     : config_(config),
       link_(link),
       sieve_(config.recorded),
-      devices_(served_devices(config.devices, mail)),
+      devices_(served_devices(config.devices, config.handles, mail)),
       doorman_({.secret = config.secret, .keys = config.keys}),
       admission_({.keys = config.keys.size(), .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id) {
@@ -202,6 +202,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 role,
                 contains(welcome.features, kFeatureChannels),
                 contains(welcome.features, kFeatureDiagnostics),
+                contains(welcome.features, kFeatureHandle),
                 std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},
@@ -322,23 +323,23 @@ void NetworkLoop::publish(LocalTime now) {
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
     // Engines ask for bounded forces, but their combination in the device's loop may exceed what a frame can carry.
-    DeviceState diagnosed = *state;
-    if (diagnosed.force_wanted && !(diagnosed.force_wanted->array().abs() <= limits::kMaxValue).all()) {
-      diagnosed.force_wanted.reset();
-    }
-    DeviceState plain = *state;
-    plain.force_wanted.reset();
+    const bool can_tell = state->force_wanted && (state->force_wanted->array().abs() <= limits::kMaxValue).all();
     for (Guest& guest : guests_) {
       View* const view = view_of(guest, number);
       if (view == nullptr) continue;
+      if (guest.sees_handle) view->pressed |= state->buttons;
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
-      if (view->deadband && !view->deadband->passes(*state)) {
+      DeviceState told = *state;
+      if (!can_tell || !guest.diagnoses) told.force_wanted.reset();
+      told.buttons = view->pressed;
+      if (view->deadband && !view->deadband->passes(told)) {
         ++stats_.foretold;
         continue;
       }
       view->last_state = state->tick;
-      guest.session.send(guest.diagnoses ? diagnosed : plain);
+      view->pressed = 0;
+      guest.session.send(told);
     }
   }
   for (Guest& guest : guests_) send_all(now, guest);
@@ -443,6 +444,7 @@ void NetworkLoop::answer(LocalTime now, Guest& guest, std::uint32_t id, const Re
     dispossess(now, *loser, guest, std::get<TakeLease>(request));
   }
   if (outcome.device) return guest.session.answer(id, std::move(*outcome.device));
+  if (outcome.handle) return guest.session.answer(id, std::move(*outcome.handle));
   guest.session.answer(id, outcome.code, std::move(outcome.detail), outcome.wait);
 }
 

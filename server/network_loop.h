@@ -52,6 +52,7 @@ class NetworkLoop {
     std::string server_name = "tendond";
     /// What guests are told of each device; its number is its place, `holder` does not count.
     std::vector<DeviceDescription> devices{};
+    std::vector<HandleDescription> handles{};  ///< likewise; fewer: of the others nothing is known
     /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
     std::vector<std::string> takeover{};
     /// Each costs a state datagram of some 250 bytes per haptic step. Where there are several keys, one key has at most

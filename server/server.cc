@@ -10,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/base/frames.h"
 #include "server/build_info.h"
 #include "server/device_factory.h"
 #include "server/machine/clock.h"
@@ -40,6 +41,14 @@ DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
     about.channels.push_back({.name = channel.name, .rule = channel.rule, .lease = channel.lease, .holder = {}});
   }
   return about;
+}
+
+HandleDescription handle_of(const Scene& scene) {
+  HandleDescription handle;
+  const std::string_view axes = scene.axes.empty() ? scene.driver().axes : scene.axes;
+  if (!axes.empty()) handle.operator_from_device = quaternion_of(operator_from_device(axes));
+  handle.buttons.assign(scene.driver().buttons.begin(), scene.driver().buttons.end());
+  return handle;
 }
 
 const char* describe(HapticController::Fault fault) {
@@ -162,6 +171,7 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
   for (const auto& runtime : devices) {
     config.devices.push_back(
         description_of(runtime->scene, runtime->safe ? runtime->safe->info() : runtime->device->info()));
+    config.handles.push_back(handle_of(runtime->scene));
   }
   config.takeover = scene.network.takeover;
   config.max_observers = scene.network.max_observers;

@@ -156,7 +156,7 @@ void ForceClient::greet(LocalTime now) {
   Hello hello;
   hello.role = role_;
   hello.name = config_.name;
-  hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels)};
+  hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels), std::string(kFeatureHandle)};
   if (config_.diagnostics) hello.features.emplace_back(kFeatureDiagnostics);
   if (claims()) hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
   connection_.greet(now, hello);
@@ -175,12 +175,14 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   holds_ = place_.role == Role::kController;
   asked_lease_.reset();
   description_.reset();
+  handle_.reset();
   order_.reset();
   order_answer_.reset();
   stats_.lease_lost_to.clear();
   ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
   Session& session = *connection_.session();
   if (claims()) session.request(Describe{.device = place_.device});
+  if (agreed_to(kFeatureHandle)) session.request(Describe{.device = place_.device, .handle = true});
   deadband_request_ = config_.state_deadband ? session.request(*config_.state_deadband) : std::nullopt;
   foretell_ = false;
   seen_tick_ = 0;
@@ -247,6 +249,7 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
 
 void ForceClient::take_answer(LocalTime now, const Session::RequestAnswered& answered) {
   if (answered.device) description_ = answered.device;
+  if (answered.handle) handle_ = answered.handle;
   if (answered.id == order_) order_answer_ = answered;
   if (answered.id == deadband_request_) {
     foretell_ = answered.code == Code::kOk && period_ > Duration::zero() &&
@@ -318,9 +321,7 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
   command.channel = place_.channel;
   command.topology_changed = touch.topology_changed;
   command.error = touch.error;
-  const auto& agreed = welcome_->features;
-  const bool with_model = std::find(agreed.begin(), agreed.end(), kFeatureLocalModel) != agreed.end();
-  if ((touch.stiffness || touch.contact) && with_model) {
+  if ((touch.stiffness || touch.contact) && agreed_to(kFeatureLocalModel)) {
     command.model = LocalModel{.at = answered.position,
                                .stiffness = touch.stiffness.value_or(Mat3(Mat3::Zero())),
                                .valid_radius = touch.valid_radius,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -194,6 +195,9 @@ class ForceClient {
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   /// What the device is and can do, when we have named a device or a channel and the server has answered; empty before.
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
+  /// How the device lies before the operator, and its buttons' names, once the server has answered; empty before, and for
+  /// good when the server does not know kFeatureHandle.
+  const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
   /// The server's newest report on our forces, once a second while they come: late ones by cause, delays, losses.
   /// From the present session; empty before the first.
@@ -213,6 +217,9 @@ class ForceClient {
   void end(Phase phase, Code code, std::string reason);
   void take(LocalTime now, const Connection::Event& event);
   bool give_order(const Request& order);
+  bool agreed_to(std::string_view feature) const {
+    return std::find(welcome_->features.begin(), welcome_->features.end(), feature) != welcome_->features.end();
+  }
   bool claims() const noexcept { return !config_.device.empty() || !config_.channel.empty(); }
   void take_report(const PeerReport& report);
   void take_event(LocalTime now, const Session::Event& event);
@@ -235,6 +242,7 @@ class ForceClient {
   Connection connection_;
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
+  std::optional<HandleDescription> handle_;
   std::optional<std::uint32_t> order_;  ///< the newest rearm or disarm: number of the request
   std::optional<Session::RequestAnswered> order_answer_;
   Grant place_;  ///< the numbers of our device and channel

@@ -226,7 +226,8 @@ const Driver& driver(const Config& /*config*/) {
     return Driver{.kind = "falcon",
                   .name = "Novint Falcon",
                   .moves_a_hand = true,
-                  .buttons = 4,  // of its grip: right, forward, centre, left
+                  .axes = "right=x up=y user=z",
+                  .buttons = {"right", "forward", "centre", "left"},  // of its grip
                   .buttons_in_words = "one of a Falcon's, 0 to 3",
                   .homing = "homed: pull the grip all the way out, then push it all the way in",
                   .ids = kIds,

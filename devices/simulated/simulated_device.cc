@@ -310,7 +310,8 @@ Friction least_friction_at(const SimulatedDevice::Config& config, const Vec3& po
 }
 
 const Driver& driver(const SimulatedDevice::Config& /*config*/) {
-  static const Driver kRow{.kind = "simulated", .name = "simulated device"};
+  static const Driver kRow{
+      .kind = "simulated", .name = "simulated device", .axes = "right=x up=y user=z", .buttons = {"button"}};
   return kRow;
 }
 

@@ -75,6 +75,7 @@ const Driver& driver(const Config& /*config*/) {
   static const Driver kRow{.kind = "spacemouse",
                            .name = "3Dconnexion SpaceMouse",
                            .exerts_force = false,
+                           .axes = "right=x up=y user=z",
                            .ids = SpaceMouseDevice::kIds,
                            .transfers = usb::PipeConfig::Transfers::kInterrupt};
   return kRow;

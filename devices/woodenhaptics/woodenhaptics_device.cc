@@ -239,7 +239,8 @@ const Driver& driver(const Config& /*config*/) {
     return Driver{.kind = "woodenhaptics",
                   .name = "WoodenHaptics, or another HID gadget of mbed",
                   .moves_a_hand = true,
-                  .buttons = 1,
+                  .axes = "right=-y up=z user=-x",
+                  .buttons = {"tip"},
                   .buttons_in_words = "0, the switch at its tip",
                   .homing =
                       "calibrated: hold the arm in its calibration pose (devices/woodenhaptics) and press the "

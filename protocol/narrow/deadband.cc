@@ -47,8 +47,9 @@ StateDeadband::StateDeadband(const SetStateDeadband& asked)
 
 bool StateDeadband::passes(const DeviceState& state) noexcept {
   const LocalTime now(state.sampled.time_since_epoch());
-  if (mode_ == state.mode) return velocity_.passes(now, state.velocity);
+  if (mode_ == state.mode && buttons_ == state.buttons) return velocity_.passes(now, state.velocity);
   mode_ = state.mode;
+  buttons_ = state.buttons;
   velocity_.sent(now, state.velocity);
   return true;
 }

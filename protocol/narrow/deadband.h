@@ -56,8 +56,8 @@ class Deadband {
 /// All other fields are those of `sent`. A `later` below zero counts as zero. Realtime-safe: yes.
 DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept;
 
-/// Leaves out the device states that their receiver can foretell(): a deadband on velocity. A state whose mode differs
-/// from the last one sent always passes.
+/// Leaves out the device states that their receiver can foretell(): a deadband on velocity. A state whose mode or
+/// buttons differ from those of the last one sent always passes.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class StateDeadband {
@@ -73,7 +73,8 @@ class StateDeadband {
 
  private:
   Deadband velocity_;
-  std::optional<Mode> mode_;  ///< of the last state sent
+  std::optional<Mode> mode_;   ///< of the last state sent
+  std::uint32_t buttons_ = 0;  ///< likewise
 };
 
 }  // namespace tendon

@@ -4,6 +4,7 @@
 #include <google/protobuf/stubs/common.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "protocol/limits.h"
 #include "protocol/wire/bounds.h"
@@ -43,6 +44,19 @@ void write(const Vec3& from, pb::Vec3& to) {
   to.set_x(from.x());
   to.set_y(from.y());
   to.set_z(from.z());
+}
+
+bool read(const pb::Quat& from, Quat& to) noexcept {
+  to = {.w = from.w(), .x = from.x(), .y = from.y(), .z = from.z()};
+  const double norm = std::sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z);
+  return std::abs(norm - 1) <= Contact::kUnitTolerance;
+}
+
+void write(const Quat& from, pb::Quat& to) {
+  to.set_w(from.w);
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_z(from.z);
 }
 
 bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }

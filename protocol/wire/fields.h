@@ -21,6 +21,9 @@ namespace pb = tendon::v1;
 
 bool read(const pb::Vec3& from, Vec3& to) noexcept;
 void write(const Vec3& from, pb::Vec3& to);
+/// False when its norm is not 1 ± Contact::kUnitTolerance.
+bool read(const pb::Quat& from, Quat& to) noexcept;
+void write(const Quat& from, pb::Quat& to);
 
 /// A clock reading.
 bool read(std::int64_t ns, LocalTime& to) noexcept;

@@ -35,6 +35,7 @@ struct ControlAck {
   std::string detail;
   Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
   std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
+  std::optional<HandleDescription> handle{};  ///< with kOk of a Describe that asks for the handle
 };
 struct Bye {
   Code code = Code::kOk;

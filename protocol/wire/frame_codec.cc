@@ -19,6 +19,7 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   to.reasons = from.reasons();
   to.force_sequence = from.force_sequence();
   const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
+  to.buttons = from.buttons();
   to.force_wanted.reset();
   if (from.has_force_wanted_n() && !read(from.force_wanted_n(), to.force_wanted.emplace())) return false;
   return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
@@ -42,6 +43,7 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   to.set_mode(static_cast<pb::Mode>(from.mode));
   to.set_device(from.device);
   to.set_channel(from.channel);
+  to.set_buttons(from.buttons);
   if (from.force_wanted) {
     write(*from.force_wanted, *to.mutable_force_wanted_n());
   } else {
@@ -173,7 +175,10 @@ bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
 }
 bool read(const pb::Rearm& from, Rearm& to) noexcept { return read_device(from.device(), to.device); }
 bool read(const pb::Disarm& from, Disarm& to) noexcept { return read_device(from.device(), to.device); }
-bool read(const pb::Describe& from, Describe& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Describe& from, Describe& to) noexcept {
+  to.handle = from.handle();
+  return read_device(from.device(), to.device);
+}
 template <class Message, class Lease>
 bool read_lease(const Message& from, Lease& to) noexcept {
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
@@ -195,7 +200,10 @@ void write_request(const SetStateRate& from, pb::Control& to) {
 }
 void write_request(const Rearm& from, pb::Control& to) { to.mutable_rearm()->set_device(from.device); }
 void write_request(const Disarm& from, pb::Control& to) { to.mutable_disarm()->set_device(from.device); }
-void write_request(const Describe& from, pb::Control& to) { to.mutable_describe()->set_device(from.device); }
+void write_request(const Describe& from, pb::Control& to) {
+  to.mutable_describe()->set_device(from.device);
+  to.mutable_describe()->set_handle(from.handle);
+}
 template <class Lease, class Message>
 void write_lease(const Lease& from, Message& to) {
   to.set_device(from.device);
@@ -315,11 +323,31 @@ void write(const DeviceDescription& from, pb::DeviceDescription& to) {
   }
 }
 
+bool read(const pb::HandleDescription& from, HandleDescription& to) {
+  const bool has_axes = from.has_operator_from_device();
+  if (has_axes && !read(from.operator_from_device(), to.operator_from_device.emplace())) return false;
+  if (from.buttons_size() > static_cast<int>(limits::kMaxButtons)) return false;
+  for (const auto& name : from.buttons()) {
+    if (!read(name, limits::kMaxLabel, to.buttons.emplace_back())) return false;
+  }
+  return read_device(from.device(), to.device);
+}
+
+void write(const HandleDescription& from, pb::HandleDescription& to) {
+  to.set_device(from.device);
+  if (from.operator_from_device) write(*from.operator_from_device, *to.mutable_operator_from_device());
+  for (const std::string& name : from.buttons) {
+    if (to.buttons_size() == static_cast<int>(limits::kMaxButtons)) break;
+    to.add_buttons(clip(name, limits::kMaxLabel));
+  }
+}
+
 }  // namespace
 
 bool read(const pb::ControlAck& from, ControlAck& to) {
   to.id = from.id();
   if (from.has_device() && !read(from.device(), to.device.emplace())) return false;
+  if (from.has_handle() && !read(from.handle(), to.handle.emplace())) return false;
   return to.id > 0 && read(from.code(), to.code) && read(from.detail(), limits::kMaxDetail, to.detail) &&
          read_ms(from.wait_ms(), to.wait);
 }
@@ -331,6 +359,8 @@ void write(const ControlAck& from, pb::ControlAck& to) {
   to.set_wait_ms(in_ms(from.wait));
   to.clear_device();
   if (from.device) write(*from.device, *to.mutable_device());
+  to.clear_handle();
+  if (from.handle) write(*from.handle, *to.mutable_handle());
 }
 
 namespace {

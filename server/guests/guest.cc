@@ -51,14 +51,16 @@ Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id) { return find_gues
 const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
 
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
+                                         const std::vector<HandleDescription>& handles,
                                          const std::vector<Mailboxes*>& mail) {
   check_names(about, limits::kMaxDevices, "device");
   if (mail.size() != about.size()) throw std::invalid_argument("expected mailboxes for each device");
   std::vector<ServedDevice> devices;
   for (std::size_t i = 0; i < mail.size(); ++i) {
-    ServedDevice& device = devices.emplace_back(ServedDevice{.about = about[i], .mail = mail[i]});
+    ServedDevice& device = devices.emplace_back(ServedDevice{
+        .about = about[i], .handle = i < handles.size() ? handles[i] : HandleDescription{}, .mail = mail[i]});
     check_names(device.about.channels, limits::kMaxChannels, "channel");
-    device.about.device = static_cast<std::uint32_t>(i);
+    device.about.device = device.handle.device = static_cast<std::uint32_t>(i);
     device.channels.resize(device.about.channels.size());
   }
   return devices;

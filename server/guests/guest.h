@@ -37,6 +37,7 @@ struct View {
   std::uint64_t state_every = 1;  ///< haptic steps
   std::uint64_t last_state = 0;   ///< tick
   std::optional<StateDeadband> deadband{};
+  std::uint32_t pressed = 0;  ///< buttons that were held at any time since the last state
 };
 
 /// Somebody with a session.
@@ -48,6 +49,7 @@ struct Guest {
   Role role;
   bool can_lose;            ///< it can be told that it has lost a lease
   bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
+  bool sees_handle;         ///< … and kFeatureHandle
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost
@@ -93,6 +95,7 @@ struct ServedChannel {
 /// A device, as guests meet it.
 struct ServedDevice {
   DeviceDescription about;
+  HandleDescription handle;
   Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
@@ -102,7 +105,9 @@ struct ServedDevice {
 
 /// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of
 /// devices or channels is out of range, two of them share a name, or there are not as many mailboxes as devices.
+/// `handles` may be fewer: nothing is known of the handles of the others.
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
+                                         const std::vector<HandleDescription>& handles,
                                          const std::vector<Mailboxes*>& mail);
 
 }  // namespace tendon

@@ -51,6 +51,7 @@ Outcome describe(LocalTime /*now*/, const Asker& asker, const Describe& wanted) 
     return {.code = Code::kInvalid, .detail = "there are " + std::to_string(asker.devices.size()) + " devices"};
   }
   const ServedDevice& device = asker.devices[wanted.device];
+  if (wanted.handle) return {.handle = device.handle};
   DeviceDescription about = device.about;
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     const Guest* const holder = guest_of(asker.guests, device.channels[i].holder);

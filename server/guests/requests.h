@@ -28,6 +28,7 @@ struct Outcome {
   std::string detail{};
   Duration wait{};                            ///< with kBusy of a TakeLease; 0 = nobody knows
   std::optional<DeviceDescription> device{};  ///< with kOk of a Describe
+  std::optional<HandleDescription> handle{};  ///< … that asks for the handle
   std::string warning{};                      ///< for the operator; empty: nothing to say
   std::uint32_t loser = 0;                    ///< of a lease: its connection id; it has not been told yet
 };

@@ -98,6 +98,7 @@ std::string encode(const StepRecord& step) {
   out.set_disarmed(step.disarmed);
   out.set_longest_hold_ns(step.longest_hold.count());
   out.set_assumption_broken(step.assumption_broken);
+  out.set_buttons(step.buttons);
   if (!step.stiffness.isZero(0)) {
     for (const auto row : step.stiffness.rowwise()) {
       for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
@@ -170,6 +171,7 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.disarmed = in.disarmed();
   out.longest_hold = Duration(in.longest_hold_ns());
   out.assumption_broken = in.assumption_broken();
+  out.buttons = in.buttons();
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

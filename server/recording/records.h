@@ -17,6 +17,7 @@ struct StepRecord : Step {
   Vec3 applied = Vec3::Zero();  ///< N, really given out by the device (`force` is what it was told)
   bool rearmed = false;         ///< the controller was rearmed since the step before
   bool disarmed = false;        ///< the operator had disarmed the device
+  std::uint32_t buttons = 0;    ///< bit i is set while button i of the handle was held
 };
 
 /// One datagram that went in or out.

@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <variant>
 
+#include "core/base/frames.h"
 #include "devices/simulated/profiles.h"
 #include "server/scene/keys.h"
 #include "server/scene/reader.h"
@@ -99,6 +101,27 @@ struct Column {
     const auto* name = std::get_if<std::string>(&value);
     return name != nullptr ? in_quotes(*name) : std::to_string(std::get<std::size_t>(value));
   }
+};
+
+/// Where the axes of a device's base frame point, in words.
+struct Axes {
+  static std::string expected(const Unit&) {
+    return "the axes that point to the operator's right, up and towards the user, like \"right=x up=y user=z\"";
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::string& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr) return Refusal{&node, expected(unit)};
+    try {
+      to = axes_in_words(operator_from_device(**text));
+    } catch (const std::invalid_argument& error) {
+      const std::string_view why = error.what();
+      return Refusal{&node, expected(unit) + " (" + std::string(why.substr(why.rfind(": ") + 2)) + ")"};
+    }
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
 enum class MechanismKind : std::uint8_t { kFalcon, kArm };
@@ -318,6 +341,9 @@ void declare_device(Table& device, Draft& draft) {
   device.kind(kinds, [&draft](Table& keys, std::size_t kind) {
     keys.key("name", draft.scene.name, Label{}, "the name by which clients ask for this device, of several",
              Absent{.text = "the name of the scene file"});
+    keys.key("axes", draft.scene.axes, Axes{},
+             "how its base frame lies before the operator; programs turn positions by it",
+             Absent{.text = "the driver's; of a recorded hand it is not known"});
     declare_kind(kind, keys, draft);
   });
 }

@@ -213,7 +213,7 @@ class SceneResolver {
     if (scene.safety->dead_man) {
       const std::uint32_t button = scene.safety->dead_man->button;
       const Driver& driver = scene.driver();
-      if (driver.moves_a_hand && button >= driver.buttons) {
+      if (driver.moves_a_hand && button >= driver.buttons.size()) {
         blame("safety.dead_man.button", {},
               "expected " + std::string(driver.buttons_in_words) + ", found " + std::to_string(button));
       }

@@ -88,6 +88,7 @@ void print(Line& line, const DeviceState& state) {
        << state.force_applied << state.energy << state.permitted_force << state.reasons << state.force_sequence
        << state.force_age << state.mode;
   if (state.force_wanted) line << "wanted" << *state.force_wanted;
+  if (state.buttons != 0) line << "buttons" << state.buttons;
 }
 
 void print(Line& line, const LocalModel& model) {
@@ -130,6 +131,10 @@ void print(Line& line, const Control& control) {
 void print(Line& line, const ControlAck& ack) {
   line << "ack" << ack.id << ack.code;
   line.put_text(ack.detail);
+  if (!ack.handle) return;
+  line << "handle";
+  if (const auto& q = ack.handle->operator_from_device) line << "axes" << q->w << q->x << q->y << q->z;
+  line.put_texts(ack.handle->buttons);
 }
 
 void print(Line& line, const Bye& bye) {

@@ -198,6 +198,28 @@ inline DeviceDescription description() {
                         .holder = "wall"}}};
 }
 
+// To a client that named the feature "handle".
+
+/// A Falcon's "right" and "left" are held.
+inline DeviceState state_with_buttons() {
+  DeviceState state = examples::state();
+  state.buttons = 0b1001;
+  return state;
+}
+
+/// Axes as a WoodenHaptics' would be, and the buttons of a Falcon.
+inline HandleDescription handle_description() {
+  return {.device = 1,
+          .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
+          .buttons = {"right", "forward", "centre", "left"}};
+}
+
+inline ControlAck handle_described(std::uint32_t id) {
+  ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
+  ack.handle = handle_description();
+  return ack;
+}
+
 inline ControlAck described(std::uint32_t id) {
   return {.id = id, .code = Code::kOk, .detail = {}, .wait = {}, .device = description()};
 }
@@ -282,6 +304,9 @@ inline std::vector<Named> datagrams() {
       {"device-report", data(61, {}, device_report())},
       {"peer-report", data(62, {}, peer_report())},
       {"control-disarm", data(63, {}, Control{.id = 13, .request = Disarm{.device = 1}})},
+      {"state-buttons", data(64, {}, state_with_buttons())},
+      {"control-describe-handle", data(65, {}, Control{.id = 14, .request = Describe{.device = 1, .handle = true}})},
+      {"control-ack-handle", data(66, {}, handle_described(14))},
   };
 }
 

@@ -16,12 +16,13 @@ using std::chrono::milliseconds;
 class Handle final : public Device {
  public:
   bool plugged = true;
+  std::uint32_t buttons = 0;
 
   const DeviceInfo& info() const noexcept override { return info_; }
   State state() const noexcept override { return plugged ? State::kHomed : State::kAbsent; }
   std::optional<PositionSample> read(LocalTime now) noexcept override {
     if (!plugged) return std::nullopt;
-    return PositionSample{.at = now, .position = Vec3::Zero()};
+    return PositionSample{.at = now, .position = Vec3::Zero(), .hand_force = std::nullopt, .buttons = buttons};
   }
   Vec3 apply(const Vec3& force) noexcept override { return plugged ? force : Vec3(Vec3::Zero()); }
 
@@ -108,6 +109,19 @@ struct Pushed {
 };
 
 using Kind = HapticOrder::Kind;
+
+TEST(HapticLoop, TheButtonsAreInTheRecordAndTheStateOfTheirStep) {
+  Handle handle;
+  Pushed pushed(handle);
+  handle.buttons = 0b101;
+  EXPECT_EQ(pushed.steps(3).buttons, 0b101U);
+  EXPECT_EQ(pushed.mail->state.take()->buttons, 0b101U);
+  handle.plugged = false;
+  EXPECT_EQ(pushed.steps(1).buttons, 0b101U) << "as it last said";
+  handle.plugged = true;
+  handle.buttons = 0;
+  EXPECT_EQ(pushed.steps(1).buttons, 0U);
+}
 
 TEST(HapticLoop, ADisarmedDeviceIsHomedAtOnceAndArmedAgainByAnOrderOnly) {
   Handle handle;

@@ -18,6 +18,7 @@ from .handshake import ClientHandshake
 from .messages import (
     FEATURE_CHANNELS,
     FEATURE_DIAGNOSTICS,
+    FEATURE_HANDLE,
     FEATURE_LOCAL_MODEL,
     NEVER,
     Claim,
@@ -32,6 +33,7 @@ from .messages import (
     ForceCommand,
     GiveLease,
     Grant,
+    HandleDescription,
     Hello,
     Instant,
     LeaseLost,
@@ -174,6 +176,7 @@ class ForceClient:
         self.welcome: Welcome | None = None
         """The server's description of itself and its device at the opening of the newest session."""
         self.description: DeviceDescription | None = None
+        self.handle: HandleDescription | None = None
         """Description of the device, once we have named a device or a channel and the server has answered."""
         self.holds = False
         """Whether the channel takes our forces. While it does not, a controller is handed no states."""
@@ -388,7 +391,7 @@ class ForceClient:
         return self.config.role is Role.CONTROLLER and not self.holds
 
     def _greet(self, now: int) -> None:
-        features: tuple[str, ...] = (FEATURE_LOCAL_MODEL, FEATURE_CHANNELS)
+        features: tuple[str, ...] = (FEATURE_LOCAL_MODEL, FEATURE_CHANNELS, FEATURE_HANDLE)
         if self.config.diagnostics:
             features += (FEATURE_DIAGNOSTICS,)
         hello = Hello(self.config.role, self.config.name, features, claims=self._claims())
@@ -420,9 +423,12 @@ class ForceClient:
         self._ask_lease = now if self.config.take_lease and self._waits_for_lease() else NEVER
         self._stats.lease_lost_to = ""
         self.description = None
+        self.handle = None
         self._session = Session(outcome.connection_id, now, outcome.cipher)
         if self._claims():
             self._session.request(Describe(self._place.device))
+        if FEATURE_HANDLE in outcome.welcome.features:
+            self._session.request(Describe(self._place.device, handle=True))
         if self.config.state_hz > 0:
             self._session.request(SetStateRate(self.config.state_hz, self._place.device))
         asked = self.config.state_deadband
@@ -475,6 +481,8 @@ class ForceClient:
     def _take_answer(self, now: int, answer: ControlAck) -> None:
         if answer.device is not None:
             self.description = answer.device
+        if answer.handle is not None:
+            self.handle = answer.handle
         if answer.id == self._deadband_request:
             self._foretell = answer.code is Code.OK and self._period > 0 and self._silence_ns() > 0
         if answer.id != self._asked_lease:

@@ -13,7 +13,7 @@ from typing import Any
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
-from .messages import Code, DeviceDescription, DeviceReport, DeviceState, LinkReport, PeerReport, Touch, Welcome
+from .messages import Code, DeviceDescription, DeviceReport, DeviceState, HandleDescription, LinkReport, PeerReport, Touch, Welcome
 
 log = logging.getLogger("tendon")
 
@@ -223,6 +223,12 @@ class AnyClient:
     def description(self) -> DeviceDescription | None:
         """Description of the device, once we have named a device or a channel and the server has answered."""
         return self._guest.core.description
+
+    @property
+    def handle(self) -> HandleDescription | None:
+        """How the device lies before the operator, and its buttons' names, once the server has answered. None for good when
+        the server does not know FEATURE_HANDLE."""
+        return self._guest.core.handle
 
     @property
     def holds(self) -> bool:

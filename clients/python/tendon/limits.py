@@ -10,7 +10,7 @@ MAX_VALUE = 1e12
 MAX_TIME_NS = 1 << 60
 """Largest distance of any clock reading from its zero."""
 UNIT_TOLERANCE = 1e-3
-"""Tolerance of the length of a unit normal."""
+"""Tolerance of the length of a unit normal or quaternion."""
 MIN_TABLE = 2
 MAX_TABLE = 16
 """Entries of a table of forces."""
@@ -24,6 +24,8 @@ MAX_NAME = 64
 """Bytes of UTF-8 in a name."""
 MAX_LABEL = 24
 """Bytes of UTF-8 in the name of a device or a channel."""
+MAX_BUTTONS = 16
+"""Named buttons of a device."""
 MAX_DEVICES = 16
 MAX_CHANNELS = 8
 MAX_CLAIMS = 16

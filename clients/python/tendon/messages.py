@@ -16,6 +16,9 @@ from typing import Union
 Vec3 = tuple[float, float, float]
 Mat3 = tuple[Vec3, Vec3, Vec3]
 
+Quat = tuple[float, float, float, float]
+"""A rotation as a unit quaternion (w, x, y, z), Hamilton's. q and −q are the same rotation."""
+
 ZERO: Vec3 = (0.0, 0.0, 0.0)
 
 PROTOCOL_VERSION = 1
@@ -26,6 +29,9 @@ FEATURE_CHANNELS = "channels"
 
 FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
+
+FEATURE_HANDLE = "handle"
+"""The client is told how the device lies before the operator, its buttons' names, and which of them are held."""
 
 FEATURE_DIAGNOSTICS = "diagnostics"
 """An observer is told the forces asked for, and the state of loops and engines (DeviceReport, PeerReport)."""
@@ -98,6 +104,7 @@ class DeviceState:
     device: int = 0
     channel: int = 0  # of the force that force_sequence, force_age_ns and mode are about
     force_wanted: Vec3 | None = None  # N, asked for by the engines, before any limit; None: not told (FEATURE_DIAGNOSTICS)
+    buttons: int = 0  # bit i is set while button i is held; a press between two states is in the next (FEATURE_HANDLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +175,11 @@ class Disarm:
 
 @dataclass(frozen=True, slots=True)
 class Describe:
-    """Client → server, reliable: asks for the description of a device; answered with a DeviceDescription."""
+    """Client → server, reliable: asks for the description of a device; answered with a DeviceDescription, or with a
+    HandleDescription. The latter only of a server that has agreed to FEATURE_HANDLE."""
 
     device: int = 0
+    handle: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +212,7 @@ class SetStateDeadband:
     """Client → server, reliable: leave out the states that this client can predict (`foretell`).
 
     After a state with velocity v the next one that is sent is the first whose velocity differs from v by more than
-    max(share · ‖v‖, floor), whose mode is another, or which comes `max_silence_us` later.
+    max(share · ‖v‖, floor), whose mode or buttons differ, or which comes `max_silence_us` later.
     """
 
     share: float = 0.1  # of the speed: 0 … 0.5
@@ -248,6 +257,17 @@ class DeviceDescription:
 
 
 @dataclass(frozen=True, slots=True)
+class HandleDescription:
+    """What the handle of a device is and can do (FEATURE_HANDLE)."""
+
+    device: int = 0
+    operator_from_device: Quat | None = None
+    """Turns the base frame into the operator's: x right, y up, z to the user; None: not known."""
+    buttons: Sequence[str] = ()
+    """Names by bit of DeviceState.buttons."""
+
+
+@dataclass(frozen=True, slots=True)
 class Control:
     """A request on its way."""
 
@@ -264,6 +284,7 @@ class ControlAck:
     detail: str = ""
     wait_ms: int = 0  # with Code.BUSY of TakeLease; 0 = nobody knows
     device: DeviceDescription | None = None  # with Code.OK of Describe
+    handle: HandleDescription | None = None  # … that asks for the handle
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from .messages import (
     DeviceReport,
     DeviceState,
     ForceCommand,
+    HandleDescription,
     Frame,
     Instant,
     LinkReport,
@@ -161,10 +162,16 @@ class Session:
         return self._asked.add(request)
 
     def answer(
-        self, number: int, code: Code, detail: str, wait_ms: int = 0, device: DeviceDescription | None = None
+        self,
+        number: int,
+        code: Code,
+        detail: str,
+        wait_ms: int = 0,
+        device: DeviceDescription | None = None,
+        handle: HandleDescription | None = None,
     ) -> None:
         """Answers a Control that has arrived. Every one must be answered; an id that waits for no answer is ignored."""
-        self._answering.answer(ControlAck(number, code, detail, wait_ms, device))
+        self._answering.answer(ControlAck(number, code, detail, wait_ms, device, handle))
 
     def close(self, code: Code, reason: str) -> None:
         """Says Bye and closes. Frames not sent yet are dropped. No Closed event follows, because the owner knows."""

@@ -110,18 +110,20 @@ class Control(_message.Message):
     def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
-    __slots__ = ["code", "detail", "device", "id", "wait_ms"]
+    __slots__ = ["code", "detail", "device", "handle", "id", "wait_ms"]
     CODE_FIELD_NUMBER: _ClassVar[int]
     DETAIL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    HANDLE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     WAIT_MS_FIELD_NUMBER: _ClassVar[int]
     code: Code
     detail: str
     device: DeviceDescription
+    handle: HandleDescription
     id: int
     wait_ms: int
-    def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., wait_ms: _Optional[int] = ..., device: _Optional[_Union[DeviceDescription, _Mapping]] = ...) -> None: ...
+    def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., wait_ms: _Optional[int] = ..., device: _Optional[_Union[DeviceDescription, _Mapping]] = ..., handle: _Optional[_Union[HandleDescription, _Mapping]] = ...) -> None: ...
 
 class Datagram(_message.Message):
     __slots__ = ["echo", "frames", "tx_time_ns"]
@@ -142,10 +144,12 @@ class Delays(_message.Message):
     def __init__(self, median_ns: _Optional[int] = ..., p99_ns: _Optional[int] = ...) -> None: ...
 
 class Describe(_message.Message):
-    __slots__ = ["device"]
+    __slots__ = ["device", "handle"]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    HANDLE_FIELD_NUMBER: _ClassVar[int]
     device: int
-    def __init__(self, device: _Optional[int] = ...) -> None: ...
+    handle: bool
+    def __init__(self, device: _Optional[int] = ..., handle: bool = ...) -> None: ...
 
 class DeviceDescription(_message.Message):
     __slots__ = ["channels", "continuous_force_n", "device", "force_dof", "loop_hz", "max_force_n", "max_stiffness_npm", "model", "name", "position_dof", "position_resolution_m", "workspace_max_m", "workspace_min_m"]
@@ -206,7 +210,8 @@ class DeviceReport(_message.Message):
     def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., device: _Optional[int] = ..., steps: _Optional[int] = ..., missed: _Optional[int] = ..., overruns: _Optional[int] = ..., unseen: _Optional[int] = ..., lateness_us_log2: _Optional[_Iterable[int]] = ..., safety: _Optional[_Union[Safety, str]] = ..., fault: _Optional[str] = ..., degraded: _Optional[str] = ...) -> None: ...
 
 class DeviceState(_message.Message):
-    __slots__ = ["channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    __slots__ = ["buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    BUTTONS_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     ENERGY_J_FIELD_NUMBER: _ClassVar[int]
@@ -221,6 +226,7 @@ class DeviceState(_message.Message):
     SAMPLED_NS_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    buttons: int
     channel: int
     device: int
     energy_j: float
@@ -235,7 +241,7 @@ class DeviceState(_message.Message):
     sampled_ns: int
     tick: int
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ...) -> None: ...
 
 class Disarm(_message.Message):
     __slots__ = ["device"]
@@ -324,6 +330,16 @@ class Grant(_message.Message):
     device: int
     role: Role
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
+
+class HandleDescription(_message.Message):
+    __slots__ = ["buttons", "device", "operator_from_device"]
+    BUTTONS_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    OPERATOR_FROM_DEVICE_FIELD_NUMBER: _ClassVar[int]
+    buttons: _containers.RepeatedScalarFieldContainer[str]
+    device: int
+    operator_from_device: Quat
+    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]
@@ -432,6 +448,18 @@ class PeerReport(_message.Message):
     name: str
     state_one_in: int
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
+
+class Quat(_message.Message):
+    __slots__ = ["w", "x", "y", "z"]
+    W_FIELD_NUMBER: _ClassVar[int]
+    X_FIELD_NUMBER: _ClassVar[int]
+    Y_FIELD_NUMBER: _ClassVar[int]
+    Z_FIELD_NUMBER: _ClassVar[int]
+    w: float
+    x: float
+    y: float
+    z: float
+    def __init__(self, w: _Optional[float] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
 
 class Rearm(_message.Message):
     __slots__ = ["device"]

@@ -5,7 +5,7 @@ import { create, fromBinary, toBinary, type DescMessage, type MessageShape } fro
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
-  Claim, Contact, Delays, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, Hello, LinkReport, LocalModel,
+  Claim, Contact, Delays, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello, LinkReport, LocalModel,
   PeerReport, Refused, Request, Stiffness, Vec3, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
@@ -34,6 +34,8 @@ export interface ControlAck {
   readonly waitMs?: number | undefined;
   /** With OK of describe. */
   readonly device?: DeviceDescription | undefined;
+  /** With OK of describe that asks for the handle. */
+  readonly handle?: HandleDescription | undefined;
 }
 export interface Bye {
   readonly code: pb.Code;
@@ -205,11 +207,13 @@ function readBody(body: Body): Frame | undefined {
     case "controlAck": {
       const { id, code, detail, waitMs } = body.value;
       const device = body.value.device && readDescription(body.value.device);
+      const handle = body.value.handle && readHandle(body.value.handle);
       const good = id > 0 && isEnum(code, pb.CodeSchema) && isText(detail, limits.kMaxDetail) &&
-        waitMs <= limits.kMaxTimeoutMs && (device !== undefined || !body.value.device);
-      return good
-        ? { kind: "controlAck", value: { id, code, detail, ...(waitMs && { waitMs }), ...(device && { device }) } }
-        : undefined;
+        waitMs <= limits.kMaxTimeoutMs && (device !== undefined || !body.value.device) &&
+        (handle !== undefined || !body.value.handle);
+      if (!good) return undefined;
+      const described = { ...(device && { device }), ...(handle && { handle }) };
+      return { kind: "controlAck", value: { id, code, detail, ...(waitMs && { waitMs }), ...described } };
     }
     case "bye": {
       const { code, reason } = body.value;
@@ -240,9 +244,10 @@ function writeBody(frame: Frame): Body {
     case "control":
       return { case: "control", value: create(pb.ControlSchema, { id: frame.value.id, op: writeRequest(frame.value.request) }) };
     case "controlAck": {
-      const { id, code, detail, waitMs, device } = frame.value;
+      const { id, code, detail, waitMs, device, handle } = frame.value;
       const ack = create(pb.ControlAckSchema, { id, code, detail: clip(detail, limits.kMaxDetail), waitMs: waitMs ?? 0 });
       if (device) ack.device = writeDescription(device);
+      if (handle) ack.handle = writeHandle(handle);
       return { case: "controlAck", value: ack };
     }
     case "bye": {
@@ -284,6 +289,7 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
     device: from.device,
     channel: from.channel,
     ...(from.forceWantedN && { forceWanted: readVec3(from.forceWantedN) }),
+    buttons: from.buttons,
   };
   const good = (!state.forceWanted || isVec3(state.forceWanted)) && isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
     isVec3(state.forceApplied) && isBounded(state.energy) &&
@@ -308,6 +314,7 @@ const writeState = (from: DeviceState): pb.DeviceState =>
     device: from.device,
     channel: from.channel,
     ...(from.forceWanted && { forceWantedN: writeVec3(from.forceWanted) }),
+    buttons: from.buttons,
   });
 
 /** 1 entry, 3 or 9, all of them within bounds. */
@@ -492,14 +499,35 @@ function writeDescription(from: DeviceDescription): pb.DeviceDescription {
   });
 }
 
+function readHandle(from: pb.HandleDescription): HandleDescription | undefined {
+  const { device, buttons, operatorFromDevice: axes } = from;
+  const good = isDevice(device) && buttons.length <= limits.kMaxButtons &&
+    buttons.every((name) => isText(name, limits.kMaxLabel)) &&
+    (!axes || Math.abs(Math.hypot(axes.w, axes.x, axes.y, axes.z) - 1) <= limits.kUnitTolerance);
+  if (!good) return undefined;
+  return {
+    device, buttons: [...buttons], ...(axes && { operatorFromDevice: { w: axes.w, x: axes.x, y: axes.y, z: axes.z } }),
+  };
+}
+
+function writeHandle(from: HandleDescription): pb.HandleDescription {
+  const { device, operatorFromDevice: axes } = from;
+  return create(pb.HandleDescriptionSchema, {
+    device,
+    ...(axes && { operatorFromDevice: create(pb.QuatSchema, { w: axes.w, x: axes.x, y: axes.y, z: axes.z }) }),
+    buttons: from.buttons.slice(0, limits.kMaxButtons).map((name) => clip(name, limits.kMaxLabel)),
+  });
+}
+
 function readRequest(op: pb.Control["op"]): Request | undefined {
   switch (op.case) {
     case "setStateRate":
       return { kind: op.case, hz: op.value.hz, device: op.value.device };
     case "rearm":
     case "disarm":
-    case "describe":
       return { kind: op.case, device: op.value.device };
+    case "describe":
+      return { kind: op.case, device: op.value.device, ...(op.value.handle && { handle: true }) };
     case "takeLease":
     case "giveLease":
       return { kind: op.case, device: op.value.device, channel: op.value.channel };
@@ -523,7 +551,7 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
     case "disarm":
       return { case: request.kind, value: create(pb.DisarmSchema, { device: request.device }) };
     case "describe":
-      return { case: request.kind, value: create(pb.DescribeSchema, { device: request.device }) };
+      return { case: request.kind, value: create(pb.DescribeSchema, { device: request.device, handle: request.handle ?? false }) };
     case "takeLease":
       return { case: request.kind, value: create(pb.TakeLeaseSchema, { device: request.device, channel: request.channel }) };
     case "giveLease":

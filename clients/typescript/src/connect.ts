@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
-import type { DeviceDescription, DeviceReport, LinkReport, PeerReport, Welcome } from "./messages.js";
+import type { DeviceDescription, DeviceReport, HandleDescription, LinkReport, PeerReport, Welcome } from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
 /** The way of datagrams to one server. */
@@ -32,6 +32,8 @@ export interface Guest {
   readonly welcome: Welcome | undefined;
   /** Description of the device, once `device` or `channel` was named and the server has answered. */
   readonly description: DeviceDescription | undefined;
+  /** How the device lies before the operator, and its buttons' names. Absent for good when the server does not know that. */
+  readonly handle: HandleDescription | undefined;
   /** The channel takes our forces; while it does not, the physics is not called. */
   readonly holds: boolean;
   /** The server's newest report on our forces, once a second while they come. */
@@ -117,6 +119,9 @@ class RealTimeGuest implements Guest {
   }
   get description(): DeviceDescription | undefined {
     return this.#client.description;
+  }
+  get handle(): HandleDescription | undefined {
+    return this.#client.handle;
   }
   get holds(): boolean {
     return this.#client.holds;

@@ -6,7 +6,8 @@ import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs, kMaxValue } from "./limits.js";
 import {
-  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureLocalModel, kProtocolVersion, Role, type Contact, type DeviceDescription,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureLocalModel, kProtocolVersion, Role, type Contact,
+  type DeviceDescription, type HandleDescription,
   type DeviceReport, type DeviceState, type Grant, type Hello, type LinkReport, type PeerReport, type Request, type StateDeadband,
   type Stiffness, type Vec3, type Welcome,
 } from "./messages.js";
@@ -189,6 +190,7 @@ export class ForceClient {
   #session: Session | undefined;
   #welcome: Welcome | undefined;
   #description: DeviceDescription | undefined;
+  #handle: HandleDescription | undefined;
   /** The numbers of our device and channel. */
   #place = kFirstPlace;
   #holds = false;
@@ -330,6 +332,11 @@ export class ForceClient {
     return this.#description;
   }
 
+  /** How the device lies before the operator, and its buttons' names. Absent for good when the server does not know that. */
+  get handle(): HandleDescription | undefined {
+    return this.#handle;
+  }
+
   /** The server's newest report on our forces in the present session; one comes each second while forces come. */
   get report(): LinkReport | undefined {
     return this.#report;
@@ -355,7 +362,7 @@ export class ForceClient {
       versionMax: kProtocolVersion,
       role: this.#role,
       name,
-      features: [kFeatureLocalModel, kFeatureChannels, ...(diagnostics ? [kFeatureDiagnostics] : [])],
+      features: [kFeatureLocalModel, kFeatureChannels, kFeatureHandle, ...(diagnostics ? [kFeatureDiagnostics] : [])],
       claims: this.#claims ? [{ device, channel, role: this.#role }] : [],
     };
     this.#handshake = new ClientHandshake(hello, this.#config.key, this.#config.random, now);
@@ -386,9 +393,11 @@ export class ForceClient {
     this.#askLease = this.#config.takeLease && this.#role === Role.CONTROLLER && !this.#holds ? now : kNever;
     this.#stats.leaseLostTo = "";
     this.#description = undefined;
+    this.#handle = undefined;
     this.#session = new Session({ connectionId, seal }, now);
     const { device } = this.#place;
     if (this.#claims) this.#session.request({ kind: "describe", device });
+    if (welcome.features.includes(kFeatureHandle)) this.#session.request({ kind: "describe", device, handle: true });
     if (this.#config.stateHz > 0) this.#session.request({ kind: "setStateRate", hz: this.#config.stateHz, device });
     const { deadband, stateDeadband } = this.#config;
     this.#deadbandRequest = stateDeadband && this.#session.request({ kind: "setStateDeadband", ...stateDeadband });
@@ -455,8 +464,9 @@ export class ForceClient {
     }
   }
 
-  #takeAnswer(now: Nanoseconds, { id, code, device, waitMs = 0 }: ControlAck): void {
+  #takeAnswer(now: Nanoseconds, { id, code, device, handle, waitMs = 0 }: ControlAck): void {
     if (device) this.#description = device;
+    if (handle) this.#handle = handle;
     if (id === this.#deadbandRequest) this.#foretells = code === Code.OK && this.#period > 0n && this.#silence() > 0n;
     if (id !== this.#askedLease) return;
     this.#askedLease = undefined;

@@ -8,7 +8,8 @@ export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
   ChannelRule, Code, Mode, reasonNames, Role, Safety, type ChannelDescription, type Contact, type Delays,
-  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type LinkReport, type PeerReport,
+  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type HandleDescription, type LinkReport, type PeerReport,
+  type Quat,
   type StateDeadband, type Stiffness, type Vec3, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";

@@ -7,7 +7,7 @@ export const kMaxDatagram = 1200;
 export const kMaxValue = 1e12;
 /** ns; largest distance of any clock reading from its zero. */
 export const kMaxTime = 1n << 60n;
-/** Tolerance of the length of a unit normal. */
+/** Tolerance of the length of a unit normal or quaternion. */
 export const kUnitTolerance = 1e-3;
 /** Entries of a table of forces. */
 export const kMinTable = 2;
@@ -23,6 +23,8 @@ export const kRequestWindow = 16;
 export const kMaxName = 64;
 /** Bytes of UTF-8 in the name of a device or a channel. */
 export const kMaxLabel = 24;
+/** Named buttons of a device. */
+export const kMaxButtons = 16;
 export const kMaxDevices = 16;
 export const kMaxChannels = 8;
 export const kMaxClaims = 16;

@@ -14,6 +14,9 @@ export const kFeatureLocalModel = "local-model";
 /** A feature: the client understands that a lease can be lost. */
 export const kFeatureChannels = "channels";
 
+/** A feature: the client is told how the device lies before the operator, its buttons' names, and which are held. */
+export const kFeatureHandle = "handle";
+
 /** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
 export const kFeatureDiagnostics = "diagnostics";
 
@@ -22,6 +25,11 @@ export interface Vec3 {
   readonly x: number;
   readonly y: number;
   readonly z: number;
+}
+
+/** A rotation as a unit quaternion, Hamilton's. q and −q are the same rotation. */
+export interface Quat extends Vec3 {
+  readonly w: number;
 }
 
 /** N/m, −∂force/∂position; a spring is positive. 1 entry k: k·I. 3: the diagonal. 9: the matrix, row by row. */
@@ -55,6 +63,8 @@ export interface DeviceState {
   readonly channel: number;
   /** N, asked for by the engines, before any limit; absent: not told, see DeviceReport. */
   readonly forceWanted?: Vec3 | undefined;
+  /** Bit i is set while button i is held. A press between two states is in the next one. */
+  readonly buttons: number;
 }
 
 /**
@@ -110,7 +120,7 @@ export interface ForceCommand {
 
 /**
  * Leave out the states that this client can predict. After a state with velocity v, the next state sent is the first
- * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode is another, or which comes
+ * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or which comes
  * maxSilenceUs later.
  */
 export interface StateDeadband {
@@ -128,7 +138,9 @@ export interface StateDeadband {
  */
 export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
-  | { readonly kind: "rearm" | "disarm" | "describe"; readonly device: number }
+  | { readonly kind: "rearm" | "disarm"; readonly device: number }
+  /** With `handle` the answer is a HandleDescription. Only for a server that has agreed to kFeatureHandle. */
+  | { readonly kind: "describe"; readonly device: number; readonly handle?: boolean }
   | { readonly kind: "takeLease" | "giveLease"; readonly device: number; readonly channel: number }
   | { readonly kind: "leaseLost"; readonly device: number; readonly channel: number; readonly to: string }
   | ({ readonly kind: "setStateDeadband" } & StateDeadband);
@@ -162,6 +174,15 @@ export interface DeviceDescription {
   readonly positionResolution: number;
   readonly loopHz: number;
   readonly channels: readonly ChannelDescription[];
+}
+
+/** What the handle of a device is and can do. */
+export interface HandleDescription {
+  readonly device: number;
+  /** Turns the base frame into the operator's: x right, y up, z to the user. Absent: not known. */
+  readonly operatorFromDevice?: Quat | undefined;
+  /** Names by bit of DeviceState.buttons. */
+  readonly buttons: readonly string[];
 }
 
 /** Two quantiles of a delay; below zero only where two clocks had to be compared. */

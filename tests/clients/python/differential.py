@@ -74,6 +74,7 @@ def _frame(frame: Frame) -> list[object]:
             *(_double(frame.energy), _double(frame.permitted_force)),
             *(frame.reasons, frame.force_sequence, frame.force_age_ns, int(frame.mode)),
             *([] if frame.force_wanted is None else ["wanted", *_vector(frame.force_wanted)]),
+            *(["buttons", frame.buttons] if frame.buttons else []),
         ]
     if isinstance(frame, ForceCommand):
         words: list[object] = ["force", frame.sequence, frame.based_on_tick, *_vector(frame.force)]
@@ -104,7 +105,12 @@ def _frame(frame: Frame) -> list[object]:
             return [*words, asked.max_silence_us * 1000]
         return ["control", frame.id, {Rearm: "rearm", Disarm: "disarm"}.get(type(frame.request), "other")]
     if isinstance(frame, ControlAck):
-        return ["ack", frame.id, int(frame.code), _text(frame.detail)]
+        words = ["ack", frame.id, int(frame.code), _text(frame.detail)]
+        if frame.handle is not None:
+            axes = frame.handle.operator_from_device
+            words += ["handle"] if axes is None else ["handle", "axes", *map(_double, axes)]
+            words += [len(frame.handle.buttons), *map(_text, frame.handle.buttons)]
+        return words
     if isinstance(frame, LinkReport):
         return _report(frame)
     if isinstance(frame, DeviceReport):

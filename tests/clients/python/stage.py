@@ -15,6 +15,7 @@ from tendon import (
     Code,
     Config,
     DeviceDescription,
+    HandleDescription,
     ForceClient,
     Mode,
     SetStateDeadband,
@@ -51,6 +52,8 @@ DESCRIPTION = DeviceDescription(
         ChannelDescription("tool", ChannelRule.PRIORITY, 500, "wall"),
     ),
 )
+
+HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"))
 
 
 class Stage:
@@ -90,7 +93,9 @@ class Stage:
                 asks_lease = isinstance(event.request, TakeLease)
                 code = self.lease_answers.pop(0) if asks_lease and self.lease_answers else self.grant
                 described = isinstance(event.request, Describe) and code is Code.OK
-                session.answer(event.id, code, "", self.wait_ms, DESCRIPTION if described else None)
+                of_handle = described and event.request.handle
+                device, handle = (None, HANDLE) if of_handle else (DESCRIPTION, None)
+                session.answer(event.id, code, "", self.wait_ms, device if described else None, handle)
                 if asks_lease and code is Code.OK and self.snatches > 0:
                     self.snatches -= 1
                     session.request(LeaseLost(1, 2, "another"))

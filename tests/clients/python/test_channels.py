@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import inf
 
 import pytest
-from stage import DESCRIPTION, KEPT, Stage
+from stage import DESCRIPTION, HANDLE, KEPT, Stage
 from world import MS, SECOND
 
 from tendon import Code, Config, Phase, Role, Touch
@@ -52,7 +52,7 @@ def test_named_places_are_claimed_in_every_hello(names, claims):
     stage.run(100 * MS)
     (hello,) = stage.server.hellos
     assert hello.claims == claims
-    assert hello.features == ("local-model", "channels")
+    assert hello.features == ("local-model", "channels", "handle")
 
 
 def test_forces_orders_leases_and_rates_name_the_granted_place():
@@ -104,6 +104,20 @@ def test_the_description_of_a_named_device_is_that_of_the_session():
     stage.run(1 * SECOND)
     assert stage.client.phase is Phase.OPEN
     assert stage.client.description is None
+
+
+def test_the_handle_is_described_where_the_server_knows_that_feature():
+    for features, known in ((("local-model", "handle"), HANDLE), (("local-model",), None)):
+        stage = Stage(Config())
+        stage.server.features = features
+        stage.run(100 * MS)
+        assert stage.client.handle == known
+        assert [control.request for control in stage.requests] == ([Describe(0, handle=True)] if known else [])
+        assert stage.client.description is None
+        stage.grant = Code.UNSUPPORTED
+        stage.server.session.close(Code.SHUTDOWN, "")
+        stage.run(1 * SECOND)
+        assert (stage.client.phase, stage.client.handle) == (Phase.OPEN, None)
 
 
 def test_no_state_is_handed_out_while_another_holds_the_channel():

@@ -99,6 +99,26 @@ def test_an_observer_looks_on_beside_a_controller(tmp_path):
                 client.send(next(client.states(30)), Touch())
 
 
+def test_an_observer_sees_the_button_and_knows_its_name_and_which_way_is_up(tmp_path):
+    demo = scene("demo").replace("[device.hand]", "[device.hand]\nbutton_after_ms = 1500")
+    turned = demo.replace("[device]", '[device]\naxes = "right=-y up=z user=-x"')
+    with Server(tmp_path, scenes={"device": turned}) as server:
+        with Client(server.address, Config(role=Role.OBSERVER)) as client:
+            seen = []
+            for hand in client.states(30):
+                seen.append(hand.buttons)
+                if hand.buttons:
+                    break
+            assert set(seen[:-1]) == {0}
+            assert seen[-1] == 1
+            about = client.handle
+            assert about is not None
+            assert tuple(about.buttons) == ("button",)
+            assert about.operator_from_device is not None
+            w, x, y, z = about.operator_from_device
+            assert (abs(w), x / w, y / w, z / w) == (0.5, -1, 1, 1)
+
+
 def test_a_second_controller_waits_and_takes_over_when_the_first_leaves(tmp_path):
     with Server(tmp_path) as server, example(tmp_path, "virtual_wall", "--server", server.address) as first:
         first.wait_for_line("connected")

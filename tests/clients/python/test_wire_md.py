@@ -91,6 +91,7 @@ REPORT = LinkReport(
     duplicated=0,
     words="forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)",
 )
+STATE_BUTTONS = replace(STATE, buttons=0b1001)
 STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5))
 DEVICE_REPORT = DeviceReport(
     number=7,
@@ -117,6 +118,7 @@ FRAMES = {
     "bye": (46, None, [Bye(Code.SHUTDOWN, "SIGTERM")]),
     "report": (57, None, [REPORT]),
     "state-wanted": (60, None, [STATE_WANTED]),
+    "state-buttons": (64, None, [STATE_BUTTONS]),
     "device-report": (61, None, [DEVICE_REPORT]),
     "peer-report": (62, None, [PEER_REPORT]),
     "state-deadband": (58, None, [Control(9, SetStateDeadband(0.1, 0.001, 20_000))]),

@@ -3,7 +3,7 @@
 // Devices, channels and leases of a ForceClient, against a server on virtual time.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
-import { ChannelRule, Code, Role, type DeviceDescription, type Request } from "../../../clients/typescript/src/messages.js";
+import { ChannelRule, Code, Role, type DeviceDescription, type HandleDescription, type Request } from "../../../clients/typescript/src/messages.js";
 import { controller, kFair, World, type ServerConduct } from "./support/world.js";
 
 describe("devices and channels", () => {
@@ -69,6 +69,27 @@ describe("devices and channels", () => {
     world.server.restart();
     world.runMs(500);
     assert.deepEqual([world.client.phase, world.client.description], ["open", undefined]);
+  });
+
+  it("the handle is described where the server knows that feature, anew in each session", () => {
+    const kHandle: HandleDescription = {
+      device: 0, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward"],
+    };
+    for (const features of [["local-model", "handle"], ["local-model"]]) {
+      const knows = features.includes("handle");
+      const { world } = controller(1, kFair, {}, {
+        features, answer: (request: Request) => (request.kind === "describe" ? { ...ok, handle: kHandle } : ok),
+      });
+      world.runMs(100);
+      assert.deepEqual(world.client.handle, knows ? kHandle : undefined);
+      assert.deepEqual(world.server.requests, knows ? [{ kind: "describe", device: 0, handle: true }] : []);
+      world.server.session!.close(Code.SHUTDOWN, "");
+      world.runMs(20);
+      world.server.conduct.answer = () => ({ code: Code.INVALID, detail: "no such device" });
+      world.server.restart();
+      world.runMs(500);
+      assert.deepEqual([world.client.phase, world.client.handle], ["open", undefined]);
+    }
   });
 
   it("that nobody named are the first ones, neither claimed nor described", () => {

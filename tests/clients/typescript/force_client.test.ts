@@ -383,7 +383,7 @@ describe("what need not be sent", () => {
     state: (tick) => ({
       tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) * 1e-4, y: 0, z: 0 }, velocity: { x: 0.1, y: 0, z: 0 },
       forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0, forceSequence: 0n,
-      forceAgeNs: 0n, mode: Mode.ACTIVE, device: 0, channel: 0,
+      forceAgeNs: 0n, mode: Mode.ACTIVE, device: 0, channel: 0, buttons: 0,
     }),
   });
 
@@ -508,6 +508,6 @@ describe("diagnostics", () => {
       /diagnostics = true: expected false: they are for observers only/);
     const world = new World(1, kFair, {}, { watch: () => {} });
     world.runMs(100);
-    assert.deepEqual(world.server.hellos[0]!.hello.features, ["local-model", "channels"]);
+    assert.deepEqual(world.server.hellos[0]!.hello.features, ["local-model", "channels", "handle"]);
   });
 });

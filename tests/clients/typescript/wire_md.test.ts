@@ -123,10 +123,20 @@ describe("WIRE.md", () => {
       value: {
         tick: 1000n, sampledNs: 1_000_000_000n, position: { x: 0.01, y: 0, z: -0.02 }, velocity: { x: 0.5, y: 0, z: 0 },
         forceApplied: { x: -2, y: 0, z: 0 }, energy: 0.25, permittedForce: 8, reasons: 3, forceSequence: 99n,
-        forceAgeNs: 1_500_000n, mode: Mode.ACTIVE, device: 0, channel: 0,
+        forceAgeNs: 1_500_000n, mode: Mode.ACTIVE, device: 0, channel: 0, buttons: 0,
       },
     }]);
     assert.deepEqual(reasonNames(3), ["energy", "max force"]);
+  });
+
+  it("state-buttons and control-ack-handle say what the page says", () => {
+    const [state] = contentOf("state-buttons").frames;
+    assert.ok(state?.kind === "state");
+    assert.equal(state.value.buttons, 0b1001);
+    const [ack] = contentOf("control-ack-handle").frames;
+    assert.ok(ack?.kind === "controlAck" && ack.value.handle);
+    assert.deepEqual(ack.value.handle.operatorFromDevice, { w: 0.5, x: -0.5, y: 0.5, z: 0.5 });
+    assert.deepEqual(ack.value.handle.buttons, ["right", "forward", "centre", "left"]);
   });
 
   it("report says what the page says", () => {

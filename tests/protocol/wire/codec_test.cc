@@ -46,6 +46,7 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
   in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
   if (*rc::gen::arbitrary<bool>()) in.force_wanted = any_vector();
+  in.buttons = *rc::gen::arbitrary<std::uint32_t>();
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -53,6 +54,7 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   RC_ASSERT(content->frames.size() == 1U);
   const auto& out = std::get<DeviceState>(content->frames[0]);
   RC_ASSERT(out.force_wanted == in.force_wanted);
+  RC_ASSERT(out.buttons == in.buttons);
   RC_ASSERT(out.tick == in.tick);
   RC_ASSERT((out.sampled == in.sampled));
   RC_ASSERT(out.position == in.position);

@@ -109,6 +109,44 @@ TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
   EXPECT_EQ(device->name.size(), limits::kMaxLabel);
 }
 
+TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
+  ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
+  answer.handle = HandleDescription{.device = 15,
+                                    .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
+                                    .buttons = std::vector(limits::kMaxButtons + 1, std::string(limits::kMaxName, 'n'))};
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
+               examples::echo());
+  ASSERT_TRUE(writer.add(answer));
+  DataReader reader;
+  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 1U);
+  const auto& handle = std::get<ControlAck>(content->frames[0]).handle;
+  ASSERT_TRUE(handle.has_value());
+  EXPECT_EQ(handle->operator_from_device, answer.handle->operator_from_device);
+  EXPECT_EQ(handle->buttons.size(), limits::kMaxButtons);
+  EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
+}
+
+TEST(Codec, AxesThatAreNoRotationMakeADescriptionRefused) {
+  const auto accepted = [](const Quat& q) {
+    ControlAck ack = examples::handle_described(1);
+    ack.handle->operator_from_device = q;
+    DataReader reader;
+    const DataContent* content = read(reader, data(1, {}, ack));
+    return content != nullptr && content->frames.size() == 1;
+  };
+  EXPECT_TRUE(accepted({.w = 0, .x = 0.6, .y = 0, .z = -0.8}));
+  EXPECT_TRUE(accepted({.w = 1.0009, .x = 0, .y = 0, .z = 0}));
+  EXPECT_FALSE(accepted({.w = 1.0011, .x = 0, .y = 0, .z = 0}));
+  EXPECT_FALSE(accepted({.w = 0.9989, .x = 0, .y = 0, .z = 0}));
+  EXPECT_FALSE(accepted({.w = 0, .x = 0, .y = 0, .z = 0}));
+  EXPECT_FALSE(accepted({.w = kNan, .x = 0, .y = 0, .z = 1}));
+  EXPECT_FALSE(accepted({.w = kInf, .x = 0, .y = 0, .z = 0}));
+}
+
 TEST(Codec, ADeviceOrChannelThatCannotBeIsRefused) {
   const auto refused = [](const RawProtobuf& frame) {
     DataReader reader;

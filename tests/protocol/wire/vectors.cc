@@ -164,6 +164,8 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"reports on a device and on an engine", false, 267, 0,
        at(267, examples::device_report(), examples::peer_report())},
       {"disarm a device", true, 268, 0, request(268, 14, Disarm{.device = 1})},
+      {"buttons that are held", false, 269, 0, at(269, examples::state_with_buttons())},
+      {"description of a handle", false, 270, 0, at(270, examples::handle_described(15))},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

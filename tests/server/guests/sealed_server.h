@@ -79,6 +79,7 @@ class SealedServer : public testing::Test {
       state.tick = tick_ += tick_step_;
       state.sampled = PeerTime(now_.time_since_epoch());
       state.force_wanted = wanted_;
+      state.buttons = buttons_;
       mail_->state.put(state);
       if (measured_) {
         ++health_.steps;
@@ -186,6 +187,7 @@ class SealedServer : public testing::Test {
   std::uint64_t tick_step_ = 1;
   std::uint64_t steps_a_turn_ = 1;  ///< more: the network thread is late, and sees only the newest of them
   std::optional<Vec3> wanted_;      ///< as the device's loop says
+  std::uint32_t buttons_ = 0;       ///< likewise
   bool measured_ = false;           ///< the log thread tells how the loops do
   Health health_;
   std::uint64_t seed_ = 10;

@@ -62,6 +62,7 @@ inline StepRecord sample_step(std::uint64_t tick) {
   if (tick % 2 == 0) step.force_error = 0.125;
   step.rearmed = tick % 5 == 0;
   step.disarmed = tick % 7 == 0;
+  step.buttons = static_cast<std::uint32_t>(tick % 5);
   step.longest_hold = std::chrono::microseconds(2000 + tick);
   step.assumption_broken = tick % 11 == 0;
   if (tick % 4 < 2) step.stiffness << 500, -1, 2, -1, 600, 3, 2, 3.5, 700 + t;
@@ -102,10 +103,10 @@ inline bool same(const StepRecord& a, const StepRecord& b) {
          same(a.hand.position, b.hand.position) && same(a.hand.velocity, b.hand.velocity) && a.held == b.held &&
          same(a.was_applied, b.was_applied) && same(a.wanted, b.wanted) && same(a.permitted, b.permitted) &&
          same(a.force, b.force) && same(a.applied, b.applied) && same(a.energy, b.energy) && a.reasons == b.reasons &&
-         a.mode == b.mode && a.rearmed == b.rearmed && a.disarmed == b.disarmed && a.longest_hold == b.longest_hold &&
-         a.assumption_broken == b.assumption_broken && a.force_sequence == b.force_sequence &&
-         a.force_age == b.force_age && a.loop_age == b.loop_age && a.channel == b.channel &&
-         a.force_error.has_value() == b.force_error.has_value() &&
+         a.mode == b.mode && a.rearmed == b.rearmed && a.disarmed == b.disarmed && a.buttons == b.buttons &&
+         a.longest_hold == b.longest_hold && a.assumption_broken == b.assumption_broken &&
+         a.force_sequence == b.force_sequence && a.force_age == b.force_age && a.loop_age == b.loop_age &&
+         a.channel == b.channel && a.force_error.has_value() == b.force_error.has_value() &&
          same(a.force_error.value_or(0), b.force_error.value_or(0)) &&
          std::equal(a.stiffness.reshaped().begin(), a.stiffness.reshaped().end(), b.stiffness.reshaped().begin());
 }

@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/frames.h"
 #include "devices/replay/replay_device.h"
 #include "server/mailboxes.h"
 #include "server/recording/byte_sink.h"
@@ -31,6 +32,34 @@ constexpr std::string_view kFalcon =
     "[limiter]\n"
     "coulomb_friction_n = 0.9\n"
     "viscous_friction_n_s_per_m = 0\n";
+
+TEST(Scene, TheAxesOfEachKindOfDeviceAreKnownOrASceneSaysThem) {
+  for (const Driver* driver : drivers()) {
+    EXPECT_EQ(driver->axes.empty(), driver->kind == "replay") << driver->kind;
+    if (!driver->axes.empty()) EXPECT_EQ(axes_in_words(operator_from_device(driver->axes)), driver->axes);
+  }
+  EXPECT_EQ(parse(std::string(kFalcon), "/scenes").axes, "");
+  const std::string head = "[device]\naxes = ";
+  const std::string rest = std::string(kFalcon.substr(kFalcon.find('\n')));
+  EXPECT_EQ(parse(head + "\"user=-x up=z right=-y\"" + rest, "/scenes").axes, "right=-y up=z user=-x");
+}
+
+TEST(Scene, AxesThatMakeNoRotationAreRefusedWithTheReason) {
+  const auto refusal = [](const std::string& axes) {
+    try {
+      parse("[device]\naxes = " + axes + std::string(kFalcon.substr(kFalcon.find('\n'))), "/scenes");
+    } catch (const SceneError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string expected =
+      "s.toml:2: device.axes: expected the axes that point to the operator's right, up and towards the user, like "
+      "\"right=x up=y user=z\"";
+  EXPECT_EQ(refusal("\"right=x up=y user=-z\""),
+            expected + " (these three make a left-handed frame), found \"right=x up=y user=-z\"");
+  EXPECT_EQ(refusal("1"), expected + ", found 1");
+}
 
 TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
   const Scene scene = parse(std::string(kFalcon), "/scenes");

@@ -212,6 +212,7 @@ INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
                                                      {Fault::kReportsOfOneNumber, "link-report"},
                                                      {Fault::kReportsBeyondBounds, "link-report"},
                                                      {Fault::kDiagnosesUnasked, "diagnostics-unasked"},
+                                                     {Fault::kTellsOfTheHandleUnasked, "handle-unasked"},
                                                  })),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(Client, BrokenToy,

@@ -165,11 +165,13 @@ constexpr std::array kChecks = {
     Check{"deadband-bounds", kServer, kWire, kData, "answered CODE_INVALID beyond 0 … 0.5"},
     Check{"deadband", kServer, kSession, "Narrow links",
           "After a state with velocity v the next one sent is the first whose velocity differs from v by more than "
-          "max(share · |v|, floor), whose mode differs, or that comes max_silence_us later."},
+          "max(share · |v|, floor), whose mode or buttons differ, or that comes max_silence_us later."},
     Check{"link-report", kServer, kSession, "Report",
           "From a controller's first force on, the server tells it once a second how its forces fare (LinkReport)"},
     Check{"diagnostics-unasked", kServer, kSession, "Report",
           "Only an observer that named the feature diagnostics is told these"},
+    Check{"handle-unasked", kServer, kSession, "Report",
+          "Only a client that named the feature handle is told which buttons are held."},
     // The end.
     Check{"bye-silence", kBoth, kSession, kStates, "nothing is sent, accepted or counted any more"},
     Check{"bye-thrice", kBoth, kSession, kStates, "Bye is said three times, what was not sent is dropped"},

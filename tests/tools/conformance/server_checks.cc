@@ -129,6 +129,8 @@ void check_states(Report& report, const Conversation& talk) {
     const bool diagnosed = frame.has_device_report() || frame.has_peer_report() || frame.state().has_force_wanted_n();
     report.judge("diagnostics-unasked", !diagnosed, frame.ShortDebugString(),
                  "nothing of it: nobody named the feature");
+    report.judge("handle-unasked", frame.state().buttons() == 0, frame.ShortDebugString(),
+                 "no buttons: nobody named the feature");
     if (!frame.has_state()) return;
     const pb::DeviceState& state = frame.state();
     ++count;

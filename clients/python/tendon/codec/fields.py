@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import IntEnum
+from math import hypot
 from typing import TypeVar
 
 from google.protobuf.message import DecodeError
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import ChannelRule, Code, Mode, Role, Safety, Vec3
+from ..messages import ChannelRule, Code, Mode, Quat, Role, Safety, Vec3
 
 
 class OutOfBounds(Exception):
@@ -36,6 +37,13 @@ def vector(message: pb.Vec3) -> Vec3:
     if not (-most <= x <= most and -most <= y <= most and -most <= z <= most):
         raise OutOfBounds
     return (x, y, z)
+
+
+def quaternion(message: pb.Quat) -> Quat:
+    q = (message.w, message.x, message.y, message.z)
+    if not abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE:  # nor is NaN
+        raise OutOfBounds
+    return q
 
 
 def whole(value: int, least: int, most: int) -> int:

@@ -24,6 +24,7 @@ from ..messages import (
     ForceTable,
     Frame,
     GiveLease,
+    HandleDescription,
     LeaseLost,
     LinkReport,
     LocalModel,
@@ -56,6 +57,7 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         device=fields.device(message.device),
         channel=fields.channel(message.channel),
         force_wanted=fields.vector(message.force_wanted_n) if message.HasField("force_wanted_n") else None,
+        buttons=message.buttons,
     )
 
 
@@ -154,7 +156,7 @@ def _read_control(message: pb.Control) -> Control:
     elif op == "disarm":
         request = Disarm(fields.device(message.disarm.device))
     elif op == "describe":
-        request = Describe(fields.device(message.describe.device))
+        request = Describe(fields.device(message.describe.device), message.describe.handle)
     elif op == "take_lease":
         request = TakeLease(fields.device(message.take_lease.device), fields.channel(message.take_lease.channel))
     elif op == "give_lease":
@@ -175,6 +177,7 @@ def _read_ack(message: pb.ControlAck) -> ControlAck:
         detail=fields.text(message.detail, limits.MAX_DETAIL),
         wait_ms=fields.whole(message.wait_ms, 0, limits.MAX_TIMEOUT_MS),
         device=_read_description(message.device) if message.HasField("device") else None,
+        handle=_read_handle(message.handle) if message.HasField("handle") else None,
     )
 
 
@@ -237,6 +240,25 @@ def _write_description(description: DeviceDescription) -> pb.DeviceDescription:
                 holder=fields.clip(channel.holder, limits.MAX_LABEL),
             )
         )
+    return message
+
+
+def _read_handle(message: pb.HandleDescription) -> HandleDescription:
+    fields.whole(len(message.buttons), 0, limits.MAX_BUTTONS)
+    axes = message.operator_from_device
+    return HandleDescription(
+        device=fields.device(message.device),
+        operator_from_device=fields.quaternion(axes) if message.HasField("operator_from_device") else None,
+        buttons=tuple(fields.text(name, limits.MAX_LABEL) for name in message.buttons),
+    )
+
+
+def _write_handle(handle: HandleDescription) -> pb.HandleDescription:
+    names = [fields.clip(name, limits.MAX_LABEL) for name in handle.buttons[: limits.MAX_BUTTONS]]
+    message = pb.HandleDescription(device=handle.device, buttons=names)
+    if handle.operator_from_device is not None:
+        w, x, y, z = handle.operator_from_device
+        message.operator_from_device.CopyFrom(pb.Quat(w=w, x=x, y=y, z=z))
     return message
 
 
@@ -386,7 +408,7 @@ def _write_control(frame: Control) -> pb.Control:
     elif isinstance(request, Disarm):
         control.disarm.CopyFrom(pb.Disarm(device=request.device))
     elif isinstance(request, Describe):
-        control.describe.CopyFrom(pb.Describe(device=request.device))
+        control.describe.CopyFrom(pb.Describe(device=request.device, handle=request.handle))
     elif isinstance(request, TakeLease):
         control.take_lease.CopyFrom(pb.TakeLease(device=request.device, channel=request.channel))
     elif isinstance(request, GiveLease):
@@ -431,6 +453,7 @@ def write(frame: Frame) -> pb.Frame:
             device=frame.device,
             channel=frame.channel,
             force_wanted_n=None if frame.force_wanted is None else _write_vector(frame.force_wanted),
+            buttons=frame.buttons,
         )
         return pb.Frame(state=state)
     if isinstance(frame, Control):
@@ -442,6 +465,7 @@ def write(frame: Frame) -> pb.Frame:
             detail=fields.clip(frame.detail, limits.MAX_DETAIL),
             wait_ms=frame.wait_ms,
             device=None if frame.device is None else _write_description(frame.device),
+            handle=None if frame.handle is None else _write_handle(frame.handle),
         )
         return pb.Frame(control_ack=ack)
     if isinstance(frame, LinkReport):

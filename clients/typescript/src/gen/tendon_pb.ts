@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIvoCCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzIvIBCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQFCCgoIX2Vycm9yX24imwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASL+AgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASIwoGZGlzYXJtGAkgASgLMhEudGVuZG9uLnYxLkRpc2FybUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSIaCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0iLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkihgEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uImoKEkNoYW5uZWxEZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiQKBHJ1bGUYAiABKA4yFi50ZW5kb24udjEuQ2hhbm5lbFJ1bGUSEAoIbGVhc2VfbXMYAyABKA0SDgoGaG9sZGVyGAQgASgJIjQKA0J5ZRIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGcmVhc29uGAIgASgJIt4ECgpMaW5rUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmZvcmNlcxgEIAEoBBITCgtsYXRlX3NlcnZlchgFIAEoBBIUCgxsYXRlX25ldHdvcmsYBiABKAQSEwoLbGF0ZV9lbmdpbmUYByABKAQSFQoNd29yc3RfbGF0ZV9ucxgIIAEoBBIWCg5sb25nZXN0X2dhcF9ucxgJIAEoBBIlCgpyb3VuZF90cmlwGAogASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19zZXJ2ZXIYCyABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX2NsaWVudBgMIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSFwoPY2xvY2tfb2Zmc2V0X25zGA0gASgSEhcKD2Nsb2NrX2RyaWZ0X3BwbRgOIAEoARIWCg5jbG9ja19lcnJvcl9ucxgPIAEoBBIQCghyZWNlaXZlZBgQIAEoBBIMCgRsb3N0GBEgASgEEhEKCXJlb3JkZXJlZBgSIAEoBBISCgpkdXBsaWNhdGVkGBMgASgEEg0KBXdvcmRzGBQgASgJEhQKDGxhdGVfdW5rbm93bhgVIAEoBBIaChJyZWZ1c2VkX25vdF9maW5pdGUYFiABKAQSHQoVcmVmdXNlZF9vdXRfb2ZfYm91bmRzGBcgASgEEhwKFHJlZnVzZWRfdW5rbm93bl90aWNrGBggASgEEhwKFHJlZnVzZWRfb2xkX3NlcXVlbmNlGBkgASgEIisKBkRlbGF5cxIRCgltZWRpYW5fbnMYASABKBISDgoGcDk5X25zGAIgASgSIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAiq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASKLAwoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHIvIBCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQFCCgoIX2Vycm9yX24imwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASL+AgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASIwoGZGlzYXJtGAkgASgLMhEudGVuZG9uLnYxLkRpc2FybUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSIqCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0SDgoGaGFuZGxlGAIgASgIIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIrQBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24SLAoGaGFuZGxlGAYgASgLMhwudGVuZG9uLnYxLkhhbmRsZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24iYwoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCSJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSLeBAoKTGlua1JlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZmb3JjZXMYBCABKAQSEwoLbGF0ZV9zZXJ2ZXIYBSABKAQSFAoMbGF0ZV9uZXR3b3JrGAYgASgEEhMKC2xhdGVfZW5naW5lGAcgASgEEhUKDXdvcnN0X2xhdGVfbnMYCCABKAQSFgoObG9uZ2VzdF9nYXBfbnMYCSABKAQSJQoKcm91bmRfdHJpcBgKIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fc2VydmVyGAsgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19jbGllbnQYDCABKAsyES50ZW5kb24udjEuRGVsYXlzEhcKD2Nsb2NrX29mZnNldF9ucxgNIAEoEhIXCg9jbG9ja19kcmlmdF9wcG0YDiABKAESFgoOY2xvY2tfZXJyb3JfbnMYDyABKAQSEAoIcmVjZWl2ZWQYECABKAQSDAoEbG9zdBgRIAEoBBIRCglyZW9yZGVyZWQYEiABKAQSEgoKZHVwbGljYXRlZBgTIAEoBBINCgV3b3JkcxgUIAEoCRIUCgxsYXRlX3Vua25vd24YFSABKAQSGgoScmVmdXNlZF9ub3RfZmluaXRlGBYgASgEEh0KFXJlZnVzZWRfb3V0X29mX2JvdW5kcxgXIAEoBBIcChRyZWZ1c2VkX3Vua25vd25fdGljaxgYIAEoBBIcChRyZWZ1c2VkX29sZF9zZXF1ZW5jZRgZIAEoBCIrCgZEZWxheXMSEQoJbWVkaWFuX25zGAEgASgSEg4KBnA5OV9ucxgCIAEoEiL0AQoMRGV2aWNlUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmRldmljZRgEIAEoDRINCgVzdGVwcxgFIAEoBBIOCgZtaXNzZWQYBiABKAQSEAoIb3ZlcnJ1bnMYByABKAQSDgoGdW5zZWVuGAggASgEEhwKEGxhdGVuZXNzX3VzX2xvZzIYCSADKARCAhABEiEKBnNhZmV0eRgKIAEoDjIRLnRlbmRvbi52MS5TYWZldHkSDQoFZmF1bHQYCyABKAkSEAoIZGVncmFkZWQYDCABKAkijgEKClBlZXJSZXBvcnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SDAoEbmFtZRgDIAEoCRIUCgxzdGF0ZV9vbmVfaW4YBCABKA0SFgoOZm9yY2VzX3JlZnVzZWQYBSABKAgSIwoEbGluaxgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0IpIBCgVIZWxsbxITCgt2ZXJzaW9uX21pbhgBIAEoDRITCgt2ZXJzaW9uX21heBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSDAoEbmFtZRgEIAEoCRIQCghmZWF0dXJlcxgFIAMoCRIgCgZjbGFpbXMYBiADKAsyEC50ZW5kb24udjEuQ2xhaW0iRwoFQ2xhaW0SDgoGZGV2aWNlGAEgASgJEg8KB2NoYW5uZWwYAiABKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlIl4KBkFuc3dlchIlCgd3ZWxjb21lGAEgASgLMhIudGVuZG9uLnYxLldlbGNvbWVIABIlCgdyZWZ1c2VkGAIgASgLMhIudGVuZG9uLnYxLlJlZnVzZWRIAEIGCgRib2R5IusBCgdXZWxjb21lEg8KB3ZlcnNpb24YASABKA0SEAoIZmVhdHVyZXMYAiADKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEhMKC2RldmljZV9uYW1lGAQgASgJEhMKC21heF9mb3JjZV9uGAUgASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgGIAEoARIPCgdsb29wX2h6GAcgASgNEhIKCnRpbWVvdXRfbXMYCCABKA0SDgoGc2VydmVyGAkgASgJEiAKBmdyYW50cxgKIAMoCzIQLnRlbmRvbi52MS5HcmFudCJHCgVHcmFudBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiYgoHUmVmdXNlZBIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAIgASgJEhMKC3ZlcnNpb25fbWluGAMgASgNEhMKC3ZlcnNpb25fbWF4GAQgASgNKoUBCgRNb2RlEhQKEE1PREVfVU5TUEVDSUZJRUQQABINCglNT0RFX0lETEUQARIPCgtNT0RFX0FDVElWRRACEhAKDE1PREVfSE9MRElORxADEhEKDU1PREVfREVDQVlJTkcQBBISCg5NT0RFX1NBRkVfU1RPUBAFEg4KCk1PREVfRkFVTFQQBipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqvAEKBlNhZmV0eRIWChJTQUZFVFlfVU5TUEVDSUZJRUQQABIRCg1TQUZFVFlfQUJTRU5UEAESEgoOU0FGRVRZX09QRU5JTkcQAhITCg9TQUZFVFlfRklSTVdBUkUQAxISCg5TQUZFVFlfVU5IT01FRBAEEhAKDFNBRkVUWV9IT01FRBAFEhAKDFNBRkVUWV9BUk1FRBAGEhAKDFNBRkVUWV9GQVVMVBAHEhQKEFNBRkVUWV9VTkdVQVJERUQQCCq9AQoEQ29kZRIUChBDT0RFX1VOU1BFQ0lGSUVEEAASCwoHQ09ERV9PSxABEhAKDENPREVfSU5WQUxJRBACEhQKEENPREVfVU5TVVBQT1JURUQQAxINCglDT0RFX0JVU1kQBBIPCgtDT0RFX0RFTklFRBAFEhEKDUNPREVfU0hVVERPV04QBhISCg5DT0RFX1RJTUVEX09VVBAHEhAKDENPREVfRVhQSVJFRBAIEhEKDUNPREVfUkVQTEFDRUQQCSpECgRSb2xlEhQKEFJPTEVfVU5TUEVDSUZJRUQQABIRCg1ST0xFX09CU0VSVkVSEAESEwoPUk9MRV9DT05UUk9MTEVSEAJiBnByb3RvMw");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -205,6 +205,49 @@ export const Vec3Schema: GenMessage<Vec3> = /*@__PURE__*/
   messageDesc(file_tendon, 3);
 
 /**
+ * A rotation as a unit quaternion, Hamilton's: w + x i + y j + z k. q and −q are the same rotation. Its norm is
+ * 1 ± 0.001, or it is refused.
+ *
+ * @generated from message tendon.v1.Quat
+ */
+export type Quat = Message<"tendon.v1.Quat"> & {
+  /**
+   * [-1.001, 1.001]
+   *
+   * @generated from field: double w = 1;
+   */
+  w: number;
+
+  /**
+   * [-1.001, 1.001]
+   *
+   * @generated from field: double x = 2;
+   */
+  x: number;
+
+  /**
+   * [-1.001, 1.001]
+   *
+   * @generated from field: double y = 3;
+   */
+  y: number;
+
+  /**
+   * [-1.001, 1.001]
+   *
+   * @generated from field: double z = 4;
+   */
+  z: number;
+};
+
+/**
+ * Describes the message tendon.v1.Quat.
+ * Use `create(QuatSchema)` to create a new message.
+ */
+export const QuatSchema: GenMessage<Quat> = /*@__PURE__*/
+  messageDesc(file_tendon, 4);
+
+/**
  * A device at one haptic step.
  *
  * @generated from message tendon.v1.DeviceState
@@ -302,6 +345,14 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
    * @generated from field: tendon.v1.Vec3 force_wanted_n = 14;
    */
   forceWantedN?: Vec3 | undefined;
+
+  /**
+   * Bit i: button i is held. A press between two states of a client is in the next one. Only to a client that named the
+   * feature "handle"
+   *
+   * @generated from field: fixed32 buttons = 17;
+   */
+  buttons: number;
 };
 
 /**
@@ -309,7 +360,7 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
  * Use `create(DeviceStateSchema)` to create a new message.
  */
 export const DeviceStateSchema: GenMessage<DeviceState> = /*@__PURE__*/
-  messageDesc(file_tendon, 4);
+  messageDesc(file_tendon, 5);
 
 /**
  * The force that the physics engine wants.
@@ -386,7 +437,7 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
  * Use `create(ForceCommandSchema)` to create a new message.
  */
 export const ForceCommandSchema: GenMessage<ForceCommand> = /*@__PURE__*/
-  messageDesc(file_tendon, 5);
+  messageDesc(file_tendon, 6);
 
 /**
  * The remote environment near one position, so that the device loop can follow the hand:
@@ -431,7 +482,7 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
  * Use `create(LocalModelSchema)` to create a new message.
  */
 export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
-  messageDesc(file_tendon, 6);
+  messageDesc(file_tendon, 7);
 
 /**
  * A surface that the tool touches or is about to. It only pushes, unless a table says otherwise.
@@ -466,7 +517,7 @@ export type Contact = Message<"tendon.v1.Contact"> & {
  * Use `create(ContactSchema)` to create a new message.
  */
 export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
-  messageDesc(file_tendon, 7);
+  messageDesc(file_tendon, 8);
 
 /**
  * The force along the normal, at the depths first_depth_m + i · step_m below at_m: at_m − depth · normal.
@@ -501,7 +552,7 @@ export type ForceTable = Message<"tendon.v1.ForceTable"> & {
  * Use `create(ForceTableSchema)` to create a new message.
  */
 export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
-  messageDesc(file_tendon, 8);
+  messageDesc(file_tendon, 9);
 
 /**
  * @generated from message tendon.v1.Control
@@ -579,7 +630,7 @@ export type Control = Message<"tendon.v1.Control"> & {
  * Use `create(ControlSchema)` to create a new message.
  */
 export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
-  messageDesc(file_tendon, 9);
+  messageDesc(file_tendon, 10);
 
 /**
  * How many states of a device per second the client wants.
@@ -605,12 +656,12 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
  * Use `create(SetStateRateSchema)` to create a new message.
  */
 export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
-  messageDesc(file_tendon, 10);
+  messageDesc(file_tendon, 11);
 
 /**
  * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the
- * first whose velocity differs from v by more than max(share · ‖v‖, floor_mps), whose mode is another, or which comes
- * max_silence_us later. In between the client goes on along the line: x + v · (t − sampled_ns).
+ * first whose velocity differs from v by more than max(share · ‖v‖, floor_mps), whose mode or buttons differ, or which
+ * comes max_silence_us later. In between the client goes on along the line: x + v · (t − sampled_ns).
  *
  * @generated from message tendon.v1.SetStateDeadband
  */
@@ -642,7 +693,7 @@ export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
  * Use `create(SetStateDeadbandSchema)` to create a new message.
  */
 export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*/
-  messageDesc(file_tendon, 11);
+  messageDesc(file_tendon, 12);
 
 /**
  * Clears a latched fault, and takes a Disarm back. With a safety layer it is the operator's request to arm. Only from a
@@ -664,7 +715,7 @@ export type Rearm = Message<"tendon.v1.Rearm"> & {
  * Use `create(RearmSchema)` to create a new message.
  */
 export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
-  messageDesc(file_tendon, 12);
+  messageDesc(file_tendon, 13);
 
 /**
  * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
@@ -688,7 +739,7 @@ export type Disarm = Message<"tendon.v1.Disarm"> & {
  * Use `create(DisarmSchema)` to create a new message.
  */
 export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 14);
 
 /**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
@@ -702,6 +753,13 @@ export type Describe = Message<"tendon.v1.Describe"> & {
    * @generated from field: uint32 device = 1;
    */
   device: number;
+
+  /**
+   * answered with a HandleDescription instead
+   *
+   * @generated from field: bool handle = 2;
+   */
+  handle: boolean;
 };
 
 /**
@@ -709,7 +767,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 15);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -738,7 +796,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 16);
 
 /**
  * I do not want to be it any more.
@@ -766,7 +824,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 17);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -801,7 +859,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 18);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -839,6 +897,13 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
    * @generated from field: tendon.v1.DeviceDescription device = 5;
    */
   device?: DeviceDescription | undefined;
+
+  /**
+   * with CODE_OK of Describe that asks for the handle
+   *
+   * @generated from field: tendon.v1.HandleDescription handle = 6;
+   */
+  handle?: HandleDescription | undefined;
 };
 
 /**
@@ -846,7 +911,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 19);
 
 /**
  * What a device is and can do.
@@ -949,7 +1014,42 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 20);
+
+/**
+ * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
+ *
+ * @generated from message tendon.v1.HandleDescription
+ */
+export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * Turns the base frame into the operator's: x right, y up, z to the user; absent: not known
+   *
+   * @generated from field: tendon.v1.Quat operator_from_device = 2;
+   */
+  operatorFromDevice?: Quat | undefined;
+
+  /**
+   * [0, 16] entries of [0, 24] bytes: names by bit of DeviceState.buttons
+   *
+   * @generated from field: repeated string buttons = 3;
+   */
+  buttons: string[];
+};
+
+/**
+ * Describes the message tendon.v1.HandleDescription.
+ * Use `create(HandleDescriptionSchema)` to create a new message.
+ */
+export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
+  messageDesc(file_tendon, 21);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -989,7 +1089,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 22);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -1013,7 +1113,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 23);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1197,7 +1297,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 24);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1223,7 +1323,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 25);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -1323,7 +1423,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 26);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -1379,7 +1479,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 27);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -1429,7 +1529,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 28);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -1462,7 +1562,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 29);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -1491,7 +1591,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 30);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -1571,7 +1671,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 31);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -1604,7 +1704,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 32);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -1640,7 +1740,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 33);
 
 /**
  * @generated from enum tendon.v1.Mode

@@ -88,7 +88,7 @@ export class Server {
     state: (tick) => ({
       tick, sampledNs: tick * 1_000_000n, position: { x: Number(tick) / 1e6, y: 0, z: 0 },
       velocity: { x: 0, y: 0, z: 0 }, forceApplied: { x: 0, y: 0, z: 0 }, energy: 0, permittedForce: Infinity, reasons: 0,
-      forceSequence: 0n, forceAgeNs: 0n, mode: Mode.ACTIVE, device: 0, channel: 0,
+      forceSequence: 0n, forceAgeNs: 0n, mode: Mode.ACTIVE, device: 0, channel: 0, buttons: 0,
     }),
   };
   readonly hellos: { readonly datagram: HelloDatagram; readonly hello: Hello }[] = [];

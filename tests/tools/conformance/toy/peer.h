@@ -89,6 +89,7 @@ enum class Fault : std::uint8_t {
   kReportsOfOneNumber,
   kReportsBeyondBounds,
   kDiagnosesUnasked,
+  kTellsOfTheHandleUnasked,
   kKnowsNoChannels,  ///< no fault: an older server
   // A client's.
   kShortHello,

@@ -302,6 +302,7 @@ void ToyServer::tick(LocalTime now) {
       state.set_mode(pb::MODE_ACTIVE);
       state.set_force_sequence(rendered_);
       if (is(Fault::kDiagnosesUnasked)) state.mutable_force_wanted_n()->set_x(1);
+      if (is(Fault::kTellsOfTheHandleUnasked)) state.set_buttons(1);
     }
     // What is due may be more than fits: eight frames a time.
     do {

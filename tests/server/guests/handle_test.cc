@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/server/guests/sealed_server.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A server whose device has four buttons and axes, and an observer of it that sees one state in 20.
+class Handle : public SealedServer {
+ protected:
+  Handle() {
+    NetworkLoop::Config config;
+    config.keys = {wall_, screen_};
+    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
+    config.handles = {{.operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
+                       .buttons = {"right", "forward", "centre", "left"}}};
+    restart(config);
+  }
+
+  Client slow_observer(std::vector<std::uint32_t>& seen, std::optional<SetStateDeadband> deadband = {}) {
+    Client client{std::make_unique<End>(wire_, parse_address("192.0.2.2:4000")), nullptr};
+    ForceClient::Config config = config_of(screen_, ++seed_);
+    if (deadband) {
+      config.state_deadband = deadband;
+    } else {
+      config.state_hz = 50;
+    }
+    client.client = std::make_unique<ForceClient>(
+        *client.end, server_.self, config,
+        [&seen](const DeviceState& state, const LinkStats&) { seen.push_back(state.buttons); }, now_);
+    return client;
+  }
+};
+
+TEST_F(Handle, APressBetweenTwoStatesIsInTheNextOneAndThenOver) {
+  std::vector<std::uint32_t> seen;
+  Client b = slow_observer(seen);
+  run(milliseconds(505), {&b});
+  for (int i = 0; i < 5; ++i) {
+    seen.clear();
+    buttons_ = 0b1000;
+    run(milliseconds(3), {&b});
+    buttons_ = 0;
+    run(milliseconds(60), {&b});
+    ASSERT_GE(seen.size(), 2U);
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), 0b1000U), 1) << i;
+    EXPECT_EQ(seen.back(), 0U);
+  }
+}
+
+TEST_F(Handle, AChangeOfButtonsPassesADeadbandAtOnce) {
+  std::vector<std::uint32_t> seen;
+  Client b = slow_observer(seen, SetStateDeadband{.share = 0.1, .floor = 1e-3, .max_silence = milliseconds(20)});
+  run(milliseconds(505), {&b});
+  for (const std::uint32_t buttons : {1U, 3U, 0U}) {
+    buttons_ = buttons;
+    run(milliseconds(3), {&b});
+    ASSERT_FALSE(seen.empty());
+    EXPECT_EQ(seen.back(), buttons);
+  }
+}
+
+TEST_F(Handle, IsDescribedToAClientOfOurs) {
+  Client a = controller(wall_, "192.0.2.1:4000");
+  run(milliseconds(500), {&a});
+  const auto& about = a.client->handle();
+  ASSERT_TRUE(about.has_value());
+  EXPECT_EQ(about->operator_from_device, (Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5}));
+  EXPECT_EQ(about->buttons, (std::vector<std::string>{"right", "forward", "centre", "left"}));
+}
+
+/// A client of another make names the features that it knows: none, or this one.
+TEST_F(Handle, ItsButtonsAreSeenOnlyByThoseThatNamedTheFeature) {
+  for (const bool names : {false, true}) {
+    restart({});
+    buttons_ = 1;
+    End end(wire_, parse_address("127.0.0.1:4000"));
+    std::vector<std::string> features;
+    if (names) features.emplace_back(kFeatureHandle);
+    ClientHandshake handshake({.hello = {.role = Role::kObserver, .name = "foreign", .features = features}}, now_);
+    std::optional<Session> session;
+    std::array<std::byte, kMaxDatagram> buffer;
+    const auto say = [&](auto& mine) {
+      while (const std::size_t size = mine.next_datagram(now_, buffer)) {
+        deliver(end.self, Bytes(buffer.begin(), buffer.begin() + static_cast<int>(size)));
+      }
+    };
+    std::size_t states = 0;
+    for (int i = 0; i < 300; ++i) {
+      session ? say(*session) : say(handshake);
+      run(milliseconds(1), {});
+      count_ = 0;
+      for (const Datagram& datagram : std::exchange(wire_, {})) {
+        session ? void(session->receive(now_, datagram.bytes)) : handshake.receive(now_, datagram.bytes);
+      }
+      if (!session && handshake.outcome()) {
+        const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake.outcome());
+        EXPECT_EQ(accepted.welcome.features, features);
+        session.emplace(Session::Config{.connection_id = accepted.connection_id}, now_);
+      }
+      while (const auto event = session ? session->next_event() : std::nullopt) {
+        const auto* seen = std::get_if<Session::StateArrived>(&*event);
+        if (seen == nullptr) continue;
+        ++states;
+        EXPECT_EQ(seen->state.buttons, names ? 1U : 0U);
+      }
+    }
+    EXPECT_GT(states, 100U);
+  }
+}
+
+}  // namespace
+}  // namespace tendon
