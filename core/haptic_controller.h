@@ -16,6 +16,24 @@
 
 namespace tendon {
 
+/// What a step has to say of the handle's rotation.
+struct TurnStep {
+  Turning hand;
+  Vec3 was_applied = Vec3::Zero();  ///< N·m, held during the interval that this step ended
+  Vec3 wanted = Vec3::Zero();       ///< N·m, what the remote environment asks for
+  Vec3 torque = Vec3::Zero();       ///< N·m, to be applied now
+};
+
+/// … and of its gripper, which has an account of its own.
+struct GripStep {
+  Grip hand;
+  double was_applied = 0;  ///< N, held during the interval that this step ended
+  double wanted = 0;       ///< N, what the remote environment asks for
+  double force = 0;        ///< N, to be applied now
+  double permitted = 0;    ///< N, the bound on |force|
+  double energy = 0;       ///< J, the account of the gripper after the interval
+};
+
 /// One haptic step: its input and its result. It holds enough to take the step again (tests/tools/replay).
 struct Step {
   Motion hand;                       ///< the motion it saw; hand.at = when
@@ -36,6 +54,8 @@ struct Step {
   Duration force_age{};                 ///< since it arrived
   Duration loop_age{};                  ///< since the motion it answers was sampled
   std::optional<double> force_error{};  ///< N, what its engine thinks that it may be wrong by; empty: it does not say
+  std::optional<TurnStep> turn{};       ///< empty: the device does not measure its orientation
+  std::optional<GripStep> grip{};       ///< empty: it has no gripper
 };
 
 /// The heart: from one look at the hand to the force it is to feel.

@@ -13,10 +13,21 @@ namespace tendon {
 /// The data sheet of a device.
 struct DeviceInfo {
   std::string name;
-  double max_force = 0;            ///< N, norm of the force vector it can give out
-  double position_resolution = 0;  ///< m, one encoder count at the handle; 0 = exact
-  double force_resolution = 0;     ///< N, the force written is within this of the force asked for; 0 = exact
-  Duration watchdog{};             ///< the force drops to zero when no command comes for this long; 0 = none
+  double max_force = 0;               ///< N, norm of the force vector it can give out
+  double position_resolution = 0;     ///< m, one encoder count at the handle; 0 = exact
+  double force_resolution = 0;        ///< N, the force written is within this of the force asked for; 0 = exact
+  bool measures_orientation = false;  ///< every sample has one
+  double max_torque = 0;              ///< N·m, norm of the torque vector it can give out; 0 = no motors that turn
+  double angular_resolution = 0;      ///< rad, one encoder count of the orientation; 0 = exact
+  /// A gripper: two fingers that open by an angle.
+  struct Gripper {
+    double open = 0;       ///< rad, its largest opening
+    double arm = 0;        ///< m, travel of the fingers on each other for each radian
+    double max_force = 0;  ///< N, on the fingers; 0 = no motor
+    bool operator==(const Gripper&) const = default;
+  };
+  std::optional<Gripper> gripper{};
+  Duration watchdog{};  ///< the force drops to zero when no command comes for this long; 0 = none
 };
 
 /// One encoder reading.
@@ -26,6 +37,10 @@ struct PositionSample {
   /// N, of the hand **on the handle** (not the other way round), measured by a force sensor; empty without one.
   std::optional<Vec3> hand_force = std::nullopt;
   std::uint32_t buttons = 0;  ///< bit i is set while button i is held down
+  /// Turns the handle frame into the base frame; empty unless the device measures it. The handle frame: −z is where the
+  /// stylus or finger points, y up, x to the right, when the handle is in its middle (OpenXR's aim pose).
+  std::optional<Quat> orientation = std::nullopt;
+  std::optional<double> opening = std::nullopt;  ///< rad, of the gripper; empty without one
 };
 
 /// A haptic device: position out, force in. A device of admittance type also measures the force of the hand.
@@ -71,6 +86,11 @@ class Device {
   /// device. The device holds it until the next `apply`, or until its own watchdog ends it. The energy ledger counts
   /// the force returned here, never the force asked for.
   virtual Vec3 apply(const Vec3& force) noexcept = 0;
+
+  /// The same for a handle with more motors than those of its position: commands all of them at once, and returns what
+  /// was really written. Called in place of `apply` when `info` names a torque or a gripper with a motor; a device that
+  /// has neither gives no torque and no grip.
+  virtual Effort apply_all(const Effort& effort) noexcept { return {.force = apply(effort.force)}; }
 };
 
 }  // namespace tendon

@@ -71,6 +71,12 @@ struct DeviceState {
   /// Bit i is set while button i is held. Only to a client that named kFeatureHandle, else 0. A press that fell between
   /// two states of a client is in the next state that it is sent.
   std::uint32_t buttons = 0;
+  // The rest of the handle, only to a client that named kFeatureHandle:
+  std::optional<Turning> turning{};      ///< empty: the device does not measure its orientation
+  std::optional<Vec3> torque_applied{};  ///< N·m, on the hand, from this step on; empty: it has no motors that turn
+  std::optional<Grip> grip{};            ///< empty: it has no gripper
+  std::optional<double> grip_applied{};  ///< N, on the fingers, > 0 opens them; empty: the gripper has no motor
+  std::optional<Vec3> hand_force{};      ///< N, of the hand on the handle; empty: it has no force sensor
 };
 
 /// Client → server, unreliable, newest wins for each device and channel: the force that the physics engine wants.
@@ -84,6 +90,8 @@ struct ForceCommand {
   std::uint32_t channel = 0;
   bool topology_changed = false;  ///< the body has been cut or torn since the answer before: no model is relied on
   std::optional<double> error{};  ///< N, what the engine thinks that `force` may be wrong by
+  std::optional<RemoteTorque> torque{};  ///< only to a server that has agreed to kFeatureHandle; so is the next
+  std::optional<double> grip_force{};    ///< N, on the fingers; > 0 opens them
 };
 
 /// Two quantiles of a delay; below zero only where two clocks had to be compared.
@@ -272,7 +280,11 @@ struct HandleDescription {
   std::uint32_t device = 0;
   /// Turns the base frame into the operator's, x right, y up, z to the user (core/base/frames.h); empty: not known.
   std::optional<Quat> operator_from_device{};
-  std::vector<std::string> buttons{};  ///< names by bit of DeviceState::buttons; at most 16 of at most 24 bytes
+  std::vector<std::string> buttons{};    ///< names by bit of DeviceState::buttons; at most 16 of at most 24 bytes
+  bool orientation_measured = false;     ///< else no state has `turning`
+  double max_torque = 0;                 ///< N·m, norm of the torque that the device can give out; 0 = none
+  std::optional<double> gripper_open{};  ///< rad, the opening of the open gripper; empty: no gripper
+  double max_gripper_force = 0;          ///< N, on the fingers; 0 = it has no motor
 };
 
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.

@@ -22,6 +22,31 @@ struct Quat {
   bool operator==(const Quat&) const = default;
 };
 
+/// How the handle is turned at one instant.
+struct Turning {
+  Quat orientation;                      ///< turns the handle frame into the base frame; see core/base/rotation.h
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, base frame axes, an estimate
+
+  bool operator==(const Turning&) const = default;
+};
+
+/// How far the gripper of the handle is open at one instant.
+struct Grip {
+  double opening = 0;   ///< rad; 0 = closed
+  double velocity = 0;  ///< rad/s, an estimate
+
+  bool operator==(const Grip&) const = default;
+};
+
+/// What the motors of a handle exert on the hand.
+struct Effort {
+  Vec3 force = Vec3::Zero();   ///< N, base frame axes
+  Vec3 torque = Vec3::Zero();  ///< N·m, base frame axes, about the handle's position
+  double grip = 0;             ///< N, on the fingers; > 0 opens them
+
+  bool operator==(const Effort&) const = default;
+};
+
 /// Where the hand is, as the device saw it at one instant.
 struct Motion {
   LocalTime at{};                ///< when the position was sampled

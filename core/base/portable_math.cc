@@ -140,4 +140,23 @@ double cos(double x) noexcept {
   return ((angle.quarter + 1) & 2) == 0 ? size : -size;
 }
 
+double atan2(double y, double x) noexcept {
+  const double up = std::abs(y);
+  const double along = std::abs(x);
+  if (up == 0 && along == 0) return 0;
+  // The angle to the nearer axis, of a tangent between 0 and 1: atan(t) = atan(c) + atan((t − c)/(1 + t c)), c = i/4.
+  constexpr std::array kAngle{0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483};
+  const double t = up < along ? up / along : along / up;
+  const auto i = static_cast<std::size_t>(t * 4 + 0.5);
+  const double c = static_cast<double>(i) / 4;
+  const double r = (t - c) / (1 + t * c);  // at most 1/8
+  const double square = r * r;
+  double series = 0;
+  for (int n = 17; n >= 3; n -= 2) series = square * (1.0 / n - series);
+  double angle = kAngle[i] + (r - r * series);
+  if (up >= along) angle = std::numbers::pi / 2 - angle;
+  if (x < 0) angle = std::numbers::pi - angle;
+  return y < 0 ? -angle : angle;
+}
+
 }  // namespace tendon::portable

@@ -36,6 +36,9 @@ double tanh(double x) noexcept;
 double sin(double x) noexcept;
 double cos(double x) noexcept;
 
+/// The angle of the point (x, y), rad, −π … π; of (0, 0) it is 0. The sign of a zero does not count. Both finite.
+double atan2(double y, double x) noexcept;
+
 /// √(a² + b²), without overflow or underflow on the way.
 template <class Scalar>
 Scalar hypot(Scalar a, Scalar b) noexcept {

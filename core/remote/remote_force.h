@@ -46,6 +46,25 @@ struct LocalModel {
   std::optional<Contact> contact{};
 };
 
+/// How a torque changes while the handle turns, near one orientation. With K = `stiffness` and p = (w, v) the rotation
+/// from `at` to the handle's orientation, p = q · at⁻¹:
+///
+///     τ(q) = torque − 2 (w K v + v × K v)          N·m
+///
+/// which is −K θ for a small turn θ, and the gradient of the energy 2 vᵀ K v (J), so that no way round makes energy; p and
+/// −p give the same torque.
+struct RotationModel {
+  Quat at;                        ///< the orientation that the torque was computed for
+  Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂τ/∂θ, base frame axes
+};
+
+/// The torque that a remote physics engine wants the hand to feel: on the hand, base frame axes, about the handle's
+/// position.
+struct RemoteTorque {
+  Vec3 torque = Vec3::Zero();  ///< N·m
+  std::optional<RotationModel> model{};
+};
+
 /// The force that a remote physics engine wants the hand to feel.
 ///
 /// **Sign, everywhere in Tendon:** a force is what the device exerts *on the hand*, so a wall that
@@ -62,6 +81,8 @@ struct RemoteForce {
   /// The body has been cut or torn since the answer before this one: neither answer's model can be relied on.
   bool topology_changed = false;
   std::optional<double> error{};  ///< N, ≥ 0: what the engine itself thinks `force` may be wrong by
+  std::optional<RemoteTorque> torque{};
+  std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
 };
 
 }  // namespace tendon

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/base/rotation.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/base/frames.h"
+#include "core/base/portable_math.h"
+
+namespace tendon {
+namespace {
+
+class Rotations : public testing::Test {
+ protected:
+  Vec3 vector(double longest) {
+    std::normal_distribution<double> any;
+    const Vec3 direction = Vec3(any(random_), any(random_), any(random_)).normalized();
+    return direction * std::uniform_real_distribution<double>(0, longest)(random_);
+  }
+  Quat rotation() { return rotation_by(vector(std::numbers::pi)); }
+  /// Symmetric, its eigenvalues between 0 and 2 N·m/rad.
+  Mat3 stiffness() {
+    const Mat3 turn = matrix_of(rotation());
+    std::uniform_real_distribution<double> value(0, 2);
+    return turn * Vec3(value(random_), value(random_), value(random_)).asDiagonal() * turn.transpose();
+  }
+  std::mt19937_64 random_{20};
+};
+
+Quat negative(const Quat& q) { return {-q.w, -q.x, -q.y, -q.z}; }
+
+TEST(PortableAtan2, IsThatOfTheCLibraryAllRound) {
+  for (int i = -1000; i <= 1000; ++i) {
+    const double angle = i * std::numbers::pi / 1000;
+    for (const double size : {1e-9, 1.0, 3e7}) {
+      const double x = size * std::cos(angle);
+      const double y = size * std::sin(angle);
+      EXPECT_NEAR(portable::atan2(y, x), std::atan2(y, x), 5e-16) << angle;
+    }
+  }
+  EXPECT_EQ(portable::atan2(0, 0), 0);
+  EXPECT_EQ(portable::atan2(1, 0), std::numbers::pi / 2);
+  EXPECT_EQ(portable::atan2(0, -1), std::numbers::pi);
+}
+
+TEST_F(Rotations, ProductsAndTurnedVectorsAreThoseOfMatrices) {
+  for (int i = 0; i < 1000; ++i) {
+    const Quat a = rotation();
+    const Quat b = rotation();
+    EXPECT_LT((matrix_of(product(a, b)) - matrix_of(a) * matrix_of(b)).norm(), 1e-14);
+    EXPECT_LT((matrix_of(inverse(a)) - matrix_of(a).transpose()).norm(), 1e-15);
+    const Vec3 v = vector(1);
+    EXPECT_LT((rotated(a, v) - matrix_of(a) * v).norm(), 1e-14);
+  }
+}
+
+TEST_F(Rotations, AVectorComesBackFromItsRotation) {
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 turn = vector(std::numbers::pi - 1e-9);
+    const Quat q = rotation_by(turn);
+    EXPECT_TRUE(is_rotation(q));
+    EXPECT_LT((rotation_vector(q) - turn).norm(), 1e-13);
+    EXPECT_EQ(rotation_vector(negative(q)), rotation_vector(q)) << "q and -q are the same rotation";
+    EXPECT_LT((matrix_of(q) - Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix()).norm(), 1e-14);
+  }
+  EXPECT_EQ(rotation_by(Vec3::Zero()), Quat{});
+  EXPECT_EQ(rotation_vector(Quat{}), Vec3(0, 0, 0));
+  const Vec3 tiny(1e-12, 0, 0);
+  EXPECT_LT((rotation_vector(rotation_by(tiny)) - tiny).norm(), 1e-27);
+}
+
+TEST_F(Rotations, TheTurnBetweenTwoLeadsFromOneToTheOther) {
+  for (int i = 0; i < 1000; ++i) {
+    const Quat from = rotation();
+    const Quat to = rotation();
+    const Quat there = product(rotation_by(turn_between(from, to)), from);
+    EXPECT_LT((matrix_of(there) - matrix_of(to)).norm(), 1e-13);
+  }
+}
+
+TEST(Rotation, OfNoDirectionIsTheIdentity) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(unit({0, 0, 0, 0}), Quat{});
+  EXPECT_EQ(unit({nan, 0, 0, 0}), Quat{});
+  EXPECT_EQ(unit({0, 0, 3, 0}), (Quat{0, 0, 1, 0}));
+  EXPECT_FALSE(is_rotation({nan, 0, 0, 0}));
+  EXPECT_FALSE(is_rotation({1.0011, 0, 0, 0}));
+  EXPECT_TRUE(is_rotation({1.0009, 0, 0, 0}));
+}
+
+TEST_F(Rotations, ASpringsTorqueIsTheGradientOfItsEnergy) {
+  for (int i = 0; i < 1000; ++i) {
+    const Mat3 k = stiffness();
+    const Quat rest = rotation();
+    const Quat q = rotation();
+    const Vec3 torque = spring_torque(k, rest, q);
+    EXPECT_EQ(spring_torque(k, rest, negative(q)), torque) << "no jump at q -> -q";
+    Vec3 gradient;
+    constexpr double kStep = 1e-5;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3 turn = kStep * Vec3::Unit(axis);
+      gradient[axis] = (spring_energy(k, rest, product(rotation_by(turn), q)) -
+                        spring_energy(k, rest, product(rotation_by(-turn), q))) /
+                       (2 * kStep);
+    }
+    EXPECT_LT((torque + gradient).norm(), 1e-9);
+  }
+}
+
+TEST_F(Rotations, ASpringIsStiffnessTimesAngleForSmallTurns) {
+  for (int i = 0; i < 100; ++i) {
+    const Mat3 k = stiffness();
+    const Quat rest = rotation();
+    const Vec3 turn = vector(1e-4);
+    EXPECT_LT((spring_torque(k, rest, product(rotation_by(turn), rest)) + k * turn).norm(), 1e-8);
+  }
+}
+
+/// The work of the hand against the spring along a closed way, J: below zero, the spring gave energy out.
+double work_round(const Mat3& k, const Quat& rest, const std::vector<Quat>& way) {
+  constexpr int kSteps = 400;  // of each leg; the work of a step is that of the torque in its middle
+  double work = 0;
+  for (std::size_t leg = 0; leg < way.size(); ++leg) {
+    const Quat& from = way[leg];
+    const Vec3 turn = turn_between(from, way[(leg + 1) % way.size()]);
+    for (int i = 0; i < kSteps; ++i) {
+      const Quat middle = product(rotation_by(turn * ((i + 0.5) / kSteps)), from);
+      work -= spring_torque(k, rest, middle).dot(turn) / kSteps;
+    }
+  }
+  return work;
+}
+
+TEST_F(Rotations, NoWayRoundASpringMakesEnergy) {
+  for (int i = 0; i < 200; ++i) {
+    const Mat3 k = stiffness();
+    const Quat rest = rotation();
+    const std::vector<Quat> way = {rotation(), rotation(), rotation(), rotation()};
+    // What is left is the error of the midpoint rule; it goes with the square of the step.
+    EXPECT_NEAR(work_round(k, rest, way), 0, 5e-5);
+  }
+}
+
+}  // namespace
+}  // namespace tendon
