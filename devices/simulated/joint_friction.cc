@@ -18,7 +18,7 @@ namespace {
 /// For each joint: the way it turns (−1 or 1), or 0 when it stands.
 using Turns = std::array<int, 3>;
 
-struct Grip {
+struct Stiction {
   Turns turns;
   Vec3 impulse;  ///< of friction on each joint
   double wrong =
@@ -26,7 +26,7 @@ struct Grip {
 };
 
 /// The friction when each joint turns or stands as `turns` says: velocity = free − coupling · impulse.
-Grip gripping(const Turns& turns, const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known) {
+Stiction sticking(const Turns& turns, const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known) {
   Mat3 equations = Mat3::Identity();
   Vec3 right;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -34,32 +34,32 @@ Grip gripping(const Turns& turns, const Mat3& coupling, const Vec3& free, const 
     if (turn == 0) equations.row(i) = coupling.row(i);  // the velocity is zero
     right[i] = turn == 0 ? free[i] : turn * most[i];
   }
-  Grip grip{turns, equations.inverse() * right};
-  const Vec3 velocity = free - coupling * grip.impulse;
-  grip.wrong = 0;
+  Stiction stiction{turns, equations.inverse() * right};
+  const Vec3 velocity = free - coupling * stiction.impulse;
+  stiction.wrong = 0;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const auto joint = static_cast<std::size_t>(i);
     if (turns[joint] == 0) {
-      grip.wrong = std::max(grip.wrong, (std::abs(grip.impulse[i]) - most[i]) * coupling(i, i));
+      stiction.wrong = std::max(stiction.wrong, (std::abs(stiction.impulse[i]) - most[i]) * coupling(i, i));
     } else if (known[joint] == 0) {
-      grip.wrong = std::max(grip.wrong, -turns[joint] * velocity[i]);
+      stiction.wrong = std::max(stiction.wrong, -turns[joint] * velocity[i]);
     }
   }
-  return grip;
+  return stiction;
 }
 
 /// The only impulse with |impulseᵢ| ≤ mostᵢ that equals mostᵢ, against the velocity, at each joint that turns. A joint
 /// that is not 0 in `known` is taken to turn that way. The answer is one of 27 cases; rounding may leave several, and
 /// then it is the least wrong one.
-Grip grip_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
-  Grip best;
+Stiction stiction_of(const Mat3& coupling, const Vec3& free, const Vec3& most, const Turns& known = {}) noexcept {
+  Stiction best;
   const auto holds = [&](Turns turns) {
     for (std::size_t i = 0; i < turns.size(); ++i) {
       if (known[i] != 0) turns[i] = known[i];
     }
-    const Grip grip = gripping(turns, coupling, free, most, known);
-    if (grip.wrong < best.wrong) best = grip;
-    return grip.wrong <= 0;
+    const Stiction stiction = sticking(turns, coupling, free, most, known);
+    if (stiction.wrong < best.wrong) best = stiction;
+    return stiction.wrong <= 0;
   };
   const auto sign = [](double x) { return (x > 0 ? 1 : 0) - (x < 0 ? 1 : 0); };
   if (holds({sign(free[0]), sign(free[1]), sign(free[2])})) return best;  // the usual case while the handle slides
@@ -131,13 +131,14 @@ JointFriction::Slide JointFriction::step(const Vec3& position, const Vec3& v0, c
   const Mat3 mobility = (impetus.resistance * Mat3::Identity() + h / 2 * viscous).inverse();
   const Mat3 spread = jacobian * mobility;
 
-  const Grip grip = grip_of(spread * jacobian.transpose(), spread * impetus.momentum, h / 2 * coulomb_);
+  const Stiction stiction = stiction_of(spread * jacobian.transpose(), spread * impetus.momentum, h / 2 * coulomb_);
   Slide slide;
-  slide.mean = grip.turns == Turns{} ? Vec3(Vec3::Zero())
-                                     : Vec3(mobility * (impetus.momentum - jacobian.transpose() * grip.impulse));
+  slide.mean = stiction.turns == Turns{}
+                   ? Vec3(Vec3::Zero())
+                   : Vec3(mobility * (impetus.momentum - jacobian.transpose() * stiction.impulse));
   slide.end = 2 * slide.mean - v0;
 
-  Turns known = grip.turns;
+  Turns known = stiction.turns;
   const Vec3 turning = jacobian * slide.end;
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (turning[static_cast<Eigen::Index>(i)] * known[i] <= 0) known[i] = 0;
@@ -146,7 +147,7 @@ JointFriction::Slide JointFriction::step(const Vec3& position, const Vec3& v0, c
   if (!some(known)) return slide;
   const double drag = (impetus.resistance - impetus.mass) * 2 / h;
   const Vec3 push = impetus.push - drag * slide.mean - viscous * slide.mean;
-  const Grip rest = grip_of(jacobian * jacobian.transpose(), jacobian * push, coulomb_, known);
+  const Stiction rest = stiction_of(jacobian * jacobian.transpose(), jacobian * push, coulomb_, known);
   if (some(rest.turns)) slide.end = standing(rest.turns, jacobian, slide.end);
   return slide;
 }
