@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/rotation.h"
+
 namespace tendon {
 namespace {
 
@@ -20,6 +22,11 @@ bool is_sound(const LocalModel& model) noexcept {
   const Contact& contact = *model.contact;
   return std::abs(contact.normal.norm() - 1) <= Contact::kUnitTolerance && std::isfinite(contact.gap) &&
          (!contact.table || is_sound(*contact.table));
+}
+
+bool is_sound(const RemoteTorque& torque) noexcept {
+  return torque.torque.allFinite() &&
+         (!torque.model || (is_rotation(torque.model->at) && torque.model->stiffness.allFinite()));
 }
 
 Mat3 conservative(const Mat3& stiffness, double max) noexcept {
@@ -60,7 +67,8 @@ Along look_up(const ForceTable& table, double depth, const Vec3& normal) noexcep
 
 bool is_sound(const RemoteForce& answer) noexcept {
   return answer.force.allFinite() && (!answer.model || is_sound(*answer.model)) &&
-         (!answer.error || (std::isfinite(*answer.error) && *answer.error >= 0));
+         (!answer.error || (std::isfinite(*answer.error) && *answer.error >= 0)) &&
+         (!answer.torque || is_sound(*answer.torque)) && (!answer.grip_force || std::isfinite(*answer.grip_force));
 }
 
 RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept {

@@ -10,7 +10,7 @@
 
 namespace tendon {
 
-/// Whether every number is finite and in its range (remote_force.h).
+/// Whether every number is finite and in its range, and every orientation a rotation (remote_force.h).
 bool is_sound(const RemoteForce& answer) noexcept;
 
 /// The part of a sound answer that is followed:

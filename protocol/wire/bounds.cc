@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/base/arithmetic.h"
+#include "core/base/rotation.h"
 #include "protocol/limits.h"
 
 namespace tendon {
@@ -31,11 +32,25 @@ bool in_bounds(const LocalModel& model) noexcept {
          model.valid_radius >= 0 && (!model.contact || in_bounds(*model.contact));
 }
 
+bool in_bounds(const RemoteTorque& torque) noexcept {
+  return all_bounded(torque.torque) &&
+         (!torque.model || (is_rotation(torque.model->at) && all_bounded(torque.model->stiffness)));
+}
+
+bool is_finite(const RemoteTorque& torque) noexcept {
+  if (!torque.torque.allFinite()) return false;
+  if (!torque.model) return true;
+  const Quat& at = torque.model->at;
+  return torque.model->stiffness.allFinite() && std::isfinite(at.w) && std::isfinite(at.x) && std::isfinite(at.y) &&
+         std::isfinite(at.z);
+}
+
 }  // namespace
 
 bool in_bounds(const ForceCommand& command) noexcept {
   return all_bounded(command.force) && (!command.model || in_bounds(*command.model)) &&
-         (!command.error || (bounded(*command.error) && *command.error >= 0));
+         (!command.error || (bounded(*command.error) && *command.error >= 0)) &&
+         (!command.torque || in_bounds(*command.torque)) && (!command.grip_force || bounded(*command.grip_force));
 }
 
 bool is_finite(const ForceCommand& command) noexcept {
@@ -53,13 +68,20 @@ bool is_finite(const ForceCommand& command) noexcept {
            (!model.contact || contact_is_finite(*model.contact));
   };
   return command.force.allFinite() && (!command.model || model_is_finite(*command.model)) &&
-         (!command.error || std::isfinite(*command.error));
+         (!command.error || std::isfinite(*command.error)) && (!command.torque || is_finite(*command.torque)) &&
+         (!command.grip_force || std::isfinite(*command.grip_force));
 }
 
 std::string_view objection(const ForceCommand& command) noexcept {
   if (in_bounds(command)) return {};
   if (!command.force.allFinite()) return "the force is not finite (NaN or infinity)";
   if (!all_bounded(command.force)) return "the force is beyond 1e12 N";
+  if (command.torque && !command.torque->torque.allFinite()) return "the torque is not finite (NaN or infinity)";
+  if (command.torque && !all_bounded(command.torque->torque)) return "the torque is beyond 1e12 N·m";
+  if (command.torque && !in_bounds(*command.torque)) {
+    return "its rotation model has a number beyond its bound (WIRE.md), or its orientation is not of length 1";
+  }
+  if (command.grip_force && !bounded(*command.grip_force)) return "the grip force is not finite, or beyond 1e12 N";
   return "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md";
 }
 

@@ -4,8 +4,8 @@
 #include <google/protobuf/stubs/common.h>
 
 #include <algorithm>
-#include <cmath>
 
+#include "core/base/rotation.h"
 #include "protocol/limits.h"
 #include "protocol/wire/bounds.h"
 #include "protocol/wire/text.h"
@@ -48,8 +48,7 @@ void write(const Vec3& from, pb::Vec3& to) {
 
 bool read(const pb::Quat& from, Quat& to) noexcept {
   to = {.w = from.w(), .x = from.x(), .y = from.y(), .z = from.z()};
-  const double norm = std::sqrt(to.w * to.w + to.x * to.x + to.y * to.y + to.z * to.z);
-  return std::abs(norm - 1) <= Contact::kUnitTolerance;
+  return is_rotation(to);
 }
 
 void write(const Quat& from, pb::Quat& to) {
@@ -57,6 +56,46 @@ void write(const Quat& from, pb::Quat& to) {
   to.set_x(from.x);
   to.set_y(from.y);
   to.set_z(from.z);
+}
+
+bool read(bool there, double from, std::optional<double>& to) noexcept {
+  to = there ? std::optional(from) : std::nullopt;
+  return !there || bounded(from);
+}
+
+bool read(bool there, const pb::Vec3& from, std::optional<Vec3>& to) noexcept {
+  to.reset();
+  return !there || read(from, to.emplace());
+}
+
+bool read(const Entries& k, Mat3& to) noexcept {
+  switch (k.size()) {
+    case 1:
+      to = k.Get(0) * Mat3::Identity();
+      return true;
+    case 3:
+      to = Vec3(k.Get(0), k.Get(1), k.Get(2)).asDiagonal();
+      return true;
+    case 9:
+      to = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.data());
+      return true;
+    default:
+      return false;
+  }
+}
+
+void write(const Mat3& k, Entries& to) {
+  to.Clear();
+  const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
+  if (diagonal && k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2)) {
+    to.Add(k(0, 0));
+  } else if (diagonal) {
+    for (int i = 0; i < 3; ++i) to.Add(k(i, i));
+  } else {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) to.Add(k(row, column));
+    }
+  }
 }
 
 bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }

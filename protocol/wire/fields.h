@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,9 +22,20 @@ namespace pb = tendon::v1;
 
 bool read(const pb::Vec3& from, Vec3& to) noexcept;
 void write(const Vec3& from, pb::Vec3& to);
-/// False when its norm is not 1 ± Contact::kUnitTolerance.
+/// False unless is_rotation().
 bool read(const pb::Quat& from, Quat& to) noexcept;
 void write(const Quat& from, pb::Quat& to);
+
+/// A field that may be absent.
+bool read(bool there, double from, std::optional<double>& to) noexcept;
+bool read(bool there, const pb::Vec3& from, std::optional<Vec3>& to) noexcept;
+
+/// A stiffness of 1, 3 or 9 entries: k·I, its diagonal, or all of it row by row. False for any other number of them; the
+/// entries are for in_bounds.
+using Entries = google::protobuf::RepeatedField<double>;
+bool read(const Entries& from, Mat3& to) noexcept;
+/// The shortest of the three forms that says the same.
+void write(const Mat3& from, Entries& to);
 
 /// A clock reading.
 bool read(std::int64_t ns, LocalTime& to) noexcept;

@@ -12,6 +12,56 @@
 
 namespace tendon::wire {
 
+namespace {
+
+using wire::read;
+using wire::write;
+
+/// What only a client that named kFeatureHandle is sent, but for the buttons.
+bool read_handle(const pb::DeviceState& from, DeviceState& to) noexcept {
+  to.turning.reset();
+  to.grip.reset();
+  if (from.has_orientation()) {
+    Turning& turning = to.turning.emplace();
+    if (!read(from.orientation(), turning.orientation)) return false;
+    if (!read(from.angular_velocity_radps(), turning.angular_velocity)) return false;
+  } else if (from.has_angular_velocity_radps()) {
+    return false;
+  }
+  if (from.has_gripper_rad()) {
+    to.grip = Grip{.opening = from.gripper_rad(), .velocity = from.gripper_velocity_radps()};
+    if (!bounded(to.grip->opening) || !bounded(to.grip->velocity)) return false;
+  } else if (from.has_gripper_velocity_radps()) {
+    return false;
+  }
+  return read(from.has_torque_applied_nm(), from.torque_applied_nm(), to.torque_applied) &&
+         read(from.has_gripper_force_applied_n(), from.gripper_force_applied_n(), to.grip_applied) &&
+         read(from.has_hand_force_n(), from.hand_force_n(), to.hand_force);
+}
+
+void write_handle(const DeviceState& from, pb::DeviceState& to) {
+  to.clear_orientation();
+  to.clear_angular_velocity_radps();
+  if (from.turning) {
+    write(from.turning->orientation, *to.mutable_orientation());
+    write(from.turning->angular_velocity, *to.mutable_angular_velocity_radps());
+  }
+  to.clear_torque_applied_nm();
+  if (from.torque_applied) write(*from.torque_applied, *to.mutable_torque_applied_nm());
+  to.clear_gripper_rad();
+  to.clear_gripper_velocity_radps();
+  if (from.grip) {
+    to.set_gripper_rad(from.grip->opening);
+    to.set_gripper_velocity_radps(from.grip->velocity);
+  }
+  to.clear_gripper_force_applied_n();
+  if (from.grip_applied) to.set_gripper_force_applied_n(*from.grip_applied);
+  to.clear_hand_force_n();
+  if (from.hand_force) write(*from.hand_force, *to.mutable_hand_force_n());
+}
+
+}  // namespace
+
 bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   to.tick = from.tick();
   to.energy = from.energy_j();
@@ -20,9 +70,8 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   to.force_sequence = from.force_sequence();
   const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
   to.buttons = from.buttons();
-  to.force_wanted.reset();
-  if (from.has_force_wanted_n() && !read(from.force_wanted_n(), to.force_wanted.emplace())) return false;
-  return read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
+  if (!read(from.has_force_wanted_n(), from.force_wanted_n(), to.force_wanted)) return false;
+  return read_handle(from, to) && read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
          read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
          bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
          read(from.force_age_ns(), to.force_age) && read(from.mode(), to.mode) &&
@@ -49,12 +98,10 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   } else {
     to.clear_force_wanted_n();
   }
+  write_handle(from, to);
 }
 
 namespace {
-
-using wire::read;
-using wire::write;
 
 /// Whether all of `from` fits; the values are for in_bounds.
 bool read(const pb::ForceTable& from, ForceTable& to) noexcept {
@@ -90,45 +137,41 @@ void write(const Contact& from, pb::Contact& to) {
 }
 
 bool read(const pb::LocalModel& from, LocalModel& to) noexcept {
-  const auto& k = from.stiffness_npm();
-  switch (k.size()) {
-    case 1:
-      to.stiffness = k.Get(0) * Mat3::Identity();
-      break;
-    case 3:
-      to.stiffness = Vec3(k.Get(0), k.Get(1), k.Get(2)).asDiagonal();
-      break;
-    case 9:
-      to.stiffness = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(k.data());
-      break;
-    default:
-      return false;
-  }
+  if (!read(from.stiffness_npm(), to.stiffness)) return false;
   read(from.at_m(), to.at);
   if (from.has_valid_radius_m()) to.valid_radius = from.valid_radius_m();
   return !from.has_contact() || read(from.contact(), to.contact.emplace());
 }
 
-/// The shortest of the three forms that says the same.
 void write(const LocalModel& from, pb::LocalModel& to) {
   write(from.at, *to.mutable_at_m());
-  const Mat3& k = from.stiffness;
   to.clear_valid_radius_m();
   if (from.valid_radius != std::numeric_limits<double>::infinity()) to.set_valid_radius_m(from.valid_radius);
   to.clear_contact();
   if (from.contact) write(*from.contact, *to.mutable_contact());
-  auto& out = *to.mutable_stiffness_npm();
-  out.Clear();
-  const bool diagonal = k(0, 1) == 0 && k(0, 2) == 0 && k(1, 0) == 0 && k(1, 2) == 0 && k(2, 0) == 0 && k(2, 1) == 0;
-  if (diagonal && k(0, 0) == k(1, 1) && k(0, 0) == k(2, 2)) {
-    out.Add(k(0, 0));
-  } else if (diagonal) {
-    for (int i = 0; i < 3; ++i) out.Add(k(i, i));
-  } else {
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) out.Add(k(row, column));
-    }
-  }
+  write(from.stiffness, *to.mutable_stiffness_npm());
+}
+
+/// Whether all of the torque fits; the values are for in_bounds.
+bool read_torque(const pb::ForceCommand& from, std::optional<RemoteTorque>& to) noexcept {
+  to.reset();
+  if (!from.has_torque_nm() && !from.has_rotation_model()) return true;
+  RemoteTorque& torque = to.emplace();
+  read(from.torque_nm(), torque.torque);
+  if (!from.has_rotation_model()) return true;
+  RotationModel& model = torque.model.emplace();
+  read(from.rotation_model().at_orientation(), model.at);
+  return read(from.rotation_model().angular_stiffness_nmprad(), model.stiffness);
+}
+
+void write_torque(const std::optional<RemoteTorque>& from, pb::ForceCommand& to) {
+  to.clear_torque_nm();
+  if (from) write(from->torque, *to.mutable_torque_nm());
+  to.clear_rotation_model();
+  if (!from || !from->model) return;
+  pb::RotationModel& model = *to.mutable_rotation_model();
+  write(from->model->at, *model.mutable_at_orientation());
+  write(from->model->stiffness, *model.mutable_angular_stiffness_nmprad());
 }
 
 }  // namespace
@@ -142,6 +185,8 @@ bool read(const pb::ForceCommand& from, ForceCommand& to) noexcept {
   to.topology_changed = from.topology_changed();
   to.error.reset();
   if (from.has_error_n()) to.error = from.error_n();
+  if (!read_torque(from, to.torque)) return false;
+  to.grip_force = from.has_gripper_force_n() ? std::optional(from.gripper_force_n()) : std::nullopt;
   read(from.force_n(), to.force);
   return to.sequence > 0 && in_bounds(to) && to.valid_for > Duration::zero() && to.valid_for <= limits::kMaxValidFor &&
          read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
@@ -165,6 +210,9 @@ void write(const ForceCommand& from, pb::ForceCommand& to) {
   to.set_topology_changed(from.topology_changed);
   to.clear_error_n();
   if (from.error) to.set_error_n(*from.error);
+  write_torque(from.torque, to);
+  to.clear_gripper_force_n();
+  if (from.grip_force) to.set_gripper_force_n(*from.grip_force);
 }
 
 namespace {
@@ -330,7 +378,10 @@ bool read(const pb::HandleDescription& from, HandleDescription& to) {
   for (const auto& name : from.buttons()) {
     if (!read(name, limits::kMaxLabel, to.buttons.emplace_back())) return false;
   }
-  return read_device(from.device(), to.device);
+  to.orientation_measured = from.orientation_measured();
+  if (from.has_gripper_open_rad() && !read_size(from.gripper_open_rad(), to.gripper_open.emplace())) return false;
+  return read_device(from.device(), to.device) && read_size(from.max_torque_nm(), to.max_torque) &&
+         read_size(from.max_gripper_force_n(), to.max_gripper_force);
 }
 
 void write(const HandleDescription& from, pb::HandleDescription& to) {
@@ -340,6 +391,10 @@ void write(const HandleDescription& from, pb::HandleDescription& to) {
     if (to.buttons_size() == static_cast<int>(limits::kMaxButtons)) break;
     to.add_buttons(clip(name, limits::kMaxLabel));
   }
+  to.set_orientation_measured(from.orientation_measured);
+  to.set_max_torque_nm(from.max_torque);
+  if (from.gripper_open) to.set_gripper_open_rad(*from.gripper_open);
+  to.set_max_gripper_force_n(from.max_gripper_force);
 }
 
 }  // namespace
