@@ -317,21 +317,43 @@ void NetworkLoop::report(LocalTime now) {
   for (std::string& warning : told.warnings) notice(true, std::move(warning));
 }
 
+namespace {
+
+/// Engines ask for bounded forces, but their combination in the device's loop may exceed what a frame can carry; and a
+/// sensor may measure anything.
+void leave_out_what_no_frame_carries(DeviceState& state) {
+  for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
+    if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();
+  }
+}
+
+/// But for the buttons.
+void leave_out_handle(DeviceState& state) {
+  state.turning.reset();
+  state.torque_applied.reset();
+  state.grip.reset();
+  state.grip_applied.reset();
+  state.hand_force.reset();
+}
+
+}  // namespace
+
 void NetworkLoop::publish(LocalTime now) {
   for (std::uint32_t number = 0; number < devices_.size(); ++number) {
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
-    // Engines ask for bounded forces, but their combination in the device's loop may exceed what a frame can carry.
-    const bool can_tell = state->force_wanted && (state->force_wanted->array().abs() <= limits::kMaxValue).all();
+    DeviceState all = *state;
+    leave_out_what_no_frame_carries(all);
     for (Guest& guest : guests_) {
       View* const view = view_of(guest, number);
       if (view == nullptr) continue;
       if (guest.sees_handle) view->pressed |= state->buttons;
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
-      DeviceState told = *state;
-      if (!can_tell || !guest.diagnoses) told.force_wanted.reset();
+      DeviceState told = all;
+      if (!guest.diagnoses) told.force_wanted.reset();
+      if (!guest.sees_handle) leave_out_handle(told);
       told.buttons = view->pressed;
       if (view->deadband && !view->deadband->passes(told)) {
         ++stats_.foretold;
@@ -408,6 +430,8 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   force.source = channel.holder;
   force.topology_changed = command.topology_changed;
   force.error = command.error;
+  force.torque = command.torque;
+  force.grip_force = command.grip_force;
   device.mail->forces[command.channel].put(force);
   ++channel.forces;
   ++stats_.forces;

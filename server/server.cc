@@ -43,11 +43,17 @@ DeviceDescription description_of(const Scene& scene, const DeviceInfo& device) {
   return about;
 }
 
-HandleDescription handle_of(const Scene& scene) {
+HandleDescription handle_of(const Scene& scene, const DeviceInfo& device) {
   HandleDescription handle;
   const std::string_view axes = scene.axes.empty() ? scene.driver().axes : scene.axes;
   if (!axes.empty()) handle.operator_from_device = quaternion_of(operator_from_device(axes));
   handle.buttons.assign(scene.driver().buttons.begin(), scene.driver().buttons.end());
+  handle.orientation_measured = device.measures_orientation;
+  handle.max_torque = device.max_torque;
+  if (device.gripper) {
+    handle.gripper_open = device.gripper->open;
+    handle.max_gripper_force = device.gripper->max_force;
+  }
   return handle;
 }
 
@@ -169,9 +175,9 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
   if (scene.network.keys) config.keys = read_key_folder(*scene.network.keys);
   config.server_name = "tendond " + std::string(kVersion);
   for (const auto& runtime : devices) {
-    config.devices.push_back(
-        description_of(runtime->scene, runtime->safe ? runtime->safe->info() : runtime->device->info()));
-    config.handles.push_back(handle_of(runtime->scene));
+    const DeviceInfo info = runtime->safe ? runtime->safe->info() : runtime->device->info();
+    config.devices.push_back(description_of(runtime->scene, info));
+    config.handles.push_back(handle_of(runtime->scene, info));
   }
   config.takeover = scene.network.takeover;
   config.max_observers = scene.network.max_observers;

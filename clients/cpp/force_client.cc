@@ -179,6 +179,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   order_.reset();
   order_answer_.reset();
   stats_.lease_lost_to.clear();
+  stats_.left_out = {};
   ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
   Session& session = *connection_.session();
   if (claims()) session.request(Describe{.device = place_.device});
@@ -191,7 +192,8 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   peer_reports_.clear();
   if (config_.state_hz > 0) session.request(SetStateRate{.hz = config_.state_hz, .device = place_.device});
   sequence_ = 0;
-  if (config_.deadband) deadband_.emplace(*config_.deadband);  // this session was sent none of the forces before
+  if (config_.deadband)
+    deadband_ = HandleDeadband::of_forces(*config_.deadband);  // this session was sent none of the forces before
   stats_.phase = Phase::kOpen;
   ++stats_.sessions;
 }
@@ -313,6 +315,25 @@ bool ForceClient::call(LocalTime now) {
   }
 }
 
+/// The torque and the grip of an answer, as far as they can be sent.
+void ForceClient::add_handle(const Touch& touch, const DeviceState& answered, ForceCommand& command) {
+  if (!touch.torque && !touch.angular_stiffness && !touch.grip_force) return;
+  if (!agreed_to(kFeatureHandle)) {
+    stats_.left_out = "torque and grip force: the server does not know them";
+    return;
+  }
+  command.grip_force = touch.grip_force;
+  if (!touch.torque && !touch.angular_stiffness) return;
+  RemoteTorque& torque = command.torque.emplace();
+  torque.torque = touch.torque.value_or(Vec3(Vec3::Zero()));
+  if (!touch.angular_stiffness) return;
+  if (answered.turning) {
+    torque.model = RotationModel{.at = answered.turning->orientation, .stiffness = *touch.angular_stiffness};
+  } else {
+    stats_.left_out = "angular stiffness: the device does not measure its orientation";
+  }
+}
+
 void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& answered) {
   ForceCommand command;
   command.based_on_tick = answered.tick;
@@ -327,12 +348,15 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
                                .valid_radius = touch.valid_radius,
                                .contact = touch.contact};
   }
+  add_handle(touch, answered, command);
   if (!in_bounds(command)) {
     ++stats_.forces_unusable;
     stats_.unusable = objection(command);
     return;
   }
-  if (deadband_ && !deadband_->passes(now, touch.force) && !touch.topology_changed) {
+  HandleDeadband::Value felt{.vector = command.force, .turning = {}, .grip = command.grip_force};
+  if (command.torque) felt.turning = command.torque->torque;
+  if (deadband_ && !deadband_->passes(now, felt) && !touch.topology_changed) {
     ++stats_.forces_alike;
     return;
   }

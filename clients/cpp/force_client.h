@@ -36,6 +36,13 @@ struct Touch {
   /// The body has been cut or torn since the previous answer: the server then uses neither answer's stiffness or table.
   bool topology_changed = false;
   std::optional<double> error{};  ///< N, the engine's own estimate of the error of `force`; recorded with it
+  // For a device whose handle has more motors than those of its position (ForceClient::handle()), of a server that knows
+  // `kFeatureHandle`; another one is sent `force` without these (Stats::left_out).
+  std::optional<Vec3> torque{};  ///< N·m, on the hand, base frame axes, about the handle's position
+  /// N·m/rad, −∂torque/∂θ at the state's orientation: with it the device loop follows the turning hand. Symmetric; a
+  /// spring is positive. Only in answer to a state with an orientation.
+  std::optional<Mat3> angular_stiffness{};
+  std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
 };
 
 /// The physics engine as a function: device state in, force out. It may take its time: while it computes, newer states
@@ -94,8 +101,8 @@ class ForceClient {
     /// slower than 10 Hz says so by rate_hz.
     Duration valid_for{};
     /// For links where datagrams are dear: a force that a hand cannot tell from the last one sent is not sent (Weber's
-    /// law), which leaves a tenth of the datagrams at 1 kHz. Only forces are compared: a changed stiffness waits for
-    /// the next force, at most for the longest silence. A changed topology is sent at once. Empty: every force is sent.
+    /// law), which leaves a tenth of the datagrams at 1 kHz. Only forces, torques and grip forces are compared
+    /// (HandleDeadband): a changed stiffness waits for the next force, at most for the longest silence. A changed topology is sent at once. Empty: every force is sent.
     std::optional<Deadband::Config> deadband{};
     /// For links where datagrams are dear: the server leaves out states that we can predict, which are most of them.
     /// With rate_hz = r the callback is called at multiples of 1/r with the state predicted for that instant, tick and
@@ -149,6 +156,7 @@ class ForceClient {
     std::uint64_t forces = 0;           ///< forces sent
     std::uint64_t forces_unusable = 0;  ///< forces not sent: not finite, or out of bounds
     std::string_view unusable{};        ///< what was wrong with the newest of them; empty: none
+    std::string_view left_out{};        ///< what of the present session's answers is not sent, and why; empty: nothing
     std::uint64_t forces_alike = 0;     ///< forces not sent: a hand cannot tell them from the previous one
     std::uint64_t strangers = 0;        ///< datagrams that were not from the server: dropped
     std::string lease_lost_to;          ///< name of the client that took the channel from us; empty: nobody
@@ -195,8 +203,8 @@ class ForceClient {
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   /// What the device is and can do, when we have named a device or a channel and the server has answered; empty before.
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
-  /// How the device lies before the operator, and its buttons' names, once the server has answered; empty before, and for
-  /// good when the server does not know kFeatureHandle.
+  /// How the device lies before the operator, its buttons' names, and what else its handle can do, once the server has
+  /// answered; empty before, and for good when the server does not know kFeatureHandle.
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
   /// The server's newest report on our forces, once a second while they come: late ones by cause, delays, losses.
@@ -228,6 +236,7 @@ class ForceClient {
   bool call(LocalTime now);
   std::optional<DeviceState> due_state(LocalTime now);
   void send(LocalTime now, const Touch& touch, const DeviceState& answered);
+  void add_handle(const Touch& touch, const DeviceState& answered, ForceCommand& command);
   Duration valid_for(std::uint64_t tick) const;
   Duration haptic_period() const;
   LocalTime next_call() const;
@@ -257,7 +266,7 @@ class ForceClient {
   std::optional<std::uint32_t> deadband_request_{};  ///< … of the states
   bool foretell_ = false;                            ///< the server leaves states out
   LocalTime next_call_{};
-  std::optional<Deadband> deadband_;
+  std::optional<HandleDeadband> deadband_;
   std::uint64_t sequence_ = 0;       ///< of the newest force
   std::uint64_t answered_tick_ = 0;  ///< the tick it answers
   std::optional<LinkReport> report_;

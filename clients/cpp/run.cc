@@ -169,6 +169,7 @@ int run_with(const Options& options, Callback callback) {
 
     std::string said;
     std::string_view unusable;  // the newest reason that was said
+    std::string_view left_out;  // likewise
     ForceClient::Phase phase = client.phase();
     PeerTime reported{};
     LocalTime now = start;
@@ -178,6 +179,9 @@ int run_with(const Options& options, Callback callback) {
       if (!text.empty() && text != said) say(said = text);
       if (const auto why = client.stats().unusable; !why.empty() && why != unusable) {
         say("a force is not sent: " + std::string(unusable = why));
+      }
+      if (const auto what = client.stats().left_out; !what.empty() && what != left_out) {
+        say("not sent with a force: " + std::string(left_out = what));
       }
       if (const auto& report = client.report()) {
         if (std::exchange(reported, report->until) != report->until) print_report(*report, options);

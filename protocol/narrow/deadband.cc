@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/base/rotation.h"
 #include "protocol/expect.h"
 #include "protocol/limits.h"
 
@@ -14,13 +15,49 @@ Deadband::Deadband(const Config& config) : config_(config) {
   expect_above_zero(seconds(config.longest_silence), "deadband.longest_silence_s");
 }
 
-bool Deadband::passes(LocalTime now, const Vec3& value) noexcept {
+bool Deadband::differs(LocalTime now, const Vec3& value) const noexcept {
   const bool imperceptible =
       sent_ && now - sent_->at < config_.longest_silence &&
       (value - sent_->value).norm() <= std::max(config_.share * sent_->value.norm(), config_.floor);
-  if (imperceptible) return false;  // false when `value` is not a number: that passes
+  return !imperceptible;  // what is not a number differs
+}
+
+bool Deadband::passes(LocalTime now, const Vec3& value) noexcept {
+  if (!differs(now, value)) return false;
   sent(now, value);
   return true;
+}
+
+namespace {
+
+Deadband::Config with_floor(Deadband::Config config, double floor) {
+  config.floor = floor;
+  return config;
+}
+
+Vec3 grip_of(const HandleDeadband::Value& value) noexcept { return {value.grip.value_or(0), 0, 0}; }
+
+}  // namespace
+
+HandleDeadband::HandleDeadband(const Deadband::Config& vector, double turning_floor, double grip_floor)
+    : vector_(vector), turning_(with_floor(vector, turning_floor)), grip_(with_floor(vector, grip_floor)) {}
+
+bool HandleDeadband::passes(LocalTime now, const Value& value) noexcept {
+  const bool same_parts = turns_ == value.turning.has_value() && grips_ == value.grip.has_value();
+  if (same_parts && !vector_.differs(now, value.vector) &&
+      !turning_.differs(now, value.turning.value_or(Vec3::Zero())) && !grip_.differs(now, grip_of(value))) {
+    return false;
+  }
+  sent(now, value);
+  return true;
+}
+
+void HandleDeadband::sent(LocalTime now, const Value& value) noexcept {
+  turns_ = value.turning.has_value();
+  grips_ = value.grip.has_value();
+  vector_.sent(now, value.vector);
+  turning_.sent(now, value.turning.value_or(Vec3::Zero()));
+  grip_.sent(now, grip_of(value));
 }
 
 DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_period) noexcept {
@@ -28,7 +65,13 @@ DeviceState foretell(const DeviceState& sent, Duration later, Duration haptic_pe
   DeviceState state = sent;
   state.tick += static_cast<std::uint64_t>(periods);
   state.sampled += periods * haptic_period;
-  state.position += seconds(periods * haptic_period) * sent.velocity;
+  const double time = seconds(periods * haptic_period);
+  state.position += time * sent.velocity;
+  if (periods > 0 && state.turning) {
+    Turning& turning = *state.turning;
+    turning.orientation = unit(product(rotation_by(time * turning.angular_velocity), turning.orientation));
+  }
+  if (state.grip) state.grip->opening += time * state.grip->velocity;
   return state;
 }
 
@@ -43,14 +86,18 @@ std::string StateDeadband::objection(const SetStateDeadband& asked) {
 }
 
 StateDeadband::StateDeadband(const SetStateDeadband& asked)
-    : velocity_({.share = asked.share, .floor = asked.floor, .longest_silence = asked.max_silence}) {}
+    : velocity_(HandleDeadband::of_velocities(
+          {.share = asked.share, .floor = asked.floor, .longest_silence = asked.max_silence})) {}
 
 bool StateDeadband::passes(const DeviceState& state) noexcept {
   const LocalTime now(state.sampled.time_since_epoch());
-  if (mode_ == state.mode && buttons_ == state.buttons) return velocity_.passes(now, state.velocity);
+  HandleDeadband::Value velocity{.vector = state.velocity};
+  if (state.turning) velocity.turning = state.turning->angular_velocity;
+  if (state.grip) velocity.grip = state.grip->velocity;
+  if (mode_ == state.mode && buttons_ == state.buttons) return velocity_.passes(now, velocity);
   mode_ = state.mode;
   buttons_ = state.buttons;
-  velocity_.sent(now, state.velocity);
+  velocity_.sent(now, velocity);
   return true;
 }
 

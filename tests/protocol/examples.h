@@ -207,11 +207,38 @@ inline DeviceState state_with_buttons() {
   return state;
 }
 
-/// Axes as a WoodenHaptics' would be, and the buttons of a Falcon.
+/// A handle with all there is, turned by 106° about y: it turns on, its fingers close on something soft.
+inline DeviceState state_with_handle() {
+  DeviceState state = examples::state();
+  state.buttons = 1;
+  state.turning = Turning{.orientation = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}, .angular_velocity = {0, 1.5, 0}};
+  state.torque_applied = Vec3(0, -0.0625, 0);
+  state.grip = Grip{.opening = 0.25, .velocity = -0.5};
+  state.grip_applied = 0.75;
+  state.hand_force = Vec3(1.5, 0, -0.25);
+  return state;
+}
+
+/// A detent about one axis, and soft fingers.
+inline ForceCommand force_with_torque() {
+  ForceCommand command = force();
+  command.sequence = 102;
+  command.torque = RemoteTorque{.torque = {0, -0.0625, 0}, .model = RotationModel{}};
+  command.torque->model->at = {.w = 0.6, .x = 0, .y = 0.8, .z = 0};
+  command.torque->model->stiffness(1, 1) = 0.25;
+  command.grip_force = 0.75;
+  return command;
+}
+
+/// Axes as a WoodenHaptics' would be, the buttons of a Falcon, and motors for all that a handle can do.
 inline HandleDescription handle_description() {
   return {.device = 1,
           .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
-          .buttons = {"right", "forward", "centre", "left"}};
+          .buttons = {"right", "forward", "centre", "left"},
+          .orientation_measured = true,
+          .max_torque = 0.125,
+          .gripper_open = 0.5,
+          .max_gripper_force = 8};
 }
 
 inline ControlAck handle_described(std::uint32_t id) {
@@ -307,6 +334,8 @@ inline std::vector<Named> datagrams() {
       {"state-buttons", data(64, {}, state_with_buttons())},
       {"control-describe-handle", data(65, {}, Control{.id = 14, .request = Describe{.device = 1, .handle = true}})},
       {"control-ack-handle", data(66, {}, handle_described(14))},
+      {"state-handle", data(67, {}, state_with_handle())},
+      {"force-torque", data(68, {}, force_with_torque())},
   };
 }
 

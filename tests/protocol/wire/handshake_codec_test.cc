@@ -111,9 +111,10 @@ TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
 
 TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
-  answer.handle = HandleDescription{.device = 15,
-                                    .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
-                                    .buttons = std::vector(limits::kMaxButtons + 1, std::string(limits::kMaxName, 'n'))};
+  answer.handle =
+      HandleDescription{.device = 15,
+                        .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
+                        .buttons = std::vector(limits::kMaxButtons + 1, std::string(limits::kMaxName, 'n'))};
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},

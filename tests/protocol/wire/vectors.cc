@@ -166,6 +166,8 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"disarm a device", true, 268, 0, request(268, 14, Disarm{.device = 1})},
       {"buttons that are held", false, 269, 0, at(269, examples::state_with_buttons())},
       {"description of a handle", false, 270, 0, at(270, examples::handle_described(15))},
+      {"a handle with all there is", false, 271, 0, at(271, examples::state_with_handle())},
+      {"torque and grip force", true, 272, 0, at(272, examples::force_with_torque())},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };
