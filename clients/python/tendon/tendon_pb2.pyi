@@ -210,7 +210,8 @@ class DeviceReport(_message.Message):
     def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., device: _Optional[int] = ..., steps: _Optional[int] = ..., missed: _Optional[int] = ..., overruns: _Optional[int] = ..., unseen: _Optional[int] = ..., lateness_us_log2: _Optional[_Iterable[int]] = ..., safety: _Optional[_Union[Safety, str]] = ..., fault: _Optional[str] = ..., degraded: _Optional[str] = ...) -> None: ...
 
 class DeviceState(_message.Message):
-    __slots__ = ["buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "mode", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "velocity_mps"]
+    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "torque_applied_nm", "velocity_mps"]
+    ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
@@ -219,13 +220,20 @@ class DeviceState(_message.Message):
     FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
     FORCE_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     FORCE_WANTED_N_FIELD_NUMBER: _ClassVar[int]
+    GRIPPER_FORCE_APPLIED_N_FIELD_NUMBER: _ClassVar[int]
+    GRIPPER_RAD_FIELD_NUMBER: _ClassVar[int]
+    GRIPPER_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
+    HAND_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
+    ORIENTATION_FIELD_NUMBER: _ClassVar[int]
     PERMITTED_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     POSITION_M_FIELD_NUMBER: _ClassVar[int]
     REASONS_FIELD_NUMBER: _ClassVar[int]
     SAMPLED_NS_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
+    TORQUE_APPLIED_NM_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    angular_velocity_radps: Vec3
     buttons: int
     channel: int
     device: int
@@ -234,14 +242,20 @@ class DeviceState(_message.Message):
     force_applied_n: Vec3
     force_sequence: int
     force_wanted_n: Vec3
+    gripper_force_applied_n: float
+    gripper_rad: float
+    gripper_velocity_radps: float
+    hand_force_n: Vec3
     mode: Mode
+    orientation: Quat
     permitted_force_n: float
     position_m: Vec3
     reasons: int
     sampled_ns: int
     tick: int
+    torque_applied_nm: Vec3
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
 
 class Disarm(_message.Message):
     __slots__ = ["device"]
@@ -262,26 +276,32 @@ class Echo(_message.Message):
     def __init__(self, peer_tx_time_ns: _Optional[int] = ..., rx_time_ns: _Optional[int] = ..., peer_packet_number: _Optional[int] = ..., received_mask: _Optional[int] = ...) -> None: ...
 
 class ForceCommand(_message.Message):
-    __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "model", "sequence", "topology_changed", "valid_for_us"]
+    __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "gripper_force_n", "model", "rotation_model", "sequence", "topology_changed", "torque_nm", "valid_for_us"]
     BASED_ON_TICK_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     ERROR_N_FIELD_NUMBER: _ClassVar[int]
     FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    GRIPPER_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MODEL_FIELD_NUMBER: _ClassVar[int]
+    ROTATION_MODEL_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     TOPOLOGY_CHANGED_FIELD_NUMBER: _ClassVar[int]
+    TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
     VALID_FOR_US_FIELD_NUMBER: _ClassVar[int]
     based_on_tick: int
     channel: int
     device: int
     error_n: float
     force_n: Vec3
+    gripper_force_n: float
     model: LocalModel
+    rotation_model: RotationModel
     sequence: int
     topology_changed: bool
+    torque_nm: Vec3
     valid_for_us: int
-    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ...) -> None: ...
+    def __init__(self, sequence: _Optional[int] = ..., based_on_tick: _Optional[int] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., model: _Optional[_Union[LocalModel, _Mapping]] = ..., valid_for_us: _Optional[int] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., topology_changed: bool = ..., error_n: _Optional[float] = ..., torque_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_force_n: _Optional[float] = ..., rotation_model: _Optional[_Union[RotationModel, _Mapping]] = ...) -> None: ...
 
 class ForceTable(_message.Message):
     __slots__ = ["first_depth_m", "force_n", "step_m"]
@@ -332,14 +352,22 @@ class Grant(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
 
 class HandleDescription(_message.Message):
-    __slots__ = ["buttons", "device", "operator_from_device"]
+    __slots__ = ["buttons", "device", "gripper_open_rad", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured"]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    GRIPPER_OPEN_RAD_FIELD_NUMBER: _ClassVar[int]
+    MAX_GRIPPER_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    MAX_TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
     OPERATOR_FROM_DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ORIENTATION_MEASURED_FIELD_NUMBER: _ClassVar[int]
     buttons: _containers.RepeatedScalarFieldContainer[str]
     device: int
+    gripper_open_rad: float
+    max_gripper_force_n: float
+    max_torque_nm: float
     operator_from_device: Quat
-    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ...) -> None: ...
+    orientation_measured: bool
+    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]
@@ -478,6 +506,14 @@ class Refused(_message.Message):
     version_max: int
     version_min: int
     def __init__(self, code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., version_min: _Optional[int] = ..., version_max: _Optional[int] = ...) -> None: ...
+
+class RotationModel(_message.Message):
+    __slots__ = ["angular_stiffness_nmprad", "at_orientation"]
+    ANGULAR_STIFFNESS_NMPRAD_FIELD_NUMBER: _ClassVar[int]
+    AT_ORIENTATION_FIELD_NUMBER: _ClassVar[int]
+    angular_stiffness_nmprad: _containers.RepeatedScalarFieldContainer[float]
+    at_orientation: Quat
+    def __init__(self, at_orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_stiffness_nmprad: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class SetStateDeadband(_message.Message):
     __slots__ = ["floor_mps", "max_silence_us", "share"]

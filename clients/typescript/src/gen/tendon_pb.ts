@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASKLAwoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHIvIBCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQFCCgoIX2Vycm9yX24imwEKCkxvY2FsTW9kZWwSHQoEYXRfbRgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEhkKDXN0aWZmbmVzc19ucG0YAiADKAFCAhABEhsKDnZhbGlkX3JhZGl1c19tGAMgASgBSACIAQESIwoHY29udGFjdBgEIAEoCzISLnRlbmRvbi52MS5Db250YWN0QhEKD192YWxpZF9yYWRpdXNfbSJfCgdDb250YWN0Eh8KBm5vcm1hbBgBIAEoCzIPLnRlbmRvbi52MS5WZWMzEg0KBWdhcF9tGAIgASgBEiQKBXRhYmxlGAMgASgLMhUudGVuZG9uLnYxLkZvcmNlVGFibGUiSAoKRm9yY2VUYWJsZRIVCg1maXJzdF9kZXB0aF9tGAEgASgBEg4KBnN0ZXBfbRgCIAEoARITCgdmb3JjZV9uGAMgAygBQgIQASL+AgoHQ29udHJvbBIKCgJpZBgBIAEoDRIxCg5zZXRfc3RhdGVfcmF0ZRgCIAEoCzIXLnRlbmRvbi52MS5TZXRTdGF0ZVJhdGVIABIhCgVyZWFybRgDIAEoCzIQLnRlbmRvbi52MS5SZWFybUgAEicKCGRlc2NyaWJlGAQgASgLMhMudGVuZG9uLnYxLkRlc2NyaWJlSAASKgoKdGFrZV9sZWFzZRgFIAEoCzIULnRlbmRvbi52MS5UYWtlTGVhc2VIABIqCgpnaXZlX2xlYXNlGAYgASgLMhQudGVuZG9uLnYxLkdpdmVMZWFzZUgAEjkKEnNldF9zdGF0ZV9kZWFkYmFuZBgIIAEoCzIbLnRlbmRvbi52MS5TZXRTdGF0ZURlYWRiYW5kSAASIwoGZGlzYXJtGAkgASgLMhEudGVuZG9uLnYxLkRpc2FybUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSIqCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0SDgoGaGFuZGxlGAIgASgIIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIrQBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24SLAoGaGFuZGxlGAYgASgLMhwudGVuZG9uLnYxLkhhbmRsZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24iYwoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCSJqChJDaGFubmVsRGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIkCgRydWxlGAIgASgOMhYudGVuZG9uLnYxLkNoYW5uZWxSdWxlEhAKCGxlYXNlX21zGAMgASgNEg4KBmhvbGRlchgEIAEoCSI0CgNCeWUSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBnJlYXNvbhgCIAEoCSLeBAoKTGlua1JlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZmb3JjZXMYBCABKAQSEwoLbGF0ZV9zZXJ2ZXIYBSABKAQSFAoMbGF0ZV9uZXR3b3JrGAYgASgEEhMKC2xhdGVfZW5naW5lGAcgASgEEhUKDXdvcnN0X2xhdGVfbnMYCCABKAQSFgoObG9uZ2VzdF9nYXBfbnMYCSABKAQSJQoKcm91bmRfdHJpcBgKIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fc2VydmVyGAsgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19jbGllbnQYDCABKAsyES50ZW5kb24udjEuRGVsYXlzEhcKD2Nsb2NrX29mZnNldF9ucxgNIAEoEhIXCg9jbG9ja19kcmlmdF9wcG0YDiABKAESFgoOY2xvY2tfZXJyb3JfbnMYDyABKAQSEAoIcmVjZWl2ZWQYECABKAQSDAoEbG9zdBgRIAEoBBIRCglyZW9yZGVyZWQYEiABKAQSEgoKZHVwbGljYXRlZBgTIAEoBBINCgV3b3JkcxgUIAEoCRIUCgxsYXRlX3Vua25vd24YFSABKAQSGgoScmVmdXNlZF9ub3RfZmluaXRlGBYgASgEEh0KFXJlZnVzZWRfb3V0X29mX2JvdW5kcxgXIAEoBBIcChRyZWZ1c2VkX3Vua25vd25fdGljaxgYIAEoBBIcChRyZWZ1c2VkX29sZF9zZXF1ZW5jZRgZIAEoBCIrCgZEZWxheXMSEQoJbWVkaWFuX25zGAEgASgSEg4KBnA5OV9ucxgCIAEoEiL0AQoMRGV2aWNlUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmRldmljZRgEIAEoDRINCgVzdGVwcxgFIAEoBBIOCgZtaXNzZWQYBiABKAQSEAoIb3ZlcnJ1bnMYByABKAQSDgoGdW5zZWVuGAggASgEEhwKEGxhdGVuZXNzX3VzX2xvZzIYCSADKARCAhABEiEKBnNhZmV0eRgKIAEoDjIRLnRlbmRvbi52MS5TYWZldHkSDQoFZmF1bHQYCyABKAkSEAoIZGVncmFkZWQYDCABKAkijgEKClBlZXJSZXBvcnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SDAoEbmFtZRgDIAEoCRIUCgxzdGF0ZV9vbmVfaW4YBCABKA0SFgoOZm9yY2VzX3JlZnVzZWQYBSABKAgSIwoEbGluaxgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0IpIBCgVIZWxsbxITCgt2ZXJzaW9uX21pbhgBIAEoDRITCgt2ZXJzaW9uX21heBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSDAoEbmFtZRgEIAEoCRIQCghmZWF0dXJlcxgFIAMoCRIgCgZjbGFpbXMYBiADKAsyEC50ZW5kb24udjEuQ2xhaW0iRwoFQ2xhaW0SDgoGZGV2aWNlGAEgASgJEg8KB2NoYW5uZWwYAiABKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlIl4KBkFuc3dlchIlCgd3ZWxjb21lGAEgASgLMhIudGVuZG9uLnYxLldlbGNvbWVIABIlCgdyZWZ1c2VkGAIgASgLMhIudGVuZG9uLnYxLlJlZnVzZWRIAEIGCgRib2R5IusBCgdXZWxjb21lEg8KB3ZlcnNpb24YASABKA0SEAoIZmVhdHVyZXMYAiADKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEhMKC2RldmljZV9uYW1lGAQgASgJEhMKC21heF9mb3JjZV9uGAUgASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgGIAEoARIPCgdsb29wX2h6GAcgASgNEhIKCnRpbWVvdXRfbXMYCCABKA0SDgoGc2VydmVyGAkgASgJEiAKBmdyYW50cxgKIAMoCzIQLnRlbmRvbi52MS5HcmFudCJHCgVHcmFudBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiYgoHUmVmdXNlZBIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAIgASgJEhMKC3ZlcnNpb25fbWluGAMgASgNEhMKC3ZlcnNpb25fbWF4GAQgASgNKoUBCgRNb2RlEhQKEE1PREVfVU5TUEVDSUZJRUQQABINCglNT0RFX0lETEUQARIPCgtNT0RFX0FDVElWRRACEhAKDE1PREVfSE9MRElORxADEhEKDU1PREVfREVDQVlJTkcQBBISCg5NT0RFX1NBRkVfU1RPUBAFEg4KCk1PREVfRkFVTFQQBipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqvAEKBlNhZmV0eRIWChJTQUZFVFlfVU5TUEVDSUZJRUQQABIRCg1TQUZFVFlfQUJTRU5UEAESEgoOU0FGRVRZX09QRU5JTkcQAhITCg9TQUZFVFlfRklSTVdBUkUQAxISCg5TQUZFVFlfVU5IT01FRBAEEhAKDFNBRkVUWV9IT01FRBAFEhAKDFNBRkVUWV9BUk1FRBAGEhAKDFNBRkVUWV9GQVVMVBAHEhQKEFNBRkVUWV9VTkdVQVJERUQQCCq9AQoEQ29kZRIUChBDT0RFX1VOU1BFQ0lGSUVEEAASCwoHQ09ERV9PSxABEhAKDENPREVfSU5WQUxJRBACEhQKEENPREVfVU5TVVBQT1JURUQQAxINCglDT0RFX0JVU1kQBBIPCgtDT0RFX0RFTklFRBAFEhEKDUNPREVfU0hVVERPV04QBhISCg5DT0RFX1RJTUVEX09VVBAHEhAKDENPREVfRVhQSVJFRBAIEhEKDUNPREVfUkVQTEFDRUQQCSpECgRSb2xlEhQKEFJPTEVfVU5TUEVDSUZJRUQQABIRCg1ST0xFX09CU0VSVkVSEAESEwoPUk9MRV9DT05UUk9MTEVSEAJiBnByb3RvMw");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASLhBQoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgPIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYECABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHEioKEXRvcnF1ZV9hcHBsaWVkX25tGBIgASgLMg8udGVuZG9uLnYxLlZlYzMSGAoLZ3JpcHBlcl9yYWQYEyABKAFIAIgBARIjChZncmlwcGVyX3ZlbG9jaXR5X3JhZHBzGBQgASgBSAGIAQESJAoXZ3JpcHBlcl9mb3JjZV9hcHBsaWVkX24YFSABKAFIAogBARIlCgxoYW5kX2ZvcmNlX24YFiABKAsyDy50ZW5kb24udjEuVmVjM0IOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi/gIKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpsZWFzZV9sb3N0GAcgASgLMhQudGVuZG9uLnYxLkxlYXNlTG9zdEgAQgQKAm9wIioKDFNldFN0YXRlUmF0ZRIKCgJoehgBIAEoDRIOCgZkZXZpY2UYAiABKA0iTAoQU2V0U3RhdGVEZWFkYmFuZBINCgVzaGFyZRgBIAEoARIRCglmbG9vcl9tcHMYAiABKAESFgoObWF4X3NpbGVuY2VfdXMYAyABKA0iFwoFUmVhcm0SDgoGZGV2aWNlGAEgASgNIhgKBkRpc2FybRIOCgZkZXZpY2UYASABKA0iKgoIRGVzY3JpYmUSDgoGZGV2aWNlGAEgASgNEg4KBmhhbmRsZRgCIAEoCCIsCglUYWtlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iLAoJR2l2ZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIjgKCUxlYXNlTG9zdBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIKCgJ0bxgDIAEoCSK0AQoKQ29udHJvbEFjaxIKCgJpZBgBIAEoDRIdCgRjb2RlGAIgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAMgASgJEg8KB3dhaXRfbXMYBCABKA0SLAoGZGV2aWNlGAUgASgLMhwudGVuZG9uLnYxLkRldmljZURlc2NyaXB0aW9uEiwKBmhhbmRsZRgGIAEoCzIcLnRlbmRvbi52MS5IYW5kbGVEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uIukBChFIYW5kbGVEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SLQoUb3BlcmF0b3JfZnJvbV9kZXZpY2UYAiABKAsyDy50ZW5kb24udjEuUXVhdBIPCgdidXR0b25zGAMgAygJEhwKFG9yaWVudGF0aW9uX21lYXN1cmVkGAQgASgIEhUKDW1heF90b3JxdWVfbm0YBSABKAESHQoQZ3JpcHBlcl9vcGVuX3JhZBgGIAEoAUgAiAEBEhsKE21heF9ncmlwcGVyX2ZvcmNlX24YByABKAFCEwoRX2dyaXBwZXJfb3Blbl9yYWQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIi9AEKDERldmljZVJlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZkZXZpY2UYBCABKA0SDQoFc3RlcHMYBSABKAQSDgoGbWlzc2VkGAYgASgEEhAKCG92ZXJydW5zGAcgASgEEg4KBnVuc2VlbhgIIAEoBBIcChBsYXRlbmVzc191c19sb2cyGAkgAygEQgIQARIhCgZzYWZldHkYCiABKA4yES50ZW5kb24udjEuU2FmZXR5Eg0KBWZhdWx0GAsgASgJEhAKCGRlZ3JhZGVkGAwgASgJIo4BCgpQZWVyUmVwb3J0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgwKBG5hbWUYAyABKAkSFAoMc3RhdGVfb25lX2luGAQgASgNEhYKDmZvcmNlc19yZWZ1c2VkGAUgASgIEiMKBGxpbmsYBiABKAsyFS50ZW5kb24udjEuTGlua1JlcG9ydCKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKrwBCgZTYWZldHkSFgoSU0FGRVRZX1VOU1BFQ0lGSUVEEAASEQoNU0FGRVRZX0FCU0VOVBABEhIKDlNBRkVUWV9PUEVOSU5HEAISEwoPU0FGRVRZX0ZJUk1XQVJFEAMSEgoOU0FGRVRZX1VOSE9NRUQQBBIQCgxTQUZFVFlfSE9NRUQQBRIQCgxTQUZFVFlfQVJNRUQQBhIQCgxTQUZFVFlfRkFVTFQQBxIUChBTQUZFVFlfVU5HVUFSREVEEAgqvQEKBENvZGUSFAoQQ09ERV9VTlNQRUNJRklFRBAAEgsKB0NPREVfT0sQARIQCgxDT0RFX0lOVkFMSUQQAhIUChBDT0RFX1VOU1VQUE9SVEVEEAMSDQoJQ09ERV9CVVNZEAQSDwoLQ09ERV9ERU5JRUQQBRIRCg1DT0RFX1NIVVRET1dOEAYSEgoOQ09ERV9USU1FRF9PVVQQBxIQCgxDT0RFX0VYUElSRUQQCBIRCg1DT0RFX1JFUExBQ0VEEAkqRAoEUm9sZRIUChBST0xFX1VOU1BFQ0lGSUVEEAASEQoNUk9MRV9PQlNFUlZFUhABEhMKD1JPTEVfQ09OVFJPTExFUhACYgZwcm90bzM");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -347,12 +347,62 @@ export type DeviceState = Message<"tendon.v1.DeviceState"> & {
   forceWantedN?: Vec3 | undefined;
 
   /**
-   * Bit i: button i is held. A press between two states of a client is in the next one. Only to a client that named the
-   * feature "handle"
+   * Only to a client that named the feature "handle", and each only of a device that has it:
+   *
+   * turns the handle frame into the base frame; absent: not measured
+   *
+   * @generated from field: tendon.v1.Quat orientation = 15;
+   */
+  orientation?: Quat | undefined;
+
+  /**
+   * only with an orientation
+   *
+   * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 16;
+   */
+  angularVelocityRadps?: Vec3 | undefined;
+
+  /**
+   * bit i: button i is held; a press between two states of a client is in the next one
    *
    * @generated from field: fixed32 buttons = 17;
    */
   buttons: number;
+
+  /**
+   * about position_m, from this step on; absent: no motors that turn
+   *
+   * @generated from field: tendon.v1.Vec3 torque_applied_nm = 18;
+   */
+  torqueAppliedNm?: Vec3 | undefined;
+
+  /**
+   * [-1e12, 1e12]: opening, 0 = closed; absent: no gripper
+   *
+   * @generated from field: optional double gripper_rad = 19;
+   */
+  gripperRad?: number | undefined;
+
+  /**
+   * [-1e12, 1e12]: only with an opening
+   *
+   * @generated from field: optional double gripper_velocity_radps = 20;
+   */
+  gripperVelocityRadps?: number | undefined;
+
+  /**
+   * [-1e12, 1e12]: on the fingers, > 0 opens them; absent: no motor
+   *
+   * @generated from field: optional double gripper_force_applied_n = 21;
+   */
+  gripperForceAppliedN?: number | undefined;
+
+  /**
+   * of the hand ON THE HANDLE; absent: no force sensor
+   *
+   * @generated from field: tendon.v1.Vec3 hand_force_n = 22;
+   */
+  handForceN?: Vec3 | undefined;
 };
 
 /**
@@ -430,6 +480,29 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
    * @generated from field: optional double error_n = 9;
    */
   errorN?: number | undefined;
+
+  /**
+   * Only to a server that granted the feature "handle":
+   *
+   * on the hand, about the handle's position; absent: none is asked for
+   *
+   * @generated from field: tendon.v1.Vec3 torque_nm = 10;
+   */
+  torqueNm?: Vec3 | undefined;
+
+  /**
+   * [-1e12, 1e12]: on the fingers, > 0 opens them; absent: none is asked for
+   *
+   * @generated from field: optional double gripper_force_n = 11;
+   */
+  gripperForceN?: number | undefined;
+
+  /**
+   * optional
+   *
+   * @generated from field: tendon.v1.RotationModel rotation_model = 14;
+   */
+  rotationModel?: RotationModel | undefined;
 };
 
 /**
@@ -438,6 +511,38 @@ export type ForceCommand = Message<"tendon.v1.ForceCommand"> & {
  */
 export const ForceCommandSchema: GenMessage<ForceCommand> = /*@__PURE__*/
   messageDesc(file_tendon, 6);
+
+/**
+ * The torque near one orientation, so that the device loop can follow the hand's turns. With p = (w, v) = the rotation
+ * from at_orientation to the handle's orientation, q · at_orientation⁻¹, and K = angular_stiffness_nmprad:
+ *     τ(q) = torque_nm − 2 (w K v + v × K v)        −K θ for a small turn θ
+ *
+ * @generated from message tendon.v1.RotationModel
+ */
+export type RotationModel = Message<"tendon.v1.RotationModel"> & {
+  /**
+   * absent is refused
+   *
+   * @generated from field: tendon.v1.Quat at_orientation = 1;
+   */
+  atOrientation?: Quat | undefined;
+
+  /**
+   * −∂τ/∂θ, base frame axes; its entries as those of stiffness_npm.
+   *
+   * [-1e12, 1e12], {1, 3, 9} entries
+   *
+   * @generated from field: repeated double angular_stiffness_nmprad = 2 [packed = true];
+   */
+  angularStiffnessNmprad: number[];
+};
+
+/**
+ * Describes the message tendon.v1.RotationModel.
+ * Use `create(RotationModelSchema)` to create a new message.
+ */
+export const RotationModelSchema: GenMessage<RotationModel> = /*@__PURE__*/
+  messageDesc(file_tendon, 7);
 
 /**
  * The remote environment near one position, so that the device loop can follow the hand:
@@ -482,7 +587,7 @@ export type LocalModel = Message<"tendon.v1.LocalModel"> & {
  * Use `create(LocalModelSchema)` to create a new message.
  */
 export const LocalModelSchema: GenMessage<LocalModel> = /*@__PURE__*/
-  messageDesc(file_tendon, 7);
+  messageDesc(file_tendon, 8);
 
 /**
  * A surface that the tool touches or is about to. It only pushes, unless a table says otherwise.
@@ -517,7 +622,7 @@ export type Contact = Message<"tendon.v1.Contact"> & {
  * Use `create(ContactSchema)` to create a new message.
  */
 export const ContactSchema: GenMessage<Contact> = /*@__PURE__*/
-  messageDesc(file_tendon, 8);
+  messageDesc(file_tendon, 9);
 
 /**
  * The force along the normal, at the depths first_depth_m + i · step_m below at_m: at_m − depth · normal.
@@ -552,7 +657,7 @@ export type ForceTable = Message<"tendon.v1.ForceTable"> & {
  * Use `create(ForceTableSchema)` to create a new message.
  */
 export const ForceTableSchema: GenMessage<ForceTable> = /*@__PURE__*/
-  messageDesc(file_tendon, 9);
+  messageDesc(file_tendon, 10);
 
 /**
  * @generated from message tendon.v1.Control
@@ -630,7 +735,7 @@ export type Control = Message<"tendon.v1.Control"> & {
  * Use `create(ControlSchema)` to create a new message.
  */
 export const ControlSchema: GenMessage<Control> = /*@__PURE__*/
-  messageDesc(file_tendon, 10);
+  messageDesc(file_tendon, 11);
 
 /**
  * How many states of a device per second the client wants.
@@ -656,7 +761,7 @@ export type SetStateRate = Message<"tendon.v1.SetStateRate"> & {
  * Use `create(SetStateRateSchema)` to create a new message.
  */
 export const SetStateRateSchema: GenMessage<SetStateRate> = /*@__PURE__*/
-  messageDesc(file_tendon, 11);
+  messageDesc(file_tendon, 12);
 
 /**
  * Leave out the states that this client can foretell: after a state with velocity v the next one that is sent is the
@@ -693,7 +798,7 @@ export type SetStateDeadband = Message<"tendon.v1.SetStateDeadband"> & {
  * Use `create(SetStateDeadbandSchema)` to create a new message.
  */
 export const SetStateDeadbandSchema: GenMessage<SetStateDeadband> = /*@__PURE__*/
-  messageDesc(file_tendon, 12);
+  messageDesc(file_tendon, 13);
 
 /**
  * Clears a latched fault, and takes a Disarm back. With a safety layer it is the operator's request to arm. Only from a
@@ -715,7 +820,7 @@ export type Rearm = Message<"tendon.v1.Rearm"> & {
  * Use `create(RearmSchema)` to create a new message.
  */
 export const RearmSchema: GenMessage<Rearm> = /*@__PURE__*/
-  messageDesc(file_tendon, 13);
+  messageDesc(file_tendon, 14);
 
 /**
  * No force from the next haptic step on, without a ramp, whatever engines ask for, until a Rearm: neither a new force
@@ -739,7 +844,7 @@ export type Disarm = Message<"tendon.v1.Disarm"> & {
  * Use `create(DisarmSchema)` to create a new message.
  */
 export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
-  messageDesc(file_tendon, 14);
+  messageDesc(file_tendon, 15);
 
 /**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
@@ -767,7 +872,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 15);
+  messageDesc(file_tendon, 16);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -796,7 +901,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 17);
 
 /**
  * I do not want to be it any more.
@@ -824,7 +929,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 18);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -859,7 +964,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 19);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -911,7 +1016,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 20);
 
 /**
  * What a device is and can do.
@@ -1014,7 +1119,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 21);
 
 /**
  * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
@@ -1042,6 +1147,34 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
    * @generated from field: repeated string buttons = 3;
    */
   buttons: string[];
+
+  /**
+   * else no state has an orientation
+   *
+   * @generated from field: bool orientation_measured = 4;
+   */
+  orientationMeasured: boolean;
+
+  /**
+   * [0, 1e12]: norm of the torque the device can give out; 0 = none
+   *
+   * @generated from field: double max_torque_nm = 5;
+   */
+  maxTorqueNm: number;
+
+  /**
+   * [0, 1e12]: the opening of the open gripper; absent: no gripper
+   *
+   * @generated from field: optional double gripper_open_rad = 6;
+   */
+  gripperOpenRad?: number | undefined;
+
+  /**
+   * [0, 1e12]: on the fingers; 0 = it has no motor
+   *
+   * @generated from field: double max_gripper_force_n = 7;
+   */
+  maxGripperForceN: number;
 };
 
 /**
@@ -1049,7 +1182,7 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
  * Use `create(HandleDescriptionSchema)` to create a new message.
  */
 export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 22);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -1089,7 +1222,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 23);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -1113,7 +1246,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 24);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1297,7 +1430,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 25);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1323,7 +1456,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 26);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -1423,7 +1556,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 27);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -1479,7 +1612,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -1529,7 +1662,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 29);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -1562,7 +1695,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 30);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -1591,7 +1724,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 31);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -1671,7 +1804,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 32);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -1704,7 +1837,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 32);
+  messageDesc(file_tendon, 33);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -1740,7 +1873,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 33);
+  messageDesc(file_tendon, 34);
 
 /**
  * @generated from enum tendon.v1.Mode
