@@ -26,6 +26,7 @@ from .messages import (
     DeviceReport,
     DeviceState,
     ForceTable,
+    Grip,
     HandleDescription,
     LinkReport,
     LinkStats,
@@ -36,6 +37,7 @@ from .messages import (
     Safety,
     SetStateDeadband,
     Touch,
+    Turning,
     Welcome,
 )
 
@@ -53,6 +55,7 @@ __all__ = [
     "ForceClient",
     "ForceDeadband",
     "ForceTable",
+    "Grip",
     "HandleDescription",
     "LinkReport",
     "LinkStats",
@@ -66,6 +69,7 @@ __all__ = [
     "SetStateDeadband",
     "Stats",
     "Touch",
+    "Turning",
     "Welcome",
     "aio",
     "cli",

@@ -9,7 +9,19 @@ from dataclasses import dataclass
 from typing import cast
 
 from . import codec, limits
-from .messages import ZERO, Contact, ForceTable, LocalModel, Mat3, Stiffness, Touch, Vec3
+from .messages import (
+    ZERO,
+    Contact,
+    ForceTable,
+    LocalModel,
+    Mat3,
+    RotationModel,
+    Stiffness,
+    Torque,
+    Touch,
+    Turning,
+    Vec3,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +34,9 @@ class Answer:
     contact: Contact | None
     topology_changed: bool
     error: float | None
+    torque: Vec3 | None = None
+    angular_stiffness: Mat3 | None = None
+    grip_force: float | None = None
 
     def objection(self) -> str:
         """Why this answer cannot be used; empty when it can."""
@@ -29,6 +44,14 @@ class Answer:
             return "the force is not finite (NaN or infinity)"
         if not _usable(self.force):
             return f"the force is beyond {limits.MAX_VALUE:g} N"
+        if self.torque is not None and not all(map(math.isfinite, self.torque)):
+            return "the torque is not finite (NaN or infinity)"
+        if self.torque is not None and not _usable(self.torque):
+            return f"the torque is beyond {limits.MAX_VALUE:g} N·m"
+        if self.angular_stiffness is not None and not all(map(_usable, self.angular_stiffness)):
+            return "its angular stiffness is not finite, or beyond the bound of WIRE.md"
+        if self.grip_force is not None and not abs(self.grip_force) <= limits.MAX_VALUE:
+            return f"the grip force is not finite, or beyond {limits.MAX_VALUE:g} N"
         if (
             (self.stiffness is not None and not all(map(_usable, self.stiffness)))
             or (self.contact is not None and not codec.is_contact(self.contact))
@@ -44,6 +67,18 @@ class Answer:
             return None
         return LocalModel(at, self.stiffness or (ZERO, ZERO, ZERO), self.valid_radius, self.contact)
 
+    @property
+    def asks_for_handle(self) -> bool:
+        """Whether it asks for more than a force."""
+        return (self.torque, self.angular_stiffness, self.grip_force) != (None, None, None)
+
+    def turning(self, hand: Turning | None) -> Torque | None:
+        """The torque, with its model around the hand's orientation where the device measures that."""
+        if self.torque is None and self.angular_stiffness is None:
+            return None
+        model = RotationModel(hand.orientation, self.angular_stiffness) if hand and self.angular_stiffness else None
+        return Torque(self.torque or ZERO, model)
+
 
 def read_touch(touch: Touch) -> Answer:
     """Raises ValueError when a force, stiffness or normal has a wrong shape."""
@@ -54,6 +89,9 @@ def read_touch(touch: Touch) -> Answer:
         contact=None if touch.contact is None else _contact(touch.contact),
         topology_changed=touch.topology_changed,
         error=touch.error,
+        torque=None if touch.torque is None else _vector(touch.torque, "a torque of three numbers"),
+        angular_stiffness=None if touch.angular_stiffness is None else _matrix(touch.angular_stiffness),
+        grip_force=None if touch.grip_force is None else float(touch.grip_force),
     )
 
 

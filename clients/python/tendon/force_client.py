@@ -46,6 +46,7 @@ from .messages import (
     SetStateDeadband,
     SetStateRate,
     TakeLease,
+    Torque,
     Touch,
     Welcome,
 )
@@ -157,6 +158,7 @@ class Stats:
     forces: int = 0  # forces sent
     forces_unusable: int = 0  # forces not sent: not finite, out of bounds, or to a state that did not come
     unusable: str = ""  # what was wrong with the newest of them; empty: none
+    left_out: str = ""  # what of the present session's answers is not sent, and why; empty: nothing
     forces_alike: int = 0  # forces not sent: a hand could not tell them from the one before
     lease_lost_to: str = ""  # name of the client that has taken the channel from us; empty: nobody
 
@@ -176,8 +178,9 @@ class ForceClient:
         self.welcome: Welcome | None = None
         """The server's description of itself and its device at the opening of the newest session."""
         self.description: DeviceDescription | None = None
-        self.handle: HandleDescription | None = None
         """Description of the device, once we have named a device or a channel and the server has answered."""
+        self.handle: HandleDescription | None = None
+        """What its handle is and can do, once the server has answered; None for good when it does not know that."""
         self.holds = False
         """Whether the channel takes our forces. While it does not, a controller is handed no states."""
         self.report: LinkReport | None = None
@@ -241,6 +244,17 @@ class ForceClient:
             return f"it answers tick {hand.tick}, which has not come"
         return answer.objection()
 
+    def _of_handle(self, hand: DeviceState, answer: Answer) -> tuple[Torque | None, float | None]:
+        """Torque and grip force of an answer, as far as they can be sent."""
+        if not answer.asks_for_handle:
+            return None, None
+        if self.welcome is None or FEATURE_HANDLE not in self.welcome.features:
+            self._stats.left_out = "torque and grip force: the server does not know them"
+            return None, None
+        if answer.angular_stiffness is not None and hand.turning is None:
+            self._stats.left_out = "angular stiffness: the device does not measure its orientation"
+        return answer.turning(hand.turning), answer.grip_force
+
     def send(self, hand: DeviceState, touch: Touch) -> None:
         """Answers a state. An answer with a number that is not finite or out of bounds, or to a state that did not
         come in this session, is counted and not sent (`stats.unusable` says why); the server then treats this client
@@ -260,7 +274,10 @@ class ForceClient:
             self._stats.forces_unusable += 1
             self._stats.unusable = objection
             return
-        alike = self._deadband is not None and not self._deadband.passes(session.latest, answer.force)
+        torque, grip_force = self._of_handle(hand, answer)
+        alike = self._deadband is not None and not self._deadband.passes(
+            session.latest, answer.force, None if torque is None else torque.torque, grip_force
+        )
         if alike and not answer.topology_changed:
             self._stats.forces_alike += 1
             return
@@ -279,6 +296,8 @@ class ForceClient:
                 self._place.channel,
                 topology_changed=answer.topology_changed,
                 error=answer.error,
+                torque=torque,
+                grip_force=grip_force,
             )
         )
         self._stats.forces += 1
@@ -422,6 +441,7 @@ class ForceClient:
         self._asked_lease = None
         self._ask_lease = now if self.config.take_lease and self._waits_for_lease() else NEVER
         self._stats.lease_lost_to = ""
+        self._stats.left_out = ""
         self.description = None
         self.handle = None
         self._session = Session(outcome.connection_id, now, outcome.cipher)

@@ -65,6 +65,7 @@ class Guest:
         self._doubt = "is tendond running there" + (", and does it know our key" if config.key else "")
         self._said = ""
         self._said_unusable = ""
+        self._said_left_out = ""
         self._told: LinkReport | None = None
 
     def turn(self, now: int) -> None:
@@ -162,6 +163,10 @@ class Guest:
         if unusable and unusable != self._said_unusable:
             self._said_unusable = unusable
             log.warning("a force is not sent: %s", unusable)
+        left_out = self.core.stats.left_out
+        if left_out and left_out != self._said_left_out:
+            self._said_left_out = left_out
+            log.warning("not sent with a force: %s", left_out)
         sentence = self._sentence()
         if sentence and sentence != self._said:
             self._said = sentence
@@ -226,8 +231,8 @@ class AnyClient:
 
     @property
     def handle(self) -> HandleDescription | None:
-        """How the device lies before the operator, and its buttons' names, once the server has answered. None for good when
-        the server does not know FEATURE_HANDLE."""
+        """How the device lies before the operator, its buttons' names, and what else its handle can do, once the server has
+        answered. None for good when the server does not know FEATURE_HANDLE."""
         return self._guest.core.handle
 
     @property

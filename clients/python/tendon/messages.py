@@ -31,7 +31,8 @@ FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
 
 FEATURE_HANDLE = "handle"
-"""The client is told how the device lies before the operator, its buttons' names, and which of them are held."""
+"""The client is told how the device lies before the operator, its buttons, orientation, gripper and torques, and may ask
+for torque and grip force."""
 
 FEATURE_DIAGNOSTICS = "diagnostics"
 """An observer is told the forces asked for, and the state of loops and engines (DeviceReport, PeerReport)."""
@@ -87,6 +88,22 @@ class Reason(IntFlag):
 
 
 @dataclass(frozen=True, slots=True)
+class Turning:
+    """How the handle is turned."""
+
+    orientation: Quat  # turns the handle frame into the base frame
+    angular_velocity: Vec3 = ZERO  # rad/s, base frame axes
+
+
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """How far the gripper of the handle is open."""
+
+    opening: float  # rad; 0 = closed
+    velocity: float = 0.0  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceState:
     """Server → client, newest wins: the device at one haptic step."""
 
@@ -105,6 +122,12 @@ class DeviceState:
     channel: int = 0  # of the force that force_sequence, force_age_ns and mode are about
     force_wanted: Vec3 | None = None  # N, asked for by the engines, before any limit; None: not told (FEATURE_DIAGNOSTICS)
     buttons: int = 0  # bit i is set while button i is held; a press between two states is in the next (FEATURE_HANDLE)
+    # None: the device has it not, or the server does not know FEATURE_HANDLE.
+    turning: Turning | None = None
+    torque_applied: Vec3 | None = None  # N·m on the hand, what the device really gives out from this step on
+    grip: Grip | None = None
+    grip_applied: float | None = None  # N on the fingers, > 0 opens them; likewise
+    hand_force: Vec3 | None = None  # N, of the hand on the handle, as a force sensor measures it
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +160,23 @@ class LocalModel:
 
 
 @dataclass(frozen=True, slots=True)
+class RotationModel:
+    """The torque near one orientation. With p = (w, v) the turn from `at` to the handle's orientation, q · at⁻¹, and
+    K = stiffness: torque − 2 (w K v + v × K v), which is torque − K θ for a small turn θ."""
+
+    at: Quat
+    stiffness: Mat3  # N·m/rad, row by row, base frame axes
+
+
+@dataclass(frozen=True, slots=True)
+class Torque:
+    """On the hand, base frame axes, about the handle's position."""
+
+    torque: Vec3  # N·m
+    model: RotationModel | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class ForceCommand:
     """Client → server, newest wins: the force that the physics engine wants."""
 
@@ -149,6 +189,8 @@ class ForceCommand:
     channel: int = 0
     topology_changed: bool = False  # cut or torn since the previous answer: the server uses the model of neither
     error: float | None = None  # N, the engine's estimate of the error of `force`
+    torque: Torque | None = None  # only to a server that has agreed to FEATURE_HANDLE; so is the next
+    grip_force: float | None = None  # N, on the fingers of the gripper; > 0 opens them
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +254,8 @@ class SetStateDeadband:
     """Client → server, reliable: leave out the states that this client can predict (`foretell`).
 
     After a state with velocity v the next one that is sent is the first whose velocity differs from v by more than
-    max(share · ‖v‖, floor), whose mode or buttons differ, or which comes `max_silence_us` later.
+    max(share · ‖v‖, floor), whose mode or buttons differ, or which comes `max_silence_us` later. So it is with the
+    velocities of rotation and gripper, with floor / 0.05 m in rad/s.
     """
 
     share: float = 0.1  # of the speed: 0 … 0.5
@@ -265,6 +308,14 @@ class HandleDescription:
     """Turns the base frame into the operator's: x right, y up, z to the user; None: not known."""
     buttons: Sequence[str] = ()
     """Names by bit of DeviceState.buttons."""
+    orientation_measured: bool = False
+    """Else no state has `turning`."""
+    max_torque: float = 0.0
+    """N·m, norm of the torque that the device can give out; 0 = none."""
+    gripper_open: float | None = None
+    """rad, the opening of the open gripper; None: no gripper."""
+    max_gripper_force: float = 0.0
+    """N, on the fingers; 0 = the gripper has no motor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -462,6 +513,11 @@ class Touch:
     contact: Contact | None = None  # the surface, with the force at other depths in a table where that is known
     topology_changed: bool = False  # cut or torn since the previous answer: neither answer's stiffness and table are used
     error: float | None = None  # N, the engine's estimate of the error of the force
+    # For a handle with more motors than those of its position (`client.handle`). A server that does not know
+    # FEATURE_HANDLE is sent the force without them (`stats.left_out`).
+    torque: Sequence[float] | None = None  # N·m on the hand, base frame axes, about the handle's position
+    angular_stiffness: Stiffness | None = None  # N·m/rad, −∂torque/∂θ at the state's orientation, in the same forms
+    grip_force: float | None = None  # N, on the fingers of the gripper; > 0 opens them
 
 
 @dataclass(slots=True)

@@ -50,6 +50,7 @@ LocalTime Server::turn(LocalTime now) {
     tick += static_cast<std::uint64_t>(kLoopHz / state_hz);
     state.tick = tick;
     state.position = position(tick);
+    state.turning = turning;
     session_->send(state);
     next_state_ = now + from_seconds(1.0 / state_hz);
   }

@@ -91,6 +91,7 @@ class Server {
   bool features = true;            ///< agree to whatever is offered, or to nothing
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
+  std::optional<Turning> turning;  ///< of the handle, in each state
 
   std::vector<Code> lease_answers;  ///< to take_lease, in this order; then kOk
   int snatches = 0;                 ///< so many leases are another one's as soon as they are given

@@ -175,6 +175,14 @@ TEST(Answer, ANormalIsMadeAUnitVector) {
 TEST(Answer, IsSoundOnlyWithEveryNumberInItsRange) {
   EXPECT_TRUE(is_sound(with_table()));
   EXPECT_TRUE(is_sound(RemoteForce{}));
+  const auto with_torque = [] {
+    RemoteForce answer = with_table();
+    answer.torque = RemoteTorque{.torque = {0, -0.1, 0}, .model = RotationModel{}};
+    answer.torque->model->at = {.w = 0.6, .x = 0, .y = -0.8, .z = 0};
+    answer.grip_force = -1;
+    return answer;
+  };
+  EXPECT_TRUE(is_sound(with_torque()));
   const struct {
     const char* what;
     void (*damage)(RemoteForce&);
@@ -198,9 +206,14 @@ TEST(Answer, IsSoundOnlyWithEveryNumberInItsRange) {
       {"one entry", [](RemoteForce& a) { a.model->contact->table->size = 1; }},
       {"17 entries", [](RemoteForce& a) { a.model->contact->table->size = 17; }},
       {"an entry", [](RemoteForce& a) { a.model->contact->table->force[8] = kNaN; }},
+      {"torque", [](RemoteForce& a) { a.torque->torque.y() = kNaN; }},
+      {"no rotation", [](RemoteForce& a) { a.torque->model->at.y = -0.81; }},
+      {"orientation", [](RemoteForce& a) { a.torque->model->at.z = kNaN; }},
+      {"angular stiffness", [](RemoteForce& a) { a.torque->model->stiffness(2, 1) = kInf; }},
+      {"grip force", [](RemoteForce& a) { a.grip_force = kInf; }},
   };
   for (const auto& [what, damage] : kDamages) {
-    RemoteForce answer = with_table();
+    RemoteForce answer = with_torque();
     damage(answer);
     EXPECT_FALSE(is_sound(answer)) << what;
   }

@@ -108,6 +108,54 @@ TEST(StateDeadband, SendsEachChangeOfModeAtOnceAndCountsTheSilenceFromThere) {
   EXPECT_TRUE(deadband.passes(state(32, kRest, kRest, Mode::kFault)));
 }
 
+DeviceState turning(int ms, const Vec3& angular_velocity, double grip_velocity = 0) {
+  DeviceState turning = state(ms, kRest, kRest);
+  turning.turning = Turning{.orientation = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}, .angular_velocity = angular_velocity};
+  turning.grip = Grip{.opening = 0.5, .velocity = grip_velocity};
+  return turning;
+}
+
+TEST(Foretell, TurnsAndGripsOnWithTheVelocitiesOfBoth) {
+  DeviceState sent = turning(100, {0, 0, 2}, -3);
+  sent.turning->orientation = {.w = 1.0009, .x = 0, .y = 0, .z = 0};
+  const DeviceState later = foretell(sent, milliseconds(10), milliseconds(1));
+  EXPECT_NEAR(later.turning->orientation.w, std::cos(0.01), 1e-12);
+  EXPECT_NEAR(later.turning->orientation.z, std::sin(0.01), 1e-12);
+  EXPECT_EQ(later.turning->angular_velocity, sent.turning->angular_velocity);
+  EXPECT_NEAR(later.grip->opening, 0.47, 1e-12);
+  EXPECT_EQ(foretell(sent, Duration(0), milliseconds(1)).turning, sent.turning) << "to the last bit";
+}
+
+TEST(StateDeadband, SendsAHandThatTurnsOrGripsAnotherWayThanForetold) {
+  StateDeadband deadband(kAsked);  // 1 mm/s is 20 mrad/s at 50 mm
+  EXPECT_TRUE(deadband.passes(turning(1, {0, 0, 0.5}, -0.5)));
+  EXPECT_FALSE(deadband.passes(turning(2, {0, 0, 0.54}, -0.46)));
+  EXPECT_TRUE(deadband.passes(turning(3, {0.06, 0, 0.5}, -0.5)));
+  EXPECT_FALSE(deadband.passes(turning(4, {0.06, 0, 0.5}, -0.5)));
+  EXPECT_TRUE(deadband.passes(turning(5, {0.06, 0, 0.5}, -0.44)));
+  EXPECT_TRUE(deadband.passes(turning(6, kRest, 0)));
+  EXPECT_FALSE(deadband.passes(turning(7, {0.019, 0, 0}, 0.019)));
+  EXPECT_TRUE(deadband.passes(turning(8, {0.021, 0, 0}, 0)));
+  EXPECT_TRUE(deadband.passes(state(9, kRest, kRest))) << "its orientation is not measured any more";
+  EXPECT_FALSE(deadband.passes(state(10, kRest, kRest)));
+}
+
+TEST(HandleDeadband, LeavesOutNoTorqueOrGripForceThatAHandCanTell) {
+  HandleDeadband deadband = HandleDeadband::of_forces(Deadband::force());
+  auto passes = [&, ms = 0](const Vec3& force, std::optional<Vec3> torque, std::optional<double> grip) mutable {
+    return deadband.passes(kStart + milliseconds(++ms), {.vector = force, .turning = torque, .grip = grip});
+  };
+  EXPECT_TRUE(passes({1, 0, 0}, {}, {}));
+  EXPECT_TRUE(passes({1, 0, 0}, Vec3(0, 0.001, 0), {})) << "a torque, however small";
+  EXPECT_FALSE(passes({1.09, 0, 0}, Vec3(0, 0.003, 0), {}));
+  EXPECT_TRUE(passes({1, 0, 0}, Vec3(0, 0.004, 0), {})) << "3 mN·m are 60 mN at 50 mm";
+  EXPECT_TRUE(passes({1, 0, 0}, Vec3(0, 0.004, 0), 0));
+  EXPECT_FALSE(passes({1, 0, 0}, Vec3(0, 0.004, 0), 0.04));
+  EXPECT_TRUE(passes({1, 0, 0}, Vec3(0, 0.004, 0), 0.06));
+  EXPECT_TRUE(passes({1, 0, 0}, {}, 0.06)) << "the torque has gone";
+  EXPECT_FALSE(passes({1, 0, 0}, {}, 0.06));
+}
+
 /// Of a hand that moves by `position(t)`: what the receiver foretells is off by no more than velocity may be, for as
 /// long as nothing is sent.
 TEST(StateDeadband, WhatIsForetoldIsOffByAtMostTheBandTimesTheSilence) {

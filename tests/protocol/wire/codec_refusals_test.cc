@@ -34,9 +34,18 @@ TEST(Codec, AStateOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"mode 0", [](DeviceState& s) { s.mode = Mode{0}; }},
       {"mode 7", [](DeviceState& s) { s.mode = Mode{7}; }},
       {"NaN wanted", [](DeviceState& s) { s.force_wanted = Vec3(0, 0, kNan); }},
+      {"NaN orientation", [](DeviceState& s) { s.turning->orientation.x = kNan; }},
+      {"an orientation that is no rotation", [](DeviceState& s) { s.turning->orientation.w = 0.602; }},
+      {"no orientation", [](DeviceState& s) { s.turning->orientation = {.w = 0, .x = 0, .y = 0, .z = 0}; }},
+      {"infinite angular velocity", [](DeviceState& s) { s.turning->angular_velocity.z() = kInf; }},
+      {"NaN torque", [](DeviceState& s) { s.torque_applied->x() = kNan; }},
+      {"infinite opening", [](DeviceState& s) { s.grip->opening = kInf; }},
+      {"NaN velocity of the grip", [](DeviceState& s) { s.grip->velocity = kNan; }},
+      {"huge grip force", [](DeviceState& s) { s.grip_applied = -1.001e12; }},
+      {"NaN force of the hand", [](DeviceState& s) { s.hand_force->y() = kNan; }},
   };
   for (const BadState& bad : cases) {
-    DeviceState state = examples::state();
+    DeviceState state = examples::state_with_handle();
     bad.spoil(state);
     DataReader reader;
     const auto* content = read(reader, data(1, {}, state, examples::force()));
@@ -73,6 +82,13 @@ TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"a table of one", [](ForceCommand& f) { f.model->contact->table->size = 1; }},
       {"negative error", [](ForceCommand& f) { f.error = -0.1; }},
       {"NaN error", [](ForceCommand& f) { f.error = kNan; }},
+      {"NaN torque", [](ForceCommand& f) { f.torque->torque.y() = kNan; }},
+      {"infinite torque", [](ForceCommand& f) { f.torque->torque.z() = kInf; }},
+      {"NaN orientation", [](ForceCommand& f) { f.torque->model->at.w = kNan; }},
+      {"an orientation that is no rotation", [](ForceCommand& f) { f.torque->model->at.w = 0.602; }},
+      {"NaN angular stiffness", [](ForceCommand& f) { f.torque->model->stiffness(0, 2) = kNan; }},
+      {"huge angular stiffness", [](ForceCommand& f) { f.torque->model->stiffness(0, 2) = 1.001e12; }},
+      {"NaN grip force", [](ForceCommand& f) { f.grip_force = kNan; }},
       {"sequence 0", [](ForceCommand& f) { f.sequence = 0; }},
       {"valid for nothing", [](ForceCommand& f) { f.valid_for = Duration{}; }},
       {"valid for less than nothing", [](ForceCommand& f) { f.valid_for = Duration{-1}; }},
@@ -81,6 +97,7 @@ TEST(Codec, AForceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   };
   for (const BadForce& bad : cases) {
     ForceCommand force = examples::force_with_all();
+    force.torque = examples::force_with_torque().torque;
     bad.spoil(force);
     DataReader reader;
     const auto* content = read(reader, data(1, {}, force, examples::state()));

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/base/rotation.h"
 #include "protocol/limits.h"
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
@@ -30,6 +31,17 @@ Duration any_time() {
   return Duration{*rc::gen::inRange<std::int64_t>(-limits::kMaxTime.count(), limits::kMaxTime.count())};
 }
 
+Quat any_rotation() {
+  Quat q;
+  do {
+    q = {.w = *rc::gen::inRange(-1000, 1001) / 1e3,
+         .x = *rc::gen::inRange(-1000, 1001) / 1e3,
+         .y = *rc::gen::inRange(-1000, 1001) / 1e3,
+         .z = *rc::gen::inRange(-1000, 1001) / 1e3};
+  } while (q == Quat{.w = 0, .x = 0, .y = 0, .z = 0});
+  return unit(q);
+}
+
 RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   DeviceState in;
   in.tick = *rc::gen::arbitrary<std::uint64_t>();
@@ -47,6 +59,11 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
   if (*rc::gen::arbitrary<bool>()) in.force_wanted = any_vector();
   in.buttons = *rc::gen::arbitrary<std::uint32_t>();
+  if (*rc::gen::arbitrary<bool>()) in.turning = {.orientation = any_rotation(), .angular_velocity = any_vector()};
+  if (*rc::gen::arbitrary<bool>()) in.torque_applied = any_vector();
+  if (*rc::gen::arbitrary<bool>()) in.grip = {.opening = any_value(), .velocity = any_value()};
+  if (*rc::gen::arbitrary<bool>()) in.grip_applied = any_value();
+  if (*rc::gen::arbitrary<bool>()) in.hand_force = any_vector();
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -55,6 +72,11 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   const auto& out = std::get<DeviceState>(content->frames[0]);
   RC_ASSERT(out.force_wanted == in.force_wanted);
   RC_ASSERT(out.buttons == in.buttons);
+  RC_ASSERT((out.turning == in.turning));
+  RC_ASSERT(out.torque_applied == in.torque_applied);
+  RC_ASSERT((out.grip == in.grip));
+  RC_ASSERT(out.grip_applied == in.grip_applied);
+  RC_ASSERT(out.hand_force == in.hand_force);
   RC_ASSERT(out.tick == in.tick);
   RC_ASSERT((out.sampled == in.sampled));
   RC_ASSERT(out.position == in.position);
@@ -98,6 +120,16 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   }
   in.topology_changed = *rc::gen::arbitrary<bool>();
   if (*rc::gen::arbitrary<bool>()) in.error = std::abs(any_value());
+  const int torque_form = *rc::gen::inRange(0, 5);
+  if (torque_form > 0) in.torque = RemoteTorque{.torque = any_vector()};
+  if (torque_form > 1) {
+    RotationModel& model = in.torque->model.emplace();
+    model.at = any_rotation();
+    if (torque_form == 2) model.stiffness = any_value() * Mat3::Identity();
+    if (torque_form == 3) model.stiffness = any_vector().asDiagonal();
+    if (torque_form == 4) model.stiffness << any_vector(), any_vector(), any_vector();
+  }
+  if (*rc::gen::arbitrary<bool>()) in.grip_force = any_value();
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -131,6 +163,14 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   }
   RC_ASSERT(out.topology_changed == in.topology_changed);
   RC_ASSERT(out.error == in.error);
+  RC_ASSERT(out.grip_force == in.grip_force);
+  RC_ASSERT(out.torque.has_value() == in.torque.has_value());
+  if (!in.torque) return;
+  RC_ASSERT(out.torque->torque == in.torque->torque);
+  RC_ASSERT(out.torque->model.has_value() == in.torque->model.has_value());
+  if (!in.torque->model) return;
+  RC_ASSERT((out.torque->model->at == in.torque->model->at));
+  RC_ASSERT(out.torque->model->stiffness == in.torque->model->stiffness);
 }
 
 Duration any_length() { return Duration{*rc::gen::inRange<std::int64_t>(0, limits::kMaxTime.count())}; }
@@ -276,7 +316,7 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastDatagram) {
   DataReader reader;
   std::array<std::byte, kMaxDatagram> buffer;
   writer.begin(buffer, {.connection_id = 1}, LocalTime{}, examples::echo());
-  writer.add(examples::force());
+  writer.add(examples::force_with_torque());
   ForceCommand plain = examples::force();
   plain.model.reset();
   writer.begin(buffer, {.connection_id = 1, .packet_number = 1}, LocalTime{}, {});
@@ -286,6 +326,21 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastDatagram) {
   EXPECT_FALSE(content->echo.has_value());
   ASSERT_EQ(content->frames.size(), 1U);
   EXPECT_FALSE(std::get<ForceCommand>(content->frames[0]).model.has_value());
+}
+
+TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastHandle) {
+  DataWriter writer;
+  std::array<std::byte, kMaxDatagram> buffer;
+  const auto write = [&](const auto&... frames) {
+    writer.begin(buffer, {.connection_id = examples::kConnection}, LocalTime{Duration{1'000'100'000}}, {});
+    (writer.add(frames), ...);
+    return examples::Bytes(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size()));
+  };
+  write(examples::state_with_handle(), examples::force_with_torque(), examples::handle_described(1));
+  HandleDescription little{.device = 1};
+  ControlAck ack = examples::handle_described(1);
+  ack.handle = little;
+  EXPECT_EQ(write(examples::state(), examples::force(), ack), data(0, {}, examples::state(), examples::force(), ack));
 }
 
 TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {

@@ -111,10 +111,13 @@ TEST(Codec, TheLongestDescriptionFitsIntoADatagramOfItsOwn) {
 
 TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   ControlAck answer{.id = ~0U, .code = Code::kOk, .detail = std::string(limits::kMaxDetail, 'd')};
-  answer.handle =
-      HandleDescription{.device = 15,
-                        .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
-                        .buttons = std::vector(limits::kMaxButtons + 1, std::string(limits::kMaxName, 'n'))};
+  answer.handle = HandleDescription{.device = 15,
+                                    .operator_from_device = Quat{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5},
+                                    .buttons = std::vector(limits::kMaxButtons + 1, std::string(limits::kMaxName, 'n')),
+                                    .orientation_measured = true,
+                                    .max_torque = 0.1,
+                                    .gripper_open = 0.3,
+                                    .max_gripper_force = 1e12};
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
@@ -127,8 +130,111 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   const auto& handle = std::get<ControlAck>(content->frames[0]).handle;
   ASSERT_TRUE(handle.has_value());
   EXPECT_EQ(handle->operator_from_device, answer.handle->operator_from_device);
+  EXPECT_TRUE(handle->orientation_measured);
+  EXPECT_EQ(handle->max_torque, 0.1);
+  EXPECT_EQ(handle->gripper_open, 0.3);
+  EXPECT_EQ(handle->max_gripper_force, 1e12);
   EXPECT_EQ(handle->buttons.size(), limits::kMaxButtons);
   EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
+}
+
+/// The worst of both: every component of every number takes its eight bytes, every counter ten.
+TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
+  const Vec3 vector = Vec3::Constant(-1.0 / 3);
+  const Mat3 matrix{{1.1, 2.1, 3.1}, {4.1, 5.1, 6.1}, {7.1, 8.1, 9.1}};
+  const Quat turned{.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5};
+  DeviceState state{.tick = ~std::uint64_t{0},
+                    .sampled = PeerTime{limits::kMaxTime},
+                    .position = vector,
+                    .velocity = vector,
+                    .force_applied = vector,
+                    .energy = -0.1,
+                    .permitted_force = kInf,
+                    .reasons = ~0U,
+                    .force_sequence = ~std::uint64_t{0},
+                    .force_age = limits::kMaxTime,
+                    .mode = Mode::kFault,
+                    .device = limits::kMaxDevices - 1,
+                    .channel = limits::kMaxChannels - 1,
+                    .force_wanted = vector,
+                    .buttons = ~0U,
+                    .turning = Turning{.orientation = turned, .angular_velocity = vector},
+                    .torque_applied = vector,
+                    .grip = Grip{.opening = 0.1, .velocity = -0.1},
+                    .grip_applied = 0.1,
+                    .hand_force = vector};
+  ForceTable table{.first = -0.1, .step = 0.1, .size = ForceTable::kMaxEntries, .force = {}};
+  table.force.fill(0.1);
+  ForceCommand force{.sequence = ~std::uint64_t{0},
+                     .based_on_tick = ~std::uint64_t{0},
+                     .force = vector,
+                     .model = LocalModel{.at = vector,
+                                         .stiffness = matrix,
+                                         .valid_radius = 0.1,
+                                         .contact = Contact{.normal = {0.6, 0.64, 0.48}, .gap = -0.1, .table = table}},
+                     .valid_for = limits::kMaxValidFor,
+                     .device = limits::kMaxDevices - 1,
+                     .channel = limits::kMaxChannels - 1,
+                     .topology_changed = true,
+                     .error = 0.1,
+                     .torque = RemoteTorque{.torque = vector, .model = RotationModel{}},
+                     .grip_force = -0.1};
+  force.torque->model->at = turned;
+  force.torque->model->stiffness = matrix;
+  OutgoingEcho echo = examples::echo();
+  echo.packet_number = ~std::uint64_t{0};
+
+  std::array<std::byte, kMaxDatagram> buffer;
+  DataWriter writer;
+  writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
+  const std::size_t empty = writer.size();
+  ASSERT_TRUE(writer.add(state));
+  EXPECT_EQ(writer.size() - empty, 390U);
+  ASSERT_TRUE(writer.add(force));
+  EXPECT_EQ(writer.size() + crypto::kTagSize, 1000U);
+
+  DataReader reader;
+  const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
+  ASSERT_NE(content, nullptr);
+  EXPECT_EQ(content->frames.size(), 2U);
+  EXPECT_EQ(content->invalid, 0U);
+}
+
+TEST(Codec, AnAngularVelocityNeedsAnOrientationAndAGripsVelocityAnOpening) {
+  const auto accepted = [](const std::function<void(RawProtobuf&)>& add) {
+    RawProtobuf state;
+    state.varint(11, 2);
+    add(state);
+    DataReader reader;
+    const auto* content = reader.read(datagram_with(RawProtobuf().message(1, state)));
+    return content != nullptr && content->frames.size() == 1;
+  };
+  constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
+  const RawProtobuf one = RawProtobuf().fixed64(1, kOne);
+  EXPECT_TRUE(accepted([&](RawProtobuf& state) { state.message(15, one); }));
+  EXPECT_TRUE(accepted([&](RawProtobuf& state) { state.message(15, one).message(16, one); }));
+  EXPECT_FALSE(accepted([&](RawProtobuf& state) { state.message(16, one); }));
+  EXPECT_TRUE(accepted([&](RawProtobuf& state) { state.fixed64(19, kOne); }));
+  EXPECT_TRUE(accepted([&](RawProtobuf& state) { state.fixed64(19, kOne).fixed64(20, kOne); }));
+  EXPECT_FALSE(accepted([&](RawProtobuf& state) { state.fixed64(20, kOne); }));
+}
+
+TEST(Codec, ARotationModelNeedsAnOrientationAndNoTorque) {
+  const auto read_torque = [](const RawProtobuf& model) -> std::optional<RemoteTorque> {
+    DataReader reader;
+    const auto* content = reader.read(datagram_with(raw_force([&](RawProtobuf& force) { force.message(14, model); })));
+    if (content == nullptr || content->frames.empty()) return {};
+    return std::get<ForceCommand>(content->frames[0]).torque;
+  };
+  constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
+  const RawProtobuf one = RawProtobuf().fixed64(1, kOne);
+  const auto torque = read_torque(RawProtobuf().message(1, one).fixed64(2, kOne));
+  ASSERT_TRUE(torque && torque->model);
+  EXPECT_EQ(torque->torque, Vec3::Zero());
+  EXPECT_EQ(torque->model->stiffness, Mat3::Identity());
+  EXPECT_FALSE(read_torque(RawProtobuf().fixed64(2, kOne))) << "no orientation";
+  EXPECT_FALSE(read_torque(RawProtobuf().message(1, one))) << "no stiffness";
+  EXPECT_FALSE(read_torque(RawProtobuf().message(1, one).fixed64(2, kOne).fixed64(2, kOne))) << "two entries";
 }
 
 TEST(Codec, AxesThatAreNoRotationMakeADescriptionRefused) {

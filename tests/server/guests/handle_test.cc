@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -77,11 +78,55 @@ TEST_F(Handle, IsDescribedToAClientOfOurs) {
   EXPECT_EQ(about->buttons, (std::vector<std::string>{"right", "forward", "centre", "left"}));
 }
 
+TEST_F(Handle, AForceOfTheHandThatNoFrameCarriesCostsNoState) {
+  DeviceState seen;
+  Client b{std::make_unique<End>(wire_, parse_address("192.0.2.2:4000")), nullptr};
+  b.client = std::make_unique<ForceClient>(
+      *b.end, server_.self, config_of(screen_, ++seed_),
+      [&seen](const DeviceState& state, const LinkStats&) { seen = state; }, now_);
+  look_.hand_force = Vec3(1, 2, 3);
+  run(milliseconds(500), {&b});
+  EXPECT_EQ(seen.hand_force, look_.hand_force);
+  const std::uint64_t before = seen.tick;
+  look_.hand_force->x() = std::numeric_limits<double>::quiet_NaN();
+  run(milliseconds(100), {&b});
+  EXPECT_GT(seen.tick, before + 50);
+  EXPECT_EQ(seen.hand_force, std::nullopt);
+}
+
+TEST_F(Handle, TorqueAndGripForceReachTheLoopOfTheDevice) {
+  look_.turning = Turning{.orientation = {.w = 0.6, .x = 0.8, .y = 0, .z = 0}};
+  Client a{std::make_unique<End>(wire_, parse_address("192.0.2.1:4000")), nullptr};
+  a.client = std::make_unique<ForceClient>(
+      *a.end, server_.self, config_of(wall_, ++seed_),
+      [](const DeviceState&) {
+        Touch touch = Vec3(1, 0, 0);
+        touch.torque = Vec3(0, 0, 0.1);
+        touch.angular_stiffness = 0.2 * Mat3::Identity();
+        touch.grip_force = -1.5;
+        return touch;
+      },
+      now_);
+  run(milliseconds(500), {&a});
+  const RemoteForce* const force = mail_->forces[0].take();
+  ASSERT_NE(force, nullptr);
+  ASSERT_TRUE(force->torque && force->torque->model);
+  EXPECT_EQ(force->torque->torque, Vec3(0, 0, 0.1));
+  EXPECT_EQ(force->torque->model->at, look_.turning->orientation);
+  EXPECT_EQ(force->torque->model->stiffness, Mat3(0.2 * Mat3::Identity()));
+  EXPECT_EQ(force->grip_force, -1.5);
+}
+
 /// A client of another make names the features that it knows: none, or this one.
-TEST_F(Handle, ItsButtonsAreSeenOnlyByThoseThatNamedTheFeature) {
+TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   for (const bool names : {false, true}) {
     restart({});
     buttons_ = 1;
+    look_.turning = Turning{.orientation = {.w = 0.6, .x = 0.8, .y = 0, .z = 0}, .angular_velocity = Vec3(0, 1, 0)};
+    look_.torque_applied = Vec3(0, 0, 0.1);
+    look_.grip = Grip{.opening = 0.2, .velocity = 0.3};
+    look_.grip_applied = 1.5;
+    look_.hand_force = Vec3(1, 2, 3);
     End end(wire_, parse_address("127.0.0.1:4000"));
     std::vector<std::string> features;
     if (names) features.emplace_back(kFeatureHandle);
@@ -111,6 +156,11 @@ TEST_F(Handle, ItsButtonsAreSeenOnlyByThoseThatNamedTheFeature) {
         if (seen == nullptr) continue;
         ++states;
         EXPECT_EQ(seen->state.buttons, names ? 1U : 0U);
+        EXPECT_EQ(seen->state.turning, names ? look_.turning : std::nullopt);
+        EXPECT_EQ(seen->state.torque_applied, names ? look_.torque_applied : std::nullopt);
+        EXPECT_EQ(seen->state.grip, names ? look_.grip : std::nullopt);
+        EXPECT_EQ(seen->state.grip_applied, names ? look_.grip_applied : std::nullopt);
+        EXPECT_EQ(seen->state.hand_force, names ? look_.hand_force : std::nullopt);
       }
     }
     EXPECT_GT(states, 100U);

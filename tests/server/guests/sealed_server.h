@@ -75,7 +75,7 @@ class SealedServer : public testing::Test {
   template <class OnTheWay>
   void run(Duration length, std::vector<Client*> clients, OnTheWay on_the_way) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += std::chrono::milliseconds(1)) {
-      DeviceState state;
+      DeviceState state = look_;
       state.tick = tick_ += tick_step_;
       state.sampled = PeerTime(now_.time_since_epoch());
       state.force_wanted = wanted_;
@@ -188,6 +188,7 @@ class SealedServer : public testing::Test {
   std::uint64_t steps_a_turn_ = 1;  ///< more: the network thread is late, and sees only the newest of them
   std::optional<Vec3> wanted_;      ///< as the device's loop says
   std::uint32_t buttons_ = 0;       ///< likewise
+  DeviceState look_;                ///< likewise: all else
   bool measured_ = false;           ///< the log thread tells how the loops do
   Health health_;
   std::uint64_t seed_ = 10;

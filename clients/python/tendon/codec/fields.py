@@ -12,7 +12,7 @@ from google.protobuf.message import DecodeError
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import ChannelRule, Code, Mode, Quat, Role, Safety, Vec3
+from ..messages import ChannelRule, Code, Mat3, Mode, Quat, Role, Safety, Vec3
 
 
 class OutOfBounds(Exception):
@@ -41,9 +41,33 @@ def vector(message: pb.Vec3) -> Vec3:
 
 def quaternion(message: pb.Quat) -> Quat:
     q = (message.w, message.x, message.y, message.z)
-    if not abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE:  # nor is NaN
+    if not is_rotation(q):
         raise OutOfBounds
     return q
+
+
+def is_rotation(q: Quat) -> bool:
+    return abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE  # nor is NaN
+
+
+def matrix(entries: Sequence[float]) -> Mat3:
+    """A stiffness from 1, 3 or 9 entries."""
+    k = [number(entry) for entry in entries]
+    if len(k) == 1:
+        return ((k[0], 0.0, 0.0), (0.0, k[0], 0.0), (0.0, 0.0, k[0]))
+    if len(k) == 3:
+        return ((k[0], 0.0, 0.0), (0.0, k[1], 0.0), (0.0, 0.0, k[2]))
+    if len(k) == 9:
+        return ((k[0], k[1], k[2]), (k[3], k[4], k[5]), (k[6], k[7], k[8]))
+    raise OutOfBounds
+
+
+def entries(matrix: Mat3) -> list[float]:
+    """The shortest of the three forms."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    if any((b, c, d, f, g, h)):
+        return [a, b, c, d, e, f, g, h, i]
+    return [a] if a == e == i else [a, e, i]
 
 
 def whole(value: int, least: int, most: int) -> int:

@@ -24,20 +24,40 @@ from ..messages import (
     ForceTable,
     Frame,
     GiveLease,
+    Grip,
     HandleDescription,
     LeaseLost,
     LinkReport,
     LocalModel,
-    Mat3,
     PeerReport,
+    Quat,
     Rearm,
     Request,
+    RotationModel,
     SetStateDeadband,
     SetStateRate,
     TakeLease,
+    Torque,
+    Turning,
     Vec3,
 )
 from . import fields
+
+
+def _read_turning(message: pb.DeviceState) -> Turning | None:
+    if message.HasField("orientation"):
+        return Turning(fields.quaternion(message.orientation), fields.vector(message.angular_velocity_radps))
+    if message.HasField("angular_velocity_radps"):
+        raise fields.OutOfBounds
+    return None
+
+
+def _read_grip(message: pb.DeviceState) -> Grip | None:
+    if message.HasField("gripper_rad"):
+        return Grip(fields.number(message.gripper_rad), fields.number(message.gripper_velocity_radps))
+    if message.HasField("gripper_velocity_radps"):
+        raise fields.OutOfBounds
+    return None
 
 
 def _read_state(message: pb.DeviceState) -> DeviceState:
@@ -58,6 +78,13 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         channel=fields.channel(message.channel),
         force_wanted=fields.vector(message.force_wanted_n) if message.HasField("force_wanted_n") else None,
         buttons=message.buttons,
+        turning=_read_turning(message),
+        torque_applied=fields.vector(message.torque_applied_nm) if message.HasField("torque_applied_nm") else None,
+        grip=_read_grip(message),
+        grip_applied=fields.number(message.gripper_force_applied_n)
+        if message.HasField("gripper_force_applied_n")
+        else None,
+        hand_force=fields.vector(message.hand_force_n) if message.HasField("hand_force_n") else None,
     )
 
 
@@ -97,39 +124,36 @@ def _write_contact(contact: Contact) -> pb.Contact:
 
 
 def _read_model(message: pb.LocalModel) -> LocalModel:
-    k = [fields.number(value) for value in message.stiffness_npm]
-    stiffness: Mat3
-    if len(k) == 1:
-        stiffness = ((k[0], 0.0, 0.0), (0.0, k[0], 0.0), (0.0, 0.0, k[0]))
-    elif len(k) == 3:
-        stiffness = ((k[0], 0.0, 0.0), (0.0, k[1], 0.0), (0.0, 0.0, k[2]))
-    elif len(k) == 9:
-        stiffness = ((k[0], k[1], k[2]), (k[3], k[4], k[5]), (k[6], k[7], k[8]))
-    else:
-        raise fields.OutOfBounds
     valid_radius = message.valid_radius_m if message.HasField("valid_radius_m") else inf
     if not is_radius(valid_radius):
         raise fields.OutOfBounds
     return LocalModel(
         at=fields.vector(message.at_m),
-        stiffness=stiffness,
+        stiffness=fields.matrix(message.stiffness_npm),
         valid_radius=valid_radius,
         contact=_read_contact(message.contact) if message.HasField("contact") else None,
     )
 
 
 def _write_model(model: LocalModel) -> pb.LocalModel:
-    """Writes the shortest of the three equivalent forms."""
-    (a, b, c), (d, e, f), (g, h, i) = model.stiffness
-    entries: list[float] = [a, b, c, d, e, f, g, h, i]
-    if not any((b, c, d, f, g, h)):
-        entries = [a] if a == e == i else [a, e, i]
     return pb.LocalModel(
         at_m=_write_vector(model.at),
-        stiffness_npm=entries,
+        stiffness_npm=fields.entries(model.stiffness),
         valid_radius_m=None if model.valid_radius == inf else model.valid_radius,
         contact=None if model.contact is None else _write_contact(model.contact),
     )
+
+
+def _read_torque(message: pb.ForceCommand) -> Torque | None:
+    if not message.HasField("rotation_model"):
+        return Torque(fields.vector(message.torque_nm)) if message.HasField("torque_nm") else None
+    at, stiffness = message.rotation_model.at_orientation, message.rotation_model.angular_stiffness_nmprad
+    return Torque(fields.vector(message.torque_nm), RotationModel(fields.quaternion(at), fields.matrix(stiffness)))
+
+
+def _write_rotation_model(model: RotationModel) -> pb.RotationModel:
+    stiffness = fields.entries(model.stiffness)
+    return pb.RotationModel(at_orientation=_write_quaternion(model.at), angular_stiffness_nmprad=stiffness)
 
 
 def _read_force(message: pb.ForceCommand) -> ForceCommand:
@@ -143,6 +167,8 @@ def _read_force(message: pb.ForceCommand) -> ForceCommand:
         channel=fields.channel(message.channel),
         topology_changed=message.topology_changed,
         error=fields.magnitude(message.error_n) if message.HasField("error_n") else None,
+        torque=_read_torque(message),
+        grip_force=fields.number(message.gripper_force_n) if message.HasField("gripper_force_n") else None,
     )
 
 
@@ -250,16 +276,25 @@ def _read_handle(message: pb.HandleDescription) -> HandleDescription:
         device=fields.device(message.device),
         operator_from_device=fields.quaternion(axes) if message.HasField("operator_from_device") else None,
         buttons=tuple(fields.text(name, limits.MAX_LABEL) for name in message.buttons),
+        orientation_measured=message.orientation_measured,
+        max_torque=fields.magnitude(message.max_torque_nm),
+        gripper_open=fields.magnitude(message.gripper_open_rad) if message.HasField("gripper_open_rad") else None,
+        max_gripper_force=fields.magnitude(message.max_gripper_force_n),
     )
 
 
 def _write_handle(handle: HandleDescription) -> pb.HandleDescription:
     names = [fields.clip(name, limits.MAX_LABEL) for name in handle.buttons[: limits.MAX_BUTTONS]]
-    message = pb.HandleDescription(device=handle.device, buttons=names)
-    if handle.operator_from_device is not None:
-        w, x, y, z = handle.operator_from_device
-        message.operator_from_device.CopyFrom(pb.Quat(w=w, x=x, y=y, z=z))
-    return message
+    axes = handle.operator_from_device
+    return pb.HandleDescription(
+        device=handle.device,
+        operator_from_device=None if axes is None else _write_quaternion(axes),
+        buttons=names,
+        orientation_measured=handle.orientation_measured,
+        max_torque_nm=handle.max_torque,
+        gripper_open_rad=handle.gripper_open,
+        max_gripper_force_n=handle.max_gripper_force,
+    )
 
 
 def _read_bye(message: pb.Bye) -> Bye:
@@ -399,6 +434,10 @@ def _write_vector(vector: Vec3) -> pb.Vec3:
     return pb.Vec3(x=vector[0], y=vector[1], z=vector[2])
 
 
+def _write_quaternion(q: Quat) -> pb.Quat:
+    return pb.Quat(w=q[0], x=q[1], y=q[2], z=q[3])
+
+
 def _write_control(frame: Control) -> pb.Control:
     control, request = pb.Control(id=frame.id), frame.request
     if isinstance(request, SetStateRate):
@@ -435,9 +474,13 @@ def write(frame: Frame) -> pb.Frame:
             channel=frame.channel,
             topology_changed=frame.topology_changed,
             error_n=frame.error,
+            torque_nm=None if frame.torque is None else _write_vector(frame.torque.torque),
+            rotation_model=_write_rotation_model(frame.torque.model) if frame.torque and frame.torque.model else None,
+            gripper_force_n=frame.grip_force,
         )
         return pb.Frame(force=force)
     if isinstance(frame, DeviceState):
+        turning = frame.turning
         state = pb.DeviceState(
             tick=frame.tick,
             sampled_ns=frame.sampled_ns,
@@ -454,6 +497,13 @@ def write(frame: Frame) -> pb.Frame:
             channel=frame.channel,
             force_wanted_n=None if frame.force_wanted is None else _write_vector(frame.force_wanted),
             buttons=frame.buttons,
+            orientation=None if turning is None else _write_quaternion(turning.orientation),
+            angular_velocity_radps=None if turning is None else _write_vector(turning.angular_velocity),
+            torque_applied_nm=None if frame.torque_applied is None else _write_vector(frame.torque_applied),
+            gripper_rad=None if frame.grip is None else frame.grip.opening,
+            gripper_velocity_radps=None if frame.grip is None else frame.grip.velocity,
+            gripper_force_applied_n=frame.grip_applied,
+            hand_force_n=None if frame.hand_force is None else _write_vector(frame.hand_force),
         )
         return pb.Frame(state=state)
     if isinstance(frame, Control):
