@@ -19,21 +19,13 @@ using wire::write;
 
 /// What only a client that named kFeatureHandle is sent, but for the buttons.
 bool read_handle(const pb::DeviceState& from, DeviceState& to) noexcept {
-  to.turning.reset();
-  to.grip.reset();
-  if (from.has_orientation()) {
-    Turning& turning = to.turning.emplace();
-    if (!read(from.orientation(), turning.orientation)) return false;
-    if (!read(from.angular_velocity_radps(), turning.angular_velocity)) return false;
-  } else if (from.has_angular_velocity_radps()) {
-    return false;
-  }
-  if (from.has_gripper_rad()) {
-    to.grip = Grip{.opening = from.gripper_rad(), .velocity = from.gripper_velocity_radps()};
-    if (!bounded(to.grip->opening) || !bounded(to.grip->velocity)) return false;
-  } else if (from.has_gripper_velocity_radps()) {
-    return false;
-  }
+  Turning turning;
+  if (!read(from.angular_velocity_radps(), turning.angular_velocity)) return false;
+  if (from.has_orientation() && !read(from.orientation(), turning.orientation)) return false;
+  to.turning = from.has_orientation() ? std::optional(turning) : std::nullopt;
+  const Grip grip{.opening = from.gripper_rad(), .velocity = from.gripper_velocity_radps()};
+  if (!bounded(grip.opening) || !bounded(grip.velocity)) return false;
+  to.grip = from.has_gripper_rad() ? std::optional(grip) : std::nullopt;
   return read(from.has_torque_applied_nm(), from.torque_applied_nm(), to.torque_applied) &&
          read(from.has_gripper_force_applied_n(), from.gripper_force_applied_n(), to.grip_applied) &&
          read(from.has_hand_force_n(), from.hand_force_n(), to.hand_force);

@@ -45,19 +45,15 @@ from . import fields
 
 
 def _read_turning(message: pb.DeviceState) -> Turning | None:
-    if message.HasField("orientation"):
-        return Turning(fields.quaternion(message.orientation), fields.vector(message.angular_velocity_radps))
-    if message.HasField("angular_velocity_radps"):
-        raise fields.OutOfBounds
-    return None
+    angular_velocity = fields.vector(message.angular_velocity_radps)
+    if not message.HasField("orientation"):
+        return None
+    return Turning(fields.quaternion(message.orientation), angular_velocity)
 
 
 def _read_grip(message: pb.DeviceState) -> Grip | None:
-    if message.HasField("gripper_rad"):
-        return Grip(fields.number(message.gripper_rad), fields.number(message.gripper_velocity_radps))
-    if message.HasField("gripper_velocity_radps"):
-        raise fields.OutOfBounds
-    return None
+    grip = Grip(fields.number(message.gripper_rad), fields.number(message.gripper_velocity_radps))
+    return grip if message.HasField("gripper_rad") else None
 
 
 def _read_state(message: pb.DeviceState) -> DeviceState:
