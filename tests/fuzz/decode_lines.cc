@@ -64,6 +64,12 @@ class Line {
     return *this << digits;
   }
   Line& operator<<(const Vec3& v) { return *this << v.x() << v.y() << v.z(); }
+  Line& operator<<(const Quat& q) { return *this << q.w << q.x << q.y << q.z; }
+  /// Zero, added, turns −0 into 0: k · 0 is either.
+  Line& operator<<(const Mat3& m) {
+    for (int row = 0; row < 3; ++row) *this << Vec3(m.row(row).transpose() + Vec3::Zero());
+    return *this;
+  }
   Line& operator<<(Duration d) { return *this << std::int64_t{d.count()}; }
   template <class Enum>
   requires std::is_enum_v<Enum> Line& operator<<(Enum value) {
@@ -89,12 +95,15 @@ void print(Line& line, const DeviceState& state) {
        << state.force_age << state.mode;
   if (state.force_wanted) line << "wanted" << *state.force_wanted;
   if (state.buttons != 0) line << "buttons" << state.buttons;
+  if (state.turning) line << "turning" << state.turning->orientation << state.turning->angular_velocity;
+  if (state.torque_applied) line << "torque" << *state.torque_applied;
+  if (state.grip) line << "grip" << state.grip->opening << state.grip->velocity;
+  if (state.grip_applied) line << "grip-force" << *state.grip_applied;
+  if (state.hand_force) line << "hand" << *state.hand_force;
 }
 
 void print(Line& line, const LocalModel& model) {
-  line << "model" << model.at;
-  const Vec3 zero = Vec3::Zero();  // added, it turns −0 into 0: k · 0 is either
-  for (int row = 0; row < 3; ++row) line << Vec3(model.stiffness.row(row).transpose() + zero);
+  line << "model" << model.at << model.stiffness;
   line << model.valid_radius;
   if (!model.contact) return;
   line << "contact" << model.contact->normal << model.contact->gap;
@@ -109,6 +118,11 @@ void print(Line& line, const ForceCommand& force) {
   if (force.model) print(line, *force.model);
   if (force.topology_changed) line << "changed";
   if (force.error) line << "error" << *force.error;
+  if (force.torque) {
+    line << "torque" << force.torque->torque;
+    if (const auto& model = force.torque->model) line << "model" << model->at << model->stiffness;
+  }
+  if (force.grip_force) line << "grip-force" << *force.grip_force;
 }
 
 void print(Line& line, const Control& control) {
@@ -133,8 +147,11 @@ void print(Line& line, const ControlAck& ack) {
   line.put_text(ack.detail);
   if (!ack.handle) return;
   line << "handle";
-  if (const auto& q = ack.handle->operator_from_device) line << "axes" << q->w << q->x << q->y << q->z;
+  if (const auto& q = ack.handle->operator_from_device) line << "axes" << *q;
   line.put_texts(ack.handle->buttons);
+  line << std::uint32_t{ack.handle->orientation_measured} << ack.handle->max_torque;
+  if (ack.handle->gripper_open) line << "gripper" << *ack.handle->gripper_open;
+  line << ack.handle->max_gripper_force;
 }
 
 void print(Line& line, const Bye& bye) {

@@ -1,12 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values to protobuf and back: the only file that knows the generated messages. Encoding trusts its input, except that
-// texts and lists are cut to their bounds. Decoding trusts nothing: undefined for what it refuses, and never throws.
+// Values to protobuf and back: no file but this one, codec_reports.ts and fields.ts knows the generated messages.
+// Encoding trusts its input, except that texts and lists are cut to their bounds. Decoding trusts nothing: undefined for
+// what it refuses, and never throws.
 import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
+import {
+  isBounded, isChannel, isDevice, isError, isLength, isMagnitude, isModel, isRotation, isRotationModel, isTime, isVec3,
+} from "./bounds.js";
+import {
+  readDeviceReport, readPeerReport, readReport, writeDeviceReport, writePeerReport, writeReport,
+} from "./codec_reports.js";
+import {
+  areFeatures, clip, isEnum, isText, readQuat, readVec3, writeFeatures, writeQuat, writeVec3,
+} from "./fields.js";
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
-  Claim, Contact, Delays, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello, LinkReport, LocalModel,
-  PeerReport, Refused, Request, Stiffness, Vec3, Welcome,
+  Claim, Contact, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello,
+  LinkReport, LocalModel, PeerReport, Refused, Request, Torque, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -146,36 +156,6 @@ export function decodeAnswerMessage(bytes: Uint8Array): Welcome | Refused | unde
   }
 }
 
-// ---- Single values
-
-const isBounded = (value: number): boolean => Math.abs(value) <= limits.kMaxValue; // false for NaN
-const isMagnitude = (value: number): boolean => value >= 0 && value <= limits.kMaxValue;
-const isTime = (ns: bigint): boolean => ns >= -limits.kMaxTime && ns <= limits.kMaxTime;
-const isDevice = (number: number): boolean => number < limits.kMaxDevices;
-const isChannel = (number: number): boolean => number < limits.kMaxChannels;
-const isVec3 = (v: Vec3): boolean => isBounded(v.x) && isBounded(v.y) && isBounded(v.z);
-/** Number 0 of every enumeration is refused, as are those that this version does not know. */
-const isEnum = (value: number, schema: { readonly value: Record<number, unknown> }): boolean =>
-  value !== 0 && schema.value[value] !== undefined;
-
-const kEncoder = new TextEncoder();
-const isText = (text: string, limit: number): boolean => kEncoder.encode(text).length <= limit;
-const areFeatures = (features: readonly string[]): boolean =>
-  features.length <= limits.kMaxFeatures && features.every((feature) => isText(feature, limits.kMaxFeature));
-
-/** The front of `text`, in whole characters of at most `limit` bytes. */
-export function clip(text: string, limit: number): string {
-  const { read } = kEncoder.encodeInto(text, new Uint8Array(limit));
-  return text.slice(0, read);
-}
-
-const writeFeatures = (features: readonly string[]): string[] =>
-  features.slice(0, limits.kMaxFeatures).map((feature) => clip(feature, limits.kMaxFeature));
-
-const kZero: Vec3 = Object.freeze({ x: 0, y: 0, z: 0 });
-const readVec3 = (v: pb.Vec3 | undefined): Vec3 => (v ? { x: v.x, y: v.y, z: v.z } : kZero);
-const writeVec3 = (v: Vec3): pb.Vec3 => create(pb.Vec3Schema, { x: v.x, y: v.y, z: v.z });
-
 function parse<Schema extends DescMessage>(schema: Schema, bytes: Uint8Array): MessageShape<Schema> | undefined {
   try {
     return fromBinary(schema, bytes, { readUnknownFields: false });
@@ -273,6 +253,18 @@ function readEcho(from: pb.Echo): Echo | undefined {
   };
 }
 
+/** What only a client with the feature `handle` is told, but for the buttons. */
+function readHandleOf(from: pb.DeviceState): Partial<DeviceState> {
+  const { orientation, angularVelocityRadps, torqueAppliedNm, gripperRad, gripperForceAppliedN, handForceN } = from;
+  return {
+    ...(orientation && { turning: { orientation: readQuat(orientation), angularVelocity: readVec3(angularVelocityRadps) } }),
+    ...(torqueAppliedNm && { torqueApplied: readVec3(torqueAppliedNm) }),
+    ...(gripperRad !== undefined && { grip: { opening: gripperRad, velocity: from.gripperVelocityRadps ?? 0 } }),
+    ...(gripperForceAppliedN !== undefined && { gripApplied: gripperForceAppliedN }),
+    ...(handForceN && { handForce: readVec3(handForceN) }),
+  };
+}
+
 function readState(from: pb.DeviceState): DeviceState | undefined {
   const state: DeviceState = {
     tick: from.tick,
@@ -290,8 +282,13 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
     channel: from.channel,
     ...(from.forceWantedN && { forceWanted: readVec3(from.forceWantedN) }),
     buttons: from.buttons,
+    ...readHandleOf(from),
   };
-  const good = (!state.forceWanted || isVec3(state.forceWanted)) && isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
+  const { turning, forceWanted, torqueApplied, handForce } = state;
+  const good = [forceWanted, torqueApplied, handForce, from.angularVelocityRadps].every((v) => !v || isVec3(v)) &&
+    (!turning || isRotation(turning.orientation)) &&
+    [from.gripperRad, from.gripperVelocityRadps, from.gripperForceAppliedN].every((n) => n === undefined || isBounded(n)) &&
+    isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
     isVec3(state.forceApplied) && isBounded(state.energy) &&
     (state.permittedForce === Infinity || isMagnitude(state.permittedForce)) && isLength(state.forceAgeNs) &&
     isEnum(state.mode, pb.ModeSchema) && isDevice(state.device) && isChannel(state.channel);
@@ -315,25 +312,14 @@ const writeState = (from: DeviceState): pb.DeviceState =>
     channel: from.channel,
     ...(from.forceWanted && { forceWantedN: writeVec3(from.forceWanted) }),
     buttons: from.buttons,
+    ...(from.turning && {
+      orientation: writeQuat(from.turning.orientation), angularVelocityRadps: writeVec3(from.turning.angularVelocity),
+    }),
+    ...(from.torqueApplied && { torqueAppliedNm: writeVec3(from.torqueApplied) }),
+    ...(from.grip && { gripperRad: from.grip.opening, gripperVelocityRadps: from.grip.velocity }),
+    ...(from.gripApplied !== undefined && { gripperForceAppliedN: from.gripApplied }),
+    ...(from.handForce && { handForceN: writeVec3(from.handForce) }),
   });
-
-/** 1 entry, 3 or 9, all of them within bounds. */
-export const isStiffness = (stiffness: Stiffness): boolean =>
-  (stiffness.length === 1 || stiffness.length === 3 || stiffness.length === 9) && stiffness.every(isBounded);
-/** All of them within bounds. */
-export const isForce = isVec3;
-
-/** Every number of it is within its bounds. */
-export function isContact({ normal, gap, table }: Contact): boolean {
-  const isTable = !table || (table.step > 0 && isBounded(table.step) && isBounded(table.first) &&
-    table.force.length >= limits.kMinTable && table.force.length <= limits.kMaxTable && table.force.every(isBounded));
-  return isVec3(normal) && Math.abs(Math.hypot(normal.x, normal.y, normal.z) - 1) <= limits.kUnitTolerance &&
-    isBounded(gap) && isTable;
-}
-/** Infinity means the same as absent. */
-export const isRadius = (metres: number | undefined): boolean =>
-  metres === undefined || metres === Infinity || isMagnitude(metres);
-export const isError = (newtons: number | undefined): boolean => newtons === undefined || isMagnitude(newtons);
 
 function readContact({ normal, gapM, table }: pb.Contact): Contact {
   return {
@@ -362,11 +348,25 @@ const writeModel = ({ at, stiffness, validRadius, contact }: LocalModel): pb.Loc
     ...(contact && { contact: writeContact(contact) }),
   });
 
-const isModel = ({ at, stiffness, validRadius, contact }: LocalModel): boolean =>
-  isVec3(at) && isStiffness(stiffness) && isRadius(validRadius) && (!contact || isContact(contact));
+function readTorque({ torqueNm, rotationModel }: pb.ForceCommand): Torque | undefined {
+  if (!torqueNm && !rotationModel) return undefined;
+  const { atOrientation: at, angularStiffnessNmprad: stiffness } = rotationModel ?? {};
+  const model = stiffness && { at: at ? readQuat(at) : { w: 0, x: 0, y: 0, z: 0 }, stiffness };
+  return { torque: readVec3(torqueNm), ...(model && { model }) };
+}
+
+const writeTorque = ({ torque, model }: Torque): Partial<pb.ForceCommand> => ({
+  torqueNm: writeVec3(torque),
+  ...(model && {
+    rotationModel: create(pb.RotationModelSchema, {
+      atOrientation: writeQuat(model.at), angularStiffnessNmprad: [...model.stiffness],
+    }),
+  }),
+});
 
 function readForce(from: pb.ForceCommand): ForceCommand | undefined {
   const model = from.model && readModel(from.model);
+  const torque = readTorque(from);
   const command: ForceCommand = {
     sequence: from.sequence,
     basedOnTick: from.basedOnTick,
@@ -377,9 +377,13 @@ function readForce(from: pb.ForceCommand): ForceCommand | undefined {
     channel: from.channel,
     ...(from.topologyChanged && { topologyChanged: true }),
     ...(from.errorN !== undefined && { error: from.errorN }),
+    ...(torque && { torque }),
+    ...(from.gripperForceN !== undefined && { gripForce: from.gripperForceN }),
   };
   const good = isDevice(command.device) && isChannel(command.channel) && command.sequence > 0n && isVec3(command.force) && command.validForUs >= 1 &&
-    command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || isModel(model)) && isError(command.error);
+    command.validForUs <= limits.kMaxValidForMs * 1000 && (!model || isModel(model)) && isError(command.error) &&
+    (!torque || (isVec3(torque.torque) && (!torque.model || isRotationModel(torque.model)))) &&
+    (command.gripForce === undefined || isBounded(command.gripForce));
   return good ? command : undefined;
 }
 
@@ -394,64 +398,9 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
     channel: from.channel,
     topologyChanged: from.topologyChanged ?? false,
     ...(from.error !== undefined && { errorN: from.error }),
+    ...(from.torque && writeTorque(from.torque)),
+    ...(from.gripForce !== undefined && { gripperForceN: from.gripForce }),
   });
-
-const isLength = (ns: bigint): boolean => ns <= limits.kMaxTime; // of time; it has no sign on the wire
-const readDelays = (from: pb.Delays | undefined): Delays | undefined =>
-  from && { medianNs: from.medianNs, p99Ns: from.p99Ns };
-const areDelays = (delays: Delays | undefined): boolean => !delays || (isTime(delays.medianNs) && isTime(delays.p99Ns));
-
-function readReport(from: pb.LinkReport): LinkReport | undefined {
-  const { $typeName: _name, $unknown: _unknown, roundTrip, toServer, toClient, ...rest } = from;
-  const report: LinkReport = {
-    ...rest,
-    roundTrip: readDelays(roundTrip),
-    toServer: readDelays(toServer),
-    toClient: readDelays(toClient),
-  };
-  const good = report.number > 0n && isTime(report.untilNs) && isLength(report.spanNs) && isLength(report.worstLateNs) &&
-    isLength(report.longestGapNs) && areDelays(report.roundTrip) && areDelays(report.toServer) &&
-    areDelays(report.toClient) && isTime(report.clockOffsetNs) && isBounded(report.clockDriftPpm) &&
-    isLength(report.clockErrorNs) && isText(report.words, limits.kMaxDetail);
-  return good ? report : undefined;
-}
-
-function writeReport({ roundTrip, toServer, toClient, words, ...rest }: LinkReport): pb.LinkReport {
-  return create(pb.LinkReportSchema, {
-    ...rest,
-    ...(roundTrip && { roundTrip: create(pb.DelaysSchema, roundTrip) }),
-    ...(toServer && { toServer: create(pb.DelaysSchema, toServer) }),
-    ...(toClient && { toClient: create(pb.DelaysSchema, toClient) }),
-    words: clip(words, limits.kMaxDetail),
-  });
-}
-
-function readDeviceReport(from: pb.DeviceReport): DeviceReport | undefined {
-  const { $typeName: _name, $unknown: _unknown, latenessUsLog2: lateness, ...rest } = from;
-  const { number, untilNs, spanNs, device, steps, overruns, unseen, safety, fault, degraded } = rest;
-  const good = number > 0n && isTime(untilNs) && isLength(spanNs) && isDevice(device) && overruns <= steps && unseen <= steps &&
-    lateness.length <= limits.kLatenessBuckets && lateness.reduce((sum, count) => sum + count, 0n) <= steps &&
-    isEnum(safety, pb.SafetySchema) && isText(fault, limits.kMaxDetail) && isText(degraded, limits.kMaxDetail);
-  return good ? { ...rest, lateness } : undefined;
-}
-
-function writeDeviceReport({ lateness, fault, degraded, ...rest }: DeviceReport): pb.DeviceReport {
-  return create(pb.DeviceReportSchema, {
-    ...rest, latenessUsLog2: [...lateness], fault: clip(fault, limits.kMaxDetail), degraded: clip(degraded, limits.kMaxDetail),
-  });
-}
-
-function readPeerReport(from: pb.PeerReport): PeerReport | undefined {
-  const { device, channel, name, stateOneIn, forcesRefused } = from;
-  const link = from.link && readReport(from.link);
-  const good = isDevice(device) && isChannel(channel) && isText(name, limits.kMaxName) && stateOneIn >= 1 &&
-    stateOneIn <= limits.kMaxOneIn;
-  return good && link ? { device, channel, name, stateOneIn, forcesRefused, link } : undefined;
-}
-
-function writePeerReport({ link, name, ...rest }: PeerReport): pb.PeerReport {
-  return create(pb.PeerReportSchema, { ...rest, name: clip(name, limits.kMaxName), link: writeReport(link) });
-}
 
 /** Its values are within bounds. */
 function isRequest(request: Request): boolean {
@@ -500,22 +449,28 @@ function writeDescription(from: DeviceDescription): pb.DeviceDescription {
 }
 
 function readHandle(from: pb.HandleDescription): HandleDescription | undefined {
-  const { device, buttons, operatorFromDevice: axes } = from;
+  const { device, buttons, operatorFromDevice: axes, orientationMeasured, gripperOpenRad: gripperOpen } = from;
+  const { maxTorqueNm: maxTorque, maxGripperForceN: maxGripperForce } = from;
   const good = isDevice(device) && buttons.length <= limits.kMaxButtons &&
-    buttons.every((name) => isText(name, limits.kMaxLabel)) &&
-    (!axes || Math.abs(Math.hypot(axes.w, axes.x, axes.y, axes.z) - 1) <= limits.kUnitTolerance);
+    buttons.every((name) => isText(name, limits.kMaxLabel)) && (!axes || isRotation(axes)) &&
+    [maxTorque, gripperOpen ?? 0, maxGripperForce].every(isMagnitude);
   if (!good) return undefined;
   return {
-    device, buttons: [...buttons], ...(axes && { operatorFromDevice: { w: axes.w, x: axes.x, y: axes.y, z: axes.z } }),
+    device, buttons: [...buttons], orientationMeasured, maxTorque, maxGripperForce,
+    ...(axes && { operatorFromDevice: readQuat(axes) }), ...(gripperOpen !== undefined && { gripperOpen }),
   };
 }
 
 function writeHandle(from: HandleDescription): pb.HandleDescription {
-  const { device, operatorFromDevice: axes } = from;
+  const { device, operatorFromDevice: axes, orientationMeasured, maxTorque, gripperOpen, maxGripperForce } = from;
   return create(pb.HandleDescriptionSchema, {
     device,
-    ...(axes && { operatorFromDevice: create(pb.QuatSchema, { w: axes.w, x: axes.x, y: axes.y, z: axes.z }) }),
+    ...(axes && { operatorFromDevice: writeQuat(axes) }),
     buttons: from.buttons.slice(0, limits.kMaxButtons).map((name) => clip(name, limits.kMaxLabel)),
+    orientationMeasured,
+    maxTorqueNm: maxTorque,
+    ...(gripperOpen !== undefined && { gripperOpenRad: gripperOpen }),
+    maxGripperForceN: maxGripperForce,
   });
 }
 

@@ -22,7 +22,7 @@ export interface ConnectConfig extends ClientConfig {
   readonly onPhase?: (guest: Guest) => void;
   /** Told of each report of the server. */
   readonly onReport?: (report: LinkReport) => void;
-  /** Told, once for each new reason, why a force of the callback was not sent. */
+  /** Told, once for each new reason, why a force of the callback, or a part of it (`leftOut`), was not sent. */
   readonly onUnusable?: (why: string) => void;
 }
 
@@ -83,6 +83,7 @@ class RealTimeGuest implements Guest {
   readonly #onReport: ((report: LinkReport) => void) | undefined;
   readonly #onUnusable: ((why: string) => void) | undefined;
   #unusable = "";
+  #leftOut = "";
   #told: LinkReport | undefined;
   readonly #defer: (task: () => void) => void;
   #resolve!: () => void;
@@ -223,10 +224,9 @@ class RealTimeGuest implements Guest {
   }
 
   #tellUnusable(): void {
-    const { unusable } = this.#client.stats();
-    if (!unusable || unusable === this.#unusable) return;
-    this.#unusable = unusable;
-    this.#onUnusable?.(unusable);
+    const { unusable, leftOut } = this.#client.stats();
+    if (unusable && unusable !== this.#unusable) this.#onUnusable?.((this.#unusable = unusable));
+    if (leftOut && leftOut !== this.#leftOut) this.#onUnusable?.((this.#leftOut = leftOut));
   }
 
   #tellReport(): void {

@@ -2,11 +2,11 @@
 // Deadbands drop forces that a hand cannot tell apart, and states that their receiver can predict
 // (protocol/SESSION.md, "Deadbands").
 import { expect } from "./expect.js";
-import type { DeviceState, StateDeadband, Vec3 } from "./messages.js";
+import type { DeviceState, ForceCommand, Quat, StateDeadband, Vec3 } from "./messages.js";
 import { fromMilliseconds, type Nanoseconds } from "./time.js";
 
 /**
- * Leaves out a force unless it differs from the last one sent by more than max(share · its norm, floor), or that one was sent
+ * Leaves out a force, with its torque and grip force, unless it differs from the last one sent by more than max(share · its norm, floor), or that one was sent
  * longestSilenceMs ago (Weber's law; Hinterseer et al., IEEE TSP 56(2), 2008).
  */
 export interface ForceDeadband {
@@ -34,37 +34,70 @@ export function checkStateDeadband({ share, floor, maxSilenceUs }: StateDeadband
   expect(possible, "stateDeadband.maxSilenceUs", maxSilenceUs, "0, or a whole number from 1000 to 20000");
 }
 
-/** The deadband of forces in one session. */
+/** m, from the middle of a handle to its end: it makes the floor of a force (N) that of a torque (N·m). */
+const kHandleLever = 0.05;
+const kZero: Vec3 = { x: 0, y: 0, z: 0 };
+
+/** The deadband of forces in one session, with their torques and grip forces. */
 export class Deadband {
   readonly #config: ForceDeadband;
-  #sent: { readonly at: Nanoseconds; readonly value: Vec3 } | undefined;
+  #sent: { readonly at: Nanoseconds; readonly force: Vec3; readonly torque: Vec3 | undefined; readonly grip: Vec3 | undefined } | undefined;
 
   constructor(config: ForceDeadband) {
     this.#config = config;
   }
 
-  /** Whether `value` is worth sending; if so it counts as sent. */
-  passes(now: Nanoseconds, { x, y, z }: Vec3): boolean {
-    const { share, floor, longestSilenceMs } = this.#config;
+  /** Whether force, torque or grip force is worth sending, or has come or gone; if so all of them count as sent. */
+  passes(now: Nanoseconds, value: Pick<ForceCommand, "force" | "torque" | "gripForce">): boolean {
+    const { floor, longestSilenceMs } = this.#config;
+    const { x, y, z } = value.force;
+    const next = {
+      at: now, force: { x, y, z }, torque: value.torque && { ...value.torque.torque },
+      grip: value.gripForce === undefined ? undefined : { x: value.gripForce, y: 0, z: 0 },
+    };
     const sent = this.#sent;
-    if (sent && now - sent.at < fromMilliseconds(longestSilenceMs)) {
-      const { x: x0, y: y0, z: z0 } = sent.value;
-      if (Math.hypot(x - x0, y - y0, z - z0) <= Math.max(share * Math.hypot(x0, y0, z0), floor)) return false;
-    }
-    this.#sent = { at: now, value: { x, y, z } };
-    return true;
+    const alike = sent && now - sent.at < fromMilliseconds(longestSilenceMs) && !next.torque === !sent.torque &&
+      !next.grip === !sent.grip && this.#alike(next.force, sent.force, floor) &&
+      this.#alike(next.torque ?? kZero, sent.torque ?? kZero, floor * kHandleLever) &&
+      this.#alike(next.grip ?? kZero, sent.grip ?? kZero, floor);
+    if (!alike) this.#sent = next;
+    return !alike;
+  }
+
+  #alike({ x, y, z }: Vec3, { x: x0, y: y0, z: z0 }: Vec3, floor: number): boolean {
+    return Math.hypot(x - x0, y - y0, z - z0) <= Math.max(this.#config.share * Math.hypot(x0, y0, z0), floor);
   }
 }
 
-/** The device's position `later` after `sent` at constant velocity, in whole haptic periods. */
+/** q, turned on about the axis of the angular velocity, and of length 1. */
+function turned({ w, x, y, z }: Quat, { x: b, y: c, z: d }: Vec3, seconds: number): Quat {
+  const speed = Math.hypot(b, c, d);
+  const half = (speed * seconds) / 2;
+  const s = speed > 0 ? Math.sin(half) / speed : 0;
+  const [p, i, j, k] = [Math.cos(half), s * b, s * c, s * d];
+  const q = {
+    w: p * w - i * x - j * y - k * z,
+    x: p * x + i * w + j * z - k * y,
+    y: p * y - i * z + j * w + k * x,
+    z: p * z + i * y - j * x + k * w,
+  };
+  const length = Math.hypot(q.w, q.x, q.y, q.z);
+  return { w: q.w / length, x: q.x / length, y: q.y / length, z: q.z / length };
+}
+
+/** The device `later` after `sent` at constant velocities of position, rotation and gripper, in whole haptic periods. */
 export function foretell(sent: DeviceState, later: Nanoseconds, hapticPeriod: Nanoseconds): DeviceState {
   const periods = later > 0n ? later / hapticPeriod : 0n;
   const seconds = Number(periods * hapticPeriod) / 1e9;
-  const { position: p, velocity: v } = sent;
+  const { position: p, velocity: v, turning, grip } = sent;
   return {
     ...sent,
     tick: sent.tick + periods,
     sampledNs: sent.sampledNs + periods * hapticPeriod,
     position: { x: p.x + v.x * seconds, y: p.y + v.y * seconds, z: p.z + v.z * seconds },
+    ...(turning && periods > 0n && {
+      turning: { ...turning, orientation: turned(turning.orientation, turning.angularVelocity, seconds) },
+    }),
+    ...(grip && { grip: { ...grip, opening: grip.opening + grip.velocity * seconds } }),
   };
 }

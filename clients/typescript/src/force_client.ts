@@ -1,38 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 import { randomBytes } from "@noble/hashes/utils";
-import { isContact, isError, isForce, isRadius, isStiffness, type ControlAck } from "./codec.js";
+import { objection, usable, type Touch } from "./answer.js";
+import type { ControlAck } from "./codec.js";
 import { checkForceDeadband, checkStateDeadband, Deadband, foretell, type ForceDeadband } from "./deadband.js";
 import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
-import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs, kMaxValue } from "./limits.js";
+import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureLocalModel, kProtocolVersion, Role, type Contact,
-  type DeviceDescription, type HandleDescription,
-  type DeviceReport, type DeviceState, type Grant, type Hello, type LinkReport, type PeerReport, type Request, type StateDeadband,
-  type Stiffness, type Vec3, type Welcome,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureLocalModel, kProtocolVersion, Role,
+  type DeviceDescription, type DeviceReport, type DeviceState, type Grant, type HandleDescription, type Hello,
+  type LinkReport, type PeerReport, type Request, type StateDeadband, type Vec3, type Welcome,
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
-
-/** The physics engine's answer to one device state. */
-export interface Touch {
-  /** N, on the hand: a wall that resists motion along +x sends −x. */
-  readonly force: Vec3;
-  /**
-   * N/m, −∂force/∂position at the state's position, so that the device loop can follow the hand until the next force;
-   * a wall with normal n: k·n·nᵀ. Used when the server has agreed to it.
-   */
-  readonly stiffness?: Stiffness | undefined;
-  /** m, how far from there the stiffness holds. */
-  readonly validRadius?: number | undefined;
-  /** The surface, with the force at other depths in a table where that is known. */
-  readonly contact?: Contact | undefined;
-  /** The body has been cut or torn since the previous answer: neither answer's stiffness and table are used. */
-  readonly topologyChanged?: boolean | undefined;
-  /** N, the engine's estimate of the error of the force. */
-  readonly error?: number | undefined;
-}
 
 /** The physics engine, seen from here. While it computes, newer states replace older ones. */
 export type Physics = (hand: DeviceState) => Vec3 | Touch;
@@ -116,6 +97,8 @@ export interface ClientStats {
   forcesUnusable: number;
   /** What was wrong with the newest of them; empty: none. */
   unusable: string;
+  /** What of the present session's answers is not sent, and why; empty: nothing. */
+  leftOut: string;
   /** Forces not sent: a hand could not tell them from the one before. */
   forcesAlike: number;
   /** Name of the client that has taken the channel from us; empty: nobody. */
@@ -227,7 +210,7 @@ export class ForceClient {
   #answeredTick = 0n;
   readonly #stats: ClientStats = {
     phase: "greeting", code: Code.OK, reason: "", link: undefined, attempts: 0, sessions: 0, states: 0, statesForetold: 0,
-    statesSkipped: 0, forces: 0, forcesUnusable: 0, unusable: "", forcesAlike: 0, leaseLostTo: "",
+    statesSkipped: 0, forces: 0, forcesUnusable: 0, unusable: "", leftOut: "", forcesAlike: 0, leaseLostTo: "",
   };
 
   /**
@@ -391,7 +374,7 @@ export class ForceClient {
     this.#holds = (grant ?? welcome).role === Role.CONTROLLER;
     this.#askedLease = undefined;
     this.#askLease = this.#config.takeLease && this.#role === Role.CONTROLLER && !this.#holds ? now : kNever;
-    this.#stats.leaseLostTo = "";
+    this.#stats.leaseLostTo = this.#stats.leftOut = "";
     this.#description = undefined;
     this.#handle = undefined;
     this.#session = new Session({ connectionId, seal }, now);
@@ -538,30 +521,26 @@ export class ForceClient {
 
   #answer(now: Nanoseconds, touch: Touch, hand: DeviceState): void {
     if (!this.#session || !this.#welcome) return; // the callback has called stop()
-    const { force, stiffness, validRadius, contact, topologyChanged, error } = touch;
-    if (!isForce(force) || (stiffness && !isStiffness(stiffness)) || !isRadius(validRadius) ||
-        (contact && !isContact(contact)) || !isError(error)) {
+    const objects = objection(touch);
+    if (objects) {
       ++this.#stats.forcesUnusable;
-      this.#stats.unusable = isForce(force)
-        ? "its stiffness, radius, contact or error is not finite, or out of the bounds of WIRE.md"
-        : [force.x, force.y, force.z].every(Number.isFinite)
-          ? `the force is beyond ${kMaxValue} N`
-          : "the force is not finite (NaN or infinity)";
+      this.#stats.unusable = objects;
       return;
     }
-    if (this.#deadband && !this.#deadband.passes(now, force) && !topologyChanged) {
+    const { topologyChanged, error } = touch;
+    const { answer, leftOut } = usable(touch, hand, this.#welcome.features);
+    if (leftOut) this.#stats.leftOut = leftOut;
+    if (this.#deadband && !this.#deadband.passes(now, answer) && !topologyChanged) {
       ++this.#stats.forcesAlike;
       return;
     }
-    const withModel = (stiffness ?? contact) && this.#welcome.features.includes(kFeatureLocalModel);
     this.#session.sendForce({
       validForUs: Math.ceil(1000 * this.#validForMs(hand.tick, this.#welcome.loopHz)),
       sequence: ++this.#sequence,
       basedOnTick: hand.tick,
-      force,
+      ...answer,
       device: this.#place.device,
       channel: this.#place.channel,
-      model: withModel ? { at: hand.position, stiffness: stiffness ?? [0], validRadius, contact } : undefined,
       topologyChanged,
       error,
     });

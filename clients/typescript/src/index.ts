@@ -2,15 +2,15 @@
 // Works in every runtime. "tendon-client/node" adds UDP and the command line.
 export { connect, type ConnectConfig, type Guest, type OpenTransport, type Transport } from "./connect.js";
 export {
-  ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Touch, type Watch,
+  ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch,
 } from "./force_client.js";
+export type { Touch } from "./answer.js";
 export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
   ChannelRule, Code, Mode, reasonNames, Role, Safety, type ChannelDescription, type Contact, type Delays,
-  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type HandleDescription, type LinkReport, type PeerReport,
-  type Quat,
-  type StateDeadband, type Stiffness, type Vec3, type Welcome,
+  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type Grip, type HandleDescription,
+  type LinkReport, type PeerReport, type Quat, type StateDeadband, type Stiffness, type Turning, type Vec3, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";
 export type { Nanoseconds } from "./time.js";

@@ -14,7 +14,10 @@ export const kFeatureLocalModel = "local-model";
 /** A feature: the client understands that a lease can be lost. */
 export const kFeatureChannels = "channels";
 
-/** A feature: the client is told how the device lies before the operator, its buttons' names, and which are held. */
+/**
+ * A feature: the client is told how the device lies before the operator, its buttons, orientation, gripper and torques,
+ * and may ask for torque and grip force.
+ */
 export const kFeatureHandle = "handle";
 
 /** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
@@ -34,6 +37,22 @@ export interface Quat extends Vec3 {
 
 /** N/m, −∂force/∂position; a spring is positive. 1 entry k: k·I. 3: the diagonal. 9: the matrix, row by row. */
 export type Stiffness = readonly number[];
+
+/** How the handle is turned. */
+export interface Turning {
+  /** Turns the handle frame into the base frame. */
+  readonly orientation: Quat;
+  /** rad/s, base frame axes */
+  readonly angularVelocity: Vec3;
+}
+
+/** How far the gripper of the handle is open. */
+export interface Grip {
+  /** rad; 0 = closed. */
+  readonly opening: number;
+  /** rad/s */
+  readonly velocity: number;
+}
 
 /** The device at one haptic step. */
 export interface DeviceState {
@@ -65,6 +84,15 @@ export interface DeviceState {
   readonly forceWanted?: Vec3 | undefined;
   /** Bit i is set while button i is held. A press between two states is in the next one. */
   readonly buttons: number;
+  /** Absent, as all below: the device has it not, or the server does not know kFeatureHandle. */
+  readonly turning?: Turning | undefined;
+  /** N·m on the hand, about the position, what the device really gives out from this step on. */
+  readonly torqueApplied?: Vec3 | undefined;
+  readonly grip?: Grip | undefined;
+  /** N on the fingers, > 0 opens them; likewise. */
+  readonly gripApplied?: number | undefined;
+  /** N of the hand on the handle, as a force sensor measures it. */
+  readonly handForce?: Vec3 | undefined;
 }
 
 /**
@@ -99,6 +127,23 @@ export interface LocalModel {
   readonly contact?: Contact | undefined;
 }
 
+/**
+ * The torque near one orientation. With p = (w, v) the turn from `at` to the handle's orientation, q · at⁻¹, and
+ * K = stiffness: torque − 2 (w K v + v × K v), which is torque − K θ for a small turn θ.
+ */
+export interface RotationModel {
+  readonly at: Quat;
+  /** N·m/rad, base frame axes. */
+  readonly stiffness: Stiffness;
+}
+
+/** On the hand, base frame axes, about the handle's position. */
+export interface Torque {
+  /** N·m */
+  readonly torque: Vec3;
+  readonly model?: RotationModel | undefined;
+}
+
 /** The force that the physics wants. */
 export interface ForceCommand {
   /** 1, 2, 3 … per session, device and channel. */
@@ -116,12 +161,16 @@ export interface ForceCommand {
   readonly topologyChanged?: boolean | undefined;
   /** N, the engine's estimate of the error of the force. */
   readonly error?: number | undefined;
+  /** Only to a server that has agreed to kFeatureHandle; so is the next. */
+  readonly torque?: Torque | undefined;
+  /** N on the fingers of the gripper; > 0 opens them. */
+  readonly gripForce?: number | undefined;
 }
 
 /**
  * Leave out the states that this client can predict. After a state with velocity v, the next state sent is the first
  * whose velocity differs from v by more than max(share · ‖v‖, floor), whose mode or buttons differ, or which comes
- * maxSilenceUs later.
+ * maxSilenceUs later. So it is with the velocities of rotation and gripper, with floor / 0.05 m in rad/s.
  */
 export interface StateDeadband {
   /** Of the speed: 0 … 0.5. */
@@ -183,6 +232,14 @@ export interface HandleDescription {
   readonly operatorFromDevice?: Quat | undefined;
   /** Names by bit of DeviceState.buttons. */
   readonly buttons: readonly string[];
+  /** Else no state has `turning`. */
+  readonly orientationMeasured: boolean;
+  /** N·m, norm of the torque that the device can give out; 0 = none. */
+  readonly maxTorque: number;
+  /** rad, the opening of the open gripper; absent: no gripper. */
+  readonly gripperOpen?: number | undefined;
+  /** N on the fingers; 0 = the gripper has no motor. */
+  readonly maxGripperForce: number;
 }
 
 /** Two quantiles of a delay; below zero only where two clocks had to be compared. */

@@ -30,6 +30,7 @@ from tendon.messages import (
     ForceCommand,
     Frame,
     LinkReport,
+    Mat3,
     PeerReport,
     Rearm,
     Refused,
@@ -66,6 +67,25 @@ def _report(report: LinkReport) -> list[object]:
     return words
 
 
+def _matrix(matrix: Mat3) -> list[object]:
+    return [_double(entry + 0.0) for row in matrix for entry in row]  # −0 is 0: k · 0 is either
+
+
+def _handle_of(state: DeviceState) -> list[object]:
+    words: list[object] = []
+    if state.turning is not None:
+        words += ["turning", *map(_double, state.turning.orientation), *_vector(state.turning.angular_velocity)]
+    if state.torque_applied is not None:
+        words += ["torque", *_vector(state.torque_applied)]
+    if state.grip is not None:
+        words += ["grip", _double(state.grip.opening), _double(state.grip.velocity)]
+    if state.grip_applied is not None:
+        words += ["grip-force", _double(state.grip_applied)]
+    if state.hand_force is not None:
+        words += ["hand", *_vector(state.hand_force)]
+    return words
+
+
 def _frame(frame: Frame) -> list[object]:
     if isinstance(frame, DeviceState):
         return [
@@ -75,14 +95,13 @@ def _frame(frame: Frame) -> list[object]:
             *(frame.reasons, frame.force_sequence, frame.force_age_ns, int(frame.mode)),
             *([] if frame.force_wanted is None else ["wanted", *_vector(frame.force_wanted)]),
             *(["buttons", frame.buttons] if frame.buttons else []),
+            *_handle_of(frame),
         ]
     if isinstance(frame, ForceCommand):
         words: list[object] = ["force", frame.sequence, frame.based_on_tick, *_vector(frame.force)]
         words.append(frame.valid_for_us * 1000)
         if frame.model is not None:
-            words += ["model", *_vector(frame.model.at)]
-            for row in frame.model.stiffness:
-                words += [_double(entry + 0.0) for entry in row]  # −0 is 0: k · 0 is either
+            words += ["model", *_vector(frame.model.at), *_matrix(frame.model.stiffness)]
             words.append(_double(frame.model.valid_radius))
             if frame.model.contact is not None:
                 words += ["contact", *_vector(frame.model.contact.normal), _double(frame.model.contact.gap)]
@@ -93,6 +112,12 @@ def _frame(frame: Frame) -> list[object]:
             words.append("changed")
         if frame.error is not None:
             words += ["error", _double(frame.error)]
+        if frame.torque is not None:
+            words += ["torque", *_vector(frame.torque.torque)]
+            model = frame.torque.model
+            words += [] if model is None else ["model", *map(_double, model.at), *_matrix(model.stiffness)]
+        if frame.grip_force is not None:
+            words += ["grip-force", _double(frame.grip_force)]
         return words
     if isinstance(frame, Control):
         if frame.request is None:
@@ -110,6 +135,10 @@ def _frame(frame: Frame) -> list[object]:
             axes = frame.handle.operator_from_device
             words += ["handle"] if axes is None else ["handle", "axes", *map(_double, axes)]
             words += [len(frame.handle.buttons), *map(_text, frame.handle.buttons)]
+            words += [int(frame.handle.orientation_measured), _double(frame.handle.max_torque)]
+            opens = frame.handle.gripper_open
+            words += [] if opens is None else ["gripper", _double(opens)]
+            words.append(_double(frame.handle.max_gripper_force))
         return words
     if isinstance(frame, LinkReport):
         return _report(frame)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from math import inf
 
 from stand_in import StandIn
@@ -20,6 +21,7 @@ from tendon import (
     Mode,
     SetStateDeadband,
     Touch,
+    Turning,
 )
 from tendon.messages import (
     Control,
@@ -53,7 +55,7 @@ DESCRIPTION = DeviceDescription(
     ),
 )
 
-HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"))
+HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"), True, 0.125, 0.5, 8.0)
 
 
 class Stage:
@@ -75,6 +77,7 @@ class Stage:
         self.lease_answers: list[Code] = []  # to TakeLease, in this order; then `grant`
         self.snatches = 0  # so many leases are another one's as soon as they are given
         self.speed = 0.0  # m/s
+        self.turning: Turning | None = None  # of the handle, in each state
         self.every = 1  # ms from one state to the next that is sent
         self._next_state = World.START
 
@@ -107,7 +110,8 @@ class Stage:
             if session is not None and tick % self.every == 0:
                 position = (1e-3 + 1e-3 * self.speed * tick, 0.0, 0.0)
                 velocity = (self.speed, 0.0, 0.0)
-                session.send(DeviceState(tick, now, position, velocity, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE))
+                state = DeviceState(tick, now, position, velocity, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE)
+                session.send(replace(state, turning=self.turning))
         while (hand := self.client.next_state(now)) is not None:
             self.seen.append(hand)
             self.seen_at.append(now)

@@ -20,6 +20,8 @@ from tendon.messages import (
     DeviceState,
     ForceCommand,
     ForceTable,
+    Grip,
+    HandleDescription,
     Hello,
     LinkReport,
     LocalModel,
@@ -27,9 +29,12 @@ from tendon.messages import (
     PeerReport,
     Refused,
     Role,
+    RotationModel,
     Safety,
     SetStateDeadband,
     SetStateRate,
+    Torque,
+    Turning,
     Welcome,
 )
 
@@ -92,6 +97,24 @@ REPORT = LinkReport(
     words="forces were late 3 times, by up to 75 ms: the network (round trip 131 ms, usually 41 ms)",
 )
 STATE_BUTTONS = replace(STATE, buttons=0b1001)
+STATE_HANDLE = replace(
+    STATE,
+    buttons=1,
+    turning=Turning((0.6, 0.0, 0.8, 0.0), (0.0, 1.5, 0.0)),
+    torque_applied=(0.0, -0.0625, 0.0),
+    grip=Grip(0.25, -0.5),
+    grip_applied=0.75,
+    hand_force=(1.5, 0.0, -0.25),
+)
+FORCE_TORQUE = replace(
+    FORCE,
+    sequence=102,
+    torque=Torque(
+        (0.0, -0.0625, 0.0), RotationModel((0.6, 0.0, 0.8, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.25, 0.0), (0.0, 0.0, 0.0)))
+    ),
+    grip_force=0.75,
+)
+HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"), True, 0.125, 0.5, 8.0)
 STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5))
 DEVICE_REPORT = DeviceReport(
     number=7,
@@ -119,6 +142,9 @@ FRAMES = {
     "report": (57, None, [REPORT]),
     "state-wanted": (60, None, [STATE_WANTED]),
     "state-buttons": (64, None, [STATE_BUTTONS]),
+    "state-handle": (67, None, [STATE_HANDLE]),
+    "force-torque": (68, None, [FORCE_TORQUE]),
+    "control-ack-handle": (66, None, [ControlAck(14, Code.OK, handle=HANDLE)]),
     "device-report": (61, None, [DEVICE_REPORT]),
     "peer-report": (62, None, [PEER_REPORT]),
     "state-deadband": (58, None, [Control(9, SetStateDeadband(0.1, 0.001, 20_000))]),

@@ -135,8 +135,29 @@ describe("WIRE.md", () => {
     assert.equal(state.value.buttons, 0b1001);
     const [ack] = contentOf("control-ack-handle").frames;
     assert.ok(ack?.kind === "controlAck" && ack.value.handle);
-    assert.deepEqual(ack.value.handle.operatorFromDevice, { w: 0.5, x: -0.5, y: 0.5, z: 0.5 });
-    assert.deepEqual(ack.value.handle.buttons, ["right", "forward", "centre", "left"]);
+    assert.deepEqual(ack.value.handle, {
+      device: 1, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward", "centre", "left"],
+      orientationMeasured: true, maxTorque: 0.125, gripperOpen: 0.5, maxGripperForce: 8,
+    });
+  });
+
+  it("state-handle and force-torque say what the page says", () => {
+    const [state] = contentOf("state-handle").frames;
+    assert.ok(state?.kind === "state");
+    const { buttons, turning, torqueApplied, grip, gripApplied, handForce } = state.value;
+    assert.deepEqual({ buttons, turning, torqueApplied, grip, gripApplied, handForce }, {
+      buttons: 1,
+      turning: { orientation: { w: 0.6, x: 0, y: 0.8, z: 0 }, angularVelocity: { x: 0, y: 1.5, z: 0 } },
+      torqueApplied: { x: 0, y: -0.0625, z: 0 }, grip: { opening: 0.25, velocity: -0.5 }, gripApplied: 0.75,
+      handForce: { x: 1.5, y: 0, z: -0.25 },
+    });
+    const [force] = contentOf("force-torque").frames;
+    assert.ok(force?.kind === "force");
+    assert.deepEqual(force.value.torque, {
+      torque: { x: 0, y: -0.0625, z: 0 },
+      model: { at: { w: 0.6, x: 0, y: 0.8, z: 0 }, stiffness: [0, 0.25, 0] },
+    });
+    assert.equal(force.value.gripForce, 0.75);
   });
 
   it("report says what the page says", () => {
