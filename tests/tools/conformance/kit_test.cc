@@ -213,6 +213,7 @@ INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
                                                      {Fault::kReportsBeyondBounds, "link-report"},
                                                      {Fault::kDiagnosesUnasked, "diagnostics-unasked"},
                                                      {Fault::kTellsOfTheHandleUnasked, "handle-unasked"},
+                                                     {Fault::kTellsTheOrientationUnasked, "handle-unasked"},
                                                  })),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(Client, BrokenToy,

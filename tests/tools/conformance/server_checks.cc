@@ -120,6 +120,12 @@ void check_roaming(ServerGuest& guest, Conversation& talk) {
                      "the session goes on there");
 }
 
+bool tells_of_the_handle(const pb::DeviceState& state) {
+  return state.buttons() != 0 || state.has_orientation() || state.has_angular_velocity_radps() ||
+         state.has_torque_applied_nm() || state.has_gripper_rad() || state.has_gripper_velocity_radps() ||
+         state.has_gripper_force_applied_n() || state.has_hand_force_n();
+}
+
 void check_states(Report& report, const Conversation& talk) {
   const pb::DeviceState* previous = nullptr;
   std::size_t count = 0;
@@ -129,8 +135,8 @@ void check_states(Report& report, const Conversation& talk) {
     const bool diagnosed = frame.has_device_report() || frame.has_peer_report() || frame.state().has_force_wanted_n();
     report.judge("diagnostics-unasked", !diagnosed, frame.ShortDebugString(),
                  "nothing of it: nobody named the feature");
-    report.judge("handle-unasked", frame.state().buttons() == 0, frame.ShortDebugString(),
-                 "no buttons: nobody named the feature");
+    report.judge("handle-unasked", !tells_of_the_handle(frame.state()), frame.ShortDebugString(),
+                 "nothing of the handle: nobody named the feature");
     if (!frame.has_state()) return;
     const pb::DeviceState& state = frame.state();
     ++count;

@@ -17,6 +17,12 @@ final class Bounds {
     return good(vector.getX()) && good(vector.getY()) && good(vector.getZ());
   }
 
+  /** A rotation. */
+  private static boolean good(Tendon.Quat q) {
+    double norm = Math.sqrt(q.getW() * q.getW() + q.getX() * q.getX() + q.getY() * q.getY() + q.getZ() * q.getZ());
+    return Math.abs(norm - 1) <= 0.001;
+  }
+
   static boolean goodTime(long ns) {
     return ns >= -FARTHEST && ns <= FARTHEST;
   }
@@ -40,7 +46,19 @@ final class Bounds {
         && (good(permitted) || Double.isInfinite(permitted))
         && Long.compareUnsigned(state.getForceAgeNs(), FARTHEST) <= 0
         && state.getModeValue() >= 1
-        && state.getModeValue() <= 6;
+        && state.getModeValue() <= 6
+        && goodHandle(state);
+  }
+
+  /** What is told with the feature "handle"; a field that is absent reads as 0, which is good. */
+  private static boolean goodHandle(Tendon.DeviceState state) {
+    return (!state.hasOrientation() || good(state.getOrientation()))
+        && good(state.getAngularVelocityRadps())
+        && good(state.getTorqueAppliedNm())
+        && good(state.getGripperRad())
+        && good(state.getGripperVelocityRadps())
+        && good(state.getGripperForceAppliedN())
+        && good(state.getHandForceN());
   }
 
   static boolean good(Tendon.Bye bye) {

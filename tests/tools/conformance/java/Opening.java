@@ -32,6 +32,7 @@ final class Opening {
             .setVersionMax(1)
             .setRole(Tendon.Role.ROLE_CONTROLLER)
             .setName("spring.java")
+            .addFeatures("handle")
             .build();
     suite = key == null ? 0 : 1;
     source.nextBytes(random);

@@ -4,7 +4,7 @@ import java.nio.ByteBuffer;
 import java.nio.ByteOrder;
 import java.util.Arrays;
 import java.util.BitSet;
-import java.util.function.Function;
+import java.util.function.BiConsumer;
 import tendon.v1.Tendon;
 
 /** The client's end of an open conversation, as SESSION.md has it. Time is passed, never taken; no socket. */
@@ -171,8 +171,8 @@ final class Session {
 
   // ---- Out ----
 
-  /** What is due; null when nothing is. `physics` turns the newest state into a force on the hand, N. */
-  byte[] nextDatagram(long now, Function<Tendon.DeviceState, Tendon.Vec3> physics) {
+  /** What is due; null when nothing is. `physics` answers the newest state with a force, and a torque if it likes. */
+  byte[] nextDatagram(long now, BiConsumer<Tendon.DeviceState, Tendon.ForceCommand.Builder> physics) {
     if (end != null) return null;
     boolean askNow = asked && now >= askAt;
     boolean silent = lastSent == null || now - lastSent >= KEEP_ALIVE;
@@ -183,8 +183,8 @@ final class Session {
           Tendon.ForceCommand.newBuilder()
               .setSequence(++sequence)
               .setBasedOnTick(unanswered.getTick())
-              .setForceN(physics.apply(unanswered))
               .setValidForUs(20_000);
+      physics.accept(unanswered, force);
       body.addFrames(Tendon.Frame.newBuilder().setForce(force));
       unanswered = null;
     }

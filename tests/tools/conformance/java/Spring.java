@@ -17,12 +17,14 @@ import java.util.Set;
 import tendon.v1.Tendon;
 
 /**
- * A spring of 500 N/m that pulls the hand to the origin.
+ * A spring of 500 N/m that pulls the hand to the origin, and one of 0.1 N·m/rad that turns the handle upright where the
+ * device measures its orientation.
  *
  * <pre>java -cp tendon-spring.jar:/usr/share/java/protobuf.jar Spring 127.0.0.1:47100 [wall.key]</pre>
  */
 public final class Spring {
   private static final double STIFFNESS = 500; // N/m
+  private static final double ANGULAR_STIFFNESS = 0.1; // N·m/rad
   private static volatile boolean ending;
 
   private final byte[] key;
@@ -106,13 +108,19 @@ public final class Spring {
     return null;
   }
 
-  private static Tendon.Vec3 pull(Tendon.DeviceState hand) {
+  private static void pull(Tendon.DeviceState hand, Tendon.ForceCommand.Builder answer) {
     Tendon.Vec3 at = hand.getPositionM();
-    return Tendon.Vec3.newBuilder()
-        .setX(-STIFFNESS * at.getX())
-        .setY(-STIFFNESS * at.getY())
-        .setZ(-STIFFNESS * at.getZ())
-        .build();
+    answer.setForceN(times(-STIFFNESS, at.getX(), at.getY(), at.getZ()));
+    if (!hand.hasOrientation()) return; // as from a server that has not granted "handle"
+    Tendon.Quat q = hand.getOrientation();
+    answer
+        .setTorqueNm(times(-2 * ANGULAR_STIFFNESS * q.getW(), q.getX(), q.getY(), q.getZ()))
+        .setRotationModel(
+            Tendon.RotationModel.newBuilder().setAtOrientation(q).addAngularStiffnessNmprad(ANGULAR_STIFFNESS));
+  }
+
+  private static Tendon.Vec3 times(double factor, double x, double y, double z) {
+    return Tendon.Vec3.newBuilder().setX(factor * x).setY(factor * y).setZ(factor * z).build();
   }
 
   private void send(byte[] datagram) throws IOException {

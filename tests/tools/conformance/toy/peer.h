@@ -90,6 +90,7 @@ enum class Fault : std::uint8_t {
   kReportsBeyondBounds,
   kDiagnosesUnasked,
   kTellsOfTheHandleUnasked,
+  kTellsTheOrientationUnasked,
   kKnowsNoChannels,  ///< no fault: an older server
   // A client's.
   kShortHello,

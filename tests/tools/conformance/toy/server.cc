@@ -303,6 +303,7 @@ void ToyServer::tick(LocalTime now) {
       state.set_force_sequence(rendered_);
       if (is(Fault::kDiagnosesUnasked)) state.mutable_force_wanted_n()->set_x(1);
       if (is(Fault::kTellsOfTheHandleUnasked)) state.set_buttons(1);
+      if (is(Fault::kTellsTheOrientationUnasked)) state.mutable_orientation()->set_w(1);
     }
     // What is due may be more than fits: eight frames a time.
     do {
