@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/base/expect.h"
+#include "core/base/rotation.h"
 #include "core/control/force_limits.h"
 
 namespace tendon {
@@ -18,6 +19,13 @@ HapticController::HapticController(const Config& config)
   if (config.max_speed) expect(*config.max_speed > 0, "max_speed", *config.max_speed, "a number above 0 m/s");
   expect_not_negative(seconds(config.watchdog), "watchdog");
   if (config.admittance) admittance_.emplace(*config.admittance);
+  if (config.rotation) {
+    if (config.admittance) {
+      throw std::invalid_argument("rotation: expected no admittance, which knows the force on a point only");
+    }
+    wrench_.emplace(wrench_config(config.limiter, *config.rotation));
+  }
+  if (config.grip) grip_.emplace(grip_config(config.limiter, *config.grip));
   if (config.friction_map) {
     if (!config.limiter.parts.adaptive_friction) {
       throw std::invalid_argument("friction_map: expected a limiter with adaptive_friction, which is the only user");
@@ -26,31 +34,59 @@ HapticController::HapticController(const Config& config)
   }
 }
 
-void HapticController::book_unseen(const Vec3& applied, Duration held) noexcept {
+void HapticController::book_unseen(const Vec3& applied, const HandleSample* handle, Duration held) noexcept {
   const Duration at_most = config_.watchdog > Duration::zero() ? std::min(held, config_.watchdog) : held;
-  limiter_.observe_unseen(applied, at_most);
+  const bool whole = handle != nullptr;
+  if (wrench_) {
+    wrench_->observe_unseen(wrench_of(applied, whole ? handle->torque : Vec3(Vec3::Zero())), at_most);
+  } else {
+    limiter_.observe_unseen(applied, at_most);
+  }
+  if (grip_) grip_->observe_unseen(Vec<1>(whole ? handle->grip_force : 0), at_most);
   if (admittance_) admittance_->observe_unseen();
 }
 
-void HapticController::book(const Motion& hand, const Vec3& applied, Step& step) noexcept {
+void HapticController::book_seen(const Motion& hand, const Vec3& applied, const HandleSample* handle,
+                                 Step& step) noexcept {
+  const Vec3 dx = hand.position - last_->position;
+  if (wrench_) {
+    const std::uint64_t broken = wrench_->broken_assumptions();
+    const Vec3 turn = turn_between(*last_orientation_, handle->turning->orientation);
+    wrench_->observe({.applied = wrench_of(applied, handle->torque), .dx = wrench_of(dx, turn), .held = step.held});
+    step.assumption_broken = wrench_->broken_assumptions() != broken;
+  } else {
+    const Interval<3> interval{.applied = applied, .dx = dx, .held = step.held};
+    const std::uint64_t broken = limiter_.broken_assumptions();
+    limiter_.observe(interval);
+    step.assumption_broken = limiter_.broken_assumptions() != broken;
+    if (admittance_) admittance_->observe(interval);
+  }
+  if (grip_) {
+    const double travel = config_.grip->arm * (handle->grip->opening - *last_opening_);
+    grip_->observe({.applied = Vec<1>(handle->grip_force), .dx = Vec<1>(travel), .held = step.held});
+  }
+}
+
+void HapticController::add_accounts(Step& step) const noexcept {
+  step.energy = wrench_ ? wrench_->energy() : limiter_.energy();
+  step.longest_hold = wrench_ ? wrench_->longest_hold() : limiter_.longest_hold();
+  if (grip_ && step.grip) step.grip->energy = grip_->energy();
+}
+
+void HapticController::book(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept {
   step.held = started_ ? hand.at - last_at_ : Duration::zero();
   step.was_applied = applied;
   if (step.held > config_.limiter.longest_hold) step.reasons |= Reason::kOverrun;
   if (config_.watchdog > Duration::zero() && step.held > config_.watchdog) {
     step.reasons |= Reason::kWatchdog;
-    book_unseen(applied, step.held);
+    book_unseen(applied, handle, step.held);
   } else if (last_) {
-    const Interval<3> interval{.applied = applied, .dx = hand.position - last_->position, .held = step.held};
-    const std::uint64_t broken = limiter_.broken_assumptions();
-    limiter_.observe(interval);
-    step.assumption_broken = limiter_.broken_assumptions() != broken;
-    if (admittance_) admittance_->observe(interval);
+    book_seen(hand, applied, handle, step);
   } else if (started_) {
     // The position before was not seen, and the device may hold a force although it was told zero.
-    book_unseen(applied, step.held);
+    book_unseen(applied, handle, step.held);
   }
-  step.energy = limiter_.energy();
-  step.longest_hold = limiter_.longest_hold();
+  add_accounts(step);
 }
 
 void HapticController::follow_tool(Step& step) noexcept {
@@ -66,24 +102,34 @@ void HapticController::follow_tool(Step& step) noexcept {
   }
 }
 
-bool HapticController::believable(const Motion& hand) const noexcept {
+/// Of a handle with motors that turn it or close its gripper these are measured in every sample.
+bool HapticController::is_finite(const Motion& hand, const HandleSample* handle) const noexcept {
   if (!hand.position.allFinite()) return false;
+  if (handle == nullptr) return !wrench_ && !grip_;
+  if (handle->turning ? !is_rotation(handle->turning->orientation) : wrench_.has_value()) return false;
+  return handle->grip ? std::isfinite(handle->grip->opening) : !grip_;
+}
+
+bool HapticController::believable(const Motion& hand, const HandleSample* handle) const noexcept {
+  if (!is_finite(hand, handle)) return false;
   if (!config_.max_speed || !last_) return true;
   return (hand.position - last_->position).norm() <= *config_.max_speed * seconds(hand.at - last_->at);
 }
 
-Step HapticController::disbelieve(const Motion& hand, const Vec3& applied) noexcept {
-  const bool finite = hand.position.allFinite();
+Step HapticController::disbelieve(const Motion& hand, const Vec3& applied, const HandleSample* handle) noexcept {
+  const bool finite = is_finite(hand, handle);
   fault_ = finite ? Fault::kPositionJumped : Fault::kPositionNotFinite;
-  Step blind = step_unseen(hand.at, applied);
+  Step blind = step_unseen(hand.at, applied, handle);
   if (!finite) blind.reasons |= Reason::kNotFinite;
   return blind;
 }
 
-Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force) noexcept {
-  if (!believable(hand)) return disbelieve(hand, applied);
-  const ForceChannels::Wanted wanted = held_.wanted(hand);
-  Step step = take(hand, applied, hand_force, wanted);
+Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+                            const HandleSample* handle) noexcept {
+  if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
+  const Quat* const orientation = handle != nullptr && handle->turning ? &handle->turning->orientation : nullptr;
+  const ForceChannels::Wanted wanted = held_.wanted(hand, orientation);
+  Step step = take(hand, applied, hand_force, wanted, handle);
   if (const auto& newest = held_.newest(wanted.channel)) {
     step.force_sequence = newest->sequence;
     step.loop_age = hand.at - newest->answers;
@@ -93,17 +139,23 @@ Step HapticController::step(const Motion& hand, const Vec3& applied, const std::
 }
 
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-                            const ForceChannels::Wanted& wanted) noexcept {
-  return believable(hand) ? take(hand, applied, hand_force, wanted) : disbelieve(hand, applied);
+                            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
+  return believable(hand, handle) ? take(hand, applied, hand_force, wanted, handle) : disbelieve(hand, applied, handle);
 }
 
 Step HapticController::take(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-                            const ForceChannels::Wanted& wanted) noexcept {
+                            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
   Step step;
   step.hand = hand;
   step.hand_force = hand_force;
-  book(hand, applied, step);
+  if (handle != nullptr) {
+    if (handle->turning) step.turn = {.hand = *handle->turning, .was_applied = handle->torque, .wanted = wanted.torque};
+    if (handle->grip) step.grip = {.hand = *handle->grip, .was_applied = handle->grip_force, .wanted = wanted.grip};
+  }
+  book(hand, applied, handle, step);
   last_ = hand;
+  if (wrench_) last_orientation_ = handle->turning->orientation;
+  if (grip_) last_opening_ = handle->grip->opening;
   last_at_ = hand.at;
   started_ = true;
   missed_ = 0;
@@ -127,11 +179,28 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
     step.reasons |= Reason::kFault;
   }
   if (disarmed_) step.force.setZero();
+  if (wrench_) {
+    limit_wrench(wanted, applied, step);
+  } else {
+    limit_force(wanted, applied, step);
+    if (!wanted.torque.isZero(0)) step.reasons |= Reason::kMaxForce;  // it has no motor that turns it
+  }
+  if (grip_) limit_grip(wanted, step);
+  if (disarmed_) {
+    step.force.setZero();
+    if (step.turn) step.turn->torque.setZero();
+    if (step.grip) step.grip->force = 0;
+    step.reasons |= Reason::kDisarmed;
+  }
+  return step;
+}
+
+void HapticController::limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept {
   const Limited saturated = saturate(step.force, config_.max_force);
   // After a pause the force may grow by what one longest hold allows, not by what the whole pause would.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
-  if (friction_map_) limiter_.adapt(friction_map_->at(hand.position));
+  if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));
   // A limit changes the environment as the hand feels it, so its stiffness is known only for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
@@ -145,30 +214,74 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
     step.reasons |= saturated.reasons;
     step.reasons |= slewed.reasons;
   }
-  if (disarmed_) {
-    step.force.setZero();
-    step.reasons |= Reason::kDisarmed;
-  }
-  return step;
 }
 
-Step HapticController::step_unseen(LocalTime now, const Vec3& applied) noexcept {
+/// The same for force and torque together. The laws of a wrench do not use stiffness.
+void HapticController::limit_wrench(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept {
+  const RotationLimits& rotation = *config_.rotation;
+  TurnStep& turn = *step.turn;
+  Vec3 torque = wanted.torque;
+  if (fault_ != Fault::kNone || disarmed_ || !torque.allFinite()) {
+    if (!torque.allFinite()) step.reasons |= Reason::kNotFinite;
+    torque.setZero();
+  }
+  const LimitedWrench saturated = saturate(wrench_of(step.force, torque), config_.max_force, rotation.max_torque);
+  const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
+  const LimitedWrench slewed =
+      limit_slew(saturated.wrench, wrench_of(applied, turn.was_applied), config_.max_slew, rotation.max_slew, elapsed);
+  if (friction_map_) wrench_->adapt({friction_map_->at(step.hand.position), rotation.friction});
+  const LimitedForce<6> limited = wrench_->limit({.force = slewed.wrench});
+  step.force = limited.force.head<3>();
+  turn.torque = limited.force.tail<3>();
+  step.permitted = limited.permitted;
+  step.reasons |= limited.reasons;
+  if (!step.reasons.has(Reason::kEnergy)) {
+    step.reasons |= saturated.reasons;
+    step.reasons |= slewed.reasons;
+  }
+}
+
+/// The gripper's own limits give no reasons: those are of the force.
+void HapticController::limit_grip(const ForceChannels::Wanted& wanted, Step& step) noexcept {
+  const GripLimits& limits = *config_.grip;
+  GripStep& grip = *step.grip;
+  const bool none = fault_ != Fault::kNone || disarmed_ || !std::isfinite(wanted.grip);
+  double force = none ? 0 : std::clamp(wanted.grip, -limits.max_force, limits.max_force);
+  if (std::isfinite(limits.max_slew)) {
+    const double most = limits.max_slew * seconds(std::min(step.held, config_.limiter.longest_hold));
+    force = std::clamp(force, grip.was_applied - most, grip.was_applied + most);
+  }
+  const LimitedForce<1> limited = grip_->limit({.force = Vec<1>(force)});
+  grip.force = limited.force[0];
+  grip.permitted = limited.permitted;
+}
+
+Step HapticController::step_unseen(LocalTime now, const Vec3& applied, const HandleSample* handle) noexcept {
   Step step;
   step.hand = last_.value_or(Motion{});
   step.hand.at = now;
   step.was_applied = applied;
+  if (handle != nullptr) {
+    const Turning turning{.orientation = last_orientation_.value_or(Quat{})};
+    const Grip grip{.opening = last_opening_.value_or(0)};
+    if (handle->turning || wrench_) {
+      step.turn = {.hand = handle->turning.value_or(turning), .was_applied = handle->torque};
+    }
+    if (handle->grip || grip_) step.grip = {.hand = handle->grip.value_or(grip), .was_applied = handle->grip_force};
+  }
   if (started_) {
     step.held = now - last_at_;
-    book_unseen(applied, step.held);
+    book_unseen(applied, handle, step.held);
   }
   last_.reset();
   last_at_ = now;
   started_ = true;
   if (++missed_ >= config_.max_missed && fault_ == Fault::kNone) fault_ = Fault::kDeviceSilent;
 
-  step.energy = limiter_.energy();
-  step.longest_hold = limiter_.longest_hold();
-  step.permitted = limiter_.limit({.force = Vec3::Zero()}).permitted;
+  add_accounts(step);
+  step.permitted =
+      wrench_ ? wrench_->limit({.force = Vec<6>::Zero()}).permitted : limiter_.limit({.force = Vec3::Zero()}).permitted;
+  if (grip_) grip_->limit({.force = Vec<1>::Zero()});
   step.mode = fault_ == Fault::kNone ? Mode::kHolding : Mode::kFault;
   step.reasons |= Reason::kUnseen;
   if (fault_ != Fault::kNone) step.reasons |= Reason::kFault;

@@ -10,6 +10,7 @@
 #include "core/base/reason.h"
 #include "core/control/admittance_loop.h"
 #include "core/control/limiter.h"
+#include "core/handle/handle_port.h"
 #include "core/ledger/friction_map.h"
 #include "core/remote/force_channels.h"
 #include "core/remote/remote_force.h"
@@ -58,6 +59,14 @@ struct Step {
   std::optional<GripStep> grip{};       ///< empty: it has no gripper
 };
 
+/// What the rest of a handle has measured, and what its other motors have held since the step before.
+struct HandleSample {
+  std::optional<Turning> turning{};  ///< empty: not measured
+  std::optional<Grip> grip{};        ///< empty: no gripper
+  Vec3 torque = Vec3::Zero();        ///< N·m, on the hand, really held
+  double grip_force = 0;             ///< N, on the fingers, really held
+};
+
 /// The heart: from one look at the hand to the force it is to feel.
 ///
 ///     account ← the interval just ended, with the force really held         (Limiter::observe)
@@ -66,6 +75,9 @@ struct Step {
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
 ///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
+///
+/// A handle with motors that turn it goes the same way as a wrench: force and torque together are shortened, so that
+/// their direction stays, and one account bounds both (WrenchPort). Its gripper is a port of its own (GripPort).
 ///
 /// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
 /// faster than the slew limit allows: energy is a matter of safety, smoothness is not.
@@ -99,6 +111,10 @@ class HapticController {
     LimiterConfig limiter;
     /// Friction by place, for a limiter with adaptive_friction; limiter.friction holds until the first step.
     std::optional<FrictionMap::Config> friction_map{};
+    /// For a device with motors that turn the handle; not together with admittance.
+    std::optional<RotationLimits> rotation{};
+    /// For a device whose gripper has a motor.
+    std::optional<GripLimits> grip{};
     /// For a device that measures the hand's force; without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
     Duration watchdog{};   ///< the device's own; 0 = it has none
@@ -129,15 +145,18 @@ class HapticController {
 
   /// One haptic step. `applied` is the force that the device has really held since the step before, `hand_force`
   /// (N, of the hand on the handle) what its force sensor measured; with `admittance` a step without one gives no
-  /// force.
-  Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {}) noexcept;
+  /// force. `handle` is the rest of the handle, of a device that has more than a position; with `rotation` every step
+  /// has its orientation, and with `grip` its opening.
+  Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
+            const HandleSample* handle = nullptr) noexcept;
 
   /// The same, but `wanted` is given instead of derived from the remote forces observed. Replays recorded steps.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-            const ForceChannels::Wanted& wanted) noexcept;
+            const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr) noexcept;
 
-  /// A haptic step in which the device gave no position: the force to apply is zero.
-  Step step_unseen(LocalTime now, const Vec3& applied) noexcept;
+  /// A haptic step in which the device gave no position: the force to apply is zero. Of `handle` the last turning and
+  /// grip go into the record, and what was held into the accounts.
+  Step step_unseen(LocalTime now, const Vec3& applied, const HandleSample* handle = nullptr) noexcept;
 
   Fault fault() const noexcept { return fault_; }
   /// Clears the fault, and ends `disarm`. Forces start again from idle: the next fresh one is ramped in.
@@ -145,24 +164,34 @@ class HapticController {
   void disarm() noexcept { disarmed_ = true; }
 
  private:
-  bool believable(const Motion& hand) const noexcept;
-  Step disbelieve(const Motion& hand, const Vec3& applied) noexcept;
+  bool is_finite(const Motion& hand, const HandleSample* handle) const noexcept;
+  bool believable(const Motion& hand, const HandleSample* handle) const noexcept;
+  Step disbelieve(const Motion& hand, const Vec3& applied, const HandleSample* handle) noexcept;
   Step take(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-            const ForceChannels::Wanted& wanted) noexcept;
-  void book(const Motion& hand, const Vec3& applied, Step& step) noexcept;
-  void book_unseen(const Vec3& applied, Duration held) noexcept;
+            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept;
+  void book(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept;
+  void book_seen(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept;
+  void book_unseen(const Vec3& applied, const HandleSample* handle, Duration held) noexcept;
+  void add_accounts(Step& step) const noexcept;
+  void limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
+  void limit_wrench(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
+  void limit_grip(const ForceChannels::Wanted& wanted, Step& step) noexcept;
   void follow_tool(Step& step) noexcept;
 
   Config config_;
   Limiter limiter_;
   std::optional<AdmittanceLoop<3>> admittance_;
   std::optional<FrictionMap> friction_map_;
+  std::optional<WrenchPort> wrench_;  ///< in place of limiter_
+  std::optional<GripPort> grip_;
   ForceChannels held_;
   Fault fault_ = Fault::kNone;
   bool disarmed_ = false;
   std::uint32_t missed_ = 0;
   std::optional<Motion> last_;  ///< empty when the position before this step is unknown
-  LocalTime last_at_{};         ///< when the force held now was applied
+  std::optional<Quat> last_orientation_;
+  std::optional<double> last_opening_;  ///< rad
+  LocalTime last_at_{};                 ///< when the force held now was applied
   bool started_ = false;
 };
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/arithmetic.h"
+#include "core/base/rotation.h"
 
 namespace tendon {
 
@@ -28,6 +29,9 @@ DeviceState to_state(std::uint32_t device, const StepRecord& record) noexcept {
   state.mode = record.mode;
   state.force_wanted = record.wanted;
   state.buttons = record.buttons;
+  state.hand_force = record.hand_force;
+  if (record.turn) state.turning = record.turn->hand;
+  if (record.grip) state.grip = record.grip->hand;
   return state;
 }
 
@@ -39,10 +43,15 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
       mail_(mail),
       controller_(config.control),
       velocity_(device.info().position_resolution),
-      force_rounding_squared_(device.info().force_resolution * device.info().force_resolution) {
+      force_rounding_squared_(device.info().force_resolution * device.info().force_resolution),
+      has_more_motors_(device.info().max_torque > 0 ||
+                       (device.info().gripper && device.info().gripper->max_force > 0)) {
   if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
   if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
+  if (device.info().measures_orientation || device.info().gripper) rest_.emplace(device.info());
 }
+
+HapticLoop::Rest::Rest(const DeviceInfo& info) : turning(info.angular_resolution), opening(0) {}
 
 void HapticLoop::take_mail(LocalTime now) noexcept {
   std::array<HapticOrder, Mailboxes::kOrders> released;
@@ -76,22 +85,64 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
 }
 
+HandleSample HapticLoop::handle_in(const PositionSample& sample) noexcept {
+  HandleSample handle{.torque = applied_.torque, .grip_force = applied_.grip};
+  if (sample.orientation) {
+    const Quat& orientation = *sample.orientation;
+    if (is_rotation(orientation)) {
+      if (rest_->last) rest_->turned += turn_between(*rest_->last, orientation);
+      rest_->last = orientation;
+    }
+    handle.turning = {.orientation = orientation, .angular_velocity = rest_->turning.observe(sample.at, rest_->turned)};
+  }
+  if (sample.opening) {
+    const double velocity = rest_->opening.observe(sample.at, {*sample.opening, 0, 0}).x();
+    handle.grip = {.opening = *sample.opening, .velocity = velocity};
+  }
+  return handle;
+}
+
+void HapticLoop::take_step(LocalTime now, StepRecord& record) noexcept {
+  const auto sample = device_.read(now);
+  if (!sample) {
+    const HandleSample handle{.torque = applied_.torque, .grip_force = applied_.grip};
+    static_cast<Step&>(record) = controller_.step_unseen(now, applied_.force, rest_ ? &handle : nullptr);
+    return;
+  }
+  const Motion hand{sample->at, sample->position, velocity_.observe(sample->at, sample->position)};
+  buttons_ = sample->buttons;
+  if (rest_) {
+    const HandleSample handle = handle_in(*sample);
+    static_cast<Step&>(record) = controller_.step(hand, applied_.force, sample->hand_force, &handle);
+  } else {
+    static_cast<Step&>(record) = controller_.step(hand, applied_.force, sample->hand_force);
+  }
+}
+
+void HapticLoop::command(StepRecord& record) noexcept {
+  if (has_more_motors_) {
+    Effort effort{.force = record.force};
+    if (record.turn) effort.torque = record.turn->torque;
+    if (record.grip) effort.grip = record.grip->force;
+    applied_ = device_.apply_all(effort);
+    if (applied_.torque != effort.torque || applied_.grip != effort.grip) record.reasons |= Reason::kDeviceClamp;
+  } else {
+    applied_.force = device_.apply(record.force);
+  }
+  if ((applied_.force - record.force).squaredNorm() > force_rounding_squared_) record.reasons |= Reason::kDeviceClamp;
+  record.applied = applied_.force;
+  record.torque_applied = applied_.torque;
+  record.grip_applied = applied_.grip;
+}
+
 LocalTime HapticLoop::step(LocalTime now) noexcept {
   const DenormalsOff off;
   if (tick_ == 0) due_ = now;
   take_mail(now);
 
   StepRecord record;
-  if (const auto sample = device_.read(now)) {
-    const Motion hand{sample->at, sample->position, velocity_.observe(sample->at, sample->position)};
-    static_cast<Step&>(record) = controller_.step(hand, applied_, sample->hand_force);
-    buttons_ = sample->buttons;
-  } else {
-    static_cast<Step&>(record) = controller_.step_unseen(now, applied_);
-  }
-  applied_ = device_.apply(record.force);
-  if ((applied_ - record.force).squaredNorm() > force_rounding_squared_) record.reasons |= Reason::kDeviceClamp;
-  record.applied = applied_;
+  take_step(now, record);
+  command(record);
   record.tick = ++tick_;
   record.scheduled = due_;
   record.rearmed = std::exchange(rearmed_, false);
@@ -120,7 +171,10 @@ void HapticLoop::rearm() noexcept {
 }
 
 void HapticLoop::publish(const StepRecord& record) noexcept {
-  mail_.state.put(to_state(config_.device, record));
+  DeviceState state = to_state(config_.device, record);
+  if (device_.info().max_torque > 0) state.torque_applied = record.torque_applied;
+  if (has_more_motors_ && record.grip) state.grip_applied = record.grip_applied;
+  mail_.state.put(state);
   if (!mail_.steps.try_push(record)) mail_.steps_lost.fetch_add(1, std::memory_order_relaxed);
   mail_.flight.record(record);
 
@@ -139,8 +193,12 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
 }
 
 void HapticLoop::stop() noexcept {
-  applied_ = device_.apply(Vec3::Zero());
-  force_.store(applied_.norm(), std::memory_order_relaxed);
+  if (has_more_motors_) {
+    applied_ = device_.apply_all({});
+  } else {
+    applied_.force = device_.apply(Vec3::Zero());
+  }
+  force_.store(applied_.force.norm(), std::memory_order_relaxed);
 }
 
 HapticLoop::Stats HapticLoop::stats() const noexcept {

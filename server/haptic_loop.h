@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 
 #include "core/estimation/velocity_estimator.h"
 #include "core/exchange/counter.h"
@@ -49,7 +50,19 @@ class HapticLoop {
   Stats stats() const noexcept;
 
  private:
+  /// What is estimated of a handle that has more than a position.
+  struct Rest {
+    explicit Rest(const DeviceInfo& info);
+    VelocityEstimator turning;
+    VelocityEstimator opening;
+    Vec3 turned = Vec3::Zero();  ///< rad: the sum of all turns so far
+    std::optional<Quat> last{};
+  };
+
   void take_mail(LocalTime now) noexcept;
+  HandleSample handle_in(const PositionSample& sample) noexcept;
+  void take_step(LocalTime now, StepRecord& record) noexcept;
+  void command(StepRecord& record) noexcept;
   void watch_device() noexcept;
   void rearm() noexcept;
   void publish(const StepRecord& record) noexcept;
@@ -60,7 +73,9 @@ class HapticLoop {
   HapticController controller_;
   VelocityEstimator velocity_;
   double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp
-  Vec3 applied_ = Vec3::Zero();
+  std::optional<Rest> rest_;       ///< empty: the device has a position only
+  bool has_more_motors_;           ///< than those of its position
+  Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};
   bool homed_once_ = false;

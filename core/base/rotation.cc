@@ -60,6 +60,11 @@ Vec3 rotated(const Quat& q, const Vec3& v) noexcept {
   return v + q.w * across + axis.cross(across);
 }
 
+bool is_within_reach(const Quat& rest, const Quat& q) noexcept {
+  constexpr double kCosine = 0.25881904510252074;  // of half of 150°
+  return std::abs(product(q, inverse(rest)).w) >= kCosine;
+}
+
 Vec3 spring_torque(const Mat3& stiffness, const Quat& rest, const Quat& q) noexcept {
   const Quat turn = product(q, inverse(rest));
   const Vec3 v = axis_part(turn);

@@ -36,8 +36,9 @@ Vec3 turn_between(const Quat& from, const Quat& to) noexcept;
 /// R v.
 Vec3 rotated(const Quat& q, const Vec3& v) noexcept;
 
-/// Beyond this a spring between two orientations is no longer believed: near 180° its torque has no direction. 150°.
-inline constexpr double kFarthestTurn = 2.6179938779914944;
+/// Whether the turn from `rest` to `q` is at most 150°. Beyond that a spring between the two is no longer believed: its
+/// torque has fallen to a half, and at 180° it has no direction.
+bool is_within_reach(const Quat& rest, const Quat& q) noexcept;
 
 /// The torque of a spring of `stiffness` K (N·m/rad, symmetric, base frame axes) that is turned from `rest` to `q`. With
 /// (w, v) = q · rest⁻¹:

@@ -83,6 +83,18 @@ RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept {
   return result;
 }
 
+RemoteTorque believed(const RemoteTorque& torque, double max_angular_stiffness) noexcept {
+  RemoteTorque result = torque;
+  if (result.model) result.model->stiffness = conservative(result.model->stiffness, max_angular_stiffness);
+  return result;
+}
+
+Vec3 reconstruct(const RemoteTorque& torque, const Quat& q) noexcept {
+  if (!torque.model) return torque.torque;
+  if (!is_within_reach(torque.model->at, q)) return Vec3::Zero();
+  return torque.torque + spring_torque(torque.model->stiffness, torque.model->at, q);
+}
+
 Vec3 within(const LocalModel& model, const Vec3& position) noexcept {
   const Vec3 way = position - model.at;
   const double distance = way.norm();

@@ -29,6 +29,13 @@ bool is_sound(const RemoteForce& answer) noexcept;
 /// Realtime-safe: yes.
 RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept;
 
+/// The part of a sound torque that is followed: its stiffness as above, with `max_angular_stiffness` in N·m/rad.
+RemoteTorque believed(const RemoteTorque& torque, double max_angular_stiffness) noexcept;
+
+/// The torque (N·m) that an answer means at the orientation `q`: by its model (RotationModel), but zero where the handle
+/// has turned by more than 150° since; the torque alone when it has none.
+Vec3 reconstruct(const RemoteTorque& torque, const Quat& q) noexcept;
+
 /// The position nearest to `position` for which a model is valid. Beyond the model's radius the force stays what it is
 /// at the edge; a jump back to the answered force would be felt as a kick.
 Vec3 within(const LocalModel& model, const Vec3& position) noexcept;

@@ -62,9 +62,9 @@ void ForceChannels::shift_weights(LocalTime now) noexcept {
   winner->weight = mine;
 }
 
-ForceChannels::Wanted ForceChannels::wanted(const Motion& hand) noexcept {
-  if (channels_.size() == 1) return {channels_.front().held.wanted(hand), 0};
-  for (Channel& channel : channels_) channel.wants = channel.held.wanted(hand);
+ForceChannels::Wanted ForceChannels::wanted(const Motion& hand, const Quat* orientation) noexcept {
+  if (channels_.size() == 1) return {channels_.front().held.wanted(hand, orientation), 0};
+  for (Channel& channel : channels_) channel.wants = channel.held.wanted(hand, orientation);
   shift_weights(hand.at);
   last_ = hand.at;
 
@@ -74,10 +74,14 @@ ForceChannels::Wanted ForceChannels::wanted(const Motion& hand) noexcept {
   Wanted sum{lead->wants, static_cast<std::size_t>(lead - channels_.begin())};
   sum.force.setZero();
   sum.stiffness.setZero();
+  sum.torque.setZero();
+  sum.grip = 0;
   for (const Channel& channel : channels_) {
     if (channel.weight == 0) continue;
     sum.force += channel.weight * channel.wants.force;
     sum.stiffness += channel.weight * channel.wants.stiffness;
+    sum.torque += channel.weight * channel.wants.torque;
+    sum.grip += channel.weight * channel.wants.grip;
     // A channel that has stopped beside one that goes on is no safe stop of the device.
     if (channel.wants.mode != Mode::kSafeStop) sum.reasons |= channel.wants.reasons;
   }

@@ -17,7 +17,7 @@ namespace tendon {
 ///
 /// Among the channels of rule kPriority, the first in order whose force is fresh (the freshest, when none is) takes all
 /// the weight: its w goes to 1 at the rate of 1 per `ramp_in`, and the others keep their proportions, so that Σ w = 1
-/// and one engine fades over into the next. The stiffnesses are combined in the same way.
+/// and one engine fades over into the next. Stiffnesses, torques and grip forces are combined in the same way.
 ///
 /// ForceChannels decides which force is *wanted*. The limiter after it sees only the sum, and keeps engines that fight
 /// each other in check as it does a single wrong one.
@@ -51,8 +51,8 @@ class ForceChannels {
   /// Forgets all forces.
   void disengage() noexcept;
 
-  /// The force wanted at `hand.position` at `hand.at`. Call it once in each haptic step.
-  Wanted wanted(const Motion& hand) noexcept;
+  /// The force wanted at `hand.position` at `hand.at`, and the torque at `orientation`. Call it once in each haptic step.
+  Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
   /// The force that a channel holds; empty when idle.
   const std::optional<RemoteForce>& newest(std::size_t channel) const noexcept {

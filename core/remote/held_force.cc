@@ -19,6 +19,8 @@ HeldForce::HeldForce(const Config& config) : config_(config) {
   expect_not_negative(seconds(config.ramp_in), "ramp_in");
   expect_above_zero(seconds(config.max_valid_for), "max_valid_for");
   expect(config.max_stiffness > 0, "max_stiffness", config.max_stiffness, "a number above 0 N/m");
+  expect(config.max_angular_stiffness > 0, "max_angular_stiffness", config.max_angular_stiffness,
+         "a number above 0 N·m/rad");
   if (config.adaptive_local_model && config.output_estimator) {
     throw std::invalid_argument("adaptive_local_model and output_estimator: expected one of them, not both");
   }
@@ -37,6 +39,10 @@ bool HeldForce::observe(const RemoteForce& force) noexcept {
   }
   if (anew && local_model_) local_model_.emplace(*config_.adaptive_local_model);  // there is nothing to blend it with
   newest_ = believed(force, config_.max_stiffness);
+  if (newest_->torque) {
+    if (newest_->topology_changed) newest_->torque->model.reset();
+    newest_->torque = believed(*newest_->torque, config_.max_angular_stiffness);
+  }
   if (local_model_) local_model_->observe(*newest_);
   if (estimator_) estimator_->correct(*newest_);
   mode_ = Mode::kActive;
@@ -57,7 +63,16 @@ Prediction HeldForce::follow(const Motion& hand) const noexcept {
   return estimator_->predict(hand).value_or(Prediction{.force = newest_->force, .stiffness = Mat3::Zero()});
 }
 
-HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
+void HeldForce::add_handle(Wanted& result, const Quat* orientation, double gain, double rest) const noexcept {
+  result.torque = from_.torque * rest;
+  if (newest_->torque) {
+    const RemoteTorque& torque = *newest_->torque;
+    result.torque += gain * (orientation != nullptr ? reconstruct(torque, *orientation) : torque.torque);
+  }
+  result.grip = from_.grip * rest + newest_->grip_force.value_or(0) * gain;
+}
+
+HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation) noexcept {
   if (estimator_) estimator_->observe(hand);
   if (!newest_) return {};
   Wanted result;
@@ -67,7 +82,7 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
   // Only `observe` ends a safe stop: a clock that goes back must not revive a force.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
     mode_ = Mode::kSafeStop;
-    rendered_.setZero();
+    rendered_ = {};
     result.mode = mode_;
     result.reasons = Reason::kSafeStop;
     return result;
@@ -85,11 +100,11 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
     gain = portable::exp(-seconds(overdue - config_.hold) / seconds(config_.decay));
   }
   const Duration since_engaged = std::max(Duration::zero(), hand.at - engaged_);
-  Vec3 rest = Vec3::Zero();
+  double rest = 0;  // the share of what the ramp starts from
   if (since_engaged < ramp_) {
     result.reasons |= Reason::kRampIn;
     const double ramp = seconds(since_engaged) / seconds(ramp_);
-    rest = from_ * (gain * (1 - ramp));
+    rest = gain * (1 - ramp);
     gain *= ramp;
   }
 
@@ -97,9 +112,10 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand) noexcept {
 
   result.mode = mode_;
   const Prediction environment = follow(hand);
-  result.force = environment.force * gain + rest;
+  result.force = environment.force * gain + from_.force * rest;
   result.stiffness = environment.stiffness * gain;
-  rendered_ = result.force;
+  if (newest_->torque || newest_->grip_force || rest > 0) add_handle(result, orientation, gain, rest);
+  rendered_ = {result.force, result.torque, result.grip};
   return result;
 }
 

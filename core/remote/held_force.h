@@ -29,6 +29,9 @@ namespace tendon {
 ///     adaptive_local_model   its stiffness, but a new one is blended in          (AdaptiveLocalModel)
 ///     output_estimator       a model of the environment, learned on the way      (OutputEstimator)
 ///
+/// A torque is led on by its own model of rotation (answer.h), a grip force stays as it was sent. Both are held, faded
+/// and ramped in together with the force that they came with. The two parts above know forces only.
+///
 /// Only the trustworthy part of an answer is used (answer.h): stiffness is capped at `max_stiffness`, and the model is
 /// dropped when the answer says that the topology of the body has changed.
 ///
@@ -55,6 +58,8 @@ class HeldForce {
     Duration max_valid_for = std::chrono::milliseconds(500);
     /// N/m, > 0: the stiffest model that is followed between two forces. Grounded devices render less stably at 1 kHz.
     double max_stiffness = 5000;
+    /// N·m/rad, > 0: the same for rotation.
+    double max_angular_stiffness = 5;
     /// At most one of these two. Empty: not used, costs nothing.
     std::optional<AdaptiveLocalModel::Config> adaptive_local_model{};
     std::optional<OutputEstimator::Config> output_estimator{};
@@ -65,7 +70,9 @@ class HeldForce {
     Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m; zero without a local model
     Mode mode = Mode::kIdle;
     Reasons reasons;
-    Duration age{};  ///< since it was received; 0 when idle
+    Duration age{};              ///< since it was received; 0 when idle
+    Vec3 torque = Vec3::Zero();  ///< N·m, on the hand
+    double grip = 0;             ///< N, on the fingers, > 0 opens them
   };
 
   /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive, safe_stop is
@@ -83,11 +90,12 @@ class HeldForce {
   void disengage() noexcept {
     newest_.reset();
     mode_ = Mode::kIdle;
-    rendered_.setZero();
+    rendered_ = {};
   }
 
-  /// The force wanted at `hand.position` at `hand.at`. Call it once in each haptic step: an estimator learns from it.
-  Wanted wanted(const Motion& hand) noexcept;
+  /// The force wanted at `hand.position` at `hand.at`, and the torque wanted at `orientation`. Call it once in each
+  /// haptic step: an estimator learns from it. Without an orientation no model of rotation is followed.
+  Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
   /// The force that is held, as it is believed; empty when idle.
   const std::optional<RemoteForce>& newest() const noexcept { return newest_; }
@@ -95,15 +103,16 @@ class HeldForce {
  private:
   Prediction follow(const Motion& hand) const noexcept;
   Duration validity() const noexcept;
+  void add_handle(Wanted& result, const Quat* orientation, double gain, double rest) const noexcept;
 
   Config config_;
   std::optional<RemoteForce> newest_;
   Mode mode_ = Mode::kIdle;
-  LocalTime engaged_{};       ///< start of the ramp
-  Duration ramp_{};           ///< its length
-  Vec3 from_ = Vec3::Zero();  ///< N, the force it starts from
-  double presence_ = 0;       ///< the share of the environment's force in `rendered_`, 0 to 1
-  Vec3 rendered_ = Vec3::Zero();
+  LocalTime engaged_{};  ///< start of the ramp
+  Duration ramp_{};      ///< its length
+  Effort from_;          ///< what it starts from
+  double presence_ = 0;  ///< the share of the environment's force in `rendered_`, 0 to 1
+  Effort rendered_;
   std::optional<AdaptiveLocalModel> local_model_;
   std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB, only when listed
 };

@@ -25,6 +25,49 @@ void put(pb::Vec3* out, const Vec3& v) {
 
 Vec3 vec3(const pb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
+void put(pb::Turn* out, const TurnStep& turn, const Vec3& applied) {
+  const Quat& q = turn.hand.orientation;
+  out->mutable_orientation()->set_w(q.w);
+  out->mutable_orientation()->set_x(q.x);
+  out->mutable_orientation()->set_y(q.y);
+  out->mutable_orientation()->set_z(q.z);
+  put(out->mutable_angular_velocity_radps(), turn.hand.angular_velocity);
+  put(out->mutable_torque_held_nm(), turn.was_applied);
+  put(out->mutable_torque_wanted_nm(), turn.wanted);
+  put(out->mutable_torque_commanded_nm(), turn.torque);
+  put(out->mutable_torque_applied_nm(), applied);
+  out->set_torque_wanted_norm_nm(turn.wanted.norm());
+  out->set_torque_applied_norm_nm(applied.norm());
+}
+
+TurnStep turn_step(const pb::Turn& in) {
+  const pb::Quat& q = in.orientation();
+  return {.hand = {.orientation = {q.w(), q.x(), q.y(), q.z()}, .angular_velocity = vec3(in.angular_velocity_radps())},
+          .was_applied = vec3(in.torque_held_nm()),
+          .wanted = vec3(in.torque_wanted_nm()),
+          .torque = vec3(in.torque_commanded_nm())};
+}
+
+void put(pb::Grip* out, const GripStep& grip, double applied) {
+  out->set_opening_rad(grip.hand.opening);
+  out->set_velocity_radps(grip.hand.velocity);
+  out->set_force_held_n(grip.was_applied);
+  out->set_force_wanted_n(grip.wanted);
+  out->set_force_commanded_n(grip.force);
+  out->set_force_applied_n(applied);
+  out->set_permitted_n(grip.permitted);
+  out->set_energy_j(grip.energy);
+}
+
+GripStep grip_step(const pb::Grip& in) {
+  return {.hand = {.opening = in.opening_rad(), .velocity = in.velocity_radps()},
+          .was_applied = in.force_held_n(),
+          .wanted = in.force_wanted_n(),
+          .force = in.force_commanded_n(),
+          .permitted = in.permitted_n(),
+          .energy = in.energy_j()};
+}
+
 void put(pb::Reason* out, Reasons reasons) {
   out->set_energy(reasons.has(Reason::kEnergy));
   out->set_max_force(reasons.has(Reason::kMaxForce));
@@ -99,6 +142,8 @@ std::string encode(const StepRecord& step) {
   out.set_longest_hold_ns(step.longest_hold.count());
   out.set_assumption_broken(step.assumption_broken);
   out.set_buttons(step.buttons);
+  if (step.turn) put(out.mutable_turn(), *step.turn, step.torque_applied);
+  if (step.grip) put(out.mutable_grip(), *step.grip, step.grip_applied);
   if (!step.stiffness.isZero(0)) {
     for (const auto row : step.stiffness.rowwise()) {
       for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
@@ -172,6 +217,14 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.longest_hold = Duration(in.longest_hold_ns());
   out.assumption_broken = in.assumption_broken();
   out.buttons = in.buttons();
+  if (in.has_turn()) {
+    out.turn = turn_step(in.turn());
+    out.torque_applied = vec3(in.turn().torque_applied_nm());
+  }
+  if (in.has_grip()) {
+    out.grip = grip_step(in.grip());
+    out.grip_applied = in.grip().force_applied_n();
+  }
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

@@ -29,7 +29,25 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
   wanted.reasons = Reasons::from_bits(recorded.reasons.bits() & kUpstream);
   wanted.age = recorded.force_age;
   wanted.channel = recorded.channel;
+  if (recorded.turn) wanted.torque = recorded.turn->wanted;
+  if (recorded.grip) wanted.grip = recorded.grip->wanted;
   return wanted;
+}
+
+/// Empty for a device that has a position only.
+std::optional<HandleSample> handle_in(const StepRecord& recorded, const Effort& held) {
+  if (!recorded.turn && !recorded.grip) return std::nullopt;
+  HandleSample handle{.torque = held.torque, .grip_force = held.grip};
+  if (recorded.turn) handle.turning = recorded.turn->hand;
+  if (recorded.grip) handle.grip = recorded.grip->hand;
+  return handle;
+}
+
+Effort was_held(const StepRecord& recorded) {
+  Effort held{.force = recorded.was_applied};
+  if (recorded.turn) held.torque = recorded.turn->was_applied;
+  if (recorded.grip) held.grip = recorded.grip->was_applied;
+  return held;
 }
 
 std::string digits(double value) {
@@ -51,10 +69,13 @@ Reasons of_the_law(Reasons reasons) {
 
 }  // namespace
 
-Step Rerun::take(const StepRecord& recorded, const Vec3& applied) {
+Step Rerun::take(const StepRecord& recorded, const Effort& held) {
+  const Vec3& applied = held.force;
+  const auto sample = handle_in(recorded, held);
+  const HandleSample* const handle = sample ? &*sample : nullptr;
   if (!recorded.reasons.has(Reason::kUnseen)) {
     missed_ = 0;
-    return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded));
+    return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded), handle);
   }
   // Of a position that was not believed the record has only that it was not.
   ++missed_;
@@ -65,9 +86,9 @@ Step Rerun::take(const StepRecord& recorded, const Vec3& applied) {
   } else if (jumped && missed_ < max_missed_) {
     hand.position.setConstant(kFurtherThanAnyHand);
   } else {
-    return controller_.step_unseen(recorded.hand.at, applied);
+    return controller_.step_unseen(recorded.hand.at, applied, handle);
   }
-  return controller_.step(hand, applied, recorded.hand_force, wanted_in(recorded));
+  return controller_.step(hand, applied, recorded.hand_force, wanted_in(recorded), handle);
 }
 
 StepRecord Rerun::step(const StepRecord& recorded) {
@@ -78,13 +99,19 @@ StepRecord Rerun::step(const StepRecord& recorded) {
   }
   if (recorded.disarmed) controller_.disarm();
   StepRecord again = recorded;
-  static_cast<Step&>(again) = take(recorded, held_ == Held::kRecorded ? recorded.was_applied : own_);
+  static_cast<Step&>(again) = take(recorded, held_ == Held::kRecorded ? was_held(recorded) : own_);
   // Of the force in use the record knows more than the law.
   again.force_sequence = recorded.force_sequence;
   again.loop_age = recorded.loop_age;
   again.force_error = recorded.force_error;
-  own_ = again.force;
-  if (held_ == Held::kOwn) again.applied = own_;
+  own_ = {.force = again.force};
+  if (again.turn) own_.torque = again.turn->torque;
+  if (again.grip) own_.grip = again.grip->force;
+  if (held_ == Held::kOwn) {
+    again.applied = own_.force;
+    again.torque_applied = own_.torque;
+    again.grip_applied = own_.grip;
+  }
   return again;
 }
 
@@ -102,6 +129,13 @@ std::string difference(const StepRecord& recorded, const StepRecord& again) {
   number("energy_j", recorded.energy, again.energy);
   number("permitted_n", recorded.permitted, again.permitted);
   if (!same(recorded.force, again.force)) say("force_commanded_n", digits(recorded.force), digits(again.force));
+  if (recorded.turn && again.turn && !same(recorded.turn->torque, again.turn->torque)) {
+    say("torque_commanded_nm", digits(recorded.turn->torque), digits(again.turn->torque));
+  }
+  if (recorded.grip && again.grip) {
+    number("grip.energy_j", recorded.grip->energy, again.grip->energy);
+    number("grip.force_commanded_n", recorded.grip->force, again.grip->force);
+  }
   if (recorded.mode != again.mode) {
     say("mode", std::to_string(static_cast<int>(recorded.mode)), std::to_string(static_cast<int>(again.mode)));
   }

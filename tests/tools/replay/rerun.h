@@ -30,13 +30,13 @@ class Rerun {
   StepRecord step(const StepRecord& recorded);
 
  private:
-  Step take(const StepRecord& recorded, const Vec3& applied);
+  Step take(const StepRecord& recorded, const Effort& held);
 
   HapticController controller_;
   std::uint32_t max_missed_;
   std::uint32_t missed_ = 0;  ///< readings in a row
   Held held_;
-  Vec3 own_ = Vec3::Zero();
+  Effort own_;
 };
 
 /// What of a step a law decides, and that is not the same bit for bit: "energy_j: recorded 0.1, again 0.2". Empty when
