@@ -46,8 +46,9 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
   if (admittance_) admittance_->observe_unseen();
 }
 
-void HapticController::book_seen(const Motion& hand, const Vec3& applied, const HandleSample* handle,
-                                 Step& step) noexcept {
+// A step of a point pays for the parts of a handle with a branch only, so what all steps have is not called but inlined.
+[[gnu::always_inline]] inline void HapticController::book_seen(const Motion& hand, const Vec3& applied,
+                                                               const HandleSample* handle, Step& step) noexcept {
   const Vec3 dx = hand.position - last_->position;
   if (wrench_) {
     const std::uint64_t broken = wrench_->broken_assumptions();
@@ -70,10 +71,11 @@ void HapticController::book_seen(const Motion& hand, const Vec3& applied, const 
 void HapticController::add_accounts(Step& step) const noexcept {
   step.energy = wrench_ ? wrench_->energy() : limiter_.energy();
   step.longest_hold = wrench_ ? wrench_->longest_hold() : limiter_.longest_hold();
-  if (grip_ && step.grip) step.grip->energy = grip_->energy();
+  if (grip_ && step.grip()) step.grip()->energy = grip_->energy();
 }
 
-void HapticController::book(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept {
+[[gnu::always_inline]] inline void HapticController::book(const Motion& hand, const Vec3& applied,
+                                                          const HandleSample* handle, Step& step) noexcept {
   step.held = started_ ? hand.at - last_at_ : Duration::zero();
   step.was_applied = applied;
   if (step.held > config_.limiter.longest_hold) step.reasons |= Reason::kOverrun;
@@ -124,34 +126,43 @@ Step HapticController::disbelieve(const Motion& hand, const Vec3& applied, const
   return blind;
 }
 
-Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-                            const HandleSample* handle) noexcept {
-  if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
+void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& applied,
+                                 const std::optional<Vec3>& hand_force, const HandleSample* handle) noexcept {
+  if (!believable(hand, handle)) {
+    fresh = disbelieve(hand, applied, handle);
+    return;
+  }
   const Quat* const orientation = handle != nullptr && handle->turning ? &handle->turning->orientation : nullptr;
   const ForceChannels::Wanted wanted = held_.wanted(hand, orientation);
-  Step step = take(hand, applied, hand_force, wanted, handle);
+  take(fresh, hand, applied, hand_force, wanted, handle);
   if (const auto& newest = held_.newest(wanted.channel)) {
-    step.force_sequence = newest->sequence;
-    step.loop_age = hand.at - newest->answers;
-    step.force_error = newest->error;
+    fresh.force_sequence = newest->sequence;
+    fresh.loop_age = hand.at - newest->answers;
+    fresh.force_error = newest->error;
   }
+}
+
+Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+                            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
+  if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
+  Step step;
+  take(step, hand, applied, hand_force, wanted, handle);
   return step;
 }
 
-Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-                            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
-  return believable(hand, handle) ? take(hand, applied, hand_force, wanted, handle) : disbelieve(hand, applied, handle);
+/// What the handle measured, and what the remote environment asks of it.
+void HapticController::note(const HandleSample& handle, const ForceChannels::Wanted& wanted, Step& step) noexcept {
+  HandleStep& noted = step.handle.emplace();
+  const HandleWanted asked = wanted.handle.value_or(HandleWanted{});
+  if (handle.turning) noted.turn = {.hand = *handle.turning, .was_applied = handle.torque, .wanted = asked.torque};
+  if (handle.grip) noted.grip = {.hand = *handle.grip, .was_applied = handle.grip_force, .wanted = asked.grip};
 }
 
-Step HapticController::take(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+void HapticController::take(Step& step, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
                             const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
-  Step step;
   step.hand = hand;
   step.hand_force = hand_force;
-  if (handle != nullptr) {
-    if (handle->turning) step.turn = {.hand = *handle->turning, .was_applied = handle->torque, .wanted = wanted.torque};
-    if (handle->grip) step.grip = {.hand = *handle->grip, .was_applied = handle->grip_force, .wanted = wanted.grip};
-  }
+  if (handle != nullptr) note(*handle, wanted, step);
   book(hand, applied, handle, step);
   last_ = hand;
   if (wrench_) last_orientation_ = handle->turning->orientation;
@@ -180,22 +191,22 @@ Step HapticController::take(const Motion& hand, const Vec3& applied, const std::
   }
   if (disarmed_) step.force.setZero();
   if (wrench_) {
-    limit_wrench(wanted, applied, step);
+    limit_wrench(applied, step);
   } else {
     limit_force(wanted, applied, step);
-    if (!wanted.torque.isZero(0)) step.reasons |= Reason::kMaxForce;  // it has no motor that turns it
+    if (wanted.handle && !wanted.handle->torque.isZero(0)) step.reasons |= Reason::kMaxForce;  // no motor turns it
   }
-  if (grip_) limit_grip(wanted, step);
+  if (grip_) limit_grip(step);
   if (disarmed_) {
     step.force.setZero();
-    if (step.turn) step.turn->torque.setZero();
-    if (step.grip) step.grip->force = 0;
+    if (TurnStep* const turn = step.turn()) turn->torque.setZero();
+    if (GripStep* const grip = step.grip()) grip->force = 0;
     step.reasons |= Reason::kDisarmed;
   }
-  return step;
 }
 
-void HapticController::limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept {
+[[gnu::always_inline]] inline void HapticController::limit_force(const ForceChannels::Wanted& wanted,
+                                                                 const Vec3& applied, Step& step) noexcept {
   const Limited saturated = saturate(step.force, config_.max_force);
   // After a pause the force may grow by what one longest hold allows, not by what the whole pause would.
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
@@ -217,10 +228,10 @@ void HapticController::limit_force(const ForceChannels::Wanted& wanted, const Ve
 }
 
 /// The same for force and torque together. The laws of a wrench do not use stiffness.
-void HapticController::limit_wrench(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept {
+void HapticController::limit_wrench(const Vec3& applied, Step& step) noexcept {
   const RotationLimits& rotation = *config_.rotation;
-  TurnStep& turn = *step.turn;
-  Vec3 torque = wanted.torque;
+  TurnStep& turn = *step.turn();
+  Vec3 torque = turn.wanted;
   if (fault_ != Fault::kNone || disarmed_ || !torque.allFinite()) {
     if (!torque.allFinite()) step.reasons |= Reason::kNotFinite;
     torque.setZero();
@@ -242,11 +253,11 @@ void HapticController::limit_wrench(const ForceChannels::Wanted& wanted, const V
 }
 
 /// The gripper's own limits give no reasons: those are of the force.
-void HapticController::limit_grip(const ForceChannels::Wanted& wanted, Step& step) noexcept {
+void HapticController::limit_grip(Step& step) noexcept {
   const GripLimits& limits = *config_.grip;
-  GripStep& grip = *step.grip;
-  const bool none = fault_ != Fault::kNone || disarmed_ || !std::isfinite(wanted.grip);
-  double force = none ? 0 : std::clamp(wanted.grip, -limits.max_force, limits.max_force);
+  GripStep& grip = *step.grip();
+  const bool none = fault_ != Fault::kNone || disarmed_ || !std::isfinite(grip.wanted);
+  double force = none ? 0 : std::clamp(grip.wanted, -limits.max_force, limits.max_force);
   if (std::isfinite(limits.max_slew)) {
     const double most = limits.max_slew * seconds(std::min(step.held, config_.limiter.longest_hold));
     force = std::clamp(force, grip.was_applied - most, grip.was_applied + most);
@@ -262,12 +273,10 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied, const Han
   step.hand.at = now;
   step.was_applied = applied;
   if (handle != nullptr) {
-    const Turning turning{.orientation = last_orientation_.value_or(Quat{})};
-    const Grip grip{.opening = last_opening_.value_or(0)};
-    if (handle->turning || wrench_) {
-      step.turn = {.hand = handle->turning.value_or(turning), .was_applied = handle->torque};
-    }
-    if (handle->grip || grip_) step.grip = {.hand = handle->grip.value_or(grip), .was_applied = handle->grip_force};
+    HandleSample known = *handle;
+    if (wrench_ && !known.turning) known.turning = Turning{.orientation = last_orientation_.value_or(Quat{})};
+    if (grip_ && !known.grip) known.grip = Grip{.opening = last_opening_.value_or(0)};
+    note(known, {}, step);
   }
   if (started_) {
     step.held = now - last_at_;

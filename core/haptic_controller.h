@@ -23,6 +23,7 @@ struct TurnStep {
   Vec3 was_applied = Vec3::Zero();  ///< N·m, held during the interval that this step ended
   Vec3 wanted = Vec3::Zero();       ///< N·m, what the remote environment asks for
   Vec3 torque = Vec3::Zero();       ///< N·m, to be applied now
+  Vec3 applied = Vec3::Zero();      ///< N·m, really given out by the device
 };
 
 /// … and of its gripper, which has an account of its own.
@@ -31,8 +32,15 @@ struct GripStep {
   double was_applied = 0;  ///< N, held during the interval that this step ended
   double wanted = 0;       ///< N, what the remote environment asks for
   double force = 0;        ///< N, to be applied now
+  double applied = 0;      ///< N, really given out by the device
   double permitted = 0;    ///< N, the bound on |force|
   double energy = 0;       ///< J, the account of the gripper after the interval
+};
+
+/// What a step has to say of a handle that has more than a position.
+struct HandleStep {
+  std::optional<TurnStep> turn{};  ///< empty: the device does not measure its orientation
+  std::optional<GripStep> grip{};  ///< empty: it has no gripper
 };
 
 /// One haptic step: its input and its result. It holds enough to take the step again (tests/tools/replay).
@@ -55,8 +63,13 @@ struct Step {
   Duration force_age{};                 ///< since it arrived
   Duration loop_age{};                  ///< since the motion it answers was sampled
   std::optional<double> force_error{};  ///< N, what its engine thinks that it may be wrong by; empty: it does not say
-  std::optional<TurnStep> turn{};       ///< empty: the device does not measure its orientation
-  std::optional<GripStep> grip{};       ///< empty: it has no gripper
+  std::optional<HandleStep> handle{};   ///< empty: the device has a position only
+
+  /// Null when the device does not measure its orientation, or has no gripper.
+  TurnStep* turn() noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }
+  const TurnStep* turn() const noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }
+  GripStep* grip() noexcept { return handle && handle->grip ? &*handle->grip : nullptr; }
+  const GripStep* grip() const noexcept { return handle && handle->grip ? &*handle->grip : nullptr; }
 };
 
 /// What the rest of a handle has measured, and what its other motors have held since the step before.
@@ -148,7 +161,14 @@ class HapticController {
   /// force. `handle` is the rest of the handle, of a device that has more than a position; with `rotation` every step
   /// has its orientation, and with `grip` its opening.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
-            const HandleSample* handle = nullptr) noexcept;
+            const HandleSample* handle = nullptr) noexcept {
+    Step fresh;
+    step_into(fresh, hand, applied, hand_force, handle);
+    return fresh;
+  }
+  /// … into a Step that has just been made, which may be part of a record.
+  void step_into(Step& fresh, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force = {},
+                 const HandleSample* handle = nullptr) noexcept;
 
   /// The same, but `wanted` is given instead of derived from the remote forces observed. Replays recorded steps.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
@@ -167,15 +187,16 @@ class HapticController {
   bool is_finite(const Motion& hand, const HandleSample* handle) const noexcept;
   bool believable(const Motion& hand, const HandleSample* handle) const noexcept;
   Step disbelieve(const Motion& hand, const Vec3& applied, const HandleSample* handle) noexcept;
-  Step take(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
+  void take(Step& step, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept;
   void book(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept;
   void book_seen(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept;
   void book_unseen(const Vec3& applied, const HandleSample* handle, Duration held) noexcept;
   void add_accounts(Step& step) const noexcept;
   void limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
-  void limit_wrench(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
-  void limit_grip(const ForceChannels::Wanted& wanted, Step& step) noexcept;
+  void limit_wrench(const Vec3& applied, Step& step) noexcept;
+  void limit_grip(Step& step) noexcept;
+  static void note(const HandleSample& handle, const ForceChannels::Wanted& wanted, Step& step) noexcept;
   void follow_tool(Step& step) noexcept;
 
   Config config_;

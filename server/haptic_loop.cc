@@ -12,8 +12,23 @@ namespace tendon {
 
 namespace {
 
-DeviceState to_state(std::uint32_t device, const StepRecord& record) noexcept {
-  DeviceState state;
+void put_handle(DeviceState& state, const StepRecord& record, const DeviceInfo& info) noexcept {
+  state.turning.reset();
+  state.torque_applied.reset();
+  state.grip.reset();
+  state.grip_applied.reset();
+  if (const TurnStep* const turn = record.turn()) {
+    state.turning = turn->hand;
+    if (info.max_torque > 0) state.torque_applied = turn->applied;
+  }
+  if (const GripStep* const grip = record.grip()) {
+    state.grip = grip->hand;
+    if (info.gripper && info.gripper->max_force > 0) state.grip_applied = grip->applied;
+  }
+}
+
+/// Writes every field of `state`.
+void put_state(DeviceState& state, std::uint32_t device, const StepRecord& record) noexcept {
   state.device = device;
   state.channel = record.channel;
   state.tick = record.tick;
@@ -30,9 +45,6 @@ DeviceState to_state(std::uint32_t device, const StepRecord& record) noexcept {
   state.force_wanted = record.wanted;
   state.buttons = record.buttons;
   state.hand_force = record.hand_force;
-  if (record.turn) state.turning = record.turn->hand;
-  if (record.grip) state.grip = record.grip->hand;
-  return state;
 }
 
 }  // namespace
@@ -96,7 +108,7 @@ HandleSample HapticLoop::handle_in(const PositionSample& sample) noexcept {
     handle.turning = {.orientation = orientation, .angular_velocity = rest_->turning.observe(sample.at, rest_->turned)};
   }
   if (sample.opening) {
-    const double velocity = rest_->opening.observe(sample.at, {*sample.opening, 0, 0}).x();
+    const double velocity = rest_->opening.observe(sample.at, Vec<1>(*sample.opening))[0];
     handle.grip = {.opening = *sample.opening, .velocity = velocity};
   }
   return handle;
@@ -113,26 +125,32 @@ void HapticLoop::take_step(LocalTime now, StepRecord& record) noexcept {
   buttons_ = sample->buttons;
   if (rest_) {
     const HandleSample handle = handle_in(*sample);
-    static_cast<Step&>(record) = controller_.step(hand, applied_.force, sample->hand_force, &handle);
+    controller_.step_into(record, hand, applied_.force, sample->hand_force, &handle);
   } else {
-    static_cast<Step&>(record) = controller_.step(hand, applied_.force, sample->hand_force);
+    controller_.step_into(record, hand, applied_.force, sample->hand_force);
   }
 }
 
 void HapticLoop::command(StepRecord& record) noexcept {
   if (has_more_motors_) {
-    Effort effort{.force = record.force};
-    if (record.turn) effort.torque = record.turn->torque;
-    if (record.grip) effort.grip = record.grip->force;
-    applied_ = device_.apply_all(effort);
-    if (applied_.torque != effort.torque || applied_.grip != effort.grip) record.reasons |= Reason::kDeviceClamp;
+    command_all(record);
   } else {
     applied_.force = device_.apply(record.force);
   }
   if ((applied_.force - record.force).squaredNorm() > force_rounding_squared_) record.reasons |= Reason::kDeviceClamp;
   record.applied = applied_.force;
-  record.torque_applied = applied_.torque;
-  record.grip_applied = applied_.grip;
+}
+
+void HapticLoop::command_all(StepRecord& record) noexcept {
+  TurnStep* const turn = record.turn();
+  GripStep* const grip = record.grip();
+  Effort effort{.force = record.force};
+  if (turn != nullptr) effort.torque = turn->torque;
+  if (grip != nullptr) effort.grip = grip->force;
+  applied_ = device_.apply_all(effort);
+  if (applied_.torque != effort.torque || applied_.grip != effort.grip) record.reasons |= Reason::kDeviceClamp;
+  if (turn != nullptr) turn->applied = applied_.torque;
+  if (grip != nullptr) grip->applied = applied_.grip;
 }
 
 LocalTime HapticLoop::step(LocalTime now) noexcept {
@@ -171,10 +189,9 @@ void HapticLoop::rearm() noexcept {
 }
 
 void HapticLoop::publish(const StepRecord& record) noexcept {
-  DeviceState state = to_state(config_.device, record);
-  if (device_.info().max_torque > 0) state.torque_applied = record.torque_applied;
-  if (has_more_motors_ && record.grip) state.grip_applied = record.grip_applied;
-  mail_.state.put(state);
+  put_state(mail_.state.back(), config_.device, record);
+  if (rest_) put_handle(mail_.state.back(), record, device_.info());
+  mail_.state.put();
   if (!mail_.steps.try_push(record)) mail_.steps_lost.fetch_add(1, std::memory_order_relaxed);
   mail_.flight.record(record);
 

@@ -54,7 +54,7 @@ class HapticLoop {
   struct Rest {
     explicit Rest(const DeviceInfo& info);
     VelocityEstimator turning;
-    VelocityEstimator opening;
+    VelocityEstimatorOf<1> opening;
     Vec3 turned = Vec3::Zero();  ///< rad: the sum of all turns so far
     std::optional<Quat> last{};
   };
@@ -63,6 +63,7 @@ class HapticLoop {
   HandleSample handle_in(const PositionSample& sample) noexcept;
   void take_step(LocalTime now, StepRecord& record) noexcept;
   void command(StepRecord& record) noexcept;
+  void command_all(StepRecord& record) noexcept;
   void watch_device() noexcept;
   void rearm() noexcept;
   void publish(const StepRecord& record) noexcept;

@@ -8,11 +8,13 @@
 #include "core/base/expect.h"
 
 namespace tendon {
-VelocityEstimator::VelocityEstimator(double resolution) : resolution_(resolution) {
+template <int N>
+VelocityEstimatorOf<N>::VelocityEstimatorOf(double resolution) : resolution_(resolution) {
   expect_not_negative(resolution, "resolution");
 }
 
-Vec3 VelocityEstimator::observe(LocalTime at, const Vec3& position) noexcept {
+template <int N>
+Vec<N> VelocityEstimatorOf<N>::observe(LocalTime at, const Vec<N>& position) noexcept {
   if (!position.allFinite()) return velocity_;
   if (count_ > 0 && at <= samples_[newest_].at) return velocity_;
   if (newest_ == 0) {
@@ -23,7 +25,7 @@ Vec3 VelocityEstimator::observe(LocalTime at, const Vec3& position) noexcept {
   samples_[newest_] = {at, position};
   count_ = std::min(count_ + 1, kWindow + 1);
 
-  // Divisions are nearly all that this would cost: one for each sample serves its three axes.
+  // Divisions are nearly all that this would cost: one for each sample serves all axes.
   std::array<double, kWindow + 1> rate;  // 1/s
   std::array<double, kWindow + 1> margin;
   for (std::size_t i = 1; i < count_; ++i) {
@@ -31,7 +33,7 @@ Vec3 VelocityEstimator::observe(LocalTime at, const Vec3& position) noexcept {
     margin[i] = resolution_ * rate[i];
   }
 
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+  for (Eigen::Index axis = 0; axis < N; ++axis) {
     // A line of slope v through the newest sample passes within `resolution` of sample i just when v lies within
     // `margin` of the slope to it: keep the intersection.
     double lowest = -std::numeric_limits<double>::infinity();
@@ -48,5 +50,8 @@ Vec3 VelocityEstimator::observe(LocalTime at, const Vec3& position) noexcept {
   }
   return velocity_;
 }
+
+template class VelocityEstimatorOf<1>;
+template class VelocityEstimatorOf<3>;
 
 }  // namespace tendon

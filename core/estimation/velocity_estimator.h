@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "core/base/motion.h"
+#include "core/ledger/port.h"
 
 namespace tendon {
 
@@ -24,7 +25,8 @@ namespace tendon {
 /// IEEE TCST 8(6), 2000 (end-fit form), with measured time stamps in place of a fixed period.
 ///
 /// Thread-safe: no. Realtime-safe: yes; at most 3 · kWindow steps per sample.
-class VelocityEstimator {
+template <int N>
+class VelocityEstimatorOf {
  public:
   /// Longer windows smooth slow motion more and notice a reversal later: 16 ms at 1 kHz resolves
   /// 2 mm/s with a 30 µm encoder.
@@ -32,16 +34,16 @@ class VelocityEstimator {
 
   /// `resolution`: one encoder count at the handle, m; 0 = exact. Throws std::invalid_argument when it
   /// is negative or not finite.
-  explicit VelocityEstimator(double resolution);
+  explicit VelocityEstimatorOf(double resolution);
 
   /// Takes the next sample and returns the velocity (m/s). A sample that is not finite or not newer
   /// than the one before changes nothing.
-  Vec3 observe(LocalTime at, const Vec3& position) noexcept;
+  Vec<N> observe(LocalTime at, const Vec<N>& position) noexcept;
 
  private:
   struct Sample {
     LocalTime at;
-    Vec3 position;
+    Vec<N> position;
   };
   static constexpr std::size_t kSlots = 2 * kWindow;
 
@@ -51,7 +53,10 @@ class VelocityEstimator {
   std::array<Sample, kSlots> samples_{};
   std::size_t newest_ = kSlots;
   std::size_t count_ = 0;  ///< from `newest_` on, at most kWindow + 1
-  Vec3 velocity_ = Vec3::Zero();
+  Vec<N> velocity_ = Vec<N>::Zero();
 };
+
+/// Of a point in space, m and m/s; or of a handle that turns, rad and rad/s.
+using VelocityEstimator = VelocityEstimatorOf<3>;
 
 }  // namespace tendon

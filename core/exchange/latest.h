@@ -19,7 +19,12 @@ class Latest {
  public:
   /// Writer only.
   void put(const T& value) {
-    slots_[back_] = value;
+    back() = value;
+    put();
+  }
+  /// Writer only: to write a value in place. `put` publishes what `back` is by then; before, it is an older value.
+  T& back() { return slots_[back_]; }
+  void put() {
     back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex;
   }
 

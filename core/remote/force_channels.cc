@@ -74,14 +74,16 @@ ForceChannels::Wanted ForceChannels::wanted(const Motion& hand, const Quat* orie
   Wanted sum{lead->wants, static_cast<std::size_t>(lead - channels_.begin())};
   sum.force.setZero();
   sum.stiffness.setZero();
-  sum.torque.setZero();
-  sum.grip = 0;
+  sum.handle.reset();
   for (const Channel& channel : channels_) {
     if (channel.weight == 0) continue;
     sum.force += channel.weight * channel.wants.force;
     sum.stiffness += channel.weight * channel.wants.stiffness;
-    sum.torque += channel.weight * channel.wants.torque;
-    sum.grip += channel.weight * channel.wants.grip;
+    if (const auto& asked = channel.wants.handle) {
+      if (!sum.handle) sum.handle.emplace();
+      sum.handle->torque += channel.weight * asked->torque;
+      sum.handle->grip += channel.weight * asked->grip;
+    }
     // A channel that has stopped beside one that goes on is no safe stop of the device.
     if (channel.wants.mode != Mode::kSafeStop) sum.reasons |= channel.wants.reasons;
   }

@@ -34,6 +34,7 @@ bool HeldForce::observe(const RemoteForce& force) noexcept {
   if (anew || mode_ == Mode::kDecaying) {
     engaged_ = force.received;
     from_ = rendered_;
+    handle_from_ = handle_rendered_;
     const double lost = anew ? 1.0 : 1 - presence_;
     ramp_ = Duration(static_cast<Duration::rep>(lost * static_cast<double>(config_.ramp_in.count())));
   }
@@ -63,13 +64,15 @@ Prediction HeldForce::follow(const Motion& hand) const noexcept {
   return estimator_->predict(hand).value_or(Prediction{.force = newest_->force, .stiffness = Mat3::Zero()});
 }
 
-void HeldForce::add_handle(Wanted& result, const Quat* orientation, double gain, double rest) const noexcept {
-  result.torque = from_.torque * rest;
+std::optional<HandleWanted> HeldForce::handle_wanted(const Quat* orientation, double gain, double rest) const noexcept {
+  HandleWanted result;
+  if (handle_from_) result = {handle_from_->torque * rest, handle_from_->grip * rest};
   if (newest_->torque) {
     const RemoteTorque& torque = *newest_->torque;
     result.torque += gain * (orientation != nullptr ? reconstruct(torque, *orientation) : torque.torque);
   }
-  result.grip = from_.grip * rest + newest_->grip_force.value_or(0) * gain;
+  result.grip += gain * newest_->grip_force.value_or(0);
+  return result;
 }
 
 HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation) noexcept {
@@ -82,7 +85,8 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation)
   // Only `observe` ends a safe stop: a clock that goes back must not revive a force.
   if (mode_ == Mode::kSafeStop || overdue >= config_.safe_stop) {
     mode_ = Mode::kSafeStop;
-    rendered_ = {};
+    rendered_.setZero();
+    handle_rendered_.reset();
     result.mode = mode_;
     result.reasons = Reason::kSafeStop;
     return result;
@@ -112,10 +116,14 @@ HeldForce::Wanted HeldForce::wanted(const Motion& hand, const Quat* orientation)
 
   result.mode = mode_;
   const Prediction environment = follow(hand);
-  result.force = environment.force * gain + from_.force * rest;
+  result.force = environment.force * gain + from_ * rest;
   result.stiffness = environment.stiffness * gain;
-  if (newest_->torque || newest_->grip_force || rest > 0) add_handle(result, orientation, gain, rest);
-  rendered_ = {result.force, result.torque, result.grip};
+  rendered_ = result.force;
+  if (newest_->torque || newest_->grip_force || handle_rendered_) {
+    if (rest == 0) handle_from_.reset();
+    result.handle = handle_wanted(orientation, gain, rest);
+    handle_rendered_ = result.handle;
+  }
   return result;
 }
 

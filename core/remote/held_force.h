@@ -13,6 +13,12 @@
 
 namespace tendon {
 
+/// What is wanted of a handle beside its force.
+struct HandleWanted {
+  Vec3 torque = Vec3::Zero();  ///< N·m, on the hand
+  double grip = 0;             ///< N, on the fingers, > 0 opens them
+};
+
 /// Holds the newest remote force between arrivals, and decides what to render when they stop coming.
 ///
 /// With age = now − received and v = valid_for (clipped to max_valid_for):
@@ -70,9 +76,8 @@ class HeldForce {
     Mat3 stiffness = Mat3::Zero();  ///< −∂F/∂x, N/m; zero without a local model
     Mode mode = Mode::kIdle;
     Reasons reasons;
-    Duration age{};              ///< since it was received; 0 when idle
-    Vec3 torque = Vec3::Zero();  ///< N·m, on the hand
-    double grip = 0;             ///< N, on the fingers, > 0 opens them
+    Duration age{};                        ///< since it was received; 0 when idle
+    std::optional<HandleWanted> handle{};  ///< empty: nothing is asked of torque and grip
   };
 
   /// Throws std::invalid_argument naming the field when a duration is negative, decay is not positive, safe_stop is
@@ -90,7 +95,8 @@ class HeldForce {
   void disengage() noexcept {
     newest_.reset();
     mode_ = Mode::kIdle;
-    rendered_ = {};
+    rendered_.setZero();
+    handle_rendered_.reset();
   }
 
   /// The force wanted at `hand.position` at `hand.at`, and the torque wanted at `orientation`. Call it once in each
@@ -103,16 +109,18 @@ class HeldForce {
  private:
   Prediction follow(const Motion& hand) const noexcept;
   Duration validity() const noexcept;
-  void add_handle(Wanted& result, const Quat* orientation, double gain, double rest) const noexcept;
+  std::optional<HandleWanted> handle_wanted(const Quat* orientation, double gain, double rest) const noexcept;
 
   Config config_;
   std::optional<RemoteForce> newest_;
   Mode mode_ = Mode::kIdle;
-  LocalTime engaged_{};  ///< start of the ramp
-  Duration ramp_{};      ///< its length
-  Effort from_;          ///< what it starts from
-  double presence_ = 0;  ///< the share of the environment's force in `rendered_`, 0 to 1
-  Effort rendered_;
+  LocalTime engaged_{};       ///< start of the ramp
+  Duration ramp_{};           ///< its length
+  Vec3 from_ = Vec3::Zero();  ///< N, the force it starts from
+  double presence_ = 0;       ///< the share of the environment's force in `rendered_`, 0 to 1
+  Vec3 rendered_ = Vec3::Zero();
+  std::optional<HandleWanted> handle_from_;
+  std::optional<HandleWanted> handle_rendered_;
   std::optional<AdaptiveLocalModel> local_model_;
   std::unique_ptr<OutputEstimator> estimator_;  ///< 100 kB, only when listed
 };

@@ -25,7 +25,7 @@ void put(pb::Vec3* out, const Vec3& v) {
 
 Vec3 vec3(const pb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-void put(pb::Turn* out, const TurnStep& turn, const Vec3& applied) {
+void put(pb::Turn* out, const TurnStep& turn) {
   const Quat& q = turn.hand.orientation;
   out->mutable_orientation()->set_w(q.w);
   out->mutable_orientation()->set_x(q.x);
@@ -35,9 +35,9 @@ void put(pb::Turn* out, const TurnStep& turn, const Vec3& applied) {
   put(out->mutable_torque_held_nm(), turn.was_applied);
   put(out->mutable_torque_wanted_nm(), turn.wanted);
   put(out->mutable_torque_commanded_nm(), turn.torque);
-  put(out->mutable_torque_applied_nm(), applied);
+  put(out->mutable_torque_applied_nm(), turn.applied);
   out->set_torque_wanted_norm_nm(turn.wanted.norm());
-  out->set_torque_applied_norm_nm(applied.norm());
+  out->set_torque_applied_norm_nm(turn.applied.norm());
 }
 
 TurnStep turn_step(const pb::Turn& in) {
@@ -45,16 +45,17 @@ TurnStep turn_step(const pb::Turn& in) {
   return {.hand = {.orientation = {q.w(), q.x(), q.y(), q.z()}, .angular_velocity = vec3(in.angular_velocity_radps())},
           .was_applied = vec3(in.torque_held_nm()),
           .wanted = vec3(in.torque_wanted_nm()),
-          .torque = vec3(in.torque_commanded_nm())};
+          .torque = vec3(in.torque_commanded_nm()),
+          .applied = vec3(in.torque_applied_nm())};
 }
 
-void put(pb::Grip* out, const GripStep& grip, double applied) {
+void put(pb::Grip* out, const GripStep& grip) {
   out->set_opening_rad(grip.hand.opening);
   out->set_velocity_radps(grip.hand.velocity);
   out->set_force_held_n(grip.was_applied);
   out->set_force_wanted_n(grip.wanted);
   out->set_force_commanded_n(grip.force);
-  out->set_force_applied_n(applied);
+  out->set_force_applied_n(grip.applied);
   out->set_permitted_n(grip.permitted);
   out->set_energy_j(grip.energy);
 }
@@ -64,6 +65,7 @@ GripStep grip_step(const pb::Grip& in) {
           .was_applied = in.force_held_n(),
           .wanted = in.force_wanted_n(),
           .force = in.force_commanded_n(),
+          .applied = in.force_applied_n(),
           .permitted = in.permitted_n(),
           .energy = in.energy_j()};
 }
@@ -142,8 +144,8 @@ std::string encode(const StepRecord& step) {
   out.set_longest_hold_ns(step.longest_hold.count());
   out.set_assumption_broken(step.assumption_broken);
   out.set_buttons(step.buttons);
-  if (step.turn) put(out.mutable_turn(), *step.turn, step.torque_applied);
-  if (step.grip) put(out.mutable_grip(), *step.grip, step.grip_applied);
+  if (const TurnStep* const turn = step.turn()) put(out.mutable_turn(), *turn);
+  if (const GripStep* const grip = step.grip()) put(out.mutable_grip(), *grip);
   if (!step.stiffness.isZero(0)) {
     for (const auto row : step.stiffness.rowwise()) {
       for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
@@ -217,14 +219,9 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.longest_hold = Duration(in.longest_hold_ns());
   out.assumption_broken = in.assumption_broken();
   out.buttons = in.buttons();
-  if (in.has_turn()) {
-    out.turn = turn_step(in.turn());
-    out.torque_applied = vec3(in.turn().torque_applied_nm());
-  }
-  if (in.has_grip()) {
-    out.grip = grip_step(in.grip());
-    out.grip_applied = in.grip().force_applied_n();
-  }
+  if (in.has_turn() || in.has_grip()) out.handle.emplace();
+  if (in.has_turn()) out.handle->turn = turn_step(in.turn());
+  if (in.has_grip()) out.handle->grip = grip_step(in.grip());
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

@@ -13,13 +13,11 @@ namespace tendon {
 /// One haptic step, as it is recorded: all inputs that are needed to repeat it, and what the device did.
 struct StepRecord : Step {
   std::uint64_t tick = 0;
-  LocalTime scheduled{};               ///< when the step was due
-  Vec3 applied = Vec3::Zero();         ///< N, really given out by the device (`force` is what it was told)
-  bool rearmed = false;                ///< the controller was rearmed since the step before
-  bool disarmed = false;               ///< the operator had disarmed the device
-  std::uint32_t buttons = 0;           ///< bit i is set while button i of the handle was held
-  Vec3 torque_applied = Vec3::Zero();  ///< N·m, really given out; only with `turn`
-  double grip_applied = 0;             ///< N, really given out; only with `grip`
+  LocalTime scheduled{};        ///< when the step was due
+  Vec3 applied = Vec3::Zero();  ///< N, really given out by the device (`force` is what it was told)
+  bool rearmed = false;         ///< the controller was rearmed since the step before
+  bool disarmed = false;        ///< the operator had disarmed the device
+  std::uint32_t buttons = 0;    ///< bit i is set while button i of the handle was held
 };
 
 /// One datagram that went in or out.

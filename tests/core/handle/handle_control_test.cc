@@ -54,8 +54,8 @@ class Stylus {
                               .grip_force = held_.grip};
     const Step step = controller.step({now_, Vec3::Zero(), Vec3::Zero()}, held_.force, {}, &handle);
     held_ = {step.force};
-    if (step.turn) held_.torque = step.turn->torque;
-    if (step.grip) held_.grip = step.grip->force;
+    if (step.turn()) held_.torque = step.turn()->torque;
+    if (step.grip()) held_.grip = step.grip()->force;
     return step;
   }
   /// Turns to and fro, and opens and closes, so that the accounts have something to spend.
@@ -75,12 +75,12 @@ class Stylus {
 TEST(HandleControl, ATorqueIsGivenWhenTheAccountPaysForIt) {
   Stylus stylus;
   stylus.ask({0, 0, 0.05});
-  EXPECT_LT(stylus.step({}).turn->torque.norm(), 0.001) << "only what friction allows: nothing has been earned";
+  EXPECT_LT(stylus.step({}).turn()->torque.norm(), 0.001) << "only what friction allows: nothing has been earned";
   stylus.earn();
   stylus.ask({0, 0, 0.05});
   const Step step = stylus.step({});
-  EXPECT_EQ(step.turn->torque, Vec3(0, 0, 0.05));
-  EXPECT_EQ(step.turn->wanted, Vec3(0, 0, 0.05));
+  EXPECT_EQ(step.turn()->torque, Vec3(0, 0, 0.05));
+  EXPECT_EQ(step.turn()->wanted, Vec3(0, 0, 0.05));
   EXPECT_TRUE(step.reasons.empty()) << to_string(step.reasons);
 }
 
@@ -130,7 +130,7 @@ TEST(HandleControl, AModelOfRotationIsFollowedBetweenTwoAnswers) {
   ASSERT_TRUE(stylus.controller.observe(answer));
   for (const double angle : {0.0, 0.1, -0.2}) {
     const Quat q = product(rotation_by({0, 0, angle}), at);
-    const Vec3 wanted = stylus.step(q).turn->wanted;
+    const Vec3 wanted = stylus.step(q).turn()->wanted;
     EXPECT_LT((wanted - Vec3(0, 0.01, -0.1 * std::sin(angle))).norm(), 1e-12) << angle;
   }
 }
@@ -174,46 +174,46 @@ TEST(HandleControl, TorqueAndGripAreRampedInFadeAndStopWithTheForce) {
     return last;
   };
   const Step ramp = wanted_after(5);
-  EXPECT_NEAR(ramp.turn->wanted.z(), 0.025, 1e-12);
-  EXPECT_NEAR(ramp.grip->wanted, 1, 1e-12);
+  EXPECT_NEAR(ramp.turn()->wanted.z(), 0.025, 1e-12);
+  EXPECT_NEAR(ramp.grip()->wanted, 1, 1e-12);
   const Step whole = wanted_after(15);
-  EXPECT_EQ(whole.turn->wanted.z(), 0.05);
-  EXPECT_EQ(whole.grip->wanted, 2);
+  EXPECT_EQ(whole.turn()->wanted.z(), 0.05);
+  EXPECT_EQ(whole.grip()->wanted, 2);
   const Step fading = wanted_after(40);  // 20 ms of hold, then 20 ms of 50
   EXPECT_EQ(fading.mode, Mode::kDecaying);
-  EXPECT_NEAR(fading.turn->wanted.z(), 0.05 * std::exp(-0.4), 1e-12);
-  EXPECT_NEAR(fading.grip->wanted, 2 * std::exp(-0.4), 1e-12);
+  EXPECT_NEAR(fading.turn()->wanted.z(), 0.05 * std::exp(-0.4), 1e-12);
+  EXPECT_NEAR(fading.grip()->wanted, 2 * std::exp(-0.4), 1e-12);
   const Step stopped = wanted_after(250);
   EXPECT_EQ(stopped.mode, Mode::kSafeStop);
-  EXPECT_EQ(stopped.turn->wanted, Vec3(0, 0, 0));
-  EXPECT_EQ(stopped.grip->wanted, 0);
+  EXPECT_EQ(stopped.turn()->wanted, Vec3(0, 0, 0));
+  EXPECT_EQ(stopped.grip()->wanted, 0);
 }
 
 TEST(HandleControl, AnAnswerWithoutATorqueEndsTheOneBefore) {
   Stylus stylus;
   stylus.ask({0, 0, 0.05});
-  EXPECT_EQ(stylus.step({}).turn->wanted.z(), 0.05);
+  EXPECT_EQ(stylus.step({}).turn()->wanted.z(), 0.05);
   stylus.controller.observe(stylus.answer());
-  EXPECT_EQ(stylus.step({}).turn->wanted.z(), 0);
+  EXPECT_EQ(stylus.step({}).turn()->wanted.z(), 0);
 }
 
 TEST(HandleControl, AGripperSpendsItsOwnAccountOnly) {
   Stylus stylus;
   for (int i = 0; i < 500; ++i) stylus.step({}, i % 2 == 0 ? 0.02 : 0.0);
   const Step earned = stylus.step({}, 0);
-  EXPECT_GT(earned.grip->energy, 1e-3);
+  EXPECT_GT(earned.grip()->energy, 1e-3);
   EXPECT_EQ(earned.energy, 0) << "opening and closing pays for no torque";
   RemoteForce answer = stylus.answer();
   answer.grip_force = 100;
   answer.torque = RemoteTorque{.torque = {0, 0, 0.05}};
   stylus.controller.observe(answer);
   const Step step = stylus.step({}, 0);
-  EXPECT_EQ(step.grip->force, 5) << "the largest that the gripper may";
-  EXPECT_LT(step.turn->torque.norm(), 0.001);
+  EXPECT_EQ(step.grip()->force, 5) << "the largest that the gripper may";
+  EXPECT_LT(step.turn()->torque.norm(), 0.001);
   // N times m per radian: the fingers' travel is what the force works on.
   const Step opened = stylus.step({}, 0.01);
   const double travel = 0.05 * 0.01;
-  EXPECT_NEAR(opened.grip->energy - step.grip->energy, -5 * travel + 0.02 * travel + 0.26 * travel * travel / 1e-3,
+  EXPECT_NEAR(opened.grip()->energy - step.grip()->energy, -5 * travel + 0.02 * travel + 0.26 * travel * travel / 1e-3,
               1e-12);
 }
 
@@ -224,19 +224,19 @@ TEST(HandleControl, DisarmAndFaultsEndTorqueAndGrip) {
   answer.torque = RemoteTorque{.torque = {0, 0, 0.05}};
   answer.grip_force = 2;
   stylus.controller.observe(answer);
-  ASSERT_GT(stylus.step({}).turn->torque.norm(), 0);
+  ASSERT_GT(stylus.step({}).turn()->torque.norm(), 0);
   stylus.controller.disarm();
   const Step disarmed = stylus.step({});
-  EXPECT_EQ(disarmed.turn->torque, Vec3(0, 0, 0));
-  EXPECT_EQ(disarmed.grip->force, 0);
+  EXPECT_EQ(disarmed.turn()->torque, Vec3(0, 0, 0));
+  EXPECT_EQ(disarmed.grip()->force, 0);
   stylus.controller.rearm();
   stylus.controller.observe(answer);
-  ASSERT_GT(stylus.step({}).turn->torque.norm(), 0);
+  ASSERT_GT(stylus.step({}).turn()->torque.norm(), 0);
   const Step broken = stylus.step({2, 0, 0, 0});  // no rotation
   EXPECT_EQ(stylus.controller.fault(), HapticController::Fault::kPositionNotFinite);
   EXPECT_TRUE(broken.reasons.has(Reason::kNotFinite));
-  EXPECT_EQ(broken.turn->torque, Vec3(0, 0, 0));
-  EXPECT_EQ(stylus.step({}).turn->torque, Vec3(0, 0, 0)) << "until it is rearmed";
+  EXPECT_EQ(broken.turn()->torque, Vec3(0, 0, 0));
+  EXPECT_EQ(stylus.step({}).turn()->torque, Vec3(0, 0, 0)) << "until it is rearmed";
 }
 
 TEST(HandleControl, ATorqueThatNoMotorCanGiveIsToldAsMaxForce) {
@@ -246,7 +246,7 @@ TEST(HandleControl, ATorqueThatNoMotorCanGiveIsToldAsMaxForce) {
   stylus.ask({0, 0, 0.05});
   const Step step = stylus.step({});
   EXPECT_TRUE(step.reasons.has(Reason::kMaxForce));
-  EXPECT_EQ(step.turn->torque, Vec3(0, 0, 0));
+  EXPECT_EQ(step.turn()->torque, Vec3(0, 0, 0));
 }
 
 TEST(HandleControl, ALawThatKnowsAPointOnlyIsRefused) {

@@ -142,7 +142,7 @@ Outcome run(std::uint64_t seed, Law law) {
     const bool seen = !dice.chance(0.02);
     const Step step = seen ? controller.step({now, x, Vec3::Zero()}, applied.force, {}, &handle)
                            : controller.step_unseen(now, applied.force, &handle);
-    applied = {step.force, step.turn->torque, step.grip->force};
+    applied = {step.force, step.turn()->torque, step.grip()->force};
     outcome.within_limits = outcome.within_limits && step.force.norm() <= config.max_force * (1 + 1e-12) &&
                             applied.torque.norm() <= config.rotation->max_torque * (1 + 1e-12) &&
                             std::abs(applied.grip) <= config.grip->max_force && step.force.allFinite() &&

@@ -29,24 +29,25 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
   wanted.reasons = Reasons::from_bits(recorded.reasons.bits() & kUpstream);
   wanted.age = recorded.force_age;
   wanted.channel = recorded.channel;
-  if (recorded.turn) wanted.torque = recorded.turn->wanted;
-  if (recorded.grip) wanted.grip = recorded.grip->wanted;
+  if (recorded.handle) wanted.handle.emplace();
+  if (recorded.turn()) wanted.handle->torque = recorded.turn()->wanted;
+  if (recorded.grip()) wanted.handle->grip = recorded.grip()->wanted;
   return wanted;
 }
 
 /// Empty for a device that has a position only.
 std::optional<HandleSample> handle_in(const StepRecord& recorded, const Effort& held) {
-  if (!recorded.turn && !recorded.grip) return std::nullopt;
+  if (!recorded.handle) return std::nullopt;
   HandleSample handle{.torque = held.torque, .grip_force = held.grip};
-  if (recorded.turn) handle.turning = recorded.turn->hand;
-  if (recorded.grip) handle.grip = recorded.grip->hand;
+  if (recorded.turn()) handle.turning = recorded.turn()->hand;
+  if (recorded.grip()) handle.grip = recorded.grip()->hand;
   return handle;
 }
 
 Effort was_held(const StepRecord& recorded) {
   Effort held{.force = recorded.was_applied};
-  if (recorded.turn) held.torque = recorded.turn->was_applied;
-  if (recorded.grip) held.grip = recorded.grip->was_applied;
+  if (recorded.turn()) held.torque = recorded.turn()->was_applied;
+  if (recorded.grip()) held.grip = recorded.grip()->was_applied;
   return held;
 }
 
@@ -105,13 +106,15 @@ StepRecord Rerun::step(const StepRecord& recorded) {
   again.loop_age = recorded.loop_age;
   again.force_error = recorded.force_error;
   own_ = {.force = again.force};
-  if (again.turn) own_.torque = again.turn->torque;
-  if (again.grip) own_.grip = again.grip->force;
-  if (held_ == Held::kOwn) {
-    again.applied = own_.force;
-    again.torque_applied = own_.torque;
-    again.grip_applied = own_.grip;
+  if (TurnStep* const turn = again.turn()) {
+    own_.torque = turn->torque;
+    turn->applied = held_ == Held::kOwn || !recorded.turn() ? own_.torque : recorded.turn()->applied;
   }
+  if (GripStep* const grip = again.grip()) {
+    own_.grip = grip->force;
+    grip->applied = held_ == Held::kOwn || !recorded.grip() ? own_.grip : recorded.grip()->applied;
+  }
+  if (held_ == Held::kOwn) again.applied = own_.force;
   return again;
 }
 
@@ -129,12 +132,12 @@ std::string difference(const StepRecord& recorded, const StepRecord& again) {
   number("energy_j", recorded.energy, again.energy);
   number("permitted_n", recorded.permitted, again.permitted);
   if (!same(recorded.force, again.force)) say("force_commanded_n", digits(recorded.force), digits(again.force));
-  if (recorded.turn && again.turn && !same(recorded.turn->torque, again.turn->torque)) {
-    say("torque_commanded_nm", digits(recorded.turn->torque), digits(again.turn->torque));
+  if (recorded.turn() && again.turn() && !same(recorded.turn()->torque, again.turn()->torque)) {
+    say("torque_commanded_nm", digits(recorded.turn()->torque), digits(again.turn()->torque));
   }
-  if (recorded.grip && again.grip) {
-    number("grip.energy_j", recorded.grip->energy, again.grip->energy);
-    number("grip.force_commanded_n", recorded.grip->force, again.grip->force);
+  if (recorded.grip() && again.grip()) {
+    number("grip.energy_j", recorded.grip()->energy, again.grip()->energy);
+    number("grip.force_commanded_n", recorded.grip()->force, again.grip()->force);
   }
   if (recorded.mode != again.mode) {
     say("mode", std::to_string(static_cast<int>(recorded.mode)), std::to_string(static_cast<int>(again.mode)));
