@@ -9,7 +9,7 @@
 
 namespace tendon {
 
-/// Force commands on their way from the loop to the motors: each arrives after a constant delay, in order.
+/// Commands on their way from the loop to the motors: each arrives after a constant delay, in order.
 ///
 /// There is room for one command every 100 µs; when they come faster and the room is full, a new command replaces the
 /// newest one. The constructor allocates the room.
@@ -19,17 +19,17 @@ class ForcesUnderWay {
  public:
   struct Command {
     Duration arrives{};
-    Vec3 force = Vec3::Zero();  ///< N
+    Effort effort;
   };
 
   /// `delay` ≥ 0 is the delay of each command.
   explicit ForcesUnderWay(Duration delay) : delay_(delay), ring_(static_cast<std::size_t>(delay / kClosest) + 2) {}
 
-  void send(Duration now, const Vec3& force) noexcept {
+  void send(Duration now, const Effort& effort) noexcept {
     const Duration arrives = now + delay_;
     const bool again = count_ > 0 && newest().arrives == arrives;
     if (!again && count_ < ring_.size()) ++count_;
-    newest() = {arrives, force};
+    newest() = {arrives, effort};
   }
 
   /// The command that arrives next; null when none is under way.

@@ -33,6 +33,23 @@ Vec3 saturated(const Vec3& force, double limit) {
   return shape * (limit / length);
 }
 
+/// The share that shortens `vector` to the norm `limit`. As above.
+double share_within(const Vec3& vector, double limit) {
+  const double largest = vector.lpNorm<Eigen::Infinity>();
+  if (!(largest > 0)) return 1;
+  return std::min(1.0, limit / (vector / largest).norm() / largest);
+}
+
+bool is_finite(const Effort& effort) {
+  return effort.force.allFinite() && effort.torque.allFinite() && std::isfinite(effort.grip);
+}
+
+void check(const SimulatedDevice::Config::Press& press) {
+  expect(press.button < 32, "presses.button", press.button, "a number from 0 to 31");
+  expect_not_negative(seconds(press.from), "presses.from");
+  expect_above_zero(seconds(press.length), "presses.length");
+}
+
 void expect_delay(const std::optional<Duration>& delay, std::string_view field) {
   if (!delay) return;
   expect(*delay > Duration::zero() && *delay <= SimulatedDevice::kMostDelay, field, seconds(*delay),
@@ -79,6 +96,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   }
   expect(config_.max_substep > Duration::zero(), "max_substep", seconds(config_.max_substep), "a duration above 0 s");
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
+  for (const Config::Press& press : config_.presses) check(press);
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
   const Rub rub = joints_ ? Rub::kJoints : config_.coulomb_friction ? Rub::kHandle : Rub::kNone;
   take_substeps_ = substeps_with({.rub = rub,
@@ -90,6 +108,15 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
            .position_resolution = config_.encoder_step.value_or(0),
            .watchdog = config_.watchdog.value_or(Duration::zero())};
+  if (config_.rotation) {
+    info_.measures_orientation = true;
+    info_.max_torque = config_.rotation->max_torque.value_or(0);
+    info_.angular_resolution = config_.rotation->encoder_step.value_or(0);
+    rotation_.emplace(*std::exchange(config_.rotation, std::nullopt));
+  }
+  if (config_.gripper) gripper_.emplace(*std::exchange(config_.gripper, std::nullopt));
+  if (gripper_) info_.gripper = gripper_->info();
+  turns_or_grips_ = rotation_ || gripper_;
 
   truth_.position = config_.start_position.value_or(hand_ ? hand_->target(0).position : Vec3::Zero());
   truth_.velocity = config_.start_velocity;
@@ -113,7 +140,22 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
   if (config_.encoder_step) sample.position = counted(sample.position, *config_.encoder_step);
   if (config_.force_sensor) sample.hand_force = sensed_force();
   if (config_.button_after) sample.buttons = lived_ >= *config_.button_after ? 1 : 0;
+  if (!config_.presses.empty()) sample.buttons |= pressed();
+  if (turns_or_grips_) sense_turn_and_grip(sample);
   return sample;
+}
+
+std::uint32_t SimulatedDevice::pressed() const noexcept {
+  std::uint32_t held = 0;
+  for (const Config::Press& press : config_.presses) {
+    if (lived_ >= press.from && lived_ - press.from < press.length) held |= std::uint32_t{1} << press.button;
+  }
+  return held;
+}
+
+void SimulatedDevice::sense_turn_and_grip(PositionSample& sample) const noexcept {
+  if (rotation_) sample.orientation = rotation_->sample();
+  if (gripper_) sample.opening = gripper_->sample();
 }
 
 Vec3 SimulatedDevice::sensed_force() const noexcept {
@@ -122,6 +164,7 @@ Vec3 SimulatedDevice::sensed_force() const noexcept {
 }
 
 Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {
+  if (turns_or_grips_) return apply_alone(force);
   Vec3 held = Vec3::Zero();
   if (force.allFinite()) held = force;
   if (config_.max_force) held = saturated(held, *config_.max_force);
@@ -132,8 +175,53 @@ Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {
 }
 
 Vec3 SimulatedDevice::send(const Vec3& force) noexcept {
-  under_way_->send(lived_, force);
+  under_way_->send(lived_, {.force = force});
   return force;
+}
+
+Vec3 SimulatedDevice::apply_alone(const Vec3& force) noexcept { return apply_all({.force = force}).force; }
+
+Effort SimulatedDevice::apply_all(const Effort& effort) noexcept {
+  if (!turns_or_grips_) return {.force = apply(effort.force)};
+  const Effort held = written(effort);
+  if (under_way_) {
+    under_way_->send(lived_, held);
+  } else {
+    hold(held);
+  }
+  return held;
+}
+
+/// What the motors can give of it.
+Effort SimulatedDevice::written(const Effort& effort) const noexcept {
+  Effort most;
+  if (!is_finite(effort)) return most;
+  double share = 1;
+  if (config_.max_force) share = share_within(effort.force, *config_.max_force);
+  if (info_.max_torque > 0) {
+    share = std::min(share, share_within(effort.torque, info_.max_torque));
+    most.torque = share * effort.torque;
+  }
+  most.force = share * effort.force;
+  if (info_.gripper) most.grip = std::clamp(effort.grip, -info_.gripper->max_force, info_.gripper->max_force);
+  return most;
+}
+
+/// It has reached the motors.
+void SimulatedDevice::hold(const Effort& effort) noexcept {
+  command_ = effort.force;
+  if (turns_or_grips_) hold_torque_and_grip(effort);
+  if (config_.watchdog) until_watchdog_ = config_.watchdog;
+}
+
+void SimulatedDevice::hold_torque_and_grip(const Effort& effort) noexcept {
+  if (rotation_) rotation_->hold(effort.torque);
+  if (gripper_) gripper_->hold(effort.grip);
+}
+
+void SimulatedDevice::turn_and_grip(Duration::rep substeps, double h) noexcept {
+  if (rotation_) rotation_->integrate(seconds(lived_), substeps, h);
+  if (gripper_) gripper_->integrate(seconds(lived_), substeps, h);
 }
 
 void SimulatedDevice::advance(Duration gap) noexcept {
@@ -146,8 +234,7 @@ Duration SimulatedDevice::live_to_last_arrival(Duration gap) noexcept {
   const Duration end = lived_ + gap;
   for (const auto* next = under_way_->next(); next != nullptr && next->arrives <= end; next = under_way_->next()) {
     live(next->arrives - lived_);
-    command_ = next->force;
-    if (config_.watchdog) until_watchdog_ = config_.watchdog;
+    hold(next->effort);
     under_way_->pop();
   }
   return end - lived_;
@@ -168,6 +255,7 @@ Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
   until_watchdog_.reset();
   integrate(before);
   command_.setZero();
+  if (turns_or_grips_) hold_torque_and_grip(Effort());
   truth_.watchdog_fired = true;
   return gap - before;
 }
@@ -175,7 +263,9 @@ Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
 void SimulatedDevice::integrate(Duration span) noexcept {
   if (span <= Duration::zero()) return;
   const auto substeps = (span + config_.max_substep - Duration(1)) / config_.max_substep;
-  (this->*take_substeps_)(substeps, seconds(span) / static_cast<double>(substeps));
+  const double h = seconds(span) / static_cast<double>(substeps);
+  (this->*take_substeps_)(substeps, h);
+  if (turns_or_grips_) turn_and_grip(substeps, h);
   lived_ += span;
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/motion.h"
 #include "core/ledger/friction.h"
@@ -14,6 +15,8 @@
 #include "devices/simulated/forces_under_way.h"
 #include "devices/simulated/joint_friction.h"
 #include "devices/simulated/operator_hand.h"
+#include "devices/simulated/simulated_gripper.h"
+#include "devices/simulated/simulated_rotation.h"
 
 namespace tendon {
 
@@ -46,6 +49,11 @@ namespace tendon {
 /// force that `apply` returns reaches the motors that much later; before the first one arrives there is no force. Both
 /// are exact to the nanosecond, whatever the period. A sample shows the first effect of a force d_s + d_f after it was
 /// applied. The device's watchdog counts the forces that reach it.
+///
+/// **A handle that turns and grips** has a `rotation` and a `gripper` (SimulatedRotation, SimulatedGripper), which live
+/// through the same substeps and share nothing else with the position: no mass, no friction, no amplifier. What is said
+/// here about delays and the watchdog holds for torque and grip too. Of a wrench that is too large, force and torque
+/// are shortened by one share, so it keeps its direction; the grip is clamped by itself.
 ///
 /// **Integration.** Substeps of equal length h ≤ max_substep; each is one implicit midpoint rule with
 /// set-valued friction (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
@@ -111,6 +119,18 @@ class SimulatedDevice final : public Device {
 
     std::optional<OperatorHand::Config> hand;
     std::optional<Duration> button_after;  ///< so long after the first `read` the hand presses button 0, and holds it
+    /// The hand presses a button.
+    struct Press {
+      std::uint32_t button = 0;  ///< its bit in PositionSample::buttons, below 32
+      Duration from{};           ///< since the first `read`, ≥ 0
+      Duration length{};         ///< > 0
+    };
+    std::vector<Press> presses{};
+
+    /// The handle also turns, and every sample has an orientation. The energy balance holds for −τ·ω besides.
+    std::optional<SimulatedRotation::Config> rotation{};
+    /// The handle has a gripper. Its energy balance is one of its own.
+    std::optional<SimulatedGripper::Config> gripper{};
 
     /// > 0. 50 µs is 20 substeps per haptic period at 1 kHz. It puts the stiffness at which a sampled spring loses
     /// stability (75 g, 1 kHz) within 1.4e-6 of the exact one at 0.26 N·s/m, and 2.8e-5 at 5. The error goes with the
@@ -147,10 +167,17 @@ class SimulatedDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
 
   /// Returns the force after saturation. A force with a component that is not finite is no force:
-  /// zero is held and returned.
+  /// zero is held and returned. It ends torque and grip.
   Vec3 apply(const Vec3& force) noexcept override;
 
+  /// Returns the effort after saturation: its wrench is shortened to `max_force` and `max_torque` by one share. A device
+  /// without motors that turn gives no torque, and one without a motor in its gripper no grip. An effort with a component
+  /// that is not finite is none.
+  Effort apply_all(const Effort& effort) noexcept override;
+
   const Truth& truth() const noexcept { return truth_; }
+  const SimulatedRotation* rotation() const noexcept { return rotation_ ? &*rotation_ : nullptr; }
+  const SimulatedGripper* gripper() const noexcept { return gripper_ ? &*gripper_ : nullptr; }
 
  private:
   /// Of the amplifier, over one substep of length h with the time constant τ.
@@ -181,7 +208,14 @@ class SimulatedDevice final : public Device {
   };
 
   Vec3 sensed_force() const noexcept;
+  std::uint32_t pressed() const noexcept;
+  Vec3 apply_alone(const Vec3& force) noexcept;
+  Effort written(const Effort& effort) const noexcept;
   Vec3 send(const Vec3& force) noexcept;
+  void hold(const Effort& effort) noexcept;
+  void hold_torque_and_grip(const Effort& effort) noexcept;
+  void turn_and_grip(Duration::rep substeps, double h) noexcept;
+  void sense_turn_and_grip(PositionSample& sample) const noexcept;
   void advance(Duration gap) noexcept;
   void live(Duration gap) noexcept;
   Duration live_to_last_arrival(Duration gap) noexcept;
@@ -201,6 +235,9 @@ class SimulatedDevice final : public Device {
   Config config_;
   std::optional<OperatorHand> hand_;
   std::optional<JointFriction> joints_;
+  std::optional<SimulatedRotation> rotation_;
+  std::optional<SimulatedGripper> gripper_;
+  bool turns_or_grips_ = false;  ///< it has one of these two
   Substeps take_substeps_;
   DeviceInfo info_;
   std::optional<LocalTime> last_read_;
