@@ -22,12 +22,16 @@ namespace tendon {
 ///     d = (X, −Z, Y) / 350, no longer than 1;     v = speed · (|d| − dead_band) / (1 − dead_band) · d/|d|, or 0
 ///     within; p ← p + v (now − before), each component within ±reach
 ///
-/// x right, y up, z towards the user, as the Falcon's. The position starts at the origin, and stays while the plug is
-/// out. Rotation is read and not used. A push that no report has confirmed for 100 ms has ended, and one `read` moves
-/// the position at most as far as 100 ms of pushing do. `apply` returns zero, whatever is asked for.
+/// x right, y up, z towards the user, as the Falcon's. The twist of the cap turns the orientation in the same way: with
+/// r = (Rx, −Rz, Ry) / 350 for d, ω is `turn_speed` in place of `speed`, and q ← rotation_by(ω (now − before)) q. So the
+/// orientation turns about the axis about which the cap is twisted, as the operator sees it, not about one of its own.
+///
+/// The position starts at the origin, the orientation unturned, and both stay while the plug is out. A push that no
+/// report has confirmed for 100 ms has ended, and so has a twist; one `read` moves the position at most as far as 100 ms
+/// of pushing do. `apply` returns zero, whatever is asked for.
 ///
 /// kAbsent while it is not plugged in, otherwise kHomed: it needs no opening. Buttons are those of its report, from
-/// bit 0.
+/// bit 0; its row names the first two, as they lie on the models that have no more.
 ///
 /// Thread-safe: `counts` and `state` from any thread, the rest from one. Realtime-safe: `read`, `apply` and
 /// `counts`.
@@ -44,6 +48,7 @@ class SpaceMouseDevice final : public Device {
     double speed = 0.1;       ///< m/s with the cap at its stop, > 0
     double dead_band = 0.05;  ///< share of the way to the stop in which nothing moves, 0 ≤ dead_band < 1
     double reach = 0.05;      ///< m to either side of the origin on each axis, > 0
+    double turn_speed = 1;    ///< rad/s with the cap twisted to its stop, > 0
   };
 
   /// Takes the pipe to a SpaceMouse. Throws std::invalid_argument naming the field, its value and what was expected.
@@ -57,9 +62,12 @@ class SpaceMouseDevice final : public Device {
 
   /// m/s: v of the equation above. Realtime-safe.
   static Vec3 velocity_for(const Config& config, const spacemouse::Axes& cap) noexcept;
+  /// rad/s: ω, of a twist. Realtime-safe.
+  static Vec3 angular_velocity_for(const Config& config, const spacemouse::Axes& twist) noexcept;
 
  private:
   void receive(LocalTime now) noexcept;
+  void take(const spacemouse::Motion& motion, LocalTime now) noexcept;
   void let_go() noexcept;
 
   Config config_;
@@ -68,8 +76,11 @@ class SpaceMouseDevice final : public Device {
   std::atomic<State> state_{State::kAbsent};
   LocalTime before_{};            ///< the last `read`
   LocalTime pushed_{};            ///< when the last translation was reported
+  LocalTime twisted_{};           ///< when the last rotation was reported
   Vec3 velocity_ = Vec3::Zero();  ///< since then
+  Vec3 angular_velocity_ = Vec3::Zero();
   Vec3 position_ = Vec3::Zero();
+  Quat orientation_;
   std::uint32_t buttons_ = 0;
 };
 

@@ -16,23 +16,20 @@ namespace tendon {
 /// an HID device with one interrupt endpoint, as its driver assumes; nobody here has seen a real one's.
 class FakeSpaceMouse final : public UsbModel {
  public:
-  bool split = false;  ///< translation and rotation in two reports
+  bool split = false;                  ///< translation and rotation in two reports
+  spacemouse::Axes twist{2313, 9, 9};  ///< somebody twists it, too
   std::uint32_t connection = 1;
   std::uint32_t connections = 1;
   std::deque<std::vector<std::uint8_t>> reports{};
 
   void push(const spacemouse::Axes& cap) {
     std::vector<std::uint8_t> report{1};
-    for (const std::int16_t axis : cap) {
-      report.push_back(static_cast<std::uint8_t>(axis & 255));
-      report.push_back(static_cast<std::uint8_t>(axis >> 8));
-    }
+    append(report, cap);
     if (split) {
       reports.push_back(report);
-      report = {2, 9, 9, 9, 0, 9, 0};
-    } else {
-      report.insert(report.end(), {9, 9, 9, 0, 9, 0});  // somebody twists it, too
+      report = {2};
     }
+    append(report, twist);
     reports.push_back(report);
   }
 
@@ -54,6 +51,13 @@ class FakeSpaceMouse final : public UsbModel {
   }
 
  private:
+  static void append(std::vector<std::uint8_t>& report, const spacemouse::Axes& axes) {
+    for (const std::int16_t axis : axes) {
+      report.push_back(static_cast<std::uint8_t>(axis & 255));
+      report.push_back(static_cast<std::uint8_t>(axis >> 8));
+    }
+  }
+
   /// A "multi-axis controller" of six axes, ±350, and two buttons (HID 1.11, 6.2.2).
   static constexpr std::array<std::uint8_t, 51> kReportDescriptor = {
       0x05, 0x01, 0x09, 0x08, 0xA1, 0x01,                                                  //

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/base/rotation.h"
 #include "tests/devices/spacemouse/fake_spacemouse.h"
 #include "tests/support/dice.h"
 
@@ -90,6 +91,53 @@ TEST(SpaceMouseDevice, RightIsXLiftedIsYTowardsTheUserIsZ) {
   EXPECT_EQ(SpaceMouseDevice::velocity_for(config, {350, 0, 0}), Vec3::UnitX());
   EXPECT_EQ(SpaceMouseDevice::velocity_for(config, {0, 350, 0}), Vec3::UnitZ());
   EXPECT_EQ(SpaceMouseDevice::velocity_for(config, {0, 0, -350}), Vec3::UnitY());
+}
+
+TEST(SpaceMouseDevice, ATwistTurnsItAboutTheAxisThatTheOperatorSees) {
+  const Vec3 axes[] = {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // Rx, Ry, Rz: right, towards the user, down
+  for (const bool split : {false, true}) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      Bench bench({.dead_band = 0.1, .turn_speed = 0.5});
+      bench.mouse.split = split;
+      bench.mouse.twist = {};
+      bench.mouse.twist[i] = 350;
+      bench.hold({}, 2s);
+      ASSERT_TRUE(bench.sample->orientation);
+      EXPECT_NEAR((rotation_vector(*bench.sample->orientation) - axes[i]).norm(), 0, 2e-3);
+      EXPECT_EQ(bench.sample->position, Vec3::Zero());
+      bench.run(1s);
+      const Quat there = *bench.sample->orientation;
+      EXPECT_NEAR((rotation_vector(there) - axes[i] * 1.05).norm(), 0, 0.01) << "over 100 ms after the last report";
+      bench.mouse.twist[i] = 0;
+      bench.mouse.twist[(i + 1) % 3] = 34;  // in the dead band
+      bench.hold({}, 1s);
+      EXPECT_EQ(bench.sample->orientation, there) << "it stays where it was let go";
+    }
+  }
+}
+
+TEST(SpaceMouseDevice, TwistsAboutTwoAxesFollowEachOtherInTheBaseFrame) {
+  Bench bench({.dead_band = 0, .turn_speed = 1});
+  bench.mouse.twist = {350, 0, 0};
+  bench.hold({}, 992ms);
+  bench.mouse.twist = {0, 0, -350};
+  bench.hold({}, 1s);
+  const Quat exact = product(rotation_by({0, 1, 0}), rotation_by({1, 0, 0}));
+  EXPECT_LT(turn_between(exact, *bench.sample->orientation).norm(), 0.02);
+}
+
+TEST(SpaceMouseDevice, ATwistEndsWhenItIsUnpluggedAndItsOrientationStays) {
+  Bench bench;
+  bench.mouse.twist = {350, 0, 0};
+  bench.hold({}, 160ms);
+  const Quat there = *bench.sample->orientation;
+  EXPECT_GT(rotation_vector(there).x(), 0.1);
+  bench.mouse.unplug();
+  bench.step();
+  EXPECT_FALSE(bench.sample);
+  bench.mouse.plug();
+  bench.run(200ms);
+  EXPECT_LT(turn_between(there, *bench.sample->orientation).norm(), 2e-3);
 }
 
 TEST(SpaceMouseDevice, SpeedGrowsFromZeroAtTheDeadBandsEdge) {
