@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "core/base/expect.h"
 
@@ -23,12 +24,14 @@ double up_to(double max, double size) noexcept {
 
 }  // namespace
 
-ForceLimit::ForceLimit(const Config& config) : config_(config) { expect_above_zero(config.max, "force_limit.max"); }
+ForceLimit::ForceLimit(const Config& config, const char* field) : config_(config) {
+  expect_above_zero(config.max, std::string(field) + ".max");
+}
 
 double ForceLimit::share(const Vec3& asked) const noexcept { return up_to(config_.max, asked.norm()); }
 
-GrowthLimit::GrowthLimit(const Config& config) : config_(config) {
-  expect_above_zero(config.rate, "growth_limit.rate");
+GrowthLimit::GrowthLimit(const Config& config, const char* field) : config_(config) {
+  expect_above_zero(config.rate, std::string(field) + ".rate");
 }
 
 double GrowthLimit::share(const Vec3& asked, const Vec3& before, Duration elapsed) const noexcept {

@@ -11,6 +11,8 @@ namespace tendon {
 // components. So none makes a force longer, turns it or raises a component, and the force still keeps every bound that
 // it kept before: the energy limiter's on the norm or on each axis. A SafeDevice has those that its Config lists.
 //
+// A torque has a limit and a growth limit of its own, in N·m, and a grip, as a vector of one component.
+//
 // Thread-safe: no. Realtime-safe: all but the constructors, which throw std::invalid_argument naming the field.
 
 /// No force is longer than `max`: s = max / ‖F‖. Clipping each component by itself would turn the force; wrapping
@@ -19,9 +21,10 @@ namespace tendon {
 class ForceLimit {
  public:
   struct Config {
-    double max = 0;  ///< N, > 0
+    double max = 0;  ///< N, of a torque N·m; > 0
   };
-  explicit ForceLimit(const Config& config);
+  /// `field`: its name in errors.
+  explicit ForceLimit(const Config& config, const char* field = "force_limit");
   double share(const Vec3& asked) const noexcept;
   double max() const noexcept { return config_.max; }
 
@@ -38,9 +41,10 @@ class ForceLimit {
 class GrowthLimit {
  public:
   struct Config {
-    double rate = 0;  ///< N/s, > 0
+    double rate = 0;  ///< N/s, of a torque N·m/s; > 0
   };
-  explicit GrowthLimit(const Config& config);
+  /// `field`: its name in errors.
+  explicit GrowthLimit(const Config& config, const char* field = "growth_limit");
   /// `before`: the force really held for the last `elapsed`.
   double share(const Vec3& asked, const Vec3& before, Duration elapsed) const noexcept;
 

@@ -2,10 +2,12 @@
 #include "devices/safety/safe_device.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <stdexcept>
 
 #include "core/base/expect.h"
+#include "core/base/rotation.h"
 
 namespace tendon {
 
@@ -24,10 +26,21 @@ std::optional<Part> made(const std::optional<Config>& config, More... more) {
   return Part(*config, more...);
 }
 
-DeviceInfo limited_info(DeviceInfo info, const std::optional<ForceLimit>& limit) {
-  if (limit) info.max_force = info.max_force > 0 ? std::min(info.max_force, limit->max()) : limit->max();
+DeviceInfo limited_info(DeviceInfo info, const std::optional<ForceLimit>& force,
+                        const std::optional<ForceLimit>& torque, const std::optional<ForceLimit>& grip) {
+  if (force) info.max_force = info.max_force > 0 ? std::min(info.max_force, force->max()) : force->max();
+  // 0 = no motor here, and a limit makes none.
+  if (torque) info.max_torque = std::min(info.max_torque, torque->max());
+  if (grip && info.gripper) info.gripper->max_force = std::min(info.gripper->max_force, grip->max());
   return info;
 }
+
+bool is_finite(const Effort& effort) noexcept {
+  return effort.force.allFinite() && effort.torque.allFinite() && std::isfinite(effort.grip);
+}
+
+/// The grip as a vector, for the parts that are made for forces.
+Vec3 along(double grip) noexcept { return {grip, 0, 0}; }
 
 }  // namespace
 
@@ -69,6 +82,10 @@ std::string_view to_string(SafetyFault fault) noexcept {
       return "the device gave no position in time";
     case SafetyFault::kDeviceLost:
       return "the device was unplugged or has lost its origin";
+    case SafetyFault::kNoRotation:
+      return "the device measured an orientation that is no rotation";
+    case SafetyFault::kTurnsTooFast:
+      return "the handle turned faster than a hand that holds it";
   }
   return "unknown";
 }
@@ -85,14 +102,20 @@ SafeDevice::SafeDevice(const Config& config, Device& device)
       step_bound_(made<StepBound>(config.step_bound, device.info().position_resolution)),
       command_watchdog_(made<Watchdog>(config.command_watchdog, "command_watchdog")),
       link_watchdog_(made<Watchdog>(config.link_watchdog, "link_watchdog")),
-      dead_man_(made<DeadManSwitch>(config.dead_man)) {
+      dead_man_(made<DeadManSwitch>(config.dead_man)),
+      torque_limit_(made<ForceLimit>(config.torque_limit, "torque_limit")),
+      torque_growth_limit_(made<GrowthLimit>(config.torque_growth_limit, "torque_growth_limit")),
+      turn_trip_(made<TurnTrip>(config.turn_trip, device.info().angular_resolution)),
+      grip_limit_(made<ForceLimit>(config.grip_limit, "grip_limit")),
+      grip_growth_limit_(made<GrowthLimit>(config.grip_growth_limit, "grip_growth_limit")) {
   expect_above_zero(arming_.rest_speed, "arming.rest_speed");
   expect_above_zero(arming_.rest_force, "arming.rest_force");
+  expect_above_zero(arming_.rest_torque, "arming.rest_torque");
   expect_above_zero(seconds(arming_.patience), "arming.patience");
   if (arming_.by == Arming::By::kDeadMan && !dead_man_) {
     throw std::invalid_argument("dead_man: expected to be listed, because the device is armed by its button");
   }
-  info_ = limited_info(device.info(), force_limit_);
+  info_ = limited_info(device.info(), force_limit_, torque_limit_, grip_limit_);
   if (arming_.by == Arming::By::kStart) request_until_ = LocalTime::max();
   publish();
 }
@@ -120,7 +143,7 @@ void SafeDevice::leave_armed() noexcept {
 std::optional<PositionSample> SafeDevice::read(LocalTime now) noexcept {
   passed_ = now_ ? std::max(now - *now_, Duration::zero()) : Duration::zero();
   now_ = now;
-  if (heat_limit_) heat_limit_->observe(applied_.norm(), passed_);
+  if (heat_limit_) heat_limit_->observe(applied_.force.norm(), passed_);
   auto sample = device_.read(now);
   if (sample && !accept(*sample)) sample.reset();
   if (now - heard_at_ > kBlind) rest_.reset();
@@ -129,13 +152,25 @@ std::optional<PositionSample> SafeDevice::read(LocalTime now) noexcept {
   return sample;
 }
 
+/// Whether the sample has numbers that mean something.
+bool SafeDevice::is_sound(const PositionSample& sample) noexcept {
+  if (!sample.position.allFinite() || (sample.opening && !std::isfinite(*sample.opening))) {
+    trip(SafetyFault::kPositionNotFinite);
+    return false;
+  }
+  if (sample.orientation && !is_rotation(*sample.orientation)) {
+    trip(SafetyFault::kNoRotation);
+    return false;
+  }
+  return true;
+}
+
 bool SafeDevice::accept(const PositionSample& sample) noexcept {
   if (device_.state() != State::kHomed) {
     forget_motion();
     return false;
   }
-  if (!sample.position.allFinite()) {
-    trip(SafetyFault::kPositionNotFinite);
+  if (!is_sound(sample)) {
     forget_motion();
     return false;
   }
@@ -148,6 +183,9 @@ bool SafeDevice::accept(const PositionSample& sample) noexcept {
   last_ = sample;
   heard_at_ = sample.at;
   if (speed_trip_ && speed_trip_->tripped(sample.at, sample.position)) trip(SafetyFault::kTooFast);
+  if (turn_trip_ && sample.orientation && turn_trip_->tripped(sample.at, *sample.orientation)) {
+    trip(SafetyFault::kTurnsTooFast);
+  }
   watch_rest(sample);
   watch_button(sample.buttons);
   return true;
@@ -196,39 +234,72 @@ void SafeDevice::forget_motion() noexcept {
   last_.reset();
   rest_.reset();
   if (speed_trip_) speed_trip_->forget();
+  if (turn_trip_) turn_trip_->forget();
 }
 
-bool SafeDevice::may_be_armed(const Vec3& asked) const noexcept {
+bool SafeDevice::may_be_armed(const Effort& asked) const noexcept {
   return now_ && *now_ <= request_until_ && device_.state() == State::kHomed && rest_ &&
-         last_->at - rest_->at >= kRest && asked.norm() <= arming_.rest_force && (!dead_man_ || button_held_) &&
-         !(link_watchdog_ && link_watchdog_->tripped(*now_ - heard_at_));
+         last_->at - rest_->at >= kRest && asked.force.norm() <= arming_.rest_force &&
+         asked.torque.norm() <= arming_.rest_torque && std::abs(asked.grip) <= arming_.rest_force &&
+         (!dead_man_ || button_held_) && !(link_watchdog_ && link_watchdog_->tripped(*now_ - heard_at_));
 }
 
-Vec3 SafeDevice::limited(const Vec3& asked) const noexcept {
-  Vec3 force = asked;
-  const auto give = [&force](double share) { force *= share; };
-  if (force_limit_) give(force_limit_->share(force));
-  if (heat_limit_) give(heat_limit_->share(force));
-  if (workspace_ && last_) give(workspace_->share(force, last_->position));
+Effort SafeDevice::limited(const Effort& asked) const noexcept {
+  Effort effort = asked;
+  const auto give = [&effort](double share) {
+    effort.force *= share;
+    effort.torque *= share;
+  };
+  if (force_limit_) give(force_limit_->share(effort.force));
+  if (torque_limit_) give(torque_limit_->share(effort.torque));
+  if (heat_limit_) give(heat_limit_->share(effort.force));
+  if (workspace_ && last_) give(workspace_->share(effort.force, last_->position));
   if (ramp_in_) give(ramp_in_->share(*now_ - armed_at_));
   if (stopping_) give(stopping_->share(*now_));
-  if (growth_limit_) give(growth_limit_->share(force, applied_, std::min(passed_, kLongestStep)));
-  return force;
+  const Duration step = std::min(passed_, kLongestStep);
+  if (growth_limit_) give(growth_limit_->share(effort.force, applied_.force, step));
+  if (torque_growth_limit_) give(torque_growth_limit_->share(effort.torque, applied_.torque, step));
+  if (effort.grip != 0) effort.grip = limited_grip(effort.grip);
+  return effort;
 }
 
-Vec3 SafeDevice::apply(const Vec3& force) noexcept {
-  const bool finite = force.allFinite();
+double SafeDevice::limited_grip(double asked) const noexcept {
+  double grip = asked;
+  if (grip_limit_) grip *= grip_limit_->share(along(grip));
+  if (ramp_in_) grip *= ramp_in_->share(*now_ - armed_at_);
+  if (stopping_) grip *= stopping_->share(*now_);
+  if (grip_growth_limit_) {
+    grip *= grip_growth_limit_->share(along(grip), along(applied_.grip), std::min(passed_, kLongestStep));
+  }
+  return grip;
+}
+
+bool SafeDevice::armed_for(const Effort& asked) noexcept {
+  const bool finite = is_finite(asked);
   if (!finite) trip(SafetyFault::kForceNotFinite);
   if (device_.state() != State::kHomed) trip(SafetyFault::kDeviceLost);
   if (stage_ == Stage::kArmed && stopped()) stage_ = Stage::kFault;
-  if (stage_ != Stage::kArmed && finite && may_be_armed(force)) {
+  if (stage_ != Stage::kArmed && finite && may_be_armed(asked)) {
     stage_ = Stage::kArmed;
     stopping_.reset();
     request_until_ = LocalTime::min();
     armed_at_ = *now_;
     ++times_armed_;
   }
-  applied_ = device_.apply(stage_ == Stage::kArmed ? limited(force) : Vec3(Vec3::Zero()));
+  return stage_ == Stage::kArmed;
+}
+
+Vec3 SafeDevice::apply(const Vec3& force) noexcept {
+  const Effort asked{.force = force};
+  const Vec3 given = armed_for(asked) ? limited(asked).force : Vec3(Vec3::Zero());
+  applied_ = {.force = device_.apply(given)};
+  if (now_) applied_at_ = *now_;
+  publish();
+  return applied_.force;
+}
+
+Effort SafeDevice::apply_all(const Effort& effort) noexcept {
+  applied_ = device_.apply_all(armed_for(effort) ? limited(effort) : Effort());
   if (now_) applied_at_ = *now_;
   publish();
   return applied_;

@@ -27,13 +27,15 @@ std::string_view to_string(SafetyState state) noexcept;
 /// Why an armed device gives no force any more.
 enum class SafetyFault : std::uint8_t {
   kNone,
-  kForceNotFinite,     ///< NaN or infinity was asked for
-  kPositionNotFinite,  ///< the device measured NaN or infinity
+  kForceNotFinite,     ///< NaN or infinity was asked for: of a force, torque or grip
+  kPositionNotFinite,  ///< the device measured NaN or infinity: a position or an opening
   kPositionJumped,     ///< StepBound
   kTooFast,            ///< SpeedTrip
   kCommandSilent,      ///< nobody called `apply` in time (Watchdog)
   kDeviceSilent,       ///< the device gave no position in time (Watchdog)
   kDeviceLost,         ///< it is not homed any more: unplugged, or lost its origin
+  kNoRotation,         ///< the device measured an orientation that is not a rotation
+  kTurnsTooFast,       ///< TurnTrip
 };
 /// A sentence for people: "the handle was faster than a hand".
 std::string_view to_string(SafetyFault fault) noexcept;
@@ -50,10 +52,16 @@ std::string_view to_string(SafetyFault fault) noexcept;
 ///
 ///     Absent → Opening → Firmware → Unhomed → Homed ⇄ Armed → Fault → Armed
 ///
+/// **Torque and grip** (`apply_all`) have all of this too. Force and torque have one share, so a wrench keeps its
+/// direction: the least that any part demands of the force or of the torque. The workspace and the heat look at the
+/// force alone, and their shares hold for the torque as well. The grip has a limit and a growth limit of its own, the
+/// same ramps, and the same ends. `apply` gives no torque and no grip.
+///
 /// **Arming** needs a request (Arming::By). The first `apply` grants it at which all of this holds: the device is
 /// homed; for 50 ms its handle has moved no further than `rest_speed` allows, and no two positions were more than 10 ms
-/// apart; the force asked for is at most `rest_force`; the dead man's button, if the scene lists one, is held. A
-/// request that is not granted within `patience` is forgotten. So is a request before the first `read`.
+/// apart; the force and the grip asked for are at most `rest_force`, the torque at most `rest_torque`; the dead man's
+/// button, if the scene lists one, is held. A handle that only turns is at rest. A request that is not granted within
+/// `patience` is forgotten. So is a request before the first `read`.
 ///
 /// **Faults** are latched in Armed only. Outside Armed there is no force to take away, and a trouble there keeps the
 /// device from being armed. The force is zero from the next `apply` on. A watchdog with a ramp takes the force to zero
@@ -68,7 +76,8 @@ std::string_view to_string(SafetyFault fault) noexcept;
 /// This layer cannot act while nobody calls it. When the whole process hangs or dies, the device's own watchdog ends
 /// the force, or the guardian does (guardian.h).
 ///
-/// A position that is not a number, or that jumped (StepBound), is passed on as no position.
+/// A sample whose position or opening is not a number, whose orientation is no rotation, or that jumped (StepBound), is
+/// passed on as no sample.
 ///
 /// Thread-safe: no; but `status` may be read from any thread. Realtime-safe: all but the constructor.
 class SafeDevice final : public Device {
@@ -80,8 +89,9 @@ class SafeDevice final : public Device {
       kDeadMan,  ///< only by pressing the dead man's button; `arm` only takes a `disarm` back
     };
     By by = By::kRequest;
-    double rest_speed = 0.02;  ///< m/s, > 0
-    double rest_force = 0.1;   ///< N, > 0
+    double rest_speed = 0.02;   ///< m/s, > 0
+    double rest_force = 0.1;    ///< N, > 0
+    double rest_torque = 0.01;  ///< N·m, > 0
     Duration patience = std::chrono::seconds(1);
   };
 
@@ -97,6 +107,11 @@ class SafeDevice final : public Device {
     std::optional<Watchdog::Config> command_watchdog;  ///< between two calls of `apply`
     std::optional<Watchdog::Config> link_watchdog;     ///< since the newest position was sampled
     std::optional<DeadManSwitch::Config> dead_man;
+    std::optional<ForceLimit::Config> torque_limit;          ///< N·m
+    std::optional<GrowthLimit::Config> torque_growth_limit;  ///< N·m/s
+    std::optional<TurnTrip::Config> turn_trip;
+    std::optional<ForceLimit::Config> grip_limit;          ///< N
+    std::optional<GrowthLimit::Config> grip_growth_limit;  ///< N/s
   };
 
   struct Status {
@@ -117,6 +132,7 @@ class SafeDevice final : public Device {
   std::uint32_t faults() const noexcept override { return faults_; }
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
+  Effort apply_all(const Effort& effort) noexcept override;
 
   Status status() const noexcept;
 
@@ -130,9 +146,13 @@ class SafeDevice final : public Device {
   void leave_armed() noexcept;
   void trip(SafetyFault fault, Duration ramp = Duration::zero()) noexcept;
   void forget_motion() noexcept;
-  bool may_be_armed(const Vec3& asked) const noexcept;
+  bool may_be_armed(const Effort& asked) const noexcept;
+  /// Whether the device is armed for what is asked; arms it when it may be.
+  bool armed_for(const Effort& asked) noexcept;
   bool stopped() const noexcept;
-  Vec3 limited(const Vec3& asked) const noexcept;
+  Effort limited(const Effort& asked) const noexcept;
+  double limited_grip(double asked) const noexcept;
+  bool is_sound(const PositionSample& sample) noexcept;
   SafetyState safety_state() const noexcept;
   void publish() noexcept;
 
@@ -149,6 +169,11 @@ class SafeDevice final : public Device {
   std::optional<Watchdog> command_watchdog_;
   std::optional<Watchdog> link_watchdog_;
   std::optional<DeadManSwitch> dead_man_;
+  std::optional<ForceLimit> torque_limit_;
+  std::optional<GrowthLimit> torque_growth_limit_;
+  std::optional<TurnTrip> turn_trip_;
+  std::optional<ForceLimit> grip_limit_;
+  std::optional<GrowthLimit> grip_growth_limit_;
 
   Stage stage_ = Stage::kWaiting;
   std::optional<RampOut> stopping_;             ///< a fault whose force is on its way to zero
@@ -164,7 +189,7 @@ class SafeDevice final : public Device {
   LocalTime heard_at_{};  ///< when the newest good position was sampled
   LocalTime applied_at_{};
   LocalTime armed_at_{};
-  Vec3 applied_ = Vec3::Zero();  ///< N, what the device really holds
+  Effort applied_;  ///< what the device really holds
 
   std::uint32_t times_armed_ = 0;
   SafetyFault last_fault_ = SafetyFault::kNone;

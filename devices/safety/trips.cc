@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/expect.h"
+#include "core/base/rotation.h"
 
 namespace tendon {
 
@@ -19,6 +20,23 @@ bool SpeedTrip::tripped(LocalTime at, const Vec3& position) noexcept {
 }
 
 void SpeedTrip::forget() noexcept { estimator_ = VelocityEstimator(resolution_); }
+
+TurnTrip::TurnTrip(const Config& config, double resolution)
+    : config_(config), resolution_(resolution), estimator_(resolution) {
+  expect_above_zero(config.max, "turn_trip.max");
+}
+
+bool TurnTrip::tripped(LocalTime at, const Quat& orientation) noexcept {
+  if (before_) turned_ += turn_between(*before_, orientation);
+  before_ = orientation;
+  return !(estimator_.observe(at, turned_).norm() <= config_.max);
+}
+
+void TurnTrip::forget() noexcept {
+  estimator_ = VelocityEstimator(resolution_);
+  before_.reset();
+  turned_.setZero();
+}
 
 StepBound::StepBound(const Config& config, double resolution) : config_(config), resolution_(resolution) {
   expect_above_zero(config.max_speed, "step_bound.max_speed");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/base/motion.h"
 #include "core/estimation/velocity_estimator.h"
@@ -31,6 +32,28 @@ class SpeedTrip {
   Config config_;
   double resolution_;
   VelocityEstimator estimator_;
+};
+
+/// Trips when the handle turns faster than any hand turns it. It adds up the small turns from sample to sample, and
+/// estimates the speed of that sum as SpeedTrip does.
+class TurnTrip {
+ public:
+  struct Config {
+    double max = 0;  ///< rad/s, > 0
+  };
+  /// `resolution`: one encoder count, rad, ≥ 0, for the VelocityEstimator.
+  TurnTrip(const Config& config, double resolution);
+  /// The next orientation, sampled at `at`. It has to be a rotation.
+  bool tripped(LocalTime at, const Quat& orientation) noexcept;
+  /// Forgets all orientations so far: the next one is the first.
+  void forget() noexcept;
+
+ private:
+  Config config_;
+  double resolution_;
+  VelocityEstimator estimator_;
+  std::optional<Quat> before_;
+  Vec3 turned_ = Vec3::Zero();  ///< rad, the sum
 };
 
 /// Trips when a position is further from the one before than `max_speed` and one count on each axis allow: the encoders

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/base/rotation.h"
 #include "tests/devices/safety/safety_rig.h"
 #include "tests/support/dice.h"
 
@@ -35,6 +36,11 @@ SafeDevice::Config everything() {
   config.command_watchdog = Watchdog::Config{.timeout = 30ms, .ramp = kRamp};
   config.link_watchdog = Watchdog::Config{.timeout = 20ms, .ramp = kRamp};
   config.dead_man = DeadManSwitch::Config{.button = 0};
+  config.torque_limit = ForceLimit::Config{.max = 0.2};
+  config.torque_growth_limit = GrowthLimit::Config{.rate = 50};
+  config.turn_trip = TurnTrip::Config{.max = 20};
+  config.grip_limit = ForceLimit::Config{.max = 5};
+  config.grip_growth_limit = GrowthLimit::Config{.rate = 500};
   return config;
 }
 
@@ -82,6 +88,26 @@ const std::array kTroubles = {
               rig.puppet.position.x() = kNaN;
               rig.step(kPush);
               rig.puppet.position.x() = 0;
+            }},
+    Trouble{"a torque that is no number", SafetyFault::kForceNotFinite,
+            [](Rig& rig) {
+              rig.step_all({.force = kPush, .torque = {0, 0, kNaN}});
+            }},
+    Trouble{"a grip that is no number", SafetyFault::kForceNotFinite,
+            [](Rig& rig) { rig.step_all({.force = kPush, .grip = kNaN}); }},
+    Trouble{"an orientation that is no rotation", SafetyFault::kNoRotation,
+            [](Rig& rig) {
+              rig.puppet.orientation = Quat{0.5, 0, 0, 0};
+              rig.step(kPush);
+              rig.puppet.orientation.reset();
+            }},
+    Trouble{"a spin", SafetyFault::kTurnsTooFast,
+            [](Rig& rig) {
+              for (int i = 0; i < 20; ++i) {
+                rig.puppet.orientation = rotation_by({0, 0.05 * i, 0});
+                rig.step(kPush);
+              }
+              rig.puppet.orientation.reset();
             }},
     Trouble{"a jump", SafetyFault::kPositionJumped,
             [](Rig& rig) {
@@ -160,7 +186,7 @@ TEST(SafeDevice, EveryFaultInEveryStateEndsInZeroForce) {
       }
     }
   }
-  EXPECT_EQ(latched.size(), 7U);
+  EXPECT_EQ(latched.size(), 9U);
 }
 
 // --- The operator disarms ----------------------------------------------------------------------------------

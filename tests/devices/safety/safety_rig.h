@@ -21,7 +21,10 @@ struct Puppet final : Device {
   std::uint32_t buttons = 0;
   bool answers = true;
   Duration age{};  ///< of the samples
+  std::optional<Quat> orientation{};
+  std::optional<double> opening{};
   Vec3 told = Vec3::Constant(kNaN);
+  Effort told_all{};
 
   const DeviceInfo& info() const noexcept override { return about; }
   State state() const noexcept override { return stage; }
@@ -29,9 +32,15 @@ struct Puppet final : Device {
     if (!answers) return std::nullopt;
     PositionSample sample{now - age, position};
     sample.buttons = buttons;
+    sample.orientation = orientation;
+    sample.opening = opening;
     return sample;
   }
   Vec3 apply(const Vec3& force) noexcept override { return told = force; }
+  Effort apply_all(const Effort& effort) noexcept override {
+    told = effort.force;
+    return told_all = effort;
+  }
 };
 
 /// A safe device around a puppet, and the loop that steps it at 1 kHz.
@@ -43,6 +52,17 @@ struct Rig {
     now += std::chrono::milliseconds(1);
     seen = safe.read(now).has_value();
     return safe.apply(asked);
+  }
+  /// The same with the whole effort.
+  Effort step_all(const Effort& asked) {
+    now += std::chrono::milliseconds(1);
+    seen = safe.read(now).has_value();
+    return safe.apply_all(asked);
+  }
+  Effort steps_all(int count, const Effort& asked) {
+    Effort last;
+    for (int i = 0; i < count; ++i) last = step_all(asked);
+    return last;
   }
   Vec3 steps(int count, const Vec3& asked = Vec3::Zero()) {
     Vec3 last = Vec3::Zero();

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The safety layer around a handle with motors that turn and grip.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "core/base/rotation.h"
+#include "devices/safety/safe_device.h"
+#include "tests/devices/safety/safety_rig.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+using By = SafeDevice::Arming::By;
+
+const Effort kAll{.force = {3, 0, -4}, .torque = {0, 0.1, 0}, .grip = -2};
+const Effort kNothing{};
+
+Effort scaled(double share, const Effort& effort) {
+  return {.force = share * effort.force, .torque = share * effort.torque, .grip = share * effort.grip};
+}
+
+void expect_near(const Effort& a, const Effort& b) {
+  EXPECT_NEAR((a.force - b.force).norm() + (a.torque - b.torque).norm() + std::abs(a.grip - b.grip), 0, 1e-12);
+}
+
+TEST(SafeWrench, GivesNoTorqueAndNoGripUntilItIsArmed) {
+  Rig rig;
+  EXPECT_EQ(rig.steps_all(200, kAll), kNothing);
+  EXPECT_EQ(rig.puppet.told_all, kNothing);
+  rig.arm();
+  EXPECT_EQ(rig.step_all(kAll), kAll);
+  EXPECT_EQ(rig.puppet.told_all, kAll);
+}
+
+TEST(SafeWrench, WithNothingListedGivesEveryEffortToTheLastBitOnceArmed) {
+  Rig rig;
+  rig.arm();
+  Dice dice(1);
+  for (int i = 0; i < 1000; ++i) {
+    const Effort asked{.force = dice.direction() * dice.decades(-3, 2),
+                       .torque = dice.direction() * dice.decades(-4, 1),
+                       .grip = dice.within(-5, 5)};
+    ASSERT_EQ(rig.step_all(asked), asked);
+  }
+}
+
+TEST(SafeWrench, IsNotArmedWhileATorqueOrAGripIsAskedFor) {
+  for (const Effort& asked : {Effort{.torque = {0, 0.011, 0}}, Effort{.grip = -0.11}, Effort{.torque = {kNaN, 0, 0}}}) {
+    Rig rig;
+    for (int i = 0; i < 300; ++i) {
+      rig.safe.arm();
+      ASSERT_EQ(rig.step_all(asked), kNothing);
+    }
+    EXPECT_EQ(rig.state(), SafetyState::kHomed);
+  }
+  Rig rig;
+  for (int i = 0; i < 300; ++i) {
+    rig.step_all({.torque = {0, 0.009, 0}, .grip = 0.09});
+    rig.safe.arm();
+  }
+  EXPECT_EQ(rig.state(), SafetyState::kArmed);
+}
+
+TEST(SafeWrench, ForceAndTorqueAreShortenedByOneShareAndTheGripByItsOwn) {
+  SafeDevice::Config config;
+  config.force_limit = ForceLimit::Config{.max = 4};
+  config.torque_limit = ForceLimit::Config{.max = 0.2};
+  config.grip_limit = ForceLimit::Config{.max = 3};
+  Rig rig(config);
+  rig.arm();
+  Dice dice(2);
+  for (int i = 0; i < 2000; ++i) {
+    const Effort asked{.force = dice.direction() * dice.within(0.1, 8),
+                       .torque = dice.direction() * dice.within(0.01, 0.4),
+                       .grip = dice.within(-6, 6)};
+    const Effort given = rig.step_all(asked);
+    const double share = std::min({1.0, 4 / asked.force.norm(), 0.2 / asked.torque.norm()});
+    ASSERT_NEAR((given.force - share * asked.force).norm(), 0, 1e-12);
+    ASSERT_NEAR((given.torque - share * asked.torque).norm(), 0, 1e-12);
+    ASSERT_NEAR(given.grip, std::clamp(asked.grip, -3.0, 3.0), 1e-12);
+  }
+}
+
+TEST(SafeWrench, NothingGrowsFasterThanItsRateAndAllFallAtOnce) {
+  SafeDevice::Config config;
+  config.torque_growth_limit = GrowthLimit::Config{.rate = 10};  // 10 mN·m in each step
+  config.grip_growth_limit = GrowthLimit::Config{.rate = 500};   // 0.5 N
+  Rig rig(config);
+  rig.arm();
+  for (int i = 1; i <= 12; ++i) {
+    const Effort given = rig.step_all(kAll);
+    const double share = std::min(1.0, i * 0.1);
+    ASSERT_NEAR(given.torque.y(), share * 0.1, 1e-12);
+    ASSERT_NEAR((given.force - share * kAll.force).norm(), 0, 1e-12) << "the wrench keeps its direction";
+    ASSERT_NEAR(given.grip, -std::min(2.0, i * 0.5), 1e-12);
+  }
+  EXPECT_EQ(rig.step_all(kNothing), kNothing);
+  rig.steps_all(12, kAll);
+  const Effort turned = rig.step_all({.torque = {0, -0.1, 0}, .grip = 2});
+  EXPECT_NEAR(turned.torque.y(), -0.01, 1e-12) << "what reverses begins at zero";
+  EXPECT_NEAR(turned.grip, 0.5, 1e-12);
+}
+
+TEST(SafeWrench, AllIsRampedInAfterArming) {
+  SafeDevice::Config config;
+  config.ramp_in = RampIn::Config{.time = 100ms};
+  Rig rig(config);
+  rig.arm();
+  for (int ms = 1; ms <= 120; ++ms) expect_near(rig.step_all(kAll), scaled(std::min(1.0, ms / 100.0), kAll));
+}
+
+TEST(SafeWrench, ASilentDevicesTorqueAndGripFallWithinTheRamp) {
+  SafeDevice::Config config;
+  config.link_watchdog = Watchdog::Config{.timeout = 20ms, .ramp = 10ms};
+  Rig rig(config);
+  rig.arm();
+  rig.puppet.answers = false;
+  rig.steps_all(20, kAll);
+  for (int ms = 0; ms < 10; ++ms) expect_near(rig.step_all(kAll), scaled(1 - ms / 10.0, kAll));
+  EXPECT_EQ(rig.step_all(kAll), kNothing);
+  EXPECT_EQ(rig.fault(), SafetyFault::kDeviceSilent);
+}
+
+TEST(SafeWrench, WhoLetsGoOfTheDeadMansButtonHasNoneAtOnce) {
+  SafeDevice::Config config;
+  config.arming.by = By::kDeadMan;
+  config.dead_man = DeadManSwitch::Config{.button = 2};
+  Rig rig(config);
+  rig.steps(60);
+  rig.puppet.buttons = 4;
+  rig.step();
+  EXPECT_EQ(rig.step_all(kAll), kAll);
+  rig.puppet.buttons = 0;
+  EXPECT_EQ(rig.step_all(kAll), kNothing);
+  EXPECT_EQ(rig.puppet.told_all, kNothing);
+  EXPECT_EQ(rig.state(), SafetyState::kHomed);
+}
+
+TEST(SafeWrench, OutsideTheWorkspaceAWrenchIsReducedAsItsForce) {
+  SafeDevice::Config config;
+  config.workspace = Workspace::Config{.shape = Workspace::Sphere{.radius = 0.05}, .margin = 0.01};
+  Rig rig(config);
+  rig.puppet.position = {0.055, 0, 0};
+  rig.arm();
+  const Effort outwards = rig.step_all({.force = {2, 0, 0}, .torque = {0, 0.1, 0}, .grip = 1});
+  expect_near(outwards, {.force = {1, 0, 0}, .torque = {0, 0.05, 0}, .grip = 1});
+  EXPECT_EQ(rig.step_all({.torque = {0, 0.1, 0}}), (Effort{.torque = {0, 0.1, 0}})) << "a torque pushes nobody out";
+}
+
+TEST(SafeWrench, WhatIsNoNumberIsNoneAndAFaultThatStays) {
+  for (Effort bad : {Effort{.torque = {0, kNaN, 0}}, Effort{.torque = {0, 0, INFINITY}}, Effort{.grip = kNaN}}) {
+    Rig rig;
+    rig.arm();
+    bad.force = kPush;
+    EXPECT_EQ(rig.step_all(bad), kNothing);
+    EXPECT_EQ(rig.fault(), SafetyFault::kForceNotFinite);
+    EXPECT_EQ(rig.steps_all(500, kAll), kNothing);
+  }
+}
+
+TEST(SafeWrench, AnOrientationThatIsNoRotationIsNotSeenAndAFault) {
+  for (const Quat& bad : {Quat{0, 0, 0, 0}, Quat{1.01, 0, 0, 0}, Quat{1, kNaN, 0, 0}}) {
+    Rig rig;
+    rig.puppet.orientation = rotation_by({0.3, 0, 0});
+    rig.arm();
+    EXPECT_EQ(rig.step_all(kAll), kAll);
+    EXPECT_TRUE(rig.seen);
+    rig.puppet.orientation = bad;
+    EXPECT_EQ(rig.step_all(kAll), kNothing);
+    EXPECT_FALSE(rig.seen);
+    EXPECT_EQ(rig.fault(), SafetyFault::kNoRotation);
+  }
+}
+
+TEST(SafeWrench, AnOpeningThatIsNoNumberIsNotSeenAndAFault) {
+  Rig rig;
+  rig.puppet.opening = 0.2;
+  rig.arm();
+  rig.puppet.opening = kNaN;
+  EXPECT_EQ(rig.step_all(kAll), kNothing);
+  EXPECT_FALSE(rig.seen);
+  EXPECT_EQ(rig.fault(), SafetyFault::kPositionNotFinite);
+}
+
+TEST(SafeWrench, AHandleThatSpinsIsLetGo) {
+  for (const double speed : {9.0, 12.0}) {
+    SafeDevice::Config config;
+    config.turn_trip = TurnTrip::Config{.max = 10};
+    Rig rig(config);
+    rig.puppet.orientation = Quat{};
+    rig.arm();
+    Effort given;
+    for (int i = 0; i < 1000; ++i) {  // past 180°, where the quaternion's sign may be either
+      const Quat q = rotation_by(Vec3(1, 2, 2) / 3 * (speed * 1e-3 * i));
+      rig.puppet.orientation = i % 2 == 0 ? q : Quat{-q.w, -q.x, -q.y, -q.z};
+      given = rig.step_all(kAll);
+    }
+    EXPECT_EQ(given, speed < 10 ? kAll : kNothing);
+    EXPECT_EQ(rig.fault(), speed < 10 ? SafetyFault::kNone : SafetyFault::kTurnsTooFast);
+  }
+}
+
+TEST(SafeWrench, SaysItsLimitsAsItsOwnWhereThereIsAMotor) {
+  SafeDevice::Config config;
+  config.torque_limit = ForceLimit::Config{.max = 0.1};
+  config.grip_limit = ForceLimit::Config{.max = 2};
+  Puppet puppet;
+  EXPECT_EQ(SafeDevice(config, puppet).info().max_torque, 0) << "a limit makes no motor";
+  puppet.about.max_torque = 0.3;
+  puppet.about.gripper = DeviceInfo::Gripper{.open = 0.5, .arm = 0.06, .max_force = 5};
+  EXPECT_EQ(SafeDevice(config, puppet).info().max_torque, 0.1);
+  EXPECT_EQ(SafeDevice(config, puppet).info().gripper->max_force, 2);
+  puppet.about.max_torque = 0.05;
+  EXPECT_EQ(SafeDevice(config, puppet).info().max_torque, 0.05);
+}
+
+TEST(SafeWrench, RefusesImpossibleValuesNamingTheField) {
+  const auto refused = [](const std::string& field, const auto& change) {
+    SafeDevice::Config config;
+    change(config);
+    Puppet puppet;
+    try {
+      const SafeDevice device(config, puppet);
+      ADD_FAILURE() << field << " was taken";
+    } catch (const std::invalid_argument& problem) {
+      EXPECT_EQ(std::string(problem.what()).rfind(field, 0), 0U) << problem.what();
+    }
+  };
+  refused("arming.rest_torque", [](auto& config) { config.arming.rest_torque = 0; });
+  refused("torque_limit.max", [](auto& config) { config.torque_limit.emplace(); });
+  refused("torque_growth_limit.rate", [](auto& config) { config.torque_growth_limit.emplace(); });
+  refused("turn_trip.max", [](auto& config) { config.turn_trip.emplace(); });
+  refused("grip_limit.max", [](auto& config) { config.grip_limit.emplace(); });
+  refused("grip_growth_limit.rate", [](auto& config) { config.grip_growth_limit.emplace(); });
+}
+
+}  // namespace
+}  // namespace tendon
