@@ -117,6 +117,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   if (config_.gripper) gripper_.emplace(*std::exchange(config_.gripper, std::nullopt));
   if (gripper_) info_.gripper = gripper_->info();
   turns_or_grips_ = rotation_ || gripper_;
+  has_more_ = turns_or_grips_ || !config_.presses.empty();
 
   truth_.position = config_.start_position.value_or(hand_ ? hand_->target(0).position : Vec3::Zero());
   truth_.velocity = config_.start_velocity;
@@ -140,8 +141,7 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
   if (config_.encoder_step) sample.position = counted(sample.position, *config_.encoder_step);
   if (config_.force_sensor) sample.hand_force = sensed_force();
   if (config_.button_after) sample.buttons = lived_ >= *config_.button_after ? 1 : 0;
-  if (!config_.presses.empty()) sample.buttons |= pressed();
-  if (turns_or_grips_) sense_turn_and_grip(sample);
+  if (has_more_) sense_more(sample);
   return sample;
 }
 
@@ -153,7 +153,8 @@ std::uint32_t SimulatedDevice::pressed() const noexcept {
   return held;
 }
 
-void SimulatedDevice::sense_turn_and_grip(PositionSample& sample) const noexcept {
+void SimulatedDevice::sense_more(PositionSample& sample) const noexcept {
+  sample.buttons |= pressed();
   if (rotation_) sample.orientation = rotation_->sample();
   if (gripper_) sample.opening = gripper_->sample();
 }
@@ -219,7 +220,13 @@ void SimulatedDevice::hold_torque_and_grip(const Effort& effort) noexcept {
   if (gripper_) gripper_->hold(effort.grip);
 }
 
-void SimulatedDevice::turn_and_grip(Duration::rep substeps, double h) noexcept {
+Duration::rep SimulatedDevice::substeps_in(Duration span) const noexcept {
+  return (span + config_.max_substep - Duration(1)) / config_.max_substep;
+}
+
+void SimulatedDevice::turn_and_grip(Duration span) noexcept {
+  const Duration::rep substeps = substeps_in(span);
+  const double h = seconds(span) / static_cast<double>(substeps);
   if (rotation_) rotation_->integrate(seconds(lived_), substeps, h);
   if (gripper_) gripper_->integrate(seconds(lived_), substeps, h);
 }
@@ -262,10 +269,9 @@ Duration SimulatedDevice::live_with_watchdog(Duration gap) noexcept {
 
 void SimulatedDevice::integrate(Duration span) noexcept {
   if (span <= Duration::zero()) return;
-  const auto substeps = (span + config_.max_substep - Duration(1)) / config_.max_substep;
-  const double h = seconds(span) / static_cast<double>(substeps);
-  (this->*take_substeps_)(substeps, h);
-  if (turns_or_grips_) turn_and_grip(substeps, h);
+  if (turns_or_grips_) turn_and_grip(span);
+  const auto substeps = substeps_in(span);
+  (this->*take_substeps_)(substeps, seconds(span) / static_cast<double>(substeps));
   lived_ += span;
 }
 

@@ -209,13 +209,15 @@ class SimulatedDevice final : public Device {
 
   Vec3 sensed_force() const noexcept;
   std::uint32_t pressed() const noexcept;
-  Vec3 apply_alone(const Vec3& force) noexcept;
+  // Kept out of line, so that a device without such parts pays a branch for them.
+  [[gnu::noinline]] Vec3 apply_alone(const Vec3& force) noexcept;
   Effort written(const Effort& effort) const noexcept;
-  Vec3 send(const Vec3& force) noexcept;
+  [[gnu::noinline]] Vec3 send(const Vec3& force) noexcept;
   void hold(const Effort& effort) noexcept;
-  void hold_torque_and_grip(const Effort& effort) noexcept;
-  void turn_and_grip(Duration::rep substeps, double h) noexcept;
-  void sense_turn_and_grip(PositionSample& sample) const noexcept;
+  [[gnu::noinline]] void hold_torque_and_grip(const Effort& effort) noexcept;
+  [[gnu::noinline]] void turn_and_grip(Duration span) noexcept;
+  Duration::rep substeps_in(Duration span) const noexcept;
+  [[gnu::noinline]] void sense_more(PositionSample& sample) const noexcept;
   void advance(Duration gap) noexcept;
   void live(Duration gap) noexcept;
   Duration live_to_last_arrival(Duration gap) noexcept;
@@ -238,6 +240,7 @@ class SimulatedDevice final : public Device {
   std::optional<SimulatedRotation> rotation_;
   std::optional<SimulatedGripper> gripper_;
   bool turns_or_grips_ = false;  ///< it has one of these two
+  bool has_more_ = false;        ///< … or presses
   Substeps take_substeps_;
   DeviceInfo info_;
   std::optional<LocalTime> last_read_;
