@@ -279,7 +279,7 @@ std::vector<std::string> without_limiter_settings(const Scene& scene) {
     throw std::runtime_error("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
                              std::string(scene.driver().name));
   }
-  return limiter_settings("none", scene.loop.control.limiter.friction);
+  return limiter_settings("none", scene.loop.control);
 }
 
 /// The name becomes a file's name and a word in the log.

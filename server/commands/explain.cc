@@ -57,6 +57,14 @@ std::vector<Listable> make_listables() {
   using Device = SimulatedDevice::Config;
   add("device.hand", "the operator: a spring, a damper and a mass",
       [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).hand); });
+  add("device.rotation", "the handle turns, in the operator's hand", [](Scene& scene) {
+    scene.loop.control.rotation.reset();
+    return drop(std::get<SimulatedDevice::Config>(scene.device).rotation);
+  });
+  add("device.gripper", "two fingers that open and close", [](Scene& scene) {
+    scene.loop.control.grip.reset();
+    return drop(std::get<SimulatedDevice::Config>(scene.device).gripper);
+  });
   effect("viscous_friction_n_s_per_m", "true viscous friction", &Device::viscous_friction);
   effect("coulomb_friction_n", "true Coulomb friction", &Device::coulomb_friction);
   effect("joint_friction", "friction of each joint, by the pose", &Device::joint_friction);
@@ -82,6 +90,11 @@ std::vector<Listable> make_listables() {
   guard("command_watchdog", "a loop that stood still gets no force", &Safety::command_watchdog);
   guard("link_watchdog", "a device that was silent gets no force", &Safety::link_watchdog);
   guard("dead_man", "no force unless the button is held", &Safety::dead_man);
+  guard("torque_limit", "no torque is longer", &Safety::torque_limit);
+  guard("torque_growth_limit", "no torque grows faster", &Safety::torque_growth_limit);
+  guard("turn_trip", "a handle that spins gets no force", &Safety::turn_trip);
+  guard("grip_limit", "no grip is larger", &Safety::grip_limit);
+  guard("grip_growth_limit", "no grip grows faster", &Safety::grip_growth_limit);
   add("limiter", "keeps the device from giving out energy",
       [](Scene& scene) { return std::exchange(scene.loop.control.limiter.law, Law::kNone) != Law::kNone; });
   for_each_aol_part([&add](const auto& part) {
@@ -117,6 +130,7 @@ class Tape final : public Device {
     return sample;
   }
   Vec3 apply(const Vec3& force) noexcept override { return device_.apply(force); }
+  Effort apply_all(const Effort& effort) noexcept override { return device_.apply_all(effort); }
 
  private:
   SimulatedDevice device_;
@@ -137,6 +151,7 @@ class Playback final : public Device {
     return sample;
   }
   Vec3 apply(const Vec3& force) noexcept override { return force; }
+  Effort apply_all(const Effort& effort) noexcept override { return effort; }
 
  private:
   DeviceInfo info_;

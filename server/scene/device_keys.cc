@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -124,7 +125,28 @@ struct Axes {
   static std::string shown(const Unit&, const std::string& value) { return in_quotes(value); }
 };
 
+/// A number along a line, as the x of a point: the opening of a gripper.
+struct AlongX {
+  static std::string expected(const Unit& unit) { return kAnyNumber.expected(unit); }
+
+  static Verdict take(const toml::node& node, const Unit& unit, Vec3& to) {
+    to.setZero();
+    return kAnyNumber.take(node, unit, to.x());
+  }
+
+  static std::string shown(const Unit& unit, const Vec3& value) { return Number::shown(unit, value.x()); }
+};
+
+/// What the keys of a motion are called, by what moves.
+struct MotionNames {
+  std::string_view amplitude, centre, from, to, points, scale, origin;
+};
+constexpr MotionNames kInMm = {"amplitude_mm", "centre_mm", "from_mm", "to_mm", "points_mm", "scale_m", "origin_mm"};
+constexpr MotionNames kInDegrees = {"amplitude_deg", "centre_deg", "from_deg",  "to_deg",
+                                    "points_deg",    "scale_deg",  "origin_deg"};
+
 enum class MechanismKind : std::uint8_t { kFalcon, kArm };
+constexpr std::size_t kMostPresses = 32;
 enum class MotionKind : std::uint8_t { kSine, kRampHold, kMinimumJerk, kRecorded };
 
 Names<const DeviceProfile*> profile_names() {
@@ -202,40 +224,46 @@ void declare_effects(Table& effects, Draft& draft) {
       });
 }
 
-template <class Table>
-void declare_csv(Table& keys, RecordedMotionFile& file) {
+template <class Point = Vector, class Table>
+void declare_csv(Table& keys, RecordedMotionFile& file, const MotionNames& names = kInMm) {
   keys.key("file", file.path, Path{}, "CSV file, relative to the scene file", kRequired);
   keys.key("time_column", file.time, Column{}, "time in s");
-  keys.key("position_column", file.position, Column{}, "position along a line", kRequired);
-  keys.key("scale_m", file.scale, kAnyNumber, "how long one unit of the position is; negative turns it round");
-  keys.key("origin_mm", file.origin, Vector{}, "where position 0 lies");
-  keys.key("direction", file.direction, Vector{}, "of the line; its length does not count");
+  keys.key("position_column", file.position, Column{}, "position along a line, or turn about an axis", kRequired);
+  keys.key(names.scale, file.scale, kAnyNumber, "how much one unit of the position is; negative turns it round",
+           Absent{.text = "1 m or 1 rad"});
+  keys.key(names.origin, file.origin, Point{}, "where position 0 lies");
+  if constexpr (std::is_same_v<Point, Vector>) {
+    keys.key("direction", file.direction, Vector{}, "of the line or the axis; its length does not count");
+  }
 }
 
-template <class Table>
-void declare_motion(Table& motion, Draft& draft) {
-  motion.kind(motion_names(), [&draft](Table& keys, MotionKind kind) {
+/// A motion of points in mm, of rotation vectors in degrees, or of one opening in degrees.
+template <class Point = Vector, class Table>
+void declare_motion(Table& motion, DraftMotion& draft, const MotionNames& names = kInMm) {
+  motion.kind(motion_names(), [&draft, &names](Table& keys, MotionKind kind) {
     switch (kind) {
       case MotionKind::kSine: {
-        auto& sine = std::get<ScriptedMotion::Sine>(draft.motion = ScriptedMotion::Sine{});
-        keys.key("amplitude_mm", sine.amplitude, kZeroOrMore, "to either side of the centre", kRequired);
+        auto& sine = std::get<ScriptedMotion::Sine>(draft.script = ScriptedMotion::Sine{});
+        keys.key(names.amplitude, sine.amplitude, kZeroOrMore, "to either side of the centre", kRequired);
         keys.key("frequency_hz", sine.frequency, kZeroOrMore, "cycles per second", kRequired);
-        keys.key("centre_mm", sine.centre, Vector{}, "where it starts");
-        keys.key("direction", sine.direction, Vector{}, "where it moves first; its length does not count");
+        keys.key(names.centre, sine.centre, Point{}, "where it starts");
+        if constexpr (std::is_same_v<Point, Vector>) {
+          keys.key("direction", sine.direction, Vector{}, "where it moves first; its length does not count");
+        }
         return;
       }
       case MotionKind::kRampHold: {
-        auto& ramp = std::get<ScriptedMotion::RampHold>(draft.motion = ScriptedMotion::RampHold{});
-        keys.key("from_mm", ramp.from, Vector{}, "where it starts", kRequired);
-        keys.key("to_mm", ramp.to, Vector{}, "where it goes at constant speed", kRequired);
+        auto& ramp = std::get<ScriptedMotion::RampHold>(draft.script = ScriptedMotion::RampHold{});
+        keys.key(names.from, ramp.from, Point{}, "where it starts", kRequired);
+        keys.key(names.to, ramp.to, Point{}, "where it goes at constant speed", kRequired);
         keys.key("ramp_ms", ramp.ramp, kAboveZero, "how long the way takes", kRequired);
         keys.key("hold_ms", ramp.hold, kZeroOrMore, "how long it rests at either end, going to and fro for ever",
                  Absent{.text = "it goes once and stays"});
         return;
       }
       case MotionKind::kMinimumJerk: {
-        auto& reach = std::get<ScriptedMotion::MinimumJerk>(draft.motion = ScriptedMotion::MinimumJerk{});
-        keys.key("points_mm", reach.points, ListOf<Vector>{}, "2 or more points; the hand rests at each", kRequired);
+        auto& reach = std::get<ScriptedMotion::MinimumJerk>(draft.script = ScriptedMotion::MinimumJerk{});
+        keys.key(names.points, reach.points, ListOf<Point>{}, "2 or more points; the hand rests at each", kRequired);
         keys.key("durations_ms", reach.durations, ListOf<Number>{kAboveZero}, "the time from each point to the next",
                  kRequired);
         keys.key("back_and_forth", reach.back_and_forth, YesNo{},
@@ -243,12 +271,52 @@ void declare_motion(Table& motion, Draft& draft) {
         return;
       }
       case MotionKind::kRecorded: {
-        auto& file = draft.recorded_motion.emplace();
-        declare_csv(keys, file);
+        auto& file = draft.recorded.emplace();
+        declare_csv<Point>(keys, file, names);
         keys.key("at_end", file.at_end, at_end_names(), "stay at the last sample, or start again");
         return;
       }
     }
+  });
+}
+
+/// How the handle turns.
+template <class Table>
+void declare_rotation(Table& keys, Draft& draft, SimulatedRotation::Config& config) {
+  keys.key("inertia_kg_m2", config.inertia, kAboveZero, "of the handle, the same about every axis", kRequired);
+  keys.key("viscous_friction_nm_s_per_rad", config.viscous_friction, kAboveZero, "true viscous friction");
+  keys.key("coulomb_friction_nm", config.coulomb_friction, kAboveZero, "true Coulomb friction");
+  keys.key("max_torque_nm", config.max_torque, kAboveZero,
+           "the motors give no longer torque; force and torque are shortened by one share",
+           Absent{.text = "it has no motors that turn"});
+  keys.key("encoder_step_rad", config.encoder_step, kAboveZero, "one encoder count, on each axis");
+  keys.key("start_deg", config.start, Vector{}, "rotation vector: the handle is turned about this axis by its length",
+           Absent{.text = "how the hand starts, or not turned"});
+  keys.part("hand", config.hand, [&draft](Table& hand, SimulatedRotation::Hand& grip) {
+    hand.key("stiffness_nm_per_rad", grip.stiffness, kAboveZero, "of the grip, against turning", kRequired);
+    hand.key("damping_nm_s_per_rad", grip.damping, kZeroOrMore, "of the grip, against turning");
+    hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft.turning, kInDegrees); });
+  });
+}
+
+/// Two fingers that open by an angle.
+template <class Table>
+void declare_gripper(Table& keys, Draft& draft, SimulatedGripper::Config& config) {
+  keys.key("open_deg", config.open, Number{.least = 0, .most = 180, .without_least = true}, "its largest opening",
+           kRequired);
+  keys.key("arm_mm_per_rad", config.arm, kAboveZero, "travel of the fingers on each other", kRequired);
+  keys.key("mass_kg", config.mass, kAboveZero, "effective mass of the fingers", kRequired);
+  keys.key("viscous_friction_n_s_per_m", config.viscous_friction, kAboveZero, "true viscous friction, at the fingers");
+  keys.key("coulomb_friction_n", config.coulomb_friction, kAboveZero, "true Coulomb friction, at the fingers");
+  keys.key("max_force_n", config.max_force, kAboveZero, "the motor gives no larger force on the fingers",
+           Absent{.text = "it has no motor"});
+  keys.key("encoder_step_rad", config.encoder_step, kAboveZero, "one encoder count of the opening");
+  keys.key("start_deg", config.start, kZeroOrMore, "how far it is open",
+           Absent{.text = "how the hand starts, or closed"});
+  keys.part("hand", config.hand, [&draft](Table& hand, SimulatedGripper::Hand& grip) {
+    hand.key("stiffness_n_per_m", grip.stiffness, kAboveZero, "of the fingers that hold it", kRequired);
+    hand.key("damping_n_s_per_m", grip.damping, kZeroOrMore, "of the fingers that hold it");
+    hand.table("motion", [&draft](Table& motion) { declare_motion<AlongX>(motion, draft.gripping, kInDegrees); });
   });
 }
 
@@ -280,8 +348,18 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
     hand.key("mass_kg", draft.hand.mass, kZeroOrMore, "moves with the handle", kProfiles);
     hand.key("button_after_ms", draft.simulated.button_after, kZeroOrMore,
              "after this time it presses button 0, and holds it", Absent{.text = "never"});
-    hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft); });
+    hand.tables("press", draft.simulated.presses, kMostPresses,
+                [](Table& presses, SimulatedDevice::Config::Press& press) {
+                  presses.key("button", press.button, Count{31}, "which button it presses");
+                  presses.key("from_ms", press.from, kZeroOrMore, "when it presses it", kRequired);
+                  presses.key("for_ms", press.length, kAboveZero, "how long it holds it", kRequired);
+                });
+    hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft.motion); });
   });
+  keys.part("rotation", config.rotation,
+            [&draft](Table& rotation, SimulatedRotation::Config& part) { declare_rotation(rotation, draft, part); });
+  keys.part("gripper", config.gripper,
+            [&draft](Table& gripper, SimulatedGripper::Config& part) { declare_gripper(gripper, draft, part); });
 }
 
 template <class Table>
@@ -302,7 +380,7 @@ void declare(Table& keys, ReplayDevice::Config& device, Draft& draft) {
   keys.key("at_end", device.at_end, at_end_names(), "stay at the last sample, or start again");
   keys.key("encoder_step_um", device.position_resolution, kZeroOrMore,
            "one encoder count of the device that was recorded; 0: its positions were exact");
-  keys.part("csv", draft.recorded_motion, [](Table& csv, RecordedMotionFile& file) { declare_csv(csv, file); });
+  keys.part("csv", draft.csv, [](Table& csv, RecordedMotionFile& file) { declare_csv(csv, file); });
 }
 
 template <class Table>
@@ -313,6 +391,8 @@ void declare(Table& keys, spacemouse::Config& device, Draft& /*draft*/) {
            "share of the way to the stop in which nothing moves");
   keys.key("reach_mm", device.motion.reach, kAboveZero,
            "the position stays within this distance of the origin, on each axis");
+  keys.key("turn_speed_deg_per_s", device.motion.turn_speed, kAboveZero,
+           "of the turn, with the cap twisted to its stop");
 }
 
 template <class Table>

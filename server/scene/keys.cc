@@ -81,6 +81,8 @@ void declare_safety(Table& safety, SafeDevice::Config& config) {
              "the device is armed only after its handle was no faster than this for 50 ms");
   safety.key("rest_force_n", config.arming.rest_force, kAboveZero,
              "the device is armed only while no larger force than this is asked for");
+  safety.key("rest_torque_nm", config.arming.rest_torque, kAboveZero,
+             "the device is armed only while no larger torque than this is asked for");
   safety.key("patience_ms", config.arming.patience, kAboveZero,
              "a request to arm that is not granted within this time is forgotten");
   safety.part("force_limit", config.force_limit, [](Table& keys, ForceLimit::Config& part) {
@@ -118,6 +120,27 @@ void declare_safety(Table& safety, SafeDevice::Config& config) {
   });
   safety.part("dead_man", config.dead_man, [](Table& keys, DeadManSwitch::Config& part) {
     keys.key("button", part.button, Count{31}, "no force unless this button is held", kRequired);
+  });
+  safety.part("torque_limit", config.torque_limit, [](Table& keys, ForceLimit::Config& part) {
+    keys.key("max_nm", part.max, kAboveZero,
+             "a longer torque is shortened to this, and the force by the same share: a wrench keeps its direction",
+             kRequired);
+  });
+  safety.part("torque_growth_limit", config.torque_growth_limit, [](Table& keys, GrowthLimit::Config& part) {
+    keys.key("rate_nm_per_s", part.rate, kAboveZero,
+             "a torque grows no faster than this, and its force no faster in proportion; it may fall at once",
+             kRequired);
+  });
+  safety.part("turn_trip", config.turn_trip, [](Table& keys, TurnTrip::Config& part) {
+    keys.key("max_deg_per_s", part.max, kAboveZero,
+             "a handle that turns faster than this is a fault: no force until the device is armed again", kRequired);
+  });
+  safety.part("grip_limit", config.grip_limit, [](Table& keys, ForceLimit::Config& part) {
+    keys.key("max_n", part.max, kAboveZero, "a larger force on the fingers is reduced to this", kRequired);
+  });
+  safety.part("grip_growth_limit", config.grip_growth_limit, [](Table& keys, GrowthLimit::Config& part) {
+    keys.key("rate_n_per_s", part.rate, kAboveZero,
+             "a force on the fingers grows no faster than this; it may fall at once", kRequired);
   });
 }
 
@@ -188,6 +211,30 @@ void declare_between(Table& force, HeldForce::Config& hold) {
     keys.key("max_stiffness_n_per_m", config.max_stiffness, kAboveZero, "no stiffer environment is believed");
     keys.key("largest_n", config.max_force, kAboveZero, "the largest estimate of the force, on each axis");
     keys.key("resolution_um", config.resolution, kZeroOrMore, "one encoder count: motion below it teaches nothing");
+  });
+}
+
+/// What the limiter counts on of a handle that turns and grips.
+template <class Table>
+void declare_handle_bounds(Table& limiter, Draft& draft) {
+  limiter.table("rotation", [&draft](Table& keys) {
+    constexpr Absent kMotors{.text = "required of a device with motors that turn its handle"};
+    keys.key("coulomb_friction_nm", draft.rotation_bounds.coulomb, kZeroOrMore,
+             "lower bound of the Coulomb friction of the device's rotation", kMotors);
+    keys.key("viscous_friction_nm_s_per_rad", draft.rotation_bounds.viscous, kZeroOrMore,
+             "lower bound of the viscous friction of the device's rotation", kMotors);
+    keys.key("most_rad_per_s2", draft.most_angular_acceleration, kAboveZero,
+             "for bounded_acceleration: the largest angular acceleration of the handle",
+             Absent{.text = "required with bounded_acceleration"});
+    keys.key("shaping_viscous_nm_s_per_rad", draft.angular_shaping_viscous, kZeroOrMore,
+             "for bounded_acceleration: angular stiffness stays below twice this over the longest hold");
+  });
+  limiter.table("gripper", [&draft](Table& keys) {
+    constexpr Absent kMotor{.text = "required of a device whose gripper has a motor"};
+    keys.key("coulomb_friction_n", draft.grip_bounds.coulomb, kZeroOrMore,
+             "lower bound of the gripper's Coulomb friction, at the fingers", kMotor);
+    keys.key("viscous_friction_n_s_per_m", draft.grip_bounds.viscous, kZeroOrMore,
+             "lower bound of the gripper's viscous friction, at the fingers", kMotor);
   });
 }
 
@@ -271,6 +318,7 @@ void declare_scene(Table& scene, Draft& draft) {
                 kProfiles);
     limiter.key("viscous_friction_n_s_per_m", draft.viscous_bound, kZeroOrMore,
                 "lower bound of the device's viscous friction", kProfiles);
+    declare_handle_bounds(limiter, draft);
     declare_law(limiter, draft);
   });
 
@@ -296,6 +344,13 @@ void declare_scene(Table& scene, Draft& draft) {
     force.key("max_force_n", draft.max_force, kAboveZero, "no force is longer than this",
               Absent{.text = "the device's; required when the device has none, 10 N when it exerts no forces"});
     force.key("max_slew_n_per_s", control.max_slew, kAboveZeroOrInf, "no force changes faster than this");
+    force.key("max_torque_nm", draft.max_torque, kAboveZero,
+              "no torque is longer than this; a wrench keeps its direction", Absent{.text = "the device's"});
+    force.key("max_torque_slew_nm_per_s", draft.max_torque_slew, kAboveZeroOrInf, "no torque changes faster than this");
+    force.key("max_angular_stiffness_nm_per_rad", control.hold.max_angular_stiffness, kAboveZero,
+              "the stiffest model of rotation that is followed between two answers");
+    force.key("max_grip_n", draft.max_grip, kAboveZero, "no force on the gripper's fingers is larger than this",
+              Absent{.text = "the device's"});
     force.key("hold_ms", control.hold.hold, kZeroOrMore, "a force is held for this long after its validity ends");
     force.key("decay_ms", control.hold.decay, kAboveZero, "time constant of its fading after that");
     force.key("safe_stop_ms", control.hold.safe_stop, kZeroOrMore,

@@ -17,6 +17,12 @@
 
 namespace tendon::scene_file {
 
+/// Where a hand wants to be: a script that the scene lists, or a recording that is still to be read.
+struct DraftMotion {
+  ScriptedMotion::Script script = ScriptedMotion::Sine{};
+  std::optional<RecordedMotionFile> recorded{};
+};
+
 /// A scene while it is read. Values that depend on several keys are still open: resolver.h settles them.
 struct Draft {
   Draft() {
@@ -33,14 +39,28 @@ struct Draft {
   OperatorHand::Config hand{0, 0, 0,
                             ScriptedMotion(ScriptedMotion::Sine{})};  // 0: what the scene does not list does not exist
   bool has_hand = false;
-  ScriptedMotion::Script motion = ScriptedMotion::Sine{};
-  std::optional<RecordedMotionFile> recorded_motion;
+  DraftMotion motion;
+  DraftMotion turning;                            ///< of [device.rotation.hand]
+  DraftMotion gripping;                           ///< of [device.gripper.hand]
+  std::optional<RecordedMotionFile> csv;          ///< what a replay plays
   std::optional<std::filesystem::path> replayed;  ///< a recording of tendond
   std::optional<Duration> longest_hold;
   HoldBound::Follow follow_holds;  ///< a memory of 0: none
   std::optional<double> coulomb_bound;
   std::optional<double> viscous_bound;
   std::optional<double> max_force;
+  /// Of [limiter.rotation] and [limiter.gripper].
+  struct FrictionBounds {
+    std::optional<double> coulomb;
+    std::optional<double> viscous;
+  };
+  FrictionBounds rotation_bounds;  ///< N·m, N·m·s/rad
+  FrictionBounds grip_bounds;      ///< N, N·s/m
+  std::optional<double> most_angular_acceleration;
+  double angular_shaping_viscous = 0;
+  std::optional<double> max_torque;  ///< N·m
+  double max_torque_slew = 50;       ///< N·m/s: 1 N per step, as for the force, at a lever of 5 cm
+  std::optional<double> max_grip;    ///< N
   std::optional<double> ledger_step;
   /// 8.5 N on a handle of 75 g that nobody holds are 113 m/s²; a tap is some 200 (control.md 8.7).
   double most_acceleration = 300;

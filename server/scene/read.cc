@@ -70,10 +70,22 @@ std::string text_of(const toml::table& file) {
 
 }  // namespace
 
-std::vector<std::string> limiter_settings(std::string_view law, const Friction& friction) {
-  return {"limiter=", "limiter.kind=\"" + std::string(law) + '"',
-          "limiter.coulomb_friction_n=" + scene_file::digits(friction.coulomb),
-          "limiter.viscous_friction_n_s_per_m=" + scene_file::digits(friction.viscous)};
+std::vector<std::string> limiter_settings(std::string_view law, const HapticController::Config& control) {
+  std::vector<std::string> settings{"limiter=", "limiter.kind=\"" + std::string(law) + '"'};
+  const auto keep = [&settings](std::string_view table, const Friction& friction, std::string_view coulomb,
+                                std::string_view viscous) {
+    const std::string prefix = std::string(table) + '.';
+    settings.push_back(prefix + std::string(coulomb) + '=' + scene_file::digits(friction.coulomb));
+    settings.push_back(prefix + std::string(viscous) + '=' + scene_file::digits(friction.viscous));
+  };
+  keep("limiter", control.limiter.friction, "coulomb_friction_n", "viscous_friction_n_s_per_m");
+  if (control.rotation) {
+    keep("limiter.rotation", control.rotation->friction, "coulomb_friction_nm", "viscous_friction_nm_s_per_rad");
+  }
+  if (control.grip) {
+    keep("limiter.gripper", control.grip->friction, "coulomb_friction_n", "viscous_friction_n_s_per_m");
+  }
+  return settings;
 }
 
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,

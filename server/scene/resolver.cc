@@ -2,6 +2,7 @@
 #include "server/scene/resolver.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -88,25 +89,44 @@ class SceneResolver {
     }
   }
 
-  ScriptedMotion::Recorded read_motion(const std::filesystem::path& directory) {
-    RecordedMotionFile& file = *draft_.recorded_motion;
+  static ScriptedMotion::Recorded read_motion(RecordedMotionFile& file, const std::filesystem::path& directory) {
     file.path = directory / file.path;
     std::ifstream csv = open_regular_file(file.path);
     return load_recorded_motion(csv, file);
   }
 
-  void resolve_motion(const std::filesystem::path& directory) {
-    if (!draft_.has_hand) return;
-    build("device.hand.motion", [&] {
-      if (draft_.recorded_motion) {
+  /// `table` is that of the hand.
+  ScriptedMotion motion_of(DraftMotion& draft, const std::string& table, const std::filesystem::path& directory) {
+    std::optional<ScriptedMotion> motion;
+    build(table + ".motion", [&] {
+      if (draft.recorded) {
         try {
-          draft_.motion = read_motion(directory);
+          draft.script = read_motion(*draft.recorded, directory);
         } catch (const std::runtime_error& refused) {
-          blame("device.hand.motion.file", {}, refused.what());
+          blame(table + ".motion.file", {}, refused.what());
         }
       }
-      draft_.hand.motion = ScriptedMotion(std::move(draft_.motion));
+      motion.emplace(std::move(draft.script));
     });
+    return *std::move(motion);
+  }
+
+  void resolve_motion(const std::filesystem::path& directory) {
+    if (draft_.has_hand) draft_.hand.motion = motion_of(draft_.motion, "device.hand", directory);
+    if (auto& rotation = draft_.simulated.rotation) {
+      if (rotation->hand) rotation->hand->motion = motion_of(draft_.turning, "device.rotation.hand", directory);
+      build("device.rotation", [&rotation] { SimulatedRotation{*rotation}; });
+    }
+    if (auto& gripper = draft_.simulated.gripper) {
+      if (gripper->hand) gripper->hand->motion = motion_of(draft_.gripping, "device.gripper.hand", directory);
+      if (gripper->start && *gripper->start > gripper->open) {
+        const Unit& unit = unit_of("_deg");
+        blame("device.gripper.start_deg", {},
+              "expected at most open_deg, which is " + with_symbol(Number::shown(unit, gripper->open), unit) +
+                  ", found " + Number::shown(unit, *gripper->start));
+      }
+      build("device.gripper", [&gripper] { SimulatedGripper{*gripper}; });
+    }
   }
 
   void resolve_falcon(const std::filesystem::path& directory) {
@@ -135,15 +155,15 @@ class SceneResolver {
     auto* device = std::get_if<ReplayDevice::Config>(&draft_.scene.device);
     if (device == nullptr) return;
     ReplayDevice::Config& replay = *device;
-    auto& csv = draft_.recorded_motion;
+    auto& csv = draft_.csv;
     if (draft_.replayed.has_value() == csv.has_value()) {
       blame("device", {}, std::string("expected either recording or a table csv, found ") + (csv ? "both" : "neither"));
     }
     const std::string_view source = csv ? "device.csv.file" : "device.recording";
     build(source, [&] {
       try {
-        replay.samples =
-            csv ? ReplayDevice::samples_of(read_motion(directory)) : read_recorded_hand(directory / *draft_.replayed);
+        replay.samples = csv ? ReplayDevice::samples_of(read_motion(*csv, directory))
+                             : read_recorded_hand(directory / *draft_.replayed);
       } catch (const std::runtime_error& refused) {
         blame(source, {}, refused.what());
       }
@@ -217,15 +237,23 @@ class SceneResolver {
         blame("safety.dead_man.button", {},
               "expected " + std::string(driver.buttons_in_words) + ", found " + std::to_string(button));
       }
-      if (!driver.moves_a_hand && !(draft_.simulated.button_after && button == 0)) {
-        blame("safety.dead_man.button", {},
-              "expected button 0 of a hand with button_after_ms: a simulated device has no others");
+      if (!driver.moves_a_hand && !is_pressed(button)) {
+        blame(
+            "safety.dead_man.button", {},
+            "expected button 0 of a hand with button_after_ms, or one of its [[device.hand.press]]: a simulated device "
+            "has no others");
       }
     }
     build("safety", [&scene, this] {
       SimulatedDevice device{draft_.simulated};
       SafeDevice{*scene.safety, device};
     });
+  }
+
+  bool is_pressed(std::uint32_t button) const {
+    const SimulatedDevice::Config& device = draft_.simulated;
+    return (device.button_after && button == 0) ||
+           std::ranges::any_of(device.presses, [button](const auto& press) { return press.button == button; });
   }
 
   void resolve_network(const std::filesystem::path& directory) {
@@ -280,6 +308,68 @@ class SceneResolver {
                                                       profile ? &profile->viscous_bound : nullptr, truth.viscous, 1);
     resolve_parts(control.limiter);
     resolve_places(control);
+    resolve_rotation(control);
+    resolve_grip(control);
+    if (control.rotation || control.grip) build("limiter", [&control] { HapticController{control}; });
+  }
+
+  /// Motors that turn the handle, and the motor of its gripper, have bounds of their own. A scene has to have them when
+  /// its device has the motors: a torque is never given without a limiter that knows it.
+  void resolve_rotation(HapticController::Config& control) const {
+    const auto& device = draft_.simulated.rotation;
+    const bool motors = device && device->max_torque;
+    const Friction friction = handle_friction(
+        motors, draft_.rotation_bounds,
+        {"limiter.rotation.coulomb_friction_nm", "limiter.rotation.viscous_friction_nm_s_per_rad"},
+        device ? Friction{device->coulomb_friction.value_or(0), device->viscous_friction.value_or(0)} : Friction{},
+        "motors that turn its handle");
+    if (!motors) return;
+    control.rotation = RotationLimits{.friction = friction,
+                                      .max_torque = draft_.max_torque.value_or(*device->max_torque),
+                                      .max_slew = draft_.max_torque_slew,
+                                      .encoder_step = device->encoder_step.value_or(0),
+                                      .most_acceleration = draft_.most_angular_acceleration,
+                                      .shaping_viscous = std::max(draft_.angular_shaping_viscous, friction.viscous)};
+  }
+
+  void resolve_grip(HapticController::Config& control) const {
+    const auto& device = draft_.simulated.gripper;
+    const bool motor = device && device->max_force;
+    const Friction friction = handle_friction(
+        motor, draft_.grip_bounds, {"limiter.gripper.coulomb_friction_n", "limiter.gripper.viscous_friction_n_s_per_m"},
+        device ? Friction{device->coulomb_friction.value_or(0), device->viscous_friction.value_or(0)} : Friction{},
+        "a motor that closes its gripper");
+    if (!motor) return;
+    control.grip =
+        GripLimits{.friction = friction, .arm = device->arm, .max_force = draft_.max_grip.value_or(*device->max_force)};
+  }
+
+  /// The friction that the limiter may count on there. `truth`: the simulated device's.
+  Friction handle_friction(bool has_motor, const Draft::FrictionBounds& given, const std::array<std::string, 2>& keys,
+                           const Friction& truth, const std::string& motor) const {
+    const Law law = draft_.scene.loop.control.limiter.law;
+    if (has_motor && law != Law::kAolPlus && law != Law::kAol && law != Law::kNone) {
+      blame("limiter.kind", {},
+            "expected \"aol+\", \"aol\" or \"none\": the other laws know the force on a point only, and this device "
+            "has " +
+                motor);
+    }
+    const auto bound = [&](const std::optional<double>& value, const std::string& key, double most) {
+      if (!has_motor && value) blame(key, {}, "expected a device with " + motor + ", because this bound is about it");
+      if (has_motor && !value && law != Law::kNone) {
+        blame(key, {}, "missing, expected " + kZeroOrMore.expected(unit_of(key)) + ", because the device has " + motor);
+      }
+      if (value && *value > most) {
+        blame(key, {},
+              "expected at most " + with_symbol(digits(most), unit_of(key)) +
+                  ", the true friction of the simulated device, because a higher bound voids the limiter's proof, "
+                  "found " +
+                  digits(*value));
+      }
+      return value.value_or(0);
+    };
+    return {.coulomb = bound(given.coulomb, keys[0], truth.coulomb),
+            .viscous = bound(given.viscous, keys[1], truth.viscous)};
   }
 
   /// The bounds by place must not exceed the true friction either.

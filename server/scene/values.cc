@@ -3,6 +3,7 @@
 
 #include <cctype>
 #include <charconv>
+#include <numbers>
 #include <system_error>
 
 namespace tendon::scene_file {
@@ -10,15 +11,24 @@ namespace {
 
 /// Longest suffix first.
 constexpr std::array kUnits = {
+    Unit{"_nm_s_per_rad", "N·m·s/rad", 1},
+    Unit{"_nm_per_rad", "N·m/rad", 1},
+    Unit{"_mm_per_rad", "mm/rad", 1e3},
+    Unit{"_deg_per_s", "°/s", 180 / std::numbers::pi},
     Unit{"_n_s_per_m", "N·s/m", 1},
     Unit{"_kb_per_s", "kB/s", 1e-3},
+    Unit{"_rad_per_s2", "rad/s²", 1},
     Unit{"_m_per_s2", "m/s²", 1},
+    Unit{"_nm_per_s", "N·m/s", 1},
     Unit{"_m_per_s", "m/s", 1},
     Unit{"_n_per_m", "N/m", 1},
     Unit{"_n_per_s", "N/s", 1},
     Unit{"_n_m_s", "N·m·s/rad", 1},
+    Unit{"_kg_m2", "kg·m²", 1},
     Unit{"_n_m", "N·m", 1},
+    Unit{"_deg", "°", 180 / std::numbers::pi},
     Unit{"_min", "min", 1.0 / 60},
+    Unit{"_rad", "rad", 1},
     Unit{"_hz", "Hz", 1},
     Unit{"_kg", "kg", 1},
     Unit{"_ma", "mA", 1e3},
@@ -26,6 +36,7 @@ constexpr std::array kUnits = {
     Unit{"_mj", "mJ", 1e3},
     Unit{"_mm", "mm", 1e3},
     Unit{"_ms", "ms", 1e3},
+    Unit{"_nm", "N·m", 1},
     Unit{"_um", "µm", 1e6},
     Unit{"_us", "µs", 1e6},
     Unit{"_m", "m", 1},

@@ -32,7 +32,8 @@ namespace tendon::scene_file {
 struct Unit {
   std::string_view suffix;
   std::string_view symbol;
-  double per_si;  ///< a whole number: dividing by it rounds once, so 43 µm is the same double as 0.000043
+  /// A whole number, but of angles and minutes: dividing by it rounds once, so 43 µm is the same double as 0.000043.
+  double per_si;
 };
 
 inline constexpr Unit kNoUnit = {"", "", 1};

@@ -67,12 +67,13 @@ TEST(SceneError, OfTheSafetyLayerNamesTheLine) {
       {"[safety]\narm = \"by dead man\"\n",
        "s.toml:4: safety: dead_man: expected to be listed, because the device is armed by its button"},
       {"[safety.dead_man]\nbutton = 0\n",
-       "s.toml:5: safety.dead_man.button: expected button 0 of a hand with button_after_ms: a simulated device has no "
-       "others"},
+       "s.toml:5: safety.dead_man.button: expected button 0 of a hand with button_after_ms, or one of its "
+       "[[device.hand.press]]: a simulated device has no others"},
       {"[safety.thermal]\n",
-       "s.toml:4: safety.thermal: unknown table; known here: arm, rest_speed_m_per_s, rest_force_n, patience_ms, "
-       "force_limit, growth_limit, ramp_in, heat_limit, workspace, speed_trip, step_bound, command_watchdog, "
-       "link_watchdog, dead_man"},
+       "s.toml:4: safety.thermal: unknown table; known here: arm, rest_speed_m_per_s, rest_force_n, rest_torque_nm, "
+       "patience_ms, force_limit, growth_limit, ramp_in, heat_limit, workspace, speed_trip, step_bound, "
+       "command_watchdog, link_watchdog, dead_man, torque_limit, torque_growth_limit, turn_trip, grip_limit, "
+       "grip_growth_limit"},
   });
 }
 
@@ -93,7 +94,8 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:5: recording.filename: unknown key; known here: path, rotate_mb, rotate_min, "
        "budget_mb, datagrams_kb_per_s"},
       {"[device.gravity]\n",
-       "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand"},
+       "s.toml:4: device.gravity: unknown table; known here: kind, name, profile, start_position_mm, effects, hand, "
+       "rotation, gripper"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
                                                              ": unknown key; known here: period_us, longest_hold_us, "
                                                              "hold_memory_ms, hold_margin, hold_most, "

@@ -40,7 +40,7 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
   };
   const HapticController::Config recorded = parse({});
   std::vector<std::string> settings;
-  if (options.law) settings = limiter_settings(*options.law, recorded.limiter.friction);
+  if (options.law) settings = limiter_settings(*options.law, recorded);
   settings.insert(settings.end(), options.settings.begin(), options.settings.end());
   return settings.empty() ? recorded : parse(settings);
 }

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The keys of a simulated handle that turns, grips and has buttons.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <string>
+
+#include "core/base/rotation.h"
+#include "server/scene/scene.h"
+#include "tests/server/scene/scene_text.h"
+#include "tests/server/scratch_folder.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ScratchFolder;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+const std::string kRotation =
+    "[device.rotation]\n"
+    "inertia_kg_m2 = 2e-5\n";
+const std::string kGripper =
+    "[device.gripper]\n"
+    "open_deg = 30\n"
+    "arm_mm_per_rad = 60\n"
+    "mass_kg = 0.02\n";
+
+TEST(SceneHandle, WithoutItsTablesAHandleIsAPoint) {
+  const SimulatedDevice::Config device = minimal_and("").simulated();
+  EXPECT_FALSE(device.rotation || device.gripper);
+  EXPECT_TRUE(device.presses.empty());
+}
+
+TEST(SceneHandle, ARotationHasWhatItListsInItsUnits) {
+  const auto bare = *minimal_and(kRotation).simulated().rotation;
+  EXPECT_EQ(bare.inertia, 2e-5);
+  EXPECT_FALSE(bare.viscous_friction || bare.coulomb_friction || bare.max_torque || bare.encoder_step || bare.start ||
+               bare.hand);
+  const auto all = *minimal_and(kRotation + R"(viscous_friction_nm_s_per_rad = 2e-4
+coulomb_friction_nm = 1e-3
+max_torque_nm = 0.2
+encoder_step_rad = 0.0005
+start_deg = [0, 90, 0]
+[device.rotation.hand]
+stiffness_nm_per_rad = 0.3
+damping_nm_s_per_rad = 0.002
+[device.rotation.hand.motion]
+kind = "sine"
+amplitude_deg = 45
+frequency_hz = 2
+centre_deg = [10, 20, 30]
+direction = [0, 0, 5]
+)")
+                        .simulated()
+                        .rotation;
+  EXPECT_EQ(all.viscous_friction, 2e-4);
+  EXPECT_EQ(all.coulomb_friction, 1e-3);
+  EXPECT_EQ(all.max_torque, 0.2);
+  EXPECT_EQ(all.encoder_step, 0.0005);
+  EXPECT_NEAR((*all.start - Vec3(0, 90 * kDegree, 0)).norm(), 0, 1e-15);
+  EXPECT_EQ(all.hand->stiffness, 0.3);
+  EXPECT_EQ(all.hand->damping, 0.002);
+  EXPECT_NEAR((all.hand->motion.at(0.125).position - Vec3(10, 20, 75) * kDegree).norm(), 0, 1e-14);
+}
+
+TEST(SceneHandle, AGripperHasWhatItListsInItsUnits) {
+  const auto all = *minimal_and(kGripper + R"(viscous_friction_n_s_per_m = 0.5
+coulomb_friction_n = 0.1
+max_force_n = 3
+encoder_step_rad = 0.001
+start_deg = 12
+[device.gripper.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+[device.gripper.hand.motion]
+kind = "ramp-hold"
+from_deg = 25
+to_deg = 5
+ramp_ms = 500
+)")
+                        .simulated()
+                        .gripper;
+  EXPECT_NEAR(all.open, 30 * kDegree, 1e-15);
+  EXPECT_EQ(all.arm, 0.06);
+  EXPECT_EQ(all.mass, 0.02);
+  EXPECT_EQ(all.viscous_friction, 0.5);
+  EXPECT_EQ(all.coulomb_friction, 0.1);
+  EXPECT_EQ(all.max_force, 3);
+  EXPECT_EQ(all.encoder_step, 0.001);
+  EXPECT_NEAR(*all.start, 12 * kDegree, 1e-15);
+  EXPECT_EQ(all.hand->stiffness, 300);
+  EXPECT_EQ(all.hand->damping, 3);
+  EXPECT_NEAR((all.hand->motion.at(0.25).position - Vec3(15 * kDegree, 0, 0)).norm(), 0, 1e-15);
+  EXPECT_FALSE(minimal_and(kGripper).simulated().gripper->max_force);
+}
+
+TEST(SceneHandle, ARecordedTurnIsAboutAnAxisAndARecordedOpeningHasNone) {
+  const ScratchFolder folder;
+  write(folder.path() / "turn.csv", "t_s,turn\n0,0\n1,2\n2,4\n");
+  const std::string hand = "[device.rotation.hand]\nstiffness_nm_per_rad = 1\n[device.rotation.hand.motion]\n";
+  const std::string recorded = "kind = \"recorded\"\nfile = \"turn.csv\"\nposition_column = \"turn\"\n";
+  const auto turned = [&](const std::string& more) {
+    return parse(std::string(kMinimal) + kRotation + hand + recorded + more, folder.path())
+        .simulated()
+        .rotation->hand->motion.at(1)
+        .position;
+  };
+  EXPECT_EQ(turned("direction = [0, 0, 1]\n"), Vec3(0, 0, 2)) << "rad, when nothing else is said";
+  EXPECT_NEAR(
+      (turned("direction = [0, 2, 0]\nscale_deg = 30\norigin_deg = [0, 0, 10]\n") - Vec3(0, 60 * kDegree, 10 * kDegree))
+          .norm(),
+      0, 1e-14);
+  const std::string fingers = "[device.gripper.hand]\nstiffness_n_per_m = 1\n[device.gripper.hand.motion]\n";
+  const auto scene =
+      parse(std::string(kMinimal) + kGripper + fingers + recorded + "scale_deg = 5\norigin_deg = 3\n", folder.path());
+  EXPECT_NEAR(scene.simulated().gripper->hand->motion.at(1).position.x(), 13 * kDegree, 1e-15);
+  EXPECT_EQ(error_of(std::string(kMinimal) + kGripper + fingers + recorded + "direction = [0, 0, 1]\n", folder.path())
+                .rfind("s.toml:14: device.gripper.hand.motion.direction: unknown key", 0),
+            0U);
+  EXPECT_EQ(error_of(std::string(kMinimal) + kRotation + hand +
+                         "kind = \"recorded\"\nfile = \"no.csv\"\nposition_column = 1\n",
+                     folder.path())
+                .rfind("s.toml:10: device.rotation.hand.motion.file: ", 0),
+            0U);
+}
+
+TEST(SceneHandle, AListOfPressesIsWhatTheHandDoesAndTheDeadManMayBeOneOfThem) {
+  const std::string hand =
+      "[device.hand]\nprofile = \"stylus\"\n[[device.hand.press]]\nfrom_ms = 20\nfor_ms = 30\n"
+      "[[device.hand.press]]\nbutton = 3\nfrom_ms = 0\nfor_ms = 1.5\n"
+      "[device.hand.motion]\nkind = \"sine\"\namplitude_mm = 0\nfrequency_hz = 0\n";
+  const auto presses = minimal_and(hand).simulated().presses;
+  ASSERT_EQ(presses.size(), 2U);
+  EXPECT_EQ(presses[0].button, 0U);
+  EXPECT_EQ(presses[0].from, 20ms);
+  EXPECT_EQ(presses[0].length, 30ms);
+  EXPECT_EQ(presses[1].button, 3U);
+  EXPECT_EQ(presses[1].length, 1500us);
+  EXPECT_EQ(minimal_and(hand + "[safety.dead_man]\nbutton = 3\n").safety->dead_man->button, 3U);
+  EXPECT_NE(error_of_minimal_and(hand + "[safety.dead_man]\nbutton = 1\n").find("safety.dead_man.button: expected"),
+            std::string::npos);
+}
+
+TEST(SceneHandle, ErrorsNameFileLineAndKey) {
+  const std::string finger = "[device.gripper.hand]\nstiffness_n_per_m = 1\n[device.gripper.hand.motion]\n";
+  const struct {
+    std::string text;
+    std::string error;
+  } cases[] = {
+      {"[device.rotation]\n", "s.toml:4: device.rotation.inertia_kg_m2: missing, expected a number above 0 kg·m²"},
+      {kRotation + "max_torque_nm = 0\n",
+       "s.toml:6: device.rotation.max_torque_nm: expected a number above 0 N·m, found 0"},
+      {kRotation + "start_deg = 3\n", "s.toml:6: device.rotation.start_deg: expected [x, y, z] in °, found 3"},
+      {kRotation + "[device.rotation.hand]\n",
+       "s.toml:6: device.rotation.hand.stiffness_nm_per_rad: missing, expected a number above 0 N·m/rad"},
+      {kRotation + "[device.rotation.hand]\nstiffness_nm_per_rad = 1\n[device.rotation.hand.motion]\nkind = \"sine\"\n"
+                   "amplitude_deg = 1\nfrequency_hz = 1\ndirection = [0, 0, 0]\n",
+       "s.toml:8: device.rotation.hand.motion: sine.direction (its length) = 0: expected a vector that is not zero"},
+      {"[device.gripper]\nopen_deg = 200\n",
+       "s.toml:5: device.gripper.open_deg: expected a number above 0 and up to 180 °, found 200"},
+      {kGripper + "start_deg = 31\n",
+       "s.toml:8: device.gripper.start_deg: expected at most open_deg, which is 30 °, found 31"},
+      {kGripper + finger + "kind = \"sine\"\namplitude_mm = 3\n",
+       "s.toml:12: device.gripper.hand.motion.amplitude_mm: unknown key; did you mean amplitude_deg?"},
+      {kGripper + finger + "kind = \"minimum-jerk\"\npoints_deg = [[1, 2, 3]]\n",
+       "s.toml:12: device.gripper.hand.motion.points_deg: expected […], each a number of °, found [[1, 2, 3]]"},
+      {"[device.hand]\nprofile = \"stylus\"\n[[device.hand.press]]\nbutton = 32\n",
+       "s.toml:7: device.hand.press[0].button: expected a whole number from 0 to 31, found 32"},
+      {"[safety.torque_limit]\n", "s.toml:4: safety.torque_limit.max_nm: missing, expected a number above 0 N·m"},
+      {"[safety.turn_trip]\nmax_deg_per_s = 0\n",
+       "s.toml:5: safety.turn_trip.max_deg_per_s: expected a number above 0 °/s, found 0"},
+  };
+  for (const auto& [text, error] : cases) EXPECT_EQ(error_of_minimal_and(text), error);
+}
+
+TEST(SceneHandle, TheSafetyLayerHasPartsForTorqueAndGrip) {
+  const auto safety = *minimal_and(kRotation + R"([safety]
+rest_torque_nm = 0.02
+torque_limit.max_nm = 0.1
+torque_growth_limit.rate_nm_per_s = 5
+turn_trip.max_deg_per_s = 720
+grip_limit.max_n = 2
+grip_growth_limit.rate_n_per_s = 100
+)")
+                           .safety;
+  EXPECT_EQ(safety.arming.rest_torque, 0.02);
+  EXPECT_EQ(safety.torque_limit->max, 0.1);
+  EXPECT_EQ(safety.torque_growth_limit->rate, 5);
+  EXPECT_NEAR(safety.turn_trip->max, 4 * std::numbers::pi, 1e-14);
+  EXPECT_EQ(safety.grip_limit->max, 2);
+  EXPECT_EQ(safety.grip_growth_limit->rate, 100);
+}
+
+TEST(SceneHandle, TheShippedOneTurnsGripsAndPressesItsButton) {
+  SimulatedDevice device(read_scene(std::filesystem::path(TENDON_SCENES) / "handle.toml").simulated());
+  EXPECT_TRUE(device.info().measures_orientation);
+  EXPECT_GT(device.info().max_torque, 0);
+  EXPECT_GT(device.info().gripper.value().max_force, 0);
+  double turned = 0;
+  double closest = 1;
+  int presses = 0;
+  std::uint32_t before = 0;
+  for (int ms = 0; ms < 4000; ++ms) {
+    const auto sample = *device.read(LocalTime(ms * 1ms));
+    turned = std::max(turned, rotation_vector(*sample.orientation).norm());
+    closest = std::min(closest, *sample.opening);
+    presses += sample.buttons == 1 && before == 0 ? 1 : 0;
+    before = sample.buttons;
+  }
+  EXPECT_NEAR(turned, 45 * kDegree, 2 * kDegree);
+  EXPECT_NEAR(closest, 5 * kDegree, 2 * kDegree);
+  EXPECT_EQ(presses, 2);
+}
+
+}  // namespace
+}  // namespace tendon
