@@ -357,6 +357,7 @@ void NetworkLoop::publish(LocalTime now) {
       told.buttons = view->pressed;
       if (view->deadband && !view->deadband->passes(told)) {
         ++stats_.foretold;
+        view->pressed = 0;  // it believes just these to be held: a release that comes next is news
         continue;
       }
       view->last_state = state->tick;
