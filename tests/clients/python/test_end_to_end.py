@@ -99,7 +99,7 @@ def test_an_observer_looks_on_beside_a_controller(tmp_path):
                 client.send(next(client.states(30)), Touch())
 
 
-def test_an_observer_sees_the_button_and_knows_its_name_and_which_way_is_up(tmp_path):
+def test_an_observer_sees_the_button_knows_its_name_and_which_way_is_up(tmp_path):
     demo = scene("demo").replace("[device.hand]", "[device.hand]\nbutton_after_ms = 1500")
     turned = demo.replace("[device]", '[device]\naxes = "right=-y up=z user=-x"')
     with Server(tmp_path, scenes={"device": turned}) as server:

@@ -69,7 +69,7 @@ def test_an_answer_that_is_not_usable_is_not_sent(touch, why):
     assert shown.client.stats.unusable == why
 
 
-def test_a_deadband_leaves_out_no_torque_or_grip_force_that_a_hand_can_tell():
+def test_a_deadband_leaves_out_no_torque_that_a_hand_can_tell():
     deadband, now = Deadband(ForceDeadband()), iter(range(0, 19 * MS, MS))
 
     def passes(x, torque=None, grip=None):

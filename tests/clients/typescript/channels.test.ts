@@ -71,7 +71,7 @@ describe("devices and channels", () => {
     assert.deepEqual([world.client.phase, world.client.description], ["open", undefined]);
   });
 
-  it("the handle is described where the server knows that feature, anew in each session", () => {
+  it("the handle is described where the server knows that, anew each session", () => {
     const kHandle: HandleDescription = {
       device: 0, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward"],
       orientationMeasured: true, maxTorque: 0.125, gripperOpen: 0.5, maxGripperForce: 8,
