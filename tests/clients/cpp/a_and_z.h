@@ -100,7 +100,7 @@ class Server {
   std::vector<Hello> hellos;        ///< … and what they said
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
   std::vector<Request> requests;  ///< but for the handle's description: everybody asks for that
-  std::optional<Code> closed;  ///< how the last session ended
+  std::optional<Code> closed;     ///< how the last session ended
   int welcomes = 0;
   std::uint64_t tick = 0;  ///< of the newest state sent
 
