@@ -38,6 +38,7 @@ void Board::tell(Press press) {
 
 void Board::welcomed(const Welcome& welcome) {
   welcome_ = welcome;
+  for (auto& [number, device] : devices_) device.handle.reset();
   ++sessions_;
   ++version_;
 }
@@ -46,6 +47,11 @@ void Board::described(const DeviceDescription& about) {
   Device& device = devices_[about.device];
   if (device.about && same(*device.about, about)) return;
   device.about = about;
+  ++version_;
+}
+
+void Board::described(const HandleDescription& handle) {
+  devices_[handle.device].handle = handle;
   ++version_;
 }
 

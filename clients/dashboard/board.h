@@ -58,6 +58,7 @@ class Board {
 
   struct Device {
     std::optional<DeviceDescription> about;
+    std::optional<HandleDescription> handle;  ///< of this session's server; empty: it has not told
     std::optional<DeviceState> newest;
     std::vector<DeviceState> waiting;  ///< not yet told to the page, in order
     std::uint64_t dropped = 0;         ///< states dropped because nobody took them
@@ -75,8 +76,10 @@ class Board {
 
   void tell(Contact contact, std::string words);
   void tell(Press press);
+  /// A session has begun: what the handles are has to be told anew, because this may be another server.
   void welcomed(const Welcome& welcome);
   void described(const DeviceDescription& about);
+  void described(const HandleDescription& handle);
   /// The number of devices is known: any beyond it belonged to another server.
   void counted(std::uint32_t devices);
   void observe(const DeviceState& state);

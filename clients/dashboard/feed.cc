@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,8 @@ namespace tendon::dash {
 namespace {
 
 constexpr Duration kReportsEvery = std::chrono::seconds(1);
+/// What "watch N beside" ends with.
+constexpr std::string_view kBeside = " beside";
 
 /// The N of "watch N".
 std::optional<std::uint32_t> number_after(std::string_view line, std::string_view word) {
@@ -42,13 +45,15 @@ bool Feed::hear(LocalTime now, PageId id, std::string_view line) {
   if (found == pages_.end()) return false;
   Page& page = found->second;
   if (!page.lines.take(now)) return false;
-  if (const auto device = number_after(line, "watch ")) {
-    page.device = *device;
-    page.post.forget_states();
-    page.reports_due = true;
-    return true;
-  }
-  return false;
+  const bool beside = line.ends_with(kBeside);
+  if (beside) line.remove_suffix(kBeside.size());
+  const auto device = number_after(line, "watch ");
+  if (!device) return false;
+  page.beside = beside;
+  if (page.device != *device) page.post.forget_states();
+  page.device = *device;
+  page.reports_due = true;
+  return true;
 }
 
 void Feed::tick(LocalTime now) {
@@ -74,8 +79,14 @@ void Feed::tick(LocalTime now) {
     const std::vector<DeviceState> states = board_.take_states(number);
     if (states.empty()) continue;
     std::string text;
+    std::string newest;
     for (auto& [id, page] : pages_) {
-      if (page.device != number) continue;
+      if (page.device != number && !page.beside) continue;
+      if (page.device != number) {
+        if (newest.empty()) newest = states_json(number, std::span(states).last(1));
+        page.post.put_beside(number, newest);
+        continue;
+      }
       if (text.empty()) text = states_json(number, states);
       page.post.put_states(text, states.size());
       counts_.states_skipped += page.post.take_skipped();

@@ -17,7 +17,8 @@ namespace tendon::dash {
 
 /// Tells every open page the news of the Board. It has no socket: lines from a page go in, texts for it come out.
 ///
-/// A page watches one device, at first the server's first one. The line "watch N" changes to device N.
+/// A page watches one device, at first the server's first one. The line "watch N" changes to device N; with "watch N
+/// beside" the page also gets the newest state of each other device, once a tick: the 3-D view shows all of them.
 ///
 /// Every tick the page gets the new states of its device, and once a second the reports on the loop and the engines.
 /// Each text is made once for all pages that watch the same device.
@@ -49,6 +50,7 @@ class Feed {
  private:
   struct Page {
     std::uint32_t device = 0;
+    bool beside = false;        ///< the other devices too
     std::uint64_t version = 0;  ///< the board's version that the page knows
     bool reports_due = true;
     PagePost post;

@@ -44,7 +44,7 @@ void Observer::greet(LocalTime now) {
   Hello hello;
   hello.role = Role::kObserver;
   hello.name = config_.name;
-  hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics)};
+  hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics), std::string(kFeatureHandle)};
   claims_ = counted_ && names_.size() > 1;
   if (claims_) {
     for (const auto& [number, name] : names_) hello.claims.push_back({name, "", Role::kObserver});
@@ -54,6 +54,7 @@ void Observer::greet(LocalTime now) {
 
 void Observer::open(LocalTime now, const Welcome& welcome) {
   asked_.clear();
+  handles_asked_.clear();
   rates_.clear();
   next_describe_ = 0;
   describe_at_ = now;
@@ -112,7 +113,8 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
   if (open == asked_.end()) return;
   const Asked asked = open->second;
   asked_.erase(open);
-  if (!asked.describe) return;
+  if (asked.what == Asked::What::kHandle && answered.handle) board_.described(*answered.handle);
+  if (asked.what != Asked::What::kDevice) return;
   if (answered.device) {
     board_.described(*answered.device);
     names_[asked.device] = answered.device->name;
@@ -133,24 +135,33 @@ void Observer::take_answer(LocalTime now, const Session::RequestAnswered& answer
 void Observer::ask(LocalTime now) {
   Session* const session = connection_.session();
   if (session == nullptr) return;
-  const bool describing = std::ranges::any_of(asked_, [](const auto& asked) { return asked.second.describe; });
+  const bool describing =
+      std::ranges::any_of(asked_, [](const auto& asked) { return asked.second.what == Asked::What::kDevice; });
   if (!describing && now >= describe_at_) {
     // Once the number of devices is known, there is no need to ask beyond the last one.
     if (counted_ && next_describe_ >= names_.size()) {
       next_describe_ = 0;
       describe_at_ = now + config_.describe_every;
     } else if (const auto id = session->request(Describe{.device = next_describe_})) {
-      asked_[*id] = {.device = next_describe_, .describe = true};
+      asked_[*id] = {.device = next_describe_, .what = Asked::What::kDevice};
       describe_at_ = LocalTime::max();
     }
   }
+  const std::optional<Welcome>& welcome = board_.welcome();
+  const bool tells_handles = welcome && std::ranges::find(welcome->features, kFeatureHandle) != welcome->features.end();
   for (const auto& [number, device] : board_.devices()) {
     if (!device.about || (number > 0 && !claims_)) continue;
+    if (tells_handles && !handles_asked_.contains(number)) {
+      if (const auto id = session->request(Describe{.device = number, .handle = true})) {
+        asked_[*id] = {.device = number, .what = Asked::What::kHandle};
+        handles_asked_.insert(number);
+      }
+    }
     const std::uint32_t wanted = watched_ ? device.about->loop_hz : std::min(kIdleStateHz, device.about->loop_hz);
     const auto rate = rates_.find(number);
     if (rate == rates_.end() ? watched_ : rate->second == wanted) continue;
     if (const auto id = session->request(SetStateRate{.hz = wanted, .device = number})) {
-      asked_[*id] = {.device = number, .describe = false};
+      asked_[*id] = {.device = number, .what = Asked::What::kStateRate};
       rates_[number] = wanted;
     }
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "clients/cpp/connection.h"
@@ -25,6 +26,7 @@ namespace tendon::dash {
 /// one claims all of them.
 ///
 /// * **Reconnection.** It tries for ever (see Connection), so it finds a server that comes back.
+/// * **Handles.** It asks for each device's HandleDescription once a session, where the server knows kFeatureHandle.
 /// * **Holders.** It asks for each device's description again every `describe_every`, because engines come and go.
 ///
 /// Thread-safe: no. Realtime-safe: no.
@@ -58,8 +60,9 @@ class Observer {
 
  private:
   struct Asked {
+    enum class What : std::uint8_t { kDevice, kHandle, kStateRate };
     std::uint32_t device = 0;
-    bool describe = false;  ///< otherwise a SetStateRate
+    What what = What::kDevice;
   };
 
   void greet(LocalTime now);
@@ -77,6 +80,7 @@ class Observer {
   bool claims_ = false;                         ///< this attempt or session has claimed the devices by name
   bool counted_ = false;                        ///< the number of devices is known
   std::map<std::uint32_t, Asked> asked_;        ///< open requests, by id
+  std::set<std::uint32_t> handles_asked_;       ///< devices whose HandleDescription was asked for in this session
   std::uint32_t next_describe_ = 0;             ///< the device to ask about next
   LocalTime describe_at_{};
   bool watched_ = true;

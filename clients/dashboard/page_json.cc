@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/dashboard/page_json.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
@@ -15,6 +16,9 @@ using Json = nlohmann::ordered_json;  // members in the order in which they are 
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 double nanoseconds(PeerTime t) { return static_cast<double>(t.time_since_epoch().count()); }
+
+/// In JSON it is null.
+constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
 
 Json vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -43,7 +47,20 @@ Json in_json(const std::optional<Press>& press) {
           {"words", press->words}};
 }
 
-Json in_json(const DeviceDescription& about, const std::string& arming_objection) {
+Json in_json(const std::optional<HandleDescription>& handle) {
+  if (!handle) return nullptr;
+  Json turned;
+  if (const auto& q = handle->operator_from_device) turned = {q->w, q->x, q->y, q->z};
+  return {{"operator_from_device", std::move(turned)},
+          {"buttons", handle->buttons},
+          {"orientation_measured", handle->orientation_measured},
+          {"max_torque_nm", handle->max_torque},
+          {"gripper_open_rad", handle->gripper_open ? Json(*handle->gripper_open) : Json()},
+          {"max_gripper_force_n", handle->max_gripper_force}};
+}
+
+Json in_json(const DeviceDescription& about, const std::optional<HandleDescription>& handle,
+             const std::string& arming_objection) {
   Json channels = Json::array();
   for (const ChannelDescription& channel : about.channels) {
     channels.push_back({{"name", channel.name},
@@ -60,6 +77,7 @@ Json in_json(const DeviceDescription& about, const std::string& arming_objection
           {"max_force_n", about.max_force},
           {"workspace_m", std::move(workspace)},
           {"channels", std::move(channels)},
+          {"handle", in_json(handle)},
           {"arming_objection", arming_objection}};
 }
 
@@ -126,13 +144,40 @@ Json column(std::span<const DeviceState> states, Of of) {
   return numbers;
 }
 
-template <class Of>
+template <int kAxes = 3, class Of>
 Json columns(std::span<const DeviceState> states, Of of) {
   Json axes = Json::array();
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < kAxes; ++axis) {
     axes.push_back(column(states, [&](const DeviceState& state) { return plotted(of(state)[axis]); }));
   }
   return axes;
+}
+
+/// Adds what the handle has beyond a point. A value that no state holds is left out: most devices have none of them.
+void add_handle(Json& json, std::span<const DeviceState> states) {
+  const auto any = [&](auto has) { return std::ranges::any_of(states, has); };
+  const auto vectors = [&](const char* name, std::optional<Vec3> DeviceState::*value) {
+    if (!any([&](const DeviceState& s) { return (s.*value).has_value(); })) return;
+    json[name] = columns(states, [&](const DeviceState& s) { return (s.*value).value_or(Vec3::Constant(kUntold)); });
+  };
+  if (any([](const DeviceState& s) { return s.turning.has_value(); })) {
+    json["orientation"] = columns<4>(states, [](const DeviceState& s) {
+      if (!s.turning) return std::array{kUntold, kUntold, kUntold, kUntold};
+      const Quat& q = s.turning->orientation;
+      return std::array{q.w, q.x, q.y, q.z};
+    });
+  }
+  vectors("torque_nm", &DeviceState::torque_applied);
+  vectors("hand_force_n", &DeviceState::hand_force);
+  if (any([](const DeviceState& s) { return s.grip.has_value(); })) {
+    json["grip_rad"] = column(states, [](const DeviceState& s) { return plotted(s.grip ? s.grip->opening : kUntold); });
+  }
+  if (any([](const DeviceState& s) { return s.grip_applied.has_value(); })) {
+    json["grip_n"] = column(states, [](const DeviceState& s) { return plotted(s.grip_applied.value_or(kUntold)); });
+  }
+  if (any([](const DeviceState& s) { return s.buttons != 0; })) {
+    json["buttons"] = column(states, [](const DeviceState& s) { return s.buttons; });
+  }
 }
 
 /// The text of a JSON value. Bytes that are not UTF-8 become U+FFFD; NaN and infinities become null.
@@ -206,7 +251,7 @@ std::string reason_name(std::size_t bit) {
 std::string server_json(const Board& board, const Abilities& abilities) {
   Json devices = Json::array();
   for (const auto& [number, device] : board.devices()) {
-    if (device.about) devices.push_back(in_json(*device.about, abilities.arming_objection(number)));
+    if (device.about) devices.push_back(in_json(*device.about, device.handle, abilities.arming_objection(number)));
   }
   return text_of({{"type", "server"},
                   {"address", abilities.server},
@@ -220,22 +265,23 @@ std::string server_json(const Board& board, const Abilities& abilities) {
 }
 
 std::string states_json(std::uint32_t device, std::span<const DeviceState> states) {
-  static constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
   const auto wanted = [](const DeviceState& s) { return s.force_wanted.value_or(Vec3(kUntold, kUntold, kUntold)); };
-  return text_of(
-      {{"type", "states"},
-       {"device", device},
-       {"tick", column(states, [](const DeviceState& s) { return s.tick; })},
-       // µs on the server's clock: a double holds them exactly for as long as a machine runs.
-       {"sampled_us", column(states, [](const DeviceState& s) { return nanoseconds(s.sampled) / 1e3; })},
-       {"position_m", columns(states, [](const DeviceState& s) { return s.position; })},
-       {"wanted_n", columns(states, wanted)},
-       {"applied_n", columns(states, [](const DeviceState& s) { return s.force_applied; })},
-       {"permitted_n", column(states, [](const DeviceState& s) { return plotted(s.permitted_force); })},
-       {"energy_j", column(states, [](const DeviceState& s) { return plotted(s.energy); })},
-       {"reasons", column(states, [](const DeviceState& s) { return s.reasons; })},
-       {"mode", column(states, [](const DeviceState& s) { return static_cast<unsigned>(s.mode); })},
-       {"force_age_ms", column(states, [](const DeviceState& s) { return plotted(milliseconds(s.force_age)); })}});
+  Json json = {
+      {"type", "states"},
+      {"device", device},
+      {"tick", column(states, [](const DeviceState& s) { return s.tick; })},
+      // µs on the server's clock: a double holds them exactly for as long as a machine runs.
+      {"sampled_us", column(states, [](const DeviceState& s) { return nanoseconds(s.sampled) / 1e3; })},
+      {"position_m", columns(states, [](const DeviceState& s) { return s.position; })},
+      {"wanted_n", columns(states, wanted)},
+      {"applied_n", columns(states, [](const DeviceState& s) { return s.force_applied; })},
+      {"permitted_n", column(states, [](const DeviceState& s) { return plotted(s.permitted_force); })},
+      {"energy_j", column(states, [](const DeviceState& s) { return plotted(s.energy); })},
+      {"reasons", column(states, [](const DeviceState& s) { return s.reasons; })},
+      {"mode", column(states, [](const DeviceState& s) { return static_cast<unsigned>(s.mode); })},
+      {"force_age_ms", column(states, [](const DeviceState& s) { return plotted(milliseconds(s.force_age)); })}};
+  add_handle(json, states);
+  return text_of(json);
 }
 
 std::string reports_json(std::uint32_t number, const Board& board) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -35,6 +36,9 @@ class PagePost {
     batches_.pop_front();
   }
 
+  /// The newest state of a device beside the one that the page watches; only the newest is kept.
+  void put_beside(std::uint32_t device, std::string text) { beside_[device] = std::move(text); }
+
   /// States dropped since the last call.
   std::uint64_t take_skipped() noexcept { return std::exchange(skipped_, 0); }
 
@@ -43,6 +47,7 @@ class PagePost {
     for (auto& text : newest_) {
       if (text) return std::exchange(text, std::nullopt);
     }
+    if (!beside_.empty()) return std::move(beside_.extract(beside_.begin()).mapped());
     if (batches_.empty()) return std::nullopt;
     std::string text = std::move(batches_.front().text);
     batches_.pop_front();
@@ -52,6 +57,7 @@ class PagePost {
   /// The page looks at another device: the waiting states of the previous one are of no use.
   void forget_states() {
     batches_.clear();
+    beside_.clear();
     newest_[static_cast<std::size_t>(Kind::kReports)].reset();
     skipped_ = 0;
   }
@@ -62,6 +68,7 @@ class PagePost {
     std::size_t states;
   };
   std::array<std::optional<std::string>, 2> newest_;
+  std::map<std::uint32_t, std::string> beside_;
   std::deque<Batch> batches_;
   std::uint64_t skipped_ = 0;
 };

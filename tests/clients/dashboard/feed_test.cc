@@ -86,6 +86,31 @@ TEST_F(FeedTest, TellsEachPageOfTheDeviceThatItLooksAt) {
   EXPECT_EQ(of_right[1]["tick"].size(), 5U);
 }
 
+TEST_F(FeedTest, TellsOfTheOtherDevicesBesideWhereAPageAsks) {
+  const auto page = feed_.join(now_);
+  const auto plain = feed_.join(now_);
+  EXPECT_TRUE(feed_.hear(now_, page, "watch 1 beside"));
+  tick();
+  all(page);
+  all(plain);
+  states(0, 3);
+  states(1, 5);
+  tick();
+  states(0, 2);
+  tick();
+  auto texts = all(page);
+  ASSERT_EQ(types(texts), (Types{"states", "states"}));
+  EXPECT_EQ(texts[0]["device"], 0);
+  EXPECT_EQ(texts[0]["tick"], json{10}) << "the newest one";
+  EXPECT_EQ(texts[1]["device"], 1);
+  EXPECT_EQ(texts[1]["tick"].size(), 5U);
+  for (const json& text : all(plain)) EXPECT_EQ(text.at("device"), 0);
+  EXPECT_TRUE(feed_.hear(now_, page, "watch 1"));
+  states(0, 1);
+  tick();
+  EXPECT_EQ(types(all(page)), Types{"reports"});
+}
+
 TEST_F(FeedTest, ReportsOnceASecond) {
   const auto page = feed_.join(now_);
   int reports = 0;
@@ -111,8 +136,9 @@ TEST_F(FeedTest, KeepsTheNewestForAPageThatDoesNotRead) {
 }
 
 TEST_F(FeedTest, SendsAwayWhoSpeaksAnotherLanguage) {
-  for (const char* line : {"", "watch", "watch ", "watch -1", "watch 16", "watch 1 ", "watch 1e1", "watch 99999999999",
-                           "hello", "arm 0", "{\"type\":\"watch\"}"}) {
+  for (const char* line :
+       {"", "watch", "watch ", "watch -1", "watch 16", "watch 1 ", "watch 1e1", "watch beside", " beside",
+        "watch 1 beside beside", "watch 99999999999", "hello", "arm 0", "{\"type\":\"watch\"}"}) {
     const auto page = feed_.join(now_);
     EXPECT_FALSE(feed_.hear(now_, page, line)) << line;
     feed_.leave(page);

@@ -32,6 +32,7 @@ class ObserverTest : public testing::Test {
       config.devices.push_back(
           {.name = name, .model = "model of " + name, .max_force = 8, .loop_hz = 1000, .channels = {{.name = "main"}}});
       config.devices.back().device = static_cast<std::uint32_t>(config.devices.size() - 1);
+      config.handles.push_back({.buttons = {"button " + std::to_string(config.handles.size())}});
       mail_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}));
       mail.push_back(mail_.back().get());
     }
@@ -48,6 +49,7 @@ class ObserverTest : public testing::Test {
         state.sampled = PeerTime(now_.time_since_epoch());
         state.device = static_cast<std::uint32_t>(i);
         state.force_wanted = Vec3(1, 2, 3);
+        state.buttons = 2;
         mail_[i]->state.put(state);
       }
       if (loop_) loop_->turn(now_);
@@ -102,6 +104,20 @@ TEST_F(ObserverTest, IsToldWhatTheEnginesWant) {
     ASSERT_TRUE(board_.devices().at(device).newest->force_wanted) << device;
     EXPECT_EQ(*board_.devices().at(device).newest->force_wanted, Vec3(1, 2, 3));
   }
+}
+
+TEST_F(ObserverTest, IsToldWhatTheHandlesAre) {
+  serve({"left", "right"});
+  run(seconds(1));
+  for (std::uint32_t device : {0U, 1U}) {
+    const auto& handle = board_.devices().at(device).handle;
+    ASSERT_TRUE(handle) << device;
+    EXPECT_EQ(handle->buttons, Names{"button " + std::to_string(device)});
+  }
+  const auto version = board_.version();
+  run(seconds(3));
+  EXPECT_EQ(board_.version(), version) << "it asks once";
+  EXPECT_EQ(board_.devices().at(1).newest->buttons, 2U);
 }
 
 TEST_F(ObserverTest, AsksForFewStatesWhileNobodyLooks) {

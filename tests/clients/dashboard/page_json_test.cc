@@ -54,6 +54,55 @@ TEST(PageJson, TellsStatesInColumns) {
   }
 }
 
+TEST(PageJson, TellsTheHandleInColumnsWhereAStateHoldsIt) {
+  DeviceState turned;
+  turned.turning = Turning{.orientation = {.w = 0.5, .x = -0.5, .y = 0.25, .z = 0.125}};
+  turned.torque_applied = Vec3(0.1, 0.2, -0.3);
+  turned.hand_force = Vec3(1, 2, 3);
+  turned.grip = Grip{.opening = 0.25};
+  turned.grip_applied = -1.5;
+  turned.buttons = 6;
+  json text = json::parse(states_json(0, std::vector{turned, DeviceState{}}));
+  EXPECT_EQ(text["orientation"], (json{{0.5, nullptr}, {-0.5, nullptr}, {0.25, nullptr}, {0.125, nullptr}}));
+  EXPECT_EQ(text["torque_nm"], (json{{0.1, nullptr}, {0.2, nullptr}, {-0.3, nullptr}}));
+  EXPECT_EQ(text["hand_force_n"], (json{{1.0, nullptr}, {2.0, nullptr}, {3.0, nullptr}}));
+  EXPECT_EQ(text["grip_rad"], (json{0.25, nullptr}));
+  EXPECT_EQ(text["grip_n"], (json{-1.5, nullptr}));
+  EXPECT_EQ(text["buttons"], (json{6, 0}));
+  text = json::parse(states_json(0, std::vector{DeviceState{}}));
+  for (const char* name : {"orientation", "torque_nm", "hand_force_n", "grip_rad", "grip_n", "buttons"}) {
+    EXPECT_FALSE(text.contains(name)) << name << ": a device without it costs nothing";
+  }
+}
+
+TEST(PageJson, TellsWhatTheHandleIs) {
+  Board board;
+  board.described(DeviceDescription{.device = 0, .name = "left"});
+  EXPECT_TRUE(json::parse(server_json(board, {}))["devices"][0]["handle"].is_null()) << "not told";
+  const auto version = board.version();
+  board.described(HandleDescription{.device = 0,
+                                    .operator_from_device = Quat{.w = 0.5, .x = 0.5, .y = 0.5, .z = 0.5},
+                                    .buttons = {"clutch", "dead man"},
+                                    .orientation_measured = true,
+                                    .max_torque = 0.2,
+                                    .gripper_open = 0.5,
+                                    .max_gripper_force = 8});
+  EXPECT_GT(board.version(), version) << "or no page is told";
+  EXPECT_EQ(json::parse(server_json(board, {}))["devices"][0]["handle"],
+            (json{{"operator_from_device", {0.5, 0.5, 0.5, 0.5}},
+                  {"buttons", {"clutch", "dead man"}},
+                  {"orientation_measured", true},
+                  {"max_torque_nm", 0.2},
+                  {"gripper_open_rad", 0.5},
+                  {"max_gripper_force_n", 8.0}}));
+  board.described(HandleDescription{.device = 0});
+  const json handle = json::parse(server_json(board, {}))["devices"][0]["handle"];
+  EXPECT_TRUE(handle["operator_from_device"].is_null());
+  EXPECT_TRUE(handle["gripper_open_rad"].is_null());
+  board.welcomed(Welcome{});
+  EXPECT_TRUE(json::parse(server_json(board, {}))["devices"][0]["handle"].is_null()) << "perhaps another server";
+}
+
 TEST(PageJson, TellsTheServerAndItsDevices) {
   Board board;
   Welcome welcome;

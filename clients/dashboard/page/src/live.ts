@@ -2,8 +2,9 @@
 import { Arming } from "./arming.js";
 import { h, mark, say } from "./dom.js";
 import { Scrubber } from "./scrubber.js";
+import type { Shown } from "./space/stage.js";
 import { Stream, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
-import { Track } from "./track.js";
+import { Track, noHandle, type HandleSample } from "./track.js";
 import { View, type Facts } from "./view.js";
 import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety, moment } from "./words.js";
 
@@ -17,6 +18,8 @@ const kFrameMs = 33;
 export class Live {
   readonly element: HTMLElement;
   readonly #track = new Track(kKept);
+  /** The newest states of the devices beside the watched one, sixty a second, while they are shown in 3-D. */
+  readonly #beside = new Map<number, { track: Track; zero: number }>();
   readonly #stream: Stream;
   readonly #view: View;
   readonly #scrubber: Scrubber;
@@ -34,6 +37,8 @@ export class Live {
   #still: { from: number; to: number } | undefined;
   #hover: number | undefined;
   #drawn = 0;
+  #spaceDirty = true;
+  #said = "";
   #dirty = true;
   #stopped = false;
 
@@ -53,10 +58,10 @@ export class Live {
       reset: () => this.#setStill(undefined),
       hover: (time) => {
         this.#hover = time;
-        this.#dirty = true;
+        this.#dirty = this.#spaceDirty = true;
       },
       changed: () => {
-        this.#dirty = true;
+        this.#dirty = this.#spaceDirty = true;
       },
     });
     this.#scrubber = new Scrubber((from, to) => this.#setStill({ from, to }));
@@ -80,16 +85,21 @@ export class Live {
     this.#dirty = true;
   }
 
+  /** 2-D or 3-D was chosen. */
+  chosen(): void {
+    this.#dirty = this.#spaceDirty = true;
+    this.#say();
+  }
+
   #take(message: Message): void {
-    this.#dirty = true;
+    this.#dirty = this.#spaceDirty = true;
     if (message.type === "states") this.#takeStates(message);
     else if (message.type === "reports") this.#reports = message.device === this.#watched ? message : this.#reports;
     else this.#takeServer(message);
   }
 
   #takeStates(message: StatesMessage): void {
-    if (message.device !== this.#watched) return;
-    const number = (value: number | null | undefined): number => value ?? NaN;
+    if (message.device !== this.#watched) return this.#takeBeside(message);
     for (let i = 0; i < message.tick.length; ++i) {
       const sampled = message.sampled_us[i]! / 1e6;
       // The server has been started again: its clock may have begun anew.
@@ -98,14 +108,19 @@ export class Live {
         this.#track.clear();
         this.#setStill(undefined);
       }
-      this.#track.push({
-        t: sampled - this.#zero,
-        x: number(message.position_m[0][i]), y: number(message.position_m[1][i]), z: number(message.position_m[2][i]),
-        wx: number(message.wanted_n[0][i]), wy: number(message.wanted_n[1][i]), wz: number(message.wanted_n[2][i]),
-        ax: number(message.applied_n[0][i]), ay: number(message.applied_n[1][i]), az: number(message.applied_n[2][i]),
-        permitted: number(message.permitted_n[i]), energy: number(message.energy_j[i]),
-        reasons: message.reasons[i]!, mode: message.mode[i]!, age: message.force_age_ms[i]! / 1e3, late: NaN,
-      });
+      push(this.#track, message, i, sampled - this.#zero);
+    }
+  }
+
+  #takeBeside(message: StatesMessage): void {
+    for (let i = 0; i < message.tick.length; ++i) {
+      const sampled = message.sampled_us[i]! / 1e6;
+      let device = this.#beside.get(message.device);
+      if (!device || sampled - device.zero < device.track.last) {
+        device = { track: new Track(kKeptBeside), zero: sampled };
+        this.#beside.set(message.device, device);
+      }
+      push(device.track, message, i, sampled - device.zero);
     }
   }
 
@@ -137,7 +152,16 @@ export class Live {
     this.#track.clear();
     this.#view.clear();
     this.#setStill(undefined);
-    this.#stream.say(`watch ${device}`, true);
+    // Its states of until now came sixty times a second; now all come.
+    this.#beside.delete(device);
+    this.#say();
+  }
+
+  #say(): void {
+    const line = `watch ${this.#watched}${this.#view.space() ? " beside" : ""}`;
+    if (line === this.#said) return;
+    this.#said = line;
+    this.#stream.say(line, true);
   }
 
   #following(): { from: number; to: number } {
@@ -168,7 +192,9 @@ export class Live {
     const frame = (now: number): void => {
       if (this.#stopped) return;
       requestAnimationFrame(frame);
-      if (!this.#dirty || now - this.#drawn < kFrameMs || !this.element.isConnected) return;
+      if (!this.element.isConnected) return;
+      if (this.#spaceDirty && this.#view.space()) this.#drawSpace();
+      if (!this.#dirty || now - this.#drawn < kFrameMs) return;
       this.#drawn = now;
       this.#dirty = false;
       this.#draw();
@@ -176,8 +202,24 @@ export class Live {
     requestAnimationFrame(frame);
   }
 
+  /** In every frame of the screen: a hand's motion at thirty pictures a second looks rough. */
+  #drawSpace(): void {
+    this.#spaceDirty = false;
+    const { from, to } = this.#still ?? this.#following();
+    const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
+    // Others are shown as long before their newest state as the watched one before its own.
+    const back = this.#track.last - cursor;
+    const shown = (this.#server?.devices ?? []).map((d): Shown => {
+      const watched = d.number === this.#watched;
+      const track = watched ? this.#track : (this.#beside.get(d.number)?.track ?? kNothing);
+      return { name: d.name || `device ${d.number}`, track, time: track.last - back, handle: d.handle, workspace: d.workspace_m, watched };
+    });
+    if (shown.length > 0) this.#view.drawSpace(shown, this.#still ? { from, to, at: cursor } : undefined);
+  }
+
   #draw(): void {
     const { from, to } = this.#still ?? this.#following();
+    this.#view.space();
     const info = this.#server?.devices.find((d) => d.number === this.#watched);
     say(this.#about, info ? `${info.model}, ${count(info.loop_hz)} steps per second, at most ${digits(info.max_force_n)} N` : "");
     const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
@@ -224,6 +266,40 @@ export class Live {
       degraded: loop?.degraded ?? "",
     };
   }
+}
+
+/** Steps that are kept of a device beside the watched one: two minutes. */
+const kKeptBeside = 7200;
+const kNothing = new Track();
+
+/** Row `i` of a batch. */
+function push(track: Track, message: StatesMessage, i: number, t: number): void {
+  const number = (value: number | null | undefined): number => value ?? NaN;
+  const handle = handleOf(message, i);
+  track.push({
+    t,
+    x: number(message.position_m[0][i]), y: number(message.position_m[1][i]), z: number(message.position_m[2][i]),
+    wx: number(message.wanted_n[0][i]), wy: number(message.wanted_n[1][i]), wz: number(message.wanted_n[2][i]),
+    ax: number(message.applied_n[0][i]), ay: number(message.applied_n[1][i]), az: number(message.applied_n[2][i]),
+    permitted: number(message.permitted_n[i]), energy: number(message.energy_j[i]),
+    reasons: message.reasons[i]!, mode: message.mode[i]!, age: message.force_age_ms[i]! / 1e3, late: NaN,
+    ...(handle && { handle }),
+  });
+}
+
+/** Undefined: the batch tells nothing of the handle. */
+function handleOf(message: StatesMessage, i: number): HandleSample | undefined {
+  const { orientation, torque_nm: torque, hand_force_n: hand, grip_rad: grip, grip_n: gripForce, buttons } = message;
+  if (!orientation && !torque && !hand && !grip && !gripForce && !buttons) return undefined;
+  const into = noHandle();
+  const number = (value: number | null | undefined): number => value ?? NaN;
+  if (orientation) [into.qw, into.qx, into.qy, into.qz] = orientation.map((column) => number(column[i])) as [number, number, number, number];
+  if (torque) [into.tx, into.ty, into.tz] = torque.map((column) => number(column[i])) as [number, number, number];
+  if (hand) [into.hx, into.hy, into.hz] = hand.map((column) => number(column[i])) as [number, number, number];
+  if (grip) into.grip = number(grip[i]);
+  if (gripForce) into.gripForce = number(gripForce[i]);
+  if (buttons) into.buttons = buttons[i]!;
+  return into;
 }
 
 const lossOf = (engine: { lost: number; received: number }): number => engine.lost / Math.max(engine.lost + engine.received, 1);

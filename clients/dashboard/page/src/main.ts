@@ -5,6 +5,7 @@ import { takePass } from "./arming.js";
 import { h, mark, s, say } from "./dom.js";
 import { Live } from "./live.js";
 import { Runs } from "./runs.js";
+import { onChoice, spaceButton } from "./space/choice.js";
 import type { ServerMessage } from "./stream.js";
 
 const contact = h("span", { class: "contact", role: "status", "data-level": "off" });
@@ -42,7 +43,7 @@ const runs = new Runs();
 const mark_ = s("svg", { viewBox: "0 0 32 32", class: "logo", "aria-hidden": "true" },
   s("rect", { width: 32, height: 32, rx: 7 }), s("path", { d: "M4 20h5c3 0 3-10 6-10s3 14 6 14 3-8 7-8" }));
 document.body.append(
-  h("header", {}, h("a", { href: "#/live", class: "brand" }, mark_ as unknown as HTMLElement, "Tendon"), contact, h("nav", {}, tabs.live, tabs.recordings), themeButton),
+  h("header", {}, h("a", { href: "#/live", class: "brand" }, mark_ as unknown as HTMLElement, "Tendon"), contact, h("nav", {}, tabs.live, tabs.recordings), spaceButton, themeButton),
   place);
 
 /** The parts of a path after its "#/"; undefined when their % signs encode nothing. */
@@ -72,6 +73,7 @@ const unknown = (address: string): HTMLElement =>
   h("main", { class: "recordings" },
     h("p", { class: "error", role: "alert", text: `There is no page at ${address}. There are two: Live and Recordings.` }),
     h("a", { href: "#/live" }, "Live"), " ", h("a", { href: "#/recordings" }, "Recordings"));
+onChoice(() => (live.chosen(), runs.repaint()));
 window.addEventListener("hashchange", route);
 window.addEventListener("resize", () => (live.repaint(), runs.repaint()));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (live.repaint(), runs.repaint()));

@@ -3,7 +3,8 @@ import { fromBinary, type Message } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema, type DescriptorProto, type FileDescriptorSet } from "@bufbuild/protobuf/wkt";
 import { BinaryReader } from "@bufbuild/protobuf/wire";
 import { McapIndexedReader, McapStreamReader, type McapTypes } from "@mcap/core";
-import { Track, type Sample } from "./track.js";
+import { contactOf, frameOfScene, type Quat } from "./space/figure.js";
+import { Track, noHandle, type HandleColumn, type HandleSample, type Sample } from "./track.js";
 import { moment } from "./words.js";
 
 /** Steps that are read at once: ten minutes at 1 kHz. A longer recording is opened in parts. */
@@ -11,11 +12,14 @@ const kMaxSteps = 600_000;
 /** A file up to this size is fetched whole: one request instead of hundreds. */
 const kWhole = 48 * 1024 * 1024;
 const kStepTopic = /(?:^|\/)haptic\/step$/;
+const kSceneTopic = /(?:^|\/)scene$/;
 
 export interface DeviceTrack {
   /** Of the device, as its topic says; empty: the first one of the recording. */
   readonly name: string;
   readonly track: Track;
+  /** Turns its base frame into the operator's; undefined: its scene does not say. */
+  readonly frame: Quat | undefined;
 }
 
 export interface Recording {
@@ -41,7 +45,7 @@ export async function readRecording(url: string, name: string, from: number, pro
   let indexed = false;
   try {
     const reader = await McapIndexedReader.Initialize({ readable: file });
-    const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || t === "/scene");
+    const topics = [...reader.channelsById.values()].map((c) => c.topic).filter((t) => kStepTopic.test(t) || kSceneTopic.test(t));
     for (const channel of reader.channelsById.values()) collected.channel(channel, reader.schemasById.get(channel.schemaId));
     if (from > 0) {
       // The scene, and when it all began.
@@ -84,13 +88,16 @@ export async function readRecording(url: string, name: string, from: number, pro
   return collected.recording("The recording has no end: the server was killed, or is still recording. Everything up to its last whole chunk is shown.");
 }
 
+/** The NAME of /NAME/haptic/step; empty: the first device. */
+const deviceOf = (topic: string, end: RegExp): string => topic.replace(end, "").replace(/^\//, "");
+
 /** What has been read so far. */
 class Collector {
   steps = 0;
   readonly schemas = new Map<number, McapTypes.TypedMcapRecords["Schema"]>();
   readonly #tracks = new Map<number, { name: string; track: Track; decode: (data: Uint8Array) => Sample }>();
-  #sceneChannel: number | undefined;
-  #sceneFields: Map<string, number> | undefined;
+  readonly #sceneChannels = new Map<number, { device: string; fields: Map<string, number> }>();
+  readonly #frames = new Map<string, Quat | undefined>();
   #scene: Recording["scene"];
   /** The log time of the first step, shown or not. */
   began: bigint | undefined;
@@ -105,19 +112,21 @@ class Collector {
   channel(channel: McapTypes.TypedMcapRecords["Channel"], schema: McapTypes.TypedMcapRecords["Schema"] | undefined): void {
     if (!schema || channel.messageEncoding !== "protobuf" || schema.encoding !== "protobuf") return;
     const types = fromBinary(FileDescriptorSetSchema, schema.data);
-    if (channel.topic === "/scene") {
-      this.#sceneChannel = channel.id;
-      this.#sceneFields = fieldsOf(types, schema.name);
+    if (kSceneTopic.test(channel.topic)) {
+      this.#sceneChannels.set(channel.id, { device: deviceOf(channel.topic, kSceneTopic), fields: fieldsOf(types, schema.name) });
     } else if (kStepTopic.test(channel.topic) && !this.#tracks.has(channel.id)) {
-      const device = channel.topic.replace(kStepTopic, "").replace(/^\//, "");
-      this.#tracks.set(channel.id, { name: device, track: new Track(), decode: stepDecoder(fieldsOf(types, schema.name)) });
+      const device = deviceOf(channel.topic, kStepTopic);
+      this.#tracks.set(channel.id, { name: device, track: new Track(), decode: stepDecoder(types, schema.name) });
     }
   }
 
   /** False: that is as much as is read at once. */
   message(message: McapTypes.TypedMcapRecords["Message"]): boolean {
-    if (message.channelId === this.#sceneChannel) {
-      this.#scene = decodeScene(message.data, this.#sceneFields!);
+    const ofScene = this.#sceneChannels.get(message.channelId);
+    if (ofScene) {
+      const scene = decodeScene(message.data, ofScene.fields);
+      this.#frames.set(ofScene.device, frameOfScene(scene.text));
+      if (ofScene.device === "") this.#scene = scene;
       return true;
     }
     const device = this.#tracks.get(message.channelId);
@@ -141,7 +150,7 @@ class Collector {
   }
 
   recording(remark = ""): Recording {
-    const devices = [...this.#tracks.values()].filter((d) => d.track.length > 0).map(({ name, track }) => ({ name, track }));
+    const devices = [...this.#tracks.values()].filter((d) => d.track.length > 0).map(({ name, track }) => ({ name, track, frame: this.#frames.get(name) }));
     if (devices.length === 0) throw new Error(this.#none());
     return { name: this.name, devices, scene: this.#scene, began: this.began ?? 0n, remarks: remark ? [remark] : [], from: this.from, next: this.#next };
   }
@@ -159,7 +168,52 @@ function fieldsOf(types: FileDescriptorSet & Message, fullName: string): Map<str
 
 const kVectors = { position_m: ["x", "y", "z"], force_wanted_n: ["wx", "wy", "wz"], force_applied_n: ["ax", "ay", "az"] } as const;
 
-function stepDecoder(fields: Map<string, number>): (data: Uint8Array) => Sample {
+/** The numbers of a message of them, such as Vec3: field 1 is `names[0]`. */
+function readNumbers(reader: BinaryReader, names: readonly HandleColumn[], into: HandleSample): void {
+  const end = reader.uint32() + reader.pos;
+  // Zeros do not travel.
+  for (const name of names) into[name] = 0;
+  while (reader.pos < end) {
+    const [number, type] = reader.tag();
+    const name = names[number - 1];
+    if (name !== undefined && type === 1) into[name] = reader.double();
+    else reader.skip(type, number);
+  }
+}
+
+/** Reads one part of the handle, by the names that its type's fields have in the file. */
+type PartReader = (reader: BinaryReader, into: HandleSample) => void;
+function partDecoder(fields: Map<string, number>, parts: Readonly<Record<string, PartReader>>): PartReader {
+  const readers: PartReader[] = [];
+  for (const [name, how] of Object.entries(parts)) {
+    const number = fields.get(name);
+    if (number !== undefined) readers[number] = how;
+  }
+  return (reader, into) => {
+    const end = reader.uint32() + reader.pos;
+    while (reader.pos < end) {
+      const [number, type] = reader.tag();
+      const how = readers[number];
+      if (how) how(reader, into);
+      else reader.skip(type, number);
+    }
+  };
+}
+
+const kTurn: Readonly<Record<string, PartReader>> = {
+  orientation: (reader, into) => readNumbers(reader, ["qw", "qx", "qy", "qz"], into),
+  torque_applied_nm: (reader, into) => readNumbers(reader, ["tx", "ty", "tz"], into),
+};
+const kGrip: Readonly<Record<string, PartReader>> = {
+  opening_rad: (reader, into) => (into.grip = reader.double()),
+  force_applied_n: (reader, into) => (into.gripForce = reader.double()),
+};
+
+function stepDecoder(types: FileDescriptorSet & Message, step: string): (data: Uint8Array) => Sample {
+  const fields = fieldsOf(types, step);
+  const beside = (name: string): string => step.replace(/[^.]*$/, name);
+  const handle = (s: Sample): HandleSample => (s.handle ??= noHandle());
+  const stiffness: number[] = [];
   const readers: ((reader: BinaryReader, s: Sample) => void)[] = [];
   const read = (name: string, how: (reader: BinaryReader, s: Sample) => void): void => {
     const number = fields.get(name);
@@ -183,7 +237,27 @@ function stepDecoder(fields: Map<string, number>): (data: Uint8Array) => Sample 
   read("mode", (reader, s) => (s.mode = reader.int32()));
   read("late_ns", (reader, s) => (s.late = Number(reader.sint64()) / 1e9));
   read("loop_age_ns", (reader, s) => (s.age = Number(reader.sint64()) / 1e9));
+  // Recordings from before there were turning handles lack these.
+  if (fields.has("turn")) {
+    const turn = partDecoder(fieldsOf(types, beside("Turn")), kTurn);
+    read("turn", (reader, s) => turn(reader, handle(s)));
+  }
+  if (fields.has("grip")) {
+    const grip = partDecoder(fieldsOf(types, beside("Grip")), kGrip);
+    read("grip", (reader, s) => {
+      // Zeros do not travel: a closed gripper says nothing of its opening.
+      handle(s).grip = handle(s).gripForce = 0;
+      grip(reader, handle(s));
+    });
+  }
+  read("hand_force_n", (reader, s) => readNumbers(reader, ["hx", "hy", "hz"], handle(s)));
+  read("buttons", (reader, s) => (handle(s).buttons = reader.fixed32()));
+  read("stiffness_wanted_n_per_m", (reader) => {
+    const end = reader.uint32() + reader.pos;
+    while (reader.pos < end) stiffness.push(reader.double());
+  });
   return (data) => {
+    stiffness.length = 0;
     const s: Sample = { t: 0, x: 0, y: 0, z: 0, wx: 0, wy: 0, wz: 0, ax: 0, ay: 0, az: 0, permitted: 0, energy: 0, reasons: 0, mode: 0, age: 0, late: 0 };
     const reader = new BinaryReader(data);
     while (reader.pos < reader.len) {
@@ -191,6 +265,12 @@ function stepDecoder(fields: Map<string, number>): (data: Uint8Array) => Sample 
       const how = readers[number];
       if (how) how(reader, s);
       else reader.skip(type, number);
+    }
+    const contact = stiffness.length > 0 ? contactOf(stiffness, [s.wx, s.wy, s.wz]) : undefined;
+    if (contact) {
+      const into = handle(s);
+      [into.nx, into.ny, into.nz] = contact.normal;
+      into.gap = contact.gap;
     }
     return s;
   };

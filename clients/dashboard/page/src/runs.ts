@@ -2,6 +2,8 @@
 import { h, say } from "./dom.js";
 import { readRecording, type DeviceTrack, type Recording } from "./recording.js";
 import { Scrubber } from "./scrubber.js";
+import type { Shown } from "./space/stage.js";
+import type { HandleInfo } from "./stream.js";
 import { quantiles, type Track } from "./track.js";
 import { View, type Facts } from "./view.js";
 import { bytes, count, duration, moment, percent } from "./words.js";
@@ -123,6 +125,9 @@ export class Runs {
 
 const addressOf = (names: readonly string[]): string => `#/recordings/${names.map(encodeURIComponent).join("/")}`;
 
+/** A recording tells of the handle only what its scene says. */
+const kUntold: HandleInfo = { operator_from_device: null, buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0 };
+
 /** One recording in its view. */
 class Run {
   readonly element: HTMLElement;
@@ -164,7 +169,13 @@ class Run {
   draw(from: number, to: number, cursor: number): void {
     const key = `${this.#device.name} ${from} ${to}`;
     if (this.#facts?.key !== key) this.#facts = { key, facts: this.#compute(from, to) };
+    if (this.view.space()) this.view.drawSpace([this.#shown(cursor)], { from: Math.max(from, this.track.first), to: Math.min(to, this.track.last), at: cursor });
     this.view.draw(this.track, from, to, cursor, moment(Math.min(Math.max(cursor, this.track.first), this.track.last)), this.#facts.facts);
+  }
+
+  #shown(time: number): Shown {
+    const { name, track, frame } = this.#device;
+    return { name, track, time, handle: frame ? { ...kUntold, operator_from_device: frame } : null, workspace: null, watched: true };
   }
 
   #compute(from: number, to: number): Facts {

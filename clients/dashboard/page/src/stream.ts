@@ -6,12 +6,24 @@ export interface ChannelInfo {
   readonly lease_ms: number;
   readonly holder: string;
 }
+/** What the handle of a device is. Quaternions are w, x, y, z. */
+export interface HandleInfo {
+  readonly operator_from_device: readonly [number, number, number, number] | null;
+  readonly buttons: readonly string[];
+  readonly orientation_measured: boolean;
+  readonly max_torque_nm: number;
+  readonly gripper_open_rad: number | null;
+  readonly max_gripper_force_n: number;
+}
 export interface DeviceInfo {
   readonly number: number;
   readonly name: string;
   readonly model: string;
   readonly loop_hz: number;
   readonly max_force_n: number;
+  readonly workspace_m: readonly [readonly [number, number, number], readonly [number, number, number]] | null;
+  /** Null: the server has not told. */
+  readonly handle: HandleInfo | null;
   readonly channels: readonly ChannelInfo[];
   /** Why it cannot be armed and disarmed from here now; empty: it can. */
   readonly arming_objection: string;
@@ -34,7 +46,8 @@ export interface ServerMessage {
   readonly press: PressInfo | null;
   readonly devices: readonly DeviceInfo[];
 }
-type Triple = readonly [readonly (number | null)[], readonly (number | null)[], readonly (number | null)[]];
+type Numbers = readonly (number | null)[];
+type Triple = readonly [Numbers, Numbers, Numbers];
 export interface StatesMessage {
   readonly type: "states";
   readonly device: number;
@@ -48,6 +61,13 @@ export interface StatesMessage {
   readonly reasons: readonly number[];
   readonly mode: readonly number[];
   readonly force_age_ms: readonly number[];
+  // Of the handle; absent where no state holds it.
+  readonly orientation?: readonly [Numbers, Numbers, Numbers, Numbers];
+  readonly torque_nm?: Triple;
+  readonly hand_force_n?: Triple;
+  readonly grip_rad?: Numbers;
+  readonly grip_n?: Numbers;
+  readonly buttons?: readonly number[];
 }
 export interface Delays {
   readonly median: number;

@@ -18,7 +18,20 @@ export interface Sample {
   mode: number;
   /** s */ age: number;
   /** s, that the step came late; only in recordings */ late: number;
+  /** What the handle has beyond a point; undefined where it has nothing. */ handle?: HandleSample;
 }
+
+const kHandleColumns = ["qw", "qx", "qy", "qz", "tx", "ty", "tz", "hx", "hy", "hz", "grip", "gripForce", "buttons", "nx", "ny", "nz", "gap"] as const;
+/**
+ * q…: its orientation, into the base frame; t…: N·m applied; h…: N of the hand; grip: rad; gripForce: N; buttons: bits; n… and gap:
+ * the surface that the engine speaks of (see contactOf).
+ */
+export type HandleColumn = (typeof kHandleColumns)[number];
+export type HandleSample = Record<HandleColumn, number>;
+
+/** Nothing is known of it, and no button is held. */
+export const noHandle = (): HandleSample => ({ ...kNoHandle });
+const kNoHandle = Object.freeze(Object.fromEntries(kHandleColumns.map((name) => [name, name === "buttons" ? 0 : NaN])) as HandleSample);
 
 const kColumns = ["x", "y", "z", "wx", "wy", "wz", "ax", "ay", "az", "permitted", "energy", "age", "late", "wanted", "applied"] as const;
 /** A column of numbers; `wanted` and `applied` are the norms. */
@@ -30,6 +43,8 @@ export class Track {
   reasons = new Uint32Array(4096);
   mode = new Uint8Array(4096);
   readonly #columns: Record<Column, Float32Array>;
+  /** Made when the first step comes that has any: most devices are points. */
+  #handle: Record<HandleColumn, Float32Array> | undefined;
   /** Index of the first one that is kept, and of the end. */
   begin = 0;
   end = 0;
@@ -49,6 +64,10 @@ export class Track {
   }
   column(name: Column): Float32Array {
     return this.#columns[name];
+  }
+
+  handle(name: HandleColumn): Float32Array | undefined {
+    return this.#handle?.[name];
   }
 
   push(s: Sample): void {
@@ -73,11 +92,13 @@ export class Track {
     c.applied[i] = Math.hypot(s.ax, s.ay, s.az);
     this.reasons[i] = s.reasons;
     this.mode[i] = s.mode;
+    if (s.handle || this.#handle) this.#pushHandle(i, s.handle ?? kNoHandle);
     if (this.length > this.limit) ++this.begin;
   }
 
   clear(): void {
     this.begin = this.end = 0;
+    this.#handle = undefined;
   }
 
   /** Index of the first step at or after `time`. */
@@ -98,8 +119,14 @@ export class Track {
     return i;
   }
 
+  #pushHandle(i: number, handle: HandleSample): void {
+    this.#handle ??= Object.fromEntries(
+      kHandleColumns.map((name) => [name, new Float32Array(this.t.length).fill(kNoHandle[name])])) as Record<HandleColumn, Float32Array>;
+    for (const name of kHandleColumns) this.#handle[name][i] = handle[name];
+  }
+
   #makeRoom(): void {
-    const columns = [this.t, this.reasons, this.mode, ...Object.values(this.#columns)];
+    const columns = [this.t, this.reasons, this.mode, ...Object.values(this.#columns), ...Object.values(this.#handle ?? {})];
     if (this.begin > this.t.length / 2) {
       for (const column of columns) column.copyWithin(0, this.begin, this.end);
       [this.begin, this.end] = [0, this.length];
@@ -114,6 +141,7 @@ export class Track {
     this.reasons = grown(this.reasons);
     this.mode = grown(this.mode);
     for (const name of kColumns) this.#columns[name] = grown(this.#columns[name]);
+    if (this.#handle) for (const name of kHandleColumns) this.#handle[name] = grown(this.#handle[name]);
   }
 }
 

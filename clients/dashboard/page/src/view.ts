@@ -3,6 +3,9 @@ import { Chart, type ChartEvents, type ChartSpec } from "./chart.js";
 import { h, mark, say } from "./dom.js";
 import { Histogram } from "./histogram.js";
 import { Lanes } from "./lanes.js";
+import { inSpace } from "./space/choice.js";
+import { SpacePanel, type Instants } from "./space/panel.js";
+import type { Shown } from "./space/stage.js";
 import type { EngineReport } from "./stream.js";
 import type { Track } from "./track.js";
 import { digits, duration, kModes, type Level } from "./words.js";
@@ -62,6 +65,7 @@ const tile = (id: string, text: string): { element: HTMLElement; name: HTMLEleme
 export class View {
   readonly element: HTMLElement;
   readonly #charts: Chart[];
+  readonly #space: SpacePanel;
   readonly #lanes = new Lanes();
   readonly #histogram = new Histogram();
   readonly #engines = h("div", { class: "engines" });
@@ -74,11 +78,12 @@ export class View {
 
   constructor(events: ChartEvents) {
     this.#charts = kCharts.map((spec) => new Chart(spec, events));
+    this.#space = new SpacePanel(() => events.changed(), (time) => events.hover(time));
     const engines = h("section", { class: "panel" }, h("h3", { text: "Engines" }), this.#engines);
     this.element = h("div", { class: "view" },
       h("div", { class: "tiles" }, ...Object.values(this.#tiles).map((t) => t.element)), this.#alert,
       h("div", { class: "columns" },
-        h("div", { class: "charts" }, ...this.#charts.map((chart) => chart.element)),
+        h("div", { class: "charts" }, this.#space.element, ...this.#charts.map((chart) => chart.element)),
         h("div", { class: "side" }, this.#lanes.element, engines, this.#histogram.element)));
   }
 
@@ -89,6 +94,19 @@ export class View {
     this.#histogram.draw(facts.lateness.buckets, facts.lateness.what, facts.lateness.more);
     this.#drawTiles(track, cursor, instant, facts);
     this.#drawEngines(facts);
+  }
+
+  /** True: the 3-D view is shown, and wants `drawSpace` for each frame. Of the plots only the force's stays. */
+  space(): boolean {
+    const shown = inSpace() && !this.#space.missing;
+    for (const chart of this.#charts) chart.element.hidden = shown && chart.spec.id !== "force";
+    if (!inSpace()) this.#space.hide();
+    return shown;
+  }
+
+  /** The devices in 3-D; `instants` where time stands still. */
+  drawSpace(shown: readonly Shown[], instants: Instants | undefined): void {
+    this.#space.draw(shown, instants);
   }
 
   extents(): [number, number][] {
@@ -105,10 +123,12 @@ export class View {
 
   repaint(): void {
     for (const chart of this.#charts) chart.repaint();
+    this.#space.repaint();
   }
 
   destroy(): void {
     for (const chart of this.#charts) chart.destroy();
+    this.#space.destroy();
   }
 
   #drawTiles(track: Track, cursor: number, instant: string, facts: Facts): void {
