@@ -6,14 +6,16 @@ import { after, before } from "node:test";
 import { packageOf } from "./support.mjs";
 
 const { chromium } = packageOf("clients/dashboard/page", "playwright-core");
+/** No GPU: WebGL is computed too, for the 3-D view. */
+const kArgs = ["--no-sandbox", "--disable-gpu-compositing", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader"];
 let browser;
 before(async () => {
-  browser = await chromium.launch({ executablePath: process.env.TENDON_BROWSER, args: ["--no-sandbox", "--disable-gpu"] });
+  browser = await chromium.launch({ executablePath: process.env.TENDON_BROWSER, args: kArgs });
 });
 after(() => browser?.close());
 
-/** `at`: where in it. A page that has looked nowhere but at tendon-dash, and against whose policy nothing was done. */
-export async function visit(test, url, { at = url, ...options } = {}) {
+/** `at`: where in it; `before`: what is done to the page before it is opened. A page that has looked nowhere but at tendon-dash, and against whose policy nothing was done. */
+export async function visit(test, url, { at = url, before = () => {}, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, ...options });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
@@ -25,6 +27,7 @@ export async function visit(test, url, { at = url, ...options } = {}) {
     await context.close();
     assert.deepEqual(wrong, []);
   });
+  await before(page);
   await page.goto(at);
   return page;
 }

@@ -80,10 +80,10 @@ export class View {
     this.#charts = kCharts.map((spec) => new Chart(spec, events));
     this.#space = new SpacePanel(() => events.changed(), (time) => events.hover(time));
     const engines = h("section", { class: "panel" }, h("h3", { text: "Engines" }), this.#engines);
-    this.element = h("div", { class: "view" },
+    this.element = h("div", { class: "view" }, this.#space.element,
       h("div", { class: "tiles" }, ...Object.values(this.#tiles).map((t) => t.element)), this.#alert,
       h("div", { class: "columns" },
-        h("div", { class: "charts" }, this.#space.element, ...this.#charts.map((chart) => chart.element)),
+        h("div", { class: "charts" }, ...this.#charts.map((chart) => chart.element)),
         h("div", { class: "side" }, this.#lanes.element, engines, this.#histogram.element)));
   }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A camera on a sphere about what it looks at. It moves only when somebody moves it.
+// From where the devices are seen. It changes only when somebody changes it.
 
-/** rad; 0, 0 looks along −z, from the user's side. */
+/** rad; 0, 0 looks along −z, from the user's side; `turn` > 0 goes to the right, `rise` > 0 up. */
 export interface View {
   readonly turn: number;
   readonly rise: number;
@@ -10,7 +10,7 @@ export interface View {
   readonly zoom: number;
 }
 
-export const kFirstView: View = { turn: 0.42, rise: 0.36, zoom: 1 };
+export const kFirstView: View = { turn: 0.42, rise: 0.3, zoom: 1 };
 const kHighest = 1.5;
 
 export function turnedBy(view: View, turn: number, rise: number): View {
@@ -21,9 +21,15 @@ export function zoomedBy(view: View, factor: number): View {
   return { ...view, zoom: Math.min(Math.max(view.zoom * factor, 0.3), 12) };
 }
 
-/** Unit vector from what is looked at to the eye. */
-export function eyeOf({ turn, rise }: View): [number, number, number] {
-  return [Math.cos(rise) * Math.sin(turn), Math.sin(rise), Math.cos(rise) * Math.cos(turn)];
+/** The grid in which `n` cells of that aspect (width / height) are drawn largest in a picture of that aspect. */
+export function gridOf(n: number, cell: number, picture: number): { columns: number; rows: number } {
+  let best = { columns: 1, rows: Math.max(n, 1), size: 0 };
+  for (let columns = 1; columns <= n; ++columns) {
+    const rows = Math.ceil(n / columns);
+    const size = Math.min(picture / (columns * cell), 1 / rows);
+    if (size > best.size * 1.001) best = { columns, rows, size };
+  }
+  return { columns: best.columns, rows: best.rows };
 }
 
 /** rad for each pixel of a drag. */

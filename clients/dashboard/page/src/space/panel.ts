@@ -42,9 +42,9 @@ export class SpacePanel {
     } });
     this.#play = h("button", { type: "button", class: "play", "aria-label": "Play", click: () => (this.#playing === undefined ? this.#start() : this.#stop()) }, "▶");
     this.#seek = h("div", { class: "seek", hidden: true }, this.#play, this.#slider, this.#when);
-    this.element = h("figure", { class: "chart space", "data-chart": "space", hidden: true },
+    this.element = h("figure", { class: "chart spatial", "data-chart": "space", hidden: true },
       h("figcaption", {}, h("span", { class: "title" }, "In space"), h("span", { class: "legend" },
-        key("applied", "applied force"), key("wanted", "wanted force", true), h("span", { text: "1 cm for 1 N" }), key("second", "torque"), key("energy", "surface"))),
+        key("applied", "applied force"), key("wanted", "wanted force", true), h("span", { text: "1 cm for 1 N" }), key("torque", "torque"), key("energy", "surface"))),
       this.#said, h("div", { class: "stage" }, this.#canvas), this.#seek, this.#rows);
   }
 
@@ -157,17 +157,19 @@ class Row {
   readonly #name = h("b", {});
   readonly #values = h("span", { class: "values" });
   readonly #buttons = h("span", { class: "buttons" });
+  readonly #frame = h("span", { class: "note", text: "How it lies before you is not known: drawn as if x were right, y up, z to you." });
   #names = "";
 
   constructor() {
-    this.element = h("div", { class: "handle" }, this.#name, this.#values, this.#buttons);
+    this.element = h("div", { class: "handle" }, this.#name, this.#values, this.#buttons, this.#frame);
   }
 
-  show({ name, watched }: Shown, figure: Figure | undefined): void {
+  show({ name, watched, handle }: Shown, figure: Figure | undefined): void {
     say(this.#name, name);
     this.#name.hidden = name === "";
     mark(this.element, "data-watched", String(watched));
     say(this.#values, figure ? valuesOf(figure) : "no state has come");
+    this.#frame.hidden = handle?.operator_from_device != null;
     const buttons = figure?.buttons ?? [];
     const names = buttons.map((b) => b.name).join("\n");
     if (names !== this.#names) {

@@ -25,21 +25,21 @@ const scratch = { to: new Vector3(), turn: new Quaternion() };
 const shapes = {
   shaft: new CylinderGeometry(0.5, 0.5, 1, 14).translate(0, 0.5, 0),
   head: new ConeGeometry(0.5, 1, 20).translate(0, 0.5, 0),
-  tip: new ConeGeometry(0.0065, 0.026, 28).rotateX(-Math.PI / 2).translate(0, 0, 0.013),
-  handle: new CylinderGeometry(0.0065, 0.0085, 0.085, 28).rotateX(Math.PI / 2).translate(0, 0, 0.0685),
-  end: new SphereGeometry(0.0085, 24, 14).translate(0, 0, 0.111),
-  knob: new SphereGeometry(0.0085, 24, 14),
+  tip: new ConeGeometry(0.0042, 0.026, 28).rotateX(-Math.PI / 2).translate(0, 0, 0.013),
+  handle: new CylinderGeometry(0.0042, 0.0052, 0.085, 28).rotateX(Math.PI / 2).translate(0, 0, 0.0685),
+  end: new SphereGeometry(0.0052, 24, 14).translate(0, 0, 0.111),
+  knob: new SphereGeometry(0.006, 24, 14),
   // From the hinge ahead, along −z.
-  finger: new BoxGeometry(0.0045, 0.009, 0.04).translate(0, 0, -0.02),
+  finger: new BoxGeometry(0.0035, 0.008, 0.036).translate(0, 0, -0.018),
   ball: new SphereGeometry(0.0085, 28, 18),
-  dot: new SphereGeometry(0.0042, 16, 10),
+  dot: new SphereGeometry(0.0034, 16, 10),
   disc: new CircleGeometry(0.038, 48),
   rim: new RingGeometry(0.0372, 0.0384, 64),
 };
 
 /** rad, of the ring for the largest torque. */
 const kMostSweep = (320 / 180) * Math.PI;
-const kRing = { radius: 0.022, thick: 0.075, segments: 80, sides: 8 };
+const kRing = { radius: 0.024, thick: 0.085, segments: 80, sides: 8 };
 
 /** A tube along an arc of radius 1 about z, from +x on. Its triangles follow the arc, so that a part of it can be drawn. */
 function arcShape(): BufferGeometry {
@@ -81,11 +81,11 @@ class Arrow {
     this.object.visible = size > kLeastForce;
     if (!this.object.visible) return;
     const length = Math.min(size * kMetresPerNewton, kLongestArrow);
-    const head = Math.min(this.width * 3.6, length * 0.6);
+    const head = Math.min(this.width * 2.8, length * 0.6);
     this.object.quaternion.setFromUnitVectors(kUp, scratch.to.fromArray(newtons!).divideScalar(size));
     this.#shaft.scale.set(this.width, Math.max(length - head, 1e-5), this.width);
     this.#head.position.y = length - head;
-    this.#head.scale.set(head * 0.75, head, head * 0.75);
+    this.#head.scale.set(head * 0.85, head, head * 0.85);
   }
 }
 
@@ -204,13 +204,13 @@ export class Prop {
     const m = this.#materials;
     const tip = new Mesh(shapes.tip, m.tip);
     this.#stylus = [new Mesh(shapes.handle, m.body), new Mesh(shapes.end, m.body), tip];
-    this.#point = [new Mesh(shapes.ball, m.tip)];
+    this.#point = [new Mesh(shapes.ball, m.tip), new Mesh(shapes.knob, m.tip)];
     this.#fingers = [new Group(), new Group()];
     for (const finger of this.#fingers) finger.add(new Mesh(shapes.finger, m.finger));
-    this.#frame = triad(0.03);
+    this.#frame = triad(0.02);
     this.#tool.add(...this.#stylus, ...this.#point, ...this.#fingers, this.#frame);
-    this.#force = new Arrow(m.applied, 0.0055);
-    this.#wanted = new Arrow(m.wanted, 0.0026);
+    this.#force = new Arrow(m.applied, 0.0062);
+    this.#wanted = new Arrow(m.wanted, 0.003);
     this.#hand = new Arrow(m.hand, 0.0026);
     this.#ring = new Ring(m.torque);
     this.#plane.add(new Mesh(shapes.disc, this.#flat.plane), new Mesh(shapes.rim, this.#flat.rim));
@@ -227,8 +227,8 @@ export class Prop {
     m.finger.color.copy(colour(watched ? "accent" : "quiet"));
     m.applied.color.copy(colour("applied"));
     m.wanted.color.copy(colour("wanted"));
-    m.torque.color.copy(colour("second"));
-    m.hand.color.copy(colour("energy"));
+    m.torque.color.copy(colour("torque"));
+    m.hand.color.copy(colour("text"));
     m.off.color.copy(colour("line"));
     m.on.color.copy(colour("notice"));
     m.on.emissive.copy(colour("notice")).multiplyScalar(0.7);
@@ -247,8 +247,8 @@ export class Prop {
     const stylus = figure.kind === "stylus";
     const gripper = figure.opening !== undefined;
     for (const part of this.#stylus) part.visible = stylus;
-    this.#stylus[2]!.visible = stylus && !gripper;
-    this.#point[0]!.visible = !stylus || gripper;
+    this.#point[0]!.visible = !stylus;
+    this.#point[1]!.visible = stylus && gripper;
     this.#frame.visible = stylus;
     this.#fingers.forEach((finger, i) => {
       finger.visible = gripper;
@@ -273,7 +273,7 @@ export class Prop {
       dot.visible = true;
       dot.material = button.held ? this.#materials.on : this.#materials.off;
       dot.scale.setScalar(button.held ? 1.25 : 1);
-      dot.position.set(stylus ? 0 : 0.011 * (i - (figure.buttons.length - 1) / 2), stylus ? 0.0085 : 0.016, stylus ? 0.042 + 0.013 * i : 0);
+      dot.position.set(stylus ? 0 : 0.011 * (i - (figure.buttons.length - 1) / 2), stylus ? 0.0058 : 0.016, stylus ? 0.042 + 0.013 * i : 0);
     });
     for (let i = figure.buttons.length; i < this.#dots.length; ++i) this.#dots[i]!.visible = false;
   }

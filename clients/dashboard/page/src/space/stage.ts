@@ -10,7 +10,7 @@ import { theme } from "../dom.js";
 import type { HandleInfo } from "../stream.js";
 import type { Track } from "../track.js";
 import { figureOf, frameOf, poseAt, rotated, threeOrder, wordsOf, type Figure, type Quat, type Vec } from "./figure.js";
-import { Orbit, eyeOf } from "./orbit.js";
+import { Orbit, gridOf } from "./orbit.js";
 import { Prop, kPathPoints, kUsualTorque } from "./prop.js";
 
 /** One device, and the instant at which it is shown. */
@@ -27,9 +27,11 @@ export interface Shown {
 
 /** s of the path that is drawn. */
 export const kPathSpan = 3;
-const kFieldOfView = 30;
-/** m between two devices side by side: where they really stand to each other nobody tells. */
-const kBetween = 0.05;
+const kFieldOfView = 22;
+/** Of a name, in heights of a box. */
+const kTitle = 0.075;
+const kRight = new Vector3(1, 0, 0);
+const kUp = new Vector3(0, 1, 0);
 const kRoom = 0.012;
 const kLeastHalf = 0.06;
 
@@ -40,7 +42,11 @@ interface Box {
 
 /** A device's place on the stage: what stands still is built anew when its name, frame or box changes. */
 class Place {
+  /** In its cell; what a person turns; and in the device's own coordinates. */
   readonly group = new Group();
+  readonly turned = new Group();
+  readonly inner = new Group();
+  title = new Sprite();
   readonly prop: Prop;
   readonly still = new Group();
   readonly path = new Float32Array(3 * kPathPoints);
@@ -50,7 +56,9 @@ class Place {
 
   constructor(triad: (length: number) => Group) {
     this.prop = new Prop(triad);
-    this.group.add(this.still, this.prop.object);
+    this.inner.add(this.still, this.prop.object);
+    this.turned.add(this.inner);
+    this.group.add(this.turned, this.title);
   }
 }
 
@@ -60,8 +68,6 @@ export class Stage {
   readonly #camera = new PerspectiveCamera(kFieldOfView, 1, 0.01, 20);
   readonly #orbit: Orbit;
   readonly #places: Place[] = [];
-  readonly #middle = new Vector3();
-  readonly #half = new Vector3();
   readonly #axes: readonly MeshBasicMaterial[];
   readonly #lines = { box: new LineBasicMaterial({ transparent: true, opacity: 0.75 }), floor: new LineBasicMaterial() };
   #colours = new Map<string, Color>();
@@ -137,45 +143,34 @@ export class Stage {
       place.path[3 * k + 1] = b;
       place.path[3 * k + 2] = c;
     }
-    const local = eye.clone().sub(place.group.position);
+    const local = eye.clone().sub(place.group.position).applyQuaternion(place.turned.quaternion.clone().invert()).sub(place.inner.position);
     const most = handle && handle.max_torque_nm > 0 ? handle.max_torque_nm : kUsualTorque;
     // As wide as two pixels are in the middle of the picture.
-    const width = (Math.tan((kFieldOfView * Math.PI) / 360) * eye.distanceTo(this.#middle) * 2.2) / Math.max(this.canvas.clientHeight, 1);
+    const width = (Math.tan((kFieldOfView * Math.PI) / 360) * eye.z * 2.2) / Math.max(this.canvas.clientHeight, 1);
     place.prop.show(place.figure, most, place.path, n, local, width);
     return place.figure ? wordsOf(place.figure) : "no state has come";
   }
 
-  /** Puts the devices side by side, in rows where the picture is narrow. */
+  /** Builds anew what of the devices has changed. */
   #arrange(): void {
-    const shown = this.#shown;
-    const narrow = this.canvas.clientWidth < this.canvas.clientHeight * 1.3;
-    const columns = narrow ? Math.ceil(Math.sqrt(shown.length)) : shown.length;
-    let changed = false;
-    shown.forEach((device, i) => {
+    this.#shown.forEach((device, i) => {
       const place = this.#places[i]!;
       const frame = frameOf(device.handle);
-      const key = JSON.stringify([device.name, frame, device.workspace ?? extentOf(device.track), device.watched, columns, shown.length]);
+      const extent = device.workspace ?? extentOf(device.track);
+      const key = JSON.stringify([device.name, frame, extent, device.watched, this.#shown.length]);
       if (key === place.key) return;
       place.key = key;
-      place.box = boxOf(device.workspace ?? extentOf(device.track), frame);
+      place.box = boxOf(extent, frame);
       place.prop.paint((name) => this.#colour(name), device.watched);
       this.#build(place, device, frame);
-      changed = true;
+      this.#moved = true;
     });
-    if (!changed) return;
-    const size = [0, 1, 2].map((k) => Math.max(...shown.map((_, i) => this.#places[i]!.box.max[k]! - this.#places[i]!.box.min[k]!)));
-    shown.forEach((_, i) => {
-      const { box, group } = this.#places[i]!;
-      const middle = [0, 1, 2].map((k) => (box.min[k]! + box.max[k]!) / 2);
-      group.position.set((i % columns) * (size[0]! + kBetween) - middle[0]!, -Math.floor(i / columns) * (size[1]! + kBetween) - middle[1]!, -middle[2]!);
-    });
-    const rows = Math.ceil(shown.length / columns);
-    this.#half.set((columns * size[0]! + (columns - 1) * kBetween) / 2, (rows * size[1]! + (rows - 1) * kBetween) / 2, size[2]! / 2);
-    this.#middle.set(this.#half.x - size[0]! / 2, -(this.#half.y - size[1]! / 2), 0);
-    this.#moved = true;
   }
 
-  /** Puts the camera where all boxes fill the picture; returns where that is. */
+  /**
+   * Puts the devices into the cells of a grid that fills the picture, and the camera before it. What a person turns are the
+   * devices, each about its own middle: so all are seen from the same side, however many there are.
+   */
   #look(): Vector3 {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     const size = `${width} ${height} ${window.devicePixelRatio}`;
@@ -187,44 +182,58 @@ export class Stage {
       this.#camera.updateProjectionMatrix();
       this.#moved = true;
     }
-    if (this.#moved) {
-      this.#moved = false;
-      const [x, y, z] = eyeOf(this.#orbit.view);
-      const back = new Vector3(x, y, z);
-      const right = new Vector3(0, 1, 0).cross(back).normalize();
-      const up = back.clone().cross(right);
-      const slope = Math.tan((kFieldOfView * Math.PI) / 360);
-      let far = 0.1;
-      for (const [a, b, c] of kCorners) {
-        const corner = new Vector3(a * this.#half.x, b * this.#half.y, c * this.#half.z);
-        const ahead = corner.dot(back);
-        far = Math.max(far, ahead + Math.abs(corner.dot(right)) / (slope * this.#camera.aspect), ahead + Math.abs(corner.dot(up)) / slope);
+    if (!this.#moved || this.#shown.length === 0) return this.#camera.position;
+    this.#moved = false;
+    const { turn, rise, zoom } = this.#orbit.view;
+    const turned = new Quaternion().setFromAxisAngle(kRight, rise).multiply(new Quaternion().setFromAxisAngle(kUp, -turn));
+    const places = this.#places.slice(0, this.#shown.length);
+    const corner = new Vector3();
+    const half = new Vector3();
+    for (const { box } of places) {
+      for (const signs of kCorners) {
+        corner.fromArray(signs.map((s, k) => (s * (box.max[k]! - box.min[k]!)) / 2)).applyQuaternion(turned);
+        half.max(corner);
       }
-      // A little more than the boxes: their names stand below them.
-      this.#camera.position.copy(back).multiplyScalar((far * 1.06) / this.#orbit.view.zoom).add(this.#middle);
-      this.#camera.up.set(0, 1, 0);
-      this.#camera.lookAt(this.#middle);
     }
+    const cell = { width: 2.2 * half.x, height: 2 * half.y * (1 + 2 * kTitle) };
+    const { columns, rows } = gridOf(places.length, cell.width / cell.height, width / height);
+    places.forEach((place, i) => {
+      const inRow = Math.min(columns, places.length - columns * Math.floor(i / columns));
+      place.group.position.set(((i % columns) - (inRow - 1) / 2) * cell.width, ((rows - 1) / 2 - Math.floor(i / columns)) * cell.height, 0);
+      place.turned.quaternion.copy(turned);
+      place.inner.position.set(...([0, 1, 2].map((k) => -(place.box.min[k]! + place.box.max[k]!) / 2) as [number, number, number]));
+      const tall = 2 * half.y * kTitle;
+      place.title.position.set(0, half.y + 0.75 * tall, 0);
+      place.title.scale.set(tall * (place.title.userData["aspect"] as number), tall, 1);
+    });
+    const slope = Math.tan((kFieldOfView * Math.PI) / 360);
+    const far = Math.max((columns * cell.width) / 2 / (slope * this.#camera.aspect), (rows * cell.height) / 2 / slope) * 1.03 + half.z;
+    this.#camera.position.set(0, 0, far / zoom);
+    this.#camera.lookAt(0, 0, 0);
     return this.#camera.position;
   }
 
   /** What stands still: the box, the floor, the frame of the base, and the name. */
-  #build(place: Place, { name, watched, handle }: Shown, frame: Quat): void {
+  #build(place: Place, { name, watched }: Shown, frame: Quat): void {
     this.#clear(place.still);
     const { min, max } = place.box;
     const size: Vec = [max[0] - min[0], max[1] - min[1], max[2] - min[2]];
     const edges = new EdgesGeometry(new BoxGeometry(...size));
     const box = new LineSegments(edges, this.#lines.box);
     box.position.set((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2);
-    const base = this.#triad(Math.max(0.035, 0.22 * Math.min(...size)), this.#letters());
+    // In a corner, not at its origin: there it would be taken for arrows of forces.
+    const base = this.#triad(Math.max(0.025, 0.17 * Math.min(...size)), this.#letters());
     base.quaternion.set(...threeOrder(frame));
+    base.position.set(min[0], min[1], min[2]);
     place.still.add(box, floorOf(place.box, this.#lines.floor), base);
-    const tall = 0.075 * Math.max(size[0], size[1]);
-    const title = this.#text(name === "" ? "device" : name, watched ? "text" : "quiet", tall);
-    title.position.set((min[0] + max[0]) / 2, max[1] - tall * 0.1 + tall * 0.75, max[2]);
-    const you = this.#text(handle?.operator_from_device ? "you are here" : "its frame is not known", "quiet", tall * 0.7);
-    you.position.set((min[0] + max[0]) / 2, min[1] + tall * 0.45, max[2]);
-    place.still.add(title, you);
+    const side = this.#text("your side", "quiet", 0.065 * Math.max(size[0], size[1]));
+    side.position.set((min[0] + max[0]) / 2, min[1], max[2]);
+    place.still.add(side);
+    place.title.material.map?.dispose();
+    place.title.material.dispose();
+    place.group.remove(place.title);
+    place.title = this.#text(name, watched ? "text" : "quiet", 1);
+    place.group.add(place.title);
   }
 
   #letters(): (axis: number) => Sprite {
@@ -236,8 +245,8 @@ export class Stage {
     const triad = new Group();
     const turns = [new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), -Math.PI / 2), new Quaternion(), new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2)];
     turns.forEach((turn, axis) => {
-      const shaft = new CylinderGeometry(0.0007, 0.0007, length, 8).translate(0, length / 2, 0);
-      const head = new ConeGeometry(0.0022, 0.007, 12).translate(0, length + 0.003, 0);
+      const shaft = new CylinderGeometry(0.0005, 0.0005, length, 8).translate(0, length / 2, 0);
+      const head = new ConeGeometry(0.0017, 0.006, 12).translate(0, length + 0.003, 0);
       for (const shape of [shaft, head]) {
         const part = new Mesh(shape, this.#axes[axis]!);
         part.quaternion.copy(turn);
@@ -265,6 +274,7 @@ export class Stage {
     const map = new CanvasTexture(canvas);
     map.colorSpace = SRGBColorSpace;
     const sprite = new Sprite(new SpriteMaterial({ map, depthWrite: false }));
+    sprite.userData["aspect"] = canvas.width / canvas.height;
     sprite.scale.set((tall * canvas.width) / canvas.height, tall, 1);
     return sprite;
   }
