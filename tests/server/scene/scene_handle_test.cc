@@ -55,6 +55,9 @@ amplitude_deg = 45
 frequency_hz = 2
 centre_deg = [10, 20, 30]
 direction = [0, 0, 5]
+[limiter.rotation]
+coulomb_friction_nm = 0
+viscous_friction_nm_s_per_rad = 1e-4
 )")
                         .simulated()
                         .rotation;
@@ -82,6 +85,9 @@ kind = "ramp-hold"
 from_deg = 25
 to_deg = 5
 ramp_ms = 500
+[limiter.gripper]
+coulomb_friction_n = 0.05
+viscous_friction_n_s_per_m = 0.25
 )")
                         .simulated()
                         .gripper;
@@ -215,6 +221,54 @@ TEST(SceneHandle, TheShippedOneTurnsGripsAndPressesItsButton) {
   EXPECT_NEAR(turned, 45 * kDegree, 2 * kDegree);
   EXPECT_NEAR(closest, 5 * kDegree, 2 * kDegree);
   EXPECT_EQ(presses, 2);
+}
+
+const std::string kMotors = kRotation +
+                            "viscous_friction_nm_s_per_rad = 2e-4\ncoulomb_friction_nm = 1e-3\nmax_torque_nm = 0.2\n" +
+                            kGripper + "viscous_friction_n_s_per_m = 0.5\nmax_force_n = 3\n";
+const std::string kBounds =
+    "[limiter.rotation]\ncoulomb_friction_nm = 5e-4\nviscous_friction_nm_s_per_rad = 1e-4\n"
+    "[limiter.gripper]\ncoulomb_friction_n = 0\nviscous_friction_n_s_per_m = 0.25\n";
+
+TEST(SceneHandle, MotorsHaveLimitsOfTheirOwn) {
+  const auto control = minimal_and(kMotors + kBounds).loop.control;
+  ASSERT_TRUE(control.rotation && control.grip);
+  EXPECT_EQ(control.rotation->friction.coulomb, 5e-4);
+  EXPECT_EQ(control.rotation->friction.viscous, 1e-4);
+  EXPECT_EQ(control.rotation->max_torque, 0.2) << "the device's";
+  EXPECT_EQ(control.grip->friction.viscous, 0.25);
+  EXPECT_EQ(control.grip->arm, 0.06);
+  EXPECT_EQ(control.grip->max_force, 3);
+  const auto less = minimal_and(kMotors + kBounds + "[force]\nmax_torque_nm = 0.1\nmax_grip_n = 2\n").loop.control;
+  EXPECT_EQ(less.rotation->max_torque, 0.1);
+  EXPECT_EQ(less.grip->max_force, 2);
+  const auto passive = minimal_and(kRotation).loop.control;
+  EXPECT_FALSE(passive.rotation || passive.grip) << "a handle that is only turned has no torque to bound";
+}
+
+TEST(SceneHandle, AMotorWithoutABoundOfItsFrictionIsRefused) {
+  EXPECT_EQ(
+      error_of_minimal_and(kMotors),
+      "s.toml: limiter.rotation.coulomb_friction_nm: missing, expected 0 N·m or more, because the device has motors "
+      "that turn its handle");
+  const std::string higher = "[limiter.rotation]\ncoulomb_friction_nm = 2e-3\nviscous_friction_nm_s_per_rad = 1e-4\n";
+  EXPECT_NE(
+      error_of_minimal_and(kMotors + higher).find("limiter.rotation.coulomb_friction_nm: expected at most 0.001 N·m"),
+      std::string::npos)
+      << error_of_minimal_and(kMotors + higher);
+  EXPECT_NE(error_of_minimal_and(kRotation + kBounds).find("expected a device with motors that turn its handle"),
+            std::string::npos)
+      << error_of_minimal_and(kRotation + kBounds);
+  const std::string law = error_of_minimal_and(kMotors + kBounds + "[limiter]\nkind = \"force-bounding\"\n");
+  EXPECT_NE(law.find("limiter.kind: expected \"aol+\", \"aol\" or \"none\""), std::string::npos) << law;
+}
+
+TEST(SceneHandle, AnotherLawKeepsTheBoundsOfTheWholeHandle) {
+  const Scene scene = minimal_and(kMotors + kBounds);
+  const auto control = parse_scene(scene.text, "s.toml", {}, limiter_settings("aol", scene.loop.control)).loop.control;
+  EXPECT_EQ(control.limiter.law, Law::kAol);
+  EXPECT_EQ(control.rotation->friction.viscous, 1e-4);
+  EXPECT_EQ(control.grip->friction.viscous, 0.25);
 }
 
 }  // namespace

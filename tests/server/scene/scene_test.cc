@@ -22,7 +22,7 @@ using testing::ScratchFolder;
 TEST(Scene, WithSettingsItsTextIsTheSceneThatTheyMake) {
   const Scene as_written = read_scene(std::string(TENDON_SCENES) + "/demo.toml");
   const Friction friction = as_written.loop.control.limiter.friction;
-  const auto settings = limiter_settings("none", friction);
+  const auto settings = limiter_settings("none", as_written.loop.control);
   const Scene changed = parse_scene(as_written.text, "demo.toml", TENDON_SCENES, settings);
   EXPECT_EQ(changed.loop.control.limiter.law, Law::kNone);
   EXPECT_EQ(changed.loop.control.limiter.friction.coulomb, friction.coulomb);
@@ -37,8 +37,9 @@ TEST(Scene, WithSettingsItsTextIsTheSceneThatTheyMake) {
 
 TEST(Scene, TheTextThatSettingsMakeHasAllDigits) {
   const double odd = 0.1 + 0.2;
-  const Scene changed =
-      parse_scene(kMinimal, "s.toml", {}, limiter_settings("aol", {.coulomb = odd / 100, .viscous = odd / 70}));
+  HapticController::Config control;
+  control.limiter.friction = {.coulomb = odd / 100, .viscous = odd / 70};
+  const Scene changed = parse_scene(kMinimal, "s.toml", {}, limiter_settings("aol", control));
   const Scene again = parse_scene(changed.text, "s.toml", {});
   EXPECT_EQ(again.loop.control.limiter.friction.coulomb, odd / 100);
   EXPECT_EQ(again.loop.control.limiter.friction.viscous, odd / 70);
