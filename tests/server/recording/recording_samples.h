@@ -63,6 +63,24 @@ inline StepRecord sample_step(std::uint64_t tick) {
   step.rearmed = tick % 5 == 0;
   step.disarmed = tick % 7 == 0;
   step.buttons = static_cast<std::uint32_t>(tick % 5);
+  if (tick % 3 != 0) step.handle.emplace();
+  if (tick % 3 == 1) {
+    step.handle->turn = TurnStep{.hand = {.orientation = {0.5, -0.5, 0.5, t}, .angular_velocity = {1, -2, t}},
+                                 .was_applied = {0.1, 0, -t},
+                                 .wanted = {0.2, 0.3, 0.4},
+                                 .torque = {0.05, 0.06, 0.07},
+                                 .applied = {0.01, 0.02, 0.03}};
+  }
+  if (tick % 6 == 2 || tick % 6 == 1) {
+    step.handle->grip = GripStep{.hand = {.opening = 0.3 + t, .velocity = -1.5},
+                                 .was_applied = 0.75,
+                                 .wanted = 2,
+                                 .force = 1.5,
+                                 .applied = 1.25,
+                                 .permitted = 1.5,
+                                 .energy = 1e-3};
+  }
+  if (step.handle && !step.handle->turn && !step.handle->grip) step.handle.reset();
   step.longest_hold = std::chrono::microseconds(2000 + tick);
   step.assumption_broken = tick % 11 == 0;
   if (tick % 4 < 2) step.stiffness << 500, -1, 2, -1, 600, 3, 2, 3.5, 700 + t;
@@ -98,13 +116,28 @@ inline bool same(double a, double b) { return std::bit_cast<std::uint64_t>(a) ==
 inline bool same(const Vec3& a, const Vec3& b) {
   return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z());
 }
+inline bool same(const std::optional<HandleStep>& a, const std::optional<HandleStep>& b) {
+  if (a.has_value() != b.has_value()) return false;
+  if (!a) return true;
+  if (a->turn.has_value() != b->turn.has_value() || a->grip.has_value() != b->grip.has_value()) return false;
+  const auto same_turn = [](const TurnStep& x, const TurnStep& y) {
+    return x.hand == y.hand && same(x.was_applied, y.was_applied) && same(x.wanted, y.wanted) &&
+           same(x.torque, y.torque) && same(x.applied, y.applied);
+  };
+  const auto same_grip = [](const GripStep& x, const GripStep& y) {
+    return x.hand == y.hand && same(x.was_applied, y.was_applied) && same(x.wanted, y.wanted) &&
+           same(x.force, y.force) && same(x.applied, y.applied) && same(x.permitted, y.permitted) &&
+           same(x.energy, y.energy);
+  };
+  return (!a->turn || same_turn(*a->turn, *b->turn)) && (!a->grip || same_grip(*a->grip, *b->grip));
+}
 inline bool same(const StepRecord& a, const StepRecord& b) {
   return a.tick == b.tick && a.scheduled == b.scheduled && a.hand.at == b.hand.at &&
          same(a.hand.position, b.hand.position) && same(a.hand.velocity, b.hand.velocity) && a.held == b.held &&
          same(a.was_applied, b.was_applied) && same(a.wanted, b.wanted) && same(a.permitted, b.permitted) &&
          same(a.force, b.force) && same(a.applied, b.applied) && same(a.energy, b.energy) && a.reasons == b.reasons &&
          a.mode == b.mode && a.rearmed == b.rearmed && a.disarmed == b.disarmed && a.buttons == b.buttons &&
-         a.longest_hold == b.longest_hold && a.assumption_broken == b.assumption_broken &&
+         a.longest_hold == b.longest_hold && a.assumption_broken == b.assumption_broken && same(a.handle, b.handle) &&
          a.force_sequence == b.force_sequence && a.force_age == b.force_age && a.loop_age == b.loop_age &&
          a.channel == b.channel && a.force_error.has_value() == b.force_error.has_value() &&
          same(a.force_error.value_or(0), b.force_error.value_or(0)) &&

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A stylus that turns and grips, at an engine that is 20 ms away: what the server does, and that a recording of it is
+// taken again to the last bit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "core/base/rotation.h"
+#include "devices/simulated/simulated_device.h"
+#include "server/scene/scene.h"
+#include "tests/tools/replay/rerun.h"
+#include "tests/tools/worlds/world.h"
+
+namespace tendon::replay {
+namespace {
+
+const std::string kStylus = R"([device]
+kind = "simulated"
+profile = "touch"
+[device.hand]
+profile = "stylus"
+[[device.hand.press]]
+from_ms = 500
+for_ms = 3
+[device.hand.motion]
+kind = "sine"
+amplitude_mm = 15
+frequency_hz = 1
+[device.rotation]
+inertia_kg_m2 = 2e-5
+viscous_friction_nm_s_per_rad = 2e-4
+coulomb_friction_nm = 1e-3
+max_torque_nm = 0.2
+[device.rotation.hand]
+stiffness_nm_per_rad = 0.3
+damping_nm_s_per_rad = 2e-3
+[device.rotation.hand.motion]
+kind = "sine"
+amplitude_deg = 30
+frequency_hz = 1.3
+direction = [0.2, 0.3, 1]
+[device.gripper]
+open_deg = 40
+arm_mm_per_rad = 60
+mass_kg = 0.02
+viscous_friction_n_s_per_m = 0.5
+coulomb_friction_n = 0.1
+max_force_n = 3
+[device.gripper.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+[device.gripper.hand.motion]
+kind = "sine"
+amplitude_deg = 10
+centre_deg = 20
+frequency_hz = 1.1
+[limiter.rotation]
+coulomb_friction_nm = 5e-4
+viscous_friction_nm_s_per_rad = 1e-4
+[limiter.gripper]
+coulomb_friction_n = 0.05
+viscous_friction_n_s_per_m = 0.25
+)";
+
+Scene stylus(const std::vector<std::string>& settings) { return parse_scene(kStylus, "scene", ".", settings); }
+
+/// A wall at x > 0, a torsion spring about z, and something soft between the fingers.
+Touch peg(const DeviceState& state) {
+  Touch touch(Vec3(-1000 * std::max(0.0, state.position.x()), 0, 0));
+  const Mat3 stiffness = Vec3(0.1, 0.1, 0.5).asDiagonal();
+  touch.torque = spring_torque(stiffness, Quat{}, state.turning->orientation);
+  touch.angular_stiffness = stiffness;
+  touch.grip_force = 200 * 0.06 * std::max(0.0, 0.35 - state.grip->opening);
+  return touch;
+}
+
+/// 4 s at an engine of 100 Hz, 20 ± 5 ms away, that loses 2 % of its datagrams.
+std::vector<StepRecord> lived(const Scene& scene, const Physics& physics = peg) {
+  SimulatedDevice device(scene.simulated());
+  simulation::World::Config config;
+  config.loop = scene.loop;
+  const auto way = injector::parse_profile("delay=uniform(15ms,25ms) loss=2%");
+  config.weather = {.up = way, .down = way};
+  config.latest_wake = std::chrono::microseconds(300);
+  simulation::World world(config, device);
+  world.add_controller({.name = "peg", .rate_hz = 100}, physics);
+  std::vector<StepRecord> steps;
+  world.watch_steps([&steps](const StepRecord& step) { steps.push_back(step); });
+  world.run_for(std::chrono::seconds(4));
+  return steps;
+}
+
+struct Accounts {
+  double handle = 0;  ///< J, force and torque: the least
+  double torque = 0;  ///< J, of the torque alone: what it gave out in all, without friction
+  double grip = 0;    ///< J: the least
+};
+
+/// Kept here from the way that the handle went, with the true friction of the device.
+Accounts accounts(const std::vector<StepRecord>& steps, const Scene& scene) {
+  const auto device = scene.simulated();
+  const Friction point = least_friction(device);
+  const double arm = device.gripper->arm;
+  Accounts least;
+  double handle = 0;
+  double grip = 0;
+  for (std::size_t i = 1; i < steps.size(); ++i) {
+    const double held = seconds(steps[i].held);
+    const Vec3 dx = steps[i].hand.position - steps[i - 1].hand.position;
+    const Vec3 turn = turn_between(steps[i - 1].turn()->hand.orientation, steps[i].turn()->hand.orientation);
+    const double travel = arm * (steps[i].grip()->hand.opening - steps[i - 1].grip()->hand.opening);
+    const auto friction = [held](double coulomb, double viscous, double way) {
+      return coulomb * way + viscous * way * way / held;
+    };
+    handle += -steps[i - 1].applied.dot(dx) + friction(point.coulomb, point.viscous, dx.norm());
+    handle += -steps[i - 1].turn()->applied.dot(turn) +
+              friction(*device.rotation->coulomb_friction, *device.rotation->viscous_friction, turn.norm());
+    least.torque -= steps[i - 1].turn()->applied.dot(turn);
+    grip += -steps[i - 1].grip()->applied * travel +
+            friction(*device.gripper->coulomb_friction, *device.gripper->viscous_friction, std::abs(travel));
+    least.handle = std::min(least.handle, handle);
+    least.grip = std::min(least.grip, grip);
+  }
+  return least;
+}
+
+TEST(WholeHandle, GivesOutNoEnergyThroughABadNetworkWithALimiterOnly) {
+  for (const std::string law : {"aol", "aol+"}) {
+    const Scene scene = stylus({"limiter.kind=" + law});
+    const std::vector<StepRecord> steps = lived(scene);
+    const Accounts least = accounts(steps, scene);
+    EXPECT_GE(least.handle, -1e-9) << law;
+    EXPECT_GE(least.grip, -1e-9) << law;
+    const auto felt = [](const StepRecord& step) { return step.turn()->applied.norm() > 0.01; };
+    EXPECT_GT(std::count_if(steps.begin(), steps.end(), felt), 400) << law << ": the peg is felt";
+  }
+  const Scene without = stylus({"limiter.kind=none"});
+  const Accounts least = accounts(lived(without), without);
+  EXPECT_LT(least.torque, -0.02) << "in rotation alone it gives out energy, J";
+  EXPECT_LT(least.handle, -0.01);
+}
+
+TEST(WholeHandle, IsTakenAgainToTheLastBit) {
+  for (const std::string law : {"aol", "aol+", "none"}) {
+    const Scene scene = stylus({"limiter.kind=" + law});
+    Rerun rerun(scene.loop.control, Rerun::Held::kRecorded);
+    int turned = 0;
+    for (const StepRecord& step : lived(scene)) {
+      ASSERT_EQ(difference(step, rerun.step(step)), "") << law << ", step " << step.tick;
+      if (step.turn()->torque.norm() > 0) ++turned;
+    }
+    EXPECT_GT(turned, 1000) << law;
+  }
+}
+
+TEST(WholeHandle, ADifferenceInItsTorqueIsSeen) {
+  const Scene scene = stylus({});
+  std::vector<StepRecord> steps = lived(scene);
+  StepRecord& odd = steps[2000];
+  odd.handle->turn->wanted *= 1.5;
+  Rerun rerun(scene.loop.control, Rerun::Held::kRecorded);
+  std::string how;
+  for (const StepRecord& step : steps) {
+    if (how = difference(step, rerun.step(step)); !how.empty()) break;
+  }
+  EXPECT_NE(how.find("torque_commanded_nm"), std::string::npos) << how;
+}
+
+TEST(WholeHandle, ItsEngineSeesWhatTheHandDoes) {
+  bool turned = false;
+  bool opened = false;
+  bool pressed = false;
+  lived(stylus({}), [&](const DeviceState& state) {
+    EXPECT_TRUE(state.turning && state.grip && state.torque_applied && state.grip_applied);
+    turned = turned || rotation_vector(state.turning->orientation).norm() > 0.3;
+    opened = opened || state.grip->opening > 0.4;
+    pressed = pressed || (state.buttons & 1U) != 0;
+    return peg(state);
+  });
+  EXPECT_TRUE(turned);
+  EXPECT_TRUE(opened);
+  EXPECT_TRUE(pressed) << "3 ms, between two answers";
+}
+
+}  // namespace
+}  // namespace tendon::replay
