@@ -120,38 +120,38 @@ it("fills the picture with a grid, and keeps the view within bounds", async (tes
 
 const kCanvas = ".spatial canvas";
 const words = (page) => page.locator(kCanvas).getAttribute("aria-label");
-/** Pixels of the 3-D picture that have about the colour of a CSS variable. */
-async function coloured(page, name) {
+/** Pixels of the 3-D picture that have about the colour of each of these CSS variables. */
+async function coloured(page, ...names) {
   const png = (await page.locator(kCanvas).screenshot()).toString("base64");
-  return page.evaluate(async ([data, variable]) => {
+  return page.evaluate(async ([data, variables]) => {
     const image = new Image();
     image.src = `data:image/png;base64,${data}`;
     await image.decode();
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [image.width, image.height];
-    const paint = canvas.getContext("2d");
+    const paint = canvas.getContext("2d", { willReadFrequently: true });
     paint.drawImage(image, 0, 0);
     const seen = paint.getImageData(0, 0, canvas.width, canvas.height).data;
-    paint.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(variable);
-    paint.fillRect(0, 0, 1, 1);
-    const hue = ([r, g, b]) => {
-      const size = Math.hypot(r, g, b);
-      return [r / size, g / size, b / size];
-    };
-    const wanted = hue(paint.getImageData(0, 0, 1, 1).data);
-    let count = 0;
-    for (let i = 0; i < seen.length; i += 4) {
-      const found = hue(seen.slice(i, i + 3));
-      if (Math.hypot(...found.map((v, k) => v - wanted[k])) < 0.12) ++count;
-    }
-    return count;
-  }, [png, `--${name}`]);
+    return variables.map((variable) => {
+      paint.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(variable);
+      paint.fillRect(0, 0, 1, 1);
+      const wanted = paint.getImageData(0, 0, 1, 1).data;
+      const long = Math.hypot(wanted[0], wanted[1], wanted[2]);
+      let count = 0;
+      for (let i = 0; i < seen.length; i += 4) {
+        const size = Math.hypot(seen[i], seen[i + 1], seen[i + 2]) || 1;
+        const off = [0, 1, 2].map((k) => seen[i + k] / size - wanted[k] / long);
+        if (Math.hypot(...off) < 0.12) ++count;
+      }
+      return count;
+    });
+  }, [png, names.map((name) => `--${name}`)]);
 }
 
 it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   const { url } = await startDash(test, "127.0.0.1:9");
   let heard;
-  const page = await visit(test, url, { before: async (made) => (heard = await fakeFeed(made)) });
+  const page = await visit(test, url, { viewport: { width: 800, height: 600 }, before: async (made) => (heard = await fakeFeed(made, { until: 4200 })) });
   const scripts = [];
   page.on("request", (request) => scripts.push(request.url()));
   assert.ok((await page.locator("[data-chart=position]").isVisible()) && !(await page.locator(kCanvas).isVisible()));
@@ -163,10 +163,8 @@ it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   await until("its numbers are told", async () => /^\d\.\d\d N · \d+ mN·m$/.test(await page.locator(".handle .values").first().textContent()));
   await says(page, ".handle .button[data-held=true]", "right");
   assert.ok(await page.locator(".handle", { hasText: "old" }).locator(".note").isVisible(), "whose frame nobody tells");
-  for (const colour of ["applied", "wanted", "torque"]) {
-    const pixels = await coloured(page, colour);
-    assert.ok(pixels > 15, `${colour}: ${pixels} pixels`);
-  }
+  const pixels = await coloured(page, "applied", "wanted", "torque");
+  assert.ok(pixels.every((n) => n > 15), `of the applied force, the wanted one and the torque: ${pixels}`);
   assert.equal(await page.locator("[data-chart=position]").isVisible(), false);
 
   await page.keyboard.press("3");
@@ -229,7 +227,7 @@ it("shows a recording in 3-D: the surface, and another instant", async (test) =>
     return false;
   });
   await says(page, ".handle .values", "mm in the surface");
-  assert.ok((await coloured(page, "energy")) > 60);
+  assert.ok((await coloured(page, "energy"))[0] > 60);
   await page.locator(".seek input").fill("0");
   const before = await page.locator(".seek .when").textContent();
   await page.click(".seek .play");

@@ -13,6 +13,8 @@ const kKept = 120_000;
 const kWindows = [0.5, 2, 5, 20, 60] as const;
 /** Frames per second: enough for a hand's motion, and it spares a phone's battery. */
 const kFrameMs = 33;
+/** The same beside the 3-D view, which is drawn in every frame and is what is looked at. */
+const kBesideSpaceMs = 66;
 
 /** The view of a running server. */
 export class Live {
@@ -194,7 +196,7 @@ export class Live {
       requestAnimationFrame(frame);
       if (!this.element.isConnected) return;
       if (this.#spaceDirty && this.#view.space()) this.#drawSpace();
-      if (!this.#dirty || now - this.#drawn < kFrameMs) return;
+      if (!this.#dirty || now - this.#drawn < (this.#view.space() ? kBesideSpaceMs : kFrameMs)) return;
       this.#drawn = now;
       this.#dirty = false;
       this.#draw();
