@@ -61,6 +61,11 @@ export function statesMessage(number, from, to, every = 1) {
   return message;
 }
 
+const reportsMessage = (device) => ({
+  type: "reports", device, link: { round_trip_ms: 0.2, received: 1000, lost: 0 }, engines: [],
+  loop: { span_s: 1, steps: 1000, missed: 0, overruns: 0, unseen: 0, safety: "armed", fault: "", degraded: "", lateness_us_log2: [], lateness_us_log2_total: [0, 0, 0, 0, 0, 2, 40, 700, 258], steps_total: 1000, missed_total: 0 },
+});
+
 /**
  * Stands in for /live of `page`, before it is opened: what a page hears of four devices at 1 kHz, sixty times a second. `heard`: the
  * lines that it said. `until` ticks; then the devices stand still.
@@ -75,6 +80,7 @@ export async function fakeFeed(page, { devices = kDevices, until = Infinity, beg
       heard.push(line);
       [watched, beside] = [Number(line.split(" ")[1]), line.endsWith(" beside")];
       tick = 0;
+      socket.send(JSON.stringify(reportsMessage(watched)));
     });
     const began = performance.now();
     const timer = setInterval(() => {

@@ -7,6 +7,7 @@ import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
 import { says, shown, visit } from "./browser.mjs";
+import { fakeFeed } from "./fake_feed.mjs";
 import { Program, kRoot, makeKeys, scratch, startDash, startServer, until } from "./support.mjs";
 
 const shoot = (page, name, more = {}) => page.screenshot({ path: join(kRoot, "deploy/screenshots", `${name}.png`), ...more });
@@ -110,4 +111,34 @@ it("a recording, and two side by side", async (test) => {
   await dark.click("#compare");
   await dark.locator(".runs.two .run .lateness").nth(1).waitFor();
   await shoot(dark, "side-by-side-dark");
+});
+
+it("four devices in 3-D, on a desk and on a phone", async (test) => {
+  const { url } = await startDash(test, "127.0.0.1:9");
+  for (const [name, options] of [["space-dark", kDark], ["space-phone", { ...kPhone, hasTouch: true, isMobile: true, deviceScaleFactor: 2 }]]) {
+    const page = await visit(test, url, { ...options, before: (made) => fakeFeed(made, { until: 9200 }) });
+    await page.click("#space");
+    await page.locator(".handle").nth(3).waitFor();
+    await until("its states are drawn", async () => (await shown(page)) >= 9200);
+    await page.waitForTimeout(500);
+    await shoot(page, name);
+  }
+});
+
+it("a recording in 3-D: pressed into a wall", async (test) => {
+  const folder = scratch(test);
+  const server = await startServer(test, folder, ["demo"], "--record", "wall.mcap", "--duration-s", "5");
+  const wall = new Program(test, "virtual_wall", ["--server", server.address, "--local-model", "--stiffness-n-per-m", "800"]);
+  await server.program.ended;
+  await wall.stop();
+  const { url } = await startDash(test, "127.0.0.1:9", "--recordings", folder);
+  const page = await visit(test, url, { ...kLight, at: `${url}/#/recordings/wall.mcap` });
+  await page.locator("[data-chart=position]").waitFor();
+  await page.click("#space");
+  const words = () => page.locator(".spatial canvas").getAttribute("aria-label");
+  for (let share = 350; share < 1000 && !/a surface/.test((await words()) ?? ""); share += 20) {
+    await page.locator(".seek input").fill(String(share));
+    await page.waitForTimeout(150);
+  }
+  await shoot(page, "space-recording");
 });
