@@ -131,12 +131,15 @@ it("a recording in 3-D: pressed into a wall", async (test) => {
   const wall = new Program(test, "virtual_wall", ["--server", server.address, "--local-model", "--stiffness-n-per-m", "800"]);
   await server.program.ended;
   await wall.stop();
-  const { url } = await startDash(test, "127.0.0.1:9", "--recordings", folder);
+  const next = await startServer(test, folder, ["demo"], "--record", "/dev/null");
+  const { url } = await startDash(test, next.address, "--recordings", folder);
   const page = await visit(test, url, { ...kLight, at: `${url}/#/recordings/wall.mcap` });
+  await says(page, ".contact", "connected");
   await page.locator("[data-chart=position]").waitFor();
   await page.click("#space");
-  const words = () => page.locator(".spatial canvas").getAttribute("aria-label");
-  for (let share = 350; share < 1000 && !/a surface/.test((await words()) ?? ""); share += 20) {
+  await page.locator(".handle").waitFor();
+  const values = () => page.locator(".handle .values").textContent();
+  for (let share = 350; share < 1000 && !/^[3-9].*in the surface/.test(await values()); share += 10) {
     await page.locator(".seek input").fill(String(share));
     await page.waitForTimeout(150);
   }
