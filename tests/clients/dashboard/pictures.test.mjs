@@ -139,7 +139,7 @@ it("a recording in 3-D: pressed into a wall", async (test) => {
   await page.click("#space");
   await page.locator(".handle").waitFor();
   const values = () => page.locator(".handle .values").textContent();
-  for (let share = 350; share < 1000 && !/^[3-9].*in the surface/.test(await values()); share += 10) {
+  for (let share = 350; share < 1000 && !/ [2-9]\.\d+ mm in the surface/.test(await values()); share += 10) {
     await page.locator(".seek input").fill(String(share));
     await page.waitForTimeout(150);
   }

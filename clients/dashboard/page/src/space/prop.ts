@@ -31,7 +31,7 @@ const shapes = {
   knob: new SphereGeometry(0.006, 24, 14),
   // From the hinge ahead, along −z.
   finger: new BoxGeometry(0.0035, 0.008, 0.036).translate(0, 0, -0.018),
-  ball: new SphereGeometry(0.0085, 28, 18),
+  ball: new SphereGeometry(0.0065, 28, 18),
   dot: new SphereGeometry(0.0034, 16, 10),
   disc: new CircleGeometry(0.038, 48),
   rim: new RingGeometry(0.0372, 0.0384, 64),
