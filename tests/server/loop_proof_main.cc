@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What loop_proof_test.cc counts instructions of: the haptic loop's step, at first of a point, then of a handle that turns
+// and grips. A line for each. Callgrind counts within `step_in_turn`, and writes a file each time it returns.
+#include <iostream>
+#include <memory>
+
+#include "core/base/rotation.h"
+#include "server/haptic_loop.h"
+
+using namespace tendon;
+
+namespace {
+
+/// A hand that swings without libm, whose instructions depend on the processor.
+double swing(std::uint64_t tick, std::uint64_t period) {
+  const double u = 2.0 * static_cast<double>(tick % period) / static_cast<double>(period) - 1;
+  return u * (1 - u * u);
+}
+
+class Handle final : public Device {
+ public:
+  explicit Handle(bool whole) : whole_(whole) {
+    info_.max_force = 8;
+    if (!whole) return;
+    info_.measures_orientation = true;
+    info_.max_torque = 0.3;
+    info_.gripper = DeviceInfo::Gripper{.open = 1, .arm = 0.05, .max_force = 5};
+  }
+  const DeviceInfo& info() const noexcept override { return info_; }
+  std::optional<PositionSample> read(LocalTime now) noexcept override {
+    ++tick_;
+    PositionSample sample{.at = now, .position = {0.02 * swing(tick_, 700), 0.004 * swing(tick_, 900), 0}};
+    if (whole_) {
+      const double x = 0.3 * swing(tick_, 800);
+      const double y = 0.2 * swing(tick_, 1100);
+      sample.orientation = unit({1, x, y, x * y});
+      sample.opening = 0.3 + 0.2 * swing(tick_, 600);
+    }
+    return sample;
+  }
+  Vec3 apply(const Vec3& force) noexcept override { return force; }
+  Effort apply_all(const Effort& effort) noexcept override { return effort; }
+
+ private:
+  DeviceInfo info_;
+  bool whole_;
+  std::uint64_t tick_ = 0;
+};
+
+HapticLoop::Config config_of(bool whole) {
+  HapticLoop::Config config;
+  HapticController::Config& control = config.control;
+  control.limiter.friction = {0.02, 0.26};
+  control.limiter.longest_hold = std::chrono::milliseconds(2);
+  control.limiter.parts.energy_cap.emplace();
+  control.limiter.parts.knee.emplace();
+  control.limiter.parts.robust_ledger = AolPlus<1, 3>::Robust{.encoder_step = {1e-5}};
+  control.max_force = 8;
+  control.max_slew = 1000;
+  if (whole) {
+    control.rotation =
+        RotationLimits{.friction = {1e-4, 1e-3}, .max_torque = 0.3, .max_slew = 100, .encoder_step = 1e-4};
+    control.grip = GripLimits{.friction = {0.02, 0.26}, .arm = 0.05, .max_force = 5};
+  }
+  return config;
+}
+
+/// What an engine of 100 Hz answers.
+RemoteForce answer(std::uint64_t sequence, LocalTime now, bool whole) {
+  RemoteForce force;
+  force.sequence = sequence;
+  force.received = force.answers = now;
+  force.valid_for = std::chrono::milliseconds(50);
+  force.force = {-2, 0.1, 0};
+  force.model = LocalModel{.at = {0.005, 0, 0}, .stiffness = Mat3::Identity() * 500};
+  if (whole) {
+    force.torque = RemoteTorque{.torque = {0, 0.02, 0}, .model = RotationModel{{}, Mat3::Identity() * 0.2}};
+    force.grip_force = 1;
+  }
+  return force;
+}
+
+}  // namespace
+
+/// A name that callgrind finds: not inlined, not mangled.
+extern "C" [[gnu::noinline]] LocalTime step_in_turn(HapticLoop& loop, Mailboxes& mail, bool whole, LocalTime now,
+                                                    std::uint64_t steps) {
+  for (std::uint64_t i = 0; i < steps; ++i) {
+    if (i % 10 == 0) mail.forces[0].put(answer(i + 1, now, whole));
+    now = loop.step(now);
+    while (mail.steps.front() != nullptr) mail.steps.pop();
+  }
+  return now;
+}
+
+int main() {
+  for (const bool whole : {false, true}) {
+    Handle device(whole);
+    const auto mail = std::make_unique<Mailboxes>();
+    HapticLoop loop(config_of(whole), device, *mail);
+    const LocalTime now = step_in_turn(loop, *mail, whole, LocalTime(), 1000);
+    step_in_turn(loop, *mail, whole, now, 3000);
+    std::cout << (whole ? "handle" : "point") << '\n';
+  }
+}

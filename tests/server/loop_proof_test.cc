@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a haptic step costs, in instructions by callgrind: of a point, which pays next to nothing for what other handles can
+// do, and of a handle that turns and grips.
+#include <gtest/gtest.h>
+
+#include <iostream>
+
+#include "tests/support/callgrind.h"
+#include "tests/support/instruction_test.h"
+
+namespace tendon {
+namespace {
+
+constexpr double kSteps = 3000 - 1000;  // between the two run lengths of loop-proof
+
+/// Of a point's step at 38d7a6d, before handles turned and gripped: this program, without its handle.
+constexpr double kBeforeHandles = 2977.5;
+
+using LoopProof = testing::InstructionTest;
+
+TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
+  const auto counted = testing::count_instructions(TENDON_LOOP_PROOF, "", "step_in_turn");
+  ASSERT_EQ(counted.size(), 2U);
+  const double point = counted[0].instructions / kSteps;
+  const double handle = counted[1].instructions / kSteps;
+  std::cout << "a step: of a point " << point << " instructions (" << kBeforeHandles
+            << " before there were handles), of a "
+            << "handle that turns and grips " << handle << ": " << handle / point << " times as many\n";
+  EXPECT_LT(point, 1.02 * kBeforeHandles);
+  EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
+  EXPECT_LT(handle, 2.5 * point);
+  EXPECT_GT(handle, 1.5 * point) << "this is no handle";
+}
+
+}  // namespace
+}  // namespace tendon
