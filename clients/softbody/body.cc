@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/body.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <stdexcept>
@@ -16,8 +18,10 @@
 #include "clients/softbody/models/modal.h"
 #include "clients/softbody/models/projective.h"
 #include "clients/softbody/models/xpbd.h"
+#include "clients/softbody/touch/capsule.h"
 #include "clients/softbody/touch/friction.h"
 #include "clients/softbody/touch/sphere.h"
+#include "protocol/expect.h"
 
 namespace tendon::softbody {
 namespace {
@@ -181,12 +185,14 @@ std::unique_ptr<Model> plain_model_of(const BodyConfig& config, const Solid& sol
   return std::make_unique<ModalModel>(solid, surface, modal_config(config, surface));
 }
 
+std::vector<int> touchable(const BodyConfig& config, const TouchSurface& surface) {
+  return config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes();
+}
+
 Made model_of(const BodyConfig& config, const Solid& solid, const TouchSurface& surface) {
   Made made;
   if (config.model == ModelKind::kCondensed) {
-    auto condensed = std::make_unique<CondensedModel>(
-        solid, surface,
-        config.reach ? surface.nodes_of_patches(surface.across(config.middle), *config.reach) : surface.nodes());
+    auto condensed = std::make_unique<CondensedModel>(solid, surface, touchable(config, surface));
     made.condensed = condensed.get();
     made.model = std::move(condensed);
   } else {
@@ -219,12 +225,15 @@ const BodyConfig& checked(const BodyConfig& config) {
   if (model.tetrahedra && config.element != Element::kTet4) {
     throw std::invalid_argument("the model \"" + std::string(model.name) + "\" wants the element tet4");
   }
-  if (config.tool == BodyConfig::Tool::kSphere) {
-    if (config.model != ModelKind::kCondensed) throw std::invalid_argument("a sphere wants the model \"condensed\"");
-    if (config.friction) throw std::invalid_argument("a sphere has no friction");
-    if (config.stiffening) throw std::invalid_argument("a sphere wants a body that does not stiffen");
-    if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument("a sphere does not stick");
+  if (config.tool != BodyConfig::Tool::kPatch) {
+    const std::string tool = config.tool == BodyConfig::Tool::kSphere ? "a sphere" : "a capsule";
+    if (config.model != ModelKind::kCondensed) throw std::invalid_argument(tool + " wants the model \"condensed\"");
+    if (config.friction) throw std::invalid_argument(tool + " has no friction");
+    if (config.stiffening) throw std::invalid_argument(tool + " wants a body that does not stiffen");
+    if (config.side == PatchContact::Side::kBilateral) throw std::invalid_argument(tool + " does not stick");
   }
+  expect(std::abs(config.tool_axis.norm() - 1) < 1e-9, "norm of tool_axis", config.tool_axis.norm(), "1");
+  expect(config.tool_offset.allFinite(), "tool_offset", config.tool_offset.norm(), "finite numbers");
   return config;
 }
 
@@ -253,6 +262,20 @@ std::optional<ModelKind> model_named(std::string_view name) noexcept {
   return found == kModels.end() ? std::nullopt : std::optional(found->kind);
 }
 
+bool turns_the_hand(const BodyConfig& config) {
+  return config.tool == BodyConfig::Tool::kCapsule || config.tool_offset != Vec3::Zero();
+}
+
+Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn) {
+  Vec3 lowest = turn * config.tool_offset - config.tool_radius * config.towards_tool;
+  if (config.tool == BodyConfig::Tool::kCapsule) {
+    const Vec3 half = turn * (config.tool_half_length * config.tool_axis);
+    const double up = half.dot(config.towards_tool);
+    if (std::abs(up) > 1e-9 * config.tool_half_length) lowest -= std::copysign(1.0, up) * half;
+  }
+  return lowest;
+}
+
 EffectSet effects_of(const BodyConfig& config) {
   EffectSet set = info(config.model).always;
   if (config.effects.gravity) set.add(kGravity);
@@ -275,9 +298,15 @@ struct Body::Parts {
         model(*made.model),
         contact(model, surface, config.tool_radius, config.side, friction_of(config)),
         patch(middle_patch(surface, config.middle)),
-        knows_turns(info(config.model).always.has(kGeometricNonlinearity)) {
-    // checked() has made sure that a sphere's model is condensed.
+        knows_turns(info(config.model).always.has(kGeometricNonlinearity)),
+        turns(turns_the_hand(config)),
+        offset(config.tool_offset),
+        axis(config.tool_axis) {
+    // checked() has made sure that the model of a sphere or a capsule is condensed.
     if (config.tool == BodyConfig::Tool::kSphere) sphere.emplace(*made.condensed, surface, config.tool_radius);
+    if (config.tool == BodyConfig::Tool::kCapsule) {
+      capsule.emplace(solid, surface, touchable(config, surface), config.tool_radius, config.tool_half_length);
+    }
     if (!config.cuts.empty()) cutting = std::make_unique<Planned>(config, solid.mesh(), solid.fixed(), surface);
   }
 
@@ -297,9 +326,13 @@ struct Body::Parts {
   Made made;
   Model& model;
   PatchContact contact;
-  std::optional<SphereContact> sphere;  ///< instead of `contact`
-  Patch patch;                          ///< around the middle
-  bool knows_turns;                     ///< simulates large rotations
+  std::optional<SphereContact> sphere;    ///< instead of `contact`
+  std::optional<CapsuleContact> capsule;  ///< the same
+  Patch patch;                            ///< around the middle
+  bool knows_turns;                       ///< simulates large rotations
+  bool turns;                             ///< turns_the_hand()
+  Vec3 offset;
+  Vec3 axis;
   std::unique_ptr<Planned> cutting;
 };
 
@@ -345,8 +378,22 @@ Body::Body(Body&&) noexcept = default;
 Body& Body::operator=(Body&&) noexcept = default;
 
 Feel Body::touch(const Vec3& tool) {
+  if (parts_->capsule) return parts_->capsule->at(tool, parts_->axis, tool);
   Feel feel = parts_->sphere ? parts_->sphere->at(tool) : parts_->contact.at(tool);
   if (parts_->cutting) parts_->note(feel);
+  return feel;
+}
+
+Feel Body::touch(const Pose& handle) {
+  if (!parts_->turns) return touch(handle.position);
+  const Vec3 lever = handle.turn * parts_->offset;
+  const Vec3 tool = handle.position + lever;
+  if (parts_->capsule) return parts_->capsule->at(tool, handle.turn * parts_->axis, handle.position);
+  // The force of a sphere, and of a patch, depends on where the tool's middle is alone.
+  Feel feel = touch(tool);
+  const Mat3 cross =
+      (Mat3() << 0, -lever.z(), lever.y(), lever.z(), 0, -lever.x(), -lever.y(), lever.x(), 0).finished();
+  feel.torque = {.torque = lever.cross(feel.force), .stiffness = cross * feel.stiffness * cross.transpose()};
   return feel;
 }
 
@@ -391,7 +438,8 @@ const Vec3& Body::normal() const { return parts_->surface.normal(); }
 Body::Size Body::size() const {
   return {parts_->solid.mesh().nodes.size(), static_cast<std::size_t>(parts_->solid.mesh().element_count()),
           static_cast<std::size_t>(parts_->solid.free_count()), parts_->surface.nodes().size(),
-          parts_->model.bytes() + parts_->contact.bytes() + (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
+          parts_->model.bytes() + parts_->contact.bytes() + (parts_->capsule ? parts_->capsule->bytes() : 0) +
+              (parts_->cutting ? parts_->cutting->cuts.bytes() : 0)};
 }
 
 }  // namespace tendon::softbody

@@ -134,12 +134,21 @@ struct BodyConfig {
   std::optional<double> reach;
   Vec3 middle = Vec3::Zero();  ///< m; only its position across `towards_tool` counts
   double tool_radius = 0;      ///< m; 0: a point
-  /// The tool presses a patch of fixed size, or is a rigid sphere of `tool_radius` whose contact grows (kCondensed
-  /// only).
-  enum class Tool : std::uint8_t { kPatch, kSphere };
+  /// The tool presses a patch of fixed size, or is rigid and its contact grows (kCondensed only): a sphere of
+  /// `tool_radius`, or a capsule of it.
+  enum class Tool : std::uint8_t { kPatch, kSphere, kCapsule };
   Tool tool = Tool::kPatch;
+  double tool_half_length = 0;      ///< kCapsule: m, from its middle to the centre of each end
+  Vec3 tool_axis = Vec3::UnitZ();   ///< kCapsule: unit vector, handle frame, from end to end
+  Vec3 tool_offset = Vec3::Zero();  ///< m, handle frame, from the handle's position to the tool's middle
   PatchContact::Side side = PatchContact::Side::kUnilateral;
 };
+
+/// Whether contact gives a torque: the tool is a capsule, or its middle is not where the handle is.
+bool turns_the_hand(const BodyConfig& config);
+
+/// From the handle to the tool's point that is farthest in the body, m, body frame, with the handle turned by `turn`.
+Vec3 lowest_of_tool(const BodyConfig& config, const Mat3& turn);
 
 /// The effects that `config` simulates, including those of its model.
 EffectSet effects_of(const BodyConfig& config);
@@ -154,9 +163,13 @@ class Body {
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// The force on a tool with its middle at `tool`. A body with time advances by one step. A cut that waits for this
+  /// The force on a tool with its middle at `tool` (m, body frame), for a capsule with the handle not turned. A body with time advances by one step. A cut that waits for this
   /// answer's force is made after the answer: the next answer is that of the cut body, and says so.
   Feel touch(const Vec3& tool);
+
+  /// The same with the handle at `handle` (body frame): the tool is at its offset from there, and where
+  /// turns_the_hand() the answer has the torque about the handle's position.
+  Feel touch(const Pose& handle);
 
   /// Sets the time since the scene began, s: Young's modulus becomes that of `time`, and cuts that are due are made. An
   /// earlier time undoes no cut.

@@ -55,16 +55,36 @@ BodyConfig without(BodyConfig body, EffectKind effect) {
   return body;
 }
 
-Explanation::Cost press_and_come_back(const BodyConfig& config, const std::function<double()>& processor_time) {
+Explanation::Cost press_and_come_back(const BodyConfig& config, const Mat3& turn,
+                                      const std::function<double()>& processor_time) {
   Body body(config);
-  const Vec3 surface = body.touch_point();
+  const Vec3 surface = body.touch_point() - lowest_of_tool(config, turn);
   const double start = processor_time();
   for (int i = 0; i < kAnswers; ++i) {
     const double depth = kWay * (1 - std::abs(2.0 * i / kAnswers - 1));
     body.tick(kInterval * i);
-    body.touch(surface + (config.tool_radius - depth) * body.normal());
+    body.touch(Pose{surface - depth * body.normal(), turn});
   }
   return {(processor_time() - start) / kAnswers, static_cast<std::int64_t>(body.size().bytes)};
+}
+
+std::string touched_by(const BodyConfig& body) {
+  std::ostringstream text;
+  switch (body.tool) {
+    case BodyConfig::Tool::kPatch:
+      text << ", on a patch of " << 1e3 * body.patch_radius << " mm";
+      break;
+    case BodyConfig::Tool::kSphere:
+      text << ", a sphere of " << 1e3 * body.tool_radius << " mm";
+      break;
+    case BodyConfig::Tool::kCapsule:
+      text << ", a capsule of " << 1e3 * body.tool_radius << " mm, " << 2e3 * body.tool_half_length
+           << " mm between the centres of its ends";
+      break;
+  }
+  if (body.tool_offset != Vec3::Zero()) text << ", " << 1e3 * body.tool_offset.norm() << " mm from the handle";
+  if (turns_the_hand(body)) text << "; with a torque";
+  return text.str();
 }
 
 std::string milliseconds(double s, double resolution) {
@@ -98,10 +118,11 @@ Explanation explain(const Scene& scene, const std::function<double()>& processor
     bodies.push_back(without(scene.body, effect.kind));
   }
   std::vector<Explanation::Cost> least(bodies.size(), {std::numeric_limits<double>::infinity(), 0});
+  const Mat3 turn = to_device(scene).transpose();
   const double start = processor_time();
   for (int round = 0; round < kMostRounds && (round == 0 || processor_time() - start < kEnough); ++round) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Explanation::Cost cost = press_and_come_back(bodies[i], processor_time);
+      const Explanation::Cost cost = press_and_come_back(bodies[i], turn, processor_time);
       least[i] = {std::min(least[i].answer_s, cost.answer_s), cost.bytes};
     }
   }
@@ -123,9 +144,7 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   const Body::Size& size = explanation.size;
   std::ostringstream text;
   text << "simulated:\n  contact: " << (body.side == PatchContact::Side::kUnilateral ? "unilateral" : "bilateral")
-       << (body.tool == BodyConfig::Tool::kSphere ? ", a sphere of " : ", on a patch of ")
-       << 1e3 * (body.tool == BodyConfig::Tool::kSphere ? body.tool_radius : body.patch_radius)
-       << " mm\n  elasticity: " << model.name << ", " << model.what << '\n';
+       << touched_by(body) << "\n  elasticity: " << model.name << ", " << model.what << '\n';
   for (const auto& [kind, simulated, adds] : explanation.parts) {
     if (!simulated || kind == EffectKind::kContact) continue;
     const EffectInfo& effect = info(kind);

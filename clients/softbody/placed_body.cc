@@ -7,28 +7,43 @@
 #include <stdexcept>
 
 #include "core/base/arithmetic.h"
+#include "core/base/rotation.h"
 
 namespace tendon::softbody {
 
 PlacedBody::PlacedBody(const Scene& scene)
     : body_(scene.body),
-      to_device_(Eigen::Quaterniond::FromTwoVectors(body_.normal(), scene.towards_hand).toRotationMatrix()),
+      to_device_(to_device(scene)),
       origin_(scene.at - to_device_ * body_.touch_point()),
       normal_(to_device_ * body_.normal()),
       only_pushes_(scene.body.side == PatchContact::Side::kUnilateral),
+      turns_(turns_the_hand(scene.body)),
       depths_(scene.table) {}
 
-Feel PlacedBody::touch(const Vec3& position) {
-  Feel feel = body_.touch(to_device_.transpose() * (position - origin_));
+Feel PlacedBody::touch(const Pose& handle) {
+  const Vec3 position = to_device_.transpose() * (handle.position - origin_);
+  Feel feel = turns_ ? body_.touch(Pose{position, to_device_.transpose() * handle.turn}) : body_.touch(position);
   feel.force = to_device_ * feel.force;
   feel.stiffness = to_device_ * feel.stiffness * to_device_.transpose();
+  if (feel.torque) {
+    feel.torque->torque = to_device_ * feel.torque->torque;
+    feel.torque->stiffness = to_device_ * feel.torque->stiffness * to_device_.transpose();
+  }
   return feel;
+}
+
+Pose PlacedBody::pose(const DeviceState& hand) const {
+  Pose pose{.position = hand.position};
+  if (!turns_ || !hand.turning) return pose;
+  const Quat q = unit(hand.turning->orientation);
+  pose.turn << rotated(q, Vec3::UnitX()), rotated(q, Vec3::UnitY()), rotated(q, Vec3::UnitZ());
+  return pose;
 }
 
 Touch PlacedBody::answer(const DeviceState& hand) {
   const DenormalsOff off;
   if (body_.has_clock()) tick(hand.sampled);
-  const Feel feel = body_.step() > 0 ? follow(hand) : touch(hand.position);
+  const Feel feel = body_.step() > 0 ? follow(hand) : touch(pose(hand));
   deepest_ = std::max(deepest_, -feel.gap);
   Touch touch = feel.force;
   touch.stiffness = feel.stiffness;
@@ -36,7 +51,11 @@ Touch PlacedBody::answer(const DeviceState& hand) {
   touch.error = feel.error;
   touch.topology_changed = feel.topology_changed;
   if (only_pushes_ && std::isfinite(feel.gap)) {
-    touch.contact = Contact{.normal = normal_, .gap = feel.gap, .table = table(hand.position, feel.gap)};
+    touch.contact = Contact{.normal = normal_, .gap = feel.gap, .table = table(pose(hand), feel.gap)};
+  }
+  if (feel.torque) {
+    touch.torque = feel.torque->torque;
+    if (hand.turning) touch.angular_stiffness = feel.torque->stiffness;
   }
   return touch;
 }
@@ -46,13 +65,13 @@ void PlacedBody::tick(PeerTime sampled) {
   body_.tick(seconds(sampled - *first_));
 }
 
-std::optional<ForceTable> PlacedBody::table(const Vec3& position, double gap) {
+std::optional<ForceTable> PlacedBody::table(const Pose& handle, double gap) {
   if (depths_ <= 0 || gap > depths_) return std::nullopt;
   ForceTable table{.first = std::max(gap, -depths_ / 2), .step = depths_ / (ForceTable::kMaxEntries - 1)};
   for (; table.size < ForceTable::kMaxEntries; ++table.size) {
     const double depth = table.first + table.size * table.step;
     try {
-      table.force[table.size] = normal_.dot(touch(position - depth * normal_).force);
+      table.force[table.size] = normal_.dot(touch(Pose{handle.position - depth * normal_, handle.turn}).force);
     } catch (const std::out_of_range&) {
       break;  // at this depth the tool would touch more than the condensed part
     }
@@ -62,24 +81,27 @@ std::optional<ForceTable> PlacedBody::table(const Vec3& position, double gap) {
 
 Feel PlacedBody::follow(const DeviceState& hand) {
   const Duration step = std::max(Duration(1), from_seconds(body_.step()));
+  const Pose now = pose(hand);
   const Duration past = followed_ ? hand.sampled - followed_->sampled : Duration(-1);
   if (past < Duration(0) || past > kMostBehind) {
-    followed_ = {hand.sampled, hand.position, Duration(0), touch(hand.position)};
+    followed_ = {hand.sampled, now, Duration(0), touch(now)};
     return followed_->feel;
   }
-  const Vec3 from = followed_->position;
+  const Pose from = followed_->handle;
   Duration owed = followed_->owed + past;
   const auto steps = owed / step;
   bool changed = false;
   for (auto i = steps; i > 0; --i) {
     owed -= step;
     const double share = past > Duration(0) ? std::min(1.0, seconds(owed) / seconds(past)) : 0;  // of the way, ahead
-    followed_->feel = touch(hand.position + share * (from - hand.position));
+    // Turns are mixed as matrices: the tool's middle then goes straight from place to place.
+    followed_->feel =
+        touch(Pose{now.position + share * (from.position - now.position), now.turn + share * (from.turn - now.turn)});
     changed = changed || followed_->feel.topology_changed;
   }
   followed_->feel.topology_changed = changed;
   followed_->sampled = hand.sampled;
-  followed_->position = hand.position;
+  followed_->handle = now;
   followed_->owed = owed;
   return followed_->feel;
 }

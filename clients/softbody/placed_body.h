@@ -15,12 +15,14 @@ class PlacedBody {
   /// Throws std::invalid_argument when the scene describes no possible body.
   explicit PlacedBody(const Scene& scene);
 
-  /// The force on the hand at `position` (m, device frame); all vectors are in the device frame. A body with time
-  /// advances by one step.
-  Feel touch(const Vec3& position);
+  /// The force on the hand at `position` (m, device frame) with the handle not turned, or at `handle`; all vectors are
+  /// in the device frame. A body with time advances by one step.
+  Feel touch(const Vec3& position) { return touch(Pose{.position = position}); }
+  Feel touch(const Pose& handle);
 
   /// The same as an answer to the server. It has the stiffness and how far that holds, the solver's error and, unless
-  /// the tool sticks, the surface. With Scene::table it has the force at other depths too: the table begins at the
+  /// the tool sticks, the surface. Where turns_the_hand() it has the torque, and the angular stiffness when the device
+  /// measures its handle's orientation; when it does not, the handle counts as not turned. With Scene::table it has the force at other depths too: the table begins at the
   /// surface, or half a table's depth above the tool where that is deeper.
   ///
   /// A body with time moves the tool from the hand's last position to this one, in the steps that fit between the two
@@ -36,10 +38,11 @@ class PlacedBody {
  private:
   void tick(PeerTime sampled);
   Feel follow(const DeviceState& hand);
-  std::optional<ForceTable> table(const Vec3& position, double gap);
+  std::optional<ForceTable> table(const Pose& handle, double gap);
+  Pose pose(const DeviceState& hand) const;
   struct Followed {
     PeerTime sampled;
-    Vec3 position;
+    Pose handle;
     Duration owed;  ///< time still to be simulated, less than a step
     Feel feel;
   };
@@ -49,6 +52,7 @@ class PlacedBody {
   Vec3 origin_;  ///< of the body's frame, in the device's
   Vec3 normal_;  ///< towards the hand
   bool only_pushes_;
+  bool turns_;                     ///< turns_the_hand()
   double depths_;                  ///< m, the depth of the table
   std::optional<PeerTime> first_;  ///< the time of the first sample that was answered; for bodies with a clock
   std::optional<Followed> followed_;

@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -237,10 +238,16 @@ void read_touch(Table table, Scene& scene) {
   body.tool_radius = table.number("tool_radius_mm", 0, true, 1e3 * kMaxLength, 1e3, 0);
   if (table.find("reach_mm") != nullptr) body.reach = table.length("reach_mm");
   if (table.find("tool") != nullptr) {
-    body.tool = table.choice("tool", "patch, sphere", [](std::string_view name) {
+    body.tool = table.choice("tool", "patch, sphere, capsule", [](std::string_view name) {
       if (name == "patch") return std::optional(BodyConfig::Tool::kPatch);
-      return name == "sphere" ? std::optional(BodyConfig::Tool::kSphere) : std::nullopt;
+      if (name == "sphere") return std::optional(BodyConfig::Tool::kSphere);
+      return name == "capsule" ? std::optional(BodyConfig::Tool::kCapsule) : std::nullopt;
     });
+  }
+  body.tool_offset = table.vector("tool_offset_mm", 1e3 * kMaxLength, 1e3, Vec3(Vec3::Zero()));
+  if (body.tool == BodyConfig::Tool::kCapsule) {
+    body.tool_half_length = table.number("tool_length_mm", 0, true, 1e3 * kMaxLength, 1e3) / 2;
+    body.tool_axis = table.direction("tool_axis", Vec3::UnitZ());
   }
   if (table.find("side") != nullptr) {
     body.side = table.choice("side", "unilateral, bilateral", [](std::string_view name) {
@@ -411,6 +418,10 @@ Scene read_scene(const std::filesystem::path& file) {
   return parse_scene(text, file.string(), file.parent_path());
 }
 
+Mat3 to_device(const Scene& scene) {
+  return Eigen::Quaterniond::FromTwoVectors(scene.body.towards_tool, scene.towards_hand).toRotationMatrix();
+}
+
 std::string scene_reference() {
   std::ostringstream text;
   text << "effects = [...]          what is simulated; nothing else is\n";
@@ -456,8 +467,14 @@ std::string scene_reference() {
          "from = [0, 0, 1]         the way to the tool, in the body's frame\n"
          "middle_mm = [0, 0, 0]    of the side that is touched; its place across `from` counts\n"
          "reach_mm                 for condensed, modal: touched only so far from the middle. Without: anywhere\n"
-         "tool = \"patch\"           or sphere: rigid, its contact grows as it is pressed in; condensed alone\n"
-         "tool_radius_mm = 0       how much earlier a patch touches; the sphere's\n"
+         "tool = \"patch\"           or sphere, or capsule: rigid, its contact grows as it is pressed in; condensed "
+         "alone\n"
+         "tool_radius_mm = 0       how much earlier a patch touches; the sphere's, the capsule's\n"
+         "tool_length_mm           of a capsule: between the centres of its ends\n"
+         "tool_axis = [0, 0, 1]    of a capsule: from end to end, in the handle's frame\n"
+         "tool_offset_mm = [0, 0, 0]     from the handle to the tool's middle, in the handle's frame. A tool at an "
+         "offset,\n"
+         "                         and a capsule, give a torque about the handle\n"
          "side = \"unilateral\"      or bilateral: once it has touched, the tool sticks, and pulls\n"
          "table_mm                 answers bring the force at 16 depths over so much, for a slow network: 17 answers'\n"
          "                         time. Of condensed, unilateral, without friction\n"

@@ -19,6 +19,9 @@ struct Scene {
   double table = 0;                   ///< m, the depths that an answer's table of forces covers; 0: no table
 };
 
+/// Turns the body's frame into the device's.
+Mat3 to_device(const Scene& scene);
+
 /// An error in a scene: "FILE:LINE: KEY: expected …, found …".
 class SceneError : public std::runtime_error {
  public:

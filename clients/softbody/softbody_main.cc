@@ -21,7 +21,9 @@ constexpr double kWay = 0.003;
 int test(const softbody::Scene& scene, const Options& options) {
   softbody::PlacedBody body(scene);
   SelfTestScript script;
-  script.start = scene.at + kWay * scene.towards_hand;
+  const Mat3 to_device = softbody::to_device(scene);
+  const Vec3 lowest = to_device * softbody::lowest_of_tool(scene.body, to_device.transpose());
+  script.start = scene.at + kWay * scene.towards_hand - lowest;
   script.into = -scene.towards_hand;
   script.depth = 2 * kWay;
   script.slide = kWay;

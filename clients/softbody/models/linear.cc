@@ -9,6 +9,8 @@
 namespace tendon::softbody {
 namespace {
 
+constexpr Eigen::Index kAtOnce = 64;  // columns: CHOLMOD's blocks are then products of matrices
+
 SymmetricMatrix stiffness_of(const Solid& solid, const Effects& effects) {
   if (solid.law() != Law::kLinear) throw std::invalid_argument("a linear model wants the linear law");
   SymmetricMatrix stiffness = solid.pattern();
@@ -102,13 +104,33 @@ std::size_t LinearModel::bytes() const noexcept {
   return factor_.bytes() + softbody::bytes(effects_) + static_cast<std::size_t>(rest_.size()) * sizeof(double);
 }
 
+MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes) {
+  const Factor factor = factor_of(stiffness_of(solid, {}));
+  const auto count = 3 * static_cast<Eigen::Index>(nodes.size());
+  const auto row_of = [&](Eigen::Index i) { return 3 * nodes[static_cast<std::size_t>(i / 3)] + i % 3; };
+  MatrixXd compliance(count, count);
+  for (Eigen::Index first = 0; first < count; first += kAtOnce) {
+    const Eigen::Index some = std::min(kAtOnce, count - first);
+    MatrixXd loads(solid.free_count(), some);
+    for (Eigen::Index j = 0; j < some; ++j) {
+      loads.col(j) = solid.to_free(VectorXd::Unit(solid.size(), row_of(first + j)));
+    }
+    const MatrixXd solution = factor.solve(loads);
+    for (Eigen::Index j = 0; j < some; ++j) {
+      VectorXd all = VectorXd::Zero(solid.size());
+      solid.add_free(solution.col(j), all);
+      for (Eigen::Index i = 0; i < count; ++i) compliance(i, first + j) = all[row_of(i)];
+    }
+  }
+  return 0.5 * (compliance + compliance.transpose());
+}
+
 CondensedModel::CondensedModel(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes)
     : nodes_(nodes), row_of_(solid.mesh().nodes.size(), -1) {
   const Factor factor = factor_of(stiffness_of(solid, {}));
   const auto count = static_cast<Eigen::Index>(nodes_.size());
   for (Eigen::Index i = 0; i < count; ++i) row_of_[at(nodes_[static_cast<std::size_t>(i)])] = static_cast<int>(i);
   table_.resize(count, count);
-  constexpr Eigen::Index kAtOnce = 64;  // columns: CHOLMOD's blocks are then products of matrices
   for (Eigen::Index first = 0; first < count; first += kAtOnce) {
     const Eigen::Index some = std::min(kAtOnce, count - first);
     MatrixXd loads(solid.free_count(), some);

@@ -37,6 +37,10 @@ class LinearModel : public Model {
   VectorXd rest_;  ///< m, all nodes: the shape at rest; empty without time
 };
 
+/// How a linear solid gives way where single nodes are pushed: the compliance (m/N) of `nodes`, three rows and columns
+/// for each (x, y, z), symmetric; zeros where a node is held. It costs a factor and three solutions for each node.
+MatrixXd compliance_of(const Solid& solid, const std::vector<int>& nodes);
+
 /// The reaction of a linear body, from the depth of each node of the patch under 1 N on the patch.
 Reaction linear_reaction(const Patch& patch, const VectorXd& depth_per_newton, Given given, double value);
 

@@ -4,11 +4,24 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "clients/softbody/models/model.h"
 #include "clients/softbody/touch/friction.h"
 
 namespace tendon::softbody {
+
+/// Where a handle is and how it is turned.
+struct Pose {
+  Vec3 position = Vec3::Zero();  ///< m
+  Mat3 turn = Mat3::Identity();  ///< a rotation: handle frame into the frame of `position`
+};
+
+/// What a tool that is longer than a point feels beside the force.
+struct FeltTorque {
+  Vec3 torque = Vec3::Zero();     ///< N·m, on the hand, about the handle's position
+  Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂torque/∂θ of a small turn θ, symmetric, not negative
+};
 
 /// The answer to one position of the tool.
 struct Feel {
@@ -22,7 +35,8 @@ struct Feel {
   double valid_radius = 0;
   double error = 0;  ///< N, the solver's estimate of its own error
   bool touching = false;
-  bool topology_changed = false;  ///< this is the first answer since the body was cut; earlier ones no longer hold
+  bool topology_changed = false;       ///< this is the first answer since the body was cut; earlier ones no longer hold
+  std::optional<FeltTorque> torque{};  ///< empty: the tool is where the handle is, and no force turns it
 };
 
 /// A tool that presses a patch of a body.

@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/touch/sphere.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "clients/softbody/touch/pushes.h"
 #include "protocol/expect.h"
 
 namespace tendon::softbody {
-namespace {
-
-/// In the first rounds all wrong nodes change sides. That may go round in circles; in later rounds only the most wrong
-/// node changes, so the energy falls in every round and the search is sure to end (Lawson & Hanson 1974).
-constexpr int kQuickRounds = 20;
-constexpr int kMostRounds = 1000;
-
-}  // namespace
 
 SphereContact::SphereContact(const CondensedModel& body, const TouchSurface& surface, double radius)
     : body_(body), surface_(surface), radius_(radius), pushed_(body.nodes().size()) {
@@ -61,7 +53,6 @@ Feel SphereContact::at(const Vec3& q) {
   const auto count = static_cast<Eigen::Index>(inside.size());
   std::vector<bool> active(inside.size());
   for (std::size_t i = 0; i < inside.size(); ++i) active[i] = pushed_[static_cast<std::size_t>(inside[i].row)];
-  if (std::ranges::find(active, true) == active.end()) active.assign(inside.size(), true);
   MatrixXd table(count, count);
   VectorXd depth(count);
   for (Eigen::Index j = 0; j < count; ++j) {
@@ -71,33 +62,7 @@ Feel SphereContact::at(const Vec3& q) {
     }
   }
 
-  const double nothing = 1e-12 * depth.maxCoeff();
-  std::vector<Eigen::Index> set;
-  VectorXd push;
-  Eigen::LLT<MatrixXd> factor;
-  for (int round = 0; round < kMostRounds; ++round) {
-    set.clear();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      if (active[static_cast<std::size_t>(i)]) set.push_back(i);
-    }
-    factor.compute(table(set, set));
-    push = factor.solve(depth(set));
-    // A pushed node is wrong when it pulls; any other node is wrong when it lies in the sphere.
-    const VectorXd left = depth - table(Eigen::all, set) * push;
-    std::vector<std::pair<double, std::size_t>> wrong;
-    for (std::size_t k = 0; k < set.size(); ++k) {
-      const double pull = -push[static_cast<Eigen::Index>(k)] * table(set[k], set[k]);
-      if (pull > nothing) wrong.emplace_back(pull, static_cast<std::size_t>(set[k]));
-    }
-    for (std::size_t i = 0; i < inside.size(); ++i) {
-      const double inside_by = left[static_cast<Eigen::Index>(i)];
-      if (!active[i] && inside_by > nothing) wrong.emplace_back(inside_by, i);
-    }
-    if (wrong.empty()) break;
-    if (round >= kQuickRounds) wrong = {*std::ranges::max_element(wrong)};
-    for (const auto& [amount, i] : wrong) active[i] = !active[i];
-  }
-
+  const auto [set, push, factor] = least_pushes(table, depth, active);
   std::fill(pushed_.begin(), pushed_.end(), false);
   Eigen::Matrix<double, 3, Eigen::Dynamic> ways(3, static_cast<Eigen::Index>(set.size()));
   for (std::size_t k = 0; k < set.size(); ++k) {

@@ -14,8 +14,8 @@ namespace tendon::softbody {
 ///     dᵢ = heightᵢ − q·n + √(R² − |rᵢ|²),   |rᵢ| < R
 ///
 /// The nodes' forces λ have the least energy ½ λᵀGλ − dᵀλ with λ ≥ 0: a node that is pushed lies on the sphere, and all
-/// others have no force. They are found by an active set, which begins with that of the last answer. The force is the
-/// slope of that energy by q, so a closed path gives out no energy:
+/// others have no force. They are found by an active set (`pushes.h`), which begins with that of the last answer. The
+/// force is the slope of that energy by q, so a closed path gives out no energy:
 ///
 ///     force = Σ λᵢ vᵢ,   vᵢ = n − rᵢ/√(R² − |rᵢ|²),      K = V G_AA⁻¹ Vᵀ   (second derivatives of d left out)
 ///
