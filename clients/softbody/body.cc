@@ -393,7 +393,10 @@ Feel Body::touch(const Pose& handle) {
   Feel feel = touch(tool);
   const Mat3 cross =
       (Mat3() << 0, -lever.z(), lever.y(), lever.z(), 0, -lever.x(), -lever.y(), lever.x(), 0).finished();
-  feel.torque = {.torque = lever.cross(feel.force), .stiffness = cross * feel.stiffness * cross.transpose()};
+  // The lever turns with the handle: so does the moment of the force.
+  const Mat3 turned = lever.dot(feel.force) * Mat3::Identity() - lever * feel.force.transpose();
+  feel.torque = {.torque = lever.cross(feel.force),
+                 .stiffness = not_negative(cross * feel.stiffness * cross.transpose() + turned)};
   return feel;
 }
 

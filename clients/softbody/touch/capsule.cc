@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "clients/softbody/models/linear.h"
-#include "clients/softbody/touch/pushes.h"
 #include "core/base/arithmetic.h"
 #include "protocol/expect.h"
 
@@ -123,6 +122,69 @@ void CapsuleContact::give_way(std::vector<Node>& nodes, const std::vector<Eigen:
   }
 }
 
+/// The two stiffnesses, from the capsule's motions along x, y, z and its turns about them at `about`. With w the motion
+/// of the capsule and v = δu − w that of a node past it, its force on the body grows by
+///
+///     δf = m δλ + λ (P v/r + δθ × m),   δu = G δf,   m·v = 0
+///
+/// where P is 1 in the directions in which the capsule is round. They are solved by turns: δλ with the last v.
+void CapsuleContact::add_slopes(const Capsule& tool, const Vec3& about, const std::vector<Node>& nodes,
+                                const Pushes& pushes, Feel& feel) const {
+  constexpr int kTurns = 5;  // each leaves about a quarter of the error
+  const auto size = static_cast<Eigen::Index>(pushes.set.size());
+  const auto node_of = [&](Eigen::Index k) -> const Node& {
+    return nodes[static_cast<std::size_t>(pushes.set[static_cast<std::size_t>(k)])];
+  };
+  using Motions = Eigen::Matrix<double, Eigen::Dynamic, 6>;  // for each node three rows, for each motion a column
+  MatrixXd gives(3 * size, 3 * size);
+  Motions w = Motions::Zero(3 * size, 6);
+  Motions grows = Motions::Zero(3 * size, 6);  // λ δθ × m
+  std::vector<Mat3> round;
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const Node& node = node_of(k);
+    const Vec3& m = node.plane.normal;
+    for (Eigen::Index i = 0; i < size; ++i) {
+      gives.block<3, 3>(3 * i, 3 * k) = compliance_.block<3, 3>(3 * node_of(i).row, 3 * node.row);
+    }
+    w.block<3, 3>(3 * k, 0) = Mat3::Identity();
+    for (int c = 0; c < 3; ++c) {
+      w.block<3, 1>(3 * k, 3 + c) = Vec3::Unit(c).cross(node.at - about);
+      grows.block<3, 1>(3 * k, 3 + c) = pushes.push[k] * Vec3::Unit(c).cross(m);
+    }
+    Mat3 here = Mat3::Identity() - m * m.transpose();
+    if (std::abs(tool.axis.dot(node.at - tool.middle)) < half_length_) here -= tool.axis * tool.axis.transpose();
+    round.emplace_back(pushes.push[k] / radius_ * here);
+  }
+  Motions moved = w;  // δu
+  Motions force(3 * size, 6);
+  Motions across(size, 6);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    for (Eigen::Index k = 0; k < size; ++k) {
+      const Eigen::Matrix<double, 3, 6> past = moved.middleRows<3>(3 * k) - w.middleRows<3>(3 * k);
+      force.middleRows<3>(3 * k) = round[static_cast<std::size_t>(k)] * past + grows.middleRows<3>(3 * k);
+    }
+    moved = gives * force;
+    for (Eigen::Index k = 0; k < size; ++k) {
+      across.row(k) = node_of(k).plane.normal.transpose() * (w.middleRows<3>(3 * k) - moved.middleRows<3>(3 * k));
+    }
+    across = pushes.factor.solve(across).eval();
+    for (Eigen::Index k = 0; k < size; ++k) force.middleRows<3>(3 * k) += node_of(k).plane.normal * across.row(k);
+    moved = gives * force;
+  }
+  Mat3 along = Mat3::Zero();
+  Mat3 around = Mat3::Zero();
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const Node& node = node_of(k);
+    along += force.block<3, 3>(3 * k, 0);
+    for (int c = 0; c < 3; ++c) {
+      around.col(c) += moved.block<3, 1>(3 * k, 3 + c).cross(pushes.push[k] * node.plane.normal) +
+                       (node.at - about).cross(force.block<3, 1>(3 * k, 3 + c));
+    }
+  }
+  feel.stiffness = not_negative(along);
+  feel.torque->stiffness = not_negative(around);
+}
+
 Feel CapsuleContact::at(const Vec3& middle, const Vec3& axis, const Vec3& about) {
   Feel feel;
   feel.torque.emplace();
@@ -178,18 +240,19 @@ Feel CapsuleContact::at(const Vec3& middle, const Vec3& axis, const Vec3& about)
 
   std::fill(pushed_.begin(), pushed_.end(), false);
   const auto size = static_cast<Eigen::Index>(pushes.set.size());
-  Eigen::Matrix<double, 3, Eigen::Dynamic> turns(3, size);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> unit(6, size);  // force and torque of unit pushes
+  unit.topRows<3>() = ways;
   double wide = 0;  // m, across, to the farthest node that is pushed
   for (Eigen::Index k = 0; k < size; ++k) {
     const Node& node = nodes[static_cast<std::size_t>(pushes.set[static_cast<std::size_t>(k)])];
-    turns.col(k) = (node.at - about).cross(ways.col(k));
+    unit.col(k).tail<3>() = (node.at - about).cross(ways.col(k));
     wide = std::max(wide, radius_ * ways.col(k).cross(surface_.normal()).norm());
     pushed_[static_cast<std::size_t>(node.row)] = true;
   }
-  feel.force = ways * pushes.push;
-  feel.stiffness = ways * pushes.factor.solve(ways.transpose());
-  feel.torque->torque = turns * pushes.push;
-  feel.torque->stiffness = turns * pushes.factor.solve(turns.transpose());
+  const Eigen::Matrix<double, 6, 1> sum = unit * pushes.push;
+  feel.force = sum.head<3>();
+  feel.torque->torque = sum.tail<3>();
+  add_slopes(tool, about, nodes, pushes, feel);
   feel.valid_radius = std::max(-feel.gap, wide / 4);
   feel.touching = size > 0;
   return feel;

@@ -7,6 +7,7 @@
 
 #include "clients/softbody/fem/solid.h"
 #include "clients/softbody/touch/contact.h"
+#include "clients/softbody/touch/pushes.h"
 
 namespace tendon::softbody {
 
@@ -28,9 +29,10 @@ namespace tendon::softbody {
 /// capsule is convex, so each shape on the way keeps out of it, and the energy never grows from one to the next. The
 /// search ends when the pushes turn by less than kEnough of the force, and `Feel::error` says what is left.
 ///
-/// The stiffnesses are W A⁻¹ Wᵀ with A the compliance of the pushed nodes along their normals and W the forces, or the
-/// torques, of unit pushes. How the normals turn (second derivatives of φ, of the order of force/radius) is left out, and
-/// so is the lever of the force: −force · lever for a long tool that stands on its end. They are never negative.
+/// The stiffnesses are the slopes of force and torque as the capsule moves and turns while the same nodes are pushed: of
+/// how the pushes change, how their normals turn, and how the lever of each turns with the handle. Where E bends
+/// downwards, as for a long handle that stands on its end and would fall over, the stiffness is 0: neither is ever
+/// negative.
 ///
 /// Valid while the contact is many nodes wide, as with SphereContact, and for small strains.
 ///
@@ -78,6 +80,8 @@ class CapsuleContact {
     Plane plane;
   };
   std::vector<Node> near(const Capsule& tool, double& gap) const;
+  void add_slopes(const Capsule& tool, const Vec3& about, const std::vector<Node>& nodes, const Pushes& pushes,
+                  Feel& feel) const;
   void give_way(std::vector<Node>& nodes, const std::vector<Eigen::Index>& set, const VectorXd& push) const;
 
   const TouchSurface& surface_;

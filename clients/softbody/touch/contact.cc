@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/softbody/touch/contact.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +11,11 @@
 #include "protocol/expect.h"
 
 namespace tendon::softbody {
+
+Mat3 not_negative(const Mat3& stiffness) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> parts((stiffness + stiffness.transpose()) / 2);
+  return parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).asDiagonal() * parts.eigenvectors().transpose();
+}
 
 PatchContact::PatchContact(Model& model, const TouchSurface& surface, double tool_radius, Side side,
                            std::unique_ptr<Friction> friction)

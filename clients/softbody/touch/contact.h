@@ -23,6 +23,9 @@ struct FeltTorque {
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂torque/∂θ of a small turn θ, symmetric, not negative
 };
 
+/// The nearest symmetric matrix that is not negative: what a stiffness may be.
+Mat3 not_negative(const Mat3& stiffness);
+
 /// The answer to one position of the tool.
 struct Feel {
   Vec3 force = Vec3::Zero();      ///< N, on the hand
