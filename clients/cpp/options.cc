@@ -33,17 +33,36 @@ std::string check_key(const std::string& file) {
   }
 }
 
+/// Empty unless the whole text is a number.
+std::optional<double> to_number(const std::string& text) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc{} || stop != end) return {};
+  return value;
+}
+
 /// Accepts 0 and the numbers from `least` to `most`. (CLI::Range accepts NaN.)
 CLI::Validator number(double least, double most) {
   return CLI::Validator(
       [=](const std::string& text) -> std::string {
-        double value = 0;
-        const char* const end = text.data() + text.size();
-        const auto [stop, error] = std::from_chars(text.data(), end, value);
-        const bool ok = error == std::errc{} && stop == end && (value == 0 || (value >= least && value <= most));
-        if (ok) return {};
+        const std::optional<double> value = to_number(text);
+        if (value && (*value == 0 || (*value >= least && *value <= most))) return {};
         std::ostringstream expected;
         expected << "expected " << (least > 0 ? "0, or " : "") << least << " to " << most << ", got \"" << text << '"';
+        return expected.str();
+      },
+      "");
+}
+
+/// Accepts the finite numbers from `least` on.
+CLI::Validator at_least(double least) {
+  return CLI::Validator(
+      [=](const std::string& text) -> std::string {
+        const std::optional<double> value = to_number(text);
+        if (value && *value >= least && *value <= std::numeric_limits<double>::max()) return {};
+        std::ostringstream expected;
+        expected << "expected a number from " << least << " on, got \"" << text << '"';
         return expected.str();
       },
       "");
@@ -100,10 +119,14 @@ void CommandLine::add_argument(const std::string& name, std::string& value, cons
   parser_->set_example(" " + name);
 }
 
-void CommandLine::add(const std::string& name, double& value, const std::string& meaning) {
-  parser_->app.add_option(name, value, meaning)
-      ->capture_default_str()
-      ->check(number(0, std::numeric_limits<double>::max()));
+void CommandLine::add_argument(const std::string& name, std::string& value, const std::vector<std::string>& choices,
+                               const std::string& meaning) {
+  parser_->app.add_option(name, value, meaning)->required()->check(CLI::IsMember(choices));
+  parser_->set_example(" " + choices.at(0));
+}
+
+void CommandLine::add(const std::string& name, double& value, const std::string& meaning, double least) {
+  parser_->app.add_option(name, value, meaning)->capture_default_str()->check(at_least(least));
 }
 
 void CommandLine::add(const std::string& name, bool& value, const std::string& meaning) {

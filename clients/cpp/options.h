@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "clients/cpp/run.h"
 
@@ -22,8 +23,11 @@ class CommandLine {
 
   /// A required argument without a name before it: "SCENE".
   void add_argument(const std::string& name, std::string& value, const std::string& meaning);
-  /// A number ≥ 0: "--stiffness-n-per-m".
-  void add(const std::string& name, double& value, const std::string& meaning);
+  /// The same, one of `choices`.
+  void add_argument(const std::string& name, std::string& value, const std::vector<std::string>& choices,
+                    const std::string& meaning);
+  /// A finite number ≥ `least`: "--stiffness-n-per-m".
+  void add(const std::string& name, double& value, const std::string& meaning, double least = 0);
   /// A switch: "--local-model".
   void add(const std::string& name, bool& value, const std::string& meaning);
 

@@ -5,12 +5,14 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <deque>
 #include <exception>
-#include <functional>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "clients/cpp/machine.h"
 #include "clients/cpp/udp_transport.h"
@@ -56,17 +58,70 @@ void say_json(const Json& json) { std::cout << json << std::endl; }
 /// Whether another attempt would be refused too.
 bool is_final(Code code) { return code != Code::kBusy && code != Code::kShutdown; }
 
+/// One session with the server: the guest, its socket, and what has been said of it.
+class Guest {
+ public:
+  /// `device` is named in what is said; empty: there is only one.
+  template <typename Callback>
+  Guest(const Options& options, const std::string& device, Callback callback, LocalTime start)
+      : options_(options),
+        device_(device),
+        who_(options.client.name + (device.empty() ? "" : " at " + device)),
+        transport_(options.server),
+        client_(transport_, transport_.server(), config(options, device), std::move(callback), start) {}
+  Guest(const Guest&) = delete;
+  Guest& operator=(const Guest&) = delete;
+
+  /// Does what is due at `now` and says what has changed. The latest time for the next turn; empty when it is over for
+  /// good.
+  std::optional<LocalTime> turn(LocalTime now);
+  /// Says Bye.
+  void leave(LocalTime now) { client_.stop(now); }
+  /// Says Bye, and sums up. Whether there was a session.
+  bool end(LocalTime now, Duration duration);
+
+  UdpTransport& transport() { return transport_; }
+
+ private:
+  static ForceClient::Config config(const Options& options, const std::string& device);
+  std::string sentence() const;
+  void say(const std::string& text) const { std::cerr << who_ << ": " << text << '\n'; }
+  void look_up_again();
+  Json to_json(const LinkReport& report) const;
+  /// In front of what stdout is told of the session.
+  Json named() const { return device_.empty() ? Json::object() : Json{{"device", device_}}; }
+
+  const Options& options_;
+  std::string device_;
+  std::string who_;
+  UdpTransport transport_;
+  ForceClient client_;
+
+  std::string said_;
+  std::string_view unusable_;  // the newest reason that was said
+  std::string_view left_out_;  ///< likewise, of a part of a force
+  ForceClient::Phase phase_ = ForceClient::Phase::kGreeting;
+  PeerTime reported_{};
+};
+
+ForceClient::Config Guest::config(const Options& options, const std::string& device) {
+  ForceClient::Config config = options.client;
+  if (!device.empty()) config.device = device;
+  config.seed = seed_from_system();
+  return config;
+}
+
 /// The connection's state in a sentence; empty when there is nothing to say.
-std::string sentence(const ForceClient& client, const Address& address, const Options& options) {
-  const ForceClient::Stats stats = client.stats();
-  const std::string server = options.server.at(address);
+std::string Guest::sentence() const {
+  const ForceClient::Stats stats = client_.stats();
+  const std::string server = options_.server.at(transport_.server());
   switch (stats.phase) {
     case ForceClient::Phase::kOpen:
-      return "connected to " + client.welcome()->device_name + " at " + server + " (" + client.welcome()->server +
-             ", " + std::to_string(client.welcome()->loop_hz) + " Hz)";
+      return "connected to " + client_.welcome()->device_name + " at " + server + " (" + client_.welcome()->server +
+             ", " + std::to_string(client_.welcome()->loop_hz) + " Hz)";
     case ForceClient::Phase::kUnanswered:
       return "no answer from " + server + "; is tendond running there" +
-             (options.client.key ? ", and does it have this key" : "") + "? Trying on";
+             (options_.client.key ? ", and does it have this key" : "") + "? Trying on";
     case ForceClient::Phase::kRefused:
       return server + " refuses: " + stats.reason + (is_final(stats.code) ? "" : "; trying again");
     case ForceClient::Phase::kLost:
@@ -79,64 +134,34 @@ std::string sentence(const ForceClient& client, const Address& address, const Op
   return {};
 }
 
-void print_summary(const ForceClient::Stats& stats, Duration duration, const Options& options) {
-  using ull = unsigned long long;
-  const LinkStats& link = stats.link;
-  if (options.json) {
-    say_json({{"summary",
-               {{"duration_s", seconds(duration)},
-                {"sessions", stats.sessions},
-                {"states", stats.states},
-                {"states_skipped", stats.states_skipped},
-                {"forces", stats.forces},
-                {"forces_unusable", stats.forces_unusable},
-                {"lost_incoming", link.lost},
-                {"lost_outgoing", link.lost_outgoing},
-                {"round_trip_ms", milliseconds(link.smoothed_round_trip)},
-                {"round_trip_variation_ms", milliseconds(link.round_trip_variation)}}}});
-  } else if (stats.sessions == 0) {
-    std::fprintf(stderr, "%s: was not connected\n", options.client.name.c_str());
-  } else {
-    std::fprintf(stderr,
-                 "%s: %.1f s, %llu states came in (%llu skipped for a newer one), %llu forces went out (%llu more were "
-                 "unusable), lost on the way: %llu in, %llu out, round trip %.2f ± %.2f ms\n",
-                 options.client.name.c_str(), seconds(duration), ull{stats.states}, ull{stats.states_skipped},
-                 ull{stats.forces}, ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing},
-                 milliseconds(link.smoothed_round_trip), milliseconds(link.round_trip_variation));
-  }
-}
-
-/// What the server says of our forces, each time that it says it.
-void print_report(const LinkReport& report, const Options& options) {
-  if (options.json) {
-    Json json = {{"number", report.number},
-                 {"forces", report.forces},
-                 {"late_server", report.late_server},
-                 {"late_network", report.late_network},
-                 {"late_engine", report.late_engine},
-                 {"late_unknown", report.late_unknown},
-                 {"refused",
-                  {{"not_finite", report.refused.not_finite},
-                   {"out_of_bounds", report.refused.out_of_bounds},
-                   {"unknown_tick", report.refused.unknown_tick},
-                   {"old_sequence", report.refused.old_sequence}}},
-                 {"worst_late_ms", milliseconds(report.worst_late)},
-                 {"longest_gap_ms", milliseconds(report.longest_gap)}};
-    const auto add = [&](const char* name, const std::optional<Delays>& d) {
-      if (d) json[name] = {{"median", milliseconds(d->median)}, {"p99", milliseconds(d->p99)}};
-    };
-    add("round_trip_ms", report.round_trip);
-    add("to_server_ms", report.to_server);
-    add("to_client_ms", report.to_client);
-    json["clock_error_ms"] = milliseconds(report.clock_error);
-    json["received"] = report.received;
-    json["lost"] = report.lost;
-    json["reordered"] = report.reordered;
-    json["duplicated"] = report.duplicated;
-    say_json({{"report", std::move(json)}});
-  } else if (!report.words.empty()) {
-    std::fprintf(stderr, "%s: the server says: %s\n", options.client.name.c_str(), report.words.c_str());
-  }
+/// What the server says of our forces.
+Json Guest::to_json(const LinkReport& report) const {
+  Json json = named();
+  json.update(Json{{"number", report.number},
+                   {"forces", report.forces},
+                   {"late_server", report.late_server},
+                   {"late_network", report.late_network},
+                   {"late_engine", report.late_engine},
+                   {"late_unknown", report.late_unknown},
+                   {"refused",
+                    {{"not_finite", report.refused.not_finite},
+                     {"out_of_bounds", report.refused.out_of_bounds},
+                     {"unknown_tick", report.refused.unknown_tick},
+                     {"old_sequence", report.refused.old_sequence}}},
+                   {"worst_late_ms", milliseconds(report.worst_late)},
+                   {"longest_gap_ms", milliseconds(report.longest_gap)}});
+  const auto add = [&](const char* name, const std::optional<Delays>& d) {
+    if (d) json[name] = {{"median", milliseconds(d->median)}, {"p99", milliseconds(d->p99)}};
+  };
+  add("round_trip_ms", report.round_trip);
+  add("to_server_ms", report.to_server);
+  add("to_client_ms", report.to_client);
+  json["clock_error_ms"] = milliseconds(report.clock_error);
+  json["received"] = report.received;
+  json["lost"] = report.lost;
+  json["reordered"] = report.reordered;
+  json["duplicated"] = report.duplicated;
+  return json;
 }
 
 /// Whether an attempt or a session is over, and the next attempt not begun.
@@ -146,67 +171,115 @@ bool waits(ForceClient::Phase phase) {
 }
 
 /// The server may have another address by now. Where nobody answered at one, the next one is tried.
-void look_up_again(UdpTransport& transport, ForceClient& client, const std::function<void(const std::string&)>& say) {
+void Guest::look_up_again() {
   try {
-    transport.look_up_again(client.phase() == ForceClient::Phase::kUnanswered);
-    client.move_to(transport.server());
+    transport_.look_up_again(client_.phase() == ForceClient::Phase::kUnanswered);
+    client_.move_to(transport_.server());
   } catch (const std::runtime_error& error) {
     say(error.what());
   }
 }
 
+std::optional<LocalTime> Guest::turn(LocalTime now) {
+  const LocalTime next = client_.turn(now);
+  const std::string text = sentence();
+  if (!text.empty() && text != said_) say(said_ = text);
+  if (const auto why = client_.stats().unusable; !why.empty() && why != unusable_) {
+    say("a force is not sent: " + std::string(unusable_ = why));
+  }
+  if (const auto what = client_.stats().left_out; !what.empty() && what != left_out_) {
+    say("not sent with a force: " + std::string(left_out_ = what));
+  }
+  if (const auto& report = client_.report(); report && std::exchange(reported_, report->until) != report->until) {
+    if (options_.json) {
+      say_json({{"report", to_json(*report)}});
+    } else if (!report->words.empty()) {
+      say("the server says: " + report->words);
+    }
+  }
+  if (client_.phase() == ForceClient::Phase::kRefused && is_final(client_.stats().code)) return {};
+  if (client_.phase() == ForceClient::Phase::kStopped) return {};
+  if (std::exchange(phase_, client_.phase()) != client_.phase() && waits(client_.phase())) look_up_again();
+  return next;
+}
+
+bool Guest::end(LocalTime now, Duration duration) {
+  leave(now);
+  using ull = unsigned long long;
+  const ForceClient::Stats stats = client_.stats();
+  const LinkStats& link = stats.link;
+  if (options_.json) {
+    Json summary = named();
+    summary.update(Json{{"duration_s", seconds(duration)},
+                        {"sessions", stats.sessions},
+                        {"states", stats.states},
+                        {"states_skipped", stats.states_skipped},
+                        {"forces", stats.forces},
+                        {"forces_unusable", stats.forces_unusable},
+                        {"lost_incoming", link.lost},
+                        {"lost_outgoing", link.lost_outgoing},
+                        {"round_trip_ms", milliseconds(link.smoothed_round_trip)},
+                        {"round_trip_variation_ms", milliseconds(link.round_trip_variation)}});
+    say_json({{"summary", std::move(summary)}});
+  } else if (stats.sessions == 0) {
+    std::fprintf(stderr, "%s: was not connected\n", who_.c_str());
+  } else {
+    std::fprintf(stderr,
+                 "%s: %.1f s, %llu states came in (%llu skipped for a newer one), %llu forces went out (%llu more were "
+                 "unusable), lost on the way: %llu in, %llu out, round trip %.2f ± %.2f ms\n",
+                 who_.c_str(), seconds(duration), ull{stats.states}, ull{stats.states_skipped}, ull{stats.forces},
+                 ull{stats.forces_unusable}, ull{link.lost}, ull{link.lost_outgoing},
+                 milliseconds(link.smoothed_round_trip), milliseconds(link.round_trip_variation));
+  }
+  return stats.sessions > 0;
+}
+
+/// One session for each callback, by the name of its device; "" is whatever the options name.
 template <typename Callback>
-int run_with(const Options& options, Callback callback) {
-  const auto say = [&](const std::string& text) { std::cerr << options.client.name << ": " << text << '\n'; };
+int run_with(const Options& options, const std::map<std::string, Callback>& callbacks) {
   try {
     const StopSignals signals;
-    UdpTransport transport(options.server);
-    ForceClient::Config config = options.client;
-    config.seed = seed_from_system();
     const LocalTime start = read_clock();
     const LocalTime end = options.duration > Duration::zero() ? start + options.duration : LocalTime::max();
-    ForceClient client(transport, transport.server(), config, std::move(callback), start);
-
-    std::string said;
-    std::string_view unusable;  // the newest reason that was said
-    std::string_view left_out;  // likewise
-    ForceClient::Phase phase = client.phase();
-    PeerTime reported{};
+    std::deque<Guest> guests;
+    std::vector<UdpTransport*> transports;
+    for (const auto& [device, callback] : callbacks) {
+      transports.push_back(&guests.emplace_back(options, device, callback, start).transport());
+    }
     LocalTime now = start;
     while (now < end && stop_asked == 0) {
-      const LocalTime next = std::min(client.turn(now), end);
-      const std::string text = sentence(client, transport.server(), options);
-      if (!text.empty() && text != said) say(said = text);
-      if (const auto why = client.stats().unusable; !why.empty() && why != unusable) {
-        say("a force is not sent: " + std::string(unusable = why));
+      LocalTime next = end;
+      for (Guest& guest : guests) {
+        const std::optional<LocalTime> due = guest.turn(now);
+        if (!due) {
+          for (Guest& other : guests) other.leave(now);
+          return 1;
+        }
+        next = std::min(next, *due);
       }
-      if (const auto what = client.stats().left_out; !what.empty() && what != left_out) {
-        say("not sent with a force: " + std::string(left_out = what));
-      }
-      if (const auto& report = client.report()) {
-        if (std::exchange(reported, report->until) != report->until) print_report(*report, options);
-      }
-      if (client.phase() == ForceClient::Phase::kRefused && is_final(client.stats().code)) return 1;
-      if (client.phase() == ForceClient::Phase::kStopped) return 1;
-      if (std::exchange(phase, client.phase()) != client.phase() && waits(client.phase())) {
-        look_up_again(transport, client, say);
-      }
-      transport.wait(std::min(next - now, kLongestWait));
+      UdpTransport::wait_for_any(transports, std::min(next - now, kLongestWait));
       now = read_clock();
     }
-    client.stop(now);
-    const ForceClient::Stats stats = client.stats();
-    print_summary(stats, now - start, options);
-    return stats.sessions > 0 ? 0 : 1;
+    bool all = true;
+    for (Guest& guest : guests) all = guest.end(now, now - start) && all;
+    return all ? 0 : 1;
   } catch (const std::exception& error) {
-    say(error.what());
+    std::cerr << options.client.name << ": " << error.what() << '\n';
     return 1;
   }
 }
 
 }  // namespace
 
-int run(const Options& options, Physics physics) { return run_with(options, std::move(physics)); }
-int run(const Options& options, Watch watch) { return run_with(options, std::move(watch)); }
+int run(const Options& options, Physics physics) { return run_with<Physics>(options, {{"", std::move(physics)}}); }
+int run(const Options& options, Watch watch) { return run_with<Watch>(options, {{"", std::move(watch)}}); }
+
+int run(const Options& options, const std::map<std::string, Physics>& physics) {
+  if (physics.empty() || physics.contains("") || !options.client.device.empty()) {
+    std::cerr << options.client.name << ": this program names its devices itself\n";
+    return 1;
+  }
+  return run_with(options, physics);
+}
 
 }  // namespace tendon

@@ -88,11 +88,19 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
 LocalTime UdpTransport::received_by(LocalTime now) const { return std::max(now, read_clock()); }
 
 void UdpTransport::wait(Duration timeout) {
-  pollfd readable{socket_->socket.native_handle(), POLLIN, 0};
+  UdpTransport* const alone = this;
+  wait_for_any({&alone, 1}, timeout);
+}
+
+void UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout) {
+  std::vector<pollfd> readable;
+  for (UdpTransport* const transport : transports) {
+    readable.push_back({transport->socket_->socket.native_handle(), POLLIN, 0});
+  }
   const Duration left = std::max(timeout, Duration::zero());
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
   const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};
-  ::ppoll(&readable, 1, &time, nullptr);
+  ::ppoll(readable.data(), readable.size(), &time, nullptr);
 }
 
 }  // namespace tendon

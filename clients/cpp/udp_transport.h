@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "clients/cpp/server_name.h"
@@ -42,6 +43,8 @@ class UdpTransport : public Link {
   /// Sleeps until a datagram can be received or `timeout` is over; a signal handler may end it sooner.
   /// A timeout of zero or less does not sleep.
   void wait(Duration timeout);
+  /// The same, until one of `transports` can receive.
+  static void wait_for_any(std::span<UdpTransport* const> transports, Duration timeout);
 
  private:
   struct Socket;  // keeps Asio out of this header

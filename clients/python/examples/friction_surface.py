@@ -7,7 +7,7 @@ from math import hypot
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("friction_surface", __doc__)
-parser.add_argument("--height-mm", type=cli.number(-100), default=2, help="Of the table, along y [%(default)s]")
+parser.add_argument("--height-mm", type=cli.at_least(-100), default=2, help="Of the table, along y [%(default)s]")
 parser.add_argument("--friction", type=cli.number(), default=0.5, help="Its coefficient [%(default)s]")
 options = parser.parse_args()
 TABLE, BRISTLE = 1000, 500  # N/m

@@ -8,7 +8,7 @@ from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("magnet", __doc__)
 parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=300, help="At the magnet [%(default)s]")
-parser.add_argument("--reach-mm", type=cli.number(1), default=8, help="Where the pull is strongest [%(default)s]")
+parser.add_argument("--reach-mm", type=cli.at_least(1), default=8, help="Where the pull is strongest [%(default)s]")
 options = parser.parse_args()
 
 

@@ -7,7 +7,7 @@ from math import cos, pi, sin
 from tendon import DeviceState, Touch, cli
 
 parser = cli.parser("texture", __doc__)
-parser.add_argument("--pitch-mm", type=cli.number(0.5), default=4, help="From ridge to ridge [%(default)s]")
+parser.add_argument("--pitch-mm", type=cli.at_least(0.5), default=4, help="From ridge to ridge [%(default)s]")
 parser.add_argument("--force-n", type=cli.number(), default=0.8, help="At the flank of a ridge [%(default)s]")
 options = parser.parse_args()
 

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
 import json
 import logging
 import math
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import AsyncExitStack
 
+from . import aio
 from .client import Client, Physics
 from .force_client import MAX_RATE_HZ, MIN_RATE_HZ, Config, Stats
 from .guest import RefusedForGood, log, parse_address
@@ -34,6 +37,21 @@ def number(least: float = 0, most: float = math.inf) -> Callable[[str], float]:
         expected = "0, or " if least > 0 else ""
         expected += f"{least:g} to {most:g}" if most < math.inf else f"a number from {least:g} on"
         raise argparse.ArgumentTypeError(f'expected {expected}, got "{text}"')
+
+    return parse
+
+
+def at_least(least: float) -> Callable[[str], float]:
+    """For add_argument(type=…): a finite number from `least` on."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isfinite(value) and value >= least:
+            return value
+        raise argparse.ArgumentTypeError(f'expected a number from {least:g} on, got "{text}"')
 
     return parse
 
@@ -90,7 +108,12 @@ def parser(name: str, purpose: str | None, rate_hz: float = 0) -> argparse.Argum
     return line
 
 
-def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: Watch | None = None) -> int:
+def run(
+    options: argparse.Namespace,
+    *,
+    physics: Physics | Mapping[str, Physics] | None = None,
+    watch: Watch | None = None,
+) -> int:
     """Runs a controller (`physics`) or an observer (`watch`) until it is told to stop: --duration-s, SIGINT or SIGTERM.
     Then it says Bye. Returns an exit code:
 
@@ -102,23 +125,20 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
     {"report":{"number":1, …}}, or to an observer those on the device's loop and its engines, {"device":{"number":1, …}}
     and {"peer":{"name":"wall", …}}, and the summary, {"summary":{"duration_s":…, …}}. Exceptions of the callback pass
     through, after a Bye.
+
+    One engine may touch several devices of the server, as two hands hold one object: `physics` then has a function for
+    each, by the device's name. They are called one after the other and need no locks. Each device has a session of its
+    own, the options hold for each, and what --json prints names the device. 0 means that every session was open once.
     """
     if (physics is None) == (watch is None):
         raise TypeError("run: expected physics or watch")
     logging.basicConfig(format=f"{options.name}: %(message)s", level=logging.INFO)
+    if isinstance(physics, Mapping):
+        return _run_several(options, physics)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     start = time.monotonic()
     try:
-        config = Config(
-            name=options.name,
-            role=Role.CONTROLLER if physics else Role.OBSERVER,
-            key=options.key,
-            device=options.device,
-            channel=options.channel,
-            take_lease=options.take_lease,
-            rate_hz=options.rate_hz,
-            diagnostics=options.json and watch is not None,
-        )
+        config = _config(options, options.device, Role.CONTROLLER if physics else Role.OBSERVER)
         with Client(options.server, config) as client:
             try:
                 reported: LinkReport | None = None
@@ -143,9 +163,68 @@ def run(options: argparse.Namespace, *, physics: Physics | None = None, watch: W
     return 0 if stats.sessions > 0 else 1
 
 
-def _print_report(report: LinkReport | None) -> None:
+def _config(options: argparse.Namespace, device: str, role: Role) -> Config:
+    return Config(
+        name=options.name,
+        role=role,
+        key=options.key,
+        device=device,
+        channel=options.channel,
+        take_lease=options.take_lease,
+        rate_hz=options.rate_hz,
+        diagnostics=options.json and role is Role.OBSERVER,
+    )
+
+
+def _run_several(options: argparse.Namespace, physics: Mapping[str, Physics]) -> int:
+    if not physics or "" in physics or options.device:
+        log.error("this program names its devices itself")
+        return 1
+    start = time.monotonic()
+    try:
+        stats = asyncio.run(_touch_several(options, physics))
+    except (RefusedForGood, OSError, ValueError) as error:
+        log.error(error)
+        return 1
+    for device, of_device in stats.items():
+        _print_summary(of_device, time.monotonic() - start, options.json, device)
+    return 0 if all(of_device.sessions > 0 for of_device in stats.values()) else 1
+
+
+async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Physics]) -> dict[str, Stats]:
+    """Until --duration-s, SIGINT or SIGTERM, or an exception of one of them."""
+
+    async def touch(device: str, client: aio.Client) -> None:
+        reported: LinkReport | None = None
+        async for hand in client.states(options.duration_s or None):
+            if options.json and client.report is not reported:
+                reported = client.report
+                _print_report(reported, device)
+            client.send(hand, physics[device](hand))
+
+    async with AsyncExitStack() as stack:
+        clients: dict[str, aio.Client] = {}
+        for device in physics:
+            client = aio.Client(options.server, _config(options, device, Role.CONTROLLER))
+            clients[device] = await stack.enter_async_context(client)
+        tasks = [asyncio.create_task(touch(*item)) for item in clients.items()]
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, lambda: [task.cancel() for task in tasks])
+        try:
+            await asyncio.gather(*tasks)
+        except asyncio.CancelledError:
+            pass  # the way to stop it
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+    return {device: client.stats for device, client in clients.items()}
+
+
+def _print_report(report: LinkReport | None, device: str = "") -> None:
     if report is not None:  # None: of a new session
-        print(json.dumps({"report": _in_words(report)}, separators=(",", ":")), flush=True)
+        words = ({"device": device} if device else {}) | _in_words(report)
+        print(json.dumps({"report": words}, separators=(",", ":")), flush=True)
 
 
 def _print_diagnoses(
@@ -206,11 +285,12 @@ def _in_words(report: LinkReport) -> dict[str, object]:
     }
 
 
-def _print_summary(stats: Stats, duration_s: float, as_json: bool) -> None:
+def _print_summary(stats: Stats, duration_s: float, as_json: bool, device: str = "") -> None:
     link = stats.link
     round_trip_ms, variation_ms = link.smoothed_round_trip_ns / 1e6, link.round_trip_variation_ns / 1e6
     if as_json:
-        summary = {
+        summary: dict[str, object] = {"device": device} if device else {}
+        summary |= {
             "duration_s": round(duration_s, 3),
             "sessions": stats.sessions,
             "states": stats.states,
@@ -224,11 +304,12 @@ def _print_summary(stats: Stats, duration_s: float, as_json: bool) -> None:
         }
         print(json.dumps({"summary": summary}, separators=(",", ":")), flush=True)
     elif stats.sessions == 0:
-        log.error("was not connected")
+        log.error("%swas not connected", f"{device}: " if device else "")
     else:
         log.info(
-            "%.1f s, %d states came in (%d skipped for a newer one), %d forces went out (%d more were unusable), "
+            "%s%.1f s, %d states came in (%d skipped for a newer one), %d forces went out (%d more were unusable), "
             "lost on the way: %d in, %d out, round trip %.2f ± %.2f ms",
+            f"{device}: " if device else "",
             duration_s,
             stats.states,
             stats.states_skipped,

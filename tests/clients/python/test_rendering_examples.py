@@ -14,7 +14,16 @@ from processes import EXAMPLES, Server, example, summary_of
 from tendon import DeviceState, Mode, Touch, cli
 
 Physics = Callable[[DeviceState], Touch]
-RENDERING = ["friction_surface", "magnet", "maze", "texture", "viscous_field", "virtual_fixture", "virtual_wall"]
+RENDERING = [
+    "friction_surface",
+    "magnet",
+    "maze",
+    "texture",
+    "two_hands",
+    "viscous_field",
+    "virtual_fixture",
+    "virtual_wall",
+]
 
 
 @pytest.fixture
@@ -144,9 +153,34 @@ def test_a_full_turn_around_the_magnet_costs_nothing(physics_of):
     assert work(physics_of("magnet"), ring) == pytest.approx(0, abs=1e-9)
 
 
+def test_the_rod_pulls_both_hands_with_one_force_along_itself(physics_of):
+    rod = physics_of("two_hands", "--stiffness-n-per-m", "400", "--length-mm", "200")
+    assert rod["left"](hand((0, 0, 0))).force == (0, 0, 0)  # the other hand does not hold it yet
+    assert rod["right"](hand((0, 0, 0))).force == pytest.approx([0, 0, 0], abs=1e-9)  # at rest
+    pulled = rod["right"](hand((0.01, 0, 0))).force
+    assert pulled == pytest.approx([-4, 0, 0])  # 10 mm too long
+    assert rod["left"](hand((0, 0, 0))).force == pytest.approx([4, 0, 0])
+    askew = rod["left"](hand((0, 0.03, -0.02))).force
+    assert rod["right"](hand((0.01, 0, 0))).force == pytest.approx([-f for f in askew])
+    assert [f / askew[0] for f in askew] == pytest.approx([1, -0.03 / 0.21, 0.02 / 0.21])
+
+
+def test_the_rods_stiffness_is_its_forces_slope(physics_of):
+    rod = physics_of("two_hands")
+    rod["left"](hand((0.004, -0.01, 0.007)))
+    at, step = (0.02, 0.013, -0.004), 1e-7
+    rows = rod["right"](hand(at)).stiffness
+    for j in range(3):
+        more, less = ([c + s * (i == j) for i, c in enumerate(at)] for s in (step, -step))
+        for i, (f, g) in enumerate(zip(rod["right"](hand(more)).force, rod["right"](hand(less)).force)):
+            assert rows[i][j] == pytest.approx(-(f - g) / (2 * step), rel=1e-4, abs=1e-3)
+
+
 def test_a_hand_feels_each_example_through_a_server(tmp_path):
     with Server(tmp_path) as server:
         for name in RENDERING:
+            if name == "two_hands":
+                continue  # it wants two devices: test_examples_in_cpp.py
             shape = ["line"] if name == "virtual_fixture" else []
             with example(tmp_path, name, *shape, "--server", server.address, "--duration-s", "1", "--json") as engine:
                 engine.wait_for_line('"summary"')

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rendering examples in C++: the same as those in Python, for the same hands, options and mistakes."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+from processes import EXAMPLES, PROGRAMS, Process, Server, scene
+from tendon import Touch
+from test_rendering_examples import RENDERING, Physics, hand, physics_of  # noqa: F401
+
+IN_CPP = ROOT / "clients" / "cpp" / "examples"
+TEST_PROGRAMS = Path(os.environ.get("TENDON_TEST_PROGRAMS", ROOT / "build" / "release" / "tests"))
+MOST_LINES = 30
+
+Hand = tuple[str, tuple[float, ...], tuple[float, ...]]
+"""Device, position in m, velocity in m/s."""
+
+
+def built(program: Path) -> Path:
+    if not program.exists():
+        pytest.skip(f"{program} is not built; TENDON_PROGRAMS and TENDON_TEST_PROGRAMS name other folders")
+    return program
+
+
+def wandering(devices: list[str], seed: int) -> Iterator[Hand]:
+    """Hands that wander through the space in which the examples happen: |x| and |y| up to 35 mm, |z| up to 10 mm."""
+    dice = random.Random(seed)
+    at = {device: (0.0, 0.0, 0.0) for device in devices}
+    for _ in range(150):
+        aim = {device: (dice.uniform(-0.035, 0.035), dice.uniform(-0.035, 0.035), dice.uniform(-0.01, 0.01)) for device in devices}
+        for device in random.Random(seed).choices(devices, k=20):
+            step = tuple((b - a) * 0.1 for a, b in zip(at[device], aim[device]))
+            at[device] = tuple(a + s for a, s in zip(at[device], step))  # type: ignore[assignment]
+            yield device, at[device], tuple(1000 * s for s in step)
+
+
+def flat(touch: Touch) -> list[float]:
+    """Force and, where one is sent, nine numbers of stiffness."""
+    stiffness = touch.stiffness
+    if stiffness is None:
+        return list(touch.force)
+    if not hasattr(stiffness[0], "__len__"):
+        return [*touch.force, *(stiffness[i] * (i == j) for i in range(3) for j in range(3))]
+    return [*touch.force, *(k for row in stiffness for k in row)]
+
+
+def in_cpp(name: str, arguments: tuple[str, ...], hands: list[Hand]) -> list[list[float]]:
+    lines = "".join(f"{device} {' '.join(map(repr, (*x, *v)))}\n" for device, x, v in hands)
+    command = [built(TEST_PROGRAMS / "touch_lines"), name, *arguments]
+    done = subprocess.run(command, input=lines, capture_output=True, text=True, timeout=60, check=True)
+    return [[float(word) for word in line.split()] for line in done.stdout.splitlines()]
+
+
+@pytest.mark.parametrize(
+    "name, arguments",
+    [
+        ("friction_surface", ()),
+        ("friction_surface", ("--height-mm", "-3", "--friction", "0.9")),
+        ("magnet", ()),
+        ("magnet", ("--stiffness-n-per-m", "150", "--reach-mm", "5")),
+        ("maze", ()),
+        ("texture", ()),
+        ("texture", ("--pitch-mm", "3", "--force-n", "0.3")),
+        ("two_hands", ()),
+        ("two_hands", ("--stiffness-n-per-m", "900", "--length-mm", "180")),
+        ("virtual_fixture", ("line",)),
+        ("virtual_fixture", ("plane",)),
+        ("virtual_fixture", ("cone", "--stiffness-n-per-m", "250")),
+        ("virtual_wall", ()),
+        ("virtual_wall", ("--local-model", "--stiffness-n-per-m", "800")),
+        ("viscous_field", ()),
+        ("viscous_field", ("--damping-n-s-per-m", "12")),
+    ],
+)
+def test_cpp_answers_as_python_does(physics_of: Callable[..., Physics], name, arguments):  # noqa: F811
+    physics = physics_of(name, *arguments)
+    by_device = physics if isinstance(physics, dict) else {"any": physics}
+    hands = list(wandering(sorted(by_device), seed=7))
+    python = [flat(by_device[device](hand(x, v))) for device, x, v in hands]  # type: ignore[arg-type]
+    assert sum(any(touch[:3]) for touch in python) > 300, "too few of these hands feel anything"
+    for here, ours, theirs in zip(hands, python, in_cpp(name, arguments, hands), strict=True):
+        assert theirs == pytest.approx(ours, rel=1e-9, abs=1e-9), here
+
+
+@pytest.mark.parametrize("name", RENDERING)
+def test_both_languages_have_the_same_options(name):
+    def options(*command: str | Path) -> set[str]:
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "clients" / "python")}
+        done = subprocess.run([*command, "--help"], capture_output=True, text=True, timeout=60, check=True, env=environment)
+        return set(re.findall(r"--[a-z][a-z-]*", done.stdout)) - {"--version"}
+
+    assert options(built(PROGRAMS / name)) == options(sys.executable, EXAMPLES / f"{name}.py")
+
+
+@pytest.mark.parametrize(
+    "name, wrong",
+    [
+        ("magnet", ("--reach-mm", "0")),
+        ("texture", ("--pitch-mm", "0.4")),
+        ("texture", ("--force-n", "-1")),
+        ("friction_surface", ("--height-mm", "-101")),
+        ("two_hands", ("--length-mm", "0")),
+        ("viscous_field", ("--damping-n-s-per-m", "nan")),
+        ("virtual_fixture", ("circle",)),
+        ("virtual_fixture", ()),
+    ],
+)
+def test_both_languages_refuse_the_same_mistakes_with_two(tmp_path, name, wrong):
+    for command in ([built(PROGRAMS / name)], [sys.executable, EXAMPLES / f"{name}.py"]):
+        with Process(tmp_path, [*command, *wrong, "--duration-s", "1"]) as program:
+            assert program.wait() == 2, program.said
+
+
+@pytest.mark.parametrize("source", [*sorted(IN_CPP.glob("*.cc")), *sorted(EXAMPLES.glob("*.py"))], ids=lambda path: path.name)
+def test_an_example_has_at_most_30_lines_of_code(source):
+    lines = [line.strip() for line in source.read_text(encoding="utf-8").splitlines()]
+    code = [line for line in lines if line and not line.startswith(("//", "#!", "# "))]
+    assert len(code) <= MOST_LINES
+
+
+def test_a_hand_feels_each_cpp_example_through_a_server(tmp_path):
+    with Server(tmp_path) as server:
+        for name in set(RENDERING) - {"two_hands"}:
+            shape = ["line"] if name == "virtual_fixture" else []
+            program = [built(PROGRAMS / name), *shape, "--server", server.address, "--duration-s", "0.5", "--json"]
+            with Process(tmp_path, program) as engine:
+                assert engine.wait() == 0, engine.said
+
+
+@pytest.mark.parametrize("command", [["cpp"], ["python"]], ids=["C++", "Python"])
+def test_two_hands_feel_each_other_through_one_rod(tmp_path, command):
+    """The left hand stays where it is. The right one moves by ± 10 mm along the rod: both are pushed and pulled."""
+    program = [built(PROGRAMS / "two_hands")] if command == ["cpp"] else [sys.executable, EXAMPLES / "two_hands.py"]
+    echo = [sys.executable, EXAMPLES / "echo_motion.py", "--json", "--rate-hz", "0"]
+    still = scene("left").replace("amplitude_mm = 15", "amplitude_mm = 0")
+    assert still != scene("left")
+    with Server(tmp_path, scenes={"left": still, "right": scene("right")}) as server:
+        with Process(tmp_path, [*program, "--server", server.address]) as engine:
+            for _ in range(2):
+                engine.wait_for_line("connected to")
+            for device in ("left", "right"):
+                with Process(tmp_path, [*echo, "--server", server.address, "--device", device, "--duration-s", "2"]) as look:
+                    assert look.wait() == 0, look.said
+                lines = [json.loads(line) for line in look.said if line.startswith('{"tick"')]
+                wanted = [line["force_wanted_n"][0] for line in lines if line["force_wanted_n"]]
+                assert min(wanted) < -0.5 and max(wanted) > 0.5, device
