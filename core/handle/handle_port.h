@@ -22,9 +22,9 @@ namespace tendon {
 ///                        and one share γ for force and torque, so that the wrench keeps its direction
 ///     HandlePort<1>      a gripper: N and m at its fingers
 ///
-/// Δθ is the turn between two samples about one axis, in base frame axes. A handle that cones between two samples turns
-/// by more than that; its friction then dissipates more than is booked, and the difference of the work is of second
-/// order in the turn: below the friction's share as long as ‖τ‖ < 4 b_r/T.
+/// Δθ is the turn between two samples about one axis, in base frame axes. A handle whose axis turns meanwhile may take
+/// up to (‖τ‖T/b_r)²/48 of the interval's viscous friction more than is booked: a bound of friction that is 2 % below
+/// the truth covers it while ‖τ‖ ≤ b_r/T.
 ///
 /// Satisfies StabilityController. Thread-safe: no. Realtime-safe: all but the constructor.
 template <int Blocks, int Size = 1>
