@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
@@ -121,9 +122,10 @@ class SceneResolver {
       if (gripper->hand) gripper->hand->motion = motion_of(draft_.gripping, "device.gripper.hand", directory);
       if (gripper->start && *gripper->start > gripper->open) {
         const Unit& unit = unit_of("_deg");
+        const auto degrees = [&unit](double angle) { return digits(std::round(angle * unit.per_si * 1e9) / 1e9); };
         blame("device.gripper.start_deg", {},
-              "expected at most open_deg, which is " + with_symbol(Number::shown(unit, gripper->open), unit) +
-                  ", found " + Number::shown(unit, *gripper->start));
+              "expected at most open_deg, which is " + with_symbol(degrees(gripper->open), unit) + ", found " +
+                  degrees(*gripper->start));
       }
       build("device.gripper", [&gripper] { SimulatedGripper{*gripper}; });
     }
