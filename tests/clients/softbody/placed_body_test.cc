@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <string>
+#include <string_view>
 
+#include "core/base/rotation.h"
 #include "core/remote/answer.h"
 #include "tests/clients/softbody/scene_text.h"
 
@@ -74,6 +78,93 @@ TEST(PlacedBody, ATableFollowsASpheresGrowingContactWhereAStiffnessDoesNot) {
     }
   }
   EXPECT_LT(of_table, 0.01 * of_stiffness);
+}
+
+constexpr std::string_view kSphereBelow =
+    "tool = \"sphere\"\ntool_radius_mm = 20\ntool_offset_mm = [60, 0, 20]\nreach_mm = 20\npatch_radius_mm";
+
+Scene with_tool(std::string_view tool) {
+  std::string text = with("patch_radius_mm", tool);
+  text.replace(text.find("[4, 4, 2]"), 9, "[12, 12, 6]");
+  return parse_scene(text, "s.toml", ".");
+}
+
+/// A hand whose handle is turned by `turn`, so that the middle of its tool, `offset` (m) away, is at `tool`.
+DeviceState hand_with(const Vec3& tool, const Vec3& offset, const Quat& turn) {
+  DeviceState hand;
+  hand.position = tool - rotated(turn, offset);
+  hand.turning = Turning{.orientation = turn};
+  return hand;
+}
+
+TEST(PlacedBody, ASphereAtAnOffsetIsThatSphereAndItsForceHasALever) {
+  PlacedBody plain(with_tool("tool = \"sphere\"\ntool_radius_mm = 20\nreach_mm = 20\npatch_radius_mm"));
+  PlacedBody held(with_tool(kSphereBelow));
+  const Vec3 offset(0.06, 0, 0.02);
+  const Vec3 tool(-0.0075, 0.004, -0.003);
+  DeviceState there;
+  there.position = tool;
+  const Touch alone = plain.answer(there);
+  EXPECT_LT(alone.force.x(), -0.1);
+  EXPECT_FALSE(alone.torque);
+  for (const Vec3& by : {Vec3(0, 0, 0), Vec3(0, 0, 1), Vec3(0.5, -1, 0.3)}) {
+    const Quat turn = rotation_by(by);
+    const Touch touch = held.answer(hand_with(tool, offset, turn));
+    EXPECT_LT((touch.force - alone.force).norm(), 1e-9);
+    ASSERT_TRUE(touch.torque && touch.angular_stiffness);
+    EXPECT_LT((*touch.torque - rotated(turn, offset).cross(alone.force)).norm(), 1e-9);
+    EXPECT_GT(touch.torque->norm(), 1e-3);
+  }
+  // A device that does not measure its handle's orientation: the handle is as in the scene.
+  DeviceState unturned = hand_with(tool, offset, Quat{});
+  unturned.turning.reset();
+  const Touch touch = held.answer(unturned);
+  EXPECT_LT((*touch.torque - offset.cross(alone.force)).norm(), 1e-9);
+  EXPECT_FALSE(touch.angular_stiffness);
+}
+
+TEST(PlacedBody, ACapsuleTurnsWithTheHandleAndAnswersWithATorque) {
+  const Scene scene = with_tool(
+      "tool = \"capsule\"\ntool_radius_mm = 15\ntool_length_mm = 30\ntool_axis = [0, 0, 1]\n"
+      "tool_offset_mm = [50, 0, 10]\nreach_mm = 30\npatch_radius_mm");
+  PlacedBody body(scene);
+  EXPECT_EQ(scene.body.tool_half_length, 0.015);
+  const Vec3 offset(0.05, 0, 0.01);
+  // In the device's frame the hand comes from −x. A capsule across touches 15 mm early, one that points ahead 30 mm.
+  const auto gap = [&](const Quat& turn) {
+    return body.answer(hand_with(Vec3(-0.04, 0, 0), offset, turn)).contact->gap;
+  };
+  EXPECT_NEAR(gap(Quat{}), 0.05 - 0.015, 2e-3);
+  EXPECT_NEAR(gap(rotation_by(Vec3(0, std::numbers::pi / 2, 0))), 0.05 - 0.03, 2e-3);
+  const Quat turn = rotation_by(Vec3(0, 0.2, 0));
+  const DeviceState hand = hand_with(Vec3(-0.005, 0, 0), offset, turn);
+  const Touch touch = body.answer(hand);
+  EXPECT_LT(touch.force.x(), -0.1);
+  ASSERT_TRUE(touch.torque && touch.angular_stiffness);
+  // The force passes through the surface somewhere in the contact.
+  const Vec3 arm(-rotated(turn, offset));
+  const Vec3 about_tool = *touch.torque + arm.cross(touch.force);
+  EXPECT_LT(about_tool.norm(), 0.03 * touch.force.norm());
+  EXPECT_GT(about_tool.norm(), 0.001 * touch.force.norm());
+  // The torque is the slope of the energy that the stiffness bends: a small turn changes it by that.
+  const Vec3 small(0, 0, 1e-5);
+  DeviceState turned = hand;
+  turned.turning->orientation = product(rotation_by(small), turn);
+  const Vec3 change = *body.answer(turned).torque - *touch.torque;
+  EXPECT_LT((change + *touch.angular_stiffness * small).norm(), 0.1 * change.norm() + 1e-8);
+  EXPECT_TRUE(is_sound(
+      RemoteForce{.force = touch.force, .model = LocalModel{.at = hand.position, .stiffness = *touch.stiffness}}));
+}
+
+TEST(PlacedBody, APatchAtAnOffsetGivesATorqueOnEveryModel) {
+  std::string text = with("patch_radius_mm", "tool_offset_mm = [0, 30, 0]\npatch_radius_mm");
+  text.replace(text.find("\"condensed\""), 11, "\"corotational\"");
+  text.replace(text.find("[\"contact\"]"), 11, "[\"contact\", \"geometric-nonlinearity\"]");
+  PlacedBody body(parse_scene(text, "s.toml", "."));
+  const Vec3 offset(0, 0.03, 0);
+  const Touch touch = body.answer(hand_with(Vec3(0.012, 0, 0), offset, Quat{}));
+  EXPECT_LT(touch.force.x(), -0.5);
+  EXPECT_EQ(*touch.torque, offset.cross(touch.force));
 }
 
 /// A scene of one of the models, with the effects that it cannot do without.

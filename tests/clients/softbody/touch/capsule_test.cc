@@ -121,12 +121,12 @@ TEST(Capsule, AClosedWayOfPlacesAndTurnsGivesBackExactlyWhatItTook) {
   const auto turn = [](double t) {
     const double angle = 2 * std::numbers::pi * t;
     return (Eigen::AngleAxisd(0.1 * std::sin(angle), Vec3::UnitZ()) *
-            Eigen::AngleAxisd(-0.15 - 0.1 * std::cos(angle), Vec3::UnitY()))
+            Eigen::AngleAxisd(-0.3 - 0.05 * std::cos(angle), Vec3::UnitY()))
         .toRotationMatrix();
   };
   const auto handle = [](double t) {
     const double angle = 2 * std::numbers::pi * t;
-    return Vec3(0.002 * std::cos(angle) - 0.022, 0.002 * std::sin(angle), 0.103 + 0.001 * std::sin(2 * angle));
+    return Vec3(0.002 * std::cos(angle) - 0.023, 0.002 * std::sin(angle), 0.0986 + 0.0005 * std::sin(2 * angle));
   };
   const Vec3 to_middle(0.02, 0, -0.045);  // m, handle frame
   double work = 0;
@@ -175,8 +175,8 @@ TEST(Capsule, ItsStiffnessesAreTheSlopesOfForceAndTorque) {
     const Vec3 about = tool.middle + Vec3(0.05, 0.02, 0);  // beside it, so that a turn presses
     const Feel feel = coarse().at(tool, about);
     const auto [moved, turned] = slopes(tool, about);
-    EXPECT_LT((feel.stiffness - moved).norm(), 0.01 * moved.norm()) << tilt;
-    EXPECT_LT((feel.torque->stiffness - turned).norm(), 0.01 * turned.norm()) << tilt;
+    EXPECT_LT((feel.stiffness - not_negative(moved)).norm(), 0.01 * moved.norm()) << tilt;
+    EXPECT_LT((feel.torque->stiffness - not_negative(turned)).norm(), 0.02 * turned.norm()) << tilt;
     for (const Mat3& k : {feel.stiffness, feel.torque->stiffness}) {
       EXPECT_LT((k - k.transpose()).norm(), 1e-9 * k.norm());
       EXPECT_GT(Eigen::SelfAdjointEigenSolver<Mat3>(k).eigenvalues().minCoeff(), -1e-9 * k.norm());

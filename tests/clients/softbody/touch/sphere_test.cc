@@ -117,5 +117,38 @@ TEST(SphereScene, ASceneChoosesItWhereItCanBe) {
                SceneError);
 }
 
+TEST(CapsuleScene, ItsKeysAreItsOwnAndItRefusesWhatItCannotDo) {
+  using testing::with;
+  const auto scene = [](const std::string& touch) {
+    return parse_scene(with("patch_radius_mm = 20", touch + "\npatch_radius_mm = 20"), "s.toml", ".");
+  };
+  const std::string capsule = "tool = \"capsule\"\ntool_radius_mm = 15\n";
+  const BodyConfig config =
+      scene(capsule + "tool_length_mm = 30\ntool_axis = [0, 3, 4]\ntool_offset_mm = [1, 2, 3]").body;
+  EXPECT_EQ(config.tool, BodyConfig::Tool::kCapsule);
+  EXPECT_DOUBLE_EQ(config.tool_half_length, 0.015);
+  EXPECT_LT((config.tool_axis - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
+  EXPECT_LT((config.tool_offset - Vec3(0.001, 0.002, 0.003)).norm(), 1e-15);
+  EXPECT_TRUE(turns_the_hand(config));
+  EXPECT_FALSE(turns_the_hand(scene("tool = \"sphere\"\ntool_radius_mm = 15").body));
+  for (const std::string& wrong :
+       {capsule, capsule + "tool_length_mm = -1", capsule + "tool_length_mm = 30\ntool_axis = [0, 0, 0]",
+        std::string("tool_length_mm = 30"), std::string("tool_axis = [1, 0, 0]"), std::string("tool_offset_mm = 3")}) {
+    EXPECT_THROW(scene(wrong), SceneError) << wrong;
+  }
+  BodyConfig other = config;
+  other.model = ModelKind::kLinear;
+  EXPECT_THROW(Body{other}, std::invalid_argument);
+  other = config;
+  other.friction = 0.3;
+  EXPECT_THROW(Body{other}, std::invalid_argument);
+  other = config;
+  other.tool_axis = Vec3(0, 0, 2);
+  EXPECT_THROW(Body{other}, std::invalid_argument);
+  other = config;
+  other.tool_radius = 0;
+  EXPECT_THROW(Body{other}, std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace tendon::softbody
