@@ -24,9 +24,7 @@ class Latest {
   }
   /// Writer only: to write a value in place. `put` publishes what `back` is by then; before, it is an older value.
   T& back() { return slots_[back_]; }
-  void put() {
-    back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex;
-  }
+  void put() { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
 
   /// Reader only: the newest value, or null when nothing was put since the last `take`. Valid until the
   /// next `take`.
