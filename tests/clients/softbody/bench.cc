@@ -39,6 +39,24 @@ void still(benchmark::State& state, ModelKind model, Element element) {
   answer(state, config);
 }
 
+/// A rigid tool of 20 mm: its contact grows and shrinks as it moves.
+void rigid(benchmark::State& state, BodyConfig::Tool tool) {
+  BodyConfig config = testing::pressed_body(ModelKind::kCondensed, Element::kHex8Sri, static_cast<int>(state.range(0)));
+  config.tool = tool;
+  config.tool_radius = 0.02;
+  config.tool_half_length = 0.015;
+  config.tool_axis = Vec3(0.96, 0, 0.28);
+  Body body(config);
+  const Vec3 up = -lowest_of_tool(config, Mat3::Identity());
+  double time = 0;
+  for (auto _ : state) {
+    time += 0.01;
+    const Vec3 way(0.003 * std::sin(2 * time), 0.002 * std::cos(3 * time), 0.0475 + 0.001 * std::sin(5 * time));
+    benchmark::DoNotOptimize(body.touch(Pose{.position = way + up}));
+  }
+  state.counters["model_mb"] = static_cast<double>(body.size().bytes) / 1e6;
+}
+
 /// Steps of state.range(1) µs, with `iterations` rounds each.
 void in_steps(benchmark::State& state, ModelKind model, int iterations) {
   BodyConfig config = testing::pressed_body(model, Element::kTet4, static_cast<int>(state.range(0)));
@@ -93,6 +111,8 @@ BENCHMARK_CAPTURE(cut_linear, anew, true)->ArgsProduct({{8, 16}, {12, 25}});
 BENCHMARK_CAPTURE(cut_neo_hookean, kept, false)->ArgsProduct({{8}, {12, 25}});
 BENCHMARK_CAPTURE(cut_neo_hookean, anew, true)->ArgsProduct({{8}, {12, 25}});
 BENCHMARK_CAPTURE(still, condensed_hex8_sri, ModelKind::kCondensed, Element::kHex8Sri)->Arg(8)->Arg(16);
+BENCHMARK_CAPTURE(rigid, sphere, BodyConfig::Tool::kSphere)->Arg(16)->Arg(24);
+BENCHMARK_CAPTURE(rigid, capsule, BodyConfig::Tool::kCapsule)->Arg(16)->Arg(24);
 BENCHMARK_CAPTURE(still, condensed_hex27, ModelKind::kCondensed, Element::kHex27)->Arg(4)->Arg(8)->Arg(10);
 BENCHMARK_CAPTURE(still, linear_hex8_sri, ModelKind::kLinear, Element::kHex8Sri)->Arg(8)->Arg(16);
 BENCHMARK_CAPTURE(still, corotational_tet4, ModelKind::kCorotational, Element::kTet4)->Arg(4)->Arg(8);
