@@ -148,6 +148,19 @@ def test_the_maze_lets_through_its_rooms_and_not_through_its_walls(physics_of):
         assert force[0] == pytest.approx(-1200 * max(0.0, 0.001 * x - 0.012)), x
 
 
+def test_a_hand_that_slides_along_a_wall_meets_the_next_one(physics_of):
+    maze = physics_of("maze")
+    for at in line((0, 0, 0), (0.008, 0, 0), (0.008, 0.0125, 0), (0.027, 0.0125, 0)):
+        force = maze(hand(at)).force
+    assert force[:2] == [0, pytest.approx(-0.6)]  # pressed half a millimetre into the wall at 12 mm
+    for at in line((0.027, 0.0125, 0), (0.03, 0.0125, 0), (0.03, -0.008, 0)):
+        force = maze(hand(at)).force
+    assert force[:2] == [pytest.approx(-2.4), 0]  # 2 mm into the wall at 28 mm, and all along it
+    for at in line((0.03, -0.008, 0), (0.03, 0, 0), (0.016, 0, 0)):
+        force = maze(hand(at)).force
+    assert force[0] == pytest.approx(1200 * 0.004)  # from the right into the block in the middle
+
+
 def test_a_full_turn_around_the_magnet_costs_nothing(physics_of):
     ring = [(0.01 * cos(2 * pi * i / 2000), 0.01 * sin(2 * pi * i / 2000), 0.002) for i in range(2001)]
     assert work(physics_of("magnet"), ring) == pytest.approx(0, abs=1e-9)
