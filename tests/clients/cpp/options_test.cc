@@ -56,6 +56,34 @@ TEST(CommandLine, ReadsWhatIsGiven) {
   EXPECT_TRUE(parsed.local_model);
 }
 
+/// The exit code of a program with the argument SHAPE and the option --reach-mm; its complaint in `err`.
+std::optional<int> parse_shape(std::vector<const char*> words, std::string& shape, double& reach, std::string& err) {
+  Options options{.client = {.name = "shapes"}};
+  CommandLine line("Shapes.", options);
+  line.add_argument("SHAPE", shape, {"line", "plane"}, "The shape");
+  line.add("--reach-mm", reach, "How far", 1);
+  words.insert(words.begin(), "shapes");
+  testing::internal::CaptureStderr();
+  const std::optional<int> exit_code = line.parse(static_cast<int>(words.size()), words.data());
+  err = testing::internal::GetCapturedStderr();
+  return exit_code;
+}
+
+TEST(CommandLine, TakesOneOfTheChoicesAndNumbersFromTheLeastOn) {
+  std::string shape, err;
+  double reach = 8;
+  EXPECT_FALSE(parse_shape({"plane", "--reach-mm", "1"}, shape, reach, err));
+  EXPECT_EQ(shape, "plane");
+  EXPECT_EQ(reach, 1);
+  EXPECT_EQ(parse_shape({"circle"}, shape, reach, err), 2);
+  EXPECT_NE(err.find("{line,plane}"), std::string::npos) << err;
+  EXPECT_EQ(parse_shape({}, shape, reach, err), 2);
+  for (const char* const wrong : {"0", "0.9", "-1", "inf", "nan", "1x"}) {
+    EXPECT_EQ(parse_shape({"line", "--reach-mm", wrong}, shape, reach, err), 2) << wrong;
+    EXPECT_NE(err.find("expected a number from 1 on, got \"" + std::string(wrong)), std::string::npos) << err;
+  }
+}
+
 TEST(CommandLine, HelpShowsAnExampleAndLeavesWithZero) {
   const Parsed parsed = parse({"--help"});
   EXPECT_EQ(parsed.exit_code, 0);

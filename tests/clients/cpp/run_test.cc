@@ -34,5 +34,35 @@ TEST(Run, TriesEachAddressOfANameInItsTurn) {
   }
 }
 
+TEST(Run, WithSeveralDevicesSaysOfWhichOneItSpeaks) {
+  Options options;
+  options.client.name = "rod";
+  options.client.patience = std::chrono::milliseconds(50);
+  options.duration = std::chrono::milliseconds(200);
+  options.server = "127.0.0.1:9";
+  const Physics nothing = [](const DeviceState&) { return Vec3(0, 0, 0); };
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options, {{"left", nothing}, {"right", nothing}}), 1);
+  const std::string said = testing::internal::GetCapturedStderr();
+  for (const std::string device : {"left", "right"}) {
+    EXPECT_NE(said.find("rod at " + device + ": no answer from 127.0.0.1:9"), std::string::npos) << said;
+    EXPECT_NE(said.find("rod at " + device + ": was not connected"), std::string::npos) << said;
+  }
+}
+
+TEST(Run, WithSeveralDevicesTakesNoOtherNameOfOne) {
+  const Physics nothing = [](const DeviceState&) { return Vec3(0, 0, 0); };
+  Options options;
+  options.client.name = "rod";
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run(options, std::map<std::string, Physics>{}), 1);
+  EXPECT_EQ(run(options, {{"", nothing}, {"right", nothing}}), 1);
+  options.client.device = "middle";
+  EXPECT_EQ(run(options, {{"left", nothing}, {"right", nothing}}), 1);
+  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string refusal = "rod: this program names its devices itself\n";
+  EXPECT_EQ(said, refusal + refusal + refusal);
+}
+
 }  // namespace
 }  // namespace tendon

@@ -133,6 +133,24 @@ TEST(UdpTransport, StaysWithItsAddressAndPortWhileTheNameHasIt) {
   EXPECT_EQ(z.guest().sin_port, port);
 }
 
+TEST(UdpTransport, WaitsForAnyOfSeveral) {
+  Z near, far;
+  UdpTransport to_near(to_string(near.address())), to_far(to_string(far.address()));
+  for (UdpTransport* const transport : {&to_near, &to_far}) {
+    const std::array<std::byte, 1> hello{};
+    transport->send(transport->server(), hello);
+  }
+  far.receive();
+  far.reply(3);
+  const std::array<UdpTransport*, 2> both{&to_near, &to_far};
+  UdpTransport::wait_for_any(both, std::chrono::hours(1));  // ends at once, or never
+  Address from;
+  std::array<std::byte, kMaxDatagram> buffer{};
+  EXPECT_EQ(to_near.receive(from, buffer), 0);
+  EXPECT_EQ(to_far.receive(from, buffer), 3);
+  UdpTransport::wait_for_any(both, Duration::zero());  // nothing is left, and it does not wait
+}
+
 TEST(UdpTransport, HearsNobodyButItsServer) {
   Z z;
   Z stranger;

@@ -7,6 +7,7 @@ import json
 import os
 import random
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -126,6 +127,41 @@ def test_an_example_has_at_most_30_lines_of_code(source):
     lines = [line.strip() for line in source.read_text(encoding="utf-8").splitlines()]
     code = [line for line in lines if line and not line.startswith(("//", "#!", "# "))]
     assert len(code) <= MOST_LINES
+
+
+def test_the_gallery_shows_each_example_with_a_command_in_both_languages():
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    for name in RENDERING:
+        picture = ROOT / "clients" / "examples" / f"{name}.png"
+        assert 0 < picture.stat().st_size <= 40_000, "too large for a page with many"
+        (row,) = (line for line in page.splitlines() if f"clients/examples/{name}.png" in line)
+        commands = re.findall(r"`([^`]+)`", row.partition("<br>")[2])
+        in_python = [word.replace("build/release/bin/", "clients/python/examples/") for word in commands[:1]]
+        assert commands == [commands[0], in_python[0].replace(name, f"{name}.py")]
+    assert {path.stem for path in IN_CPP.glob("*.cc")} == {path.stem for path in EXAMPLES.glob("*.py")}
+    assert {path.stem for path in IN_CPP.glob("*.cc")} == {*RENDERING, "echo_motion"}
+
+
+@pytest.mark.skipif(shutil.which("gnuplot") is None, reason="no gnuplot: apt-get install gnuplot-nox")
+@pytest.mark.parametrize("name, options", [("viscous_field", []), ("two_hands", ["--python"])])
+def test_draw_draws_what_a_hand_felt(tmp_path, name, options):
+    built(PROGRAMS / "tendond")
+    draw = [sys.executable, ROOT / "clients/examples/draw", name, *options]
+    run = [*draw, "--programs", PROGRAMS, "--attempts", "1", "--out", tmp_path]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_draw_fails_when_the_hand_has_felt_nothing(tmp_path):
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    (programs / "tendond").symlink_to(built(PROGRAMS / "tendond").resolve())
+    (programs / "viscous_field").symlink_to("/bin/true")
+    draw = [sys.executable, ROOT / "clients/examples/draw", "viscous_field", "--programs", programs, "--attempts", "1", "--out", tmp_path]
+    done = subprocess.run(draw, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and "0 with a force" in done.stderr, done.stderr
+    assert not (tmp_path / "viscous_field.png").exists()
 
 
 def test_a_hand_feels_each_cpp_example_through_a_server(tmp_path):

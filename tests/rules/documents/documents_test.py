@@ -17,7 +17,8 @@ import sys
 
 # Commands that another machine, or a reader's own choice, decides on.
 PLACEHOLDER = re.compile(r"[A-Z]{2,}|…|\.\.\.|<.*>|\*")
-PROGRAM = re.compile(r"^(tendond|tendon-[a-z-]+|virtual_wall|echo_motion|falcon-server)$")
+EXAMPLE = r"echo_motion|friction_surface|magnet|maze|texture|two_hands|virtual_fixture|virtual_wall|viscous_field"
+PROGRAM = re.compile(rf"^(tendond|tendon-[a-z-]+|{EXAMPLE}|falcon-server)$")
 SCRIPT = re.compile(r"^(deploy/[a-z-]+|tests/[a-z/]+/[a-z]+\.sh)$")
 
 
