@@ -135,7 +135,7 @@ TEST(UdpTransport, StaysWithItsAddressAndPortWhileTheNameHasIt) {
 
 TEST(UdpTransport, WaitsForAnyOfSeveral) {
   Z near, far;
-  UdpTransport to_near(to_string(near.address())), to_far(to_string(far.address()));
+  UdpTransport to_near(near.address()), to_far(far.address());
   for (UdpTransport* const transport : {&to_near, &to_far}) {
     const std::array<std::byte, 1> hello{};
     transport->send(transport->server(), hello);
@@ -146,8 +146,8 @@ TEST(UdpTransport, WaitsForAnyOfSeveral) {
   UdpTransport::wait_for_any(both, std::chrono::hours(1));  // ends at once, or never
   Address from;
   std::array<std::byte, kMaxDatagram> buffer{};
-  EXPECT_EQ(to_near.receive(from, buffer), 0);
-  EXPECT_EQ(to_far.receive(from, buffer), 3);
+  EXPECT_EQ(to_near.receive(from, buffer), 0U);
+  EXPECT_EQ(to_far.receive(from, buffer), 3U);
   UdpTransport::wait_for_any(both, Duration::zero());  // nothing is left, and it does not wait
 }
 
