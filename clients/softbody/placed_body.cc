@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "core/base/arithmetic.h"
-#include "core/base/rotation.h"
+#include "protocol/rotation.h"
 
 namespace tendon::softbody {
 

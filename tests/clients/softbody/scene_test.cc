@@ -198,7 +198,7 @@ TEST(SoftbodyScene, MistakesAreNamedWithLineKeyAndWhatWasExpected) {
             "s.toml: touch.patch_radius_mm: expected a number above 0 and at most 1e+06, found nothing");
   EXPECT_EQ(refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nfriction = 1")),
             "s.toml:12: touch.friction: unknown key; expected one of from, middle_mm, patch_radius_mm, reach_mm, side, "
-            "table_mm, tool, tool_radius_mm");
+            "table_mm, tool, tool_offset_mm, tool_radius_mm");
   EXPECT_EQ(
       refusal(with("patch_radius_mm = 20", "patch_radius_mm = 20\nside = \"bilateral\"\ntable_mm = 5")),
       "s.toml:13: touch.table_mm: only for the model condensed, unilateral and without friction: others remember");

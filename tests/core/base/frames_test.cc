@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <random>
+#include <numbers>
 #include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "tests/support/dice.h"
 
 namespace tendon {
 namespace {
@@ -53,16 +55,11 @@ std::string refusal(const std::string& axes) {
 
 bool ends_with(const std::string& text, const std::string& end) { return text.ends_with(end); }
 
-Mat3 any_rotation(std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  return Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
-      .normalized()
-      .toRotationMatrix();
-}
+Vec3 any_vector(Dice& dice) { return dice.direction() * dice.within(0, 2); }
 
-Vec3 any_vector(std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  return {normal(random), normal(random), normal(random)};
+Mat3 any_rotation(Dice& dice) {
+  const Vec3 axis = dice.direction();
+  return Eigen::AngleAxisd(dice.within(0, std::numbers::pi), axis).toRotationMatrix();
 }
 
 TEST(Axes, EachOfThe24RightHandedBasesIsReadAndSaidAgain) {
@@ -111,7 +108,7 @@ TEST(Axes, ThoseOfAWoodenHapticsAreTheQuaternionOfHalves) {
 }
 
 TEST(Axes, AQuaternionAndItsNegativeAreTheSameMatrix) {
-  std::mt19937_64 random(1);
+  Dice random(1);
   for (int i = 0; i < 1000; ++i) {
     const Mat3 rotation = any_rotation(random);
     const Quat q = quaternion_of(rotation);
@@ -150,7 +147,7 @@ TEST(Frames, HaveANameOfTheirOwnByWhichTheyAreFound) {
 
 /// In all 48 bases, and so in every frame of the table: physics does not care where one looks from.
 TEST(Frames, WorkAndTurnsAreTheSameSeenFromAnyOfThe48Bases) {
-  std::mt19937_64 random(7);
+  Dice random(7);
   for (const Mat3& basis : axis_aligned_bases()) {
     const Frame frame{.name = {}, .axes = {}, .source = {}, .from_operator = basis, .per_metre = 100};
     const Mat3 turn = any_rotation(random);

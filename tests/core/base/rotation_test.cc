@@ -6,32 +6,29 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <random>
 #include <utility>
 #include <vector>
 
 #include "core/base/frames.h"
 #include "core/base/portable_math.h"
+#include "tests/support/dice.h"
 
 namespace tendon {
 namespace {
 
 class Rotations : public testing::Test {
  protected:
-  Vec3 vector(double longest) {
-    std::normal_distribution<double> any;
-    const Vec3 direction = Vec3(any(random_), any(random_), any(random_)).normalized();
-    return direction * std::uniform_real_distribution<double>(0, longest)(random_);
-  }
+  Vec3 vector(double longest) { return dice_.direction() * dice_.within(0, longest); }
   Quat rotation() { return rotation_by(vector(std::numbers::pi)); }
   /// Symmetric, its eigenvalues between 0 and 2 N·m/rad.
   Mat3 stiffness() {
     const Mat3 turn = matrix_of(rotation());
-    std::uniform_real_distribution<double> value(0, 2);
-    return turn * Vec3(value(random_), value(random_), value(random_)).asDiagonal() * turn.transpose();
+    const Vec3 values(dice_.within(0, 2), dice_.within(0, 2), dice_.within(0, 2));
+    return turn * values.asDiagonal() * turn.transpose();
   }
-  std::mt19937_64 random_{20};
+  Dice dice_{20};
 };
 
 Quat negative(const Quat& q) { return {-q.w, -q.x, -q.y, -q.z}; }

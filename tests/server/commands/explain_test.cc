@@ -33,7 +33,9 @@ std::set<std::string> optional_parts() {
     if (line.starts_with('[')) table = line.substr(1, line.find(']') - 1);
     const bool part = line.starts_with('[') && (table.starts_with("safety.") || table.starts_with("limiter.") ||
                                                 table.starts_with("force.") || table.starts_with("device.effects."));
-    if (part) keys.insert(table);
+    // The bounds of a handle go with its motors.
+    const bool bounds = table == "limiter.rotation" || table == "limiter.gripper";
+    if (part && !bounds) keys.insert(table);
     const bool key = line.starts_with("  ") && line.find_first_of(" ", 2) == std::string::npos;
     if (table == "device.effects" && key && line != "  mass_kg") keys.insert(table + "." + line.substr(2));
   }

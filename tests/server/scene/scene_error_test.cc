@@ -229,9 +229,11 @@ TEST(SceneError, RefusesPartsThatCannotBe) {
       {"[limiter]\nkind = \"port-hamiltonian\"\n",
        "s.toml:4: limiter.environment_stiffness_n_per_m: missing, expected a number above 0 N/m"},
       {"[limiter]\nkind = \"aol\"\nclamp_n = 1\n",
-       "s.toml:6: limiter.clamp_n: unknown key; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m"},
+       "s.toml:6: limiter.clamp_n: unknown key; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m, "
+       "rotation, gripper"},
       {"[limiter]\nkind = \"aol\"\n[limiter.knee]\n",
-       "s.toml:6: limiter.knee: unknown table; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m"},
+       "s.toml:6: limiter.knee: unknown table; known here: kind, coulomb_friction_n, viscous_friction_n_s_per_m, "
+       "rotation, gripper"},
       {"[limiter.knee]\nstart = 1\n", "s.toml:5: limiter.knee.start: expected a number from 0.01 to 0.99, found 1"},
       {"[limiter.latency_reserve]\nholds = 17\n",
        "s.toml:5: limiter.latency_reserve.holds: expected a whole number from 1 to 16, found 17"},

@@ -247,10 +247,10 @@ TEST(SceneHandle, MotorsHaveLimitsOfTheirOwn) {
 }
 
 TEST(SceneHandle, AMotorWithoutABoundOfItsFrictionIsRefused) {
-  EXPECT_EQ(
-      error_of_minimal_and(kMotors),
-      "s.toml: limiter.rotation.coulomb_friction_nm: missing, expected 0 N·m or more, because the device has motors "
-      "that turn its handle");
+  EXPECT_EQ(error_of_minimal_and(kMotors),
+            "s.toml: limiter.rotation.coulomb_friction_nm: missing, expected a number of 0 N·m or more, because the "
+            "device has motors "
+            "that turn its handle");
   const std::string higher = "[limiter.rotation]\ncoulomb_friction_nm = 2e-3\nviscous_friction_nm_s_per_rad = 1e-4\n";
   EXPECT_NE(
       error_of_minimal_and(kMotors + higher).find("limiter.rotation.coulomb_friction_nm: expected at most 0.001 N·m"),

@@ -29,7 +29,7 @@ export function rotated([w, x, y, z]: Quat, v: Vec): Vec {
 /** The order of three.js: x, y, z, w. */
 export const threeOrder = ([w, x, y, z]: Quat): [number, number, number, number] => [x, y, z, w];
 
-/** One state of a device, in its base frame. What is undefined is not measured, or nobody has told it. */
+/** One state of a device, in its base frame. A part is undefined when the device does not measure it, or nobody has told it. */
 export interface Pose {
   readonly position: Vec;
   readonly orientation?: Quat | undefined;
