@@ -23,8 +23,7 @@ def maze(hand: DeviceState) -> Touch:
         if MAZE[behind[1]][behind[0]] == " ":
             room[:] = behind
         else:
-            depth = from_middle - (behind[axis] - room[axis]) / 2
-            force[axis] = -sign * STIFFNESS * CELL * depth
+            force[axis] = -sign * STIFFNESS * CELL * (from_middle - (behind[axis] - room[axis]) / 2)
     return Touch(force=force)
 
 

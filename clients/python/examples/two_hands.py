@@ -1,12 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A rod from the device "left" to the device "right", which stands 200 mm beside it along x: what one hand does to its
-end, the other feels at the other end."""
+"""A rod from the device "left" to "right", which stands 200 mm beside it along x: each hand feels the other."""
 import sys
 from math import dist
 
 from tendon import DeviceState, Touch, cli
-from tendon.client import Physics
 
 parser = cli.parser("two_hands", __doc__)
 parser.add_argument("--stiffness-n-per-m", type=cli.number(), default=400, help="How hard it is to stretch [%(default)s]")
@@ -15,20 +13,18 @@ options = parser.parse_args()
 ends: dict[str, list[float]] = {}  # of the rod, m, in the frame between the two devices
 
 
-def held(mine: str, other: str, device_x: float) -> Physics:
-    def rod(hand: DeviceState) -> Touch:
-        x, y, z = hand.position
-        ends[mine] = [x + device_x, y, z]
-        length = dist(ends[mine], ends.get(other, ends[mine]))
-        if length == 0:  # the other hand does not hold it yet
-            return Touch()
-        n = [(a - b) / length for a, b in zip(ends[mine], ends[other])]
-        k = options.stiffness_n_per_m
-        tension = k * (length - options.length_mm / 1000)
-        rows = [[k * a * b + tension / length * ((i == j) - a * b) for j, b in enumerate(n)] for i, a in enumerate(n)]
-        return Touch(force=[-tension * c for c in n], stiffness=rows)
-
-    return rod
+def rod(mine: str, other: str, device_x: float, hand: DeviceState) -> Touch:
+    x, y, z = hand.position
+    ends[mine] = [x + device_x, y, z]
+    length = dist(ends[mine], ends.get(other, ends[mine]))
+    if length == 0:  # the other hand does not hold it yet
+        return Touch()
+    n = [(a - b) / length for a, b in zip(ends[mine], ends[other])]
+    k = options.stiffness_n_per_m
+    tension = k * (length - options.length_mm / 1000)
+    rows = [[k * a * b + tension / length * ((i == j) - a * b) for j, b in enumerate(n)] for i, a in enumerate(n)]
+    return Touch(force=[-tension * c for c in n], stiffness=rows)
 
 
-sys.exit(cli.run(options, physics={"left": held("left", "right", -0.1), "right": held("right", "left", 0.1)}))
+hands = {"left": lambda hand: rod("left", "right", -0.1, hand), "right": lambda hand: rod("right", "left", 0.1, hand)}
+sys.exit(cli.run(options, physics=hands))
