@@ -162,9 +162,9 @@ void add_handle(Json& json, std::span<const DeviceState> states) {
   };
   if (any([](const DeviceState& s) { return s.turning.has_value(); })) {
     json["orientation"] = columns<4>(states, [](const DeviceState& s) {
-      if (!s.turning) return std::array{kUntold, kUntold, kUntold, kUntold};
+      if (!s.turning) return Eigen::Vector4d(kUntold, kUntold, kUntold, kUntold);
       const Quat& q = s.turning->orientation;
-      return std::array{q.w, q.x, q.y, q.z};
+      return Eigen::Vector4d(q.w, q.x, q.y, q.z);
     });
   }
   vectors("torque_nm", &DeviceState::torque_applied);

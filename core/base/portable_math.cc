@@ -147,7 +147,7 @@ double atan2(double y, double x) noexcept {
   // The angle to the nearer axis, of a tangent between 0 and 1: atan(t) = atan(c) + atan((t − c)/(1 + t c)), c = i/4.
   constexpr std::array kAngle{0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483};
   const double t = up < along ? up / along : along / up;
-  const auto i = static_cast<std::size_t>(t * 4 + 0.5);
+  const auto i = static_cast<std::size_t>(round(t * 4));
   const double c = static_cast<double>(i) / 4;
   const double r = (t - c) / (1 + t * c);  // at most 1/8
   const double square = r * r;
