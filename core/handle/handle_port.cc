@@ -12,7 +12,7 @@
 namespace tendon {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -58,8 +58,8 @@ void HandlePort<Blocks, Size>::observe_unseen(const Vec<kSize>& applied, Duratio
 template <int Blocks, int Size>
 auto HandlePort<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> LimitedForce<kSize> {
   if (!limits_) {
-    if (!wanted.force.allFinite()) return {Vec<kSize>::Zero(), kInfinite, Reason::kNotFinite};
-    return {wanted.force, kInfinite, {}};
+    if (!wanted.force.allFinite()) return {Vec<kSize>::Zero(), kUnbounded, Reason::kNotFinite};
+    return {wanted.force, kUnbounded, {}};
   }
   LimitedForce<kSize> limited = law_.limit(wanted);
   if constexpr (Blocks > 1) {

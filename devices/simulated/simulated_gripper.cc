@@ -6,16 +6,9 @@
 #include <utility>
 
 #include "core/base/expect.h"
+#include "devices/simulated/expect_part.h"
 
 namespace tendon {
-namespace {
-
-void expect_part(const std::optional<double>& value, const char* field) {
-  if (value) expect_above_zero(*value, field);
-}
-
-}  // namespace
-
 SimulatedGripper::SimulatedGripper(Config config) : config_(std::move(config)), most_(config_.arm * config_.open) {
   expect_above_zero(config_.open, "gripper.open");
   expect_above_zero(config_.arm, "gripper.arm");

@@ -7,13 +7,10 @@
 
 #include "core/base/expect.h"
 #include "core/base/portable_math.h"
+#include "devices/simulated/expect_part.h"
 
 namespace tendon {
 namespace {
-
-void expect_part(const std::optional<double>& value, const char* field) {
-  if (value) expect_above_zero(*value, field);
-}
 
 /// The angular velocity of rotation_by(φ(t)), in base frame axes:
 ///

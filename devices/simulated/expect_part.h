@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "core/base/expect.h"
+
+namespace tendon {
+
+/// A part of a simulated device is there with a number above zero, or not there. Throws std::invalid_argument naming the
+/// field.
+inline void expect_part(const std::optional<double>& value, const char* field) {
+  if (value) expect_above_zero(*value, field);
+}
+
+}  // namespace tendon
