@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+//! tendon.proto as tables, with the bounds of its comments and those rules of WIRE.md that concern several fields.
+
+use crate::protobuf::{Bound, Field, Kind, Label, Schema, Value};
+use Bound::{Above, Any, Between, Bytes, OrInfinite, Whole};
+use Kind::{Bool, Enum, Fixed32, Fixed64, Real, Signed64, Sub, Text, Unsigned32, Unsigned64};
+use Label::{Many, One, Optional, Required};
+
+const MOST: i128 = i128::MAX;
+const TIME: Bound = Whole(-(1 << 60), 1 << 60);
+const SPAN: Bound = Whole(0, 1 << 60);
+const LARGE: f64 = 1e12;
+const SIGNED: Bound = Between(-LARGE, LARGE);
+const POSITIVE: Bound = Between(0.0, LARGE);
+const DEVICE: Bound = Whole(0, 15);
+const CHANNEL: Bound = Whole(0, 7);
+
+const fn message(fields: &'static [Field]) -> Schema {
+    Schema { fields, oneof: &[], rule: |_| true }
+}
+
+fn near_one(parts: &[f64]) -> bool {
+    (parts.iter().map(|part| part * part).sum::<f64>().sqrt() - 1.0).abs() <= 0.001
+}
+
+fn any(_: usize) -> bool {
+    true
+}
+
+fn entries_of_a_stiffness(count: usize) -> bool {
+    count == 1 || count == 3 || count == 9
+}
+
+pub static VECTOR: Schema =
+    message(&[Field(1, Real, One, SIGNED), Field(2, Real, One, SIGNED), Field(3, Real, One, SIGNED)]);
+
+pub static QUATERNION: Schema = Schema {
+    fields: &[
+        Field(1, Real, One, Between(-1.001, 1.001)),
+        Field(2, Real, One, Between(-1.001, 1.001)),
+        Field(3, Real, One, Between(-1.001, 1.001)),
+        Field(4, Real, One, Between(-1.001, 1.001)),
+    ],
+    oneof: &[],
+    rule: |node| near_one(&node.reals::<4>()),
+};
+
+pub static STATE: Schema = message(&[
+    Field(1, Unsigned64, One, Any),
+    Field(2, Fixed64, One, TIME),
+    Field(3, Sub(&VECTOR), Optional, Any),
+    Field(4, Sub(&VECTOR), Optional, Any),
+    Field(5, Sub(&VECTOR), Optional, Any),
+    Field(6, Real, One, SIGNED),
+    Field(7, Real, One, OrInfinite(0.0, LARGE)),
+    Field(8, Fixed32, One, Any),
+    Field(9, Unsigned64, One, Any),
+    Field(10, Unsigned64, One, SPAN),
+    Field(11, Enum, One, Whole(1, 6)),
+    Field(12, Unsigned32, One, DEVICE),
+    Field(13, Unsigned32, One, CHANNEL),
+    Field(14, Sub(&VECTOR), Optional, Any),
+    Field(15, Sub(&QUATERNION), Optional, Any),
+    Field(16, Sub(&VECTOR), Optional, Any),
+    Field(17, Fixed32, One, Any),
+    Field(18, Sub(&VECTOR), Optional, Any),
+    Field(19, Real, Optional, SIGNED),
+    Field(20, Real, Optional, SIGNED),
+    Field(21, Real, Optional, SIGNED),
+    Field(22, Sub(&VECTOR), Optional, Any),
+]);
+
+static TABLE: Schema = message(&[
+    Field(1, Real, One, SIGNED),
+    Field(2, Real, One, Above(0.0, LARGE)),
+    Field(3, Real, Many(|count| (2..=16).contains(&count)), SIGNED),
+]);
+
+static CONTACT: Schema = Schema {
+    fields: &[Field(1, Sub(&VECTOR), Required, Any), Field(2, Real, One, SIGNED), Field(3, Sub(&TABLE), Optional, Any)],
+    oneof: &[],
+    rule: |node| node.sub(1).map_or(false, |normal| near_one(&normal.reals::<3>())),
+};
+
+static LOCAL_MODEL: Schema = message(&[
+    Field(1, Sub(&VECTOR), Optional, Any),
+    Field(2, Real, Many(entries_of_a_stiffness), SIGNED),
+    Field(3, Real, Optional, OrInfinite(0.0, LARGE)),
+    Field(4, Sub(&CONTACT), Optional, Any),
+]);
+
+static ROTATION_MODEL: Schema =
+    message(&[Field(1, Sub(&QUATERNION), Required, Any), Field(2, Real, Many(entries_of_a_stiffness), SIGNED)]);
+
+pub static FORCE: Schema = message(&[
+    Field(1, Unsigned64, One, Whole(1, MOST)),
+    Field(2, Unsigned64, One, Any),
+    Field(3, Sub(&VECTOR), Optional, Any),
+    Field(4, Sub(&LOCAL_MODEL), Optional, Any),
+    Field(5, Unsigned32, One, Whole(1, 10_000_000)),
+    Field(6, Unsigned32, One, DEVICE),
+    Field(7, Unsigned32, One, CHANNEL),
+    Field(8, Bool, One, Any),
+    Field(9, Real, Optional, POSITIVE),
+    Field(10, Sub(&VECTOR), Optional, Any),
+    Field(11, Real, Optional, SIGNED),
+    Field(14, Sub(&ROTATION_MODEL), Optional, Any),
+]);
+
+static STATE_RATE: Schema = message(&[Field(1, Unsigned32, One, Any), Field(2, Unsigned32, One, DEVICE)]);
+static OF_DEVICE: Schema = message(&[Field(1, Unsigned32, One, DEVICE)]);
+static DESCRIBE: Schema = message(&[Field(1, Unsigned32, One, DEVICE), Field(2, Bool, One, Any)]);
+static LEASE: Schema = message(&[Field(1, Unsigned32, One, DEVICE), Field(2, Unsigned32, One, CHANNEL)]);
+static LEASE_LOST: Schema =
+    message(&[Field(1, Unsigned32, One, DEVICE), Field(2, Unsigned32, One, CHANNEL), Field(3, Text, One, Bytes(64))]);
+static DEADBAND: Schema =
+    message(&[Field(1, Real, One, SIGNED), Field(2, Real, One, SIGNED), Field(3, Unsigned32, One, Any)]);
+
+pub static CONTROL: Schema = Schema {
+    fields: &[
+        Field(1, Unsigned32, One, Whole(1, MOST)),
+        Field(2, Sub(&STATE_RATE), Optional, Any),
+        Field(3, Sub(&OF_DEVICE), Optional, Any),
+        Field(4, Sub(&DESCRIBE), Optional, Any),
+        Field(5, Sub(&LEASE), Optional, Any),
+        Field(6, Sub(&LEASE), Optional, Any),
+        Field(7, Sub(&LEASE_LOST), Optional, Any),
+        Field(8, Sub(&DEADBAND), Optional, Any),
+        Field(9, Sub(&OF_DEVICE), Optional, Any),
+    ],
+    oneof: &[2, 3, 4, 5, 6, 7, 8, 9],
+    rule: |_| true,
+};
+
+static CHANNEL_DESCRIPTION: Schema = message(&[
+    Field(1, Text, One, Bytes(24)),
+    Field(2, Enum, One, Whole(1, 2)),
+    Field(3, Unsigned32, One, Whole(0, 3_600_000)),
+    Field(4, Text, One, Bytes(24)),
+]);
+
+static DEVICE_DESCRIPTION: Schema = Schema {
+    fields: &[
+        Field(1, Unsigned32, One, DEVICE),
+        Field(2, Text, One, Bytes(24)),
+        Field(3, Text, One, Bytes(64)),
+        Field(4, Unsigned32, One, Whole(1, 6)),
+        Field(5, Unsigned32, One, Whole(1, 6)),
+        Field(6, Sub(&VECTOR), Optional, Any),
+        Field(7, Sub(&VECTOR), Optional, Any),
+        Field(8, Real, One, POSITIVE),
+        Field(9, Real, One, POSITIVE),
+        Field(10, Real, One, POSITIVE),
+        Field(11, Real, One, POSITIVE),
+        Field(12, Unsigned32, One, Whole(1, 1_000_000)),
+        Field(13, Sub(&CHANNEL_DESCRIPTION), Many(|count| (1..=8).contains(&count)), Any),
+    ],
+    oneof: &[],
+    rule: |node| match (node.sub(6), node.sub(7)) {
+        (None, None) => true,
+        (Some(low), Some(high)) => low.reals::<3>().iter().zip(high.reals::<3>()).all(|(low, high)| *low <= high),
+        _ => false,
+    },
+};
+
+static HANDLE_DESCRIPTION: Schema = message(&[
+    Field(1, Unsigned32, One, DEVICE),
+    Field(2, Sub(&QUATERNION), Optional, Any),
+    Field(3, Text, Many(|count| count <= 16), Bytes(24)),
+    Field(4, Bool, One, Any),
+    Field(5, Real, One, POSITIVE),
+    Field(6, Real, Optional, POSITIVE),
+    Field(7, Real, One, POSITIVE),
+]);
+
+pub static CONTROL_ACK: Schema = message(&[
+    Field(1, Unsigned32, One, Whole(1, MOST)),
+    Field(2, Enum, One, Whole(1, 9)),
+    Field(3, Text, One, Bytes(128)),
+    Field(4, Unsigned32, One, Whole(0, 3_600_000)),
+    Field(5, Sub(&DEVICE_DESCRIPTION), Optional, Any),
+    Field(6, Sub(&HANDLE_DESCRIPTION), Optional, Any),
+]);
+
+pub static BYE: Schema = message(&[Field(1, Enum, One, Whole(1, 9)), Field(2, Text, One, Bytes(128))]);
+
+static DELAYS: Schema = message(&[Field(1, Signed64, One, TIME), Field(2, Signed64, One, TIME)]);
+
+pub static LINK_REPORT: Schema = message(&[
+    Field(1, Unsigned64, One, Whole(1, MOST)),
+    Field(2, Fixed64, One, TIME),
+    Field(3, Unsigned64, One, SPAN),
+    Field(8, Unsigned64, One, SPAN),
+    Field(9, Unsigned64, One, SPAN),
+    Field(10, Sub(&DELAYS), Optional, Any),
+    Field(11, Sub(&DELAYS), Optional, Any),
+    Field(12, Sub(&DELAYS), Optional, Any),
+    Field(13, Signed64, One, TIME),
+    Field(14, Real, One, SIGNED),
+    Field(15, Unsigned64, One, SPAN),
+    Field(20, Text, One, Bytes(128)),
+]);
+
+pub static DEVICE_REPORT: Schema = Schema {
+    fields: &[
+        Field(1, Unsigned64, One, Whole(1, MOST)),
+        Field(2, Fixed64, One, TIME),
+        Field(3, Unsigned64, One, SPAN),
+        Field(4, Unsigned32, One, DEVICE),
+        Field(5, Unsigned64, One, Any),
+        Field(6, Unsigned64, One, Any),
+        Field(7, Unsigned64, One, Any),
+        Field(8, Unsigned64, One, Any),
+        Field(9, Unsigned64, Many(|count| count <= 24), Any),
+        Field(10, Enum, One, Whole(1, 8)),
+        Field(11, Text, One, Bytes(128)),
+        Field(12, Text, One, Bytes(128)),
+    ],
+    oneof: &[],
+    rule: |node| {
+        let counted: i128 = node.all(9).iter().map(|value| if let Value::Whole(v) = value { *v } else { 0 }).sum();
+        let steps = node.whole(5);
+        counted <= steps && node.whole(7) <= steps && node.whole(8) <= steps
+    },
+};
+
+pub static PEER_REPORT: Schema = message(&[
+    Field(1, Unsigned32, One, DEVICE),
+    Field(2, Unsigned32, One, CHANNEL),
+    Field(3, Text, One, Bytes(64)),
+    Field(4, Unsigned32, One, Whole(1, 1000)),
+    Field(5, Bool, One, Any),
+    Field(6, Sub(&LINK_REPORT), Required, Any),
+]);
+
+pub static FRAME: Schema = Schema {
+    fields: &[
+        Field(1, Sub(&STATE), Optional, Any),
+        Field(2, Sub(&FORCE), Optional, Any),
+        Field(3, Sub(&CONTROL), Optional, Any),
+        Field(4, Sub(&CONTROL_ACK), Optional, Any),
+        Field(5, Sub(&BYE), Optional, Any),
+        Field(6, Sub(&LINK_REPORT), Optional, Any),
+        Field(7, Sub(&DEVICE_REPORT), Optional, Any),
+        Field(8, Sub(&PEER_REPORT), Optional, Any),
+    ],
+    oneof: &[1, 2, 3, 4, 5, 6, 7, 8],
+    rule: |_| true,
+};
+
+pub static ECHO: Schema = Schema {
+    fields: &[
+        Field(1, Fixed64, One, TIME),
+        Field(2, Fixed64, One, TIME),
+        Field(3, Unsigned64, One, Any),
+        Field(4, Fixed32, One, Any),
+    ],
+    oneof: &[],
+    rule: |_| true,
+};
+
+/// Its frames and its echo are judged one by one, so `fits` is not asked about the whole.
+pub static DATAGRAM: Schema = message(&[
+    Field(1, Fixed64, One, TIME),
+    Field(2, Sub(&ECHO), Optional, Any),
+    Field(3, Sub(&FRAME), Many(any), Any),
+]);
+
+pub fn usable_time(ns: i128) -> bool {
+    (-(1 << 60)..=1 << 60).contains(&ns)
+}
+
+static GRANT: Schema =
+    message(&[Field(1, Unsigned32, One, DEVICE), Field(2, Unsigned32, One, CHANNEL), Field(3, Enum, One, Whole(1, 2))]);
+
+static WELCOME: Schema = message(&[
+    Field(1, Unsigned32, One, Whole(1, MOST)),
+    Field(2, Text, Many(|count| count <= 16), Bytes(32)),
+    Field(3, Enum, One, Whole(1, 2)),
+    Field(4, Text, One, Bytes(64)),
+    Field(5, Real, One, POSITIVE),
+    Field(6, Real, One, POSITIVE),
+    Field(7, Unsigned32, One, Whole(1, 1_000_000)),
+    Field(8, Unsigned32, One, Whole(1, 3_600_000)),
+    Field(9, Text, One, Bytes(64)),
+    Field(10, Sub(&GRANT), Many(|count| count <= 16), Any),
+]);
+
+static REFUSED: Schema = message(&[
+    Field(1, Enum, One, Whole(1, 9)),
+    Field(2, Text, One, Bytes(128)),
+    Field(3, Unsigned32, One, Any),
+    Field(4, Unsigned32, One, Any),
+]);
+
+pub static ANSWER: Schema = Schema {
+    fields: &[Field(1, Sub(&WELCOME), Optional, Any), Field(2, Sub(&REFUSED), Optional, Any)],
+    oneof: &[1, 2],
+    rule: |node| node.has(1) || node.has(2),
+};
