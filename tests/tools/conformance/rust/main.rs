@@ -61,7 +61,8 @@ fn shorten<const N: usize>(vector: &mut [f64; N], most: f64) -> bool {
     if length <= most {
         return false;
     }
-    vector.iter_mut().for_each(|part| *part *= most / length);
+    // A hair shorter, or rounding makes it longer than the limit and the server says so.
+    vector.iter_mut().for_each(|part| *part *= most * (1.0 - 1e-12) / length);
     true
 }
 
@@ -131,6 +132,44 @@ impl Spring {
     }
 }
 
+/// What a session showed, for the words at its end.
+#[derive(Debug, Default)]
+struct Seen {
+    states: u64,
+    presses: u32,
+    buttons: u32,
+    largest_force_n: f64,
+    largest_torque_nm: f64,
+    fastest_turn_radps: f64,
+    largest_turn_rad: f64,
+    largest_grip_force_n: f64,
+    widest_gripper_rad: f64,
+    largest_hand_force_n: f64,
+}
+
+fn length(vector: Option<&Node>) -> f64 {
+    vector.map_or(0.0, |vector| vector.reals::<3>().iter().map(|part| part * part).sum::<f64>().sqrt())
+}
+
+impl Seen {
+    fn note(&mut self, state: &Node) {
+        let buttons = state.whole(17) as u32;
+        self.states += 1;
+        self.presses += (buttons & !self.buttons).count_ones();
+        self.buttons = buttons;
+        let largest = |largest: &mut f64, value: f64| *largest = largest.max(value);
+        largest(&mut self.largest_force_n, length(state.sub(5)));
+        largest(&mut self.largest_torque_nm, length(state.sub(18)));
+        largest(&mut self.fastest_turn_radps, length(state.sub(16)));
+        largest(&mut self.largest_hand_force_n, length(state.sub(22)));
+        largest(&mut self.largest_grip_force_n, state.real(21).abs());
+        largest(&mut self.widest_gripper_rad, state.real(19));
+        if let Some([w, ..]) = state.sub(15).map(Node::reals::<4>) {
+            largest(&mut self.largest_turn_rad, 2.0 * w.abs().min(1.0).acos());
+        }
+    }
+}
+
 enum Phase {
     Pause(i64),
     Opening(Attempt),
@@ -145,6 +184,7 @@ struct Client {
     phase: Phase,
     pause_ns: i64,
     spring: Spring,
+    seen: Seen,
     handle_request: Option<u32>,
 }
 
@@ -171,6 +211,7 @@ impl Client {
         let now_ns = self.now_ns();
         eprintln!("welcome to {:?}, force up to {} N", welcome.device_name, welcome.max_force_n);
         self.spring = Spring { max_force_n: welcome.max_force_n, ..Spring::default() };
+        self.seen = Seen::default();
         self.pause_ns = FIRST_PAUSE_NS;
         let mut session = Session::new(&welcome, Some(random), now_ns);
         session.request(DESCRIBE, &[], now_ns);
@@ -214,6 +255,7 @@ impl Client {
         while let Some(event) = session.event() {
             match event {
                 Event::State(state) => {
+                    self.seen.note(&state);
                     if welcome.controls && state.whole(12) == 0 {
                         let force = self.spring.answer(&state, welcome);
                         if !session.send_force(force) {
@@ -293,6 +335,7 @@ impl Client {
                 self.receive(&buffer[..length]);
             }
         }
+        eprintln!("{:?}", self.seen);
         let now_ns = self.now_ns();
         if let Phase::Open(session, _) = &mut self.phase {
             let byes = session.close(CODE_OK, "the program ends", now_ns);
@@ -355,6 +398,7 @@ fn main() {
         phase: Phase::Pause(0),
         pause_ns: FIRST_PAUSE_NS,
         spring: Spring::default(),
+        seen: Seen::default(),
         handle_request: None,
     };
     client.run();

@@ -2,7 +2,7 @@
 //! The handshake (SESSION.md, "Opening"), without socket or clock: datagrams and instants go in and come out.
 
 use crate::noise::{self, Handshake, Key};
-use crate::protobuf::{decode, fits, Node, Writer};
+use crate::protobuf::{decode, fits, Node, Value, Writer};
 use crate::schema::ANSWER;
 
 pub const HELLO: u8 = 1;
@@ -130,9 +130,8 @@ impl Attempt {
         if connection == 0 || welcome.whole(1) != VERSION {
             return None;
         }
-        let granted = |name: &str| {
-            welcome.all(2).iter().any(|feature| matches!(feature, crate::protobuf::Value::Text(text) if text == name))
-        };
+        let granted =
+            |name: &str| welcome.all(2).iter().any(|feature| matches!(feature, Value::Text(text) if text == name));
         Some(Outcome::Welcome(Welcome {
             connection,
             controls: self.controls && welcome.whole(3) == CONTROLLER,

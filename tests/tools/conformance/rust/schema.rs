@@ -89,7 +89,7 @@ static LOCAL_MODEL: Schema = message(&[
     Field(4, Sub(&CONTACT), Optional, Any),
 ]);
 
-static ROTATION_MODEL: Schema =
+pub static ROTATION_MODEL: Schema =
     message(&[Field(1, Sub(&QUATERNION), Required, Any), Field(2, Real, Many(entries_of_a_stiffness), SIGNED)]);
 
 pub static FORCE: Schema = message(&[
