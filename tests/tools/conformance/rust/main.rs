@@ -61,7 +61,7 @@ fn shorten<const N: usize>(vector: &mut [f64; N], most: f64) -> bool {
     if length <= most {
         return false;
     }
-    // A hair shorter, or rounding makes it longer than the limit and the server says so.
+    // A hair shorter, so that rounding does not leave it longer than the limit.
     vector.iter_mut().for_each(|part| *part *= most * (1.0 - 1e-12) / length);
     true
 }
