@@ -46,7 +46,8 @@ void HapticController::book_unseen(const Vec3& applied, const HandleSample* hand
   if (admittance_) admittance_->observe_unseen();
 }
 
-// A step of a point pays for the parts of a handle with a branch only, so what all steps have is not called but inlined.
+// A step of a point pays for the parts of a handle with a branch only, so what all steps have is not called but
+// inlined.
 [[gnu::always_inline]] inline void HapticController::book_seen(const Motion& hand, const Vec3& applied,
                                                                const HandleSample* handle, Step& step) noexcept {
   const Vec3 dx = hand.position - last_->position;

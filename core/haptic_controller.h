@@ -139,8 +139,8 @@ class HapticController {
     /// Readings that may fail in a row before it is a fault: 20 ms at 1 kHz, what libfranka allows.
     std::uint32_t max_missed = 20;
     /// m/s; > 0. A faster motion is not a hand but an encoder that has wrapped or lost count. It is a fault, and is not
-    /// booked: the account would credit 0.2 m in a millisecond with 32 J of friction at 0.8 N·s/m. Empty: every position
-    /// is believed.
+    /// booked: the account would credit 0.2 m in a millisecond with 32 J of friction at 0.8 N·s/m. Empty: every
+    /// position is believed.
     std::optional<double> max_speed{};
   };
 

@@ -47,7 +47,8 @@ struct PositionSample {
 /// Encoder counts and USB transfers stay below this interface; above it everything is SI.
 ///
 /// Thread-safe: no; the haptic thread owns it.
-/// Realtime-safe: `read` and `apply` must not allocate, lock or log, nor block for longer than the device's own transfer.
+/// Realtime-safe: `read` and `apply` must not allocate, lock or log, nor block for longer than the device's own
+/// transfer.
 class Device {
  public:
   /// How far the device has come on its way from the plug to the force. Positions are valid in `kHomed` only.

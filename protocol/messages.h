@@ -217,9 +217,9 @@ struct Disarm {
   std::uint32_t device = 0;
 };
 
-/// Client → server, reliable: what a device is and can do; answered with a DeviceDescription, or, when `handle` is asked
-/// for, with a HandleDescription. The latter only of a server that has agreed to kFeatureHandle: an older one does not
-/// know the difference.
+/// Client → server, reliable: what a device is and can do; answered with a DeviceDescription, or, when `handle` is
+/// asked for, with a HandleDescription. The latter only of a server that has agreed to kFeatureHandle: an older one
+/// does not know the difference.
 struct Describe {
   std::uint32_t device = 0;
   bool handle = false;

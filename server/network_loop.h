@@ -29,10 +29,10 @@ namespace tendon {
 /// One thread calls `turn` when a datagram has come, when a haptic loop has made a step, or when the time that the last
 /// turn returned has come. That thread does nothing else, except wait and read the clock.
 ///
-/// Each channel takes the forces of one controller; with a lease, several controllers may share it in turn (SESSION.md).
-/// There are up to `max_observers` observers. Those that ask for it (kFeatureDiagnostics) are told once a second how
-/// the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind something old. Of
-/// forces the newest wins; every request is answered.
+/// Each channel takes the forces of one controller; with a lease, several controllers may share it in turn
+/// (SESSION.md). There are up to `max_observers` observers. Those that ask for it (kFeatureDiagnostics) are told once a
+/// second how the devices' loops and the engines do. Each turn drains the link, so that nothing new waits behind
+/// something old. Of forces the newest wins; every request is answered.
 ///
 /// Without keys, guests speak in the clear, from this machine only. With keys they speak suite 1 only. A guest is
 /// half-open until its first authentic Data, and until then nothing changes for anybody else. Its address is the one

@@ -58,9 +58,9 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Starts the threads. Throws std::runtime_error, a sentence for the operator, when the system refuses one; those that
-  /// had begun have ended then. With `run_for` each haptic thread ends by itself, with zero force, so long after its first
-  /// step: it takes run_for / period steps, or fewer when some came too late.
+  /// Starts the threads. Throws std::runtime_error, a sentence for the operator, when the system refuses one; those
+  /// that had begun have ended then. With `run_for` each haptic thread ends by itself, with zero force, so long after
+  /// its first step: it takes run_for / period steps, or fewer when some came too late.
   void start(std::optional<Duration> run_for = std::nullopt);
 
   /// Zero force first; then goodbye to the guests; then the end of the recording.

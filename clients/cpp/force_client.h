@@ -36,8 +36,8 @@ struct Touch {
   /// The body has been cut or torn since the previous answer: the server then uses neither answer's stiffness or table.
   bool topology_changed = false;
   std::optional<double> error{};  ///< N, the engine's own estimate of the error of `force`; recorded with it
-  // For a device whose handle has more motors than those of its position (ForceClient::handle()), of a server that knows
-  // `kFeatureHandle`; another one is sent `force` without these (Stats::left_out).
+  // For a device whose handle has more motors than those of its position (ForceClient::handle()), of a server that
+  // knows `kFeatureHandle`; another one is sent `force` without these (Stats::left_out).
   std::optional<Vec3> torque{};  ///< N·m, on the hand, base frame axes, about the handle's position
   /// N·m/rad, −∂torque/∂θ at the state's orientation: with it the device loop follows the turning hand. Symmetric; a
   /// spring is positive. Only in answer to a state with an orientation.
@@ -102,7 +102,8 @@ class ForceClient {
     Duration valid_for{};
     /// For links where datagrams are dear: a force that a hand cannot tell from the last one sent is not sent (Weber's
     /// law), which leaves a tenth of the datagrams at 1 kHz. Only forces, torques and grip forces are compared
-    /// (HandleDeadband): a changed stiffness waits for the next force, at most for the longest silence. A changed topology is sent at once. Empty: every force is sent.
+    /// (HandleDeadband): a changed stiffness waits for the next force, at most for the longest silence. A changed
+    /// topology is sent at once. Empty: every force is sent.
     std::optional<Deadband::Config> deadband{};
     /// For links where datagrams are dear: the server leaves out states that we can predict, which are most of them.
     /// With rate_hz = r the callback is called at multiples of 1/r with the state predicted for that instant, tick and

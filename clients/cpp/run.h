@@ -33,10 +33,11 @@ struct Options {
 int run(const Options& options, Physics physics);  ///< a controller
 int run(const Options& options, Watch watch);      ///< an observer
 
-/// The same for one engine that touches several devices of the server, as two hands hold one object: its callbacks by the
-/// names of their devices. They are called one after the other on this thread and need no locks. Each device has a
+/// The same for one engine that touches several devices of the server, as two hands hold one object: its callbacks by
+/// the names of their devices. They are called one after the other on this thread and need no locks. Each device has a
 /// session of its own; the options hold for each, and what is said of a session names its device.
-/// `options.client.device` must be empty. 0 means that every session was open once; the run ends when one ends for good.
+/// `options.client.device` must be empty. 0 means that every session was open once; the run ends when one ends for
+/// good.
 int run(const Options& options, const std::map<std::string, Physics>& physics);
 
 }  // namespace tendon

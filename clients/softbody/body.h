@@ -163,8 +163,9 @@ class Body {
   Body(Body&&) noexcept;
   Body& operator=(Body&&) noexcept;
 
-  /// The force on a tool with its middle at `tool` (m, body frame), for a capsule with the handle not turned. A body with time advances by one step. A cut that waits for this
-  /// answer's force is made after the answer: the next answer is that of the cut body, and says so.
+  /// The force on a tool with its middle at `tool` (m, body frame), for a capsule with the handle not turned. A body
+  /// with time advances by one step. A cut that waits for this answer's force is made after the answer: the next answer
+  /// is that of the cut body, and says so.
   Feel touch(const Vec3& tool);
 
   /// The same with the handle at `handle` (body frame): the tool is at its offset from there, and where

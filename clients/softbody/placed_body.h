@@ -22,8 +22,9 @@ class PlacedBody {
 
   /// The same as an answer to the server. It has the stiffness and how far that holds, the solver's error and, unless
   /// the tool sticks, the surface. Where turns_the_hand() it has the torque, and the angular stiffness when the device
-  /// measures its handle's orientation; when it does not, the handle counts as not turned. With Scene::table it has the force at other depths too: the table begins at the
-  /// surface, or half a table's depth above the tool where that is deeper.
+  /// measures its handle's orientation; when it does not, the handle counts as not turned. With Scene::table it has the
+  /// force at other depths too: the table begins at the surface, or half a table's depth above the tool where that is
+  /// deeper.
   ///
   /// A body with time moves the tool from the hand's last position to this one, in the steps that fit between the two
   /// samples; when none fits, the last answer is repeated. After more than `kMostBehind`, or when the server's clock is

@@ -8,9 +8,9 @@
 ///
 /// libm does not: glibc takes other instructions on a processor with FMA, and each version of it may round the last bit
 /// otherwise. A law that calls it decides otherwise on another machine, and a simulation with an encoder magnifies that
-/// last bit to another run. These use only + − · ÷ √, whole-number rounding and std::fmod, which are exact or which IEEE
-/// 754 rounds correctly, in a fixed order. Compile with -ffp-contract=off (CMakeLists.txt does): a fused multiply-add
-/// would round once less.
+/// last bit to another run. These use only + − · ÷ √, whole-number rounding and std::fmod, which are exact or which
+/// IEEE 754 rounds correctly, in a fixed order. Compile with -ffp-contract=off (CMakeLists.txt does): a fused
+/// multiply-add would round once less.
 ///
 /// Errors are at most 2e-16 of the result and 1e-16 of 1, whichever is more, unless stated. NaN gives NaN where it is
 /// accepted. Realtime-safe: yes.

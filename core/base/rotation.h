@@ -29,8 +29,8 @@ Quat rotation_by(const Vec3& vector) noexcept;
 /// The vector of that rotation, at most π long: rotation_by(rotation_vector(q)) is q.
 Vec3 rotation_vector(const Quat& q) noexcept;
 
-/// The turn from `from` to `to` in base frame axes: the vector θ with to = rotation_by(θ) · from. What a constant torque
-/// works on while the handle turns about one axis: −τ·θ goes into the account.
+/// The turn from `from` to `to` in base frame axes: the vector θ with to = rotation_by(θ) · from. What a constant
+/// torque works on while the handle turns about one axis: −τ·θ goes into the account.
 Vec3 turn_between(const Quat& from, const Quat& to) noexcept;
 
 /// R v.
@@ -40,13 +40,13 @@ Vec3 rotated(const Quat& q, const Vec3& v) noexcept;
 /// torque has fallen to a half, and at 180° it has no direction.
 bool is_within_reach(const Quat& rest, const Quat& q) noexcept;
 
-/// The torque of a spring of `stiffness` K (N·m/rad, symmetric, base frame axes) that is turned from `rest` to `q`. With
-/// (w, v) = q · rest⁻¹:
+/// The torque of a spring of `stiffness` K (N·m/rad, symmetric, base frame axes) that is turned from `rest` to `q`.
+/// With (w, v) = q · rest⁻¹:
 ///
 ///     τ = −2 (w K v + v × K v)          the gradient of U = 2 vᵀ K v;   −K θ for small turns θ
 ///
-/// It makes no energy on any way round, for any symmetric K. (The form 2 K sgn(w) v is a gradient too, of 4 K (1 − |w|),
-/// but only for a K that is the same about every axis, and it jumps at 180°.)
+/// It makes no energy on any way round, for any symmetric K. (The form 2 K sgn(w) v is a gradient too, of 4 K (1 −
+/// |w|), but only for a K that is the same about every axis, and it jumps at 180°.)
 Vec3 spring_torque(const Mat3& stiffness, const Quat& rest, const Quat& q) noexcept;
 
 /// U of that spring, J.

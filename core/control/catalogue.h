@@ -25,8 +25,8 @@
 
 namespace tendon {
 
-// The catalogue of the laws: all that the rest of the house knows of a law by name. A new law is an enumerator and a row
-// here. Scenes, `tendon-lab`, the property tests and the golden numbers find it by laws().
+// The catalogue of the laws: all that the rest of the house knows of a law by name. A new law is an enumerator and a
+// row here. Scenes, `tendon-lab`, the property tests and the golden numbers find it by laws().
 
 /// The stability controllers that a scene can choose; each has its file in core/control.
 enum class Law : std::uint8_t {
@@ -55,8 +55,8 @@ struct LawInfo {
   Law law;
   std::string_view name;  ///< in scenes, tables and command lines
   std::string_view what;  ///< one line
-  /// Its own theory promises that the ledger is never negative, **whatever** the remote environment asks for. The others
-  /// are passive in some environments, or take back what they gave out.
+  /// Its own theory promises that the ledger is never negative, **whatever** the remote environment asks for. The
+  /// others are passive in some environments, or take back what they gave out.
   bool passive;
   bool needs_stiffness;  ///< of an environment that does not send its own
 };

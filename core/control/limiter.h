@@ -14,9 +14,9 @@ namespace tendon {
 ///
 /// It keeps the promise of a law that is `passive` through overruns. T is how long a hold may be (HoldBound): T_max, or
 /// longer after a hold that was longer. The laws with a bound like equation (8) then bound by T (FollowsHolds). The
-/// proofs of the other passive laws end with the first hold beyond T_max; from then on equation (8) with T and the port's
-/// ledger bounds their force as well (OutputBound, Theorem 1). As long as no hold is longer than T_max, none of this
-/// changes a bit.
+/// proofs of the other passive laws end with the first hold beyond T_max; from then on equation (8) with T and the
+/// port's ledger bounds their force as well (OutputBound, Theorem 1). As long as no hold is longer than T_max, none of
+/// this changes a bit.
 ///
 /// Satisfies StabilityController<Limiter, 3>. Thread-safe: no. Realtime-safe: all but the constructor.
 class Limiter {

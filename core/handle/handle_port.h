@@ -14,8 +14,8 @@
 namespace tendon {
 
 /// The limiter of a port that is no point in space: the wrench of a handle that turns, or its gripper. The law is AOL+
-/// (AolPlus) with its parts, AOL, which is AOL+ without any, or none, which books but does not bound. It keeps the promise
-/// of Limiter: E ≥ 0 through overruns, because its T follows the longest hold (HoldBound).
+/// (AolPlus) with its parts, AOL, which is AOL+ without any, or none, which books but does not bound. It keeps the
+/// promise of Limiter: E ≥ 0 through overruns, because its T follows the longest hold (HoldBound).
 ///
 ///     HandlePort<2, 3>   a wrench: F (N) with Δx (m), τ (N·m) with Δθ (rad), friction of each, **one account**:
 ///                            E(n) = Σₖ [ −F·Δx − τ·Δθ + f_c ‖Δx‖ + b ‖Δx‖²/T + τ_c ‖Δθ‖ + b_r ‖Δθ‖²/T ]
@@ -47,8 +47,8 @@ class HandlePort {
   void observe(const Interval<kSize>& interval) noexcept;
   void observe_unseen(const Vec<kSize>& applied, Duration at_most) noexcept;
 
-  /// `permitted` is the bound on the norm of the first block (a wrench: of its force, N) in the direction that is wanted;
-  /// for a demand whose first block is zero, what it could be alone.
+  /// `permitted` is the bound on the norm of the first block (a wrench: of its force, N) in the direction that is
+  /// wanted; for a demand whose first block is zero, what it could be alone.
   LimitedForce<kSize> limit(const Demand<kSize>& wanted) noexcept;
 
   double energy() const noexcept { return law_.energy(); }
@@ -94,7 +94,8 @@ struct GripLimits {
   double max_force = 0;  ///< N, > 0
   double max_slew = std::numeric_limits<double>::infinity();  ///< N/s, > 0
 };
-/// The parts energy_cap, knee and latency_reserve of `point` hold for the gripper too; the others are about the position.
+/// The parts energy_cap, knee and latency_reserve of `point` hold for the gripper too; the others are about the
+/// position.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 
 /// What the memoryless limits leave of a wrench, and why: the first share s and then the second, s ≤ 1 the largest with

@@ -5,7 +5,8 @@
 
 namespace tendon {
 
-/// How long the next force may be held: the T that the bounds of OutputBound count on, following what the machine shows.
+/// How long the next force may be held: the T that the bounds of OutputBound count on, following what the machine
+/// shows.
 ///
 ///     T(0)   = T_max                                        what the scene says
 ///     T(n+1) = min((1 + margin) · held, most · T_max)       after an interval with held > T(n); never below T(n)

@@ -32,8 +32,8 @@ RemoteForce believed(const RemoteForce& answer, double max_stiffness) noexcept;
 /// The part of a sound torque that is followed: its stiffness as above, with `max_angular_stiffness` in N·m/rad.
 RemoteTorque believed(const RemoteTorque& torque, double max_angular_stiffness) noexcept;
 
-/// The torque (N·m) that an answer means at the orientation `q`: by its model (RotationModel), but zero where the handle
-/// has turned by more than 150° since; the torque alone when it has none.
+/// The torque (N·m) that an answer means at the orientation `q`: by its model (RotationModel), but zero where the
+/// handle has turned by more than 150° since; the torque alone when it has none.
 Vec3 reconstruct(const RemoteTorque& torque, const Quat& q) noexcept;
 
 /// The position nearest to `position` for which a model is valid. Beyond the model's radius the force stays what it is

@@ -51,7 +51,8 @@ class ForceChannels {
   /// Forgets all forces.
   void disengage() noexcept;
 
-  /// The force wanted at `hand.position` at `hand.at`, and the torque at `orientation`. Call it once in each haptic step.
+  /// The force wanted at `hand.position` at `hand.at`, and the torque at `orientation`. Call it once in each haptic
+  /// step.
   Wanted wanted(const Motion& hand, const Quat* orientation = nullptr) noexcept;
 
   /// The force that a channel holds; empty when idle.

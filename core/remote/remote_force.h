@@ -51,8 +51,8 @@ struct LocalModel {
 ///
 ///     τ(q) = torque − 2 (w K v + v × K v)          N·m
 ///
-/// which is −K θ for a small turn θ, and the gradient of the energy 2 vᵀ K v (J), so that no way round makes energy; p and
-/// −p give the same torque.
+/// which is −K θ for a small turn θ, and the gradient of the energy 2 vᵀ K v (J), so that no way round makes energy; p
+/// and −p give the same torque.
 struct RotationModel {
   Quat at;                        ///< the orientation that the torque was computed for
   Mat3 stiffness = Mat3::Zero();  ///< N·m/rad, −∂τ/∂θ, base frame axes

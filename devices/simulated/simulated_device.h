@@ -170,9 +170,9 @@ class SimulatedDevice final : public Device {
   /// zero is held and returned. It ends torque and grip.
   Vec3 apply(const Vec3& force) noexcept override;
 
-  /// Returns the effort after saturation: its wrench is shortened to `max_force` and `max_torque` by one share. A device
-  /// without motors that turn gives no torque, and one without a motor in its gripper no grip. An effort with a component
-  /// that is not finite is none.
+  /// Returns the effort after saturation: its wrench is shortened to `max_force` and `max_torque` by one share. A
+  /// device without motors that turn gives no torque, and one without a motor in its gripper no grip. An effort with a
+  /// component that is not finite is none.
   Effort apply_all(const Effort& effort) noexcept override;
 
   const Truth& truth() const noexcept { return truth_; }

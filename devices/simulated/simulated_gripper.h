@@ -14,8 +14,8 @@ namespace tendon {
 ///
 ///     m dv/dt = F_device + F_hand − b v − f_c sgn(v),      0 ≤ x ≤ arm · open;      F > 0 opens
 ///
-/// **The hand** is a spring and a damper, F_hand = k (s − x) + c (ṡ − v), to the opening that it wants. **The stops** at
-/// both ends are rigid and take all of the speed: v = 0 there, and the fingers stay until something pulls them away.
+/// **The hand** is a spring and a damper, F_hand = k (s − x) + c (ṡ − v), to the opening that it wants. **The stops**
+/// at both ends are rigid and take all of the speed: v = 0 there, and the fingers stay until something pulls them away.
 ///
 /// **Integration** is that of SimulatedDevice, the implicit midpoint rule with set-valued friction: it sticks exactly,
 /// and neither makes nor hides energy. A substep that would end beyond a stop ends at it. That never makes energy,

@@ -21,9 +21,9 @@ namespace tendon {
 ///
 ///     τ_hand = K θ + c (ω_s − ω),      s = rotation_by(θ) · q,      |θ| ≤ π
 ///
-/// Its spring is linear in the turn θ, as that of the position is in the way: a hand is as stiff at 60° as at 1°. It has
-/// the energy K θ²/2, and jumps at 180°, further than a hand lets itself be turned. The script gives s as a rotation
-/// vector φ(t), s = rotation_by(φ); ω_s is the angular velocity of that rotation.
+/// Its spring is linear in the turn θ, as that of the position is in the way: a hand is as stiff at 60° as at 1°. It
+/// has the energy K θ²/2, and jumps at 180°, further than a hand lets itself be turned. The script gives s as a
+/// rotation vector φ(t), s = rotation_by(φ); ω_s is the angular velocity of that rotation.
 ///
 /// **Integration** is that of SimulatedDevice: with the mean velocity ω̄ of a substep h it satisfies, exactly,
 ///
@@ -34,9 +34,9 @@ namespace tendon {
 ///
 ///     work of the hand + kinetic energy at the start = −Σ τ_device·h ω̄ + Σ (τ_c |ω̄| + b ω̄²) h + kinetic energy now
 ///
-/// up to rounding, where it did not come to rest; it stores no more than that where it did. The h ω̄ is turn_between(q₀,
-/// q₁). Over several substeps turn_between is the sum of them only while the axis stays the same; for turns about
-/// changing axes the two differ by ½ ∫∫ ω × ω, a third order of the time.
+/// up to rounding, where it did not come to rest; it stores no more than that where it did. The h ω̄ is
+/// turn_between(q₀, q₁). Over several substeps turn_between is the sum of them only while the axis stays the same; for
+/// turns about changing axes the two differ by ½ ∫∫ ω × ω, a third order of the time.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class SimulatedRotation {

@@ -23,12 +23,13 @@ namespace tendon {
 ///     within; p ← p + v (now − before), each component within ±reach
 ///
 /// x right, y up, z towards the user, as the Falcon's. The twist of the cap turns the orientation in the same way: with
-/// r = (Rx, −Rz, Ry) / 350 for d, ω is `turn_speed` in place of `speed`, and q ← rotation_by(ω (now − before)) q. So the
-/// orientation turns about the axis about which the cap is twisted, as the operator sees it, not about one of its own.
+/// r = (Rx, −Rz, Ry) / 350 for d, ω is `turn_speed` in place of `speed`, and q ← rotation_by(ω (now − before)) q. So
+/// the orientation turns about the axis about which the cap is twisted, as the operator sees it, not about one of its
+/// own.
 ///
 /// The position starts at the origin, the orientation unturned, and both stay while the plug is out. A push that no
-/// report has confirmed for 100 ms has ended, and so has a twist; one `read` moves the position at most as far as 100 ms
-/// of pushing do. `apply` returns zero, whatever is asked for.
+/// report has confirmed for 100 ms has ended, and so has a twist; one `read` moves the position at most as far as 100
+/// ms of pushing do. `apply` returns zero, whatever is asked for.
 ///
 /// kAbsent while it is not plugged in, otherwise kHomed: it needs no opening. Buttons are those of its report, from
 /// bit 0; its row names the first two, as they lie on the models that have no more.

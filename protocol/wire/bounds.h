@@ -23,7 +23,8 @@ bool in_bounds(const ForceCommand& command) noexcept;
 /// Whether `command` holds no NaN, and no infinity except as a model's `valid_radius`.
 bool is_finite(const ForceCommand& command) noexcept;
 
-/// Why `command` is not in bounds, for the author of the engine that it comes from; empty when it is. Of static storage.
+/// Why `command` is not in bounds, for the author of the engine that it comes from; empty when it is. Of static
+/// storage.
 std::string_view objection(const ForceCommand& command) noexcept;
 
 }  // namespace tendon

@@ -30,8 +30,8 @@ void write(const Quat& from, pb::Quat& to);
 bool read(bool there, double from, std::optional<double>& to) noexcept;
 bool read(bool there, const pb::Vec3& from, std::optional<Vec3>& to) noexcept;
 
-/// A stiffness of 1, 3 or 9 entries: k·I, its diagonal, or all of it row by row. False for any other number of them; the
-/// entries are for in_bounds.
+/// A stiffness of 1, 3 or 9 entries: k·I, its diagonal, or all of it row by row. False for any other number of them;
+/// the entries are for in_bounds.
 using Entries = google::protobuf::RepeatedField<double>;
 bool read(const Entries& from, Mat3& to) noexcept;
 /// The shortest of the three forms that says the same.

@@ -20,7 +20,8 @@ struct Health {
   std::uint64_t missed = 0;    ///< periods without a step, because the one before came so late
   std::uint64_t overruns = 0;  ///< steps with Reason::kOverrun
   std::uint64_t unseen = 0;    ///< steps with Reason::kUnseen
-  /// Intervals in which the hand accelerated by more than AOL+'s bounded_acceleration allows: the scene's bound is wrong.
+  /// Intervals in which the hand accelerated by more than AOL+'s bounded_acceleration allows: the scene's bound is
+  /// wrong.
   std::uint64_t broken_assumptions = 0;
   DeviceCounts device{};  ///< what the device's driver has counted
   LatenessHistogram lateness{};

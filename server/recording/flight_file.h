@@ -19,8 +19,8 @@ namespace tendon {
 std::filesystem::path flight_path(const std::optional<std::filesystem::path>& recording, const std::string& device,
                                   int number);
 
-/// A new file for a fault: the first of these paths, from number 1 on, at which there is none yet. The faults of all runs
-/// of a name thus stay. Throws std::runtime_error with path and reason. Log thread only.
+/// A new file for a fault: the first of these paths, from number 1 on, at which there is none yet. The faults of all
+/// runs of a name thus stay. Throws std::runtime_error with path and reason. Log thread only.
 std::unique_ptr<FileSink> open_flight(const std::optional<std::filesystem::path>& recording, const std::string& device);
 
 /// Writes the steps that led to a fault as a recording of its own.

@@ -113,8 +113,8 @@ std::vector<Scene> read_scenes(const std::vector<std::filesystem::path>& files, 
 Scene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& directory,
                   std::span<const std::string> settings = {});
 
-/// The settings that put `law` in place of the scene's limiter, without its parts. The friction bounds of `control` stay:
-/// they are the device's.
+/// The settings that put `law` in place of the scene's limiter, without its parts. The friction bounds of `control`
+/// stay: they are the device's.
 std::vector<std::string> limiter_settings(std::string_view law, const HapticController::Config& control);
 
 /// Every key that a scene may have: meaning, what is accepted in which unit, and what holds without it.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A disk that is full stops the recording, not the run; with room again it goes on. The exit code says that something is
-// missing.
+// A disk that is full stops the recording, not the run; with room again it goes on. The exit code says that something
+// is missing.
 #include <gtest/gtest.h>
 
 #include <cstddef>

@@ -308,8 +308,8 @@ Observed clock_goes_back(std::uint64_t seed, bool decay) {
 
 // Oracle: passive, bounded, quiet; an engine whose clock is set back waits for so long, its force fades meanwhile, and
 // it is back after it: at once, or where the session has ended meanwhile, when it has noticed that. The server itself
-// has one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms sees that nobody reads another), which cannot be set; a
-// device whose time stamps go back changes no force by it.
+// has one clock, CLOCK_MONOTONIC (server/machine/clock.cc; tests/rules/rooms sees that nobody reads another), which
+// cannot be set; a device whose time stamps go back changes no force by it.
 TEST(HardLoop, AClockThatIsSetBackKicksNobody) {
   constexpr Duration kWithin = seconds(5);
   const Observed seen = kept(kWithin, [](std::uint64_t seed) { return clock_goes_back(seed, true); });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What loop_proof_test.cc counts instructions of: the haptic loop's step, at first of a point, then of a handle that turns
-// and grips. A line for each. Callgrind counts within `step_in_turn`, and writes a file each time it returns.
+// What loop_proof_test.cc counts instructions of: the haptic loop's step, at first of a point, then of a handle that
+// turns and grips. A line for each. Callgrind counts within `step_in_turn`, and writes a file each time it returns.
 #include <iostream>
 #include <memory>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a haptic step costs, in instructions by callgrind: of a point, which pays next to nothing for what other handles can
-// do, and of a handle that turns and grips.
+// What a haptic step costs, in instructions by callgrind: of a point, which pays next to nothing for what other handles
+// can do, and of a handle that turns and grips.
 #include <gtest/gtest.h>
 
 #include <iostream>

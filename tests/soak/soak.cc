@@ -330,8 +330,8 @@ class Run {
                                     .threads = watched.looks.back().threads});
       }
       const int code = watched.program->stop();
-      // Exit code 1: with so many hogs the proxy missed release times, and what a full disk did not take is missing; both
-      // say so.
+      // Exit code 1: with so many hogs the proxy missed release times, and what a full disk did not take is missing;
+      // both say so.
       const bool may_miss = watched.program.get() == proxy_ || watched.program.get() == full_;
       if (code != 0 && !(code == 1 && may_miss)) {
         broken(watched.name + ": exit code " + std::to_string(code));

@@ -71,8 +71,8 @@ std::optional<double> CapsuleContact::Capsule::above(const Vec3& x, const Vec3& 
   return lowest;
 }
 
-/// The nodes that the capsule may push: those inside, and those that are nearer to it than the deepest is inside, since a
-/// press can move them into it sideways. `gap` becomes the least gap of all touchable nodes.
+/// The nodes that the capsule may push: those inside, and those that are nearer to it than the deepest is inside, since
+/// a press can move them into it sideways. `gap` becomes the least gap of all touchable nodes.
 std::vector<CapsuleContact::Node> CapsuleContact::near(const Capsule& tool, double& gap) const {
   const Vec3& n = surface_.normal();
   gap = std::numeric_limits<double>::infinity();

@@ -24,13 +24,13 @@ namespace tendon::softbody {
 ///     force = −Σ λᵢ mᵢ,   torque = −Σ (yᵢ − p) × λᵢ mᵢ   about a point p
 ///
 /// The body answers with its whole compliance, along the surface too. (SphereContact leaves that out: with ν = 0.45 it
-/// differs by some percent in a deep press.) The search solves one problem of `pushes.h` after another, in which a plane
-/// stands for the capsule at each node: the plane that touches it where it is nearest to the node's last place. A
+/// differs by some percent in a deep press.) The search solves one problem of `pushes.h` after another, in which a
+/// plane stands for the capsule at each node: the plane that touches it where it is nearest to the node's last place. A
 /// capsule is convex, so each shape on the way keeps out of it, and the energy never grows from one to the next. The
 /// search ends when the pushes turn by less than kEnough of the force, and `Feel::error` says what is left.
 ///
-/// The stiffnesses are the slopes of force and torque as the capsule moves and turns while the same nodes are pushed: of
-/// how the pushes change, how their normals turn, and how the lever of each turns with the handle. Where E bends
+/// The stiffnesses are the slopes of force and torque as the capsule moves and turns while the same nodes are pushed:
+/// of how the pushes change, how their normals turn, and how the lever of each turns with the handle. Where E bends
 /// downwards, as for a long handle that stands on its end and would fall over, the stiffness is 0: neither is ever
 /// negative.
 ///
@@ -39,9 +39,9 @@ namespace tendon::softbody {
 /// Thread-safe: no. Realtime-safe: no.
 class CapsuleContact {
  public:
-  /// `nodes`: those that can be touched, ascending; `radius` m, above 0; `half_length` m, from the middle to the centre of
-  /// each end, 0 or more. Makes the compliance of the nodes by three solutions for each. Throws std::invalid_argument.
-  /// Surface must outlive this.
+  /// `nodes`: those that can be touched, ascending; `radius` m, above 0; `half_length` m, from the middle to the centre
+  /// of each end, 0 or more. Makes the compliance of the nodes by three solutions for each. Throws
+  /// std::invalid_argument. Surface must outlive this.
   CapsuleContact(const Solid& solid, const TouchSurface& surface, const std::vector<int>& nodes, double radius,
                  double half_length);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The promise for a handle that turns and grips: whatever the hand does with it, whatever the engines ask for, the one
-// account of force and torque and the account of the gripper are never negative. The accounts are kept here a second time,
-// from the equations and the way the handle really went.
+// account of force and torque and the account of the gripper are never negative. The accounts are kept here a second
+// time, from the equations and the way the handle really went.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 

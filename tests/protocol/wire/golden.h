@@ -9,8 +9,8 @@
 
 namespace tendon::golden {
 
-/// A datagram in the clear as WIRE.md shows it: a line for each field, its bytes in hex, and what they say. Field names,
-/// types and enumerators are those of tendon.proto.
+/// A datagram in the clear as WIRE.md shows it: a line for each field, its bytes in hex, and what they say. Field
+/// names, types and enumerators are those of tendon.proto.
 std::string block(std::span<const std::byte> datagram);
 
 /// The blocks of a page that open with "```golden NAME", by name.

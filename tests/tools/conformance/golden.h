@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the kit says word for word as WIRE.md's golden datagrams do. tests/tools/conformance/documents_test.cc compares them
-// with protocol/vectors/plain.json.
+// What the kit says word for word as WIRE.md's golden datagrams do. tests/tools/conformance/documents_test.cc compares
+// them with protocol/vectors/plain.json.
 
 namespace tendon::conformance::golden {
 

@@ -45,8 +45,8 @@ HapticController::Config control_of(const SceneRecord& scene, const Options& opt
   return settings.empty() ? recorded : parse(settings);
 }
 
-/// Reads the parts of the recording once; `visit` has every step, as it was and as it is again. The first record of each
-/// part is the scene; that of the first part is run.
+/// Reads the parts of the recording once; `visit` has every step, as it was and as it is again. The first record of
+/// each part is the scene; that of the first part is run.
 template <class Visit, class VisitDatagram>
 Gaps read_run(const Options& options, Rerun::Held held, const Visit& visit, const VisitDatagram& visit_datagram) {
   Gaps gaps;

@@ -24,7 +24,8 @@ struct Options {
   bool progress = false;  ///< to stderr, a line that is written over
 };
 
-/// Reads the recording, with its parts as one run, of one device (of several: the first) and takes every step of it again, in bounded memory.
+/// Reads the recording, with its parts as one run, of one device (of several: the first) and takes every step of it
+/// again, in bounded memory.
 ///
 /// Without `law` and `settings` the scene that was recorded is run, each step with what the device held then, and
 /// whatever the law decides has to be the same bit for bit: interval, account, bound, force, mode, reasons. Returns

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // touch_lines EXAMPLE [ARGUMENT…]: what a rendering example answers to hands on paper. There is no server: run() is the
-// one below, which reads a line "DEVICE X Y Z U V W" for each state (m, m/s) and prints its answer, "FX FY FZ" in N and,
-// where the example sends a stiffness, its nine numbers in N/m, row by row. The examples' sources are the real ones.
+// one below, which reads a line "DEVICE X Y Z U V W" for each state (m, m/s) and prints its answer, "FX FY FZ" in N
+// and, where the example sends a stiffness, its nine numbers in N/m, row by row. The examples' sources are the real
+// ones.
 #include <cstdio>
 #include <cstring>
 #include <iostream>

@@ -52,8 +52,8 @@ Pressed& coarse() {
   return pressed;
 }
 
-/// A capsule whose axis rises by `tilt` (rad) and goes `aside` (rad) from the x axis. The middle of its lower end is `deep`
-/// (m) below the place where it would only touch, above (x, y).
+/// A capsule whose axis rises by `tilt` (rad) and goes `aside` (rad) from the x axis. The middle of its lower end is
+/// `deep` (m) below the place where it would only touch, above (x, y).
 ContactIntegral::Tool oblique(double tilt, double aside, double deep, double x, double y) {
   const Vec3 axis(std::cos(tilt) * std::cos(aside), std::cos(tilt) * std::sin(aside), std::sin(tilt));
   return {Vec3(x, y, 0.05 + kRadius - deep) + kHalfLength * axis, axis, kRadius, kHalfLength};

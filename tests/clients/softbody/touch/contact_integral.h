@@ -15,8 +15,8 @@
 
 namespace tendon::softbody::testing {
 
-/// B1 with small cells where a tool touches it: `cell` wide (m), out to ± `fine_x` and ± `fine_y` from the middle of its
-/// top, and layers that grow from there.
+/// B1 with small cells where a tool touches it: `cell` wide (m), out to ± `fine_x` and ± `fine_y` from the middle of
+/// its top, and layers that grow from there.
 struct FineBlock {
   FineBlock(double cell, double fine_x, double fine_y, double poisson = 0.45)
       : xs(across(cell, fine_x)), ys(across(cell, fine_y)), zs(up(cell)), solid(make(poisson)) {}

@@ -8,8 +8,8 @@
 
 namespace tendon::lab {
 
-/// Golden costs: the instructions in one step of every law, as a table that is committed. A law that got dearer shows as
-/// a diff of it.
+/// Golden costs: the instructions in one step of every law, as a table that is committed. A law that got dearer shows
+/// as a diff of it.
 ///
 /// They depend on the compiler, its flags and Eigen, so the table says with which it was counted. With the same ones
 /// they depend on nothing else: they are counted by callgrind, and no clock is asked.

@@ -29,7 +29,8 @@ std::string begin_picture(const std::filesystem::path& path, int width, int heig
 void check_picture_name(const std::filesystem::path& path);
 
 /// Has gnuplot (package gnuplot-nox) run a script which draws `path`, and waits for it. Throws std::runtime_error when
-/// gnuplot is not installed or fails, or when the picture is not whole afterwards, as on a full disk; it is removed then.
+/// gnuplot is not installed or fails, or when the picture is not whole afterwards, as on a full disk; it is removed
+/// then.
 void run_gnuplot(const std::string& script, const std::filesystem::path& path);
 
 }  // namespace tendon::lab
