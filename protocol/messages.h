@@ -68,6 +68,9 @@ struct DeviceState {
   /// N, what the engines ask for at this step, after hold or local model and before any limit. Only to an observer that
   /// named kFeatureDiagnostics; empty: not told.
   std::optional<Vec3> force_wanted{};
+  /// N/m, −∂force_wanted/∂position as the engines' models say it at this step, and to whom force_wanted is told; empty:
+  /// no model.
+  std::optional<Mat3> stiffness_wanted{};
   /// Bit i is set while button i is held. Only to a client that named kFeatureHandle, else 0. A press that fell between
   /// two states of a client is in the next state that it is sent.
   std::uint32_t buttons = 0;

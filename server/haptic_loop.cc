@@ -43,6 +43,7 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   state.force_age = record.force_age;
   state.mode = record.mode;
   state.force_wanted = record.wanted;
+  state.stiffness_wanted = record.stiffness;
   state.buttons = record.buttons;
   state.hand_force = record.hand_force;
 }

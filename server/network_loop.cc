@@ -325,6 +325,10 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
   for (auto* const vector : {&state.force_wanted, &state.hand_force}) {
     if (*vector && !((*vector)->array().abs() <= limits::kMaxValue).all()) vector->reset();
   }
+  std::optional<Mat3>& stiffness = state.stiffness_wanted;
+  const bool tells =
+      state.force_wanted && stiffness && !stiffness->isZero(0) && (stiffness->array().abs() <= limits::kMaxValue).all();
+  if (!tells) stiffness.reset();
 }
 
 /// But for the buttons.
@@ -352,7 +356,10 @@ void NetworkLoop::publish(LocalTime now) {
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
       DeviceState told = all;
-      if (!guest.diagnoses) told.force_wanted.reset();
+      if (!guest.diagnoses) {
+        told.force_wanted.reset();
+        told.stiffness_wanted.reset();
+      }
       if (!guest.sees_handle) leave_out_handle(told);
       told.buttons = view->pressed;
       if (view->deadband && !view->deadband->passes(told)) {

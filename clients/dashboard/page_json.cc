@@ -153,6 +153,15 @@ Json columns(std::span<const DeviceState> states, Of of) {
   return axes;
 }
 
+/// Adds the stiffness that the engines' models say, row by row. Where no state holds one it is left out.
+void add_stiffness(Json& json, std::span<const DeviceState> states) {
+  if (std::ranges::none_of(states, [](const DeviceState& s) { return s.stiffness_wanted.has_value(); })) return;
+  json["stiffness_n_per_m"] = columns<9>(states, [](const DeviceState& s) {
+    const Mat3 stiffness = s.stiffness_wanted.value_or(Mat3::Constant(kUntold));
+    return Eigen::Vector<double, 9>(stiffness.transpose().reshaped());
+  });
+}
+
 /// Adds what the handle has beyond a point. A value that no state holds is left out: most devices have none of them.
 void add_handle(Json& json, std::span<const DeviceState> states) {
   const auto any = [&](auto has) { return std::ranges::any_of(states, has); };
@@ -280,6 +289,7 @@ std::string states_json(std::uint32_t device, std::span<const DeviceState> state
       {"reasons", column(states, [](const DeviceState& s) { return s.reasons; })},
       {"mode", column(states, [](const DeviceState& s) { return static_cast<unsigned>(s.mode); })},
       {"force_age_ms", column(states, [](const DeviceState& s) { return plotted(milliseconds(s.force_age)); })}};
+  add_stiffness(json, states);
   add_handle(json, states);
   return text_of(json);
 }

@@ -63,6 +63,12 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
   const bool unbounded_force = to.permitted_force == std::numeric_limits<double>::infinity();
   to.buttons = from.buttons();
   if (!read(from.has_force_wanted_n(), from.force_wanted_n(), to.force_wanted)) return false;
+  to.stiffness_wanted.reset();
+  if (!from.stiffness_wanted_npm().empty()) {
+    Mat3& stiffness = to.stiffness_wanted.emplace();
+    if (!read(from.stiffness_wanted_npm(), stiffness) || !(stiffness.array().abs() <= limits::kMaxValue).all())
+      return false;
+  }
   return read_handle(from, to) && read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
          read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
          bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
@@ -90,6 +96,8 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   } else {
     to.clear_force_wanted_n();
   }
+  to.clear_stiffness_wanted_npm();
+  if (from.stiffness_wanted) write(*from.stiffness_wanted, *to.mutable_stiffness_wanted_npm());
   write_handle(from, to);
 }
 

@@ -94,6 +94,7 @@ void print(Line& line, const DeviceState& state) {
        << state.force_applied << state.energy << state.permitted_force << state.reasons << state.force_sequence
        << state.force_age << state.mode;
   if (state.force_wanted) line << "wanted" << *state.force_wanted;
+  if (state.stiffness_wanted) line << "stiffness" << *state.stiffness_wanted;
   if (state.buttons != 0) line << "buttons" << state.buttons;
   if (state.turning) line << "turning" << state.turning->orientation << state.turning->angular_velocity;
   if (state.torque_applied) line << "torque" << *state.torque_applied;

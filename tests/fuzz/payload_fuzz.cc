@@ -35,6 +35,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else if (const auto* state = std::get_if<Session::StateArrived>(&*event)) {
       fuzz::require(state->state.position.allFinite() && state->state.velocity.allFinite());
       fuzz::require(!state->state.force_wanted || state->state.force_wanted->allFinite());
+      fuzz::require(!state->state.stiffness_wanted || state->state.stiffness_wanted->allFinite());
     } else if (const auto* device = std::get_if<Session::DeviceReportArrived>(&*event)) {
       std::uint64_t uncounted = device->report.steps;
       for (const std::uint64_t count : device->report.lateness) {

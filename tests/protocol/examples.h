@@ -98,10 +98,11 @@ inline LinkReport report() {
 
 // To an observer that named the feature "diagnostics".
 
-/// Four times as much is wanted as is given.
+/// Four times as much is wanted as is given, by a wall that resists along x.
 inline DeviceState state_with_wanted() {
   DeviceState diagnosed = state();
   diagnosed.force_wanted = Vec3(-8, 0, 0.5);
+  diagnosed.stiffness_wanted = Vec3(800, 0, 0).asDiagonal();
   return diagnosed;
 }
 

@@ -121,6 +121,7 @@ class DeviceState:
     device: int = 0
     channel: int = 0  # of the force that force_sequence, force_age_ns and mode are about
     force_wanted: Vec3 | None = None  # N, asked for by the engines, before any limit; None: not told (FEATURE_DIAGNOSTICS)
+    stiffness_wanted: Mat3 | None = None  # N/m, −∂force_wanted/∂position as the engines' models say it; None: no model
     buttons: int = 0  # bit i is set while button i is held; a press between two states is in the next (FEATURE_HANDLE)
     # None: the device has it not, or the server does not know FEATURE_HANDLE.
     turning: Turning | None = None

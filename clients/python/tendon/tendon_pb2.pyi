@@ -210,7 +210,7 @@ class DeviceReport(_message.Message):
     def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., device: _Optional[int] = ..., steps: _Optional[int] = ..., missed: _Optional[int] = ..., overruns: _Optional[int] = ..., unseen: _Optional[int] = ..., lateness_us_log2: _Optional[_Iterable[int]] = ..., safety: _Optional[_Union[Safety, str]] = ..., fault: _Optional[str] = ..., degraded: _Optional[str] = ...) -> None: ...
 
 class DeviceState(_message.Message):
-    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "tick", "torque_applied_nm", "velocity_mps"]
+    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "stiffness_wanted_npm", "tick", "torque_applied_nm", "velocity_mps"]
     ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
@@ -230,6 +230,7 @@ class DeviceState(_message.Message):
     POSITION_M_FIELD_NUMBER: _ClassVar[int]
     REASONS_FIELD_NUMBER: _ClassVar[int]
     SAMPLED_NS_FIELD_NUMBER: _ClassVar[int]
+    STIFFNESS_WANTED_NPM_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
     TORQUE_APPLIED_NM_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
@@ -252,10 +253,11 @@ class DeviceState(_message.Message):
     position_m: Vec3
     reasons: int
     sampled_ns: int
+    stiffness_wanted_npm: _containers.RepeatedScalarFieldContainer[float]
     tick: int
     torque_applied_nm: Vec3
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_wanted_npm: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Disarm(_message.Message):
     __slots__ = ["device"]

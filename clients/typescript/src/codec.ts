@@ -4,7 +4,8 @@
 // what it refuses, and never throws.
 import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
 import {
-  isBounded, isChannel, isDevice, isError, isLength, isMagnitude, isModel, isRotation, isRotationModel, isTime, isVec3,
+  isBounded, isChannel, isDevice, isError, isLength, isMagnitude, isModel, isRotation, isRotationModel, isStiffness, isTime,
+  isVec3,
 } from "./bounds.js";
 import {
   readDeviceReport, readPeerReport, readReport, writeDeviceReport, writePeerReport, writeReport,
@@ -281,12 +282,13 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
     device: from.device,
     channel: from.channel,
     ...(from.forceWantedN && { forceWanted: readVec3(from.forceWantedN) }),
+    ...(from.stiffnessWantedNpm.length > 0 && { stiffnessWanted: from.stiffnessWantedNpm }),
     buttons: from.buttons,
     ...readHandleOf(from),
   };
   const { turning, forceWanted, torqueApplied, handForce } = state;
   const good = [forceWanted, torqueApplied, handForce, from.angularVelocityRadps].every((v) => !v || isVec3(v)) &&
-    (!turning || isRotation(turning.orientation)) &&
+    (!turning || isRotation(turning.orientation)) && (!state.stiffnessWanted || isStiffness(state.stiffnessWanted)) &&
     [from.gripperRad, from.gripperVelocityRadps, from.gripperForceAppliedN].every((n) => n === undefined || isBounded(n)) &&
     isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
     isVec3(state.forceApplied) && isBounded(state.energy) &&
@@ -311,6 +313,7 @@ const writeState = (from: DeviceState): pb.DeviceState =>
     device: from.device,
     channel: from.channel,
     ...(from.forceWanted && { forceWantedN: writeVec3(from.forceWanted) }),
+    ...(from.stiffnessWanted && { stiffnessWantedNpm: [...from.stiffnessWanted] }),
     buttons: from.buttons,
     ...(from.turning && {
       orientation: writeQuat(from.turning.orientation), angularVelocityRadps: writeVec3(from.turning.angularVelocity),

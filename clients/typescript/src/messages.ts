@@ -82,6 +82,8 @@ export interface DeviceState {
   readonly channel: number;
   /** N, asked for by the engines, before any limit; absent: not told, see DeviceReport. */
   readonly forceWanted?: Vec3 | undefined;
+  /** N/m, −∂forceWanted/∂position as the engines' models say it, told with forceWanted; absent: no model. */
+  readonly stiffnessWanted?: Stiffness | undefined;
   /** Bit i is set while button i is held. A press between two states is in the next one. */
   readonly buttons: number;
   /** Absent, as all below: the device has it not, or the server does not know kFeatureHandle. */

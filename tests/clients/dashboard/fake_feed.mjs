@@ -38,7 +38,7 @@ function stateOf(number, t) {
   }
   if (number === 1) {
     return { ...plain, position_m: [0.025 * sway(1.3), 0.04 * sway(1.9), 0.03 * sway(1.5, 1)], applied_n: [1.2, 1.5 * sway(1.9), -1], wanted_n: [1.2, 1.5 * sway(1.9), -1],
-      orientation: turn(0, 1, 0, 0.6 + 0.3 * sway(1.1)), torque_nm: [0, 0.1 * sway(1.1), 0.16], grip_rad: 0.45 + 0.3 * sway(2.2), grip_n: 2.5, buttons: sway(0.8) > 0 ? 1 : 0 };
+      orientation: turn(0, 1, 0, 0.6 + 0.3 * sway(1.1)), torque_nm: [0, 0.1 * sway(1.1), 0.16], stiffness_n_per_m: [0, 0, 0, 0, 0, 0, 0, 0, 500], grip_rad: 0.45 + 0.3 * sway(2.2), grip_n: 2.5, buttons: sway(0.8) > 0 ? 1 : 0 };
   }
   if (number === 2) return { ...plain, position_m: [0.03 * sway(2), 0.035 * sway(1.2), 0.03 * sway(2.6)], applied_n: [3 * sway(2), 0, 1], wanted_n: [4 * sway(2), 0, 1], buttons: 4 };
   return { ...plain, position_m: [0.03 * sway(1.4), 0.03 * sway(2.9), 0.02], applied_n: [0, 0, 0], wanted_n: [0, 0, 0] };
@@ -55,6 +55,7 @@ export function statesMessage(number, from, to, every = 1) {
     type: "states", device: number, tick: ticks, sampled_us: ticks.map((tick) => tick * 1000), position_m: columns("position_m", 3), wanted_n: columns("wanted_n", 3), applied_n: columns("applied_n", 3),
     permitted_n: one(6), energy_j: one(0.01), reasons: one(0), mode: one(2), force_age_ms: one(2),
   };
+  if (states[0]?.stiffness_n_per_m) message.stiffness_n_per_m = columns("stiffness_n_per_m", 9);
   if (states[0]?.orientation) Object.assign(message, { orientation: columns("orientation", 4), torque_nm: columns("torque_nm", 3) });
   if (states[0]?.grip_rad !== null && states[0]) Object.assign(message, { grip_rad: states.map((s) => s.grip_rad), grip_n: states.map((s) => s.grip_n) });
   if (states.some((s) => s.buttons)) message.buttons = states.map((s) => s.buttons);

@@ -23,6 +23,7 @@ TEST(PageJson, TellsStatesInColumns) {
   first.sampled = PeerTime(microseconds(1'000'123));
   first.position = Vec3(0.001, -0.5, 0);
   first.force_wanted = Vec3(1, 2, 3);
+  first.stiffness_wanted = Mat3{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   first.force_applied = Vec3(0.25, 0, -1);
   first.permitted_force = std::numeric_limits<double>::infinity();
   first.energy = -0.125;
@@ -40,6 +41,8 @@ TEST(PageJson, TellsStatesInColumns) {
   EXPECT_EQ(text["position_m"][1][0], -0.5);
   EXPECT_EQ(text["wanted_n"][2][0], 3.0);
   EXPECT_TRUE(text["wanted_n"][2][1].is_null()) << "not told";
+  EXPECT_EQ(text["stiffness_n_per_m"].size(), 9U);
+  EXPECT_EQ(text["stiffness_n_per_m"][1], (json{2.0, nullptr})) << "row by row; the second engine has no model";
   EXPECT_EQ(text["applied_n"][2][0], -1.0);
   EXPECT_TRUE(text["permitted_n"][0].is_null()) << "no bound";
   EXPECT_EQ(text["permitted_n"][1], 0.0);
@@ -70,7 +73,8 @@ TEST(PageJson, TellsTheHandleInColumnsWhereAStateHoldsIt) {
   EXPECT_EQ(text["grip_n"], (json{-1.5, nullptr}));
   EXPECT_EQ(text["buttons"], (json{6, 0}));
   text = json::parse(states_json(0, std::vector{DeviceState{}}));
-  for (const char* name : {"orientation", "torque_nm", "hand_force_n", "grip_rad", "grip_n", "buttons"}) {
+  for (const char* name :
+       {"orientation", "torque_nm", "hand_force_n", "grip_rad", "grip_n", "buttons", "stiffness_n_per_m"}) {
     EXPECT_FALSE(text.contains(name)) << name << ": a device without it costs nothing";
   }
 }

@@ -94,6 +94,7 @@ def _frame(frame: Frame) -> list[object]:
             *(_double(frame.energy), _double(frame.permitted_force)),
             *(frame.reasons, frame.force_sequence, frame.force_age_ns, int(frame.mode)),
             *([] if frame.force_wanted is None else ["wanted", *_vector(frame.force_wanted)]),
+            *([] if frame.stiffness_wanted is None else ["stiffness", *_matrix(frame.stiffness_wanted)]),
             *(["buttons", frame.buttons] if frame.buttons else []),
             *_handle_of(frame),
         ]

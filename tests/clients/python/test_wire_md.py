@@ -115,7 +115,8 @@ FORCE_TORQUE = replace(
     grip_force=0.75,
 )
 HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"), True, 0.125, 0.5, 8.0)
-STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5))
+WALL = ((800.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5), stiffness_wanted=WALL)
 DEVICE_REPORT = DeviceReport(
     number=7,
     until_ns=1_000_000_000,
@@ -253,6 +254,7 @@ def out_of_bounds():
     yield "mode 0", state(mode=0)
     yield "mode 7", state(mode=7)
     yield "wanted NaN", state(force_wanted=(0.0, nan, 0.0))
+    yield "stiffness wanted infinite", state(stiffness_wanted=((inf, 0.0, 0.0), WALL[1], WALL[2]))
     yield "sequence 0", force(sequence=0)
     yield "force NaN", force(force=(nan, 0.0, 0.0))
     yield "valid for nothing", force(valid_for_us=0)

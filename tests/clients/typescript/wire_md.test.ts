@@ -179,6 +179,7 @@ describe("WIRE.md", () => {
     const [frame] = contentOf("state-wanted").frames;
     assert.ok(frame?.kind === "state");
     assert.deepEqual(frame.value.forceWanted, { x: -8, y: 0, z: 0.5 });
+    assert.deepEqual(frame.value.stiffnessWanted, [800, 0, 0]);
   });
 
   const kDeviceReport: DeviceReport = {

@@ -33,6 +33,7 @@ TEST(Codec, AStateOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"negative age", [](DeviceState& s) { s.force_age = Duration{-1}; }},
       {"mode 0", [](DeviceState& s) { s.mode = Mode{0}; }},
       {"mode 7", [](DeviceState& s) { s.mode = Mode{7}; }},
+      {"infinite stiffness wanted", [](DeviceState& s) { s.stiffness_wanted = Mat3::Constant(kInf); }},
       {"NaN wanted", [](DeviceState& s) { s.force_wanted = Vec3(0, 0, kNan); }},
       {"NaN orientation", [](DeviceState& s) { s.turning->orientation.x = kNan; }},
       {"an orientation that is no rotation", [](DeviceState& s) { s.turning->orientation.w = 0.602; }},

@@ -31,6 +31,15 @@ Duration any_time() {
   return Duration{*rc::gen::inRange<std::int64_t>(-limits::kMaxTime.count(), limits::kMaxTime.count())};
 }
 
+/// One, three or nine entries on the wire.
+Mat3 any_stiffness() {
+  const int form = *rc::gen::inRange(1, 4);
+  Mat3 stiffness = any_value() * Mat3::Identity();
+  if (form == 2) stiffness = any_vector().asDiagonal();
+  if (form == 3) stiffness << any_vector(), any_vector(), any_vector();
+  return stiffness;
+}
+
 Quat any_rotation() {
   Quat q;
   do {
@@ -58,6 +67,7 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
   in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
   if (*rc::gen::arbitrary<bool>()) in.force_wanted = any_vector();
+  if (*rc::gen::arbitrary<bool>()) in.stiffness_wanted = any_stiffness();
   in.buttons = *rc::gen::arbitrary<std::uint32_t>();
   if (*rc::gen::arbitrary<bool>()) in.turning = {.orientation = any_rotation(), .angular_velocity = any_vector()};
   if (*rc::gen::arbitrary<bool>()) in.torque_applied = any_vector();
@@ -71,6 +81,7 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   RC_ASSERT(content->frames.size() == 1U);
   const auto& out = std::get<DeviceState>(content->frames[0]);
   RC_ASSERT(out.force_wanted == in.force_wanted);
+  RC_ASSERT(out.stiffness_wanted == in.stiffness_wanted);
   RC_ASSERT(out.buttons == in.buttons);
   RC_ASSERT((out.turning == in.turning));
   RC_ASSERT(out.torque_applied == in.torque_applied);
@@ -100,11 +111,8 @@ RC_GTEST_PROP(Codec, AForceComesOutAsItWentIn, ()) {
   in.valid_for = std::chrono::microseconds(*rc::gen::inRange(1, 10'000'001));
   in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
   in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
-  const int form = *rc::gen::inRange(0, 4);
-  if (form > 0) {
-    in.model = LocalModel{.at = any_vector(), .stiffness = any_value() * Mat3::Identity()};
-    if (form == 2) in.model->stiffness = any_vector().asDiagonal();
-    if (form == 3) in.model->stiffness << any_vector(), any_vector(), any_vector();
+  if (*rc::gen::arbitrary<bool>()) {
+    in.model = LocalModel{.at = any_vector(), .stiffness = any_stiffness()};
     if (*rc::gen::arbitrary<bool>()) in.model->valid_radius = std::abs(any_value());
     if (*rc::gen::arbitrary<bool>()) {
       Contact& contact = in.model->contact.emplace(Contact{.normal = Vec3(0.6, 0, -0.8), .gap = any_value()});

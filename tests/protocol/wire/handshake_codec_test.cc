@@ -157,6 +157,7 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
                     .device = limits::kMaxDevices - 1,
                     .channel = limits::kMaxChannels - 1,
                     .force_wanted = vector,
+                    .stiffness_wanted = matrix,
                     .buttons = ~0U,
                     .turning = Turning{.orientation = turned, .angular_velocity = vector},
                     .torque_applied = vector,

@@ -38,6 +38,8 @@ TEST_F(SealedServer, TellsAnObserverThatAsksHowTheLoopAndTheEngineDo) {
 
   ASSERT_TRUE(seen.force_wanted.has_value());
   EXPECT_EQ(*seen.force_wanted, Vec3(3, 0, -4));
+  ASSERT_TRUE(seen.stiffness_wanted.has_value());
+  EXPECT_EQ(*seen.stiffness_wanted, Mat3::Identity());
   const DeviceReport& report = *b.client->device_report();
   EXPECT_EQ(report.number, 2U);
   EXPECT_EQ(report.span, seconds(1));
@@ -125,6 +127,7 @@ TEST_F(SealedServer, WhoDoesNotAskIsToldNothingOfIt) {
   run(milliseconds(2500), {&a, &b, &c});
   EXPECT_GT(seen.tick, 2000U);
   EXPECT_FALSE(seen.force_wanted.has_value());
+  EXPECT_FALSE(seen.stiffness_wanted.has_value());
   EXPECT_FALSE(b.client->device_report().has_value());
   EXPECT_TRUE(b.client->peer_reports().empty());
   EXPECT_TRUE(c.client->device_report().has_value());
@@ -202,6 +205,7 @@ TEST_F(SealedServer, AControllerIsNotGrantedTheFeatureAndIsToldNothingOfIt) {
       const auto* arrived = std::get_if<Session::StateArrived>(&*event);
       ASSERT_NE(arrived, nullptr);
       EXPECT_FALSE(arrived->state.force_wanted.has_value());
+      EXPECT_FALSE(arrived->state.stiffness_wanted.has_value());
       ++states;
     }
   }
@@ -240,10 +244,12 @@ TEST_F(SealedServer, AForceThatIsNoNumberIsNotToldAndCostsNoState) {
   run(milliseconds(500), {&b});
   EXPECT_GT(seen.tick, 400U);
   EXPECT_FALSE(seen.force_wanted.has_value());
+  EXPECT_FALSE(seen.stiffness_wanted.has_value());
   wanted_ = Vec3(0, 2e12, 0);
   run(milliseconds(100), {&b});
   EXPECT_GT(seen.tick, 500U);
   EXPECT_FALSE(seen.force_wanted.has_value());
+  EXPECT_FALSE(seen.stiffness_wanted.has_value());
   EXPECT_EQ(b.client->stats().link.invalid, 0U);
 }
 

@@ -79,6 +79,7 @@ class SealedServer : public testing::Test {
       state.tick = tick_ += tick_step_;
       state.sampled = PeerTime(now_.time_since_epoch());
       state.force_wanted = wanted_;
+      if (wanted_) state.stiffness_wanted = Mat3::Identity();
       state.buttons = buttons_;
       mail_->state.put(state);
       if (measured_) {

@@ -53,6 +53,29 @@ ForceCommand some_force() {
   return message;
 }
 
+/// Of a handle that turns and grips, with a sensor of the hand's force.
+DeviceState handle_state() {
+  DeviceState message = some_state();
+  message.buttons = 1;
+  message.turning = Turning{.orientation = {.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5}, .angular_velocity = {0.1, 2, -3}};
+  message.torque_applied = Vec3(0.01, -0.02, 0.03);
+  message.grip = Grip{.opening = 0.25, .velocity = -0.5};
+  message.grip_applied = 1.5;
+  message.hand_force = Vec3(1.5, -2.5, -0.25);
+  return message;
+}
+
+/// With a model of its force and of its torque.
+ForceCommand handle_force() {
+  ForceCommand message = some_force();
+  message.model = LocalModel{.at = {0.0123, -0.0456, 0.0789}, .stiffness = Mat3::Constant(123.4)};
+  message.torque = RemoteTorque{
+      .torque = {0.01, -0.02, 0.03},
+      .model = RotationModel{.at = {.w = 0.5, .x = -0.5, .y = 0.5, .z = 0.5}, .stiffness = Mat3::Constant(0.123)}};
+  message.grip_force = 1.5;
+  return message;
+}
+
 const OutgoingEcho kEcho{PeerTime(std::chrono::seconds(5)), LocalTime(std::chrono::seconds(6)), 99, 0xffffffff};
 
 /// As many messages as are wanted and fit, in one datagram.
@@ -266,6 +289,8 @@ void measure_datagrams(Run& run) {
   codec(run, blocks, "state", some_state(), 16);
   codec(run, blocks, "force", some_force(), 1);
   codec(run, blocks, "force", some_force(), 16);
+  codec(run, blocks, "whole-handle state", handle_state(), 1);
+  codec(run, blocks, "whole-handle force", handle_force(), 1);
   DataWriter writer;
   Buffer buffer{};
   write(writer, buffer, some_state(), 1);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/base/rotation.h"
 #include "core/estimation/velocity_estimator.h"
 #include "core/exchange/flight_recorder.h"
 #include "core/exchange/spsc_ring.h"
@@ -61,6 +62,53 @@ HapticController::Config controller_config(Law law, const AolPlus<1, 3>::Parts& 
   return config;
 }
 
+/// A controller whose engine of 100 Hz answers: of a point, or of a handle that turns and grips as its point moves.
+class Heart {
+ public:
+  Heart(HapticController::Config config, bool whole) : whole_(whole), heart_(whole ? with_motors(config) : config) {}
+
+  void step(const Vec3& x) {
+    now_ += milliseconds(1);
+    const double turn = 20 * x.x();  // rad
+    if (++steps_ % 10 == 0) {
+      RemoteForce force;
+      force.sequence = steps_;
+      force.received = now_;
+      force.force = -3000 * x;
+      force.valid_for = milliseconds(30);
+      if (whole_) {
+        force.torque = RemoteTorque{.torque = Vec3(-0.5 * turn, 0, 0), .model = {}};
+        force.grip_force = -10 * turn;
+      }
+      heart_.observe(force);
+    }
+    if (whole_) {
+      handle_.turning->orientation = rotation_by({turn, 0, 0});
+      handle_.grip->opening = turn;
+    }
+    Step result = heart_.step({now_, x, Vec3::Zero()}, held_, {}, whole_ ? &handle_ : nullptr);
+    held_ = result.force;
+    if (const TurnStep* const turned = result.turn()) handle_.torque = turned->torque;
+    if (const GripStep* const gripped = result.grip()) handle_.grip_force = gripped->force;
+    keep(result);
+  }
+
+ private:
+  static HapticController::Config with_motors(HapticController::Config config) {
+    config.rotation =
+        RotationLimits{.friction = {1e-4, 1e-3}, .max_torque = 0.3, .max_slew = 100, .encoder_step = 1e-4};
+    config.grip = GripLimits{.friction = kFriction, .arm = 0.05, .max_force = 5};
+    return config;
+  }
+
+  bool whole_;
+  HapticController heart_;
+  HandleSample handle_{.turning = Turning{}, .grip = Grip{}};
+  Vec3 held_ = Vec3::Zero();
+  LocalTime now_{};
+  std::uint64_t steps_ = 0;
+};
+
 }  // namespace
 
 void measure_steps(Run& run) {
@@ -106,35 +154,26 @@ void measure_steps(Run& run) {
                      square_root_and_divide),
                  "VelocityEstimator::observe, 3 DOF", root));
 
-  const auto controller = [&](const char* what, Law law, const AolPlus<1, 3>::Parts& parts) {
-    HapticController heart(controller_config(law, parts));
-    Vec3 held = Vec3::Zero();
-    LocalTime time{};
-    std::uint64_t step = 0;
-    return row_of(in_turns(
-                      blocks, kCalls,
-                      [&](std::size_t) {
-                        time += milliseconds(1);
-                        const Vec3& x = places[++step % places.size()];
-                        if (step % 10 == 0) {  // a 100 Hz engine
-                          RemoteForce force;
-                          force.sequence = step;
-                          force.received = time;
-                          force.force = -3000 * x;
-                          force.valid_for = milliseconds(30);
-                          heart.observe(force);
-                        }
-                        Step result = heart.step({time, x, Vec3::Zero()}, held);
-                        held = result.force;
-                        keep(result);
-                      },
-                      square_root_and_divide),
-                  what, root);
+  const AolPlus<1, 3>::Parts parts = lab::default_parts(lab::kPaperEncoder);
+  const auto controller = [&](const char* what, const HapticController::Config& config) {
+    Heart heart(config, false);
+    return row_of(
+        in_turns(
+            blocks, kCalls, [&](std::size_t) { heart.step(places[++at % places.size()]); }, square_root_and_divide),
+        what, root);
   };
-  run.add(controller("HapticController::step, AOL", Law::kAol, {}));
-  row = controller("HapticController::step, AOL+ with its default parts", Law::kAolPlus,
-                   lab::default_parts(lab::kPaperEncoder));
+  run.add(controller("HapticController::step, AOL", controller_config(Law::kAol, {})));
+  row = controller("HapticController::step, AOL+ with its default parts", controller_config(Law::kAolPlus, parts));
   row.target = Row::Target{"≤ 300 ns", row.p50 <= 300};
+  run.add(row);
+
+  Heart handle(controller_config(Law::kAolPlus, parts), true);
+  Heart point(controller_config(Law::kAolPlus, parts), false);
+  row = row_of(in_turns(
+                   blocks, kCalls, [&](std::size_t) { handle.step(places[++at % places.size()]); },
+                   [&](std::size_t) { point.step(places[++at % places.size()]); }),
+               "… of a handle that turns and grips: a wrench and a gripper", "the same step of a point");
+  row.target = Row::Target{"≤ 2.5 × the floor", *row.ratio <= 2.5};
   run.add(row);
 
   StepRecord record;

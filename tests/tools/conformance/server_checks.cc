@@ -132,7 +132,8 @@ void check_states(Report& report, const Conversation& talk) {
   talk.for_each_frame(0, [&](const pb::Frame& frame) {
     report.judge("states", !frame.has_force() && !frame.has_control(), frame.ShortDebugString(),
                  "only frames that a server sends");
-    const bool diagnosed = frame.has_device_report() || frame.has_peer_report() || frame.state().has_force_wanted_n();
+    const bool diagnosed = frame.has_device_report() || frame.has_peer_report() || frame.state().has_force_wanted_n() ||
+                           !frame.state().stiffness_wanted_npm().empty();
     report.judge("diagnostics-unasked", !diagnosed, frame.ShortDebugString(),
                  "nothing of it: nobody named the feature");
     report.judge("handle-unasked", !tells_of_the_handle(frame.state()), frame.ShortDebugString(),

@@ -2,6 +2,7 @@
 import { Arming } from "./arming.js";
 import { h, mark, say } from "./dom.js";
 import { Scrubber } from "./scrubber.js";
+import { contactOf } from "./space/figure.js";
 import type { Shown } from "./space/stage.js";
 import { Stream, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
 import { Track, noHandle, type HandleSample } from "./track.js";
@@ -291,8 +292,8 @@ function push(track: Track, message: StatesMessage, i: number, t: number): void 
 
 /** Undefined: the batch tells nothing of the handle. */
 function handleOf(message: StatesMessage, i: number): HandleSample | undefined {
-  const { orientation, torque_nm: torque, hand_force_n: hand, grip_rad: grip, grip_n: gripForce, buttons } = message;
-  if (!orientation && !torque && !hand && !grip && !gripForce && !buttons) return undefined;
+  const { orientation, torque_nm: torque, hand_force_n: hand, grip_rad: grip, grip_n: gripForce, buttons, stiffness_n_per_m: stiffness } = message;
+  if (!orientation && !torque && !hand && !grip && !gripForce && !buttons && !stiffness) return undefined;
   const into = noHandle();
   const number = (value: number | null | undefined): number => value ?? NaN;
   if (orientation) [into.qw, into.qx, into.qy, into.qz] = orientation.map((column) => number(column[i])) as [number, number, number, number];
@@ -301,6 +302,11 @@ function handleOf(message: StatesMessage, i: number): HandleSample | undefined {
   if (grip) into.grip = number(grip[i]);
   if (gripForce) into.gripForce = number(gripForce[i]);
   if (buttons) into.buttons = buttons[i]!;
+  const contact = stiffness && contactOf(stiffness.map((column) => number(column[i])), message.wanted_n.map((column) => number(column[i])) as [number, number, number]);
+  if (contact) {
+    [into.nx, into.ny, into.nz] = contact.normal;
+    into.gap = contact.gap;
+  }
   return into;
 }
 

@@ -61,7 +61,8 @@ export interface StatesMessage {
   readonly reasons: readonly number[];
   readonly mode: readonly number[];
   readonly force_age_ms: readonly number[];
-  // Of the handle; absent where no state holds it.
+  // Absent where no state holds it: the stiffness that engines ask for, row by row, and the handle.
+  readonly stiffness_n_per_m?: readonly Numbers[];
   readonly orientation?: readonly [Numbers, Numbers, Numbers, Numbers];
   readonly torque_nm?: Triple;
   readonly hand_force_n?: Triple;
