@@ -205,6 +205,7 @@ void ForceClient::end(Phase phase, Code code, std::string reason) {
   holds_ = false;
   unseen_.reset();
   newest_.reset();
+  pressed_ = 0;
 }
 
 void ForceClient::take(LocalTime now, const Connection::Event& event) {
@@ -235,6 +236,7 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
     ++stats_.states;
     if (unseen_) ++stats_.states_skipped;
     unseen_ = newest_ = arrived->state;
+    pressed_ |= arrived->state.buttons;
     newest_arrived_ = now;
   } else if (const auto* report = std::get_if<Session::ReportArrived>(&event)) {
     report_ = report->report;
@@ -295,9 +297,10 @@ std::optional<DeviceState> ForceClient::due_state(LocalTime now) {
 /// True when a force now waits to be sent.
 bool ForceClient::call(LocalTime now) {
   if (now < next_call_ || (physics_ && !holds_)) return false;
-  const std::optional<DeviceState> due = due_state(now);
+  std::optional<DeviceState> due = due_state(now);
   if (!due) return false;
-  const DeviceState& state = *due;
+  DeviceState& state = *due;
+  state.buttons |= std::exchange(pressed_, 0U);
   seen_tick_ = state.tick;
   next_call_ += period_;
   if (next_call_ <= now) next_call_ = now + period_;

@@ -46,7 +46,8 @@ struct Touch {
 };
 
 /// The physics engine as a function: device state in, force out. It may take its time: while it computes, newer states
-/// replace older ones. Its exceptions pass through ForceClient::turn.
+/// replace older ones, and a button that was held in one of those is held in the next state that it is shown. Its
+/// exceptions pass through ForceClient::turn.
 using Physics = std::function<Touch(const DeviceState& hand)>;
 
 /// An onlooker: device state and the state of the link in, nothing out.
@@ -261,6 +262,7 @@ class ForceClient {
   LocalTime ask_lease_ = LocalTime::max();    ///< when to ask (again)
 
   std::optional<DeviceState> unseen_;  ///< newest state that the callback has not seen
+  std::uint32_t pressed_ = 0;          ///< buttons held in any of the states since the one that it has seen
   std::optional<DeviceState> newest_;  ///< newest state, seen or not
   LocalTime newest_arrived_{};
   std::uint64_t seen_tick_ = 0;                      ///< newest tick that the callback has seen

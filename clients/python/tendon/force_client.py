@@ -203,6 +203,7 @@ class ForceClient:
         self._retry = now  # when the next attempt begins
         self._back_off = _ns(config.retry_min_s)  # wait before the attempt after that
         self._unseen: DeviceState | None = None  # newest state that was not handed out
+        self._pressed = 0  # buttons held in any of the states since the one that was handed out
         self._newest: DeviceState | None = None  # newest state, handed out or not
         self._newest_arrived = now
         self._seen_tick = 0  # newest tick handed out
@@ -360,6 +361,9 @@ class ForceClient:
         if state is None:
             return None
         self._unseen = None
+        if self._pressed & ~state.buttons:
+            state = replace(state, buttons=state.buttons | self._pressed)
+        self._pressed = 0
         self._seen_tick = state.tick
         self._next_call += self._period
         if self._next_call <= now:
@@ -473,6 +477,7 @@ class ForceClient:
         self._ended, self._session = self._session, None
         self.holds = False
         self._unseen = self._newest = None
+        self._pressed = 0
         self._retry = now + self._back_off
         self._back_off = min(2 * self._back_off, _ns(self.config.retry_max_s))
 
@@ -482,6 +487,7 @@ class ForceClient:
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None
                 self._unseen = self._newest = event
+                self._pressed |= event.buttons
                 self._newest_arrived = now
                 self._back_off = _ns(self.config.retry_min_s)
             elif isinstance(event, LinkReport):

@@ -190,6 +190,8 @@ export class ForceClient {
 
   /** Newest state that the callback has not seen. */
   #unseen: DeviceState | undefined;
+  /** Buttons held in any of the states since the one that it has seen. */
+  #pressed = 0;
   /** Newest state, seen or not. */
   #newest: DeviceState | undefined;
   #newestArrived: Nanoseconds;
@@ -400,6 +402,7 @@ export class ForceClient {
     this.#session = undefined;
     this.#holds = false;
     this.#unseen = this.#newest = undefined;
+    this.#pressed = 0;
     this.#retry = now + this.#backOff;
     this.#backOff = earliest(2n * this.#backOff, fromMilliseconds(this.#config.retryMaxMs));
   }
@@ -427,6 +430,7 @@ export class ForceClient {
         ++this.#stats.states;
         if (this.#unseen) ++this.#stats.statesSkipped;
         this.#unseen = this.#newest = event.state;
+        this.#pressed |= event.state.buttons;
         this.#newestArrived = now;
         this.#backOff = fromMilliseconds(this.#config.retryMinMs);
       } else if (event.kind === "report") {
@@ -483,9 +487,12 @@ export class ForceClient {
   /** True when a force now waits to be sent. */
   #call(now: Nanoseconds): boolean {
     if (now < this.#nextCall || (this.#physics && !this.#holds)) return false;
-    const hand = this.#foretells ? this.#foretold(now) : this.#unseen;
-    if (!hand) return false;
+    const newest = this.#foretells ? this.#foretold(now) : this.#unseen;
+    if (!newest) return false;
+    const buttons = (newest.buttons | this.#pressed) >>> 0;
+    const hand = buttons === newest.buttons ? newest : { ...newest, buttons };
     this.#unseen = undefined;
+    this.#pressed = 0;
     this.#seenTick = hand.tick;
     this.#nextCall += this.#period;
     if (this.#nextCall <= now) this.#nextCall = now + this.#period;

@@ -51,6 +51,7 @@ LocalTime Server::turn(LocalTime now) {
     state.tick = tick;
     state.position = position(tick);
     state.turning = turning;
+    state.buttons = press_every > 0 && tick % press_every == 0 ? 2 : 0;
     session_->send(state);
     next_state_ = now + from_seconds(1.0 / state_hz);
   }

@@ -92,6 +92,7 @@ class Server {
   static constexpr int kLoopHz = 1000;
   int state_hz = kLoopHz;
   std::optional<Turning> turning;  ///< of the handle, in each state
+  std::uint64_t press_every = 0;   ///< ticks: button 1 is held in one state of so many, unless 0
 
   std::vector<Code> lease_answers;  ///< to take_lease, in this order; then kOk
   int snatches = 0;                 ///< so many leases are another one's as soon as they are given

@@ -8,6 +8,8 @@ namespace tendon {
 namespace {
 
 using a_and_z::World;
+using a_and_z::Weather;
+constexpr Weather kFineWeather{.loss = 0, .delay = std::chrono::milliseconds(5), .jitter = Duration::zero()};
 constexpr Duration kSecond = std::chrono::seconds(1);
 
 /// An answer with all that a handle can be made to feel.
@@ -36,6 +38,21 @@ TEST(ForceClientHandle, TorqueAngularStiffnessAndGripForceTravelWithTheForce) {
   EXPECT_EQ(command.grip_force, -1.5);
   EXPECT_FALSE(command.model) << "a rotation model needs no other";
   EXPECT_EQ(world.a->stats().left_out, "");
+}
+
+TEST(ForceClientHandle, APressInAStateThatIsSkippedIsInTheNextOneThatIsNot) {
+  World world(12, kFineWeather);
+  world.z->press_every = 100;
+  int calls = 0;
+  int pressed = 0;
+  world.connect({.rate_hz = 20}, [&](const DeviceState& hand) {
+    ++calls;
+    pressed += hand.buttons == 2 ? 1 : 0;
+    return Vec3(Vec3::Zero());
+  });
+  world.run(4 * kSecond);
+  EXPECT_GT(calls, 75);
+  EXPECT_NEAR(pressed, 40, 1) << "once each, of 1 ms in 100 ms";
 }
 
 TEST(ForceClientHandle, SaysWhatItCannotSendAndSendsTheForce) {

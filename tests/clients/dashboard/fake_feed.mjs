@@ -38,9 +38,9 @@ function stateOf(number, t) {
   }
   if (number === 1) {
     return { ...plain, position_m: [0.025 * sway(1.3), 0.04 * sway(1.9), 0.03 * sway(1.5, 1)], applied_n: [1.2, 1.5 * sway(1.9), -1], wanted_n: [1.2, 1.5 * sway(1.9), -1],
-      orientation: turn(0, 1, 0, 0.6 + 0.3 * sway(1.1)), torque_nm: [0, 0.1 * sway(1.1), 0.16], stiffness_n_per_m: [0, 0, 0, 0, 0, 0, 0, 0, 500], grip_rad: 0.45 + 0.3 * sway(2.2), grip_n: 2.5, buttons: sway(0.8) > 0 ? 1 : 0 };
+      orientation: turn(0, 1, 0, 0.6 + 0.3 * sway(1.1)), torque_nm: [0, 0.1 * sway(1.1), 0.16], grip_rad: 0.45 + 0.3 * sway(2.2), grip_n: 2.5, buttons: sway(0.8) > 0 ? 1 : 0 };
   }
-  if (number === 2) return { ...plain, position_m: [0.03 * sway(2), 0.035 * sway(1.2), 0.03 * sway(2.6)], applied_n: [3 * sway(2), 0, 1], wanted_n: [4 * sway(2), 0, 1], buttons: 4 };
+  if (number === 2) return { ...plain, position_m: [0.03 * sway(2), 0.035 * sway(1.2), 0.03 * sway(2.6)], applied_n: [3 * sway(2), 0, 1], wanted_n: [4 * sway(2), 0, 1], stiffness_n_per_m: [0, 0, 0, 0, 0, 0, 0, 0, 500], buttons: 4 };
   return { ...plain, position_m: [0.03 * sway(1.4), 0.03 * sway(2.9), 0.02], applied_n: [0, 0, 0], wanted_n: [0, 0, 0] };
 }
 

@@ -157,12 +157,12 @@ it("shows four devices in 3-D, and goes back to the plots", async (test) => {
   assert.ok((await page.locator("[data-chart=position]").isVisible()) && !(await page.locator(kCanvas).isVisible()));
   assert.equal(scripts.filter((address) => address.includes("stage")).length, 0, "three.js is loaded when it is asked for");
   await page.click("#space");
-  await until("all four are drawn", async () => /^3-D view\. stylus: a stylus, a force, a wanted force, a torque, (front|rear) held; gripper: a stylus, .*two fingers, a surface.*; falcon: a point, .*right held; old: a point$/.test(await words(page)), () => words(page));
+  await until("all four are drawn", async () => /^3-D view\. stylus: a stylus, a force, a wanted force, a torque, (front|rear) held; gripper: a stylus, .*two fingers.*; falcon: a point, .*a surface, right held; old: a point$/.test(await words(page)), () => words(page));
   assert.equal(scripts.filter((address) => address.includes("stage")).length, 1);
   assert.deepEqual(heard.slice(-1), ["watch 0 beside"]);
   await until("its numbers are told", async () => /^\d\.\d\d N · \d+ mN·m$/.test(await page.locator(".handle .values").first().textContent()));
   await says(page, ".handle .button[data-held=true]", "right");
-  assert.match(await page.locator(".handle", { hasText: "gripper" }).locator(".values").textContent(), / 2(\.0+)? mm in the surface/);
+  assert.match(await page.locator(".handle", { hasText: "falcon" }).locator(".values").textContent(), / 2(\.0+)? mm in the surface/);
   assert.ok(await page.locator(".handle", { hasText: "old" }).locator(".note").isVisible(), "whose frame nobody tells");
   const pixels = await coloured(page, "applied", "wanted", "torque");
   assert.ok(pixels.every((n) => n > 15), `of the applied force, the wanted one and the torque: ${pixels}`);

@@ -78,6 +78,7 @@ class Stage:
         self.snatches = 0  # so many leases are another one's as soon as they are given
         self.speed = 0.0  # m/s
         self.turning: Turning | None = None  # of the handle, in each state
+        self.press_every = 0  # ticks: button 1 is held in one state of so many, unless 0
         self.every = 1  # ms from one state to the next that is sent
         self._next_state = World.START
 
@@ -111,7 +112,8 @@ class Stage:
                 position = (1e-3 + 1e-3 * self.speed * tick, 0.0, 0.0)
                 velocity = (self.speed, 0.0, 0.0)
                 state = DeviceState(tick, now, position, velocity, ZERO, 0.0, 8.0, 0, 0, 0, Mode.ACTIVE)
-                session.send(replace(state, turning=self.turning))
+                pressed = self.press_every > 0 and tick % self.press_every == 0
+                session.send(replace(state, turning=self.turning, buttons=2 if pressed else 0))
         while (hand := self.client.next_state(now)) is not None:
             self.seen.append(hand)
             self.seen_at.append(now)

@@ -181,6 +181,14 @@ def test_states_are_handed_out_on_the_grid_of_the_rate():
     assert stats.states == len(stage.seen) + stats.states_skipped + (stage.client.next_state_due() != inf)
 
 
+def test_a_press_in_a_state_that_is_skipped_is_in_the_next_one_that_is_not():
+    stage = Stage(Config(rate_hz=20))
+    stage.press_every = 100
+    stage.run(4 * SECOND)
+    assert len(stage.seen) > 75
+    assert sum(hand.buttons == 2 for hand in stage.seen) == pytest.approx(40, abs=1)  # once each, of 1 ms in 100 ms
+
+
 def test_after_a_pause_the_grid_starts_anew_and_nothing_is_caught_up():
     stage = Stage(Config(rate_hz=100))
     stage.run(500 * MS)

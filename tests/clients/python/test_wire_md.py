@@ -254,7 +254,7 @@ def out_of_bounds():
     yield "mode 0", state(mode=0)
     yield "mode 7", state(mode=7)
     yield "wanted NaN", state(force_wanted=(0.0, nan, 0.0))
-    yield "stiffness wanted infinite", state(stiffness_wanted=((inf, 0.0, 0.0), WALL[1], WALL[2]))
+    yield "stiffness wanted NaN", state(stiffness_wanted=((nan, 0.0, 0.0), WALL[1], WALL[2]))
     yield "sequence 0", force(sequence=0)
     yield "force NaN", force(force=(nan, 0.0, 0.0))
     yield "valid for nothing", force(valid_for_us=0)

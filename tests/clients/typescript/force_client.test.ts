@@ -270,6 +270,20 @@ describe("the callback", () => {
     assert.ok(states - statesSkipped - seen.length <= 1);
   });
 
+  it("sees a press that was in a state which it skipped", () => {
+    let pressed = 0;
+    const world: World = new World(1, kFair, { rateHz: 20 }, {
+      physics: (hand) => {
+        if (hand.buttons === 2) ++pressed;
+        return kPush;
+      },
+    });
+    const { state } = world.server.conduct;
+    world.server.conduct.state = (tick) => ({ ...state(tick), buttons: tick % 100n === 0n ? 2 : 0 });
+    world.runMs(4000);
+    assert.ok(Math.abs(pressed - 40) <= 1, `${pressed} calls saw one, of 1 ms in 100 ms`);
+  });
+
   it("its forces are valid for three periods, at least 20 ms, or as asked", () => {
     const validity = (config: ClientConfig, stateEvery = 1): number => {
       const { world } = controller(1, kFair, config);

@@ -190,9 +190,9 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
   const std::size_t empty = writer.size();
   ASSERT_TRUE(writer.add(state));
-  EXPECT_EQ(writer.size() - empty, 356U);
+  EXPECT_EQ(writer.size() - empty, 431U);
   ASSERT_TRUE(writer.add(force));
-  EXPECT_EQ(writer.size() + crypto::kTagSize, 970U);
+  EXPECT_EQ(writer.size() + crypto::kTagSize, 1045U);
 
   DataReader reader;
   const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));

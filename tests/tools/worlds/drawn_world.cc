@@ -10,6 +10,7 @@
 
 #include "tests/support/any_contact.h"
 #include "tests/tools/injector/profile/named_profiles.h"
+#include "tests/tools/worlds/drawn_handle.h"
 
 namespace tendon::simulation {
 
@@ -190,17 +191,16 @@ ScriptedMotion draw_motion(Dice& dice) {
   }
 }
 
-void draw_device(Dice& dice, DrawnWorld& world, double force_scale) {
+void draw_device(Dice& dice, DrawnWorld& world, bool sabotaged) {
   auto& control = world.config.loop.control;
   const Friction& friction = control.limiter.friction;
-  if (dice.chance(0.4) || force_scale != 1) {
+  if (dice.chance(0.4) || sabotaged) {
     AdversaryDevice::Config device;
     device.friction = friction;
     device.hostility = dice.uniform();
     device.largest_move = dice.decades(-4, -2);
     if (dice.chance(0.5)) device.clamp = control.max_force * dice.uniform();
-    device.force_scale = force_scale;
-    if (force_scale != 1) device.clamp = kInf;
+    if (sabotaged) device.clamp = kInf;
     world.device = device;
     return;
   }
@@ -325,10 +325,11 @@ bool DrawnWorld::rogue() const {
 bool DrawnWorld::exact() const {
   const auto* simulated = std::get_if<SimulatedDevice::Config>(&device);
   return simulated != nullptr && !simulated->encoder_step && !simulated->amplifier_bandwidth && !simulated->watchdog &&
-         port.unseen == 0;
+         port.unseen == 0 && (!simulated->rotation || !simulated->rotation->encoder_step);
 }
 
-DrawnWorld draw_world(std::uint64_t seed, double force_scale) {
+DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage) {
+  const bool sabotaged = sabotage != Sabotage{};
   Dice dice(seed);
   DrawnWorld world;
   world.seed = seed;
@@ -341,16 +342,16 @@ DrawnWorld draw_world(std::uint64_t seed, double force_scale) {
   // Periods of 0.5 … 2 ms, mostly 1: each interval is a period and up to as much again, less what the step before was
   // late.
   config.loop.period = std::chrono::microseconds(dice.chance(0.7) ? 1000 : static_cast<int>(dice.within(500, 2000)));
-  const bool punctual = dice.chance(0.3) || force_scale != 1;
+  const bool punctual = dice.chance(0.3) || sabotaged;
   config.latest_wake = punctual ? Duration::zero() : config.loop.period;
   control.limiter.longest_hold = punctual ? config.loop.period : 2 * config.loop.period;
   control.max_force = dice.decades(0, 2);
   control.max_slew = dice.chance(0.3) ? kInf : dice.decades(2, 5);
-  if (dice.chance(0.1) && force_scale == 1) {
+  if (dice.chance(0.1) && !sabotaged) {
     config.pause_probability = 2e-3;
     config.pause = dice.milliseconds(5, 60);
   }
-  draw_device(dice, world, force_scale);
+  draw_device(dice, world, sabotaged);
   const auto* simulated = std::get_if<SimulatedDevice::Config>(&world.device);
   const bool counts = simulated != nullptr && simulated->encoder_step.has_value();
   draw_law(dice, control, counts, counts ? *simulated->encoder_step : 0);
@@ -358,7 +359,7 @@ DrawnWorld draw_world(std::uint64_t seed, double force_scale) {
   world.port.friction = control.limiter.friction;
   world.port.watchdog = control.watchdog;
   world.port.seed = dice.bits();
-  if (dice.chance(0.08) && force_scale == 1) {
+  if (dice.chance(0.08) && !sabotaged) {
     world.port.unseen = dice.decades(-3, -1.5);
     world.port.most_gone = dice.chance(0.5) ? 3 : 40;
   }
@@ -378,6 +379,7 @@ DrawnWorld draw_world(std::uint64_t seed, double force_scale) {
   world.changes.push_back({world.clears, fair});
   draw_suite(Dice(~seed), world);
   draw_mechanism(Dice(seed ^ 0x9e3779b97f4a7c15), world);
+  draw_handle(Dice(seed ^ 0x2545f4914f6cdd1d), world, sabotage);
   return world;
 }
 
@@ -397,6 +399,7 @@ std::string describe(const DrawnWorld& world) {
   } else {
     text += "an adversary";
   }
+  text += describe_handle(world);
   const AolPlus<1, 3>::Parts& parts = control.limiter.parts;
   text += "; " + std::string(info(control.limiter.law).name);
   if (parts.energy_cap) text += " energy_cap";
@@ -456,7 +459,7 @@ void say_more(Dice& dice, const DeviceState& hand, Touch& touch) {
 
 Physics make_physics(const DrawnClient& client) {
   const double k = client.stiffness;
-  return [client, k, dice = Dice(client.seed)](const DeviceState& hand) mutable -> Touch {
+  auto of_a_point = [client, k, dice = Dice(client.seed)](const DeviceState& hand) mutable -> Touch {
     if (client.bad_days > 0 && dice.chance(client.bad_days)) {
       return Vec3(dice.chance(0.5) ? Vec3(Vec3::Constant(std::nan(""))) : Vec3(0, kInf, 0));
     }
@@ -484,6 +487,12 @@ Physics make_physics(const DrawnClient& client) {
         break;
     }
     return Vec3(hand.force_applied.norm() > 1e-3 ? Vec3(hand.force_applied * 100) : dice.direction());
+  };
+  return [client, of_a_point = std::move(of_a_point),
+          dice = Dice(~client.seed)](const DeviceState& hand) mutable -> Touch {
+    Touch answer = of_a_point(hand);
+    answer_handle(client, dice, hand, answer);
+    return answer;
   };
 }
 

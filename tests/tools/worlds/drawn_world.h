@@ -75,8 +75,8 @@ struct DrawnWorld {
   bool exact() const;  ///< a simulated device whose truth the account of the port must match
 };
 
-/// `force_scale` other than 1: the device, an adversary, gives out so much more than it is told to.
-DrawnWorld draw_world(std::uint64_t seed, double force_scale = 1);
+/// With sabotage the device is an adversary's.
+DrawnWorld draw_world(std::uint64_t seed, const Sabotage& sabotage = {});
 
 /// One direction of a bad network: any model of the injector but changes of address and flipped bits.
 injector::Profile draw_bad_weather(Dice& dice);

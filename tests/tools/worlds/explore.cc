@@ -36,15 +36,14 @@ AnyDevice make_device(const DrawnWorld& drawn) {
   return any;
 }
 
-void add(World& world, const DrawnClient& client, LocalTime began) {
+void add(World& world, const DrawnClient& client, LocalTime began, Watch watch) {
   const injector::DriftingClock clock(client.clock, began);
   switch (client.kind) {
     case DrawnClient::Kind::kController:
       world.add_controller(client.config, make_physics(client), clock);
       break;
     case DrawnClient::Kind::kObserver:
-      world.add_observer(
-          client.config, [](const DeviceState&, const LinkStats&) {}, clock);
+      world.add_observer(client.config, std::move(watch), clock);
       break;
     case DrawnClient::Kind::kRogue: {
       Rogue::Config config = client.rogue;
@@ -96,7 +95,10 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
   std::vector<Event> events;
   for (std::size_t i = 0; i < drawn.clients.size(); ++i) {
     const DrawnClient& client = drawn.clients[i];
-    events.push_back({client.joins, [&world, &client, began] { add(world, client, began); }});
+    events.push_back({client.joins, [&world, &client, &witness, i, began] {
+                        add(world, client, began,
+                            [&witness, i](const DeviceState& state, const LinkStats&) { witness.see_state(i, state); });
+                      }});
     if (client.killed) events.push_back({*client.killed, [&world, i] { world.kill(i); }});
     if (client.restarted) {
       events.push_back({*client.restarted, [&world, &client, i] {
@@ -148,6 +150,9 @@ Outcome run(const DrawnWorld& drawn, const Extras& extras) {
   if (outcome.breach) outcome.breach->at = LocalTime(outcome.breach->at - began);
   outcome.felt = witness.felt();
   outcome.limited = witness.limited();
+  outcome.turned = witness.turned();
+  outcome.gripped = witness.gripped();
+  outcome.presses = witness.presses();
   outcome.recovered = witness.checked_recovery();
   outcome.least_energy = witness.least_energy();
   outcome.steps = world.haptic().stats().steps;

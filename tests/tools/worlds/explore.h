@@ -15,6 +15,9 @@ struct Outcome {
   std::optional<Breach> breach;  ///< the first promise that was broken
   bool felt = false;             ///< a remote force was rendered
   bool limited = false;          ///< … and limited by energy
+  bool turned = false;           ///< a torque was given out
+  bool gripped = false;          ///< a grip force was
+  int presses = 0;               ///< of buttons, that observers had to be shown and were
   bool recovered = false;        ///< it was checked that everybody is served again
   double least_energy = 0;       ///< J
   std::uint64_t steps = 0;

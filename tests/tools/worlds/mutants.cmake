@@ -65,3 +65,23 @@ tendon_mutant(no-roaming SOURCE server/network_loop.cc LIBRARY tendon_loops
 tendon_mutant(bold-clock SOURCE core/estimation/clock_offset_estimator.cc LIBRARY tendon_core
   REPLACE "const double bound = std::max(" "const double bound = 1.0 / 3 * std::max("
   ORACLES "clock")
+# The turn of a handle is not booked: torque costs nothing.
+tendon_mutant(turns-for-free SOURCE core/haptic_controller.cc LIBRARY tendon_core
+  REPLACE "wrench_of(applied, handle->torque), .dx" "wrench_of(applied, Vec3(Vec3::Zero())), .dx"
+  ORACLES "ledger")
+# Nor is the travel of a gripper's fingers.
+tendon_mutant(squeezes-for-free SOURCE core/haptic_controller.cc LIBRARY tendon_core
+  REPLACE "travel = config_.grip->arm" "travel = 0 * config_.grip->arm"
+  ORACLES "ledger")
+# A press that ends before the next state of a client is forgotten.
+tendon_mutant(forgets-presses SOURCE server/network_loop.cc LIBRARY tendon_loops
+  REPLACE "view->pressed |= state->buttons" "view->pressed = state->buttons"
+  ORACLES "press")
+# … or that a client's callback skips.
+tendon_mutant(skips-presses SOURCE clients/cpp/force_client.cc LIBRARY tendon_client
+  REPLACE "std::exchange(pressed_, 0U)" "0 * std::exchange(pressed_, 0U)"
+  ORACLES "press")
+# A turn is the long way round where q is written as −q.
+tendon_mutant(long-way-round SOURCE core/base/rotation.cc LIBRARY tendon_core
+  REPLACE "sign = q.w < 0 ? -1.0 : 1.0" "sign = 1.0"
+  ORACLES "ledger|truth|bound")

@@ -36,6 +36,9 @@ struct Tally {
   std::uint64_t datagrams = 0;
   std::uint64_t felt = 0;
   std::uint64_t limited = 0;
+  std::uint64_t turned = 0;
+  std::uint64_t gripped = 0;
+  std::uint64_t presses = 0;
   std::uint64_t recovered = 0;
   double least_energy = std::numeric_limits<double>::infinity();
 
@@ -45,6 +48,9 @@ struct Tally {
     datagrams += outcome.network.sent;
     felt += outcome.felt ? 1 : 0;
     limited += outcome.limited ? 1 : 0;
+    turned += outcome.turned ? 1 : 0;
+    gripped += outcome.gripped ? 1 : 0;
+    presses += static_cast<std::uint64_t>(outcome.presses);
     recovered += outcome.recovered ? 1 : 0;
     least_energy = std::min(least_energy, outcome.least_energy);
   }
@@ -135,6 +141,9 @@ void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
                .add("datagrams", tally.datagrams)
                .add("felt", tally.felt)
                .add("limited", tally.limited)
+               .add("turned", tally.turned)
+               .add("gripped", tally.gripped)
+               .add("presses", tally.presses)
                .add("recovered", tally.recovered)
                .add("least_energy_j", tally.least_energy)
                .str()
@@ -145,8 +154,9 @@ void tell(const Tally& tally, double elapsed, bool json, std::ostream& out) {
       << elapsed << " s: " << worlds / elapsed << " per second, " << std::setprecision(0) << simulated / elapsed
       << " times real time\n"
       << std::defaultfloat << std::setprecision(6) << tally.steps << " haptic steps, " << tally.datagrams
-      << " datagrams; forces felt in " << tally.felt << " worlds, limited in " << tally.limited
-      << ", recovery checked in " << tally.recovered << "; least energy " << tally.least_energy << " J\n";
+      << " datagrams; forces felt in " << tally.felt << " worlds, limited in " << tally.limited << ", torques in "
+      << tally.turned << ", grips in " << tally.gripped << "; " << tally.presses
+      << " presses shown; recovery checked in " << tally.recovered << "; least energy " << tally.least_energy << " J\n";
 }
 
 }  // namespace
@@ -177,6 +187,7 @@ bool explore(const RunOptions& options, std::ostream& out, std::ostream& progres
   // Worlds in which nothing happens would prove nothing.
   if (broken.empty() && tally.worlds >= kEnoughToJudge &&
       (tally.felt < tally.worlds * 8 / 10 || tally.limited < tally.worlds * 6 / 10 ||
+       tally.turned < tally.worlds / 20 || tally.gripped < tally.worlds / 20 || tally.presses < tally.worlds / 20 ||
        tally.recovered < tally.worlds * 8 / 10)) {
     throw std::runtime_error("too little happens in these worlds for them to prove anything");
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -17,7 +18,8 @@ namespace tendon::simulation {
 ///     E = Σ [ −F·Δx + f_c ‖Δx‖ + b ‖Δx‖²/T ]        and the same for each axis by itself
 ///
 /// An interval whose motion nobody saw (a reading at either end failed, or the device's watchdog ended the force) is
-/// booked at its worst, −T (‖F‖ − f_c)₊²/(4b). It uses none of the code under test.
+/// booked at its worst, −T (‖F‖ − f_c)₊²/(4b). It uses none of the code under test. Where motors turn the handle, the
+/// same of torque and turn goes into E, and a gripper with a motor has an account of its own.
 ///
 /// It can make readings fail, as a bad cable does, and go on holding its force when it is told zero, as an amplifier
 /// that falls slowly or a command that was lost does.
@@ -30,6 +32,9 @@ class WatchedDevice final : public Device {
     double most_gone = 0;  ///< … and then so many in a row, at most
     double disobeys = 0;   ///< probability that it keeps its force when it is told zero
     std::uint64_t seed = 0;
+    std::optional<Friction> rotation{};  ///< N·m and N·m·s/rad, where motors turn the handle
+    std::optional<Friction> grip{};      ///< where the gripper has a motor
+    double arm = 0;                      ///< m/rad, of the gripper
   };
 
   WatchedDevice(Device& device, const Config& config) : device_(device), config_(config), dice_(config.seed) {}
@@ -47,7 +52,7 @@ class WatchedDevice final : public Device {
     if (fails || (config_.watchdog > Duration::zero() && held > config_.watchdog)) {
       if (last_at_) book_unseen(held);
     } else if (last_) {
-      book(sample->position - *last_, held);
+      book(*last_, *sample, held);
     } else if (last_at_) {
       book_unseen(held);
     }
@@ -56,15 +61,20 @@ class WatchedDevice final : public Device {
       last_.reset();
       return std::nullopt;
     }
-    last_ = sample->position;
+    last_ = sample;
     return sample;
   }
 
   Vec3 apply(const Vec3& force) noexcept override {
-    told_ = force;
-    const bool keeps = config_.disobeys > 0 && force.isZero(0) && dice_.chance(config_.disobeys);
-    force_ = device_.apply(keeps ? force_ : force);
-    return force_;
+    told_ = {.force = force};
+    held_ = {.force = device_.apply(keeps(told_) ? held_.force : force)};
+    return held_.force;
+  }
+
+  Effort apply_all(const Effort& effort) noexcept override {
+    told_ = effort;
+    held_ = device_.apply_all(keeps(told_) ? held_ : effort);
+    return held_;
   }
 
   /// From now on readings come.
@@ -73,31 +83,56 @@ class WatchedDevice final : public Device {
     failing_ = 0;
   }
 
-  double energy() const noexcept { return joint_; }                   ///< J, friction isotropic
+  double energy() const noexcept { return joint_ + turned_; }         ///< J, friction isotropic; with what turned
   double least_of_axes() const noexcept { return axes_.minCoeff(); }  ///< J, each axis has all the friction
   double sum_of_axes() const noexcept { return axes_.sum(); }         ///< J
-  const Vec3& told() const noexcept { return told_; }                 ///< N, what the device was told
-  const Vec3& held() const noexcept { return force_; }                ///< N, what it holds
+  double grip_energy() const noexcept { return gripped_; }            ///< J, of the gripper
+  const Effort& told() const noexcept { return told_; }               ///< what the device was told
+  const Effort& held() const noexcept { return held_; }               ///< what it holds
 
  private:
-  void book(const Vec3& dx, Duration held) noexcept {
-    const double length = dx.norm();
+  bool keeps(const Effort& told) { return config_.disobeys > 0 && told == Effort{} && dice_.chance(config_.disobeys); }
+
+  /// What a motor of `effort` takes in while its port moves by `along` it and by `length` in all.
+  static double taken(double effort_along, double length, const Friction& friction, double t) {
+    const double rate = t > 0 ? friction.viscous / t : 0;
+    return -effort_along + friction.coulomb * length + rate * length * length;
+  }
+  /// … at the worst.
+  static double worst(double effort, const Friction& friction, double t) {
+    const double excess = std::max(effort - friction.coulomb, 0.0);
+    return excess > 0 ? -t * excess * excess / (4 * friction.viscous) : 0.0;
+  }
+
+  /// The shorter way round from one orientation to the other: its axis times its angle, rad.
+  static Vec3 turn(const Quat& from, const Quat& to) {
+    const Eigen::Quaterniond a(from.w, from.x, from.y, from.z);
+    const Eigen::Quaterniond b(to.w, to.x, to.y, to.z);
+    const Eigen::AngleAxisd by(b * a.conjugate());
+    return by.angle() * by.axis();
+  }
+
+  void book(const PositionSample& before, const PositionSample& now, Duration held) noexcept {
     const double t = seconds(held);
-    const double rate = t > 0 ? config_.friction.viscous / t : 0;
-    joint_ += -force_.dot(dx) + config_.friction.coulomb * length + rate * length * length;
-    for (int i = 0; i < 3; ++i) {
-      axes_[i] += -force_[i] * dx[i] + config_.friction.coulomb * std::abs(dx[i]) + rate * dx[i] * dx[i];
+    const Vec3 dx = now.position - before.position;
+    joint_ += taken(held_.force.dot(dx), dx.norm(), config_.friction, t);
+    for (int i = 0; i < 3; ++i) axes_[i] += taken(held_.force[i] * dx[i], std::abs(dx[i]), config_.friction, t);
+    if (config_.rotation) {
+      const Vec3 by = turn(*before.orientation, *now.orientation);
+      turned_ += taken(held_.torque.dot(by), by.norm(), *config_.rotation, t);
+    }
+    if (config_.grip) {
+      const double by = config_.arm * (*now.opening - *before.opening);
+      gripped_ += taken(held_.grip * by, std::abs(by), *config_.grip, t);
     }
   }
 
   void book_unseen(Duration held) noexcept {
-    const Duration at_most = config_.watchdog > Duration::zero() ? std::min(held, config_.watchdog) : held;
-    const auto worst = [&](double force) {
-      const double excess = std::max(force - config_.friction.coulomb, 0.0);
-      return excess > 0 ? seconds(at_most) * excess * excess / (4 * config_.friction.viscous) : 0.0;
-    };
-    joint_ -= worst(force_.norm());
-    for (int i = 0; i < 3; ++i) axes_[i] -= worst(std::abs(force_[i]));
+    const double t = seconds(config_.watchdog > Duration::zero() ? std::min(held, config_.watchdog) : held);
+    joint_ += worst(held_.force.norm(), config_.friction, t);
+    for (int i = 0; i < 3; ++i) axes_[i] += worst(std::abs(held_.force[i]), config_.friction, t);
+    if (config_.rotation) turned_ += worst(held_.torque.norm(), *config_.rotation, t);
+    if (config_.grip) gripped_ += worst(std::abs(held_.grip), *config_.grip, t);
   }
 
   Device& device_;
@@ -105,10 +140,12 @@ class WatchedDevice final : public Device {
   Dice dice_;
   int failing_ = 0;
   std::optional<LocalTime> last_at_;
-  std::optional<Vec3> last_;
-  Vec3 told_ = Vec3::Zero();
-  Vec3 force_ = Vec3::Zero();
+  std::optional<PositionSample> last_;
+  Effort told_;
+  Effort held_;
   double joint_ = 0;
+  double turned_ = 0;
+  double gripped_ = 0;
   Vec3 axes_ = Vec3::Zero();
 };
 

@@ -25,7 +25,7 @@ constexpr std::array kOracles = {
         "the device gives out no energy that it was not given, −1 nJ for rounding, and in a hold beyond the law's "
         "bound no more than the law says"},
     OracleInfo{Oracle::kTruth, "truth", "the hand has really done at least the work that the account of the port says"},
-    OracleInfo{Oracle::kBound, "bound", "no force is larger than the scene's bound, or than the law's own"},
+    OracleInfo{Oracle::kBound, "bound", "no force, torque or grip is larger than the scene's bound, or than the law's"},
     OracleInfo{Oracle::kFinite, "finite", "only numbers reach the device"},
     OracleInfo{Oracle::kFresh, "fresh", "a force is rendered as fresh only while one came within its validity"},
     OracleInfo{Oracle::kStopped, "stopped", "long after the last force there is none, and none during a fault"},
@@ -39,12 +39,17 @@ constexpr std::array kOracles = {
                "what the server says of a controller's clock is within the bound it publishes"},
     OracleInfo{Oracle::kRecovery, "recovery", "after bad weather everybody is served again within the promised time"},
     OracleInfo{Oracle::kCalm, "calm", "nobody wants to be called again and again"},
+    OracleInfo{Oracle::kPress, "press", "an observer is shown every press of a button, however short"},
 };
 
 std::string number(double value) {
   std::array<char, 32> buffer{};
   std::snprintf(buffer.data(), buffer.size(), "%.6g", value);
   return buffer.data();
+}
+std::string words(const Effort& effort) {
+  return number(effort.force.norm()) + " N, " + number(effort.torque.norm()) + " N·m and " + number(effort.grip) +
+         " N of grip";
 }
 std::string ms(Duration duration) { return number(seconds(duration) * 1e3) + " ms"; }
 
@@ -92,10 +97,15 @@ Witness::Witness(const DrawnWorld& drawn, World& world, const WatchedDevice& por
       slew_time_([&] {
         const HapticController::Config& control = drawn.config.loop.control;
         // The limit counts at most the longest hold of each interval; pauses add nothing.
-        return from_seconds(2 * control.max_force / control.max_slew) + 2 * control.limiter.longest_hold;
+        double slowest = control.max_force / control.max_slew;
+        if (control.rotation) slowest = std::max(slowest, control.rotation->max_torque / control.rotation->max_slew);
+        if (control.grip) slowest = std::max(slowest, control.grip->max_force / control.grip->max_slew);
+        return from_seconds(2 * slowest) + 2 * control.limiter.longest_hold;
       }()),
       may_replay_ticks_(drawn.rogue() || drawn.believes_damage()),
-      clocks_step_(std::ranges::any_of(drawn.clients, [](const DrawnClient& c) { return !c.clock.steps.empty(); })) {}
+      clocks_step_(std::ranges::any_of(drawn.clients, [](const DrawnClient& c) { return !c.clock.steps.empty(); })),
+      began_(world.now()),
+      seen_(drawn.clients.size()) {}
 
 void Witness::report(Oracle oracle, std::string what) {
   if (!breach_) breach_ = Breach{oracle, world_.now(), std::move(what)};
@@ -114,39 +124,69 @@ double Witness::account() const {
 
 void Witness::see(const StepRecord& step) {
   if (breach_) return;
-  const HapticController::Config& control = drawn_.config.loop.control;
-  const Vec3& told = port_.told();
-  if (!told.allFinite() || !port_.held().allFinite() || !step.hand.velocity.allFinite() ||
-      !std::isfinite(step.energy)) {
-    report(Oracle::kFinite, "force " + number(told.norm()) + " N, energy " + number(step.energy) + " J");
+  const Effort& told = port_.told();
+  const Effort& held = port_.held();
+  const bool numbers = told.force.allFinite() && told.torque.allFinite() && std::isfinite(told.grip) &&
+                       held.force.allFinite() && held.torque.allFinite() && std::isfinite(held.grip);
+  if (!numbers || !step.hand.velocity.allFinite() || !std::isfinite(step.energy)) {
+    report(Oracle::kFinite, "force " + number(told.force.norm()) + " N, torque " + number(told.torque.norm()) +
+                                " N·m, grip " + number(told.grip) + " N, energy " + number(step.energy) + " J");
   }
-  const double size = told.norm();
-  const double by_law = control.limiter.law == Law::kAolPerAxis ? told.cwiseAbs().maxCoeff() : size;
-  if (size > control.max_force * (1 + 1e-12) || by_law > step.permitted * (1 + 1e-12) + 1e-12) {
-    report(Oracle::kBound, number(size) + " N, where " + number(control.max_force) + " N and " +
-                               number(step.permitted) + " N are the bounds");
-  }
+  see_bounds(step);
   see_energy(step);
   see_age(step);
   if (step.mode == Mode::kActive) felt_ = true;
   if (step.reasons.has(Reason::kEnergy)) limited_ = true;
+  turned_ = turned_ || !held.torque.isZero(0);
+  gripped_ = gripped_ || held.grip != 0;
+}
+
+void Witness::see_bounds(const StepRecord& step) {
+  const HapticController::Config& control = drawn_.config.loop.control;
+  const Effort& told = port_.told();
+  const auto within = [&](double size, double bound, const char* unit) {
+    if (size > bound * (1 + 1e-12) + 1e-12) {
+      report(Oracle::kBound, number(size) + " " + unit + ", where " + number(bound) + " " + unit + " are the bound");
+    }
+  };
+  const double by_law = control.limiter.law == Law::kAolPerAxis ? told.force.cwiseAbs().maxCoeff() : told.force.norm();
+  within(told.force.norm(), control.max_force, "N");
+  within(by_law, step.permitted, "N");
+  within(told.torque.norm(), control.rotation ? control.rotation->max_torque : 0, "N·m");
+  within(std::abs(told.grip), control.grip ? control.grip->max_force : 0, "N of grip");
+  if (const GripStep* const grip = step.grip(); grip != nullptr && control.grip) {
+    within(std::abs(told.grip), grip->permitted, "N of grip");
+  }
+}
+
+/// A hold beyond the bound that an effort was chosen for takes at most `may_take` from below zero; then the account only
+/// rises until it is back.
+void Witness::see_account(const char* whose, double& last, double now, double may_take) {
+  const double before = std::exchange(last, now);
+  const double may_leave = std::min(before, 0.0) - may_take;
+  if (now < may_leave - kRounding) {
+    report(Oracle::kLedger, whose + number(now) + " J, where the hold may leave " + number(may_leave) + " J");
+  }
+  if (before >= 0 && may_take == 0) least_energy_ = std::min(least_energy_, now);
 }
 
 void Witness::see_energy(const StepRecord& step) {
-  const double now = account();
-  const double before = std::exchange(last_account_, now);
-  // A hold beyond the bound that the force was chosen for takes at most (T_act − T)(‖F‖ − f_c)₊²/(4b) from below zero;
-  // then the account only rises until it is back.
-  const Friction& friction = drawn_.config.loop.control.limiter.friction;
   const Duration held = drawn_.port.watchdog > Duration::zero() ? std::min(step.held, drawn_.port.watchdog) : step.held;
   const double beyond = std::max(0.0, seconds(held - std::exchange(bound_, step.longest_hold)));
-  const double excess = std::max(0.0, step.was_applied.norm() - friction.coulomb);
-  const double may_leave = std::min(before, 0.0) - beyond * excess * excess / (4 * friction.viscous);
-  if (now < may_leave - kRounding) {
-    report(Oracle::kLedger, number(now) + " J, where a hold of " + ms(held) + " may leave " + number(may_leave) +
-                                " J; the law says " + number(step.energy) + " J");
+  // (T_act − T)(‖F‖ − f_c)₊²/(4b)
+  const auto takes = [&](double effort, const Friction& friction) {
+    const double excess = std::max(0.0, effort - friction.coulomb);
+    return beyond * excess * excess / (4 * friction.viscous);
+  };
+  double may_take = takes(step.was_applied.norm(), drawn_.config.loop.control.limiter.friction);
+  if (const TurnStep* const turn = step.turn(); turn != nullptr && drawn_.port.rotation) {
+    may_take += takes(turn->was_applied.norm(), *drawn_.port.rotation);
   }
-  if (before >= 0 && beyond == 0) least_energy_ = std::min(least_energy_, now);
+  see_account("", last_account_, account(), may_take);
+  if (!drawn_.port.grip) return;
+  const GripStep* const grip = step.grip();
+  see_account("of the gripper, ", last_grip_, port_.grip_energy(),
+              grip != nullptr ? takes(std::abs(grip->was_applied), *drawn_.port.grip) : 0);
 }
 
 void Witness::see_age(const StepRecord& step) {
@@ -157,12 +197,14 @@ void Witness::see_age(const StepRecord& step) {
                                : "no force has ever come");
   }
   const bool over = !last_force_ || now - *last_force_ > valid_ + safe_stop_;
-  if (over && !step.wanted.isZero(0)) {
+  const bool wants = !step.wanted.isZero(0) || (step.turn() != nullptr && !step.turn()->wanted.isZero(0)) ||
+                     (step.grip() != nullptr && step.grip()->wanted != 0);
+  if (over && wants) {
     report(Oracle::kStopped, number(step.wanted.norm()) + " N are wanted" +
                                  (last_force_ ? ", " + ms(now - *last_force_) + " after the last force" : ""));
   }
   if (step.reasons.has(Reason::kUnseen)) {
-    if (!port_.told().isZero(0)) report(Oracle::kStopped, number(port_.told().norm()) + " N, and nobody sees the hand");
+    if (port_.told() != Effort{}) report(Oracle::kStopped, words(port_.told()) + ", and nobody sees the hand");
     return;
   }
   // Down to zero through the slew limit. (Other laws than these may have a spring of their own to let go of.)
@@ -170,9 +212,9 @@ void Witness::see_age(const StepRecord& step) {
     silent_since_.reset();
   else if (!silent_since_)
     silent_since_ = now;
-  if (aol_ && silent_since_ && now - *silent_since_ > slew_time_ && !port_.told().isZero(0)) {
-    report(Oracle::kStopped, number(port_.told().norm()) + " N are given out, " + ms(now - *silent_since_) +
-                                 " after there should be none");
+  if (aol_ && silent_since_ && now - *silent_since_ > slew_time_ && port_.told() != Effort{}) {
+    report(Oracle::kStopped,
+           words(port_.told()) + " are given out, " + ms(now - *silent_since_) + " after there should be none");
   }
   if (may_replay_ticks_ || step.force_sequence == 0) return;
   const LocalTime answered = now - step.loop_age;
@@ -313,9 +355,17 @@ void Witness::see_end() {
   if (in != out) {
     report(Oracle::kCounters, "the network: " + std::to_string(in) + " went in, " + std::to_string(out) + " are known");
   }
-  if (simulated_ != nullptr && drawn_.exact() && simulated_->truth().hand_work < port_.energy() - kRounding) {
-    report(Oracle::kTruth, "work of the hand " + number(simulated_->truth().hand_work) + " J, account " +
-                               number(port_.energy()) + " J");
+  if (simulated_ != nullptr && drawn_.exact()) {
+    double work = simulated_->truth().hand_work;
+    if (drawn_.port.rotation) work += simulated_->rotation()->truth().hand_work;
+    const auto judge = [&](const char* whose, double done, double account) {
+      if (done < account - kRounding) {
+        report(Oracle::kTruth,
+               std::string("work of the ") + whose + " " + number(done) + " J, account " + number(account) + " J");
+      }
+    };
+    judge("hand", work, port_.energy());
+    if (drawn_.port.grip) judge("fingers", simulated_->gripper()->truth().hand_work, port_.grip_energy());
   }
   // A flipped bit that the checksum of UDP does not see may be a number far ahead, behind which all true ones are late:
   // where no cipher authenticates datagrams, only safety is promised then.
@@ -323,6 +373,26 @@ void Witness::see_end() {
   if (!long_enough || drawn_.believes_damage()) return;
   see_served();
   see_counters();
+  see_presses();
+}
+
+/// Each press has a button of its own.
+void Witness::see_presses() {
+  const auto* const device = std::get_if<SimulatedDevice::Config>(&drawn_.device);
+  if (device == nullptr) return;
+  for (const SimulatedDevice::Config::Press& press : device->presses) {
+    const LocalTime from = began_ + press.from;
+    if (from < *recovered_by_ || from + press.length + kServed > world_.now()) continue;
+    for (std::size_t i = 0; i < drawn_.clients.size(); ++i) {
+      if (!world_.alive(i) || drawn_.clients[i].kind != DrawnClient::Kind::kObserver) continue;
+      if ((seen_[i] >> press.button & 1) == 0) {
+        report(Oracle::kPress, "observer " + drawn_.clients[i].config.name + " was not shown a press of " +
+                                   ms(press.length) + " at " + ms(press.from));
+      } else {
+        ++presses_;
+      }
+    }
+  }
 }
 
 }  // namespace tendon::simulation

@@ -31,6 +31,7 @@ enum class Oracle : std::uint8_t {
   kClock,
   kRecovery,
   kCalm,
+  kPress,
 };
 
 struct OracleInfo {
@@ -68,6 +69,8 @@ class Witness {
 
   void see(const StepRecord& step);
   void see(const World::Turn& turn);
+  /// Client `handle`, an observer, is shown a state.
+  void see_state(std::size_t handle, const DeviceState& state) { seen_[handle] |= state.buttons; }
   /// The weather has just cleared: what was lost before is over.
   void weather_clears(LocalTime last_arrival_of_bad_weather);
   /// From when on everybody must be served; empty before the weather clears.
@@ -82,6 +85,10 @@ class Witness {
 
   bool felt() const { return felt_; }        ///< a remote force was rendered
   bool limited() const { return limited_; }  ///< … and limited by energy
+  bool turned() const { return turned_; }    ///< a torque was given out
+  bool gripped() const { return gripped_; }  ///< a grip force was
+  /// Presses of buttons that observers had to be shown, and were.
+  int presses() const { return presses_; }
   bool checked_recovery() const { return checked_recovery_; }
   /// J, of the port's account, while it owes nothing to holds beyond the law's bound.
   double least_energy() const { return least_energy_; }
@@ -94,7 +101,10 @@ class Witness {
     std::uint64_t accounted = 0;
   };
   double account() const;
+  void see_bounds(const StepRecord& step);
   void see_energy(const StepRecord& step);
+  void see_account(const char* whose, double& last, double now, double may_take);
+  void see_presses();
   void see_age(const StepRecord& step);
   void see_server();
   void see_clock(const NetworkLoop::Stats& server);
@@ -121,9 +131,15 @@ class Witness {
   LocalTime answered_ = LocalTime::min();  ///< when the motion was sampled which the rendered force answers
   std::optional<LocalTime> silent_since_;  ///< there should be no force
   double last_account_ = 0;
+  double last_grip_ = 0;
   Duration bound_ = Duration::max();  ///< so long the force held now may be held, by the step that chose it
   bool felt_ = false;
   bool limited_ = false;
+  bool turned_ = false;
+  bool gripped_ = false;
+  int presses_ = 0;
+  LocalTime began_;
+  std::vector<std::uint32_t> seen_;  ///< buttons, by client
   bool checked_recovery_ = false;
   double least_energy_ = std::numeric_limits<double>::infinity();
   std::optional<LocalTime> recovered_by_;

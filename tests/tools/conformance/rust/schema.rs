@@ -68,6 +68,7 @@ pub static STATE: Schema = message(&[
     Field(20, Real, Optional, SIGNED),
     Field(21, Real, Optional, SIGNED),
     Field(22, Sub(&VECTOR), Optional, Any),
+    Field(25, Real, Many(|count| count == 0 || entries_of_a_stiffness(count)), SIGNED),
 ]);
 
 static TABLE: Schema = message(&[
