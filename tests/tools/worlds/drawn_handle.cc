@@ -129,13 +129,13 @@ void draw_handle(Dice dice, DrawnWorld& world, const Sabotage& sabotage) {
   const Law law = world.config.loop.control.limiter.law;
   const bool bounded = law == Law::kAol || law == Law::kAolPlus;
   const bool adversary = std::holds_alternative<AdversaryDevice::Config>(world.device);
-  const bool turns = dice.chance(0.4) || sabotage.torque != 1;
+  const bool turns = dice.chance(0.6) || sabotage.torque != 1;
   const bool torques = bounded && (dice.chance(0.7) || sabotage.torque != 1);
-  const bool grips = dice.chance(0.3) || sabotage.grip != 1;
+  const bool grips = dice.chance(0.5) || sabotage.grip != 1;
   const bool squeezes = bounded && (dice.chance(0.7) || sabotage.grip != 1);
   if (turns) draw_rotation(dice, world, torques);
   if (grips) draw_gripper(dice, world, squeezes);
-  if (!adversary && dice.chance(0.5)) draw_presses(dice, world);
+  if (!adversary && dice.chance(0.8)) draw_presses(dice, world);
   if (sabotage == Sabotage{}) return;
   auto& device = std::get<AdversaryDevice::Config>(world.device);
   device.more = sabotage;

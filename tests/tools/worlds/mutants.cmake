@@ -69,9 +69,9 @@ tendon_mutant(bold-clock SOURCE core/estimation/clock_offset_estimator.cc LIBRAR
 tendon_mutant(turns-for-free SOURCE core/haptic_controller.cc LIBRARY tendon_core
   REPLACE "wrench_of(applied, handle->torque), .dx" "wrench_of(applied, Vec3(Vec3::Zero())), .dx"
   ORACLES "ledger")
-# Nor is the travel of a gripper's fingers.
-tendon_mutant(squeezes-for-free SOURCE core/haptic_controller.cc LIBRARY tendon_core
-  REPLACE "travel = config_.grip->arm" "travel = 0 * config_.grip->arm"
+# The work of the fingers is booked with the wrong sign.
+tendon_mutant(grip-sign SOURCE core/haptic_controller.cc LIBRARY tendon_core
+  REPLACE "Vec<1>(handle->grip_force)" "Vec<1>(-handle->grip_force)"
   ORACLES "ledger")
 # A press that ends before the next state of a client is forgotten.
 tendon_mutant(forgets-presses SOURCE server/network_loop.cc LIBRARY tendon_loops
