@@ -127,7 +127,7 @@ class HeldTool implements Tool {
       if (!(inertia >= stiffness * step * step)) {
         const [least, unit, of] = i < 3 ? ["mass", "kg", "N/m"] : ["moment of inertia", "kg·m²", "N·m/rad"];
         throw toolError(name, `is too light for its coupling: at ${stiffness} ${of} and a step of ${step} s it wants a ${least} of ` +
-          `${(stiffness * step * step).toPrecision(3)} ${unit} or more, got ${inertia.toPrecision(3)}`);
+          `${(stiffness * step * step).toExponential(1)} ${unit} or more, got ${inertia.toExponential(1)}`);
       }
       return 2 * Math.sqrt(stiffness * inertia);
     });
@@ -186,11 +186,9 @@ class HeldTool implements Tool {
 
   #derivatives(): { readonly stiffness: Matrix | undefined; readonly angularStiffness: Matrix | undefined } {
     const { mjSTAGE_NONE: none, mjSTAGE_VEL: velocity } = this.#mj.mjtStage;
-    const warmstart: Float64Array = this.#data.qacc_warmstart.slice();
     const turn = this.#pose(this.#data.qpos).turn;
     const answer = (hand: Pose, stage: number): Float64Array => {
       this.#pull(hand);
-      this.#data.qacc_warmstart.set(warmstart);
       this.#mj.mj_forwardSkip(this.#model, this.#data, stage, 1);
       return this.#data.qfrc_constraint.slice(this.#dof, this.#dof + 6);
     };
@@ -208,7 +206,6 @@ class HeldTool implements Tool {
       return [0, 1, 2].map((i) => -(more![i]! - less![i]!) / (2 * probe));
     });
     answer(this.#hand, velocity.value); // what else reads the scene finds it as it is
-    this.#data.qacc_warmstart.set(warmstart);
     const rows = (first: number): Matrix => [0, 1, 2].flatMap((row) => [0, 1, 2].map((axis) => columns[first + axis]![row]!));
     return {
       stiffness: spring(rows(0), this.#coupling.stiffness),
