@@ -48,6 +48,16 @@ TEST(Table, TellsANewcomerWhichRunWasStable) {
   EXPECT_EQ(table.find('\x1b'), std::string::npos) << "colour codes";
 }
 
+TEST(Table, TellsOfTheWorkOfTorquesWhereAHandleTurns) {
+  std::vector runs = {run_of(Law::kNone, "off"), run_of(Law::kAol, "on")};
+  EXPECT_EQ(to_table(runs).find("torques"), std::string::npos);
+  EXPECT_NE(to_json(runs[0]).find(R"("torque_work_j":null)"), std::string::npos);
+  runs[0].summary.torque_work = 8.95;
+  EXPECT_NE(to_table(runs).find("work of torques on the hand, at most       8.95 J   does not turn"), std::string::npos)
+      << to_table(runs);
+  EXPECT_NE(to_json(runs[0]).find(R"("torque_work_j":8.95)"), std::string::npos);
+}
+
 TEST(Table, ColumnsAreAlignedThoughSomeLettersHaveSeveralBytes) {
   std::vector runs = {run_of(Law::kNone, "größer"), run_of(Law::kAol, "µ")};
   std::istringstream table(to_table(runs));
