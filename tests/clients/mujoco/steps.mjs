@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// node steps.mjs: what a step costs and what a sphere 2 mm deep in B1 feels, by fineness; the table in
-// clients/mujoco/README.md. Wants tests/clients/typescript/run mujoco build.
-import { TouchableScene } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
+// node steps.mjs: what a step costs and what a sphere 2 mm deep in B1 feels, by fineness; the tables in
+// clients/mujoco/README.md. Then what an answer of the peg costs, wedged in its hole. Wants tests/clients/typescript/run
+// mujoco build.
+import { readFileSync } from "node:fs";
+import { TouchableScene, zUp } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
 import { block } from "../../../clients/mujoco/build/tests/clients/mujoco/scenes.js";
 
 for (const n of [4, 8, 12, 16]) {
@@ -18,3 +20,19 @@ for (const n of [4, 8, 12, 16]) {
     `each = ${Math.round(1000 / ms)} steps/s, ${force.z.toFixed(3)} N up, ${Math.hypot(force.x, force.y).toFixed(3)} N aside`);
   scene.delete();
 }
+
+const example = readFileSync(new URL("../../../clients/mujoco/examples/peg_in_hole.ts", import.meta.url), "utf8");
+const scene = await TouchableScene.load(/`([\s\S]*)`/.exec(example)[1], { tool: "peg", rotation: zUp() });
+const tilt = (radians) => ({ w: Math.cos(radians / 2), x: 0, y: 0, z: Math.sin(radians / 2) });
+const wedge = (i) => scene.touch({ x: 0, y: -0.018, z: 0 }, 0.01, tilt(0.15 + 0.05 * Math.sin(i / 5)));
+for (let i = 0; i < 200; ++i) scene.touch({ x: 0, y: -0.0001 * Math.min(i, 180), z: 0 }, 0.01, tilt(0));
+const stiffnessToo = scene.mujoco.mj_forwardSkip;
+for (const [what, forward] of [["without stiffness", () => {}], ["with both stiffnesses", stiffnessToo]]) {
+  scene.mujoco.mj_forwardSkip = forward;
+  for (let i = 0; i < 200; ++i) wedge(i);
+  const before = process.cpuUsage();
+  for (let i = 0; i < 1000; ++i) wedge(i);
+  const { user, system } = process.cpuUsage(before);
+  console.log(`peg, wedged by ${scene.data.ncon} contacts, ${what}: ${((user + system) / 1e6).toFixed(3)} ms of processor time for an answer of 10 steps`);
+}
+scene.delete();
