@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rotations as unit quaternions w, x, y, z, and matrices row by row; the same words as core/base/rotation.h.
+import type { Quat } from "tendon-client";
 import type { Triple } from "./contact_force.js";
 
 export type Rotation = readonly [number, number, number, number];
@@ -72,8 +73,8 @@ export function spring(m: Matrix, most: number): Matrix | undefined {
       const off = left[3 * p + q]!;
       if (off === 0) continue;
       const angle = Math.atan2(2 * off, left[4 * q]! - left[4 * p]!) / 2;
-      const turn = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-      [turn[4 * p], turn[3 * p + q], turn[3 * q + p], turn[4 * q]] = [Math.cos(angle), Math.sin(angle), -Math.sin(angle), Math.cos(angle)];
+      const [turn, cos, sin] = [[1, 0, 0, 0, 1, 0, 0, 0, 1], Math.cos(angle), Math.sin(angle)];
+      [turn[4 * p], turn[3 * p + q], turn[3 * q + p], turn[4 * q]] = [cos, sin, -sin, cos];
       left = matrixProduct(transposed(turn), matrixProduct(left, turn));
       axes = matrixProduct(axes, turn);
     }
@@ -88,7 +89,7 @@ export function spring(m: Matrix, most: number): Matrix | undefined {
  * Device frame to a scene whose z points up: x to the operator's right, y away from the operator. `operatorFromDevice` is
  * the HandleDescription's, of x right, y up, z to the operator; left out: the device's axes are those.
  */
-export function zUp(operatorFromDevice: { readonly w: number; readonly x: number; readonly y: number; readonly z: number } = { w: 1, x: 0, y: 0, z: 0 }): Matrix {
+export function zUp(operatorFromDevice: Quat = { w: 1, x: 0, y: 0, z: 0 }): Matrix {
   const { w, x, y, z } = operatorFromDevice;
   return matrixProduct([1, 0, 0, 0, 0, -1, 0, 1, 0], matrixOf(unit([w, x, y, z])));
 }

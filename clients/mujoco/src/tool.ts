@@ -215,7 +215,9 @@ class HeldTool implements Tool {
 }
 
 /** Throws an Error that says why the hand cannot hold this body. */
-export function toolOf(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, geoms: readonly number[], coupling: Coupling): Tool {
+export function toolOf(
+  mj: MainModule, model: MjModel, data: MjData, body: number, name: string, geoms: readonly number[], coupling: Coupling,
+): Tool {
   if (!geoms.some((geom) => model.geom_contype[geom] !== 0 || model.geom_conaffinity[geom] !== 0))
     throw toolError(name, "has no geom that touches anything");
   if (model.body_mocapid[body] >= 0) return new LedTool(mj, model, data, body, geoms);
