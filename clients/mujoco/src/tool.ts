@@ -106,6 +106,7 @@ class HeldTool implements Tool {
   readonly #model: MjModel;
   readonly #data: MjData;
   readonly #coupling: Coupling;
+  readonly #derives: boolean;
   readonly #qpos: number;
   readonly #dof: number;
   /** N·s/m and N·m·s/rad, of the six degrees of freedom; those of rotation are about the tool's own axes. */
@@ -114,8 +115,8 @@ class HeldTool implements Tool {
   /** N and N·m, what the dampers owe to the hand's motion; their part of the tool's own is MuJoCo's. */
   #dragged: readonly number[] = [0, 0, 0, 0, 0, 0];
 
-  constructor(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, coupling: Coupling) {
-    [this.#mj, this.#model, this.#data, this.#coupling] = [mj, model, data, coupling];
+  constructor(mj: MainModule, model: MjModel, data: MjData, body: number, name: string, coupling: Coupling, derives: boolean) {
+    [this.#mj, this.#model, this.#data, this.#coupling, this.#derives] = [mj, model, data, coupling, derives];
     const joint: number = model.body_jntadr[body];
     [this.#qpos, this.#dof] = [model.jnt_qposadr[joint], model.jnt_dofadr[joint]];
     this.home = this.#pose(model.qpos0);
@@ -145,11 +146,10 @@ class HeldTool implements Tool {
 
   felt(): Felt {
     const { force, torque } = this.#springs(this.#hand);
-    const stretched = Math.hypot(...force) / this.#coupling.stiffness;
-    return {
-      force: negative(force), torque: negative(torque), ...this.#derivatives(),
-      validRadius: stretched, // so far back the hand lets go of what it presses; a spring beyond would pull
-    };
+    const felt = { force: negative(force), torque: negative(torque) };
+    if (!this.#derives) return felt;
+    // So far back the hand lets go of what it presses; a spring beyond would pull.
+    return { ...felt, ...this.#derivatives(), validRadius: Math.hypot(...force) / this.#coupling.stiffness };
   }
 
   restart(): void {
@@ -217,11 +217,12 @@ class HeldTool implements Tool {
 /** Throws an Error that says why the hand cannot hold this body. */
 export function toolOf(
   mj: MainModule, model: MjModel, data: MjData, body: number, name: string, geoms: readonly number[], coupling: Coupling,
+  derives: boolean,
 ): Tool {
   if (!geoms.some((geom) => model.geom_contype[geom] !== 0 || model.geom_conaffinity[geom] !== 0))
     throw toolError(name, "has no geom that touches anything");
   if (model.body_mocapid[body] >= 0) return new LedTool(mj, model, data, body, geoms);
   const free = model.body_jntnum[body] === 1 && model.jnt_type[model.body_jntadr[body]] === mj.mjtJoint.mjJNT_FREE.value;
   if (!free) throw toolError(name, `wants mocap="true", and the hand leads it, or a <freejoint/>, and the hand holds and turns it`);
-  return new HeldTool(mj, model, data, body, name, coupling);
+  return new HeldTool(mj, model, data, body, name, coupling, derives);
 }

@@ -32,7 +32,8 @@ async function run(test: TestContext, ...options: readonly string[]) {
   assert.equal(await engine.end("SIGINT"), 0);
   await network.end("SIGINT"); // it fails on a machine too busy for it: then the network was a worse one
   const { summary } = JSON.parse(engine.lines.find((line) => line.startsWith('{"summary"'))!);
-  assert.ok(summary.forces > 150 && summary.forces_unusable === 0, JSON.stringify(summary));
+  assert.ok(summary.forces > 100 && summary.forces_unusable === 0, JSON.stringify(summary));
+  assert.ok(!engine.lines.some((line) => line.includes("is not sent")), engine.lines.join("\n")); // torque and stiffness are
   const report = JSON.parse(execFileSync(join(programs, "tendon-report"), [recording, "--json"], { encoding: "utf8" }));
   test.diagnostic(`torques did ${report.torque_work_j.toFixed(3)} J, least energy ${report.least_energy_j.toExponential(2)} J, ` +
     `${report.forces_per_s.toFixed(0)} forces/s, ${report.loop_age_p50_ms.toFixed(0)} ms from the hand to the force, ` +
