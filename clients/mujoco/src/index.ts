@@ -1,2 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
 export { TouchableScene, type SceneConfig, type SceneStats } from "./touchable_scene.js";
+export { zUp } from "./rotation.js";
+export type { Coupling } from "./tool.js";

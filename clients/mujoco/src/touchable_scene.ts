@@ -1,19 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 import loadMujoco, { type MainModule, type MjData, type MjModel } from "@mujoco/mujoco";
-import type { DeviceState, Vec3 } from "tendon-client";
+import type { DeviceState, Quat, Touch, Vec3 } from "tendon-client";
 import { ContactForce, type Triple } from "./contact_force.js";
 import { loadModel, type Assets } from "./load.js";
+import {
+  inverse, matrixProduct, product, rotationBy, rotationOf, rotationVector, times, transposed, unit, type Matrix, type Rotation,
+} from "./rotation.js";
+import { toolOf, type Coupling, type Pose, type Tool } from "./tool.js";
 
 export interface SceneConfig {
-  /** Name of the body that the hand holds: a mocap body with a geom. Where the scene puts it is where the device's origin is. */
+  /**
+   * Name of the body that the hand holds, with a geom. Where and how the scene puts it is where the device's origin is, and how
+   * a handle lies that is not turned. With mocap="true" the hand leads it: a point. With a <freejoint/> a virtual coupling holds it:
+   * it turns with the handle, and torque, stiffness and angular stiffness are sent besides (tool.ts has the law).
+   */
   readonly tool: string;
-  /** Device frame to scene frame: a rotation, row by row. The identity. */
+  /** Of a held tool: 1000 N/m and 2 N·m/rad. */
+  readonly coupling?: Partial<Coupling>;
+  /** Of a held tool: it is found by 14 evaluations of the scene at each answer, without its collisions. true. */
+  readonly sendStiffness?: boolean;
+  /** Device frame to scene frame: a rotation, row by row. The identity; zUp() is for scenes whose z points up. */
   readonly rotation?: readonly number[];
   /**
    * m/s. The tool follows the hand no faster: a hand that comes from nowhere (at the start, after a gap, by mistake) would be
    * deep inside a body from one step to the next. 1: faster than hands are in contact.
    */
   readonly maxToolSpeed?: number;
+  /** rad/s, likewise. 20. */
+  readonly maxToolSpin?: number;
   /** Steps for one answer; where more are due, simulated time falls behind, and the hand is not made to wait. 20. */
   readonly maxSteps?: number;
   /** Files that the scene names. */
@@ -27,9 +41,9 @@ export interface SceneStats {
   readonly answers: number;
   /** Of MuJoCo. */
   readonly steps: number;
-  /** Positions that were no numbers: nothing was computed. */
+  /** Positions that were no numbers, orientations that were no rotations: nothing was computed. */
   readonly badPositions: number;
-  /** Answers in which the hand was faster than maxToolSpeed: the force is that at the tool, which lags. */
+  /** Answers in which the hand was faster than maxToolSpeed or maxToolSpin: the force is that at the tool, which lags. */
   readonly lagging: number;
   /** MuJoCo lost the solution; the scene began anew. */
   readonly restarts: number;
@@ -41,7 +55,7 @@ export interface SceneStats {
 
 const kIdentity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 /** A force that ForceClient counts and does not send: to have none is better than to have a wrong one. */
-const kNoForce: Vec3 = { x: NaN, y: NaN, z: NaN };
+const kNoTouch: Touch = { force: { x: NaN, y: NaN, z: NaN } };
 
 function checkRotation(r: readonly number[]): readonly number[] {
   const dot = (i: number, j: number): number => r[3 * i]! * r[3 * j]! + r[3 * i + 1]! * r[3 * j + 1]! + r[3 * i + 2]! * r[3 * j + 2]!;
@@ -63,8 +77,8 @@ function positive(name: string, value: number): number {
  *     const scene = await TouchableScene.load(mjcf, { tool: "tool" });
  *     process.exitCode = await run(options, scene);
  *
- * The tool follows the hand, the scene is stepped by as much time as has passed at the device, and the sum of the contact
- * forces on the tool goes back. What MuJoCo would get wrong without a word is refused at load (an Error), or comes as no force
+ * The tool follows the hand, the scene is stepped by as much time as has passed at the device, and what the tool feels goes
+ * back. What MuJoCo would get wrong without a word is refused at load (an Error), or comes as no force
  * and a warning: README.md lists it. Memory is WebAssembly's: delete() frees it.
  */
 export class TouchableScene {
@@ -72,16 +86,19 @@ export class TouchableScene {
   readonly mujoco: MainModule;
   readonly model: MjModel;
   readonly data: MjData;
-  readonly #config: Required<Pick<SceneConfig, "maxToolSpeed" | "maxSteps" | "rotation" | "onWarning">>;
+  readonly #config: Required<Pick<SceneConfig, "maxToolSpeed" | "maxToolSpin" | "maxSteps" | "onWarning">>;
   readonly #timestep: number;
-  readonly #mocap: number;
-  readonly #home: Triple;
-  readonly #onTool: ContactForce;
+  /** Device to scene. */
+  readonly #frame: Matrix;
+  readonly #turned: Rotation;
+  readonly #tool: Tool;
+  /** Where the tool was led last. */
+  #led: Pose;
   readonly #stats = { answers: 0, steps: 0, badPositions: 0, lagging: 0, restarts: 0, incomplete: 0, behind: 0 };
   #sampledNs: bigint | undefined;
   /** s that have passed and were not simulated yet: less than a step. */
   #due = 0;
-  #force: Vec3 | undefined;
+  #touch: Touch | undefined;
   /** How often MuJoCo has warned, by mjtWarning. */
   #warned: readonly number[];
 
@@ -102,54 +119,69 @@ export class TouchableScene {
     [this.mujoco, this.model] = [mujoco, model];
     this.#config = {
       maxToolSpeed: positive("maxToolSpeed", config.maxToolSpeed ?? 1),
+      maxToolSpin: positive("maxToolSpin", config.maxToolSpin ?? 20),
       maxSteps: Math.ceil(positive("maxSteps", config.maxSteps ?? 20)),
-      rotation: checkRotation(config.rotation ?? kIdentity),
       onWarning: config.onWarning,
     };
+    this.#frame = checkRotation(config.rotation ?? kIdentity);
+    this.#turned = rotationOf(this.#frame);
     this.#timestep = model.opt.timestep;
     const body = this.#body(config.tool);
-    this.#mocap = model.body_mocapid[body];
-    if (this.#mocap < 0) throw new Error(`MuJoCo scene: the tool, body "${config.tool}", wants mocap="true": the hand moves it`);
-    const geoms = this.#geomsOf(body);
-    if (!geoms.some((geom) => model.geom_contype[geom] !== 0 || model.geom_conaffinity[geom] !== 0))
-      throw new Error(`MuJoCo scene: the tool, body "${config.tool}", has no geom that touches anything`);
-    this.#home = [model.body_pos[3 * body], model.body_pos[3 * body + 1], model.body_pos[3 * body + 2]];
-    this.#onTool = new ContactForce(mujoco, model, geoms);
     this.data = new mujoco.MjData(model);
+    try {
+      this.#tool = toolOf(mujoco, model, this.data, body, config.tool, this.#geomsOf(body), {
+        stiffness: positive("coupling.stiffness", config.coupling?.stiffness ?? 1000),
+        angularStiffness: positive("coupling.angularStiffness", config.coupling?.angularStiffness ?? 2),
+      }, config.sendStiffness ?? true);
+    } catch (error) {
+      this.data.delete();
+      throw error;
+    }
+    this.#led = this.#tool.home;
     this.#warned = this.#warnings();
   }
 
   /** The callback of connect() and run(). */
-  readonly physics = (hand: DeviceState): Vec3 => {
+  readonly physics = (hand: DeviceState): Touch => {
     const before = this.#sampledNs ?? hand.sampledNs;
     this.#sampledNs = hand.sampledNs; // a server that was restarted counts from another beginning
-    return this.answer(hand.position, Math.max(Number(hand.sampledNs - before) / 1e9, 0)) ?? kNoForce;
+    const elapsed = Math.max(Number(hand.sampledNs - before) / 1e9, 0);
+    return this.touch(hand.position, elapsed, hand.turning?.orientation) ?? kNoTouch;
   };
 
+  /** The force of touch(), N. */
+  answer(position: Vec3, elapsed: number, orientation?: Quat): Vec3 | undefined {
+    return this.touch(position, elapsed, orientation)?.force;
+  }
+
   /**
-   * N, on the hand, in the device's frame: the hand is at `position` (m, device frame), `elapsed` s after the last call. The
-   * tool goes there in a line while the scene is stepped; at the first call by one step. Undefined where there is no force that
-   * could be believed; onWarning has heard why.
+   * What the hand feels, in the device's frame: it is at `position` (m) and turned by `orientation`, `elapsed` s after the last
+   * call. The tool goes there in a line, turning about one axis, while the scene is stepped; at the first call by one step. A held
+   * tool gives torque, too, and only for a hand with an orientation. Undefined where there is no force that could be believed;
+   * onWarning has heard why.
    */
-  answer(position: Vec3, elapsed: number): Vec3 | undefined {
-    const hand = [position.x, position.y, position.z];
+  touch(position: Vec3, elapsed: number, orientation?: Quat): Touch | undefined {
+    const hand = [position.x, position.y, position.z] as const;
+    const { w, x, y, z } = orientation ?? { w: 1, x: 0, y: 0, z: 0 };
+    const isTurn = Math.abs(Math.hypot(w, x, y, z) - 1) <= 1e-3;
     // MuJoCo takes NaN and 1e30 for a tool that touches nothing, and says nothing.
-    if (!hand.every((value) => Math.abs(value) < this.mujoco.mjMAXVAL) || !(elapsed >= 0 && Number.isFinite(elapsed))) {
-      this.#tell(++this.#stats.badPositions, `a hand at (${hand.join(", ")}) m, ${elapsed} s later, is nowhere: not computed`);
+    if (!hand.every((value) => Math.abs(value) < this.mujoco.mjMAXVAL) || !isTurn || !(elapsed >= 0 && Number.isFinite(elapsed))) {
+      const turned = isTurn ? "" : `, turned by (${[w, x, y, z].join(", ")}),`;
+      this.#tell(++this.#stats.badPositions, `a hand at (${hand.join(", ")}) m,${turned} ${elapsed} s later, is nowhere: not computed`);
       return undefined;
     }
     const steps = this.#stepsFor(elapsed);
-    if (steps === 0) return this.#force;
-    this.#advance(hand, steps);
+    if (steps === 0) return this.#touch;
+    this.#advance(this.#toScene(hand, unit([w, x, y, z])), steps);
     this.#stats.steps += steps;
     const lost = this.#lost();
-    const force = lost || this.#isIncomplete() ? undefined : this.#toDevice(this.#onTool.on(this.data));
+    const touch = lost || this.#isIncomplete() ? undefined : this.#felt(orientation !== undefined);
     if (lost) {
       this.#tell(++this.#stats.restarts, `MuJoCo lost the solution (${lost}): no force, and the scene begins anew`);
       this.#restart();
     }
-    if (force) ++this.#stats.answers;
-    return (this.#force = force);
+    if (touch) ++this.#stats.answers;
+    return (this.#touch = touch);
   }
 
   /** N, in the scene's frame: what all contacts together exert on a body, as of the newest step. */
@@ -166,7 +198,7 @@ export class TouchableScene {
   }
 
   delete(): void {
-    this.#onTool.delete();
+    this.#tool.delete();
     this.data.delete();
     this.model.delete();
   }
@@ -194,16 +226,28 @@ export class TouchableScene {
     return done;
   }
 
-  #advance(hand: readonly number[], steps: number): void {
-    const { rotation: r, maxToolSpeed } = this.#config;
-    const tool = (): Float64Array => this.data.mocap_pos.subarray(3 * this.#mocap, 3 * this.#mocap + 3); // a view dies when the heap grows
-    const from = [...tool()];
-    const way = from.map((at, i) => this.#home[i]! + r[3 * i]! * hand[0]! + r[3 * i + 1]! * hand[1]! + r[3 * i + 2]! * hand[2]! - at);
-    const reach = maxToolSpeed * steps * this.#timestep;
-    const share = Math.min(1, reach / Math.hypot(...way)); // 1 where there is no way: reach / 0
-    if (share < 1) this.#tell(++this.#stats.lagging, `the hand is faster than ${maxToolSpeed} m/s: the tool lags behind it`);
+  #toScene(hand: Triple, turn: Rotation): Pose {
+    const { at, turn: home } = this.#tool.home;
+    const way = times(this.#frame, hand);
+    const turned = product(product(this.#turned, turn), inverse(this.#turned));
+    return { at: [at[0] + way[0], at[1] + way[1], at[2] + way[2]], turn: product(turned, home) };
+  }
+
+  #advance(hand: Pose, steps: number): void {
+    const { maxToolSpeed, maxToolSpin } = this.#config;
+    const from = this.#led;
+    const way = from.at.map((at, i) => hand.at[i]! - at) as never as Triple;
+    const spin = rotationVector(product(hand.turn, inverse(from.turn)));
+    const time = steps * this.#timestep;
+    // 1 where there is no way: reach / 0
+    const share = Math.min(1, (maxToolSpeed * time) / Math.hypot(...way), (maxToolSpin * time) / Math.hypot(...spin));
+    if (share < 1)
+      this.#tell(++this.#stats.lagging, `the hand is faster than ${maxToolSpeed} m/s or ${maxToolSpin} rad/s: the tool lags behind it`);
     for (let step = 1; step <= steps; ++step) {
-      tool().set(from.map((at, i) => at + way[i]! * share * (step / steps)));
+      const part = share * (step / steps);
+      const turn = unit(product(rotationBy([part * spin[0], part * spin[1], part * spin[2]]), from.turn));
+      this.#led = { at: [from.at[0] + way[0] * part, from.at[1] + way[1] * part, from.at[2] + way[2] * part], turn };
+      this.#tool.lead(this.#led, this.#timestep);
       this.mujoco.mj_step(this.model, this.data);
     }
   }
@@ -239,16 +283,30 @@ export class TouchableScene {
 
   #restart(): void {
     this.mujoco.mj_resetData(this.model, this.data);
+    this.#tool.restart();
+    this.#led = this.#tool.home;
     this.#warned = this.#warnings();
   }
 
-  #toDevice([x, y, z]: Triple): Vec3 {
-    const r = this.#config.rotation;
+  /** Of a hand without an orientation nobody can use the torque. */
+  #felt(turns: boolean): Touch {
+    const { force, torque, stiffness, angularStiffness, validRadius } = this.#tool.felt();
     return {
-      x: r[0]! * x + r[3]! * y + r[6]! * z,
-      y: r[1]! * x + r[4]! * y + r[7]! * z,
-      z: r[2]! * x + r[5]! * y + r[8]! * z,
+      force: this.#toDevice(force),
+      stiffness: stiffness && this.#springToDevice(stiffness),
+      validRadius,
+      torque: turns && torque ? this.#toDevice(torque) : undefined,
+      angularStiffness: turns && angularStiffness ? this.#springToDevice(angularStiffness) : undefined,
     };
+  }
+
+  #toDevice(v: Triple): Vec3 {
+    const [x, y, z] = times(transposed(this.#frame), v);
+    return { x, y, z };
+  }
+
+  #springToDevice(k: Matrix): Matrix {
+    return matrixProduct(transposed(this.#frame), matrixProduct(k, this.#frame));
   }
 
   /** The 1st, 2nd, 4th, 8th … time. */

@@ -48,10 +48,10 @@ it("forces that the device gives out are those that MuJoCo gave", async (test) =
   let [busyMs, pressed] = [0, 0];
   const physics = (hand: DeviceState) => {
     const before = performance.now();
-    const force = scene.physics(hand);
+    const touch = scene.physics(hand);
     busyMs += performance.now() - before;
-    if (force.x < -0.2) ++pressed;
-    return force;
+    if (touch.force.x < -0.2) ++pressed;
+    return touch;
   };
   let felt = 0;
   const engine = connect(udp(tendond.address), { name: "mujoco", rateHz: 100 }, { physics });

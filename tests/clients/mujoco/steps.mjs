@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// node steps.mjs: what a step costs and what a sphere 2 mm deep in B1 feels, by fineness; the table in
-// clients/mujoco/README.md. Wants tests/clients/typescript/run mujoco build.
-import { TouchableScene } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
+// node steps.mjs: what a step costs and what a sphere 2 mm deep in B1 feels, by fineness; the tables in
+// clients/mujoco/README.md. Then what an answer of the peg costs, wedged in its hole. Wants tests/clients/typescript/run
+// mujoco build.
+import { readFileSync } from "node:fs";
+import { TouchableScene, zUp } from "../../../clients/mujoco/build/clients/mujoco/src/index.js";
 import { block } from "../../../clients/mujoco/build/tests/clients/mujoco/scenes.js";
 
 for (const n of [4, 8, 12, 16]) {
@@ -16,5 +18,21 @@ for (const n of [4, 8, 12, 16]) {
   const ms = (user + system) / 1000 / (scene.stats().steps - from);
   console.log(`n = ${n}: ${scene.model.nv} degrees of freedom, ${scene.stats().steps - from} steps, ${ms.toFixed(2)} ms of processor time ` +
     `each = ${Math.round(1000 / ms)} steps/s, ${force.z.toFixed(3)} N up, ${Math.hypot(force.x, force.y).toFixed(3)} N aside`);
+  scene.delete();
+}
+
+const example = readFileSync(new URL("../../../clients/mujoco/examples/peg_in_hole.ts", import.meta.url), "utf8");
+const tilt = (radians) => ({ w: Math.cos(radians / 2), x: 0, y: 0, z: Math.sin(radians / 2) });
+for (const sendStiffness of [false, true]) {
+  const scene = await TouchableScene.load(/`([\s\S]*)`/.exec(example)[1], { tool: "peg", rotation: zUp(), sendStiffness });
+  const wedge = (i) => scene.touch({ x: 0, y: -0.018, z: 0 }, 0.01, tilt(0.15 + 0.05 * Math.sin(i / 5)));
+  for (let i = 0; i < 200; ++i) scene.touch({ x: 0, y: -0.0001 * Math.min(i, 180), z: 0 }, 0.01, tilt(0));
+  for (let i = 0; i < 200; ++i) wedge(i);
+  const before = process.cpuUsage();
+  for (let i = 0; i < 1000; ++i) wedge(i);
+  const { user, system } = process.cpuUsage(before);
+  const ms = ((user + system) / 1e6).toFixed(3);
+  console.log(`peg, wedged by ${scene.data.ncon} contacts, ${sendStiffness ? "with" : "without"} stiffness: ${ms} ms of processor time for ` +
+    `an answer of 10 steps`);
   scene.delete();
 }

@@ -111,6 +111,12 @@ std::vector<Row> rows(std::span<const Run> runs) {
       {"  peak force", [](const Run& run) { return digits(run.summary.peak_force, "%.2f N"); }},
       {"Force is not the one asked for in", [](const Run& run) { return percent(run.summary.share_limited()); }},
   };
+  if (std::ranges::any_of(runs, [](const Run& run) { return run.summary.torque_work.has_value(); })) {
+    const auto work = [](const Run& run) {
+      return run.summary.torque_work ? with_unit(*run.summary.torque_work, "J") : "does not turn";
+    };
+    rows.insert(rows.begin() + 3, {"  work of torques on the hand, at most", work});
+  }
   for (const ReasonName& name : kReasonNames) {
     const auto occurs = [&](const Run& run) { return run.summary.share_limited(name.reason) > 0; };
     if (std::ranges::none_of(runs, occurs)) continue;
@@ -230,6 +236,7 @@ std::string to_json(const Run& run) {
       .add("limiter_on", s.limiter_on)
       .add("energy_given_out_j", s.energy_given_out)
       .add("least_energy_j", s.least_energy)
+      .add("torque_work_j", s.torque_work)
       .add("passive", s.passive())
       .add("kept_its_promise", s.kept_its_promise())
       .add("holds_beyond_bound", s.holds_beyond_bound)

@@ -48,6 +48,19 @@ TEST(Table, TellsANewcomerWhichRunWasStable) {
   EXPECT_EQ(table.find('\x1b'), std::string::npos) << "colour codes";
 }
 
+TEST(Table, TellsOfTheWorkOfTorquesWhereAHandleTurns) {
+  std::vector runs = {run_of(Law::kNone, "off"), run_of(Law::kAol, "on")};
+  EXPECT_EQ(to_table(runs).find("torques"), std::string::npos);
+  EXPECT_NE(to_json(runs[0]).find(R"("torque_work_j":null)"), std::string::npos);
+  runs[0].summary.torque_work = 8.95;
+  const std::string table = to_table(runs);
+  const std::size_t row = table.find("  work of torques on the hand, at most  ");
+  ASSERT_NE(row, std::string::npos) << table;
+  const std::string line = table.substr(row, table.find('\n', row) - row);
+  EXPECT_TRUE(line.find("8.95 J ") < line.find("does not turn")) << line;
+  EXPECT_NE(to_json(runs[0]).find(R"("torque_work_j":8.95)"), std::string::npos);
+}
+
 TEST(Table, ColumnsAreAlignedThoughSomeLettersHaveSeveralBytes) {
   std::vector runs = {run_of(Law::kNone, "größer"), run_of(Law::kAol, "µ")};
   std::istringstream table(to_table(runs));

@@ -14,6 +14,8 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/rotation.h"
+
 namespace tendon::lab {
 namespace {
 
@@ -111,6 +113,7 @@ void RunObserver::observe(const StepRecord& step) {
   so_far_.peak_force = std::max(so_far_.peak_force, step.applied.norm());
 
   observe_energy(step);
+  observe_torque(step);
   if (!step.reasons.has(Reason::kUnseen)) observe_motion(step);
   observe_force(step);
 }
@@ -129,6 +132,16 @@ void RunObserver::observe_energy(const StepRecord& step) {
   } else {
     so_far_.least_energy = std::min(so_far_.least_energy, energy_ - overdrawn_);
   }
+}
+
+/// A turn that was not seen is booked as one about a single axis, with the torque held last.
+void RunObserver::observe_torque(const StepRecord& step) {
+  const TurnStep* const turn = step.turn();
+  if (turn == nullptr || step.reasons.has(Reason::kUnseen)) return;
+  const Quat& orientation = turn->hand.orientation;
+  if (orientation_) torque_work_ += turn->was_applied.dot(turn_between(*orientation_, orientation));
+  orientation_ = orientation;
+  so_far_.torque_work = std::max(so_far_.torque_work.value_or(0), torque_work_);
 }
 
 void RunObserver::observe_motion(const StepRecord& step) {

@@ -63,6 +63,11 @@ struct RunSummary {
   /// A limiter was at work: some step had a finite bound.
   bool limiter_on = false;
 
+  /// J, the largest sum so far of τ·Δθ: what the torques alone have done to the hand, friction not counted. What is above
+  /// zero came from the movement's part of the account, from friction, or from nowhere. Empty: the device does not
+  /// measure its orientation.
+  std::optional<double> torque_work;
+
   // The hand. Steps without a position count in nothing that has to do with motion.
   double peak_speed = 0;      ///< m/s
   double peak_force = 0;      ///< N, really applied
@@ -138,6 +143,7 @@ class RunObserver {
   };
 
   void observe_energy(const StepRecord& step);
+  void observe_torque(const StepRecord& step);
   void observe_motion(const StepRecord& step);
   void observe_force(const StepRecord& step);
   Vec3 main_axis() const;
@@ -148,6 +154,9 @@ class RunObserver {
   double energy_ = 0;
   double overdrawn_ = 0;              ///< D, J
   Duration bound_ = Duration::max();  ///< T in force when the force of the next interval was chosen
+
+  std::optional<Quat> orientation_;  ///< of the last step that saw one
+  double torque_work_ = 0;           ///< Σ τ·Δθ, J
 
   std::optional<Vec3> origin_;  ///< the first position: sums of small numbers keep their digits
   double positions_ = 0;

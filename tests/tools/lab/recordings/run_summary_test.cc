@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/rotation.h"
 #include "protocol/wire/codec.h"
 #include "tests/tools/lab/experiments/steps.h"
 
@@ -91,6 +92,26 @@ TEST(RunSummary, AnOverrunIsForgivenOnlyUntilTheLedgerHasRecovered) {
   auto steps = with_energies({0, -0.5, 0.1, -0.2});
   steps[1].reasons = Reason::kOverrun;
   EXPECT_DOUBLE_EQ(summarise(steps).least_energy, -0.2);
+}
+
+TEST(RunSummary, WhatTorquesDoToTheHandIsToldByItself) {
+  std::vector<StepRecord> steps;
+  double angle = 0;
+  const auto turn_on = [&](double by, double torque, Reasons reasons = {}) {
+    steps.push_back(step_at(steps.size()));
+    steps.back().reasons = reasons;
+    TurnStep& turn = steps.back().handle.emplace().turn.emplace();
+    if (!reasons.has(Reason::kUnseen)) angle += by;
+    turn.hand.orientation = rotation_by(Vec3(0, 0, angle));
+    turn.was_applied = Vec3(7, 7, torque);
+  };
+  turn_on(1.0, 0.5);  // how the first step came to be is not known
+  turn_on(0.1, 0.2);
+  turn_on(0.2, 0.3);
+  turn_on(0, 9, Reason::kUnseen);
+  turn_on(-0.1, 0.5);
+  EXPECT_NEAR(summarise(steps).torque_work.value(), 0.08, 1e-12);
+  EXPECT_FALSE(summarise(with_energies({0, 1})).torque_work);
 }
 
 TEST(RunSummary, SharesAreOfAllStepsAndFactsAboutAStepAreNoLimits) {
