@@ -92,14 +92,14 @@ KellyVerdict kelly_verdict(const Runs& runs) {
     verdict.flaw = "the slide of " + number(slow.slide_time) +
                    " s is shorter than 4 m/b = " + number(4 * slow.time_constant) + " s";
   } else if (!(slow.friction.coulomb > 0)) {
-    verdict.flaw = "its f_c = " + number(slow.friction.coulomb) + " N is not positive";
+    verdict.flaw = "its f_c = " + number(slow.friction.coulomb) + " is not positive";
   } else if (fast == nullptr) {
     verdict.flaw = "there is no second slope, 1.5 times as steep or more, to compare with";
   } else if (!fast->plausible()) {
     verdict.flaw = "at the second slope the slide of " + number(fast->slide_time) +
                    " s is shorter than 4 m/b = " + number(4 * fast->time_constant) + " s or f_c is not positive";
   } else if (std::abs(fast->friction.viscous - b) > kAgreement * b) {
-    verdict.flaw = "two slopes do not agree, b = " + number(b) + " and " + number(fast->friction.viscous) + " N·s/m";
+    verdict.flaw = "two slopes do not agree, b = " + number(b) + " and " + number(fast->friction.viscous);
   }
   return verdict;
 }
@@ -155,12 +155,12 @@ void judge(Identification& result) {
     result.trust = Trust::kIntegral;
     result.reason = "Kelly's line is no asymptote yet" + at(*flawed) + ": " + flawed->kelly_flaw +
                     " (it says b = " + number(flawed->kelly.viscous) + ", the integral " +
-                    number(flawed->integral.viscous) + " N·s/m)";
+                    number(flawed->integral.viscous) + ")";
   } else if (apart != result.places.end()) {
     result.trust = Trust::kNeither;
     result.reason = "Kelly's validity test passed, yet the two differ" + at(*apart) +
                     ": b = " + number(apart->kelly.viscous) + " and " + number(apart->integral.viscous) +
-                    " N·s/m. Is the mass right? Published is the lesser of both";
+                    ". Is the mass right? Published is the lesser of both";
   } else {
     result.trust = Trust::kBoth;
     result.reason = "Kelly's validity test passed and the integral agrees. Published is the lesser of both";

@@ -73,7 +73,7 @@ Slide slide_of(const RampRun& run, double encoder_step) {
   }
   const double travel = std::max(forth, back);
   if (!(travel > kFewestCounts * encoder_step)) {
-    refuse("expected a handle that moves more than ", kFewestCounts, " encoder counts, found ", travel, " m");
+    refuse("expected a handle that moves more than ", kFewestCounts, " encoder counts, found ", travel);
   }
   Slide slide;
   slide.direction = forth > back ? 1 : -1;

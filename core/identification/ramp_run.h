@@ -6,7 +6,8 @@
 
 namespace tendon {
 
-/// One sample of a run: along the one axis that is free to move.
+/// One sample of a run: along the one axis that is free to move. For a run that turns a handle read rad for m, N·m for N
+/// and kg·m² for kg, here and in all that follows from it.
 struct RampSample {
   double t = 0;         ///< s
   double position = 0;  ///< m, encoder reading at t

@@ -376,10 +376,12 @@ void Witness::see_end() {
   see_presses();
 }
 
-/// Each press has a button of its own.
+/// Each press has a button of its own. Where addresses change, states go to where nobody is until the client is heard
+/// from its new one, and a press may be in one of those.
 void Witness::see_presses() {
   const auto* const device = std::get_if<SimulatedDevice::Config>(&drawn_.device);
-  if (device == nullptr) return;
+  const bool roams = drawn_.changes.back().weather.up.rebind > Duration::zero();
+  if (device == nullptr || roams) return;
   for (const SimulatedDevice::Config::Press& press : device->presses) {
     const LocalTime from = began_ + press.from;
     if (from < *recovered_by_ || from + press.length + kServed > world_.now()) continue;

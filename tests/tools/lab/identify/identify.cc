@@ -20,12 +20,18 @@
 namespace tendon::lab {
 namespace {
 
-constexpr double kEncoderStep = 3e-5;  // m
+constexpr double kEncoderStep = 3e-5;       // m
+constexpr double kAngularStep = 1e-4;       // rad
+constexpr double kSimulatedMass = 0.075;    // kg
+constexpr double kSimulatedInertia = 1e-4;  // kg·m²
+
+double usual_step(Freedom freedom) { return freedom == Freedom::kRotation ? kAngularStep : kEncoderStep; }
 
 struct Source {
-  std::vector<RampRun> runs;
-  std::vector<std::string> names;  ///< of the runs, for people
-  IdentificationConfig config;
+  FreedomInfo freedom = info(Freedom::kMovement);
+  std::vector<RampRun> runs{};
+  std::vector<std::string> names{};  ///< of the runs, for people
+  IdentificationConfig config{};
 };
 
 void check(const IdentifyOptions& options) {
@@ -42,8 +48,12 @@ void check(const IdentifyOptions& options) {
       throw std::invalid_argument(option + " " + std::to_string(*value) + ": expected a finite number > 0");
     }
   };
-  check_positive(options.mass, "--mass-kg");
-  check_positive(options.encoder_step, "--encoder-step-m");
+  check_positive(options.mass, "--mass");
+  check_positive(options.encoder_step, "--encoder-step");
+  if (options.profile && options.freedom != Freedom::kMovement) {
+    throw std::invalid_argument("--simulate " + *options.profile + ": expected --of movement: no profile has motors " +
+                                "that turn or grip; --simulate-friction simulates them");
+  }
 }
 
 SimulatedDevice::Config device_of(const IdentifyOptions& options) {
@@ -60,35 +70,71 @@ SimulatedDevice::Config device_of(const IdentifyOptions& options) {
   }
   const Friction& friction = *options.simulated_friction;
   SimulatedDevice::Config device;
-  device.mass = 0.075;
-  device.encoder_step = kEncoderStep;
-  if (friction.viscous != 0) device.viscous_friction = friction.viscous;
-  if (friction.coulomb != 0) device.coulomb_friction = friction.coulomb;
+  device.mass = kSimulatedMass;
+  const auto rubs = [&friction](auto& part) {
+    if (friction.viscous != 0) part.viscous_friction = friction.viscous;
+    if (friction.coulomb != 0) part.coulomb_friction = friction.coulomb;
+  };
+  switch (options.freedom) {
+    case Freedom::kMovement:
+      device.encoder_step = kEncoderStep;
+      rubs(device);
+      break;
+    case Freedom::kRotation:
+      device.rotation =
+          SimulatedRotation::Config{.inertia = kSimulatedInertia, .max_torque = 1, .encoder_step = kAngularStep};
+      rubs(*device.rotation);
+      break;
+    case Freedom::kGripper:
+      device.gripper = SimulatedGripper::Config{.open = 10,
+                                                .arm = 0.05,
+                                                .mass = kSimulatedMass,
+                                                .start = 5,
+                                                .max_force = 10,
+                                                .encoder_step = kEncoderStep / 0.05};
+      rubs(*device.gripper);
+      break;
+  }
   return device;
 }
 
+/// What is asked of a device whose friction is of the size of a stylus's: torques are a fiftieth of forces, and turns
+/// eight times the travel.
+RampExperiment experiment_of(const IdentifyOptions& options) {
+  RampExperiment experiment{.device = device_of(options), .freedom = options.freedom, .seed = options.seed};
+  if (options.freedom == Freedom::kRotation) {
+    for (double& rate : experiment.rates) rate /= 50;
+    experiment.force_noise /= 50;
+    experiment.travel = 2;
+  }
+  return experiment;
+}
+
 Source simulated(const IdentifyOptions& options) {
-  RampExperiment experiment{.device = device_of(options), .seed = options.seed};
-  Source source;
+  const RampExperiment experiment = experiment_of(options);
+  Source source{.freedom = info(options.freedom)};
   source.runs = simulated_ramps(experiment);
   for (std::size_t i = 0; i < source.runs.size(); ++i) {
     source.names.push_back("simulated " + std::to_string(i + 1));
     source.runs[i].place = "x";
   }
-  source.config = {.mass = options.mass.value_or(experiment.device.mass),
-                   .encoder_step = options.encoder_step.value_or(experiment.device.encoder_step.value_or(0))};
+  const bool turns = options.freedom == Freedom::kRotation;
+  const bool moves = options.freedom == Freedom::kMovement;
+  const double step = moves ? experiment.device.encoder_step.value_or(0) : usual_step(options.freedom);
+  source.config = {.mass = options.mass.value_or(turns ? kSimulatedInertia : experiment.device.mass),
+                   .encoder_step = options.encoder_step.value_or(step)};
   return source;
 }
 
 Source recorded(const IdentifyOptions& options) {
-  Source source;
+  Source source{.freedom = info(options.freedom)};
   for (std::size_t i = 0; i < options.files.size(); ++i) {
-    RampRun run = load_ramp_csv(options.files[i]);
+    RampRun run = load_ramp_csv(options.files[i], options.freedom);
     if (!options.places.empty()) run.place = options.places[i];
     source.runs.push_back(std::move(run));
     source.names.push_back(options.files[i].string());
   }
-  source.config = {.mass = options.mass, .encoder_step = options.encoder_step.value_or(kEncoderStep)};
+  source.config = {.mass = options.mass, .encoder_step = options.encoder_step.value_or(usual_step(options.freedom))};
   return source;
 }
 
@@ -101,6 +147,11 @@ void check_runs(const Source& source) {
       throw std::runtime_error(source.names[i] + ": " + error.what());
     }
   }
+}
+
+Friction bound_of(const Source& source, const Identification& result) {
+  const double share = source.freedom.share;
+  return {.coulomb = share * result.lower_bound.coulomb, .viscous = share * result.lower_bound.viscous};
 }
 
 // ---- For people -------------------------------------------------------------------------------------------------
@@ -126,56 +177,75 @@ void write_table(const Source& source, const Identification& result, std::ostrea
   const auto padded = [width](const std::string& text) {
     return text + std::string(width - std::min(width, text.size()), ' ');
   };
-  out << padded("run") << "   slope N/s  travel m  b integral ± 1σ      Kelly b   f_c integral ± 1σ    Kelly f_c\n";
+  const FreedomInfo& freedom = source.freedom;
+  const std::string slope = "slope " + std::string(freedom.effort_unit) + "/s";
+  const std::string travel = "travel " + std::string(freedom.position_unit);
+  const auto right = [](const std::string& text, std::size_t columns) {
+    const auto letters =
+        static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
+    return std::string(columns - std::min(columns, letters), ' ') + text;
+  };
+  out << padded("run") << right(slope, 13) << right(travel, 12)
+      << "  b integral ± 1σ          Kelly b   f_c integral ± 1σ        Kelly f_c\n";
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const RunEstimate& run = result.runs[i];
     out << padded(source.names[i])
-        << formatted("  %9.4g  %8.4f  %8.5f ± %7.5f  %9.5f  %8.5f ± %7.5f  %9.5f\n", run.direction * run.kelly.rate,
-                     run.travel, run.integral.friction.viscous, run.integral_error.viscous, run.kelly.friction.viscous,
-                     run.integral.friction.coulomb, run.integral_error.coulomb, run.kelly.friction.coulomb);
+        << formatted("  %11.4g  %10.4f  %10.6f ± %9.6f  %11.6f  %10.6f ± %9.6f  %11.6f\n",
+                     run.direction * run.kelly.rate, run.travel, run.integral.friction.viscous,
+                     run.integral_error.viscous, run.kelly.friction.viscous, run.integral.friction.coulomb,
+                     run.integral_error.coulomb, run.kelly.friction.coulomb);
   }
   out << '\n';
   for (const PlaceEstimate& place : result.places) {
     out << (place.place.empty() ? "all runs" : place.place)
-        << formatted(": b = %.5f ± %.5f N·s/m, f_c = %.5f ± %.5f N; Kelly: b = %.5f, f_c = %.5f, ",
-                     place.integral.viscous, place.integral_error.viscous, place.integral.coulomb,
-                     place.integral_error.coulomb, place.kelly.viscous, place.kelly.coulomb)
+        << formatted(": b = %.6f ± %.6f %s, f_c = %.6f ± %.6f %s; Kelly: b = %.6f, f_c = %.6f, ",
+                     place.integral.viscous, place.integral_error.viscous, std::string(freedom.viscous_unit).c_str(),
+                     place.integral.coulomb, place.integral_error.coulomb, std::string(freedom.effort_unit).c_str(),
+                     place.kelly.viscous, place.kelly.coulomb)
         << (place.kelly_valid ? "valid" : "not valid") << '\n';
   }
-  out << formatted("mass %.4f kg%s, force noise %.2g N\n\n", result.mass, source.config.mass ? " (given)" : " (fitted)",
-                   result.force_noise)
+  const bool turns = freedom.freedom == Freedom::kRotation;
+  out << formatted("%s %.4g %s%s, noise %.2g %s\n\n", turns ? "inertia" : "mass", result.mass,
+                   std::string(freedom.inertia_unit).c_str(), source.config.mass ? " (given)" : " (fitted)",
+                   result.force_noise, std::string(freedom.effort_unit).c_str())
       << "Trusted: " << to_string(result.trust) << ". " << result.reason << ".\n";
   for (const std::string& warning : result.warnings) out << "Warning: " << warning << ".\n";
-  out << "\n# Lower bounds (3 standard deviations) for a scene:\n[limiter]\ncoulomb_friction_n = "
-      << rounded_down(result.lower_bound.coulomb)
-      << "\nviscous_friction_n_s_per_m = " << rounded_down(result.lower_bound.viscous) << '\n';
+  const Friction bound = bound_of(source, result);
+  out << "\n# Lower bounds (3 standard deviations" << (freedom.share < 1 ? ", and 2 % for turns about moving axes" : "")
+      << ") for a scene:\n[" << freedom.table << "]\n"
+      << freedom.coulomb_key << " = " << rounded_down(bound.coulomb) << '\n'
+      << freedom.viscous_key << " = " << rounded_down(bound.viscous) << '\n';
 }
 
 // ---- JSON -------------------------------------------------------------------------------------------------------
 
 /// `viscous_…` and `coulomb_…`, with a prefix to the keys.
-void add(JsonLine& line, const std::string& prefix, const Friction& friction) {
-  line.add(prefix + "viscous_n_s_per_m", friction.viscous).add(prefix + "coulomb_n", friction.coulomb);
+void add(JsonLine& line, const std::string& prefix, const Friction& friction, bool turns) {
+  line.add(prefix + (turns ? "viscous_nm_s_per_rad" : "viscous_n_s_per_m"), friction.viscous)
+      .add(prefix + (turns ? "coulomb_nm" : "coulomb_n"), friction.coulomb);
 }
 
 void write_json(const Source& source, const Identification& result, std::ostream& out) {
+  const bool turns = source.freedom.freedom == Freedom::kRotation;
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const RunEstimate& run = result.runs[i];
     JsonLine line;
     line.add("run", source.names[i])
         .add("place", run.place)
-        .add("slope_n_per_s", run.direction * run.kelly.rate)
-        .add("travel_m", run.travel);
-    add(line, "integral_", run.integral.friction);
-    add(line, "integral_sigma_", run.integral_error);
-    add(line, "kelly_", run.kelly.friction);
+        .add(turns ? "slope_nm_per_s" : "slope_n_per_s", run.direction * run.kelly.rate)
+        .add(turns ? "travel_rad" : "travel_m", run.travel);
+    add(line, "integral_", run.integral.friction, turns);
+    add(line, "integral_sigma_", run.integral_error, turns);
+    add(line, "kelly_", run.kelly.friction, turns);
     out << line.add("kelly_long_enough", run.kelly.long_enough()).str() << '\n';
   }
   JsonLine line;
-  line.add("result", to_string(result.trust)).add("reason", result.reason);
-  add(line, "estimate_", result.estimate);
-  add(line, "lower_bound_", result.lower_bound);
-  line.add("mass_kg", result.mass).add("force_noise_n", result.force_noise).add("warnings", result.warnings);
+  line.add("result", to_string(result.trust)).add("of", source.freedom.name).add("reason", result.reason);
+  add(line, "estimate_", result.estimate, turns);
+  add(line, "lower_bound_", bound_of(source, result), turns);
+  line.add(turns ? "inertia_kg_m2" : "mass_kg", result.mass)
+      .add(turns ? "torque_noise_nm" : "force_noise_n", result.force_noise)
+      .add("warnings", result.warnings);
   out << line.str() << '\n';
 }
 

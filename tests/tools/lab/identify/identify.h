@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/ledger/friction.h"
+#include "tests/tools/lab/identify/freedom.h"
 
 namespace tendon::lab {
 
@@ -17,11 +18,14 @@ struct IdentifyOptions {
   std::vector<std::filesystem::path> files = {};  ///< CSV, one run each
   /// Axis and pose, once for each file in order. Left out: all runs are of one place.
   std::vector<std::string> places = {};
-  std::optional<std::string> profile = {};          ///< simulate the device profile of that name
-  std::optional<Friction> simulated_friction = {};  ///< simulate a device of 75 g and 30 µm with that friction
-  std::uint64_t seed = 1;                           ///< of the simulation
-  std::optional<double> mass = {};                  ///< kg; left out: fitted, or that of the simulated device
-  std::optional<double> encoder_step = {};          ///< m; left out: 30 µm, or that of the simulated device
+  std::optional<std::string> profile = {};  ///< simulate the device profile of that name
+  Freedom freedom = Freedom::kMovement;
+  /// Simulate a device with that friction: a movement or fingers of 75 g and 30 µm, a rotation of 10⁻⁴ kg·m² and 0.1
+  /// mrad.
+  std::optional<Friction> simulated_friction = {};
+  std::uint64_t seed = 1;                   ///< of the simulation
+  std::optional<double> mass = {};          ///< kg or kg·m²; left out: fitted, or that of the simulated device
+  std::optional<double> encoder_step = {};  ///< m or rad; left out: 30 µm, 0.1 mrad, or as simulated
   bool json = false;
 };
 

@@ -2,6 +2,7 @@
 // tendon-identify: the friction of a device from runs in which its force rises until it moves. Its command line.
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -21,10 +22,13 @@ int main(int argc, char** argv) {
       "at\n"
       "5 poses of each axis. One CSV file each, with a header line and the columns t_s, x_m, force_n (force on the "
       "hand).\n"
+      "With --of rotation it is a torque that rises and a turn about one axis: t_s, angle_rad, torque_nm; with --of\n"
+      "gripper the travel of the fingers and the force on them: t_s, x_m, force_n.\n"
       "\nExample: without hardware\n"
       "  tendon-identify --simulate-friction 0.005,0.05\n"
+      "  tendon-identify --of rotation --simulate-friction 0.0005,0.001\n"
       "Example: recorded runs\n"
-      "  tendon-identify forth.csv back.csv --axis x --axis x --mass-kg 0.075 --encoder-step-m 3e-5\n"
+      "  tendon-identify forth.csv back.csv --axis x --axis x --mass 0.075 --encoder-step 3e-5\n"
       "\nExit: 0 done; 1 a file is bad or a run cannot be used; 2 wrong usage.");
 
   app.set_version_flag("--version", version_text());
@@ -32,19 +36,27 @@ int main(int argc, char** argv) {
   std::vector<std::string> files;
   std::string profile;
   std::vector<double> friction;
+  std::map<std::string, Freedom> freedoms;
+  for (const FreedomInfo& each : kFreedoms) freedoms.emplace(each.name, each.freedom);
   double mass = 0;
   double encoder_step = 0;
+  app.add_option("--of", options.freedom, "what the runs move")
+      ->transform(CLI::CheckedTransformer(freedoms, CLI::ignore_case).description(""))
+      ->type_name("movement|rotation|gripper");
   app.add_option("RUN", files, "runs, one file each")->type_name("FILE.csv");
   app.add_option("--axis", options.places, "axis and pose of a run; once for each file, in order")
       ->type_name("TEXT")
       ->allow_extra_args(false);
   CLI::Option* const mass_option =
-      app.add_option("--mass-kg", mass, "handle and mechanism; left out: fitted")->type_name("KG");
+      app.add_option("--mass", mass, "handle and mechanism, kg, or its inertia, kg·m²; left out: fitted")
+          ->type_name("M");
   CLI::Option* const step_option =
-      app.add_option("--encoder-step-m", encoder_step, "one count; left out: 3e-5")->type_name("M");
+      app.add_option("--encoder-step", encoder_step, "one count, m or rad; left out: 3e-5 m, 1e-4 rad")
+          ->type_name("STEP");
   app.add_option("--simulate", profile, "simulate a device instead: phantom-premium, touch, falcon")
       ->type_name("PROFILE");
-  app.add_option("--simulate-friction", friction, "simulate 75 g with b (N·s/m) and f_c (N) instead")
+  app.add_option("--simulate-friction", friction,
+                 "simulate 75 g with b (N·s/m) and f_c (N) instead, or 1e-4 kg·m² with N·m·s/rad and N·m")
       ->type_name("B,FC")
       ->delimiter(',')
       ->expected(2);

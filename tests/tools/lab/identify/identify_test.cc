@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/server/scratch_folder.h"
+#include "tests/support/dice.h"
 #include "tests/tools/lab/identify/simulated_ramps.h"
 
 namespace tendon::lab {
@@ -116,6 +117,53 @@ TEST_F(Identify, SimulatesEveryProfile) {
   }
 }
 
+/// Of rotations and grippers of any friction; the seeds are of frictions and of noise.
+TEST_F(Identify, TheBoundsOfARotationAndAGripperAreBelowTheTruthAndNearIt) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Dice dice(seed);
+    const bool turns = seed % 2 == 0;
+    const Friction truth = turns ? Friction{.coulomb = dice.decades(-3.3, -2.7), .viscous = dice.decades(-4, -3)}
+                                 : Friction{.coulomb = dice.decades(-1.6, -1), .viscous = dice.decades(-1.3, -0.3)};
+    const std::string text = output_of(
+        {.freedom = turns ? Freedom::kRotation : Freedom::kGripper, .simulated_friction = truth, .seed = seed});
+    const auto fragment = text.find(turns ? "\n[limiter.rotation]\n" : "\n[limiter.gripper]\n");
+    ASSERT_NE(fragment, std::string::npos) << text;
+    const std::string scene = text.substr(fragment);
+    const double coulomb = value_after(scene, turns ? "coulomb_friction_nm = " : "coulomb_friction_n = ");
+    const double viscous =
+        value_after(scene, turns ? "viscous_friction_nm_s_per_rad = " : "viscous_friction_n_s_per_m = ");
+    const double most = turns ? 0.985 : 1;
+    EXPECT_LE(coulomb, most * truth.coulomb) << text;
+    EXPECT_LE(viscous, most * truth.viscous) << text;
+    EXPECT_GE(coulomb, 0.85 * truth.coulomb) << text;
+    EXPECT_GE(viscous, 0.7 * truth.viscous) << text;
+  }
+}
+
+TEST_F(Identify, ReadsTheColumnsOfARotation) {
+  const auto file = folder_.path() / "turn.csv";
+  std::ofstream(file) << "t_s,x_m,force_n\n0,0,0\n";
+  EXPECT_EQ(error_of({.files = {file}, .freedom = Freedom::kRotation}),
+            file.string() + ":1: expected a header line with a column 'angle_rad', found 't_s,x_m,force_n'");
+  RampExperiment experiment{.freedom = Freedom::kRotation, .rates = {0.001, 0.002, 0.01}, .repeats = 1, .travel = 2};
+  experiment.device.mass = 0.1;
+  experiment.device.rotation = SimulatedRotation::Config{
+      .inertia = 1e-4, .viscous_friction = 5e-4, .coulomb_friction = 1e-3, .max_torque = 1, .encoder_step = 1e-4};
+  experiment.force_noise = 1e-4;
+  std::vector<std::filesystem::path> files;
+  for (const RampRun& run : simulated_ramps(experiment)) {
+    files.push_back(folder_.path() / (std::to_string(files.size()) + ".csv"));
+    std::ofstream out(files.back());
+    out.precision(12);
+    out << "t_s,angle_rad,torque_nm\n";
+    for (const RampSample& sample : run.samples)
+      out << sample.t << ',' << sample.position << ',' << sample.force << '\n';
+  }
+  const std::string text = output_of({.files = files, .freedom = Freedom::kRotation, .mass = 1e-4, .json = true});
+  EXPECT_NEAR(value_after(text, "\"estimate_viscous_nm_s_per_rad\":"), 5e-4, 5e-5) << text;
+  EXPECT_NEAR(value_after(text, "\"estimate_coulomb_nm\":"), 1e-3, 5e-5) << text;
+}
+
 TEST_F(Identify, NamesTheFileAndTheLineThatIsBad) {
   auto files = recorded_runs();
   {
@@ -140,8 +188,8 @@ TEST_F(Identify, RefusesOptionsThatMakeNoSense) {
   EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .profile = "touch"}), "more than one"));
   EXPECT_TRUE(holds(error_of({.files = {"a.csv"}, .places = {"x", "y"}}), "--axis once for each of 1 files, found 2"));
   EXPECT_EQ(error_of({.profile = "tuch"}), "--simulate tuch: expected one of phantom-premium, touch, falcon");
-  EXPECT_TRUE(holds(error_of({.profile = "touch", .mass = -1}), "--mass-kg -1"));
-  EXPECT_TRUE(holds(error_of({.profile = "touch", .encoder_step = 0}), "--encoder-step-m 0"));
+  EXPECT_TRUE(holds(error_of({.profile = "touch", .mass = -1}), "--mass -1"));
+  EXPECT_TRUE(holds(error_of({.profile = "touch", .encoder_step = 0}), "--encoder-step 0"));
   EXPECT_TRUE(holds(error_of({.simulated_friction = Friction{.coulomb = -1, .viscous = 0.1}}), "coulomb_friction"));
 }
 

@@ -19,7 +19,6 @@ namespace tendon::lab {
 namespace {
 
 constexpr std::size_t kMaxRows = 4'000'000;  // more than an hour at 1 kHz: a wrong path may lead to anything
-constexpr std::array<std::string_view, 3> kColumns = {"t_s", "x_m", "force_n"};
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
@@ -46,10 +45,13 @@ std::optional<double> finite_number(std::string_view text) {
 
 class Reader {
  public:
-  Reader(std::istream& in, const std::string& name) : in_(in), name_(name) {}
+  Reader(std::istream& in, const std::string& name, const FreedomInfo& freedom)
+      : in_(in), name_(name), columns_{"t_s", freedom.position, freedom.effort} {}
 
   RampRun run() {
-    if (!next_line()) fail("expected a header line with t_s, x_m and force_n, found nothing");
+    if (!next_line())
+      fail("expected a header line with t_s, " + std::string(columns_[1]) + " and " + std::string(columns_[2]) +
+           ", found nothing");
     find_columns();
     RampRun run;
     while (next_line()) {
@@ -80,15 +82,15 @@ class Reader {
   }
 
   void find_columns() {
-    for (std::size_t i = 0; i < kColumns.size(); ++i) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
       std::optional<std::size_t> found;
       for (std::size_t j = 0; j < cells_.size(); ++j) {
-        if (cells_[j] != kColumns.at(i)) continue;
-        if (found) fail("expected one column '" + std::string(kColumns.at(i)) + "', found two");
+        if (cells_[j] != columns_.at(i)) continue;
+        if (found) fail("expected one column '" + std::string(columns_.at(i)) + "', found two");
         found = j;
       }
       if (!found) {
-        fail("expected a header line with a column '" + std::string(kColumns.at(i)) + "', found '" +
+        fail("expected a header line with a column '" + std::string(columns_.at(i)) + "', found '" +
              std::string(trimmed(line_)) + "'");
       }
       where_.at(i) = *found;
@@ -96,7 +98,7 @@ class Reader {
   }
 
   double number(std::size_t column) const {
-    const std::string what = "expected a finite number as " + std::string(kColumns.at(column));
+    const std::string what = "expected a finite number as " + std::string(columns_.at(column));
     if (where_.at(column) >= cells_.size()) fail(what + ", found the end of the line");
     const std::string_view cell = cells_[where_.at(column)];
     const auto value = finite_number(cell);
@@ -109,16 +111,19 @@ class Reader {
   std::string line_;
   std::vector<std::string_view> cells_;  ///< of line_
   std::size_t line_number_ = 0;
-  std::array<std::size_t, kColumns.size()> where_{};
+  std::array<std::string_view, 3> columns_;
+  std::array<std::size_t, 3> where_{};
 };
 
 }  // namespace
 
-RampRun read_ramp_csv(std::istream& in, const std::string& name) { return Reader(in, name).run(); }
+RampRun read_ramp_csv(std::istream& in, const std::string& name, Freedom freedom) {
+  return Reader(in, name, info(freedom)).run();
+}
 
-RampRun load_ramp_csv(const std::filesystem::path& file) {
+RampRun load_ramp_csv(const std::filesystem::path& file, Freedom freedom) {
   std::ifstream in = open_regular_file(file, "ramp run");
-  return read_ramp_csv(in, file.string());
+  return read_ramp_csv(in, file.string(), freedom);
 }
 
 }  // namespace tendon::lab

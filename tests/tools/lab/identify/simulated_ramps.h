@@ -8,11 +8,14 @@
 #include "core/identification/ramp_run.h"
 #include "devices/device.h"
 #include "devices/simulated/simulated_device.h"
+#include "tests/tools/lab/identify/freedom.h"
 
 namespace tendon::lab {
 
-/// One run of the friction experiment on a device that nobody touches: from rest, a force along x that rises from zero.
+/// One run of the friction experiment on a device that nobody touches: from rest, a force along x that rises from zero;
+/// or a torque about x, or a force on the fingers, with their units.
 struct RampPlan {
+  Freedom freedom = Freedom::kMovement;
   double rate = 0.1;     ///< N/s, not 0; below 0: towards −x
   double travel = 0.25;  ///< m, after which it ends
   Duration period = std::chrono::milliseconds(1);
@@ -29,7 +32,8 @@ RampRun run_ramp(Device& device, LocalTime begin, const RampPlan& plan);
 /// The friction experiment of the paper (Tables II, III) on a simulated device: from rest, a force that rises from zero
 /// at a constant rate, until the handle has travelled through its workspace.
 struct RampExperiment {
-  SimulatedDevice::Config device;                ///< without a hand
+  SimulatedDevice::Config device{};              ///< without a hand
+  Freedom freedom = Freedom::kMovement;          ///< the units below are those of a movement
   std::vector<double> rates = {0.05, 0.1, 0.5};  ///< N/s, each > 0; every one is run in both directions
   int repeats = 5;                               ///< of each rate and direction
   double travel = 0.25;                          ///< m

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace tendon::lab {
+
+/// What of a handle an experiment moves.
+enum class Freedom : std::uint8_t {
+  kMovement,  ///< one axis of its position: m, N
+  kRotation,  ///< a turn about one axis: rad, N·m
+  kGripper,   ///< its fingers: m of travel, N at the fingers
+};
+
+/// The words for it: the fit is the same with other units.
+struct FreedomInfo {
+  Freedom freedom;
+  std::string_view name;      ///< of `tendon-identify --of`
+  std::string_view position;  ///< column of a CSV file
+  std::string_view effort;    ///< column of a CSV file
+  std::string_view position_unit;
+  std::string_view effort_unit;
+  std::string_view viscous_unit;
+  std::string_view inertia_unit;
+  std::string_view table;        ///< of a scene, where the bounds go
+  std::string_view coulomb_key;  ///< there
+  std::string_view viscous_key;
+  /// A bound is so much below what was found: HandlePort books a turn as if its axis stayed, which takes up to 2 % of
+  /// the viscous friction more than there is.
+  double share;
+};
+
+inline constexpr FreedomInfo kFreedoms[] = {
+    {Freedom::kMovement, "movement", "x_m", "force_n", "m", "N", "N·s/m", "kg", "limiter", "coulomb_friction_n",
+     "viscous_friction_n_s_per_m", 1},
+    {Freedom::kRotation, "rotation", "angle_rad", "torque_nm", "rad", "N·m", "N·m·s/rad", "kg·m²", "limiter.rotation",
+     "coulomb_friction_nm", "viscous_friction_nm_s_per_rad", 0.98},
+    {Freedom::kGripper, "gripper", "x_m", "force_n", "m", "N", "N·s/m", "kg", "limiter.gripper", "coulomb_friction_n",
+     "viscous_friction_n_s_per_m", 1},
+};
+
+constexpr const FreedomInfo& info(Freedom freedom) noexcept { return kFreedoms[static_cast<std::size_t>(freedom)]; }
+
+}  // namespace tendon::lab
