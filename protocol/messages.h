@@ -277,6 +277,9 @@ struct DeviceDescription {
   std::vector<ChannelDescription> channels{};
 };
 
+/// Which hand holds a device.
+enum class Hand : std::uint8_t { kAny = 0, kLeft = 1, kRight = 2 };
+
 /// What the handle of a device is and can do. It is a message of its own because it would not fit beside the longest
 /// DeviceDescription into one datagram.
 struct HandleDescription {
@@ -288,6 +291,8 @@ struct HandleDescription {
   double max_torque = 0;                 ///< N·m, norm of the torque that the device can give out; 0 = none
   std::optional<double> gripper_open{};  ///< rad, the opening of the open gripper; empty: no gripper
   double max_gripper_force = 0;          ///< N, on the fingers; 0 = it has no motor
+  std::string group{};                   ///< devices of one body have the same; at most 24 bytes; empty: by itself
+  Hand hand = Hand::kAny;
 };
 
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.

@@ -54,6 +54,8 @@ HandleDescription handle_of(const Scene& scene, const DeviceInfo& device) {
     handle.gripper_open = device.gripper->open;
     handle.max_gripper_force = device.gripper->max_force;
   }
+  handle.group = scene.group;
+  handle.hand = scene.hand;
   return handle;
 }
 

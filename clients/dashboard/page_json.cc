@@ -47,6 +47,18 @@ Json in_json(const std::optional<Press>& press) {
           {"words", press->words}};
 }
 
+std::string_view name(Hand hand) {
+  switch (hand) {
+    case Hand::kAny:
+      return "any";
+    case Hand::kLeft:
+      return "left";
+    case Hand::kRight:
+      return "right";
+  }
+  return "unknown";
+}
+
 Json in_json(const std::optional<HandleDescription>& handle) {
   if (!handle) return nullptr;
   Json turned;
@@ -56,7 +68,9 @@ Json in_json(const std::optional<HandleDescription>& handle) {
           {"orientation_measured", handle->orientation_measured},
           {"max_torque_nm", handle->max_torque},
           {"gripper_open_rad", handle->gripper_open ? Json(*handle->gripper_open) : Json()},
-          {"max_gripper_force_n", handle->max_gripper_force}};
+          {"max_gripper_force_n", handle->max_gripper_force},
+          {"group", handle->group},
+          {"hand", name(handle->hand)}};
 }
 
 Json in_json(const DeviceDescription& about, const std::optional<HandleDescription>& handle,

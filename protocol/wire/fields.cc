@@ -114,6 +114,10 @@ bool read(pb::Role from, Role& to) noexcept { return read_enum(from, Role::kCont
 bool read(pb::Code from, Code& to) noexcept { return read_enum(from, Code::kReplaced, to); }
 bool read(pb::Safety from, Safety& to) noexcept { return read_enum(from, Safety::kUnguarded, to); }
 bool read(pb::ChannelRule from, ChannelRule& to) noexcept { return read_enum(from, ChannelRule::kPriority, to); }
+bool read(pb::Hand from, Hand& to) noexcept {
+  to = Hand::kAny;
+  return from == pb::HAND_ANY || read_enum(from, Hand::kRight, to);
+}
 
 bool read_device(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxDevices; }
 bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxChannels; }

@@ -53,6 +53,7 @@ bool read(pb::Role from, Role& to) noexcept;
 bool read(pb::Code from, Code& to) noexcept;
 bool read(pb::Safety from, Safety& to) noexcept;
 bool read(pb::ChannelRule from, ChannelRule& to) noexcept;
+bool read(pb::Hand from, Hand& to) noexcept;
 
 bool read_device(std::uint32_t from, std::uint32_t& to) noexcept;
 bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept;

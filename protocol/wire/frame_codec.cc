@@ -380,8 +380,9 @@ bool read(const pb::HandleDescription& from, HandleDescription& to) {
   }
   to.orientation_measured = from.orientation_measured();
   if (from.has_gripper_open_rad() && !read_size(from.gripper_open_rad(), to.gripper_open.emplace())) return false;
+  if (!read(from.group(), limits::kMaxLabel, to.group)) return false;
   return read_device(from.device(), to.device) && read_size(from.max_torque_nm(), to.max_torque) &&
-         read_size(from.max_gripper_force_n(), to.max_gripper_force);
+         read_size(from.max_gripper_force_n(), to.max_gripper_force) && read(from.hand(), to.hand);
 }
 
 void write(const HandleDescription& from, pb::HandleDescription& to) {
@@ -395,6 +396,8 @@ void write(const HandleDescription& from, pb::HandleDescription& to) {
   to.set_max_torque_nm(from.max_torque);
   if (from.gripper_open) to.set_gripper_open_rad(*from.gripper_open);
   to.set_max_gripper_force_n(from.max_gripper_force);
+  to.set_group(clip(from.group, limits::kMaxLabel));
+  to.set_hand(static_cast<pb::Hand>(from.hand));
 }
 
 }  // namespace

@@ -424,6 +424,11 @@ void declare_device(Table& device, Draft& draft) {
     keys.key("axes", draft.scene.axes, Axes{},
              "how its base frame lies before the operator; programs turn positions by it",
              Absent{.text = "the driver's; of a recorded hand it is not known"});
+    keys.key("group", draft.scene.group, Label{}, "devices of one body, as two arms or five fingers, have the same",
+             Absent{.text = "it is by itself"});
+    keys.key("held_by", draft.scene.hand,
+             Names<Hand>{{{"any", Hand::kAny}, {"left", Hand::kLeft}, {"right", Hand::kRight}}},
+             "the hand of the operator that holds it");
     declare_kind(kind, keys, draft);
   });
 }

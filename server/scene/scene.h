@@ -60,7 +60,9 @@ struct Scene {
 
   std::string name;  ///< of the device, as clients claim it
   AnyDevice device;
-  std::string axes;                          ///< of its base frame, "right=x up=y user=z"; empty: not known
+  std::string axes;   ///< of its base frame, "right=x up=y user=z"; empty: not known
+  std::string group;  ///< devices of one body have the same; empty: by itself
+  Hand hand = Hand::kAny;
   std::optional<SafeDevice::Config> safety;  ///< empty: no safety layer; never for a real device
   HapticLoop::Config loop;
   std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere

@@ -153,6 +153,8 @@ void print(Line& line, const ControlAck& ack) {
   line << std::uint32_t{ack.handle->orientation_measured} << ack.handle->max_torque;
   if (ack.handle->gripper_open) line << "gripper" << *ack.handle->gripper_open;
   line << ack.handle->max_gripper_force;
+  line.put_text(ack.handle->group);
+  line << static_cast<std::uint32_t>(ack.handle->hand);
 }
 
 void print(Line& line, const Bye& bye) {

@@ -239,7 +239,9 @@ inline HandleDescription handle_description() {
           .orientation_measured = true,
           .max_torque = 0.125,
           .gripper_open = 0.5,
-          .max_gripper_force = 8};
+          .max_gripper_force = 8,
+          .group = "arms",
+          .hand = Hand::kRight};
 }
 
 inline ControlAck handle_described(std::uint32_t id) {

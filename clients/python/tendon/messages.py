@@ -300,6 +300,14 @@ class DeviceDescription:
     channels: Sequence[ChannelDescription]
 
 
+class Hand(IntEnum):
+    """Which hand holds a device."""
+
+    ANY = 0
+    LEFT = 1
+    RIGHT = 2
+
+
 @dataclass(frozen=True, slots=True)
 class HandleDescription:
     """What the handle of a device is and can do (FEATURE_HANDLE)."""
@@ -317,6 +325,9 @@ class HandleDescription:
     """rad, the opening of the open gripper; None: no gripper."""
     max_gripper_force: float = 0.0
     """N, on the fingers; 0 = the gripper has no motor."""
+    group: str = ""
+    """Devices of one body (two arms, five fingers) have the same; empty: by itself."""
+    hand: Hand = Hand.ANY
 
 
 @dataclass(frozen=True, slots=True)

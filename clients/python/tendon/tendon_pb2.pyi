@@ -19,6 +19,9 @@ CODE_TIMED_OUT: Code
 CODE_UNSPECIFIED: Code
 CODE_UNSUPPORTED: Code
 DESCRIPTOR: _descriptor.FileDescriptor
+HAND_ANY: Hand
+HAND_LEFT: Hand
+HAND_RIGHT: Hand
 MODE_ACTIVE: Mode
 MODE_DECAYING: Mode
 MODE_FAULT: Mode
@@ -354,10 +357,12 @@ class Grant(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
 
 class HandleDescription(_message.Message):
-    __slots__ = ["buttons", "device", "gripper_open_rad", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured"]
+    __slots__ = ["buttons", "device", "gripper_open_rad", "group", "hand", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured"]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     GRIPPER_OPEN_RAD_FIELD_NUMBER: _ClassVar[int]
+    GROUP_FIELD_NUMBER: _ClassVar[int]
+    HAND_FIELD_NUMBER: _ClassVar[int]
     MAX_GRIPPER_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MAX_TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
     OPERATOR_FROM_DEVICE_FIELD_NUMBER: _ClassVar[int]
@@ -365,11 +370,13 @@ class HandleDescription(_message.Message):
     buttons: _containers.RepeatedScalarFieldContainer[str]
     device: int
     gripper_open_rad: float
+    group: str
+    hand: Hand
     max_gripper_force_n: float
     max_torque_nm: float
     operator_from_device: Quat
     orientation_measured: bool
-    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ...) -> None: ...
+    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ..., group: _Optional[str] = ..., hand: _Optional[_Union[Hand, str]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]
@@ -578,6 +585,9 @@ class Welcome(_message.Message):
     def __init__(self, version: _Optional[int] = ..., features: _Optional[_Iterable[str]] = ..., role: _Optional[_Union[Role, str]] = ..., device_name: _Optional[str] = ..., max_force_n: _Optional[float] = ..., position_resolution_m: _Optional[float] = ..., loop_hz: _Optional[int] = ..., timeout_ms: _Optional[int] = ..., server: _Optional[str] = ..., grants: _Optional[_Iterable[_Union[Grant, _Mapping]]] = ...) -> None: ...
 
 class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class Hand(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class ChannelRule(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

@@ -453,13 +453,13 @@ function writeDescription(from: DeviceDescription): pb.DeviceDescription {
 
 function readHandle(from: pb.HandleDescription): HandleDescription | undefined {
   const { device, buttons, operatorFromDevice: axes, orientationMeasured, gripperOpenRad: gripperOpen } = from;
-  const { maxTorqueNm: maxTorque, maxGripperForceN: maxGripperForce } = from;
-  const good = isDevice(device) && buttons.length <= limits.kMaxButtons &&
+  const { maxTorqueNm: maxTorque, maxGripperForceN: maxGripperForce, group, hand } = from;
+  const good = isDevice(device) && isText(group, limits.kMaxLabel) && (hand === pb.Hand.ANY || isEnum(hand, pb.HandSchema)) && buttons.length <= limits.kMaxButtons &&
     buttons.every((name) => isText(name, limits.kMaxLabel)) && (!axes || isRotation(axes)) &&
     [maxTorque, gripperOpen ?? 0, maxGripperForce].every(isMagnitude);
   if (!good) return undefined;
   return {
-    device, buttons: [...buttons], orientationMeasured, maxTorque, maxGripperForce,
+    device, buttons: [...buttons], orientationMeasured, maxTorque, maxGripperForce, group, hand,
     ...(axes && { operatorFromDevice: readQuat(axes) }), ...(gripperOpen !== undefined && { gripperOpen }),
   };
 }
@@ -474,6 +474,8 @@ function writeHandle(from: HandleDescription): pb.HandleDescription {
     maxTorqueNm: maxTorque,
     ...(gripperOpen !== undefined && { gripperOpenRad: gripperOpen }),
     maxGripperForceN: maxGripperForce,
+    group: clip(from.group, limits.kMaxLabel),
+    hand: from.hand,
   });
 }
 

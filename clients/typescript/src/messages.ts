@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
 // frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
-import { ChannelRule, Code, Mode, Role, Safety } from "./gen/tendon_pb.js";
+import { ChannelRule, Code, Hand, Mode, Role, Safety } from "./gen/tendon_pb.js";
 import type { Nanoseconds } from "./time.js";
 
-export { ChannelRule, Code, Mode, Role, Safety };
+export { ChannelRule, Code, Hand, Mode, Role, Safety };
 
 /** The version of the wire that this client speaks. */
 export const kProtocolVersion = 1;
@@ -242,6 +242,9 @@ export interface HandleDescription {
   readonly gripperOpen?: number | undefined;
   /** N on the fingers; 0 = the gripper has no motor. */
   readonly maxGripperForce: number;
+  /** Devices of one body (two arms, five fingers) have the same; empty: by itself. */
+  readonly group: string;
+  readonly hand: Hand;
 }
 
 /** Two quantiles of a delay; below zero only where two clocks had to be compared. */

@@ -11,7 +11,7 @@ const product = (a, b) => [
   a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
 ];
 const kBox = [[-0.08, -0.06, -0.06], [0.08, 0.06, 0.06]];
-const handle = (more) => ({ operator_from_device: [1, 0, 0, 0], buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, ...more });
+const handle = (more) => ({ operator_from_device: [1, 0, 0, 0], buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any", ...more });
 
 /** A base frame with x to the user, y to the right and z up, as of a Falcon. */
 export const kTurnedFrame = [0.5, -0.5, -0.5, -0.5];

@@ -90,7 +90,9 @@ TEST(PageJson, TellsWhatTheHandleIs) {
                                     .orientation_measured = true,
                                     .max_torque = 0.2,
                                     .gripper_open = 0.5,
-                                    .max_gripper_force = 8});
+                                    .max_gripper_force = 8,
+                                    .group = "arms",
+                                    .hand = Hand::kLeft});
   EXPECT_GT(board.version(), version) << "or no page is told";
   EXPECT_EQ(json::parse(server_json(board, {}))["devices"][0]["handle"],
             (json{{"operator_from_device", {0.5, 0.5, 0.5, 0.5}},
@@ -98,7 +100,9 @@ TEST(PageJson, TellsWhatTheHandleIs) {
                   {"orientation_measured", true},
                   {"max_torque_nm", 0.2},
                   {"gripper_open_rad", 0.5},
-                  {"max_gripper_force_n", 8.0}}));
+                  {"max_gripper_force_n", 8.0},
+                  {"group", "arms"},
+                  {"hand", "left"}}));
   board.described(HandleDescription{.device = 0});
   const json handle = json::parse(server_json(board, {}))["devices"][0]["handle"];
   EXPECT_TRUE(handle["operator_from_device"].is_null());

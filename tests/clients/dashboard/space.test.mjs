@@ -27,7 +27,7 @@ const near = (actual, wanted, what) => {
   assert.equal(actual.length, wanted.length, what);
   actual.forEach((v, i) => assert.ok(Math.abs(v - wanted[i]) < 1e-6, `${what}: ${actual} is not ${wanted}`));
 };
-const kHandle = { operator_from_device: null, buttons: [], orientation_measured: true, max_torque_nm: 0.2, gripper_open_rad: null, max_gripper_force_n: 0 };
+const kHandle = { operator_from_device: null, buttons: [], orientation_measured: true, max_torque_nm: 0.2, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any" };
 const kSample = { t: 0, x: 0.1, y: 0.2, z: 0.3, wx: NaN, wy: NaN, wz: NaN, ax: 1, ay: 2, az: 3, permitted: 1, energy: 0, reasons: 0, mode: 2, age: 0, late: 0 };
 
 it("turns everything of a device into the frame of who looks at it", async (test) => {

@@ -140,6 +140,7 @@ def _frame(frame: Frame) -> list[object]:
             opens = frame.handle.gripper_open
             words += [] if opens is None else ["gripper", _double(opens)]
             words.append(_double(frame.handle.max_gripper_force))
+            words += [_text(frame.handle.group), int(frame.handle.hand)]
         return words
     if isinstance(frame, LinkReport):
         return _report(frame)

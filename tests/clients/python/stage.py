@@ -16,6 +16,7 @@ from tendon import (
     Code,
     Config,
     DeviceDescription,
+    Hand,
     HandleDescription,
     ForceClient,
     Mode,
@@ -55,7 +56,17 @@ DESCRIPTION = DeviceDescription(
     ),
 )
 
-HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"), True, 0.125, 0.5, 8.0)
+HANDLE = HandleDescription(
+    device=1,
+    operator_from_device=(0.5, -0.5, 0.5, 0.5),
+    buttons=("right", "forward", "centre", "left"),
+    orientation_measured=True,
+    max_torque=0.125,
+    gripper_open=0.5,
+    max_gripper_force=8.0,
+    group="arms",
+    hand=Hand.RIGHT,
+)
 
 
 class Stage:

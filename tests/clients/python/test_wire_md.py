@@ -21,6 +21,7 @@ from tendon.messages import (
     ForceCommand,
     ForceTable,
     Grip,
+    Hand,
     HandleDescription,
     Hello,
     LinkReport,
@@ -114,7 +115,17 @@ FORCE_TORQUE = replace(
     ),
     grip_force=0.75,
 )
-HANDLE = HandleDescription(1, (0.5, -0.5, 0.5, 0.5), ("right", "forward", "centre", "left"), True, 0.125, 0.5, 8.0)
+HANDLE = HandleDescription(
+    device=1,
+    operator_from_device=(0.5, -0.5, 0.5, 0.5),
+    buttons=("right", "forward", "centre", "left"),
+    orientation_measured=True,
+    max_torque=0.125,
+    gripper_open=0.5,
+    max_gripper_force=8.0,
+    group="arms",
+    hand=Hand.RIGHT,
+)
 WALL = ((800.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5), stiffness_wanted=WALL)
 DEVICE_REPORT = DeviceReport(

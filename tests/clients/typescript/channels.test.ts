@@ -3,7 +3,7 @@
 // Devices, channels and leases of a ForceClient, against a server on virtual time.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
-import { ChannelRule, Code, Role, type DeviceDescription, type HandleDescription, type Request } from "../../../clients/typescript/src/messages.js";
+import { ChannelRule, Code, Hand, Role, type DeviceDescription, type HandleDescription, type Request } from "../../../clients/typescript/src/messages.js";
 import { controller, kFair, World, type ServerConduct } from "./support/world.js";
 
 describe("devices and channels", () => {
@@ -74,7 +74,7 @@ describe("devices and channels", () => {
   it("the handle is described where the server knows that, anew each session", () => {
     const kHandle: HandleDescription = {
       device: 0, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward"],
-      orientationMeasured: true, maxTorque: 0.125, gripperOpen: 0.5, maxGripperForce: 8,
+      orientationMeasured: true, maxTorque: 0.125, gripperOpen: 0.5, maxGripperForce: 8, group: "arms", hand: Hand.RIGHT,
     };
     for (const features of [["local-model", "handle"], ["local-model"]]) {
       const knows = features.includes("handle");

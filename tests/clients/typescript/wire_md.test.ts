@@ -15,7 +15,7 @@ import {
   concat, DatagramType, decodeAnswer, decodeHeader, decodeHello, decodeRetry, encodeAnswer, encodeHello, encodeRetry,
   kHeaderSize,
 } from "../../../clients/typescript/src/datagram.js";
-import { Code, Mode, reasonNames, Role, Safety, type DeviceReport, type PeerReport } from "../../../clients/typescript/src/messages.js";
+import { Code, Hand, Mode, reasonNames, Role, Safety, type DeviceReport, type PeerReport } from "../../../clients/typescript/src/messages.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { toHex } from "./support/bytes.js";
 import { kRoot } from "./support/paths.js";
@@ -137,7 +137,7 @@ describe("WIRE.md", () => {
     assert.ok(ack?.kind === "controlAck" && ack.value.handle);
     assert.deepEqual(ack.value.handle, {
       device: 1, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward", "centre", "left"],
-      orientationMeasured: true, maxTorque: 0.125, gripperOpen: 0.5, maxGripperForce: 8,
+      orientationMeasured: true, maxTorque: 0.125, gripperOpen: 0.5, maxGripperForce: 8, group: "arms", hand: Hand.RIGHT,
     });
   });
 

@@ -177,8 +177,9 @@ class Maker {
     if (is_enum) {
       const auto& type = *field.enum_type();
       const int last = type.value(type.value_count() - 1)->number();
+      const int least = type.value(0)->name().ends_with("_UNSPECIFIED") ? 1 : 0;
       for (const int value : {0, 1, last, last + 1}) {
-        add(std::to_string(value), value >= 1 && value <= last,
+        add(std::to_string(value), value >= least && value <= last,
             [&] { reflection.SetEnumValue(&message, &field, value); });
       }
       return;

@@ -117,7 +117,9 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
                                     .orientation_measured = true,
                                     .max_torque = 0.1,
                                     .gripper_open = 0.3,
-                                    .max_gripper_force = 1e12};
+                                    .max_gripper_force = 1e12,
+                                    .group = std::string(limits::kMaxName, 'g'),
+                                    .hand = Hand::kRight};
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
@@ -134,6 +136,8 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   EXPECT_EQ(handle->max_torque, 0.1);
   EXPECT_EQ(handle->gripper_open, 0.3);
   EXPECT_EQ(handle->max_gripper_force, 1e12);
+  EXPECT_EQ(handle->group.size(), limits::kMaxLabel);
+  EXPECT_EQ(handle->hand, Hand::kRight);
   EXPECT_EQ(handle->buttons.size(), limits::kMaxButtons);
   EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
 }

@@ -62,6 +62,30 @@ TEST(Scene, AxesThatMakeNoRotationAreRefusedWithTheReason) {
   EXPECT_EQ(refusal("1"), expected + ", found 1");
 }
 
+TEST(Scene, ADeviceSaysItsGroupAndTheHandThatHoldsIt) {
+  const auto scene_of = [](const std::string& keys) {
+    return parse("[device]\n" + keys + std::string(kFalcon.substr(kFalcon.find('\n'))), "/scenes");
+  };
+  EXPECT_EQ(scene_of("").group, "");
+  EXPECT_EQ(scene_of("").hand, Hand::kAny);
+  EXPECT_EQ(scene_of("group = \"surgeon\"").group, "surgeon");
+  EXPECT_EQ(scene_of("held_by = \"left\"").hand, Hand::kLeft);
+  EXPECT_EQ(scene_of("held_by = \"right\"").hand, Hand::kRight);
+  const auto refusal = [&](const std::string& keys) {
+    try {
+      scene_of(keys);
+    } catch (const SceneError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal("held_by = \"both\""),
+            "s.toml:2: device.held_by: expected one of \"any\", \"left\", \"right\", found \"both\"");
+  EXPECT_EQ(refusal("held_by = 1"), "s.toml:2: device.held_by: expected one of \"any\", \"left\", \"right\", found 1");
+  EXPECT_EQ(refusal("group = \"two arms\""),
+            "s.toml:2: device.group: expected a name of 1 to 24 letters, digits, - or _, found \"two arms\"");
+}
+
 TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
   const Scene scene = parse(std::string(kFalcon), "/scenes");
   ASSERT_TRUE(std::holds_alternative<falcon::Config>(scene.device));
@@ -87,9 +111,9 @@ TEST(Scene, AFalconIsARealDeviceWhoseFrictionIsToldNotTaken) {
 
 TEST(Scene, AFalconHasNoKeysOfTheSimulatedDeviceAndIsNotWithoutALimiter) {
   const std::string falcon = "[device]\nkind = \"falcon\"\n";
-  EXPECT_EQ(
-      error_of(falcon + "profile = \"falcon\"\n"),
-      "s.toml:3: device.profile: unknown key; known here: kind, name, axes, port, firmware, accept_unknown_firmware");
+  EXPECT_EQ(error_of(falcon + "profile = \"falcon\"\n"),
+            "s.toml:3: device.profile: unknown key; known here: kind, name, axes, group, held_by, port, firmware, "
+            "accept_unknown_firmware");
   EXPECT_EQ(error_of(falcon + "port = \"left\"\n"),
             "s.toml:3: device.port: expected a port as `tendond devices` names it, like \"1-2.3\", found \"left\"");
   EXPECT_EQ(error_of(falcon + "[limiter]\nkind = \"none\"\n"),

@@ -94,7 +94,8 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:5: recording.filename: unknown key; known here: path, rotate_mb, rotate_min, "
        "budget_mb, datagrams_kb_per_s"},
       {"[device.gravity]\n",
-       "s.toml:4: device.gravity: unknown table; known here: kind, name, axes, profile, start_position_mm, effects, "
+       "s.toml:4: device.gravity: unknown table; known here: kind, name, axes, group, held_by, profile, "
+       "start_position_mm, effects, "
        "hand, "
        "rotation, gripper"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +

@@ -126,7 +126,7 @@ export class Runs {
 const addressOf = (names: readonly string[]): string => `#/recordings/${names.map(encodeURIComponent).join("/")}`;
 
 /** A recording tells of the handle only what its scene says. */
-const kUntold: HandleInfo = { operator_from_device: null, buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0 };
+const kUntold: HandleInfo = { operator_from_device: null, buttons: [], orientation_measured: false, max_torque_nm: 0, gripper_open_rad: null, max_gripper_force_n: 0, group: "", hand: "any" };
 
 /** One recording in its view. */
 class Run {

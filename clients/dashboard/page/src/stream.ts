@@ -14,6 +14,8 @@ export interface HandleInfo {
   readonly max_torque_nm: number;
   readonly gripper_open_rad: number | null;
   readonly max_gripper_force_n: number;
+  readonly group: string;
+  readonly hand: "any" | "left" | "right";
 }
 export interface DeviceInfo {
   readonly number: number;

@@ -277,6 +277,8 @@ def _read_handle(message: pb.HandleDescription) -> HandleDescription:
         max_torque=fields.magnitude(message.max_torque_nm),
         gripper_open=fields.magnitude(message.gripper_open_rad) if message.HasField("gripper_open_rad") else None,
         max_gripper_force=fields.magnitude(message.max_gripper_force_n),
+        group=fields.text(message.group, limits.MAX_LABEL),
+        hand=fields.enum(fields.HANDS, message.hand),
     )
 
 
@@ -291,6 +293,8 @@ def _write_handle(handle: HandleDescription) -> pb.HandleDescription:
         max_torque_nm=handle.max_torque,
         gripper_open_rad=handle.gripper_open,
         max_gripper_force_n=handle.max_gripper_force,
+        group=fields.clip(handle.group, limits.MAX_LABEL),
+        hand=cast(pb.Hand, handle.hand),
     )
 
 

@@ -172,6 +172,8 @@ static HANDLE_DESCRIPTION: Schema = message(&[
     Field(5, Real, One, POSITIVE),
     Field(6, Real, Optional, POSITIVE),
     Field(7, Real, One, POSITIVE),
+    Field(8, Text, One, Bytes(24)),
+    Field(9, Enum, One, Whole(0, 2)),
 ]);
 
 pub static CONTROL_ACK: Schema = message(&[
