@@ -114,6 +114,13 @@ class AolPlus {
   /// **true** ledger, below zero by at most what rounding may have hidden.
   double spendable() const noexcept;
 
+  /// SharesAccount. `credit` and `withdraw` change the exact and the robust ledger alike.
+  void credit(double energy) noexcept;
+  void withdraw(double energy) noexcept;
+  double payable() const noexcept { return spendable() - reserved(); }
+  /// Counts the knee (a bound of F/s lets F through whole), the forces under way and shaping_viscous in.
+  double worst_loss(const Vec<kSize>& force) const noexcept;
+
   /// The device's friction is now at least this. Without the part adaptive_friction nothing changes.
   void adapt(const std::array<Friction, Blocks>& friction) noexcept;
 
