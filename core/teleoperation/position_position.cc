@@ -2,11 +2,19 @@
 #include "core/teleoperation/position_position.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
+#include <utility>
 
 #include "core/base/expect.h"
 
 namespace tendon {
+
+namespace {
+
+/// s per s: faster than two clocks drift apart, so the floor finds a way that has become longer within seconds.
+constexpr double kFloorRise = 2e-3;
+
+}  // namespace
 
 template <int N>
 PositionPosition<N>::PositionPosition(const Config& config) : config_(config), stiffness_(config.stiffness) {
@@ -24,11 +32,14 @@ PositionPosition<N>::PositionPosition(const Config& config) : config_(config), s
 
 template <int N>
 void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
-  if (!message.position.allFinite() || !message.velocity.allFinite() || message.answers > sequence_) {
+  if (!message.position.allFinite() || !message.velocity.allFinite() || message.answers > sequence_ ||
+      message.round_trip < Duration::zero()) {
     ++refused_;
     return;
   }
-  if (message.sequence > newest_.sequence) newest_ = message;
+  if (message.sequence <= newest_.sequence) return;
+  if (newest_.sequence == 0) floor_ = std::numeric_limits<double>::infinity();
+  newest_ = message;
 }
 
 template <int N>
@@ -38,18 +49,38 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
   velocity_ = velocity;
   Vec<N> force = -config_.own_damping * velocity;
   if (newest_.sequence == 0) return {force + 0 * position};  // not finite when the position is not
+  const double period = seconds(config_.period);
   if (newest_.answers > 0) {
-    const double period = seconds(config_.period);
-    const double loop = static_cast<double>(sequence_ - newest_.answers) * period;
-    const double fallen = loop_ + (loop - loop_) * std::min(1.0, period / seconds(config_.recovery));
-    loop_ = std::max(loop, fallen);
+    if (static_cast<double>(sequence_ - stretch_began_) * period >= seconds(config_.recovery)) {
+      stretch_began_ = sequence_;
+      loop_before_ = std::exchange(loop_, 0);
+    }
+    loop_ = std::max(loop_, static_cast<double>(sequence_ - newest_.answers) * period);
   }
   stiffness_ = config_.stiffness;
-  if (config_.adapt_to_delay && loop_ > 0) stiffness_ = std::min(stiffness_, 2 * config_.own_damping / loop_);
-  force += stiffness_ * (newest_.position - position) + config_.damping * (newest_.velocity - velocity);
+  const double loop = seconds(round_trip());
+  if (config_.adapt_to_delay && loop > 0) stiffness_ = std::min(stiffness_, 2 * config_.own_damping / loop);
+
+  const double lag = static_cast<double>(sequence_) * period - seconds(newest_.time);
+  floor_ = std::min(lag, floor_ + kFloorRise * period);
+  const double late = lag - floor_;
+  const double ahead = std::min(late, seconds(kMostAhead));
+  const Vec<N> there = newest_.position + ahead * newest_.velocity;
+  const Vec<N> speed = late > ahead ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
+  force += stiffness_ * (there - position) + config_.damping * (speed - velocity);
   const double size = force.stableNorm();
   if (size > config_.max_force) force *= config_.max_force / size;
   return {force, stiffness_ * Mat<N>::Identity()};
+}
+
+template <int N>
+PortMotion<N> PositionPosition<N>::message() const noexcept {
+  return {.sequence = sequence_,
+          .answers = newest_.sequence,
+          .time = from_seconds(static_cast<double>(sequence_) * seconds(config_.period)),
+          .round_trip = from_seconds(std::max(loop_, loop_before_)),
+          .position = position_,
+          .velocity = velocity_};
 }
 
 template class PositionPosition<1>;

@@ -1,3 +1,282 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/teleoperation/purse.h"
+//
+// Two devices tied by position–position springs, limiters and purses, over bad networks: what is felt, how it feels in
+// free motion, how quiet it is, and that the pair gives out nothing.
+#include "tests/core/teleoperation/pair.h"
+
 #include <gtest/gtest.h>
+
+#include <complex>
+#include <iostream>
+#include <numbers>
+
+namespace tendon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kNanojoule = 1e-9;
+constexpr std::array kRoundTrips = {0, 10, 50, 200, 600};  // ms
+
+constexpr AolPlus<1, 3>::Parts kCapped{.energy_cap = AolPlus<1, 3>::EnergyCap{}};
+
+/// From 0 to `far` in 0.5 s, as a half cosine.
+double ramp(double t, double far) {
+  if (t <= 0) return 0;
+  return t >= 0.5 ? far : far * (1 - std::cos(2 * kPi * t)) / 2;
+}
+
+/// A hand presses 30 mm at a wall that is at 10 mm behind the follower.
+PairConfig pressing(double wall, double hand = 400, double depth = 0.03) {
+  PairConfig config;
+  config.leader.around = {.stiffness = hand, .damping = 2, .reference = [depth](double t) { return ramp(t, depth); }};
+  config.follower.around = {.stiffness = wall, .reference = [](double) { return 0.01; }, .wall = true};
+  return config;
+}
+
+/// A hand that waves 20 mm to and fro at 1 Hz; nothing at the follower.
+PairConfig waving() {
+  PairConfig config;
+  config.leader.around = {
+      .stiffness = 400, .damping = 2, .reference = [](double t) { return 0.02 * std::sin(2 * kPi * t); }};
+  return config;
+}
+
+void use_law(PairConfig& config, Law law) {
+  for (EndConfig* end : {&config.leader, &config.follower}) {
+    end->law = law;
+    if (law == Law::kAolPlus) end->parts = kCapped;
+  }
+}
+
+TEST(Pair, WithoutAPurseTheFollowerDoesNotFollow) {
+  PairConfig config = waving();
+  config.max_account = 1e-12;  // nothing that comes is credited, and nothing is kept to be given
+  Pair pair(config);
+  double farthest = 0;
+  pair.run(3, [&](double) { farthest = std::max(farthest, std::abs(pair.follower.body.x)); });
+  EXPECT_LT(farthest, 1e-3);
+  Pair shared(waving());
+  shared.run(3, [&](double) { farthest = std::max(farthest, std::abs(shared.follower.body.x)); });
+  EXPECT_GT(farthest, 0.012);
+}
+
+TEST(Pair, ItsStiffnessIsThatOfTheTwoLimitersInSeries) {
+  struct Case {
+    double b_leader, b_follower;
+    int t_leader, t_follower;
+  };
+  for (const Case& c : {Case{0.26, 0.26, 10, 10}, Case{0.5, 0.5, 10, 10}, Case{0.26, 1.0, 10, 10},
+                        Case{0.26, 0.5, 10, 20}, Case{1.0, 0.3, 20, 5}}) {
+    PairConfig config;
+    const double speed = 0.005;
+    config.leader.path = [speed](double t) { return speed * t; };
+    config.follower.path = [](double) { return 0.0; };
+    config.leader.friction = {0, c.b_leader};
+    config.follower.friction = {0, c.b_follower};
+    config.leader.period = c.t_leader;
+    config.follower.period = c.t_follower;
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->spring = {.stiffness = 1e4, .adapt_to_delay = false};
+    }
+    Pair pair(config);
+    pair.run(1);
+    const double force = pair.leader.applied;
+    pair.run(1);
+    const double slope = (force - pair.leader.applied) / (speed * 1);
+    const double expected = 1 / (c.t_leader * 1e-4 / (2 * c.b_leader) + c.t_follower * 1e-4 / (2 * c.b_follower));
+    std::cout << "b " << c.b_leader << ", " << c.b_follower << "; T " << c.t_leader / 10.0 << ", "
+              << c.t_follower / 10.0 << " ms: " << slope << " N/m, predicted " << expected << "\n";
+    EXPECT_NEAR(slope / expected, 1, 0.03);
+    EXPECT_NEAR(pair.follower.applied / -pair.leader.applied, 1, 0.03);
+  }
+}
+
+TEST(Pair, FreeMotionDragsByStiffnessTimesRoundTripAndAllDamping) {
+  struct Case {
+    double stiffness;
+    int one_way;  // tenths of a ms
+    double own_damping;
+  };
+  for (const Case& c : {Case{400, 0, 0.5}, Case{400, 40, 2}, Case{100, 100, 2}, Case{200, 150, 4}}) {
+    constexpr double kAmplitude = 0.05;
+    constexpr double kHertz = 0.25;
+    PairConfig config;
+    config.leader.path = [](double t) { return kAmplitude * std::sin(2 * kPi * kHertz * t); };
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->spring = {.stiffness = c.stiffness, .own_damping = c.own_damping, .adapt_to_delay = false};
+    }
+    config.there.delay = config.back.delay = c.one_way;
+    Pair pair(config);
+    pair.run(4);
+    const std::uint64_t cut = pair.leader.cut + pair.follower.cut;
+    double work = 0;
+    double squares = 0;
+    pair.run(8, [&](double) {
+      work -= pair.leader.applied * pair.leader.speed;
+      squares += pair.leader.speed * pair.leader.speed;
+    });
+    // The leader goes first in a tick: what it sends is used at once, the answer in its next period.
+    const double loop = std::max(2 * c.one_way, 10) * 1e-4;
+    EXPECT_NEAR(seconds(pair.leader.spring.round_trip()), loop, 1e-9);
+    const double expected = c.stiffness * loop + 2 * c.own_damping + config.follower.friction.viscous +
+                            4 * config.follower.friction.coulomb / (kPi * kAmplitude * 2 * kPi * kHertz);
+    std::cout << "K " << c.stiffness << ", T_loop " << loop * 1e3 << " ms, B " << c.own_damping << ": "
+              << work / squares << " N·s/m, predicted " << expected << "\n";
+    EXPECT_NEAR(work / squares / expected, 1, 0.03);
+    EXPECT_EQ(pair.leader.cut + pair.follower.cut, cut) << "a clipped force is not the spring's";
+  }
+}
+
+TEST(Pair, AHeldForceIsThatAtTheWallOverAnyNetwork) {
+  for (const Law law : {Law::kAol, Law::kAolPlus}) {
+    for (const double wall : {500.0, 5000.0}) {
+      for (const int round_trip : kRoundTrips) {
+        PairConfig config = pressing(wall);
+        use_law(config, law);
+        make_bad(config, round_trip, 7);
+        Pair pair(config);
+        pair.run(6);
+        double worst = 0;
+        pair.run(2, [&](double) {
+          const double felt = -pair.leader.applied;
+          const double at_wall = -pair.follower.body.outside;
+          worst = std::max(worst, std::abs(felt - at_wall) - 0.01 * at_wall);
+        });
+        const double at_wall = -pair.follower.body.outside;
+        std::cout << info(law).name << ", wall " << wall << " N/m, RTT " << round_trip << " ms: K "
+                  << pair.leader.spring.stiffness() << " N/m, felt " << -pair.leader.applied << " N, at the wall "
+                  << at_wall << " N, cut " << pair.leader.cut << "\n";
+        EXPECT_LE(worst, 2 * config.leader.friction.coulomb);
+        EXPECT_GT(at_wall, round_trip > 200 ? 0.1 : 0.5) << "nothing was held";
+        EXPECT_GE(pair.least_account, -kNanojoule);
+        EXPECT_GE(pair.least_sum, -kNanojoule);
+      }
+    }
+  }
+}
+
+TEST(Pair, ItIsQuietHeldAndFreeAtEveryRoundTrip) {
+  for (const Law law : {Law::kAol, Law::kAolPlus}) {
+    for (const int round_trip : kRoundTrips) {
+      for (const bool held : {true, false}) {
+        PairConfig config = held ? pressing(500) : waving();
+        use_law(config, law);
+        make_bad(config, round_trip, 3);
+        Pair pair(config);
+        std::array force = {HighPass(50), HighPass(50)};
+        std::array speed = {HighPass(20), HighPass(20)};
+        pair.run(10, [&](double t) {
+          const bool counts = t > 4;
+          force[0].add(pair.leader.applied, counts);
+          force[1].add(pair.follower.applied, counts);
+          speed[0].add(pair.leader.body.v, counts);
+          speed[1].add(pair.follower.body.v, counts);
+        });
+        const double ripple = std::max(force[0].rms(), force[1].rms());
+        const double buzz = std::max(speed[0].rms(), speed[1].rms());
+        std::cout << info(law).name << (held ? ", held" : ", free") << ", RTT " << round_trip << " ms: ripple "
+                  << 1e3 * ripple << " mN, buzz " << 1e3 * buzz << " mm/s\n";
+        EXPECT_LT(ripple, 0.02);
+        EXPECT_LT(buzz, 2e-3);
+        EXPECT_GE(pair.least_account, -kNanojoule);
+        EXPECT_GE(pair.least_sum, -kNanojoule);
+      }
+    }
+  }
+}
+
+TEST(Pair, AfterAMinuteOfWavingTheTwoStandAtOnePlace) {
+  for (const double loss : {0.01, 0.3}) {
+    PairConfig config = waving();
+    config.leader.around.reference = [](double t) { return t < 60 ? 0.02 * std::sin(2 * kPi * t) : 0.0; };
+    make_bad(config, 50, 5);
+    config.there.loss = config.back.loss = loss;
+    Pair pair(config);
+    pair.run(63);
+    const double apart = std::abs(pair.leader.body.x - pair.follower.body.x);
+    const double most = 2 * config.leader.friction.coulomb / pair.follower.spring.stiffness();
+    std::cout << "loss " << 100 * loss << " %: " << 1e3 * apart << " mm apart, friction allows " << 1e3 * most << "\n";
+    EXPECT_LE(apart, most);
+    EXPECT_GE(pair.least_sum, -kNanojoule);
+  }
+}
+
+TEST(Pair, AScaledPairPaysInTheOtherEndsJoules) {
+  // s_x 0.2, s_f 5: a joule of the follower is 25 at the leader. K_l = s_x s_f K_f.
+  for (const Law law : {Law::kAol, Law::kAolPlus}) {
+    for (const int round_trip : {0, 50, 200}) {
+      PairConfig config = pressing(2000, 400, 0.08);
+      config.follower.around.reference = [](double) { return 0.004; };
+      config.position_scale = 0.2;
+      config.force_scale = 5;
+      use_law(config, law);
+      make_bad(config, round_trip, 11);
+      Pair pair(config);
+      pair.run(6);
+      const double felt = -pair.leader.applied;
+      const double at_wall = -pair.follower.body.outside;
+      std::cout << info(law).name << ", RTT " << round_trip << " ms: felt " << felt << " N, at the wall " << at_wall
+                << " N, least sum " << pair.least_sum << " J\n";
+      EXPECT_GE(pair.least_account, -kNanojoule);
+      EXPECT_GE(pair.least_sum, -kNanojoule);
+      EXPECT_GT(at_wall, 0.05);
+    }
+  }
+}
+
+TEST(Pair, WithoutLimitersTheSamePairGivesOutEnergy) {
+  PairConfig config = pressing(500);
+  for (EndConfig* end : {&config.leader, &config.follower}) {
+    end->spring = {.stiffness = 400, .own_damping = 0, .adapt_to_delay = false};
+  }
+  make_bad(config, 50, 7);
+  config.limited = false;
+  Pair pair(config);
+  pair.run(3);
+  EXPECT_LT(pair.least_sum, -0.1);
+  config.limited = true;
+  Pair safe(config);
+  safe.run(3);
+  EXPECT_GE(safe.least_sum, -kNanojoule);
+}
+
+TEST(Pair, TheHandFeelsTheImpedanceThatLawrenceGives) {
+  // Beyond B_l, the hand feels C (Z_f + Z_e)/(C + Z_f + Z_e).
+  using Complex = std::complex<double>;
+  for (const double stiffness_around : {0.0, 500.0}) {
+    for (const double hertz : {0.1, 0.3, 1.0, 3.0, 10.0}) {
+      PairConfig config;
+      const double w = 2 * kPi * hertz;
+      config.leader.path = [w](double t) { return 0.005 * std::sin(w * t); };
+      config.follower.around = {.stiffness = stiffness_around};
+      for (EndConfig* end : {&config.leader, &config.follower}) {
+        end->friction.coulomb = 0;
+        end->spring = {.stiffness = 400, .damping = 1, .own_damping = 4, .adapt_to_delay = false};
+        end->period = 1;
+      }
+      Pair pair(config);
+      const double settle = std::ceil(hertz) / hertz;
+      pair.run(settle + 1 / hertz);
+      Complex force = 0;
+      Complex speed = 0;
+      const double from = pair.time();
+      pair.run(2 / hertz, [&](double t) {
+        const Complex turn = std::polar(1.0, -w * (t - from));
+        force -= pair.leader.applied * turn;
+        speed += w * 0.005 * std::cos(w * t) * turn;
+      });
+      const Complex s(0, w);
+      const Complex c = config.leader.spring.stiffness / s + config.leader.spring.damping;
+      const Complex z = config.follower.mass * s + config.follower.friction.viscous +
+                        config.follower.spring.own_damping + stiffness_around / s;
+      const Complex expected = c * z / (c + z);
+      const Complex felt = force / speed - config.leader.spring.own_damping;
+      std::cout << (stiffness_around > 0 ? "spring, " : "free, ") << hertz << " Hz: felt " << felt << ", expected "
+                << expected << "\n";
+      EXPECT_LT(std::abs(felt - expected) / std::abs(expected), 0.05);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tendon

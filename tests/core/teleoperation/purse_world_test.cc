@@ -158,6 +158,7 @@ class World {
           // A receiver that does not look: every message is of the peer's present epoch and about our present totals.
           message.answers_epoch = port.epoch;
           message.epoch = 1;
+          message.taken = std::min(message.taken, port.purse->given(number(i, j)));  // else that alone gives it away
         }
         port.purse->receive(number(i, j), message);
       });
