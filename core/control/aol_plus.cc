@@ -56,6 +56,7 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
 template <int Blocks, int Size>
 AolPlus<Blocks, Size>::AolPlus(const Config& config)
     : parts_(config.parts),
+      shared_(config.shared_account),
       friction_(config.friction),
       longest_hold_(config.longest_hold),
       ledgers_(each<EnergyLedger, Blocks>([&config](std::size_t i) { return config.friction[i]; },
@@ -214,7 +215,9 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
     contact_ = std::min({contact_, most, parts_.energy_cap->most_contact});
   }
   last_wanted_ = wanted;
-  discarded_ = std::max(discarded_, account() - (parts_.energy_cap->energy + contact_));
+  double kept = parts_.energy_cap->energy + contact_;
+  if (shared_) kept += worst_loss(wanted);
+  discarded_ = std::max(discarded_, account() - kept);
 }
 
 template <int Blocks, int Size>

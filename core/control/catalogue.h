@@ -188,7 +188,10 @@ inline constexpr std::tuple kRows{
            }},
     LawRow{{Law::kAolPlus, "aol+", "Adjusting Output-Limiter with the parts that are listed", true, false},
            [](const LimiterConfig& c) {
-             return AolPlus<1, 3>({.friction = {c.friction}, .longest_hold = c.longest_hold, .parts = c.parts});
+             return AolPlus<1, 3>({.friction = {c.friction},
+                                   .longest_hold = c.longest_hold,
+                                   .parts = c.parts,
+                                   .shared_account = c.shared_account});
            }},
 };
 

@@ -65,12 +65,13 @@ class PositionPosition {
   static constexpr Duration kMostAhead = std::chrono::milliseconds(20);
 
   struct Config {
-    double stiffness = 0;  ///< most K, N/m; > 0
-    double damping = 0;    ///< D, N·s/m; ≥ 0
+    double stiffness = 0;    ///< most K, N/m; > 0
+    double damping = 0;      ///< D, N·s/m; ≥ 0
     double own_damping = 0;  ///< B, N·s/m; ≥ 0, and > 0 with adapt_to_delay
     bool adapt_to_delay = true;
-    Duration period{};                                     ///< of this end, > 0
-    Duration recovery = std::chrono::seconds(5);  ///< T_loop falls when it has been shorter for one to two of these; > 0
+    Duration period{};  ///< of this end, > 0
+    Duration recovery =
+        std::chrono::seconds(5);  ///< T_loop falls when it has been shorter for one to two of these; > 0
     double max_force = std::numeric_limits<double>::infinity();  ///< N, > 0
   };
 
@@ -99,7 +100,7 @@ class PositionPosition {
   Vec<N> position_ = Vec<N>::Zero();
   Vec<N> velocity_ = Vec<N>::Zero();
   double stiffness_;
-  double loop_ = 0;  ///< s, measured here: the longest of this stretch of `recovery`
+  double loop_ = 0;         ///< s, measured here: the longest of this stretch of `recovery`
   double loop_before_ = 0;  ///< of the stretch before
   std::uint64_t stretch_began_ = 0;
   double floor_ = 0;  ///< s, our time less the other's when its message is used: the least lately

@@ -19,8 +19,8 @@ struct PurseMessage {
   std::uint64_t sequence = 0;       ///< 1, 2, … within an epoch
   double account = 0;               ///< J, A after giving; ± kMostAccount
   double need = 0;                  ///< J, n; 0 … kMostAccount
-  double given = 0;                 ///< J, G: total given to the receiver; never falls within the two epochs; ≤ kMostTotal
-  double taken = 0;                 ///< J, R: the receiver's total that was heard of, in the receiver's joules; ≤ kMostTotal
+  double given = 0;  ///< J, G: total given to the receiver; never falls within the two epochs; ≤ kMostTotal
+  double taken = 0;  ///< J, R: the receiver's total that was heard of, in the receiver's joules; ≤ kMostTotal
 
   static constexpr double kMostAccount = 1e3;
   static constexpr double kMostTotal = 1e6;
@@ -86,12 +86,12 @@ class Purse {
   static constexpr std::size_t kMostPeers = 3;
 
   struct Config {
-    std::size_t peers = 1;                            ///< 1 … kMostPeers
+    std::size_t peers = 1;                             ///< 1 … kMostPeers
     std::array<double, kMostPeers> joule = {1, 1, 1};  ///< what one joule of each peer is worth here; 1e-6 … 1e6
-    double start = 0.2e-3;                            ///< ε, J; > 0
-    double max_power = 2;                             ///< W, > 0
-    double max_account = 0.2;                         ///< J, > 0 … kMostAccount
-    std::uint64_t epoch = 1;                          ///< > 0; above every one that this port had before
+    double start = 0.2e-3;                             ///< ε, J; > 0
+    double max_power = 2;                              ///< W, > 0
+    double max_account = 0.2;                          ///< J, > 0 … kMostAccount
+    std::uint64_t epoch = 1;                           ///< > 0; above every one that this port had before
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -102,10 +102,10 @@ class Purse {
 
   /// Once in each period, after the interval was booked and before the force is limited.
   struct Period {
-    double payable = 0;    ///< J, SharesAccount::payable
-    double loss = 0;       ///< J, ℓ of the force that is wanted; +∞ is allowed
-    Duration elapsed{};    ///< length of the interval that has just ended
-    bool giving = true;    ///< false: clutched or not engaged; what comes is still added
+    double payable = 0;  ///< J, SharesAccount::payable
+    double loss = 0;     ///< J, ℓ of the force that is wanted; +∞ is allowed
+    Duration elapsed{};  ///< length of the interval that has just ended
+    bool giving = true;  ///< false: clutched or not engaged; what comes is still added
   };
   /// J ≥ 0, for the limiter: credit first, then withdraw.
   struct Settlement {
@@ -117,11 +117,11 @@ class Purse {
   /// What to send to a peer after settle(), or empty epoch (0) for a peer that is none. Each call has a sequence of its own.
   PurseMessage message(std::size_t peer) noexcept;
 
-  double account() const noexcept { return account_; }           ///< A after the last settle, J
-  double need() const noexcept { return need_; }                 ///< n at the last settle, J
+  double account() const noexcept { return account_; }              ///< A after the last settle, J
+  double need() const noexcept { return need_; }                    ///< n at the last settle, J
   double discarded() const noexcept { return discarded_.value(); }  ///< J so far
-  std::uint64_t refused() const noexcept { return refused_; }    ///< messages
-  double given(std::size_t peer) const noexcept;                 ///< G, J, of the present epochs
+  std::uint64_t refused() const noexcept { return refused_; }       ///< messages
+  double given(std::size_t peer) const noexcept;                    ///< G, J, of the present epochs
   /// R, in the peer's joules, of the present epochs.
   double taken(std::size_t peer) const noexcept;
 
@@ -129,12 +129,12 @@ class Purse {
   struct Peer {
     std::uint64_t epoch = 0;
     std::uint64_t sequence = 0;
-    double account = 0;     ///< J of the peer
-    double need = 0;        ///< J of the peer; 0: nothing heard
-    double heard = 0;       ///< R, J of the peer
-    double credited = 0;    ///< of R
-    double given = 0;       ///< G, J of ours
-    double arrived = 0;     ///< of G, as it told
+    double account = 0;   ///< J of the peer
+    double need = 0;      ///< J of the peer; 0: nothing heard
+    double heard = 0;     ///< R, J of the peer
+    double credited = 0;  ///< of R
+    double given = 0;     ///< G, J of ours
+    double arrived = 0;   ///< of G, as it told
     std::uint64_t sent = 0;
   };
 

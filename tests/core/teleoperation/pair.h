@@ -46,8 +46,9 @@ class Body {
  private:
   void substep(double force, double middle, double h) {
     const double rest = around_.reference ? around_.reference(middle) : 0;
-    const double rest_speed =
-        around_.reference && !around_.wall ? (around_.reference(middle + h) - around_.reference(middle - h)) / (2 * h) : 0;
+    const double rest_speed = around_.reference && !around_.wall
+                                  ? (around_.reference(middle + h) - around_.reference(middle - h)) / (2 * h)
+                                  : 0;
     const bool touches = !around_.wall || x > rest;
     const double k = touches ? around_.stiffness : 0;
     const double c = touches ? around_.damping : 0;

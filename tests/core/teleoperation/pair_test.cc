@@ -127,6 +127,34 @@ TEST(Pair, FreeMotionDragsByStiffnessTimesRoundTripAndAllDamping) {
   }
 }
 
+/// N felt in a press at a hard wall, and J in both accounts before it, after `waves` s of waving.
+std::pair<double, double> felt_after(Law law, double waves) {
+  PairConfig config = pressing(5000, 400, 0.05);
+  const auto press = config.leader.around.reference;
+  config.leader.around.reference = [press, waves](double t) {
+    return t < waves ? 0.009 * std::sin(2 * kPi * t) : press(t - waves);
+  };
+  use_law(config, law);
+  Pair pair(config);
+  pair.run(waves);
+  const double waved = pair.leader.limiter.payable() + pair.follower.limiter.payable();
+  pair.run(4);
+  return {-pair.leader.applied, waved};
+}
+
+TEST(Pair, AnEnergyCapCutsNothingOfAForceThatIsPaidFor) {
+  // The cap keeps what free motion earns small, and leaves the account that a held force needs.
+  const auto [felt, none] = felt_after(Law::kAol, 0);
+  const auto [felt_capped, waved_capped] = felt_after(Law::kAolPlus, 20);
+  const auto [felt_waved, waved] = felt_after(Law::kAol, 20);
+  std::cout << "AOL " << felt << " N; after 20 s of waving " << felt_waved << " N of " << 1e3 * waved
+            << " mJ, with the cap " << felt_capped << " N of " << 1e3 * waved_capped << " mJ\n";
+  EXPECT_GE(felt_capped, 0.99 * felt);
+  EXPECT_GT(felt, 5);
+  EXPECT_LT(waved_capped, 0.02);
+  EXPECT_GT(waved, 0.1);
+}
+
 TEST(Pair, AHeldForceIsThatAtTheWallOverAnyNetwork) {
   for (const Law law : {Law::kAol, Law::kAolPlus}) {
     for (const double wall : {500.0, 5000.0}) {

@@ -44,10 +44,10 @@ struct Port {
 };
 
 struct Outcome {
-  double least_account = kInf;  ///< J
-  double least_sum = kInf;      ///< J, of all ledgers from the beginning
+  double least_account = kInf;    ///< J
+  double least_sum = kInf;        ///< J, of all ledgers from the beginning
   double least_unclaimed = kInf;  ///< J, that sum less all accounts: below zero when energy is claimed twice
-  double given = 0;             ///< J
+  double given = 0;               ///< J
   bool finite = true;
   bool broken() const { return std::min({least_account, least_sum, least_unclaimed}) < -kNanojoule; }
 };
@@ -254,7 +254,8 @@ void expect_no_world_gains(std::uint64_t worlds, int periods) {
     worst.given += outcome.given;
   }
   std::cout << worlds << " worlds of " << periods << " periods: least account " << worst.least_account
-            << " J, least sum of ledgers " << worst.least_sum << " J, claimed by no account " << worst.least_unclaimed << " J, given " << worst.given << " J\n";
+            << " J, least sum of ledgers " << worst.least_sum << " J, claimed by no account " << worst.least_unclaimed
+            << " J, given " << worst.given << " J\n";
   EXPECT_GT(worst.given, 0.01 * static_cast<double>(worlds)) << "nobody gave anything: nothing was tested";
 }
 
