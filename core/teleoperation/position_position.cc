@@ -2,6 +2,7 @@
 #include "core/teleoperation/position_position.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -13,6 +14,9 @@ namespace {
 
 /// s per s: faster than two clocks drift apart, so the floor finds a way that has become longer within seconds.
 constexpr double kFloorRise = 2e-3;
+
+/// 36 years: no difference of two such times overflows.
+constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
 
 }  // namespace
 
@@ -27,19 +31,30 @@ PositionPosition<N>::PositionPosition(const Config& config) : config_(config), s
   }
   expect_above_zero(seconds(config.period), "period");
   expect_above_zero(seconds(config.recovery), "recovery");
+  expect(config.epoch > 0, "epoch", static_cast<double>(config.epoch), "a number above 0");
   expect(config.max_force > 0, "max_force", config.max_force, "a number above 0 N, or infinity");
 }
 
 template <int N>
 void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
-  if (!message.position.allFinite() || !message.velocity.allFinite() || message.answers > sequence_ ||
-      message.round_trip < Duration::zero()) {
+  const bool answered = message.answers_epoch == config_.epoch;
+  if (!message.position.allFinite() || !message.velocity.allFinite() || message.epoch == 0 || message.sequence == 0 ||
+      message.time < -kMostTime || message.time > kMostTime || message.round_trip < Duration::zero() ||
+      (answered && message.answers > sequence_)) {
     ++refused_;
     return;
   }
-  if (message.sequence <= newest_.sequence) return;
-  if (newest_.sequence == 0) floor_ = std::numeric_limits<double>::infinity();
+  if (newest_.sequence > 0) {
+    if (message.epoch < newest_.epoch) return;
+    if (message.epoch == newest_.epoch && message.sequence <= newest_.sequence) return;
+  }
+  if (newest_.sequence == 0 || message.epoch > newest_.epoch) {
+    floor_ = std::numeric_limits<double>::infinity();
+    loop_ = loop_before_ = Duration::zero();
+    stretch_began_ = sequence_;
+  }
   newest_ = message;
+  if (!answered) newest_.answers = 0;
 }
 
 template <int N>
@@ -49,36 +64,41 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
   velocity_ = velocity;
   Vec<N> force = -config_.own_damping * velocity;
   if (newest_.sequence == 0) return {force + 0 * position};  // not finite when the position is not
-  const double period = seconds(config_.period);
+  const auto counted = [this](std::uint64_t periods) { return static_cast<std::int64_t>(periods) * config_.period; };
   if (newest_.answers > 0) {
-    if (static_cast<double>(sequence_ - stretch_began_) * period >= seconds(config_.recovery)) {
+    if (counted(sequence_ - stretch_began_) >= config_.recovery) {
       stretch_began_ = sequence_;
-      loop_before_ = std::exchange(loop_, 0);
+      loop_before_ = std::exchange(loop_, Duration::zero());
     }
-    loop_ = std::max(loop_, static_cast<double>(sequence_ - newest_.answers) * period);
+    loop_ = std::max(loop_, counted(sequence_ - newest_.answers));
   }
   stiffness_ = config_.stiffness;
   const double loop = seconds(round_trip());
   if (config_.adapt_to_delay && loop > 0) stiffness_ = std::min(stiffness_, 2 * config_.own_damping / loop);
 
-  const double lag = static_cast<double>(sequence_) * period - seconds(newest_.time);
-  floor_ = std::min(lag, floor_ + kFloorRise * period);
+  const double lag = seconds(counted(sequence_) - newest_.time);
+  floor_ = std::min(lag, floor_ + kFloorRise * seconds(config_.period));
   const double late = lag - floor_;
   const double ahead = std::min(late, seconds(kMostAhead));
   const Vec<N> there = newest_.position + ahead * newest_.velocity;
   const Vec<N> speed = late > ahead ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
   force += stiffness_ * (there - position) + config_.damping * (speed - velocity);
-  const double size = force.stableNorm();
-  if (size > config_.max_force) force *= config_.max_force / size;
+  if (std::isfinite(config_.max_force)) {
+    const double size = force.stableNorm();
+    if (size > config_.max_force) force *= config_.max_force / size;
+  }
   return {force, stiffness_ * Mat<N>::Identity()};
 }
 
 template <int N>
 PortMotion<N> PositionPosition<N>::message() const noexcept {
-  return {.sequence = sequence_,
+  const bool heard = newest_.sequence > 0;
+  return {.epoch = config_.epoch,
+          .sequence = sequence_,
+          .answers_epoch = heard ? newest_.epoch : 0,
           .answers = newest_.sequence,
-          .time = from_seconds(static_cast<double>(sequence_) * seconds(config_.period)),
-          .round_trip = from_seconds(std::max(loop_, loop_before_)),
+          .time = static_cast<std::int64_t>(sequence_) * config_.period,
+          .round_trip = std::max(loop_, loop_before_),
           .position = position_,
           .velocity = velocity_};
 }

@@ -12,9 +12,11 @@ namespace tendon {
 /// What one end of a position–position coupling tells the other, in the receiver's frame and scale.
 template <int N>
 struct PortMotion {
-  std::uint64_t sequence = 0;        ///< the sender's period: 1, 2, …; one that is not above the newest is dropped
-  std::uint64_t answers = 0;         ///< sequence of the receiver's motion that the sender used in it; 0: none yet
-  Duration time{};                   ///< the sender's own: only differences are used. Its periods are counted
+  std::uint64_t epoch = 1;     ///< of the sender, > 0: above every one before when it starts anew (Purse)
+  std::uint64_t sequence = 0;  ///< the sender's period in it: 1, 2, …; one that is not above the newest is dropped
+  std::uint64_t answers_epoch = 0;   ///< the receiver's epoch that `answers` belongs to; 0: none yet
+  std::uint64_t answers = 0;         ///< sequence of the receiver's motion that the sender used; 0: none yet
+  Duration time{};                   ///< the sender's own: only differences are used; ± 2⁶⁰ ns
   Duration round_trip{};             ///< that the sender has measured; 0: not yet
   Vec<N> position = Vec<N>::Zero();  ///< m
   Vec<N> velocity = Vec<N>::Zero();  ///< m/s
@@ -52,8 +54,9 @@ struct PortMotion {
 ///
 /// This law is not passive. It needs a limiter and a Purse at both ends.
 ///
-/// A message or a position that is not finite: the message is dropped and counted in `refused`; the demand is not
-/// finite, which the limiter turns to zero. Before the first message only −B v.
+/// A message that is not finite or out of its bounds is dropped and counted in `refused`. A higher epoch of the other end
+/// begins anew with it; one of a lower epoch is passed over. When the position is not finite, neither is the demand, which
+/// the limiter turns to zero. Before the first message only −B v.
 ///
 /// Source: position–position coupling, Hannaford 1989 (recalled); the bound on K derived here and measured.
 ///
@@ -69,9 +72,10 @@ class PositionPosition {
     double damping = 0;      ///< D, N·s/m; ≥ 0
     double own_damping = 0;  ///< B, N·s/m; ≥ 0, and > 0 with adapt_to_delay
     bool adapt_to_delay = true;
-    Duration period{};  ///< of this end, > 0
-    Duration recovery =
-        std::chrono::seconds(5);  ///< T_loop falls when it has been shorter for one to two of these; > 0
+    Duration period{};        ///< of this end, > 0
+    std::uint64_t epoch = 1;  ///< > 0, as the Purse's
+    /// T_loop falls when it has been shorter for one to two of these; > 0.
+    Duration recovery = std::chrono::seconds(5);
     double max_force = std::numeric_limits<double>::infinity();  ///< N, > 0
   };
 
@@ -88,9 +92,7 @@ class PositionPosition {
 
   double stiffness() const noexcept { return stiffness_; }  ///< K in use, N/m
   /// T_loop in use; zero until the other end has answered.
-  Duration round_trip() const noexcept {
-    return std::max(from_seconds(std::max(loop_, loop_before_)), newest_.round_trip);
-  }
+  Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }
   std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -100,8 +102,8 @@ class PositionPosition {
   Vec<N> position_ = Vec<N>::Zero();
   Vec<N> velocity_ = Vec<N>::Zero();
   double stiffness_;
-  double loop_ = 0;         ///< s, measured here: the longest of this stretch of `recovery`
-  double loop_before_ = 0;  ///< of the stretch before
+  Duration loop_{};         ///< measured here: the longest of this stretch of `recovery`
+  Duration loop_before_{};  ///< of the stretch before
   std::uint64_t stretch_began_ = 0;
   double floor_ = 0;  ///< s, our time less the other's when its message is used: the least lately
   std::uint64_t refused_ = 0;

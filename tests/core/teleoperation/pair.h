@@ -87,6 +87,12 @@ struct PairConfig {
   double force_scale = 1;     ///< s_f; the springs' K, D, B are the caller's to scale: K_l = s_x s_f K_f
   Network there{};            ///< in tenths of a millisecond
   Network back{};
+  double encoder_step = 0;  ///< m, of both ends; 0: exact
+  /// From this time on, s, each way takes so many more tenths of a millisecond.
+  double longer_from = std::numeric_limits<double>::infinity();
+  int longer_by = 0;
+  double cut_from = std::numeric_limits<double>::infinity();  ///< s: nothing is sent for cut_for
+  double cut_for = 0;
   bool limited = true;  ///< false: no limiter and no purse
   double max_account = 10;
   double max_power = 100;
@@ -132,15 +138,22 @@ class Pair {
         leader(config.leader, purse_of(config, config.force_scale / config.position_scale)),
         follower(config.follower, purse_of(config, config.position_scale / config.force_scale)),
         there_(config.there),
-        back_(config.back) {}
+        back_(config.back),
+        later_there_(longer(config.there, config.longer_by)),
+        later_back_(longer(config.back, config.longer_by)) {}
 
   /// Runs for `duration` s; `look(t)` after every millisecond.
   template <class Look>
   void run(double duration, Look look) {
     const int last = now_ + static_cast<int>(std::lround(duration * 1e4));
     for (; now_ < last; ++now_) {
-      if (now_ % config_.leader.period == 0) step(leader, back_, there_, 1 / config_.position_scale);
-      if (now_ % config_.follower.period == 0) step(follower, there_, back_, config_.position_scale);
+      const bool later = time() >= config_.longer_from;
+      if (now_ % config_.leader.period == 0) {
+        step(leader, {&back_, &later_back_}, later ? later_there_ : there_, 1 / config_.position_scale);
+      }
+      if (now_ % config_.follower.period == 0) {
+        step(follower, {&there_, &later_there_}, later ? later_back_ : back_, config_.position_scale);
+      }
       const double sum =
           leader.ledger.energy() + config_.force_scale / config_.position_scale * follower.ledger.energy();
       least_sum = std::min(least_sum, sum);
@@ -167,30 +180,38 @@ class Pair {
     return purse;
   }
 
-  void step(End& end, Link<Message>& in, Link<Message>& out, double scale) {
+  static Network longer(Network network, int by) {
+    network.delay += by;
+    return network;
+  }
+
+  void step(End& end, const std::array<Link<Message>*, 2>& in, Link<Message>& out, double scale) {
     const double length = end.config.period * 1e-4;
     const Duration held = end.config.period * std::chrono::microseconds(100);
     if (end.periods > 0) {
-      const double before = end.body.x;
+      const double before = measured(end);
+      const double true_before = end.body.x;
       if (end.config.path) {
         end.body.x = end.config.path(time());
       } else {
         end.body.advance(end.applied, time() - length, length);
       }
-      const Interval<3> interval{Vec3(end.applied, 0, 0), Vec3(end.body.x - before, 0, 0), held};
+      const Interval<3> interval{Vec3(end.applied, 0, 0), Vec3(measured(end) - before, 0, 0), held};
       end.speed = interval.dx.x() / length;
       end.limiter.observe(interval);
-      end.ledger.observe(interval.applied, interval.dx, held);
+      end.ledger.observe(interval.applied, Vec3(end.body.x - true_before, 0, 0), held);
     }
     ++end.periods;
     least_account = std::min(least_account, end.limiter.payable());
-    in.deliver(now_, [&](Message message) {
-      message.motion.position *= scale;
-      message.motion.velocity *= scale;
-      end.spring.receive(message.motion);
-      end.purse.receive(0, message.purse);
-    });
-    const Demand<3> wanted = end.spring.command(Vec3(end.body.x, 0, 0), Vec3(end.speed, 0, 0));
+    for (Link<Message>* link : in) {
+      link->deliver(now_, [&](Message message) {
+        message.motion.position *= scale;
+        message.motion.velocity *= scale;
+        end.spring.receive(message.motion);
+        end.purse.receive(0, message.purse);
+      });
+    }
+    const Demand<3> wanted = end.spring.command(Vec3(measured(end), 0, 0), Vec3(end.speed, 0, 0));
     end.wanted = wanted.force.x();
     if (config_.limited) {
       share<3>(end.purse, end.limiter, wanted.force, held);
@@ -201,7 +222,14 @@ class Pair {
     } else {
       end.applied = std::clamp(end.wanted, -100.0, 100.0);
     }
-    out.send(now_, {end.purse.message(0), end.spring.message()});
+    if (time() < config_.cut_from || time() >= config_.cut_from + config_.cut_for) {
+      out.send(now_, {end.purse.message(0), end.spring.message()});
+    }
+  }
+
+  double measured(const End& end) const {
+    const double step = config_.encoder_step;
+    return step > 0 ? step * std::round(end.body.x / step) : end.body.x;
   }
 
   PairConfig config_;
@@ -215,6 +243,8 @@ class Pair {
  private:
   Link<Message> there_;
   Link<Message> back_;
+  Link<Message> later_there_;
+  Link<Message> later_back_;
   int now_ = 0;
 };
 

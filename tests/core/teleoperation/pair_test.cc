@@ -268,6 +268,116 @@ TEST(Pair, WithoutLimitersTheSamePairGivesOutEnergy) {
   EXPECT_GE(safe.least_sum, -kNanojoule);
 }
 
+struct HardCase {
+  const char* name;
+  void (*make)(PairConfig&);
+};
+
+constexpr HardCase kHardCases[] = {
+    {"round trip 10 to 300 ms while pressing",
+     [](PairConfig& c) {
+       make_bad(c, 10, 2);
+       c.longer_from = 1;
+       c.longer_by = 1450;
+     }},
+    {"400 ms without a message at the impact",
+     [](PairConfig& c) {
+       make_bad(c, 20, 2);
+       c.cut_from = 0.25;
+       c.cut_for = 0.4;
+     }},
+    {"one way 5 ms, the other 200 ms",
+     [](PairConfig& c) {
+       c.there.delay = 50;
+       c.back.delay = 2000;
+     }},
+    {"0.5 m/s into 20 kN/m",
+     [](PairConfig& c) {
+       make_bad(c, 20, 2);
+       c.leader.around.reference = [](double t) { return std::min(0.5 * t, 0.05); };
+       c.follower.around.stiffness = 20'000;
+     }},
+    {"hands at both ends against each other",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.follower.around = {
+           .stiffness = 300, .damping = 2, .reference = [](double t) { return -0.02 * std::sin(9 * t); }};
+     }},
+    {"a follower ten times heavier",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.follower.mass *= 10;
+     }},
+    {"a follower at 500 Hz",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.follower.period = 20;
+     }},
+    {"a leader with b = 0.005",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.leader.friction.viscous = 0.005;
+     }},
+};
+
+void press_and_leave(PairConfig& config) {
+  config.leader.around.reference = [](double t) {
+    return t < 3 ? ramp(t, 0.03) : ramp(t, 0.03) * std::cos(4 * (t - 3));
+  };
+}
+
+TEST(Pair, NoHardCaseGetsEnergyOutOfIt) {
+  for (const HardCase& hard : kHardCases) {
+    for (const Law law : {Law::kAol, Law::kAolPlus}) {
+      PairConfig config = pressing(500);
+      press_and_leave(config);
+      hard.make(config);
+      use_law(config, law);
+      Pair pair(config);
+      double fastest = 0;
+      pair.run(8, [&](double) {
+        fastest = std::max({fastest, std::abs(pair.leader.body.v), std::abs(pair.follower.body.v)});
+      });
+      std::cout << hard.name << ", " << info(law).name << ": least account " << pair.least_account << " J, sum "
+                << pair.least_sum << " J, fastest " << fastest << " m/s\n";
+      EXPECT_GE(pair.least_account, -kNanojoule) << hard.name;
+      EXPECT_GE(pair.least_sum, -kNanojoule) << hard.name;
+      EXPECT_LT(fastest, 3) << hard.name;
+    }
+    PairConfig config = pressing(500);
+    press_and_leave(config);
+    hard.make(config);
+    config.limited = false;
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->spring = {.stiffness = 400, .adapt_to_delay = false};
+    }
+    Pair bare(config);
+    bare.run(8);
+    std::cout << "  springs alone: sum " << bare.least_sum << " J\n";
+    EXPECT_LT(bare.least_sum, -kNanojoule) << hard.name << ": nothing to protect from";
+  }
+}
+
+TEST(Pair, ItIsStableOverTheRoundTripsOfSpaceflight) {
+  for (const int round_trip : {700, 800, 7000}) {
+    PairConfig config = pressing(500);
+    make_bad(config, round_trip, 13);
+    Pair pair(config);
+    HighPass force(50);
+    const double settled = round_trip > 1000 ? 40 : 8;
+    pair.run(settled + 2, [&](double t) { force.add(pair.leader.applied, t > settled); });
+    std::cout << "RTT " << round_trip << " ms: K " << pair.leader.spring.stiffness() << " N/m, felt "
+              << -pair.leader.applied << " N, at the wall " << -pair.follower.body.outside << " N, ripple "
+              << 1e3 * force.rms() << " mN\n";
+    EXPECT_LT(force.rms(), 0.02);
+    EXPECT_GE(pair.least_account, -kNanojoule);
+    EXPECT_GE(pair.least_sum, -kNanojoule);
+    if (round_trip < 1000) {
+      EXPECT_GT(-pair.leader.applied, 0.1);
+    }
+  }
+}
+
 TEST(Pair, TheHandFeelsTheImpedanceThatLawrenceGives) {
   // Beyond B_l, the hand feels C (Z_f + Z_e)/(C + Z_f + Z_e).
   using Complex = std::complex<double>;

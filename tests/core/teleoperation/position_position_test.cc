@@ -47,6 +47,7 @@ void talk(PositionPosition<3>& end, int delay, int periods) {
     const auto then = static_cast<std::int64_t>(now) - delay;
     if (then > 0) {
       end.receive({.sequence = static_cast<std::uint64_t>(then) + kOffset,
+                   .answers_epoch = 1,
                    .answers = static_cast<std::uint64_t>(then),
                    .time = milliseconds(then + kOffset)});
     }
@@ -80,7 +81,8 @@ TEST(PositionPosition, WithoutAdaptingTheStiffnessStays) {
 TEST(PositionPosition, BothEndsTakeTheLongerRoundTrip) {
   PositionPosition<3> end(config_of());
   end.command(Vec3::Zero(), Vec3::Zero());
-  end.receive({.sequence = 1, .answers = 1, .round_trip = milliseconds(100), .position = Vec3(0.01, 0, 0)});
+  end.receive(
+      {.sequence = 1, .answers_epoch = 1, .answers = 1, .round_trip = milliseconds(100), .position = Vec3(0.01, 0, 0)});
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 2 * 4 / 0.1 * 0.01);
   EXPECT_EQ(end.message().round_trip, milliseconds(1)) << "what it tells is its own: else neither would ever fall";
 }
@@ -90,7 +92,8 @@ TEST(PositionPosition, SilenceLowersTheStiffnessAndEndsTheFeedForward) {
   config.damping = 0;
   PositionPosition<3> end(config);
   end.command(Vec3::Zero(), Vec3::Zero());
-  end.receive({.sequence = 1, .answers = 1, .position = Vec3(0.01, 0, 0), .velocity = Vec3(0.1, 0, 0)});
+  end.receive(
+      {.sequence = 1, .answers_epoch = 1, .answers = 1, .position = Vec3(0.01, 0, 0), .velocity = Vec3(0.1, 0, 0)});
   double force = 0;
   for (int n = 0; n < 999; ++n) force = end.command(Vec3::Zero(), Vec3::Zero()).force.x();
   EXPECT_NEAR(end.stiffness(), 2 * 4 / 0.999, 1e-9);
@@ -119,6 +122,20 @@ TEST(PositionPosition, ALateMessageIsCarriedOnWithItsVelocity) {
   }
 }
 
+TEST(PositionPosition, AnEndThatStartsAnewIsHeardAndItsFormerMessagesAreNot) {
+  PositionPosition<3> end(config_of());
+  talk(end, 300, 400);
+  end.receive({.epoch = 2, .sequence = 1, .position = Vec3(0.01, 0, 0)});
+  EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4) << "the round trip begins anew, too";
+  end.receive({.epoch = 1, .sequence = 5'000'000, .position = Vec3(0.05, 0, 0)});
+  EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4);
+  // It answers what another epoch of ours sent: no measure of the round trip.
+  end.receive({.epoch = 2, .sequence = 2, .answers_epoch = 9, .answers = 5'000'000, .position = Vec3(0.02, 0, 0)});
+  EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 8);
+  EXPECT_EQ(end.round_trip(), Duration::zero());
+  EXPECT_EQ(end.refused(), 0U);
+}
+
 TEST(PositionPosition, ItsForceIsBounded) {
   auto config = config_of();
   config.max_force = 5;
@@ -135,9 +152,11 @@ TEST(PositionPosition, WhatIsWrongOrOldIsPassedOver) {
   EXPECT_EQ(end.refused(), 0U) << "late is not wrong";
   end.receive({.sequence = 3, .position = Vec3(kNan, 0, 0)});
   end.receive({.sequence = 3, .velocity = Vec3(0, kNan, 0)});
-  end.receive({.sequence = 3, .answers = 1});  // we have sent none
+  end.receive({.sequence = 3, .answers_epoch = 1, .answers = 1});  // we have sent none
   end.receive({.sequence = 3, .round_trip = milliseconds(-1)});
-  EXPECT_EQ(end.refused(), 4U);
+  end.receive({.sequence = 3, .time = std::chrono::hours(1'000'000)});
+  end.receive({.epoch = 0, .sequence = 3});
+  EXPECT_EQ(end.refused(), 6U);
   EXPECT_DOUBLE_EQ(end.command(Vec3::Zero(), Vec3::Zero()).force.x(), 4);
   EXPECT_FALSE(end.command(Vec3(kNan, 0, 0), Vec3::Zero()).force.allFinite()) << "the limiter turns it to zero";
 }
