@@ -293,7 +293,7 @@ constexpr HardCase kHardCases[] = {
      }},
     {"0.5 m/s into 20 kN/m",
      [](PairConfig& c) {
-       make_bad(c, 20, 2);
+       make_bad(c, 100, 2);
        c.leader.around.reference = [](double t) { return std::min(0.5 * t, 0.05); };
        c.follower.around.stiffness = 20'000;
      }},
@@ -305,7 +305,7 @@ constexpr HardCase kHardCases[] = {
      }},
     {"a follower ten times heavier",
      [](PairConfig& c) {
-       make_bad(c, 50, 2);
+       make_bad(c, 200, 2);
        c.follower.mass *= 10;
      }},
     {"a follower at 500 Hz",
