@@ -34,8 +34,8 @@ namespace tendon {
 /// nothing back. (A spring whose force grows with its travel d returns at most F·d. The leak in time of control.md 8.1
 /// would weaken the force on a hand that just holds a spring.)
 ///
-/// An account that ports share (Purse) keeps ℓ(F_wanted) besides: E ≤ E_cap + C + ℓ(F_wanted). A follower's port does work,
-/// so it has no C of its own, and what its peer paid for the force would be discarded each period (README of
+/// An account that ports share (Purse) keeps ℓ(F_wanted) besides: E ≤ E_cap + C + ℓ(F_wanted). A follower's port does
+/// work, so it has no C of its own, and what its peer paid for the force would be discarded each period (README of
 /// core/teleoperation has the figures).
 ///
 /// **robust_ledger** For positions in counts of Δ.

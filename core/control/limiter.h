@@ -21,8 +21,8 @@ namespace tendon {
 /// Satisfies StabilityController<Limiter, 3>. Thread-safe: no. Realtime-safe: all but the constructor.
 class Limiter {
  public:
-  /// Throws what the law's constructor throws, and std::invalid_argument for a `shared_account` on a law that has none to
-  /// share.
+  /// Throws what the law's constructor throws, and std::invalid_argument for a `shared_account` on a law that has none
+  /// to share.
   explicit Limiter(const LimiterConfig& config);
 
   void observe(const Interval<3>& interval) noexcept;

@@ -27,25 +27,26 @@ struct PortMotion {
 ///     F = K (y − x) + D (ẏ − v) − B v,   ‖F‖ ≤ max_force        N, on whoever holds this end
 ///     K = min(stiffness, 2B/T_loop)                             with `adapt_to_delay`
 ///
-/// x, v are this end's position and velocity, y, ẏ the other's: the newest that came, and y + ẏ e when that is by e later
-/// than the quickest messages lately (e ≤ kMostAhead, then y stands still and ẏ is 0). F acts along each axis by itself
-/// and is the same in every frame.
+/// x, v are this end's position and velocity, y, ẏ the other's: the newest that came, and y + ẏ e when that is by e
+/// later than the quickest messages lately (e ≤ kMostAhead, then y stands still and ẏ is 0). F acts along each axis by
+/// itself and is the same in every frame.
 ///
 /// **Why K falls with the delay.** The late spring lags behind the motion and gives out what a damper of K·T_loop/2 at
 /// each end takes up; with K ≤ 2B/T_loop the coupling is quiet (B: all damping at one end that is sure). Above it the
 /// limiters and the purse keep the pair passive, but it buzzes: 0.04 … 0.08 m/s in free motion from 50 ms on.
 ///
-/// **T_loop** is measured without a clock: a message says which of our motions it answers, and our periods since then are
-/// counted, so delay, loss and the other end's waiting are all in it. Both ends take the longer of what they measured:
-/// two different K would hold two different forces. K falls at once and rises after `recovery`.
-/// T_loop is the longest of the last one to two of these, so that a held force does not waver. When nothing comes T_loop
-/// grows and K falls; when to give up is the caller's business (the loss ladder). A change of K under stretch costs
-/// ½ ΔK δ², which the accounts pay.
+/// **T_loop** is measured without a clock: a message says which of our motions it answers, and our periods since then
+/// are counted, so delay, loss and the other end's waiting are all in it. Both ends take the longer of what they
+/// measured: two different K would hold two different forces. K falls at once and rises after `recovery`. T_loop is the
+/// longest of the last one to two of these, so that a held force does not waver. When nothing comes T_loop grows and K
+/// falls; when to give up is the caller's business (the loss ladder). A change of K under stretch costs ½ ΔK δ², which
+/// the accounts pay.
 ///
-/// **Why y + ẏ e.** A message that is 5 ms later than the last one leaves y 1 mm behind at 0.2 m/s: 0.4 N of noise at 400
-/// N/m. Measured free motion at RTT 10 ms with 5 ms of jitter: see the README.
+/// **Why y + ẏ e.** A message that is 5 ms later than the last one leaves y 1 mm behind at 0.2 m/s: 0.4 N of noise at
+/// 400 N/m. Measured free motion at RTT 10 ms with 5 ms of jitter: see the README.
 ///
-/// **What it feels like** in free motion, as a damper, with a sine of peak speed v̂ and the follower's friction b_f, f_c:
+/// **What it feels like** in free motion, as a damper, with a sine of peak speed v̂ and the follower's friction b_f,
+/// f_c:
 ///
 ///     b_felt = K·T_loop + B_l + B_f + b_f + 4 f_c/(π v̂)
 ///
@@ -54,9 +55,9 @@ struct PortMotion {
 ///
 /// This law is not passive. It needs a limiter and a Purse at both ends.
 ///
-/// A message that is not finite or out of its bounds is dropped and counted in `refused`. A higher epoch of the other end
-/// begins anew with it; one of a lower epoch is passed over. When the position is not finite, neither is the demand, which
-/// the limiter turns to zero. Before the first message only −B v.
+/// A message that is not finite or out of its bounds is dropped and counted in `refused`. A higher epoch of the other
+/// end begins anew with it; one of a lower epoch is passed over. When the position is not finite, neither is the
+/// demand, which the limiter turns to zero. Before the first message only −B v.
 ///
 /// Source: position–position coupling, Hannaford 1989 (recalled); the bound on K derived here and measured.
 ///
