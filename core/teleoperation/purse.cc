@@ -107,7 +107,7 @@ double Purse::give(double account, double need) noexcept {
   double left = account;
   for (std::size_t j = 0; j < config_.peers; ++j) {
     Peer& peer = peers_[j];
-    const double total = std::min(peer.given + share * std::min(gifts[j], left), PurseMessage::kMostTotal);
+    const double total = std::min(peer.given + std::min(share * gifts[j], left), PurseMessage::kMostTotal);
     // What the total really grew by: the peer will count that.
     const double grown = total - peer.given;
     if (!(grown > 0) || grown > left) continue;

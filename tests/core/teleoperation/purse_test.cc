@@ -84,6 +84,13 @@ TEST(Purse, NeverGivesMoreThanItHasHoweverManyAsk) {
   }
 }
 
+TEST(Purse, WhenItHasTooLittleAllAreCutInProportion) {
+  Purse purse({.peers = 3});
+  for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, -10, 0.01));
+  EXPECT_NEAR(purse.settle(period_of(0.03, 0.01)).withdraw, 0.03, 1e-12);
+  for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(purse.given(j), 0.01, 1e-12) << j;
+}
+
 TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
   Purse purse({.peers = 3, .max_account = 1});
   const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last has more than its share: it is given nothing
@@ -98,10 +105,10 @@ TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
 TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
   // s_x 0.2, s_f 5: at the leader a joule of the follower is 25.
   Purse leader({.joule = {25}, .max_account = 10});
-  leader.receive(0, from_peer(1, 0, 0.001, 0.004));
+  leader.receive(0, from_peer(1, 0.0002, 0.001, 0.004));
   const auto settlement = leader.settle(period_of(0, 0.025 - 0.2e-3));
   EXPECT_DOUBLE_EQ(settlement.credit, 0.1);
-  EXPECT_NEAR(settlement.withdraw, 0.05, 1e-12) << "both need the same, in the leader's joules";
+  EXPECT_NEAR(settlement.withdraw, (0.1 - 0.005) / 2, 1e-12) << "both need the same, in the leader's joules";
   EXPECT_EQ(leader.message(0).taken, 0.004) << "totals are told as they were heard";
 }
 
