@@ -52,6 +52,7 @@ void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
     floor_ = std::numeric_limits<double>::infinity();
     loop_ = loop_before_ = Duration::zero();
     stretch_began_ = sequence_;
+    knows_loop_ = false;
   }
   newest_ = message;
   if (!answered) newest_.answers = 0;
@@ -72,9 +73,12 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
     }
     loop_ = std::max(loop_, counted(sequence_ - newest_.answers));
   }
-  stiffness_ = config_.stiffness;
   const double loop = seconds(round_trip());
-  if (config_.adapt_to_delay && loop > 0) stiffness_ = std::min(stiffness_, 2 * config_.own_damping / loop);
+  double quiet = config_.stiffness;
+  if (config_.adapt_to_delay && loop > 0) quiet = std::min(quiet, 2 * config_.own_damping / loop);
+  const double share = knows_loop_ ? std::min(1.0, seconds(config_.period) / seconds(kSettling)) : 1.0;
+  stiffness_ += share * (quiet - stiffness_);
+  knows_loop_ = loop > 0;
 
   const double lag = seconds(counted(sequence_) - newest_.time);
   floor_ = std::min(lag, floor_ + kFloorRise * seconds(config_.period));

@@ -159,25 +159,30 @@ TEST(Pair, AHeldForceIsThatAtTheWallOverAnyNetwork) {
   for (const Law law : {Law::kAol, Law::kAolPlus}) {
     for (const double wall : {500.0, 5000.0}) {
       for (const int round_trip : kRoundTrips) {
-        PairConfig config = pressing(wall);
-        use_law(config, law);
-        make_bad(config, round_trip, 7);
-        Pair pair(config);
-        pair.run(6);
-        double worst = 0;
-        pair.run(2, [&](double) {
-          const double felt = -pair.leader.applied;
+        for (std::uint64_t hand = 0; hand < 4; ++hand) {  // the first is the one of the README, the others are drawn
+          Dice dice(2000 + hand);
+          PairConfig config = pressing(wall, hand == 0 ? 400 : dice.within(150, 600));
+          use_law(config, law);
+          make_bad(config, round_trip, 7 + hand);
+          Pair pair(config);
+          pair.run(6);
+          double worst = 0;
+          pair.run(2, [&](double) {
+            const double felt = -pair.leader.applied;
+            const double at_wall = -pair.follower.body.outside;
+            worst = std::max(worst, std::abs(felt - at_wall) - 0.01 * at_wall);
+          });
           const double at_wall = -pair.follower.body.outside;
-          worst = std::max(worst, std::abs(felt - at_wall) - 0.01 * at_wall);
-        });
-        const double at_wall = -pair.follower.body.outside;
-        std::cout << info(law).name << ", wall " << wall << " N/m, RTT " << round_trip << " ms: K "
-                  << pair.leader.spring.stiffness() << " N/m, felt " << -pair.leader.applied << " N, at the wall "
-                  << at_wall << " N, cut " << pair.leader.cut << "\n";
-        EXPECT_LE(worst, 2 * config.leader.friction.coulomb);
-        EXPECT_GT(at_wall, round_trip > 200 ? 0.1 : 0.5) << "nothing was held";
-        EXPECT_GE(pair.least_account, -kNanojoule);
-        EXPECT_GE(pair.least_sum, -kNanojoule);
+          if (hand == 0) {
+            std::cout << info(law).name << ", wall " << wall << " N/m, RTT " << round_trip << " ms: K "
+                      << pair.leader.spring.stiffness() << " N/m, felt " << -pair.leader.applied << " N, at the wall "
+                      << at_wall << " N, cut " << pair.leader.cut << "\n";
+          }
+          EXPECT_LE(worst, 2 * config.leader.friction.coulomb) << "RTT " << round_trip << ", hand " << hand;
+          EXPECT_GT(at_wall, round_trip > 200 ? 0.1 : 0.5) << "nothing was held";
+          EXPECT_GE(pair.least_account, -kNanojoule);
+          EXPECT_GE(pair.least_sum, -kNanojoule);
+        }
       }
     }
   }
@@ -187,27 +192,31 @@ TEST(Pair, ItIsQuietHeldAndFreeAtEveryRoundTrip) {
   for (const Law law : {Law::kAol, Law::kAolPlus}) {
     for (const int round_trip : kRoundTrips) {
       for (const bool held : {true, false}) {
-        PairConfig config = held ? pressing(500) : waving();
-        use_law(config, law);
-        make_bad(config, round_trip, 3);
-        Pair pair(config);
-        std::array force = {HighPass(50), HighPass(50)};
-        std::array speed = {HighPass(20), HighPass(20)};
-        pair.run(10, [&](double t) {
-          const bool counts = t > 4;
-          force[0].add(pair.leader.applied, counts);
-          force[1].add(pair.follower.applied, counts);
-          speed[0].add(pair.leader.body.v, counts);
-          speed[1].add(pair.follower.body.v, counts);
-        });
-        const double ripple = std::max(force[0].rms(), force[1].rms());
-        const double buzz = std::max(speed[0].rms(), speed[1].rms());
+        double ripple = 0;
+        double buzz = 0;
+        for (std::uint64_t seed = 3; seed < 7; ++seed) {
+          PairConfig config = held ? pressing(500) : waving();
+          use_law(config, law);
+          make_bad(config, round_trip, seed);
+          Pair pair(config);
+          std::array force = {HighPass(50), HighPass(50)};
+          std::array speed = {HighPass(20), HighPass(20)};
+          pair.run(8, [&](double t) {
+            const bool counts = t > 4;
+            force[0].add(pair.leader.applied, counts);
+            force[1].add(pair.follower.applied, counts);
+            speed[0].add(pair.leader.body.v, counts);
+            speed[1].add(pair.follower.body.v, counts);
+          });
+          ripple = std::max({ripple, force[0].rms(), force[1].rms()});
+          buzz = std::max({buzz, speed[0].rms(), speed[1].rms()});
+          EXPECT_GE(pair.least_account, -kNanojoule);
+          EXPECT_GE(pair.least_sum, -kNanojoule);
+        }
         std::cout << info(law).name << (held ? ", held" : ", free") << ", RTT " << round_trip << " ms: ripple "
                   << 1e3 * ripple << " mN, buzz " << 1e3 * buzz << " mm/s\n";
         EXPECT_LT(ripple, 0.02);
         EXPECT_LT(buzz, 2e-3);
-        EXPECT_GE(pair.least_account, -kNanojoule);
-        EXPECT_GE(pair.least_sum, -kNanojoule);
       }
     }
   }
