@@ -7,8 +7,13 @@
 #include <gtest/gtest.h>
 
 #include <complex>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <numbers>
+
+#include "devices/simulated/recorded_motion.h"
 
 namespace tendon {
 namespace {
@@ -223,16 +228,23 @@ TEST(Pair, ItIsQuietHeldAndFreeAtEveryRoundTrip) {
 }
 
 TEST(Pair, AfterAMinuteOfWavingTheTwoStandAtOnePlace) {
+  constexpr double kCount = 10e-6;
   for (const double loss : {0.01, 0.3}) {
     PairConfig config = waving();
     config.leader.around.reference = [](double t) { return t < 60 ? 0.02 * std::sin(2 * kPi * t) : 0.0; };
     make_bad(config, 50, 5);
     config.there.loss = config.back.loss = loss;
+    config.encoder_step = kCount;
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->law = Law::kAolPlus;
+      end->parts.robust_ledger = AolPlus<1, 3>::Robust{.encoder_step = {kCount}};
+    }
     Pair pair(config);
     pair.run(63);
     const double apart = std::abs(pair.leader.body.x - pair.follower.body.x);
-    const double most = 2 * config.leader.friction.coulomb / pair.follower.spring.stiffness();
-    std::cout << "loss " << 100 * loss << " %: " << 1e3 * apart << " mm apart, friction allows " << 1e3 * most << "\n";
+    const double most = 2 * config.leader.friction.coulomb / pair.follower.spring.stiffness() + 2 * kCount;
+    std::cout << "loss " << 100 * loss << " %: " << 1e3 * apart << " mm apart, friction and counts allow " << 1e3 * most
+              << "; least true sum " << pair.least_sum << " J\n";
     EXPECT_LE(apart, most);
     EXPECT_GE(pair.least_sum, -kNanojoule);
   }
@@ -364,6 +376,38 @@ TEST(Pair, NoHardCaseGetsEnergyOutOfIt) {
     bare.run(8);
     std::cout << "  springs alone: sum " << bare.least_sum << " J\n";
     EXPECT_LT(bare.least_sum, -kNanojoule) << hard.name << ": nothing to protect from";
+  }
+}
+
+/// A column of a recording as a path of the handle, m.
+std::function<double(double)> recorded(const std::filesystem::path& file, const char* column) {
+  std::ifstream csv(file);
+  const ScriptedMotion motion(load_recorded_motion(csv, {.path = file, .position = column, .scale = 0.075}));
+  return [motion](double t) { return motion.at(t).position.x(); };
+}
+
+TEST(Pair, RecordedMotionOfBothPortsOfARigGetsNoEnergyOut) {
+  const char* const data = std::getenv("TENDON_DATA");
+  if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no recorded rig";
+  for (const char* const name : {"m2_question1d_foam.csv", "m2_question1d_rigid.csv"}) {
+    const std::filesystem::path file = std::filesystem::path(data) / "tue-1dof-teleop" / name;
+    for (const Law law : {Law::kAol, Law::kAolPlus}) {
+      for (const int round_trip : kRoundTrips) {
+        PairConfig config;
+        config.leader.path = recorded(file, "master_pos_rad");
+        config.follower.path = recorded(file, "slave_pos_rad");
+        use_law(config, law);
+        make_bad(config, round_trip, 17);
+        Pair pair(config);
+        double largest = 0;
+        pair.run(5, [&](double) { largest = std::max(largest, std::abs(pair.leader.applied)); });
+        std::cout << name << ", " << info(law).name << ", RTT " << round_trip << " ms: least account "
+                  << pair.least_account << " J, sum " << pair.least_sum << " J, largest force " << largest << " N\n";
+        EXPECT_GE(pair.least_account, -kNanojoule);
+        EXPECT_GE(pair.least_sum, -kNanojoule);
+        EXPECT_GT(largest, 0.05) << "nothing was rendered";
+      }
+    }
   }
 }
 
