@@ -84,6 +84,25 @@ double Aol<Blocks, Size>::energy() const noexcept {
   return sum;
 }
 
+template <int Blocks, int Size>
+void Aol<Blocks, Size>::credit(double energy) noexcept {
+  if (energy > 0) ledgers_[0].transfer(energy);
+}
+
+template <int Blocks, int Size>
+void Aol<Blocks, Size>::withdraw(double energy) noexcept {
+  if (energy > 0) ledgers_[0].transfer(-energy);
+}
+
+template <int Blocks, int Size>
+double Aol<Blocks, Size>::worst_loss(const Vec<kSize>& force) const noexcept {
+  double sum = 0;
+  for (int i = 0; i < Blocks; ++i) {
+    sum += bounds_[static_cast<std::size_t>(i)].at(force.template segment<Size>(i * Size).norm());
+  }
+  return sum;
+}
+
 template class Aol<1>;
 template class Aol<1, 3>;
 template class Aol<3>;

@@ -49,6 +49,12 @@ class Aol {
   LimitedForce<kSize> limit(const Demand<kSize>& wanted) noexcept;
   double energy() const noexcept;
 
+  /// SharesAccount: E is then the shared account.
+  void credit(double energy) noexcept;
+  void withdraw(double energy) noexcept;
+  double payable() const noexcept { return energy(); }
+  double worst_loss(const Vec<kSize>& force) const noexcept;
+
   /// From the next `limit` on, T_max is this (> 0).
   void hold_at_most(Duration longest_hold) noexcept;
 

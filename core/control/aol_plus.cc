@@ -56,6 +56,7 @@ void check(const typename AolPlus<Blocks, Size>::Config& config) {
 template <int Blocks, int Size>
 AolPlus<Blocks, Size>::AolPlus(const Config& config)
     : parts_(config.parts),
+      shared_(config.shared_account),
       friction_(config.friction),
       longest_hold_(config.longest_hold),
       ledgers_(each<EnergyLedger, Blocks>([&config](std::size_t i) { return config.friction[i]; },
@@ -214,7 +215,9 @@ void AolPlus<Blocks, Size>::cap(const Vec<kSize>& wanted) noexcept {
     contact_ = std::min({contact_, most, parts_.energy_cap->most_contact});
   }
   last_wanted_ = wanted;
-  discarded_ = std::max(discarded_, account() - (parts_.energy_cap->energy + contact_));
+  double kept = parts_.energy_cap->energy + contact_;
+  if (shared_) kept += worst_loss(wanted);
+  discarded_ = std::max(discarded_, account() - kept);
 }
 
 template <int Blocks, int Size>
@@ -224,7 +227,7 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
   const double size = force.norm();
 
   if (parts_.energy_cap) cap(force);
-  const double budget = spendable() - reserved();
+  const double budget = payable();
 
   std::array<double, Blocks> sizes{};
   std::array<OutputBound, Blocks> bounds = bounds_;
@@ -278,6 +281,36 @@ auto AolPlus<Blocks, Size>::limit(const Demand<kSize>& wanted) noexcept -> Limit
     next_under_way_ = (next_under_way_ + 1) % static_cast<std::size_t>(parts_.latency_reserve->holds);
   }
   return result;
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::credit(double energy) noexcept {
+  if (!(energy > 0)) return;
+  ledgers_[0].transfer(energy);
+  if (robust_) (*robust_)[0].transfer(energy);
+}
+
+template <int Blocks, int Size>
+void AolPlus<Blocks, Size>::withdraw(double energy) noexcept {
+  if (!(energy > 0)) return;
+  ledgers_[0].transfer(-energy);
+  if (robust_) (*robust_)[0].transfer(-energy);
+}
+
+template <int Blocks, int Size>
+double AolPlus<Blocks, Size>::worst_loss(const Vec<kSize>& force) const noexcept {
+  const double whole = parts_.knee ? parts_.knee->start : 1.0;
+  const double forces = parts_.latency_reserve ? 1.0 + parts_.latency_reserve->holds : 1.0;
+  double sum = 0;
+  for (int i = 0; i < Blocks; ++i) {
+    const auto block = static_cast<std::size_t>(i);
+    OutputBound bound = bounds_[block];
+    if (parts_.bounded_acceleration) {
+      bound.viscous_per_hold = parts_.bounded_acceleration->shaping_viscous[block] / seconds(longest_hold_);
+    }
+    sum += forces * bound.at(force.template segment<Size>(i * Size).norm() / whole);
+  }
+  return sum;
 }
 
 template <int Blocks, int Size>

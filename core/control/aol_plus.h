@@ -34,6 +34,10 @@ namespace tendon {
 /// nothing back. (A spring whose force grows with its travel d returns at most F·d. The leak in time of control.md 8.1
 /// would weaken the force on a hand that just holds a spring.)
 ///
+/// An account that ports share (Purse) keeps ℓ(F_wanted) besides: E ≤ E_cap + C + ℓ(F_wanted). A follower's port does
+/// work, so it has no C of its own, and what its peer paid for the force would be discarded each period (README of
+/// core/teleoperation has the figures).
+///
 /// **robust_ledger** For positions in counts of Δ.
 ///
 /// **knee** Forces above 80 % of the bound are compressed smoothly instead of clipped: quieter on stiff walls.
@@ -99,6 +103,7 @@ class AolPlus {
     std::array<Friction, Blocks> friction{};
     Duration longest_hold{};  ///< T_max; > 0
     Parts parts{};
+    bool shared_account = false;  ///< other ports pay into the account: see energy_cap
   };
 
   /// Throws std::invalid_argument naming the part and its field.
@@ -113,6 +118,13 @@ class AolPlus {
   /// What may be spent: Ē before it is cut off at zero, and before the reserve is set aside. J; a lower bound of the
   /// **true** ledger, below zero by at most what rounding may have hidden.
   double spendable() const noexcept;
+
+  /// SharesAccount. `credit` and `withdraw` change the exact and the robust ledger alike.
+  void credit(double energy) noexcept;
+  void withdraw(double energy) noexcept;
+  double payable() const noexcept { return spendable() - reserved(); }
+  /// Counts the knee (a bound of F/s lets F through whole), the forces under way and shaping_viscous in.
+  double worst_loss(const Vec<kSize>& force) const noexcept;
 
   /// The device's friction is now at least this. Without the part adaptive_friction nothing changes.
   void adapt(const std::array<Friction, Blocks>& friction) noexcept;
@@ -132,6 +144,7 @@ class AolPlus {
   void use(std::size_t block, const Friction& friction) noexcept;
 
   Parts parts_;
+  bool shared_;
   std::array<Friction, Blocks> friction_;  ///< in use
   Duration longest_hold_;
   std::array<EnergyLedger, Blocks> ledgers_;

@@ -80,6 +80,8 @@ struct LimiterConfig {
   /// N·s/m, what the passivity controllers and kReferenceEnergy may inject at most; far below 2m/T, where a digital
   /// damper is unstable. 20 is an eighth of that at 75 g and 1 kHz.
   double max_damping = 20;
+  /// Other ports pay into the account and draw on it (Purse). Refused for laws that have none to share.
+  bool shared_account = false;
 };
 
 namespace catalogue {
@@ -186,7 +188,10 @@ inline constexpr std::tuple kRows{
            }},
     LawRow{{Law::kAolPlus, "aol+", "Adjusting Output-Limiter with the parts that are listed", true, false},
            [](const LimiterConfig& c) {
-             return AolPlus<1, 3>({.friction = {c.friction}, .longest_hold = c.longest_hold, .parts = c.parts});
+             return AolPlus<1, 3>({.friction = {c.friction},
+                                   .longest_hold = c.longest_hold,
+                                   .parts = c.parts,
+                                   .shared_account = c.shared_account});
            }},
 };
 

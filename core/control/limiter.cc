@@ -2,11 +2,18 @@
 #include "core/control/limiter.h"
 
 #include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <string>
 #include <variant>
 
 namespace tendon {
 
 Limiter::Limiter(const LimiterConfig& config) : law_(make_law(config)), longest_hold_(config.longest_hold) {
+  if (config.shared_account && !std::visit([]<class L>(const L&) { return SharesAccount<L, 3>; }, law_)) {
+    throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
+                                "\" has no account that a purse could share: expected aol, aol-box or aol+");
+  }
   if (!info(config.law).passive) return;
   if (config.follow_holds) holds_.emplace(config.longest_hold, *config.follow_holds);
   bound_ = OutputBound::of(config.friction, config.longest_hold);
@@ -51,6 +58,46 @@ LimitedForce<3> Limiter::limit(const Demand<3>& wanted) noexcept {
 
 double Limiter::energy() const noexcept {
   return std::visit([](const auto& law) { return law.energy(); }, law_);
+}
+
+void Limiter::credit(double energy) noexcept {
+  std::visit(
+      [energy]<class L>(L& law) {
+        if constexpr (SharesAccount<L, 3>) law.credit(energy);
+      },
+      law_);
+}
+
+void Limiter::withdraw(double energy) noexcept {
+  std::visit(
+      [energy]<class L>(L& law) {
+        if constexpr (SharesAccount<L, 3>) law.withdraw(energy);
+      },
+      law_);
+}
+
+double Limiter::payable() const noexcept {
+  return std::visit(
+      []<class L>(const L& law) {
+        if constexpr (SharesAccount<L, 3>) {
+          return law.payable();
+        } else {
+          return 0.0;
+        }
+      },
+      law_);
+}
+
+double Limiter::worst_loss(const Vec<3>& force) const noexcept {
+  return std::visit(
+      [&force]<class L>(const L& law) {
+        if constexpr (SharesAccount<L, 3>) {
+          return law.worst_loss(force);
+        } else {
+          return std::numeric_limits<double>::infinity();
+        }
+      },
+      law_);
 }
 
 void Limiter::adapt(const Friction& friction) noexcept {

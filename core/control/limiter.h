@@ -21,13 +21,21 @@ namespace tendon {
 /// Satisfies StabilityController<Limiter, 3>. Thread-safe: no. Realtime-safe: all but the constructor.
 class Limiter {
  public:
-  /// Throws what the law's constructor throws.
+  /// Throws what the law's constructor throws, and std::invalid_argument for a `shared_account` on a law that has none
+  /// to share.
   explicit Limiter(const LimiterConfig& config);
 
   void observe(const Interval<3>& interval) noexcept;
   void observe_unseen(const Vec<3>& applied, Duration at_most) noexcept;
   LimitedForce<3> limit(const Demand<3>& wanted) noexcept;
   double energy() const noexcept;
+
+  /// SharesAccount, of a law that does so (`shared_account` refuses the others). Other laws pass over `credit` and
+  /// `withdraw`; their `payable` is 0 and their `worst_loss` +∞.
+  void credit(double energy) noexcept;
+  void withdraw(double energy) noexcept;
+  double payable() const noexcept;
+  double worst_loss(const Vec<3>& force) const noexcept;
 
   /// Forwards to AolPlus::adapt. Other laws ignore it.
   void adapt(const Friction& friction) noexcept;

@@ -37,6 +37,27 @@ concept StabilityController = requires(Law law, const Interval<N>& interval, con
   noexcept->std::convertible_to<double>;
 };
 
+/// A law whose account other ports may pay into and draw on (Purse), J:
+///
+///     credit(J)        the account rises: another port has given up as much. Below zero or not finite: nothing happens
+///     withdraw(J)      the account falls. The caller withdraws no more than `payable`; the same for bad values
+///     payable()        what bounds the next force; of it max(payable, 0) may be withdrawn
+///     worst_loss(F)    ℓ(F) of OutputBound: the account that lets F (N) through whole; +∞ when none does
+///
+/// `energy` is then the account, the port's own ledger + credited − withdrawn. Both take place between `observe` and
+/// `limit` of one period: what is withdrawn after `limit` was already lent to the force.
+template <class Law, int N>
+concept SharesAccount = requires(Law law, const Law& same, const Vec<N>& force, double energy) {
+  { law.credit(energy) }
+  noexcept;
+  { law.withdraw(energy) }
+  noexcept;
+  { same.payable() }
+  noexcept->std::same_as<double>;
+  { same.worst_loss(force) }
+  noexcept->std::same_as<double>;
+};
+
 /// A law whose bound counts on how long its forces are held, and follows a new bound of that from the next `limit` on
 /// (HoldBound).
 template <class Law>

@@ -23,6 +23,10 @@ void EnergyLedger::adapt(const Friction& friction) noexcept {
   if (possible(friction.coulomb) && possible(friction.viscous)) friction_ = friction;
 }
 
+void EnergyLedger::transfer(double energy) noexcept {
+  if (std::isfinite(energy)) energy_ += energy;
+}
+
 double EnergyLedger::book(double work, double squared_displacement, Duration held) noexcept {
   const double viscous = held > Duration::zero() ? friction_.viscous * squared_displacement / seconds(held) : 0.0;
   const double income = work + friction_.coulomb * std::sqrt(squared_displacement) + viscous;

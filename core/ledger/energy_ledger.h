@@ -50,6 +50,11 @@ class EnergyLedger {
   /// keeps such forces at f_c).
   double observe_unseen(double applied, Duration at_most) noexcept;
 
+  /// Adds `energy` (J) that the account of another port has given up, or takes away what this one gives (negative). A
+  /// value that is not finite changes nothing. E is then the account of a port that shares (Purse), no more the ledger
+  /// of this port alone.
+  void transfer(double energy) noexcept;
+
   /// From the next interval on friction has these lower bounds. Throws nothing: values that are not finite
   /// or negative change nothing.
   void adapt(const Friction& friction) noexcept;

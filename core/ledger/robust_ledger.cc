@@ -84,6 +84,11 @@ void RobustLedger<N>::observe_unseen(const Vec<N>& applied, Duration at_most) no
 }
 
 template <int N>
+void RobustLedger<N>::transfer(double energy) noexcept {
+  if (std::isfinite(energy)) energy_ += energy;
+}
+
+template <int N>
 void RobustLedger<N>::adapt(const Friction& friction) noexcept {
   const auto possible = [](double value) { return std::isfinite(value) && value >= 0; };
   if (!possible(friction.coulomb) || !possible(friction.viscous)) return;

@@ -42,6 +42,9 @@ class RobustLedger {
   /// As EnergyLedger::observe_unseen. Where the hand is now is unknown: travel starts again from zero.
   void observe_unseen(const Vec<N>& applied, Duration at_most) noexcept;
 
+  /// As EnergyLedger::transfer.
+  void transfer(double energy) noexcept;
+
   /// As EnergyLedger::adapt.
   void adapt(const Friction& friction) noexcept;
 

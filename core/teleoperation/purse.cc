@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/teleoperation/purse.h"
+
+#include <cmath>
+
+#include "core/base/expect.h"
+
+namespace tendon {
+
+namespace {
+
+// False for what is not a number.
+bool within(double value, double low, double high) noexcept { return value >= low && value <= high; }
+
+bool possible(const PurseMessage& message) noexcept {
+  constexpr double kAccount = PurseMessage::kMostAccount;
+  constexpr double kTotal = PurseMessage::kMostTotal;
+  return message.epoch > 0 && message.sequence > 0 && within(message.account, -kAccount, kAccount) &&
+         within(message.need, 0, kAccount) && within(message.given, 0, kTotal) && within(message.taken, 0, kTotal);
+}
+
+}  // namespace
+
+Purse::Purse(const Config& config) : config_(config), allowance_(config.max_account) {
+  expect(config.peers >= 1 && config.peers <= kMostPeers, "peers", static_cast<double>(config.peers), "1 to 3");
+  for (std::size_t j = 0; j < config.peers; ++j) {
+    expect(within(config.joule[j], 1e-6, 1e6), "joule", config.joule[j], "1e-6 to 1e6");
+  }
+  expect_above_zero(config.start, "start");
+  expect_above_zero(config.max_power, "max_power");
+  expect(config.max_account > 0 && config.max_account <= PurseMessage::kMostAccount, "max_account", config.max_account,
+         "above 0 J, at most 1000 J");
+  expect(config.epoch > 0, "epoch", static_cast<double>(config.epoch), "a number above 0");
+}
+
+void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
+  if (peer >= config_.peers) return;
+  Peer& from = peers_[peer];
+  if (!possible(message)) {
+    ++refused_;
+    return;
+  }
+  if (message.epoch < from.epoch || (message.epoch == from.epoch && message.sequence <= from.sequence)) return;
+  // Ours goes on being numbered: the peer may have heard messages of ours that answered its former epoch.
+  if (message.epoch > from.epoch) from = {.epoch = message.epoch, .sent = from.sent};
+  const bool ours = message.answers_epoch == config_.epoch;
+  // G itself comes back: a copy of a double is exact.
+  if (ours && (message.given < from.heard || message.taken < from.arrived || message.taken > from.given)) {
+    ++refused_;
+    return;
+  }
+  from.sequence = message.sequence;
+  from.account = message.account;
+  from.need = message.need;
+  if (!ours) return;  // its totals are those of a pair that is no more
+  from.heard = message.given;
+  from.arrived = message.taken;
+}
+
+double Purse::take() noexcept {
+  double sum = 0;
+  for (std::size_t j = 0; j < config_.peers; ++j) {
+    sum += (peers_[j].heard - peers_[j].credited) * config_.joule[j];
+    peers_[j].credited = peers_[j].heard;
+  }
+  return sum;
+}
+
+double Purse::give(double account, double need) noexcept {
+  if (!(account > 0)) return 0;
+  std::array<double, kMostPeers> there{};  // Â_j and n_j, in our joules
+  std::array<double, kMostPeers> needs{};  // 0: is given nothing
+  for (std::size_t j = 0; j < config_.peers; ++j) {
+    const Peer& peer = peers_[j];
+    if (peer.epoch == 0) continue;
+    there[j] = peer.account * config_.joule[j] + (peer.given - peer.arrived);
+    needs[j] = peer.need * config_.joule[j];
+  }
+  // The common ratio of those that are below it; whoever is above it drops out and lowers nobody.
+  double ratio = 0;
+  for (std::size_t round = 0; round < config_.peers; ++round) {
+    double accounts = account;
+    double all_needs = need;
+    for (std::size_t j = 0; j < config_.peers; ++j) {
+      if (needs[j] > 0) {
+        accounts += there[j];
+        all_needs += needs[j];
+      }
+    }
+    ratio = accounts / all_needs;
+    bool dropped = false;
+    for (std::size_t j = 0; j < config_.peers; ++j) {
+      if (needs[j] > 0 && ratio * needs[j] <= there[j]) {
+        needs[j] = 0;
+        dropped = true;
+      }
+    }
+    if (!dropped) break;
+  }
+  std::array<double, kMostPeers> gifts{};
+  double sum = 0;
+  for (std::size_t j = 0; j < config_.peers; ++j) {
+    if (needs[j] > 0) gifts[j] = std::max(ratio * needs[j] - there[j], 0.0);
+    sum += gifts[j];
+  }
+  const double share = sum > account ? account / sum : 1.0;
+  double left = account;
+  for (std::size_t j = 0; j < config_.peers; ++j) {
+    Peer& peer = peers_[j];
+    const double total = std::min(peer.given + std::min(share * gifts[j], left), PurseMessage::kMostTotal);
+    // What the total really grew by: the peer will count that.
+    const double grown = total - peer.given;
+    if (!(grown > 0) || grown > left) continue;
+    peer.given = total;
+    left -= grown;
+  }
+  return account - left;
+}
+
+Purse::Settlement Purse::settle(const Period& period) noexcept {
+  Settlement settlement;
+  if (!std::isfinite(period.payable) || std::isnan(period.loss)) return settlement;
+  allowance_ += config_.max_power * std::max(0.0, seconds(period.elapsed));
+  allowance_ = std::min(allowance_, config_.max_account);
+  const double came = take();
+  settlement.credit = std::min(came, allowance_);
+  allowance_ -= settlement.credit;
+  double account = period.payable + settlement.credit;
+  const double excess = std::max(account - config_.max_account, 0.0);
+  account -= excess;
+  discarded_ += came - settlement.credit + excess;
+
+  need_ = std::min(std::max(period.loss, 0.0) + config_.start, PurseMessage::kMostAccount);
+  const double gift = period.giving ? give(account, need_) : 0.0;
+  allowance_ = std::min(allowance_ + gift, config_.max_account);
+  account_ = account - gift;
+  settlement.withdraw = excess + gift;
+  return settlement;
+}
+
+PurseMessage Purse::message(std::size_t peer) noexcept {
+  if (peer >= config_.peers) return {};
+  Peer& to = peers_[peer];
+  constexpr double kMost = PurseMessage::kMostAccount;
+  return {.epoch = config_.epoch,
+          .answers_epoch = to.epoch,
+          .sequence = ++to.sent,
+          .account = std::clamp(account_, -kMost, kMost),
+          .need = need_,
+          .given = to.given,
+          .taken = to.heard};
+}
+
+double Purse::given(std::size_t peer) const noexcept { return peer < config_.peers ? peers_[peer].given : 0; }
+double Purse::taken(std::size_t peer) const noexcept { return peer < config_.peers ? peers_[peer].heard : 0; }
+
+}  // namespace tendon

@@ -1,0 +1,473 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Two devices tied by position–position springs, limiters and purses, over bad networks: what is felt, how it feels in
+// free motion, how quiet it is, and that the pair gives out nothing.
+#include "tests/core/teleoperation/pair.h"
+
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <numbers>
+
+#include "devices/simulated/recorded_motion.h"
+
+namespace tendon {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kNanojoule = 1e-9;
+constexpr std::array kRoundTrips = {0, 10, 50, 200, 600};  // ms
+
+constexpr AolPlus<1, 3>::Parts kCapped{.energy_cap = AolPlus<1, 3>::EnergyCap{}};
+
+/// From 0 to `far` in 0.5 s, as a half cosine.
+double ramp(double t, double far) {
+  if (t <= 0) return 0;
+  return t >= 0.5 ? far : far * (1 - std::cos(2 * kPi * t)) / 2;
+}
+
+/// A hand presses 30 mm at a wall that is at 10 mm behind the follower.
+PairConfig pressing(double wall, double hand = 400, double depth = 0.03) {
+  PairConfig config;
+  config.leader.around = {.stiffness = hand, .damping = 2, .reference = [depth](double t) { return ramp(t, depth); }};
+  config.follower.around = {.stiffness = wall, .reference = [](double) { return 0.01; }, .wall = true};
+  return config;
+}
+
+/// A hand that waves 20 mm to and fro at 1 Hz; nothing at the follower.
+PairConfig waving() {
+  PairConfig config;
+  config.leader.around = {
+      .stiffness = 400, .damping = 2, .reference = [](double t) { return 0.02 * std::sin(2 * kPi * t); }};
+  return config;
+}
+
+void use_law(PairConfig& config, Law law) {
+  for (EndConfig* end : {&config.leader, &config.follower}) {
+    end->law = law;
+    if (law == Law::kAolPlus) end->parts = kCapped;
+  }
+}
+
+TEST(Pair, WithoutAPurseTheFollowerDoesNotFollow) {
+  PairConfig config = waving();
+  config.max_account = 1e-12;  // nothing that comes is credited, and nothing is kept to be given
+  Pair pair(config);
+  double farthest = 0;
+  pair.run(3, [&](double) { farthest = std::max(farthest, std::abs(pair.follower.body.x)); });
+  EXPECT_LT(farthest, 1e-3);
+  Pair shared(waving());
+  shared.run(3, [&](double) { farthest = std::max(farthest, std::abs(shared.follower.body.x)); });
+  EXPECT_GT(farthest, 0.012);
+}
+
+TEST(Pair, ItsStiffnessIsThatOfTheTwoLimitersInSeries) {
+  struct Case {
+    double b_leader, b_follower;
+    int t_leader, t_follower;
+  };
+  for (const Case& c : {Case{0.26, 0.26, 10, 10}, Case{0.5, 0.5, 10, 10}, Case{0.26, 1.0, 10, 10},
+                        Case{0.26, 0.5, 10, 20}, Case{1.0, 0.3, 20, 5}}) {
+    PairConfig config;
+    const double speed = 0.005;
+    config.leader.path = [speed](double t) { return speed * t; };
+    config.follower.path = [](double) { return 0.0; };
+    config.leader.friction = {0, c.b_leader};
+    config.follower.friction = {0, c.b_follower};
+    config.leader.period = c.t_leader;
+    config.follower.period = c.t_follower;
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->spring = {.stiffness = 1e4, .adapt_to_delay = false};
+    }
+    Pair pair(config);
+    pair.run(1);
+    const double force = pair.leader.applied;
+    pair.run(1);
+    const double slope = (force - pair.leader.applied) / (speed * 1);
+    const double expected = 1 / (c.t_leader * 1e-4 / (2 * c.b_leader) + c.t_follower * 1e-4 / (2 * c.b_follower));
+    std::cout << "b " << c.b_leader << ", " << c.b_follower << "; T " << c.t_leader / 10.0 << ", "
+              << c.t_follower / 10.0 << " ms: " << slope << " N/m, predicted " << expected << "\n";
+    EXPECT_NEAR(slope / expected, 1, 0.03);
+    EXPECT_NEAR(pair.follower.applied / -pair.leader.applied, 1, 0.03);
+  }
+}
+
+TEST(Pair, FreeMotionDragsByStiffnessTimesRoundTripAndAllDamping) {
+  struct Case {
+    double stiffness;
+    int one_way;  // tenths of a ms
+    double own_damping;
+  };
+  for (const Case& c : {Case{400, 0, 0.5}, Case{400, 40, 2}, Case{100, 100, 2}, Case{200, 150, 4}}) {
+    constexpr double kAmplitude = 0.05;
+    constexpr double kHertz = 0.25;
+    PairConfig config;
+    config.leader.path = [](double t) { return kAmplitude * std::sin(2 * kPi * kHertz * t); };
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->spring = {.stiffness = c.stiffness, .own_damping = c.own_damping, .adapt_to_delay = false};
+    }
+    config.there.delay = config.back.delay = c.one_way;
+    Pair pair(config);
+    pair.run(4);
+    const std::uint64_t cut = pair.leader.cut + pair.follower.cut;
+    double work = 0;
+    double squares = 0;
+    pair.run(8, [&](double) {
+      work -= pair.leader.applied * pair.leader.speed;
+      squares += pair.leader.speed * pair.leader.speed;
+    });
+    // The leader goes first in a tick: what it sends is used at once, the answer in its next period.
+    const double loop = std::max(2 * c.one_way, 10) * 1e-4;
+    EXPECT_NEAR(seconds(pair.leader.spring.round_trip()), loop, 1e-9);
+    const double expected = c.stiffness * loop + 2 * c.own_damping + config.follower.friction.viscous +
+                            4 * config.follower.friction.coulomb / (kPi * kAmplitude * 2 * kPi * kHertz);
+    std::cout << "K " << c.stiffness << ", T_loop " << loop * 1e3 << " ms, B " << c.own_damping << ": "
+              << work / squares << " N·s/m, predicted " << expected << "\n";
+    EXPECT_NEAR(work / squares / expected, 1, 0.03);
+    EXPECT_EQ(pair.leader.cut + pair.follower.cut, cut) << "a clipped force is not the spring's";
+  }
+}
+
+/// N felt in a press at a hard wall, and J in both accounts before it, after `waves` s of waving.
+std::pair<double, double> felt_after(Law law, double waves) {
+  PairConfig config = pressing(5000, 400, 0.05);
+  const auto press = config.leader.around.reference;
+  config.leader.around.reference = [press, waves](double t) {
+    return t < waves ? 0.009 * std::sin(2 * kPi * t) : press(t - waves);
+  };
+  use_law(config, law);
+  Pair pair(config);
+  pair.run(waves);
+  const double waved = pair.leader.limiter.payable() + pair.follower.limiter.payable();
+  pair.run(4);
+  return {-pair.leader.applied, waved};
+}
+
+TEST(Pair, AnEnergyCapCutsNothingOfAForceThatIsPaidFor) {
+  // The cap keeps what free motion earns small, and leaves the account that a held force needs.
+  const auto [felt, none] = felt_after(Law::kAol, 0);
+  const auto [felt_capped, waved_capped] = felt_after(Law::kAolPlus, 20);
+  const auto [felt_waved, waved] = felt_after(Law::kAol, 20);
+  std::cout << "AOL " << felt << " N; after 20 s of waving " << felt_waved << " N of " << 1e3 * waved
+            << " mJ, with the cap " << felt_capped << " N of " << 1e3 * waved_capped << " mJ\n";
+  EXPECT_GE(felt_capped, 0.99 * felt);
+  EXPECT_GT(felt, 5);
+  EXPECT_LT(waved_capped, 0.02);
+  EXPECT_GT(waved, 0.1);
+}
+
+TEST(Pair, AHeldForceIsThatAtTheWallOverAnyNetwork) {
+  for (const Law law : {Law::kAol, Law::kAolPlus}) {
+    for (const double wall : {500.0, 5000.0}) {
+      for (const int round_trip : kRoundTrips) {
+        for (std::uint64_t hand = 0; hand < 4; ++hand) {  // the first is the one of the README, the others are drawn
+          Dice dice(2000 + hand);
+          PairConfig config = pressing(wall, hand == 0 ? 400 : dice.within(150, 600));
+          use_law(config, law);
+          make_bad(config, round_trip, 7 + hand);
+          Pair pair(config);
+          pair.run(6);
+          double worst = 0;
+          pair.run(2, [&](double) {
+            const double felt = -pair.leader.applied;
+            const double at_wall = -pair.follower.body.outside;
+            worst = std::max(worst, std::abs(felt - at_wall) - 0.01 * at_wall);
+          });
+          const double at_wall = -pair.follower.body.outside;
+          if (hand == 0) {
+            std::cout << info(law).name << ", wall " << wall << " N/m, RTT " << round_trip << " ms: K "
+                      << pair.leader.spring.stiffness() << " N/m, felt " << -pair.leader.applied << " N, at the wall "
+                      << at_wall << " N, cut " << pair.leader.cut << "\n";
+          }
+          EXPECT_LE(worst, 2 * config.leader.friction.coulomb) << "RTT " << round_trip << ", hand " << hand;
+          EXPECT_GT(at_wall, round_trip > 200 ? 0.1 : 0.5) << "nothing was held";
+          EXPECT_GE(pair.least_account, -kNanojoule);
+          EXPECT_GE(pair.least_sum, -kNanojoule);
+        }
+      }
+    }
+  }
+}
+
+TEST(Pair, ItIsQuietHeldAndFreeAtEveryRoundTrip) {
+  for (const Law law : {Law::kAol, Law::kAolPlus}) {
+    for (const int round_trip : kRoundTrips) {
+      for (const bool held : {true, false}) {
+        double ripple = 0;
+        double buzz = 0;
+        for (std::uint64_t seed = 3; seed < 7; ++seed) {
+          PairConfig config = held ? pressing(500) : waving();
+          use_law(config, law);
+          make_bad(config, round_trip, seed);
+          Pair pair(config);
+          std::array force = {HighPass(50), HighPass(50)};
+          std::array speed = {HighPass(20), HighPass(20)};
+          pair.run(8, [&](double t) {
+            const bool counts = t > 4;
+            force[0].add(pair.leader.applied, counts);
+            force[1].add(pair.follower.applied, counts);
+            speed[0].add(pair.leader.body.v, counts);
+            speed[1].add(pair.follower.body.v, counts);
+          });
+          ripple = std::max({ripple, force[0].rms(), force[1].rms()});
+          buzz = std::max({buzz, speed[0].rms(), speed[1].rms()});
+          EXPECT_GE(pair.least_account, -kNanojoule);
+          EXPECT_GE(pair.least_sum, -kNanojoule);
+        }
+        std::cout << info(law).name << (held ? ", held" : ", free") << ", RTT " << round_trip << " ms: ripple "
+                  << 1e3 * ripple << " mN, buzz " << 1e3 * buzz << " mm/s\n";
+        EXPECT_LT(ripple, 0.02);
+        EXPECT_LT(buzz, 2e-3);
+      }
+    }
+  }
+}
+
+TEST(Pair, AfterAMinuteOfWavingTheTwoStandAtOnePlace) {
+  constexpr double kCount = 10e-6;
+  for (const double loss : {0.01, 0.3}) {
+    PairConfig config = waving();
+    config.leader.around.reference = [](double t) { return t < 60 ? 0.02 * std::sin(2 * kPi * t) : 0.0; };
+    make_bad(config, 50, 5);
+    config.there.loss = config.back.loss = loss;
+    config.encoder_step = kCount;
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->law = Law::kAolPlus;
+      end->parts.robust_ledger = AolPlus<1, 3>::Robust{.encoder_step = {kCount}};
+    }
+    Pair pair(config);
+    pair.run(63);
+    const double apart = std::abs(pair.leader.body.x - pair.follower.body.x);
+    const double most = 2 * config.leader.friction.coulomb / pair.follower.spring.stiffness() + 2 * kCount;
+    std::cout << "loss " << 100 * loss << " %: " << 1e3 * apart << " mm apart, friction and counts allow " << 1e3 * most
+              << "; least true sum " << pair.least_sum << " J\n";
+    EXPECT_LE(apart, most);
+    EXPECT_GE(pair.least_sum, -kNanojoule);
+  }
+}
+
+TEST(Pair, AScaledPairPaysInTheOtherEndsJoules) {
+  // s_x 0.2, s_f 5: a joule of the follower is 25 at the leader. K_l = s_x s_f K_f.
+  for (const Law law : {Law::kAol, Law::kAolPlus}) {
+    for (const int round_trip : {0, 50, 200}) {
+      PairConfig config = pressing(2000, 400, 0.08);
+      config.follower.around.reference = [](double) { return 0.004; };
+      config.position_scale = 0.2;
+      config.force_scale = 5;
+      use_law(config, law);
+      make_bad(config, round_trip, 11);
+      Pair pair(config);
+      pair.run(6);
+      const double felt = -pair.leader.applied;
+      const double at_wall = -pair.follower.body.outside;
+      std::cout << info(law).name << ", RTT " << round_trip << " ms: felt " << felt << " N, at the wall " << at_wall
+                << " N, least sum " << pair.least_sum << " J\n";
+      EXPECT_GE(pair.least_account, -kNanojoule);
+      EXPECT_GE(pair.least_sum, -kNanojoule);
+      EXPECT_GT(at_wall, 0.05);
+    }
+  }
+}
+
+TEST(Pair, WithoutLimitersTheSamePairGivesOutEnergy) {
+  PairConfig config = pressing(500);
+  for (EndConfig* end : {&config.leader, &config.follower}) {
+    end->spring = {.stiffness = 400, .own_damping = 0, .adapt_to_delay = false};
+  }
+  make_bad(config, 50, 7);
+  config.limited = false;
+  Pair pair(config);
+  pair.run(3);
+  EXPECT_LT(pair.least_sum, -0.1);
+  config.limited = true;
+  Pair safe(config);
+  safe.run(3);
+  EXPECT_GE(safe.least_sum, -kNanojoule);
+}
+
+struct HardCase {
+  const char* name;
+  void (*make)(PairConfig&);
+};
+
+constexpr HardCase kHardCases[] = {
+    {"round trip 10 to 300 ms while pressing",
+     [](PairConfig& c) {
+       make_bad(c, 10, 2);
+       c.longer_from = 1;
+       c.longer_by = 1450;
+     }},
+    {"400 ms without a message at the impact",
+     [](PairConfig& c) {
+       make_bad(c, 20, 2);
+       c.cut_from = 0.25;
+       c.cut_for = 0.4;
+     }},
+    {"one way 5 ms, the other 200 ms",
+     [](PairConfig& c) {
+       c.there.delay = 50;
+       c.back.delay = 2000;
+     }},
+    {"0.5 m/s into 20 kN/m",
+     [](PairConfig& c) {
+       make_bad(c, 100, 2);
+       c.leader.around.reference = [](double t) { return std::min(0.5 * t, 0.05); };
+       c.follower.around.stiffness = 20'000;
+     }},
+    {"hands at both ends against each other",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.follower.around = {
+           .stiffness = 300, .damping = 2, .reference = [](double t) { return -0.02 * std::sin(9 * t); }};
+     }},
+    {"a follower ten times heavier",
+     [](PairConfig& c) {
+       make_bad(c, 200, 2);
+       c.follower.mass *= 10;
+     }},
+    {"a follower at 500 Hz",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.follower.period = 20;
+     }},
+    {"a leader with b = 0.005",
+     [](PairConfig& c) {
+       make_bad(c, 50, 2);
+       c.leader.friction.viscous = 0.005;
+     }},
+};
+
+void press_and_leave(PairConfig& config) {
+  config.leader.around.reference = [](double t) {
+    return t < 3 ? ramp(t, 0.03) : ramp(t, 0.03) * std::cos(4 * (t - 3));
+  };
+}
+
+TEST(Pair, NoHardCaseGetsEnergyOutOfIt) {
+  for (const HardCase& hard : kHardCases) {
+    for (const Law law : {Law::kAol, Law::kAolPlus}) {
+      PairConfig config = pressing(500);
+      press_and_leave(config);
+      hard.make(config);
+      use_law(config, law);
+      Pair pair(config);
+      double fastest = 0;
+      pair.run(8, [&](double) {
+        fastest = std::max({fastest, std::abs(pair.leader.body.v), std::abs(pair.follower.body.v)});
+      });
+      std::cout << hard.name << ", " << info(law).name << ": least account " << pair.least_account << " J, sum "
+                << pair.least_sum << " J, fastest " << fastest << " m/s\n";
+      EXPECT_GE(pair.least_account, -kNanojoule) << hard.name;
+      EXPECT_GE(pair.least_sum, -kNanojoule) << hard.name;
+      EXPECT_LT(fastest, 3) << hard.name;
+    }
+    PairConfig config = pressing(500);
+    press_and_leave(config);
+    hard.make(config);
+    config.limited = false;
+    for (EndConfig* end : {&config.leader, &config.follower}) {
+      end->spring = {.stiffness = 400, .adapt_to_delay = false};
+    }
+    Pair bare(config);
+    bare.run(8);
+    std::cout << "  springs alone: sum " << bare.least_sum << " J\n";
+    EXPECT_LT(bare.least_sum, -kNanojoule) << hard.name << ": nothing to protect from";
+  }
+}
+
+/// A column of a recording as a path of the handle, m.
+std::function<double(double)> recorded(const std::filesystem::path& file, const char* column) {
+  std::ifstream csv(file);
+  const ScriptedMotion motion(load_recorded_motion(csv, {.path = file, .position = column, .scale = 0.075}));
+  return [motion](double t) { return motion.at(t).position.x(); };
+}
+
+TEST(Pair, RecordedMotionOfBothPortsOfARigGetsNoEnergyOut) {
+  const char* const data = std::getenv("TENDON_DATA");
+  if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no recorded rig";
+  for (const char* const name : {"m2_question1d_foam.csv", "m2_question1d_rigid.csv"}) {
+    const std::filesystem::path file = std::filesystem::path(data) / "tue-1dof-teleop" / name;
+    for (const Law law : {Law::kAol, Law::kAolPlus}) {
+      for (const int round_trip : kRoundTrips) {
+        PairConfig config;
+        config.leader.path = recorded(file, "master_pos_rad");
+        config.follower.path = recorded(file, "slave_pos_rad");
+        use_law(config, law);
+        make_bad(config, round_trip, 17);
+        Pair pair(config);
+        double largest = 0;
+        pair.run(5, [&](double) { largest = std::max(largest, std::abs(pair.leader.applied)); });
+        std::cout << name << ", " << info(law).name << ", RTT " << round_trip << " ms: least account "
+                  << pair.least_account << " J, sum " << pair.least_sum << " J, largest force " << largest << " N\n";
+        EXPECT_GE(pair.least_account, -kNanojoule);
+        EXPECT_GE(pair.least_sum, -kNanojoule);
+        EXPECT_GT(largest, 0.05) << "nothing was rendered";
+      }
+    }
+  }
+}
+
+TEST(Pair, ItIsStableOverTheRoundTripsOfSpaceflight) {
+  for (const int round_trip : {700, 800, 7000}) {
+    PairConfig config = pressing(500);
+    make_bad(config, round_trip, 13);
+    Pair pair(config);
+    HighPass force(50);
+    const double settled = round_trip > 1000 ? 40 : 8;
+    pair.run(settled + 2, [&](double t) { force.add(pair.leader.applied, t > settled); });
+    std::cout << "RTT " << round_trip << " ms: K " << pair.leader.spring.stiffness() << " N/m, felt "
+              << -pair.leader.applied << " N, at the wall " << -pair.follower.body.outside << " N, ripple "
+              << 1e3 * force.rms() << " mN\n";
+    EXPECT_LT(force.rms(), 0.02);
+    EXPECT_GE(pair.least_account, -kNanojoule);
+    EXPECT_GE(pair.least_sum, -kNanojoule);
+    if (round_trip < 1000) {
+      EXPECT_GT(-pair.leader.applied, 0.1);
+    }
+  }
+}
+
+TEST(Pair, TheHandFeelsTheImpedanceThatLawrenceGives) {
+  // Beyond B_l, the hand feels C (Z_f + Z_e)/(C + Z_f + Z_e).
+  using Complex = std::complex<double>;
+  for (const double stiffness_around : {0.0, 500.0}) {
+    for (const double hertz : {0.1, 0.3, 1.0, 3.0, 10.0}) {
+      PairConfig config;
+      const double w = 2 * kPi * hertz;
+      config.leader.path = [w](double t) { return 0.005 * std::sin(w * t); };
+      config.follower.around = {.stiffness = stiffness_around};
+      for (EndConfig* end : {&config.leader, &config.follower}) {
+        end->friction.coulomb = 0;
+        end->spring = {.stiffness = 400, .damping = 1, .own_damping = 4, .adapt_to_delay = false};
+        end->period = 1;
+      }
+      Pair pair(config);
+      const double settle = std::ceil(hertz) / hertz;
+      pair.run(settle + 1 / hertz);
+      Complex force = 0;
+      Complex speed = 0;
+      const double from = pair.time();
+      pair.run(2 / hertz, [&](double t) {
+        const Complex turn = std::polar(1.0, -w * (t - from));
+        force -= pair.leader.applied * turn;
+        speed += w * 0.005 * std::cos(w * t) * turn;
+      });
+      const Complex s(0, w);
+      const Complex c = config.leader.spring.stiffness / s + config.leader.spring.damping;
+      const Complex z = config.follower.mass * s + config.follower.friction.viscous +
+                        config.follower.spring.own_damping + stiffness_around / s;
+      const Complex expected = c * z / (c + z);
+      const Complex felt = force / speed - config.leader.spring.own_damping;
+      std::cout << (stiffness_around > 0 ? "spring, " : "free, ") << hertz << " Hz: felt " << felt << ", expected "
+                << expected << "\n";
+      EXPECT_LT(std::abs(felt - expected) / std::abs(expected), 0.05);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tendon

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What one purse does with what it is told: the rule of giving, scales, epochs, and a peer that lies.
+#include "core/teleoperation/purse.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "core/control/limiter.h"
+#include "core/ledger/energy_ledger.h"
+#include "tests/core/control/adversary.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// A message of a peer of epoch 7 that has heard of our epoch 1.
+PurseMessage from_peer(std::uint64_t sequence, double account, double need, double given = 0, double taken = 0) {
+  return {.epoch = 7,
+          .answers_epoch = 1,
+          .sequence = sequence,
+          .account = account,
+          .need = need,
+          .given = given,
+          .taken = taken};
+}
+
+Purse::Period period_of(double payable, double loss) {
+  return {.payable = payable, .loss = loss, .elapsed = milliseconds(1)};
+}
+
+TEST(Purse, GivesUntilBothHaveTheSameShareOfTheirNeed) {
+  Purse purse({});
+  purse.receive(0, from_peer(1, 0.01, 0.03));
+  const double need = 0.01 + 0.2e-3;
+  const auto settlement = purse.settle(period_of(0.05, 0.01));
+  EXPECT_DOUBLE_EQ(settlement.withdraw, (0.05 * 0.03 - 0.01 * need) / (need + 0.03));
+  EXPECT_NEAR((0.05 - settlement.withdraw) / need, (0.01 + settlement.withdraw) / 0.03, 1e-12);
+  EXPECT_EQ(purse.message(0).given, settlement.withdraw);
+}
+
+TEST(Purse, CountsWhatIsUnderWay) {
+  Purse purse({});
+  purse.receive(0, from_peer(1, 0.01, 0.03));
+  const auto first = purse.settle(period_of(0.05, 0.01));
+  purse.receive(0, from_peer(2, 0.01, 0.03));  // the gift has not arrived yet
+  EXPECT_NEAR(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 0, 1e-15);
+  purse.receive(0, from_peer(3, 0.01, 0.03, 0, first.withdraw));  // it has, and was spent
+  EXPECT_GT(purse.settle(period_of(0.05 - first.withdraw, 0.01)).withdraw, 1e-3);
+}
+
+TEST(Purse, GivesNothingToOneThatWasNotHeardOrWhileItMayNot) {
+  Purse purse({});
+  EXPECT_EQ(purse.settle(period_of(0.1, 0)).withdraw, 0);
+  purse.receive(0, from_peer(1, 0, 0.03, 0.01));
+  auto period = period_of(0.1, 0);
+  period.giving = false;
+  const auto settlement = purse.settle(period);
+  EXPECT_EQ(settlement.withdraw, 0);
+  EXPECT_DOUBLE_EQ(settlement.credit, 0.01) << "what comes is still added";
+}
+
+TEST(Purse, NeverGivesMoreThanItHasHoweverManyAsk) {
+  Dice dice(3);
+  for (int n = 0; n < 20'000; ++n) {
+    const auto peers = static_cast<std::size_t>(dice.within(1, 4));
+    Purse purse({.peers = peers});
+    for (std::size_t j = 0; j < peers; ++j) {
+      const double sign = dice.chance(0.3) ? -1 : 1;
+      purse.receive(j, from_peer(1, sign * dice.decades(-6, 3), dice.decades(-6, 3)));
+    }
+    const double payable = (dice.chance(0.2) ? -1 : 1) * dice.decades(-9, -1);
+    const auto settlement = purse.settle(period_of(payable, dice.chance(0.1) ? kInf : dice.decades(-6, 3)));
+    ASSERT_GE(settlement.withdraw, 0);
+    ASSERT_LE(settlement.withdraw, std::max(payable, 0.0));
+  }
+}
+
+TEST(Purse, WhenItHasTooLittleAllAreCutInProportion) {
+  Purse purse({.peers = 3});
+  for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, -10, 0.01));
+  EXPECT_NEAR(purse.settle(period_of(0.03, 0.01)).withdraw, 0.03, 1e-12);
+  for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(purse.given(j), 0.01, 1e-12) << j;
+}
+
+TEST(Purse, ThreePeersAndItselfEndAtOneRatio) {
+  Purse purse({.peers = 3, .max_account = 1});
+  const std::array<double, 3> accounts = {0.01, 0.02, 0.5};  // the last has more than its share: it is given nothing
+  const std::array<double, 3> needs = {0.05, 0.02, 0.1};
+  for (std::size_t j = 0; j < 3; ++j) purse.receive(j, from_peer(1, accounts[j], needs[j]));
+  const double left = 0.3 - purse.settle(period_of(0.3, 0.03 - 0.2e-3)).withdraw;
+  EXPECT_NEAR((accounts[0] + purse.given(0)) / needs[0], left / 0.03, 1e-12);
+  EXPECT_NEAR((accounts[1] + purse.given(1)) / needs[1], left / 0.03, 1e-12);
+  EXPECT_EQ(purse.given(2), 0);
+}
+
+TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
+  // s_x 0.2, s_f 5: at the leader a joule of the follower is 25.
+  Purse leader({.joule = {25}, .max_account = 10});
+  leader.receive(0, from_peer(1, 0.0002, 0.001, 0.004));
+  const auto settlement = leader.settle(period_of(0, 0.025 - 0.2e-3));
+  EXPECT_DOUBLE_EQ(settlement.credit, 0.1);
+  EXPECT_NEAR(settlement.withdraw, (0.1 - 0.005) / 2, 1e-12) << "both need the same, in the leader's joules";
+  EXPECT_EQ(leader.message(0).taken, 0.004) << "totals are told as they were heard";
+}
+
+TEST(Purse, ATotalIsCountedOnceHoweverOftenItComes) {
+  Purse purse({});
+  purse.receive(0, from_peer(2, 0, 0, 0.02));
+  purse.receive(0, from_peer(2, 0, 0, 0.02));
+  purse.receive(0, from_peer(1, 0, 0, 0.01));  // overtaken: late, not wrong
+  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.02);
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0);
+  EXPECT_EQ(purse.refused(), 0U);
+}
+
+TEST(Purse, WhatIsWrongIsRefusedAndCounted) {
+  Purse purse({});
+  purse.receive(0, from_peer(5, 0, 0, 0.02));
+  std::uint64_t refused = 0;
+  const auto refuses = [&](const PurseMessage& message, const char* why) {
+    purse.receive(0, message);
+    EXPECT_EQ(purse.refused(), ++refused) << why;
+  };
+  refuses(from_peer(6, 0, 0, 0.01), "a total that falls");
+  refuses(from_peer(7, kNan, 0, 0.02), "account");
+  refuses(from_peer(7, 2e3, 0, 0.02), "account");
+  refuses(from_peer(7, 0, kNan, 0.02), "need");
+  refuses(from_peer(7, 0, -1, 0.02), "need");
+  refuses(from_peer(7, 0, 0, kInf), "given");
+  refuses(from_peer(7, 0, 0, kNan), "given");
+  refuses(from_peer(7, 0, 0, 2e6), "given");
+  refuses(from_peer(7, 0, 0, 0.02, 0.5), "taken above what was given");
+  refuses(from_peer(7, 0, 0, 0.02, kNan), "taken");
+  refuses(from_peer(0, 0, 0, 0.02), "sequence");
+  refuses(PurseMessage{}, "epoch");
+  purse.receive(1, from_peer(1, 0, 0, 0.02));  // nobody
+  EXPECT_EQ(purse.refused(), refused);
+  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.02);
+}
+
+TEST(Purse, ANewEpochOfThePeerVoidsTheTotalsAndTheOldNeverCountsAgain) {
+  Purse purse({});
+  purse.receive(0, from_peer(9, 0, 0.03, 0.02));
+  EXPECT_GT(purse.settle(period_of(0.01, 0)).withdraw, 0);
+  const std::uint64_t sent = purse.message(0).sequence;
+  PurseMessage restarted = from_peer(1, 0, 0.03);
+  restarted.epoch = 8;
+  restarted.answers_epoch = 0;
+  purse.receive(0, restarted);
+  EXPECT_EQ(purse.given(0), 0);
+  EXPECT_EQ(purse.taken(0), 0);
+  const PurseMessage answer = purse.message(0);
+  EXPECT_EQ(answer.answers_epoch, 8U);
+  EXPECT_GT(answer.sequence, sent) << "the peer may have heard the former ones";
+  purse.receive(0, from_peer(10, 0, 0.03, 0.05));  // of the former epoch, late
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0);
+  EXPECT_EQ(purse.refused(), 0U);
+}
+
+TEST(Purse, TotalsThatAnswerAnEpochOfOursThatIsOverAreNotCounted) {
+  Purse restarted({.epoch = 2});
+  restarted.receive(0, from_peer(50, 0, 0.03, 0.08));  // answers epoch 1: who had that epoch has already spent it
+  EXPECT_EQ(restarted.settle(period_of(0, 0)).credit, 0);
+  PurseMessage anew = from_peer(51, 0, 0.03, 0.01);
+  anew.answers_epoch = 2;
+  restarted.receive(0, anew);
+  EXPECT_DOUBLE_EQ(restarted.settle(period_of(0, 0)).credit, 0.01);
+}
+
+TEST(Purse, AnAccountAboveTheMostIsDiscardedWhoeverEarnedIt) {
+  Purse purse({.max_account = 0.2});
+  const auto settlement = purse.settle(period_of(0.5, 0));
+  EXPECT_DOUBLE_EQ(settlement.withdraw, 0.3);
+  EXPECT_DOUBLE_EQ(purse.discarded(), 0.3);
+  EXPECT_DOUBLE_EQ(purse.account(), 0.2);
+}
+
+TEST(Purse, AgainstAnyPeerItsOwnPortLosesNoMoreThanTheAllowance) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Dice dice(seed);
+    const Friction friction{.coulomb = 0.02, .viscous = dice.decades(-1, 0)};
+    const Purse::Config config{.max_power = dice.decades(-1, 1), .max_account = dice.decades(-2, 0)};
+    Purse purse(config);
+    Limiter limiter({.law = dice.chance(0.5) ? Law::kAol : Law::kAolPlus,
+                     .friction = friction,
+                     .longest_hold = milliseconds(1),
+                     .shared_account = true});
+    EnergyLedger ledger(friction);
+    const double most_force = friction.coulomb + 2 * std::sqrt(friction.viscous * 1e3 * config.max_account);
+    Vec3 force = Vec3::Zero();
+    double total = 0;
+    for (int n = 1; n <= 1000; ++n) {
+      const Vec3 dx = worst_motion<3>(force, friction, milliseconds(1));
+      limiter.observe({force, dx, milliseconds(1)});
+      ledger.observe(force, dx, milliseconds(1));
+      ASSERT_GE(ledger.energy(), -(config.max_account + config.max_power * n * 1e-3) - 1e-9) << "seed " << seed;
+      PurseMessage lie = from_peer(static_cast<std::uint64_t>(n), dice.within(-1e3, 1e3), dice.decades(-6, 3));
+      switch (static_cast<int>(dice.within(0, 7))) {
+        case 0:
+          lie.given = 1e6;
+          break;
+        case 1:
+          lie.given = kNan;
+          break;
+        case 2:
+          lie.need = kNan;
+          break;
+        case 3:
+          lie.given = total / 2;  // falls
+          break;
+        case 4:  // begins anew all the time
+          lie.epoch = 7 + static_cast<std::uint64_t>(n);
+          lie.sequence = 1;
+          lie.given = 1e6;
+          break;
+        case 5:
+          lie.taken = dice.decades(-6, 6);
+          break;
+        default:
+          lie.given = total += dice.decades(-4, 2);
+      }
+      purse.receive(0, lie);
+      const Vec3 wanted = dice.direction() * dice.decades(-1, 5);
+      share<3>(purse, limiter, wanted, milliseconds(1));
+      force = limiter.limit({wanted}).force;
+      ASSERT_TRUE(force.allFinite());
+      ASSERT_LE(force.norm(), most_force * (1 + 1e-9)) << "seed " << seed;
+      ASSERT_GE(limiter.payable(), -1e-9) << "seed " << seed;
+    }
+  }
+}
+
+TEST(Purse, AGreedyPeerGetsWhatThereIsAndNoMore) {
+  Purse purse({});
+  purse.receive(0, from_peer(1, 0, 1e3));
+  const auto settlement = purse.settle(period_of(0.1, 0.01));
+  EXPECT_LE(settlement.withdraw, 0.1);
+  EXPECT_GT(settlement.withdraw, 0.0999);
+}
+
+TEST(Purse, APeriodThatIsNoNumberMovesNothing) {
+  Purse purse({});
+  purse.receive(0, from_peer(1, 0, 0.03, 0.01));
+  for (const auto& bad : {period_of(kNan, 0), period_of(kInf, 0), period_of(0.1, kNan)}) {
+    const auto settlement = purse.settle(bad);
+    EXPECT_EQ(settlement.credit, 0);
+    EXPECT_EQ(settlement.withdraw, 0);
+  }
+  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 0.01) << "it was kept";
+}
+
+TEST(Purse, RefusesImpossibleConfigurations) {
+  const auto says = [](const Purse::Config& config) { return complaint([&] { Purse purse(config); }); };
+  EXPECT_EQ(says({.peers = 4}), "peers = 4: expected 1 to 3");
+  EXPECT_EQ(says({.peers = 0}), "peers = 0: expected 1 to 3");
+  EXPECT_EQ(says({.joule = {0}}), "joule = 0: expected 1e-6 to 1e6");
+  EXPECT_EQ(says({.max_account = 2e3}), "max_account = 2000: expected above 0 J, at most 1000 J");
+  EXPECT_EQ(says({.epoch = 0}), "epoch = 0: expected a number above 0");
+  EXPECT_NE(says({.start = 0}).find("start"), std::string::npos);
+  EXPECT_NE(says({.max_power = kNan}).find("max_power"), std::string::npos);
+}
+
+TEST(SharedAccount, OnlyTheAolFamilyHasOne) {
+  for (const LawInfo& law : laws()) {
+    const LimiterConfig config{.law = law.law,
+                               .friction = {0.02, 0.26},
+                               .longest_hold = milliseconds(1),
+                               .max_force = 5,
+                               .environment_stiffness = 500,
+                               .shared_account = true};
+    const std::string why = complaint([&] { Limiter limiter(config); });
+    const bool shares = law.law == Law::kAol || law.law == Law::kAolBox || law.law == Law::kAolPlus;
+    if (shares) {
+      EXPECT_EQ(why, "") << law.name;
+    } else {
+      EXPECT_EQ(why, "law \"" + std::string(law.name) +
+                         "\" has no account that a purse could share: expected aol, aol-box or aol+");
+    }
+  }
+}
+
+TEST(SharedAccount, ACreditRaisesTheBoundAndAWithdrawalLowersIt) {
+  for (const Law law : {Law::kAol, Law::kAolBox, Law::kAolPlus}) {
+    Limiter limiter({.law = law, .friction = {0.02, 0.26}, .longest_hold = milliseconds(1), .shared_account = true});
+    const Vec3 wanted(3, 0, 0);
+    const double loss = limiter.worst_loss(wanted);
+    EXPECT_LT(limiter.limit({wanted}).force.norm(), 0.06);
+    limiter.credit(loss * (1 + 1e-12));
+    EXPECT_EQ(limiter.limit({wanted}).force, wanted) << info(law).name << ": what it needs lets it through whole";
+    limiter.withdraw(loss / 2);
+    EXPECT_LT(limiter.limit({wanted}).force.norm(), 2.9) << info(law).name;
+    const double before = limiter.payable();
+    for (const double bad : {kNan, kInf, -kInf, -1.0, 0.0}) {
+      limiter.credit(bad);
+      limiter.withdraw(bad);
+    }
+    EXPECT_EQ(limiter.payable(), before) << info(law).name;
+    EXPECT_EQ(limiter.energy(), before) << info(law).name;
+  }
+}
+
+TEST(SharedAccount, WhatAolPlusNeedsCountsItsPartsIn) {
+  AolPlus<1, 3>::Config config{.friction = {{{0.02, 0.26}}}, .longest_hold = milliseconds(1), .shared_account = true};
+  const Vec3 wanted(2, 0, 0);
+  const double plain = AolPlus<1, 3>(config).worst_loss(wanted);
+  config.parts.latency_reserve = {2};
+  EXPECT_DOUBLE_EQ((AolPlus<1, 3>(config).worst_loss(wanted)), 3 * plain);
+  config.parts.latency_reserve.reset();
+  config.parts.knee = {0.5};
+  AolPlus<1, 3> with_knee(config);
+  with_knee.credit(with_knee.worst_loss(wanted) * (1 + 1e-12));
+  EXPECT_EQ(with_knee.limit({wanted}).force, wanted);
+  config.parts.knee.reset();
+  config.parts.robust_ledger = {.encoder_step = {1e-5}, .window = 10};
+  AolPlus<1, 3> robust(config);
+  robust.credit(0.01);
+  EXPECT_DOUBLE_EQ(robust.payable(), 0.01);
+  EXPECT_DOUBLE_EQ(robust.energy(), 0.01);
+  robust.withdraw(0.004);
+  EXPECT_DOUBLE_EQ(robust.payable(), 0.006);
+}
+
+}  // namespace
+}  // namespace tendon
