@@ -387,7 +387,7 @@ std::function<double(double)> recorded(const std::filesystem::path& file, const 
 }
 
 TEST(Pair, RecordedMotionOfBothPortsOfARigGetsNoEnergyOut) {
-  const char* const data = std::getenv("TENDON_DATA");
+  const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
   if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no recorded rig";
   for (const char* const name : {"m2_question1d_foam.csv", "m2_question1d_rigid.csv"}) {
     const std::filesystem::path file = std::filesystem::path(data) / "tue-1dof-teleop" / name;
