@@ -47,7 +47,7 @@ Json in_json(const std::optional<Press>& press) {
           {"words", press->words}};
 }
 
-std::string_view name(Hand hand) {
+std::string_view hand_name(Hand hand) {
   switch (hand) {
     case Hand::kAny:
       return "any";
@@ -70,7 +70,7 @@ Json in_json(const std::optional<HandleDescription>& handle) {
           {"gripper_open_rad", handle->gripper_open ? Json(*handle->gripper_open) : Json()},
           {"max_gripper_force_n", handle->max_gripper_force},
           {"group", handle->group},
-          {"hand", name(handle->hand)}};
+          {"hand", hand_name(handle->hand)}};
 }
 
 Json in_json(const DeviceDescription& about, const std::optional<HandleDescription>& handle,
