@@ -236,6 +236,7 @@ void ForceClient::take_event(LocalTime now, const Session::Event& event) {
     ++stats_.states;
     if (unseen_) ++stats_.states_skipped;
     unseen_ = newest_ = arrived->state;
+    if (physics_ && !holds_) pressed_ = 0;  // a press of that time was another engine's
     pressed_ |= arrived->state.buttons;
     newest_arrived_ = now;
   } else if (const auto* report = std::get_if<Session::ReportArrived>(&event)) {

@@ -487,7 +487,8 @@ class ForceClient:
                 self._stats.states += 1
                 self._stats.states_skipped += self._unseen is not None
                 self._unseen = self._newest = event
-                self._pressed |= event.buttons
+                # A press of the time when the channel was not ours was another engine's.
+                self._pressed = event.buttons | (0 if self._waits_for_lease() else self._pressed)
                 self._newest_arrived = now
                 self._back_off = _ns(self.config.retry_min_s)
             elif isinstance(event, LinkReport):

@@ -430,6 +430,7 @@ export class ForceClient {
         ++this.#stats.states;
         if (this.#unseen) ++this.#stats.statesSkipped;
         this.#unseen = this.#newest = event.state;
+        if (this.#physics && !this.#holds) this.#pressed = 0; // a press of that time was another engine's
         this.#pressed |= event.state.buttons;
         this.#newestArrived = now;
         this.#backOff = fromMilliseconds(this.#config.retryMinMs);

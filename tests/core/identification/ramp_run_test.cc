@@ -83,8 +83,8 @@ TEST(Slide, SaysWhatIsWrongWithARun) {
 TEST(Slide, RefusesARunWithoutMotion) {
   RampRun run = ExactRamp{}.run();
   for (RampSample& sample : run.samples) sample.position = 0.1;
-  EXPECT_EQ(error_of(run), "expected a handle that moves more than 50 encoder counts, found 0 m");
-  EXPECT_EQ(error_of(run, 0), "expected a handle that moves more than 50 encoder counts, found 0 m");
+  EXPECT_EQ(error_of(run), "expected a handle that moves more than 50 encoder counts, found 0");
+  EXPECT_EQ(error_of(run, 0), "expected a handle that moves more than 50 encoder counts, found 0");
 }
 
 TEST(Slide, RefusesAHandleThatTurnsRound) {

@@ -125,8 +125,8 @@ constexpr std::array kChecks = {
     Check{"stray-data-silence", kServer, kSession, kDropped,
           "unknown_connection (Data for nobody, or in suite 0 from another address)"},
     Check{"roaming", kServer, kSession, kOpening,
-          "The peer's address is the source of the authentic datagram with the highest packet number; in suite 0 it "
-          "never changes."},
+          "A client's address is the source of its authentic datagram with the highest packet number; in suite 0 it "
+          "never changes, and a server's never does."},
     Check{"observer-only-looks", kServer, kWire, kHello,
           "ROLE_OBSERVER sees states, ROLE_CONTROLLER also sends forces"},
     Check{"rearm-by-controller", kServer, kWire, kData,
@@ -150,7 +150,8 @@ constexpr std::array kChecks = {
           "The requester numbers its requests 1, 2, 3 …, has at most 16 open"},
     Check{"request-repeated", kClient, kSession, kRequests, "repeats each until its answer arrives"},
     Check{"request-resend-rate", kClient, kSession, kSent,
-          "max(20 ms, SRTT + 4 RTTVAR), doubled with every repetition, at most 1 s in all"},
+          "max(20 ms, SRTT + 4 RTTVAR), doubled with every repetition up to 1 s, until the answer or the end of the "
+          "session"},
     Check{"request-stops", kClient, kSession, kRequests, "The answer is the acknowledgement."},
     // Devices and channels.
     Check{"claims-granted", kServer, kWire, kAnswer, "one for each claim, in the claims' order"},
