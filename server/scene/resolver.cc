@@ -18,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/handle/turn_friction.h"
 #include "devices/simulated/recorded_motion.h"
 #include "server/machine/regular_file.h"
 #include "server/scene/reader.h"
@@ -324,7 +325,7 @@ class SceneResolver {
         motors, draft_.rotation_bounds,
         {"limiter.rotation.coulomb_friction_nm", "limiter.rotation.viscous_friction_nm_s_per_rad"},
         device ? Friction{device->coulomb_friction.value_or(0), device->viscous_friction.value_or(0)} : Friction{},
-        "motors that turn its handle");
+        "motors that turn its handle", kTurnFrictionShare);
     if (!motors) return;
     control.rotation = RotationLimits{.friction = friction,
                                       .max_torque = draft_.max_torque.value_or(*device->max_torque),
@@ -346,9 +347,10 @@ class SceneResolver {
         GripLimits{.friction = friction, .arm = device->arm, .max_force = draft_.max_grip.value_or(*device->max_force)};
   }
 
-  /// The friction that the limiter may count on there. `truth`: the simulated device's.
+  /// The friction that the limiter may count on there. `truth`: the simulated device's; of its viscous part it may count
+  /// on `share`.
   Friction handle_friction(bool has_motor, const Draft::FrictionBounds& given, const std::array<std::string, 2>& keys,
-                           const Friction& truth, const std::string& motor) const {
+                           const Friction& truth, const std::string& motor, double share = 1) const {
     const Law law = draft_.scene.loop.control.limiter.law;
     if (has_motor && law != Law::kAolPlus && law != Law::kAol && law != Law::kNone) {
       blame("limiter.kind", {},
@@ -356,22 +358,23 @@ class SceneResolver {
             "has " +
                 motor);
     }
-    const auto bound = [&](const std::optional<double>& value, const std::string& key, double most) {
+    const auto bound = [&](const std::optional<double>& value, const std::string& key, double true_size, double of_it) {
+      const double most = of_it * true_size;
       if (!has_motor && value) blame(key, {}, "expected a device with " + motor + ", because this bound is about it");
       if (has_motor && !value && law != Law::kNone) {
         blame(key, {}, "missing, expected " + kZeroOrMore.expected(unit_of(key)) + ", because the device has " + motor);
       }
       if (value && *value > most) {
         blame(key, {},
-              "expected at most " + with_symbol(digits(most), unit_of(key)) +
-                  ", the true friction of the simulated device, because a higher bound voids the limiter's proof, "
+              "expected at most " + with_symbol(digits(most), unit_of(key)) + (of_it < 1 ? ", 98 % of" : ",") +
+                  " the true friction of the simulated device, because a higher bound voids the limiter's proof, "
                   "found " +
                   digits(*value));
       }
       return value.value_or(0);
     };
-    return {.coulomb = bound(given.coulomb, keys[0], truth.coulomb),
-            .viscous = bound(given.viscous, keys[1], truth.viscous)};
+    return {.coulomb = bound(given.coulomb, keys[0], truth.coulomb, 1),
+            .viscous = bound(given.viscous, keys[1], truth.viscous, share)};
   }
 
   /// The bounds by place must not exceed the true friction either.

@@ -256,6 +256,13 @@ TEST(SceneHandle, AMotorWithoutABoundOfItsFrictionIsRefused) {
       error_of_minimal_and(kMotors + higher).find("limiter.rotation.coulomb_friction_nm: expected at most 0.001 N·m"),
       std::string::npos)
       << error_of_minimal_and(kMotors + higher);
+  const std::string truth = "[limiter.rotation]\ncoulomb_friction_nm = 1e-3\nviscous_friction_nm_s_per_rad = 2e-4\n";
+  EXPECT_NE(
+      error_of_minimal_and(kMotors + truth)
+          .find("limiter.rotation.viscous_friction_nm_s_per_rad: expected at most 0.000196 N·m·s/rad, 98 % of the "
+                "true friction of the simulated device"),
+      std::string::npos)
+      << error_of_minimal_and(kMotors + truth);
   EXPECT_NE(error_of_minimal_and(kRotation + kBounds).find("expected a device with motors that turn its handle"),
             std::string::npos)
       << error_of_minimal_and(kRotation + kBounds);

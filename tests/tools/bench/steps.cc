@@ -65,7 +65,7 @@ HapticController::Config controller_config(Law law, const AolPlus<1, 3>::Parts& 
 /// A controller whose engine of 100 Hz answers: of a point, or of a handle that turns and grips as its point moves.
 class Heart {
  public:
-  Heart(HapticController::Config config, bool whole) : whole_(whole), heart_(whole ? with_motors(config) : config) {}
+  Heart(const HapticController::Config& config, bool whole) : whole_(whole), heart_(whole ? with_motors(config) : config) {}
 
   void step(const Vec3& x) {
     now_ += milliseconds(1);

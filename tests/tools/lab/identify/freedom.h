@@ -5,6 +5,8 @@
 #include <span>
 #include <string_view>
 
+#include "core/handle/turn_friction.h"
+
 namespace tendon::lab {
 
 /// What of a handle an experiment moves.
@@ -27,16 +29,14 @@ struct FreedomInfo {
   std::string_view table;        ///< of a scene, where the bounds go
   std::string_view coulomb_key;  ///< there
   std::string_view viscous_key;
-  /// A bound is so much below what was found: HandlePort books a turn as if its axis stayed, which takes up to 2 % of
-  /// the viscous friction more than there is.
-  double share;
+  double share;  ///< a bound is so much of what was found
 };
 
 inline constexpr FreedomInfo kFreedoms[] = {
     {Freedom::kMovement, "movement", "x_m", "force_n", "m", "N", "N·s/m", "kg", "limiter", "coulomb_friction_n",
      "viscous_friction_n_s_per_m", 1},
     {Freedom::kRotation, "rotation", "angle_rad", "torque_nm", "rad", "N·m", "N·m·s/rad", "kg·m²", "limiter.rotation",
-     "coulomb_friction_nm", "viscous_friction_nm_s_per_rad", 0.98},
+     "coulomb_friction_nm", "viscous_friction_nm_s_per_rad", kTurnFrictionShare},
     {Freedom::kGripper, "gripper", "x_m", "force_n", "m", "N", "N·s/m", "kg", "limiter.gripper", "coulomb_friction_n",
      "viscous_friction_n_s_per_m", 1},
 };
