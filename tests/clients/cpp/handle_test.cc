@@ -7,8 +7,8 @@
 namespace tendon {
 namespace {
 
-using a_and_z::World;
 using a_and_z::Weather;
+using a_and_z::World;
 constexpr Weather kFineWeather{.loss = 0, .delay = std::chrono::milliseconds(5), .jitter = Duration::zero()};
 constexpr Duration kSecond = std::chrono::seconds(1);
 
