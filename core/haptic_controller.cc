@@ -26,6 +26,12 @@ HapticController::HapticController(const Config& config)
     wrench_.emplace(wrench_config(config.limiter, *config.rotation));
   }
   if (config.grip) grip_.emplace(grip_config(config.limiter, *config.grip));
+  if (config.coupling) {
+    if (config.rotation) {
+      throw std::invalid_argument("coupling: expected no rotation, because a coupling moves a point only");
+    }
+    coupling_.emplace(*config.coupling);
+  }
   if (config.friction_map) {
     if (!config.limiter.parts.adaptive_friction) {
       throw std::invalid_argument("friction_map: expected a limiter with adaptive_friction, which is the only user");
@@ -134,7 +140,8 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
     return;
   }
   const Quat* const orientation = handle != nullptr && handle->turning ? &handle->turning->orientation : nullptr;
-  const ForceChannels::Wanted wanted = held_.wanted(hand, orientation);
+  ForceChannels::Wanted wanted = held_.wanted(hand, orientation);
+  if (coupling_) add_coupling(hand, wanted);
   take(fresh, hand, applied, hand_force, wanted, handle);
   if (const auto& newest = held_.newest(wanted.channel)) {
     fresh.force_sequence = newest->sequence;
@@ -144,11 +151,28 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
 }
 
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-                            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
+                            const ForceChannels::Wanted& wanted, const HandleSample* handle,
+                            const Purse::Settlement& settled) noexcept {
   if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
+  settled_ = settled;
   Step step;
   take(step, hand, applied, hand_force, wanted, handle);
   return step;
+}
+
+void HapticController::add_coupling(const Motion& hand, ForceChannels::Wanted& wanted) noexcept {
+  const Demand<3> demand = coupling_->command(hand, buttons_, ready());
+  wanted.force += demand.force;
+  wanted.stiffness += demand.stiffness;
+  const bool silent = wanted.mode == Mode::kIdle || wanted.mode == Mode::kSafeStop;
+  if (silent && coupling_->live()) wanted.mode = Mode::kActive;
+}
+
+/// What the peer has paid raises the account, what this port pays lowers it: before the force is bounded by it.
+void HapticController::settle(const Vec3& wanted, Duration elapsed) noexcept {
+  if (coupling_) settled_ = coupling_->settle(limiter_.payable(), limiter_.worst_loss(wanted), elapsed);
+  limiter_.credit(settled_.credit);
+  limiter_.withdraw(settled_.withdraw);
 }
 
 /// What the handle measured, and what the remote environment asks of it.
@@ -213,6 +237,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));
+  if (config_.limiter.shared_account) settle(slewed.force, step.held);
   // A limit changes the environment as the hand feels it, so its stiffness is known only for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
@@ -287,6 +312,8 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied, const Han
   last_at_ = now;
   started_ = true;
   if (++missed_ >= config_.max_missed && fault_ == Fault::kNone) fault_ = Fault::kDeviceSilent;
+  if (coupling_) coupling_->command_unseen(now, ready());
+  settled_ = {};
 
   add_accounts(step);
   step.permitted =

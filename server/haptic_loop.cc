@@ -87,11 +87,24 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         rearm();
         device_.arm();
         break;
+      case HapticOrder::Kind::kEngage:
+        if (Coupling* const coupling = controller_.coupling()) coupling->engage();
+        break;
+      case HapticOrder::Kind::kDisengage:
+        if (Coupling* const coupling = controller_.coupling()) coupling->disengage();
+        break;
     }
     mail_.orders.pop();
   }
   for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
     if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
+  }
+  if (Coupling* const coupling = controller_.coupling()) {
+    peer_.reset();
+    if (const PortState* const peer = mail_.port_in.take()) {
+      coupling->receive(*peer, now);
+      peer_ = *peer;
+    }
   }
   // The last force of a source that has gone may still lie in its box, and must not count as fresh. Releasing twice
   // does no harm, because the number of a source is never used again.
@@ -117,6 +130,7 @@ HandleSample HapticLoop::handle_in(const PositionSample& sample) noexcept {
 
 void HapticLoop::take_step(LocalTime now, StepRecord& record) noexcept {
   const auto sample = device_.read(now);
+  if (controller_.coupling() != nullptr) controller_.notice(sample ? sample->buttons : buttons_, device_.armed());
   if (!sample) {
     const HandleSample handle{.torque = applied_.torque, .grip_force = applied_.grip};
     static_cast<Step&>(record) = controller_.step_unseen(now, applied_.force, rest_ ? &handle : nullptr);
@@ -168,6 +182,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   record.disarmed = disarmed_;
   record.buttons = buttons_;
   watch_device();
+  if (controller_.coupling() != nullptr) publish_port(record);
   publish(record);
 
   due_ += config_.period;
@@ -208,6 +223,20 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
   if (record.held.count() > longest_interval_ns_.load(std::memory_order_relaxed)) {
     longest_interval_ns_.store(record.held.count(), std::memory_order_relaxed);
   }
+}
+
+/// The contact that a follower feels is what its force sensor measures of whatever moves its handle.
+void HapticLoop::publish_port(const StepRecord& record) noexcept {
+  Coupling& coupling = *controller_.coupling();
+  const PortRecord port{.tick = record.tick,
+                        .at = record.hand.at,
+                        .settled = controller_.settled(),
+                        .stiffness = coupling.stiffness(),
+                        .round_trip = coupling.round_trip(),
+                        .sent = coupling.message(record.applied, record.hand_force),
+                        .peer = peer_};
+  mail_.port_out.put(port.sent);
+  if (!mail_.ports.try_push(port)) mail_.ports_lost.fetch_add(1, std::memory_order_relaxed);
 }
 
 void HapticLoop::stop() noexcept {

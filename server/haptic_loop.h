@@ -67,6 +67,7 @@ class HapticLoop {
   void watch_device() noexcept;
   void rearm() noexcept;
   void publish(const StepRecord& record) noexcept;
+  void publish_port(const StepRecord& record) noexcept;
 
   Config config_;
   Device& device_;
@@ -76,6 +77,7 @@ class HapticLoop {
   double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp
   std::optional<Rest> rest_;       ///< empty: the device has a position only
   bool has_more_motors_;           ///< than those of its position
+  std::optional<PortState> peer_;  ///< of a coupling: what came since the step before
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};

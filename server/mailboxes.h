@@ -10,6 +10,7 @@
 #include "core/exchange/latest.h"
 #include "core/exchange/spsc_ring.h"
 #include "core/remote/remote_force.h"
+#include "core/teleoperation/port_state.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/guests/health.h"
@@ -20,9 +21,11 @@ namespace tendon {
 /// An order to the haptic thread.
 struct HapticOrder {
   enum class Kind : std::uint8_t {
-    kRelease,  ///< `source` no longer has `channel`: its force is no longer fresh
-    kRearm,    ///< clear the latched fault, and take kDisarm back
-    kDisarm,   ///< no force until kRearm
+    kRelease,    ///< `source` no longer has `channel`: its force is no longer fresh
+    kRearm,      ///< clear the latched fault, and take kDisarm back
+    kDisarm,     ///< no force until kRearm
+    kEngage,     ///< the operator's act of a coupling
+    kDisengage,  ///< … and its end
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
@@ -34,8 +37,11 @@ struct HapticOrder {
 ///
 ///     network ──forces─▶ haptic      one box for each channel; newest wins: an older force is worth nothing
 ///     network ──orders─▶ haptic      all of them, in order
+///     network ──port in─▶ haptic     of a coupling: the peer's port; newest wins
 ///     haptic  ──state──▶ network     newest wins
+///     haptic  ──port out▶ network    of a coupling: this port; newest wins
 ///     haptic  ──steps──▶ log         all of them; what does not fit is counted
+///     haptic  ──ports──▶ log         of a coupling: all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
 ///     log     ──health─▶ network     newest wins: what it counts is since the start
 ///     network ─datagrams▶ log        of all devices, those that DatagramSieve lets through; what it leaves out, and what
@@ -46,6 +52,7 @@ struct Mailboxes {
   /// In values; powers of two.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz: the log thread may wait that long for a slow disk
+    std::size_t ports = 1;      ///< of a device with a coupling as many as steps
     std::size_t flight = 2048;  ///< the last 2 s at 1 kHz
     std::size_t datagrams = 4096;
   };
@@ -54,14 +61,18 @@ struct Mailboxes {
   static constexpr std::size_t kOrders = 16;
 
   explicit Mailboxes(const Capacities& capacities)
-      : steps(capacities.steps), flight(capacities.flight), datagrams(capacities.datagrams) {}
+      : steps(capacities.steps), ports(capacities.ports), flight(capacities.flight), datagrams(capacities.datagrams) {}
   Mailboxes() : Mailboxes(Capacities{}) {}
 
   std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
+  Latest<PortState> port_in;
+  Latest<PortState> port_out;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
+  SpscRing<PortRecord> ports;
+  std::atomic<std::uint64_t> ports_lost{0};
   FlightRecorder<StepRecord> flight;
   Latest<Health> health;
   SpscRing<DatagramRecord> datagrams;

@@ -119,9 +119,10 @@ std::unique_ptr<PartRecorder> recorder_of(const std::vector<Scene>& scenes, Loca
   if (!recording) return nullptr;
   PartRecorder::Config config;
   config.path = recording->path;
-  config.run = {.scene = scene_record(scenes.front()), .started = started};
+  const auto is_coupled = [](const Scene& scene) { return scene.teleoperation.has_value(); };
+  config.run = {.scene = scene_record(scenes.front()), .ports = is_coupled(scenes.front()), .started = started};
   for (std::size_t i = 1; i < scenes.size(); ++i) {
-    config.run.more_devices.push_back({scenes[i].name, scene_record(scenes[i])});
+    config.run.more_devices.push_back({scenes[i].name, scene_record(scenes[i]), is_coupled(scenes[i])});
   }
   config.rotate_bytes = static_cast<std::uint64_t>(recording->rotate_bytes);
   config.rotate_after = from_seconds(recording->rotate_after);
@@ -154,9 +155,15 @@ Server::DeviceRuntime::DeviceRuntime(const Scene& the_scene, const Mailboxes::Ca
 
 Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
   DeviceRuntimes devices;
-  for (const Scene& scene : scenes) {
+  for (Scene scene : scenes) {
+    // Above the epoch of every run before, as long as the time of day does not go back (Purse).
+    if (auto& coupling = scene.loop.control.coupling) {
+      coupling->spring.epoch =
+          static_cast<std::uint64_t>((clock::now().time_since_epoch() + clock::unix_offset()).count());
+    }
     Mailboxes::Capacities capacities;
     if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
+    capacities.ports = scene.teleoperation ? capacities.steps : 1;
     devices.push_back(std::make_unique<DeviceRuntime>(scene, capacities, guardian));
   }
   return devices;
@@ -327,10 +334,17 @@ void Server::drain_to_recorder(LocalTime now) {
     DeviceRuntime& runtime = *devices_[device];
     while (const StepRecord* step = runtime.mail.steps.front()) {
       runtime.meter.observe(*step);
+      // The haptic thread pushes what the coupling did before the step.
+      for (const PortRecord* port = runtime.mail.ports.front(); port != nullptr && port->tick <= step->tick;
+           port = runtime.mail.ports.front()) {
+        if (recorder_) recorder_->record(*port, device);
+        runtime.mail.ports.pop();
+      }
       if (recorder_) recorder_->record(*step, device);
       runtime.mail.steps.pop();
     }
     steps_lost += news(runtime.mail.steps_lost, runtime.told_steps_lost);
+    steps_lost += news(runtime.mail.ports_lost, runtime.told_ports_lost);  // such a step cannot be replayed
   }
   Mailboxes& first = devices_.front()->mail;
   while (const DatagramRecord* datagram = first.datagrams.front()) {

@@ -94,6 +94,7 @@ class Server {
     SafeDevice::Status told_safety;
     DeviceCounts told_counts;
     std::uint64_t told_steps_lost = 0;
+    std::uint64_t told_ports_lost = 0;
   };
   using DeviceRuntimes = std::vector<std::unique_ptr<DeviceRuntime>>;
 

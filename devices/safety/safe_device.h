@@ -128,6 +128,7 @@ class SafeDevice final : public Device {
   DeviceCounts counts() const noexcept override { return device_.counts(); }
   void arm() noexcept override;
   void disarm() noexcept override;
+  bool armed() const noexcept override { return stage_ == Stage::kArmed && !stopped(); }
   std::uint32_t times_armed() const noexcept override { return times_armed_; }
   std::uint32_t faults() const noexcept override { return faults_; }
   std::optional<PositionSample> read(LocalTime now) noexcept override;

@@ -105,6 +105,11 @@ std::vector<Listable> make_listables() {
       return there;
     });
   });
+  add("teleoperation", "ties the handle to one of another server", [](Scene& scene) {
+    scene.loop.control.limiter.shared_account = false;
+    scene.teleoperation.reset();
+    return drop(scene.loop.control.coupling);
+  });
   control("admittance", "the handle follows a tool of another mass", &HapticController::Config::admittance);
   between("adaptive_local_model", "models of the engine are blended and capped",
           &HeldForce::Config::adaptive_local_model);

@@ -40,6 +40,11 @@ void PartRecorder::record(const StepRecord& step, std::size_t device) {
   look_after(step.hand.at);
 }
 
+/// No look_after: it stays in the part of its step.
+void PartRecorder::record(const PortRecord& port, std::size_t device) {
+  if (recorder_) recorder_->record(port, device);
+}
+
 void PartRecorder::record(const DatagramRecord& datagram) {
   if (!recorder_) {
     ++missing_.datagrams;

@@ -67,6 +67,7 @@ class PartRecorder {
 
   /// As those of Recorder.
   void record(const StepRecord& step, std::size_t device = 0);
+  void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   void lost(const LossRecord& loss);
   void tick(LocalTime now);

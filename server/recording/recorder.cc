@@ -21,6 +21,7 @@ Recorder::Recorder(const Config& config, ByteSink& sink)
       step_channels_{add_channel(writer_, recording::kStep)},
       datagram_channel_(add_channel(writer_, recording::kDatagram)),
       loss_channel_(add_channel(writer_, recording::kLoss)) {
+  port_channels_.push_back(config_.ports ? add_channel(writer_, recording::kPort) : 0);
   write(scene_channel_, config_.started, recording::encode(config_.scene));
   for (const Device& device : config_.more_devices) {
     const auto of_device = [&](const recording::Channel& channel) {
@@ -29,6 +30,7 @@ Recorder::Recorder(const Config& config, ByteSink& sink)
     };
     write(of_device(recording::kScene), config_.started, recording::encode(device.scene));
     step_channels_.push_back(of_device(recording::kStep));
+    port_channels_.push_back(device.ports ? of_device(recording::kPort) : 0);
   }
   settle(writer_.flush_chunk());
 }
@@ -40,6 +42,10 @@ void Recorder::record(const StepRecord& step, std::size_t device) {
   }
   ++pending_.steps;
   write(step_channels_[device], step.hand.at, recording::encode(step));
+}
+
+void Recorder::record(const PortRecord& port, std::size_t device) {
+  if (recording()) write(port_channels_[device], port.at, recording::encode(port));
 }
 
 void Recorder::record(const DatagramRecord& datagram) {

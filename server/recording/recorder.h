@@ -32,9 +32,11 @@ class Recorder {
   struct Device {
     std::string name;  ///< its records are in channels /NAME/scene and /NAME/haptic/step
     SceneRecord scene;
+    bool ports = false;  ///< it has a coupling
   };
   struct Config {
     SceneRecord scene;
+    bool ports = false;  ///< the first device has a coupling
     std::vector<Device> more_devices{};
     LocalTime started{};  ///< time of the scene's message
     /// The most recorded time that a kill can cost. Each flush costs one write(2) and some 300 bytes of chunk and
@@ -59,6 +61,8 @@ class Recorder {
 
   /// `device` by number: 0 is the first, and those of `more_devices` follow.
   void record(const StepRecord& step, std::size_t device = 0);
+  /// Of a device with `ports`; before the step with the same tick.
+  void record(const PortRecord& port, std::size_t device = 0);
   void record(const DatagramRecord& datagram);
   /// Notes that records were dropped before they came here, so that a reader knows of the gap.
   void lost(const LossRecord& loss);
@@ -93,6 +97,7 @@ class Recorder {
   McapWriter writer_;
   std::uint16_t scene_channel_;
   std::vector<std::uint16_t> step_channels_;  ///< by device
+  std::vector<std::uint16_t> port_channels_;  ///< by device; 0: it has no coupling
   std::uint16_t datagram_channel_;
   std::uint16_t loss_channel_;
   std::optional<LocalTime> chunk_opened_;

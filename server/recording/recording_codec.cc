@@ -70,6 +70,52 @@ GripStep grip_step(const pb::Grip& in) {
           .energy = in.energy_j()};
 }
 
+void put(pb::PortState* out, const PortState& state) {
+  out->set_epoch(state.epoch);
+  out->set_sequence(state.sequence);
+  out->set_answers_epoch(state.answers_epoch);
+  out->set_answers(state.answers);
+  out->set_time_ns(state.time.count());
+  out->set_round_trip_ns(state.round_trip.count());
+  out->set_phase(static_cast<std::uint32_t>(state.phase));
+  out->set_engagement(state.engagement);
+  out->set_buttons(state.buttons);
+  put(out->mutable_displacement_m(), state.position);
+  put(out->mutable_velocity_mps(), state.velocity);
+  put(out->mutable_force_n(), state.force);
+  if (state.contact_force) put(out->mutable_contact_force_n(), *state.contact_force);
+  out->set_account_j(state.account);
+  out->set_need_j(state.need);
+  out->set_given_j(state.given);
+  out->set_taken_j(state.taken);
+}
+
+PortState port_state(const pb::PortState& in) {
+  if (in.phase() < static_cast<std::uint32_t>(PortPhase::kAlone) ||
+      in.phase() > static_cast<std::uint32_t>(PortPhase::kFault)) {
+    throw std::invalid_argument("a port has the unknown phase " + std::to_string(in.phase()));
+  }
+  PortState out;
+  out.epoch = in.epoch();
+  out.sequence = in.sequence();
+  out.answers_epoch = in.answers_epoch();
+  out.answers = in.answers();
+  out.time = Duration(in.time_ns());
+  out.round_trip = Duration(in.round_trip_ns());
+  out.phase = static_cast<PortPhase>(in.phase());
+  out.engagement = in.engagement();
+  out.buttons = in.buttons();
+  out.position = vec3(in.displacement_m());
+  out.velocity = vec3(in.velocity_mps());
+  out.force = vec3(in.force_n());
+  if (in.has_contact_force_n()) out.contact_force = vec3(in.contact_force_n());
+  out.account = in.account_j();
+  out.need = in.need_j();
+  out.given = in.given_j();
+  out.taken = in.taken_j();
+  return out;
+}
+
 void put(pb::Reason* out, Reasons reasons) {
   out->set_energy(reasons.has(Reason::kEnergy));
   out->set_max_force(reasons.has(Reason::kMaxForce));
@@ -154,6 +200,18 @@ std::string encode(const StepRecord& step) {
   return out.SerializeAsString();
 }
 
+std::string encode(const PortRecord& port) {
+  pb::Port out;
+  out.set_tick(port.tick);
+  out.set_credited_j(port.settled.credit);
+  out.set_withdrawn_j(port.settled.withdraw);
+  out.set_stiffness_n_per_m(port.stiffness);
+  out.set_round_trip_ns(port.round_trip.count());
+  put(out.mutable_sent(), port.sent);
+  if (port.peer) put(out.mutable_peer(), *port.peer);
+  return out.SerializeAsString();
+}
+
 std::string encode(const DatagramRecord& datagram) {
   pb::Datagram out;
   out.set_direction(static_cast<pb::Direction>(datagram.direction));
@@ -228,6 +286,19 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
                                   std::to_string(entries) + " numbers instead of 9");
     for (int i = 0; i < entries; ++i) out.stiffness(i / 3, i % 3) = in.stiffness_wanted_n_per_m(i);
   }
+  return out;
+}
+
+PortRecord decode_port(std::string_view message, LocalTime at) {
+  const auto in = parse<pb::Port>(message);
+  PortRecord out;
+  out.tick = in.tick();
+  out.at = at;
+  out.settled = {.credit = in.credited_j(), .withdraw = in.withdrawn_j()};
+  out.stiffness = in.stiffness_n_per_m();
+  out.round_trip = Duration(in.round_trip_ns());
+  out.sent = port_state(in.sent());
+  if (in.has_peer()) out.peer = port_state(in.peer());
   return out;
 }
 

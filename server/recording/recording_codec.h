@@ -52,6 +52,7 @@ struct Channel {
 };
 inline constexpr Channel kScene = {"/scene", "tendon.recording.v1.Scene"};
 inline constexpr Channel kStep = {"/haptic/step", "tendon.recording.v1.Step"};
+inline constexpr Channel kPort = {"/haptic/port", "tendon.recording.v1.Port"};
 inline constexpr Channel kDatagram = {"/net/datagram", "tendon.recording.v1.Datagram"};
 inline constexpr Channel kLoss = {"/recording/lost", "tendon.recording.v1.Lost"};
 
@@ -64,6 +65,7 @@ std::string schema_data();
 /// The same record gives the same bytes.
 std::string encode(const SceneRecord& scene);
 std::string encode(const StepRecord& step);
+std::string encode(const PortRecord& port);
 std::string encode(const DatagramRecord& datagram);
 std::string encode(const LossRecord& loss);
 
@@ -71,6 +73,7 @@ std::string encode(const LossRecord& loss);
 // bits, NaN included. Throws std::invalid_argument with what is wrong when the bytes are not such a message.
 SceneRecord decode_scene(std::string_view message);
 StepRecord decode_step(std::string_view message, LocalTime at);
+PortRecord decode_port(std::string_view message, LocalTime at);
 DatagramRecord decode_datagram(std::string_view message, LocalTime at);
 LossRecord decode_loss(std::string_view message, LocalTime at);
 

@@ -35,12 +35,14 @@ std::optional<RecordingReader::Record> RecordingReader::next() {
         return scene;
       }
       const bool step = is(channel, recording::kStep);
+      const bool port = is(channel, recording::kPort);
       const bool datagram = is(channel, recording::kDatagram);
       const bool loss = is(channel, recording::kLoss);
-      if (!step && !datagram && !loss) continue;
+      if (!step && !port && !datagram && !loss) continue;
       if (!unix_offset_) throw std::invalid_argument("a record comes before the scene");
       const LocalTime at = recording::local_time(message->log_time, *unix_offset_);
       if (step) return recording::decode_step(message->data, at);
+      if (port) return recording::decode_port(message->data, at);
       if (datagram) return recording::decode_datagram(message->data, at);
       return recording::decode_loss(message->data, at);
     } catch (const std::invalid_argument& error) {

@@ -25,7 +25,7 @@ namespace tendon {
 /// Thread-safe: no. Realtime-safe: no.
 class RecordingReader {
  public:
-  using Record = std::variant<SceneRecord, StepRecord, DatagramRecord, LossRecord>;
+  using Record = std::variant<SceneRecord, StepRecord, DatagramRecord, LossRecord, PortRecord>;
 
   /// Throws std::runtime_error with path and reason when the file cannot be read.
   explicit RecordingReader(const std::filesystem::path& path);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "core/haptic_controller.h"
 #include "protocol/link.h"
@@ -18,6 +19,17 @@ struct StepRecord : Step {
   bool rearmed = false;         ///< the controller was rearmed since the step before
   bool disarmed = false;        ///< the operator had disarmed the device
   std::uint32_t buttons = 0;    ///< bit i is set while button i of the handle was held
+};
+
+/// What a coupling did in one haptic step: with the StepRecord of the same tick enough to repeat it.
+struct PortRecord {
+  std::uint64_t tick = 0;
+  LocalTime at{};                 ///< of the step's position
+  Purse::Settlement settled{};    ///< J, what the limiter was credited with, and what was withdrawn
+  double stiffness = 0;           ///< N/m, K in use
+  Duration round_trip{};          ///< in use; 0: not known
+  PortState sent;                 ///< to the peer
+  std::optional<PortState> peer;  ///< that came since the step before; the newest
 };
 
 /// One datagram that went in or out.

@@ -18,24 +18,6 @@
 namespace tendon::scene_file {
 namespace {
 
-/// Where this server listens.
-struct ListenAddress {
-  static std::string expected(const Unit&) { return "an address like \"127.0.0.1:47100\" or \"[::1]:47100\""; }
-
-  static Verdict take(const toml::node& node, const Unit& unit, Address& to) {
-    const auto* text = node.as_string();
-    if (text == nullptr) return Refusal{&node, expected(unit)};
-    try {
-      to = parse_address(**text);
-      return {};
-    } catch (const std::invalid_argument&) {
-      return Refusal{&node, expected(unit)};
-    }
-  }
-
-  static std::string shown(const Unit&, const Address& value) { return in_quotes(to_string(value)); }
-};
-
 Names<Law> law_names() {
   Names<Law> names;
   for (const LawInfo& law : laws()) names.all.emplace_back(law.name, law.law);
@@ -374,9 +356,11 @@ void declare_scene(Table& scene, Draft& draft) {
              "it leaves");
   });
 
+  declare_teleoperation(scene, draft);
+
   scene.table("network", [&draft](Table& keys) {
     Scene::Network& network = draft.scene.network;
-    keys.key("listen", network.listen, ListenAddress{},
+    keys.key("listen", network.listen, NetworkAddress{},
              "port 0 lets the system choose one. Without keys a loopback address");
     keys.key("keys", network.keys, Path{},
              "folder with a file NAME.key for each client, relative to this file; only they are let in");

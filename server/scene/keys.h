@@ -66,6 +66,11 @@ struct Draft {
   double most_acceleration = 300;
   /// With more, delayed walls stay passive but buzz (control.md 8.7).
   double shaping_viscous = 0.3;
+  Coupling::Config coupling;             ///< of [teleoperation], when there is one
+  Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
+  std::optional<double> coupling_force;  ///< N
+  bool engages_by_button = false;
+  std::optional<std::uint32_t> engage_button;
   std::vector<Vec3> places;
   std::vector<double> place_coulomb;
   std::vector<double> place_viscous;
@@ -82,6 +87,10 @@ inline constexpr Absent kRequired = {.required = true};
 /// All of a scene. Defined for Reader and Reference.
 template <class Table>
 void declare_scene(Table& scene, Draft& draft);
+
+/// [teleoperation]. Defined for Reader and Reference.
+template <class Table>
+void declare_teleoperation(Table& scene, Draft& draft);
 
 /// [device]. Defined for Reader and Reference.
 template <class Table>

@@ -18,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/rotation.h"
 #include "core/handle/turn_friction.h"
 #include "devices/simulated/recorded_motion.h"
 #include "server/machine/regular_file.h"
@@ -50,6 +51,7 @@ class SceneResolver {
     resolve_structural_mode();
     resolve_joint_friction();
     resolve_control();
+    resolve_teleoperation(directory);
     resolve_replay(directory);
     resolve_channels();
     // The constructors check rules that the keys do not.
@@ -314,6 +316,59 @@ class SceneResolver {
     resolve_rotation(control);
     resolve_grip(control);
     if (control.rotation || control.grip) build("limiter", [&control] { HapticController{control}; });
+  }
+
+  /// The coupling as the loop runs it. What both ends must have alike is compared when they meet.
+  void resolve_teleoperation(const std::filesystem::path& directory) {
+    auto& peer = draft_.scene.teleoperation;
+    if (!peer) return;
+    HapticController::Config& control = draft_.scene.loop.control;
+    Coupling::Config& coupling = draft_.coupling;
+    const bool leads = coupling.role == PortRole::kLeader;
+    if (peer->key) peer->key = directory / *peer->key;
+    if (peer->key && !peer->dial) {
+      blame("teleoperation.key", {}, "expected none without dial: who is dialled lets in by [network] keys");
+    }
+    if (peer->dial && !is_loopback(*peer->dial)) {
+      if (!peer->key) {
+        blame("teleoperation.dial", {},
+              "expected an address of this machine, or a key besides: nothing crosses a network in the clear");
+      }
+      if (is_loopback(draft_.scene.network.listen)) {
+        blame("network.listen", {"network.listen", "teleoperation.dial"},
+              "expected an address that reaches the peer, like \"0.0.0.0:47100\", because teleoperation.dial is on "
+              "another machine");
+      }
+    }
+    if (control.rotation) {
+      blame("teleoperation", {},
+            "expected a device without motors that turn its handle: a coupling moves a point only");
+    }
+    if (!leads && coupling.clutch) blame("teleoperation.clutch", {}, "expected none: the leader clutches");
+    if (leads && coupling.holds_place) {
+      blame("teleoperation.on_loss", {}, "expected \"release\": a hand holds the leader");
+    }
+    if (draft_.engages_by_button != draft_.engage_button.has_value() || (!leads && draft_.engages_by_button)) {
+      blame("teleoperation.engage.by", {"teleoperation.engage.button"},
+            leads ? "expected \"button\" together with button, or \"request\" without"
+                  : "expected \"request\": the leader engages");
+    }
+    coupling.engage_by = draft_.engage_button;
+    coupling.map.rotation = rotation_by(draft_.map_rotation);
+    coupling.spring.period = draft_.scene.loop.period;
+    coupling.spring.max_force = draft_.coupling_force.value_or(control.max_force);
+    const Law law = control.limiter.law;
+    if (coupling.method == CouplingMethod::kPositionPosition && law != Law::kNone && !coupling.purse) {
+      blame("teleoperation.purse", {"teleoperation"},
+            "missing, expected this table: behind a limiter of its own a follower cannot move unless the leader pays");
+    }
+    if (coupling.purse && law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
+      blame("teleoperation.purse", {"limiter.kind"},
+            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no account that a purse can share");
+    }
+    control.limiter.shared_account = coupling.purse.has_value();
+    build("teleoperation", [&coupling] { Coupling{coupling}; });
+    control.coupling = coupling;
   }
 
   /// Motors that turn the handle, and the motor of its gripper, have bounds of their own. A scene has to have them when

@@ -58,6 +58,14 @@ struct Scene {
     double datagram_bytes_per_s = 4e6;
   };
 
+  /// How this device finds the one that it is coupled to; the law is loop.control.coupling.
+  struct Teleoperation {
+    std::optional<Address> dial;               ///< empty: the peer dials this server
+    std::optional<std::filesystem::path> key;  ///< of this server, for the peer; empty: in the clear
+    std::string device;                        ///< of the peer; empty: its first
+    std::string channel;                       ///< of it; empty: its first
+  };
+
   std::string name;  ///< of the device, as clients claim it
   AnyDevice device;
   std::string axes;   ///< of its base frame, "right=x up=y user=z"; empty: not known
@@ -68,9 +76,10 @@ struct Scene {
   std::optional<std::uint32_t> cpu;  ///< on which the haptic thread stays; empty: anywhere
   std::vector<Channel> channels = {Channel{}};
   Network network;
-  bool has_network = false;            ///< the file has a table [network]
-  std::optional<Recording> recording;  ///< empty: nothing is recorded
-  std::string text;                    ///< for the recording: the file, whole; with settings, the scene that they make
+  bool has_network = false;                    ///< the file has a table [network]
+  std::optional<Teleoperation> teleoperation;  ///< empty: the device is not coupled
+  std::optional<Recording> recording;          ///< empty: nothing is recorded
+  std::string text;  ///< for the recording: the file, whole; with settings, the scene that they make
 
   /// The row of its device.
   const Driver& driver() const;

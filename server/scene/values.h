@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,6 +21,7 @@
 #include "core/base/motion.h"
 #include "core/base/time.h"
 #include "protocol/limits.h"
+#include "protocol/link.h"
 
 // How values are written in a scene file: units and rules. Internal to server/scene.
 //
@@ -297,6 +299,29 @@ struct Path {
 
   static std::string shown(const Unit&, const std::filesystem::path& value) { return in_quotes(value.string()); }
   static std::string shown(const Unit&, const std::optional<std::filesystem::path>&) { return "none"; }
+};
+
+/// Where a server listens.
+struct NetworkAddress {
+  static std::string expected(const Unit&) { return "an address like \"127.0.0.1:47100\" or \"[::1]:47100\""; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, Address& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr) return Refusal{&node, expected(unit)};
+    try {
+      to = parse_address(**text);
+      return {};
+    } catch (const std::invalid_argument&) {
+      return Refusal{&node, expected(unit)};
+    }
+  }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::optional<Address>& to) {
+    return take(node, unit, to.emplace());
+  }
+
+  static std::string shown(const Unit&, const Address& value) { return in_quotes(to_string(value)); }
+  static std::string shown(const Unit&, const std::optional<Address>&) { return "none"; }
 };
 
 /// One of a few names.

@@ -61,6 +61,7 @@ Gaps read_run(const Options& options, Rerun::Held held, const Visit& visit, cons
         gaps.lost_datagrams += loss->datagrams;
       }
       if (const auto* datagram = std::get_if<DatagramRecord>(&*record)) visit_datagram(*datagram);
+      if (const auto* port = std::get_if<PortRecord>(&*record)) rerun->settled(*port);
       if (const auto* step = std::get_if<StepRecord>(&*record)) visit(*step, rerun->step(*step));
     }
     gaps.truncated = gaps.truncated || reader.truncated();

@@ -24,12 +24,20 @@ class Rerun {
 
   /// Throws what HapticController throws.
   Rerun(const HapticController::Config& control, Held held)
-      : controller_(control), max_missed_(control.max_missed), held_(held) {}
+      : controller_(without_coupling(control)), max_missed_(control.max_missed), held_(held) {}
+
+  /// What the coupling's purse settled in the next step, if that has this tick. The rest of a coupling is in the force
+  /// that was wanted.
+  void settled(const PortRecord& port) { port_ = port; }
 
   /// `recorded` with what this controller makes of it. `applied` is its own force with kOwn, else the recorded one.
   StepRecord step(const StepRecord& recorded);
 
  private:
+  static HapticController::Config without_coupling(HapticController::Config control) {
+    control.coupling.reset();
+    return control;
+  }
   Step take(const StepRecord& recorded, const Effort& held);
 
   HapticController controller_;
@@ -37,6 +45,7 @@ class Rerun {
   std::uint32_t missed_ = 0;  ///< readings in a row
   Held held_;
   Effort own_;
+  PortRecord port_;  ///< tick 0: none yet
 };
 
 /// What of a step a law decides, and that is not the same bit for bit: "energy_j: recorded 0.1, again 0.2". Empty when

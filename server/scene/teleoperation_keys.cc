@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string>
+#include <string_view>
+
+#include "server/scene/keys.h"
+#include "server/scene/reader.h"
+#include "server/scene/reference.h"
+#include "server/scene/values.h"
+
+namespace tendon::scene_file {
+namespace {
+
+/// Which axes of the leader's frame are coupled: "xyz", or some of these letters in this order.
+struct CoupledAxes {
+  static constexpr std::string_view kLetters = "xyz";
+
+  static std::string expected(const Unit&) { return "one or more of the letters x, y, z, in this order"; }
+
+  static Verdict take(const toml::node& node, const Unit& unit, std::array<bool, 3>& to) {
+    const auto* text = node.as_string();
+    if (text == nullptr || (*text)->empty()) return Refusal{&node, expected(unit)};
+    std::array<bool, 3> axes{};
+    std::size_t next = 0;
+    for (const char letter : **text) {
+      const std::size_t axis = kLetters.find(letter);
+      if (axis == std::string_view::npos || axis < next) return Refusal{&node, expected(unit)};
+      axes[axis] = true;
+      next = axis + 1;
+    }
+    to = axes;
+    return {};
+  }
+
+  static std::string shown(const Unit&, const std::array<bool, 3>& axes) {
+    std::string text;
+    for (std::size_t axis = 0; axis < axes.size(); ++axis) {
+      if (axes[axis]) text += kLetters[axis];
+    }
+    return in_quotes(text);
+  }
+};
+
+/// A displacement, a force or the share of one.
+constexpr Number kScale{.least = 0.01, .most = 100};
+
+template <class Table>
+void declare_map(Table& keys, Draft& draft) {
+  PoseMap::Config& map = draft.coupling.map;
+  keys.key("position_scale", map.position_scale, kScale, "displacements of the follower over those of the leader");
+  keys.key("force_scale", map.force_scale, kScale, "forces at the leader over those at the follower");
+  keys.key("rotation_deg", draft.map_rotation, Vector{},
+           "rotation vector that turns the leader's base frame into the follower's: about this axis by its length");
+  keys.key("axes", map.axes, CoupledAxes{},
+           "the axes of the leader's base frame that are coupled; the others are free");
+}
+
+template <class Table>
+void declare_coupling(Table& keys, Draft& draft) {
+  PositionPosition<3>::Config& spring = draft.coupling.spring;
+  keys.key("stiffness_n_per_m", spring.stiffness, kAboveZero,
+           "the stiffest that the spring between the handles is, as the leader feels it", kRequired);
+  keys.key("damping_n_s_per_m", spring.own_damping, kZeroOrMore,
+           "rendered at each handle by itself, as the leader feels it. Above 0 with adapt_to_delay");
+  keys.key("mutual_damping_n_s_per_m", spring.damping, kZeroOrMore, "between the handles, beside the spring");
+  keys.key("adapt_to_delay", spring.adapt_to_delay, YesNo{},
+           "the stiffness is at most twice damping_n_s_per_m over the round trip: above that it buzzes");
+  keys.key("max_force_n", draft.coupling_force, kAboveZero, "no force of the coupling is longer than this",
+           Absent{.text = "force.max_force_n"});
+}
+
+}  // namespace
+
+template <class Table>
+void declare_teleoperation(Table& scene, Draft& draft) {
+  scene.part("teleoperation", draft.scene.teleoperation, [&draft](Table& keys, Scene::Teleoperation& peer) {
+    Coupling::Config& coupling = draft.coupling;
+    keys.key("role", coupling.role, Names<PortRole>{{{"leader", PortRole::kLeader}, {"follower", PortRole::kFollower}}},
+             "the leader engages and clutches; the follower goes where the leader goes", kRequired);
+    keys.key("method", coupling.method,
+             Names<CouplingMethod>{{{"position-position", CouplingMethod::kPositionPosition},
+                                    {"position-force", CouplingMethod::kPositionForce}}},
+             "position-position: a spring between the handles. position-force: the leader feels the contact force that "
+             "the follower measures");
+    keys.key("dial", peer.dial, NetworkAddress{}, "address of the server of the other handle",
+             Absent{.text = "that server dials this one"});
+    keys.key("key", peer.key, Path{}, "the key file with which this server dials, relative to this file",
+             Absent{.text = "in the clear, on this machine only"});
+    keys.key("device", peer.device, Label{}, "name of the other handle, of the server that is dialled",
+             Absent{.text = "its first device"});
+    keys.key("channel", peer.channel, Label{}, "the channel of that device that this server takes",
+             Absent{.text = "its first channel"});
+    keys.key("on_loss", coupling.holds_place, Names<bool>{{{"release", false}, {"hold", true}}},
+             "when nothing comes from the leader. release: the force fades, because a hand holds the handle. hold: a "
+             "robot, which stays where it is. Of a follower");
+    keys.table("map", [&draft](Table& map) { declare_map(map, draft); });
+    keys.table("coupling", [&draft](Table& law) { declare_coupling(law, draft); });
+    keys.part("purse", coupling.purse, [](Table& purse, Purse::Config& config) {
+      purse.key("max_account_mj", config.max_account, Number{.least = 0, .most = 1e6, .without_least = true},
+                "no account is above this; the rest is discarded");
+      purse.key("max_power_w", config.max_power, kAboveZero,
+                "the peer's energy is believed up to this power, once max_account_mj has been used up");
+    });
+    keys.part("clutch", coupling.clutch, [](Table& clutch, Coupling::Button& button) {
+      clutch.key("button", button.bit, Count{31}, "number of the button that frees the leader's handle", kRequired);
+      clutch.key("toggle", button.toggles, YesNo{}, "each press changes it; otherwise as long as it is held");
+    });
+    keys.table("engage", [&draft, &coupling](Table& engage) {
+      engage.key("by", draft.engages_by_button, Names<bool>{{{"request", false}, {"button", true}}},
+                 "the leader's act that couples the handles, after a loss too. request: a guest's, or the other "
+                 "server's. button: a press");
+      engage.key("button", draft.engage_button, Count{31}, "for \"button\": its number",
+                 Absent{.text = "required with \"button\""});
+      engage.key("ramp_ms", coupling.ramp, kAboveZero, "the force rises from zero for this long");
+    });
+  });
+}
+
+template void declare_teleoperation(Reader&, Draft&);
+template void declare_teleoperation(Reference&, Draft&);
+
+}  // namespace tendon::scene_file
