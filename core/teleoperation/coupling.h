@@ -40,7 +40,7 @@ enum class CouplingMethod : std::uint8_t {
 ///
 /// **Phases** (PortPhase), `ready` = the device is seen, armed and without fault:
 ///
-///     alone    → coupled   a state of the peer has come
+///     alone    → coupled   a state of the peer has come;  coupled → alone   none has for as long as the ladder says
 ///     coupled  → engaged   leader: the act (engage(), or its button pressed), while ready and the peer is coupled,
 ///                          engaged or clutched, and fresh. follower: ready, and the leader is engaged by an act that
 ///                          is newer than any the follower has seen before
@@ -56,17 +56,19 @@ enum class CouplingMethod : std::uint8_t {
 /// clutched, fades within kFade. (A cut by the limiter is faster.)
 ///
 /// **Ladder.** Age: how long ago the newest state came. v = max(3 periods of the peer, 20 ms, twice the longest gap
-/// between two newer states lately):
+/// of at most 100 ms between two newer states lately):
 ///
 ///     age > v            the peer's velocity counts as zero
 ///     age > v + 20 ms    the force fades within kFade; with `holds_place` (a robot) it stays: the last place is held
 ///     age > v + 250 ms   phase lost. Force zero; with `holds_place` the place where the TOOL is now is held
 ///
+/// A robot (`holds_place`) holds its place with its own spring whenever it is ready and not live.
+///
 /// A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is safe.
 ///
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
-/// law; the leader's force is s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact
+/// law, with a K that does not adapt to the delay, because the leader has no spring; the leader's force is s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact
 /// (`contact_measured`).
 /// All forces of the coupling are bounded by max_force.
 ///
@@ -135,10 +137,56 @@ class Coupling {
   std::uint64_t refused() const noexcept;  ///< states
 
  private:
+  bool leads() const noexcept { return config_.role == PortRole::kLeader; }
+  bool heard() const noexcept { return peer_.epoch > 0; }
+  bool fresh() const noexcept { return heard() && age_ <= stale_after(); }
+  bool peer_is_in_act() const noexcept;
+  Duration stale_after() const noexcept;
+  void begin_epoch(const PortState& peer) noexcept;
+  void watch(LocalTime now) noexcept;
+  void take_buttons(std::uint32_t buttons) noexcept;
+  void change_phase(bool ready) noexcept;
+  void leave(PortPhase next) noexcept;
+  void stop_living() noexcept;
+  void live_on(const Vec3& position) noexcept;
+  Vec3 mapped(const Vec3& displacement) const noexcept;
+  Vec3 coupled(const Vec3& vector) const noexcept;
+  Demand<3> law(const Vec3& displacement, const Vec3& velocity) noexcept;
+  Vec3 hold(const Motion& hand) noexcept;
+
   Config config_;
-  PortPhase phase_ = PortPhase::kAlone;
+  PoseMap map_;
   PositionPosition<3> spring_;
-  // … as the implementation needs
+  std::optional<Purse> purse_;
+
+  PortPhase phase_ = PortPhase::kAlone;
+  std::uint64_t engagement_ = 0;  ///< of the newest act: made (leader), followed (follower)
+  std::uint64_t seen_ = 0;        ///< follower: no act up to this one engages it any more
+  bool joined_ = false;           ///< leader: the follower has answered the act
+  bool wants_clutch_ = false;
+  bool after_clutch_ = false;  ///< u goes on from where it stood
+  bool live_ = false;
+  std::uint32_t buttons_ = 0;
+
+  PortState peer_;         ///< newest; epoch 0: none
+  LocalTime peer_at_{};    ///< when it came
+  Duration gap_{};         ///< longest between two newer states: of this stretch of kRecovery
+  Duration gap_before_{};  ///< … and of the one before
+  LocalTime stretch_began_{};
+  Duration age_{};
+  LocalTime now_{};
+  LocalTime acted_at_{};
+  Duration elapsed_{};
+
+  Vec3 offset_ = Vec3::Zero();  ///< m, p₀
+  Vec3 u_ = Vec3::Zero();       ///< m
+  Vec3 u_velocity_ = Vec3::Zero();
+  double gain_ = 0;                ///< of the law, 0 … 1
+  Vec3 given_ = Vec3::Zero();      ///< N, of the law in this period, with its gain
+  Vec3 fading_ = Vec3::Zero();     ///< N, what is left of the law's force when it ended
+  Vec3 fade_from_ = Vec3::Zero();  ///< N, of that at its end
+  std::optional<Vec3> held_at_{};  ///< m: the place that a robot holds
+  std::uint64_t refused_ = 0;
 };
 
 }  // namespace tendon

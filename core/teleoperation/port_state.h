@@ -25,12 +25,14 @@ enum class PortPhase : std::uint8_t {
 /// any order: the highest `sequence` of the highest `epoch` counts. Vectors are in the SENDER's base frame and scale;
 /// the receiver maps them (PoseMap).
 struct PortState {
+  static constexpr Duration kMostRoundTrip = std::chrono::seconds(10);
+
   std::uint64_t epoch = 0;          ///< of the sender, > 0: above every one before when it starts anew (Purse)
   std::uint64_t sequence = 0;       ///< the sender's period in it: 1, 2, …
   std::uint64_t answers_epoch = 0;  ///< the receiver's epoch that `answers`, `given` and `taken` belong to; 0: none yet
   std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none yet
   Duration time{};                  ///< the sender's own: only differences are used; ± 2⁶⁰ ns
-  Duration round_trip{};            ///< that the sender has measured, ≥ 0; 0: not yet
+  Duration round_trip{};            ///< that the sender has measured; 0: not yet; ≤ kMostRoundTrip
   PortPhase phase = PortPhase::kAlone;
   std::uint64_t engagement = 0;  ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none yet
   std::uint32_t buttons = 0;     ///< bit i: button i is held
@@ -43,5 +45,8 @@ struct PortState {
   double given = 0;                     ///< J, PurseMessage::given
   double taken = 0;                     ///< J, PurseMessage::taken
 };
+
+/// Whether each value is finite and within the bounds that it has above and on the wire (tendon.proto).
+bool is_sound(const PortState& state) noexcept;
 
 }  // namespace tendon

@@ -20,9 +20,9 @@ namespace tendon {
 class PoseMap {
  public:
   struct Config {
-    double position_scale = 1;  ///< s_x, follower / leader; 0.01 … 100
-    double force_scale = 1;     ///< s_f, leader / follower; 0.01 … 100
-    Quat rotation{};            ///< R, of length 1
+    double position_scale = 1;                      ///< s_x, follower / leader; 0.01 … 100
+    double force_scale = 1;                         ///< s_f, leader / follower; 0.01 … 100
+    Quat rotation{};                                ///< R, of length 1
     std::array<bool, 3> axes = {true, true, true};  ///< of the leader's frame; one at least
   };
 
@@ -32,9 +32,9 @@ class PoseMap {
   Vec3 to_follower(const Vec3& displacement) const noexcept;  ///< m, m/s: s_x R (the coupled part of u_l)
   Vec3 to_leader(const Vec3& displacement) const noexcept;    ///< m, m/s: the coupled part of Rᵀ u_f/s_x
   Vec3 force_to_leader(const Vec3& force) const noexcept;     ///< N: s_f (the coupled part of Rᵀ F_f)
-  /// The part of a force along the coupled axes, in the frame of either end.
-  Vec3 coupled_at_leader(const Vec3& force) const noexcept;
-  Vec3 coupled_at_follower(const Vec3& force) const noexcept;
+  /// The part of a vector along the coupled axes, in the frame of either end.
+  Vec3 coupled_at_leader(const Vec3& vector) const noexcept;
+  Vec3 coupled_at_follower(const Vec3& vector) const noexcept;
 
   double stiffness_at_follower(double at_leader) const noexcept;  ///< K_l → K_f; dampers likewise
   double leader_joule() const noexcept;    ///< what one joule of the follower is worth at the leader: s_f/s_x
