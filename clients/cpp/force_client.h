@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/cpp/connection.h"
+#include "protocol/connection.h"
 #include "protocol/link.h"
 #include "protocol/messages.h"
 #include "protocol/narrow/deadband.h"

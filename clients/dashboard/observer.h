@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "clients/cpp/connection.h"
+#include "protocol/connection.h"
 #include "clients/dashboard/board.h"
 #include "protocol/link.h"
 #include "protocol/secrets/crypto.h"

@@ -50,7 +50,7 @@ tendon_mutant(older-force SOURCE protocol/session.cc LIBRARY tendon_protocol
   REPLACE "number <= *mine.number" "number == *mine.number"
   ORACLES "newest")
 # Who was refused or lost never comes back.
-tendon_mutant(no-return SOURCE clients/cpp/connection.cc LIBRARY tendon_client
+tendon_mutant(no-return SOURCE protocol/connection.cc LIBRARY tendon_client
   REPLACE "now >= retry_" "false"
   ORACLES "calm|recovery")
 # Datagrams of the next key open, but that key never becomes the present one: the one after it is unknown.

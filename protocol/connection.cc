@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clients/cpp/connection.h"
+#include "protocol/connection.h"
 
 #include <algorithm>
 #include <array>
