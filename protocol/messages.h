@@ -80,6 +80,8 @@ struct DeviceState {
   std::optional<Grip> grip{};            ///< empty: it has no gripper
   std::optional<double> grip_applied{};  ///< N, on the fingers, > 0 opens them; empty: the gripper has no motor
   std::optional<Vec3> hand_force{};      ///< N, of the hand on the handle; empty: it has no force sensor
+  /// In the order of HandleDescription::joints. Only to a client that named kFeatureJoints; empty: it tells none.
+  std::optional<Joints> joints{};
 };
 
 /// Client → server, unreliable, newest wins for each device and channel: the force that the physics engine wants.
@@ -293,6 +295,9 @@ struct HandleDescription {
   double max_gripper_force = 0;          ///< N, on the fingers; 0 = it has no motor
   std::string group{};                   ///< devices of one body have the same; at most 24 bytes; empty: by itself
   Hand hand = Hand::kAny;
+  /// Names of the joints, by their place in DeviceState::joints; at most 8 of at most 24 bytes. Only to a client that
+  /// named kFeatureJoints; empty: the device tells none.
+  std::vector<std::string> joints{};
 };
 
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.
@@ -302,6 +307,9 @@ inline constexpr std::string_view kFeatureChannels = "channels";
 
 /// A feature: the client is told how the device lies before the operator, its buttons' names, and which are held.
 inline constexpr std::string_view kFeatureHandle = "handle";
+
+/// A feature: the client is told the angles of the device's joints in each state, and their names in HandleDescription.
+inline constexpr std::string_view kFeatureJoints = "joints";
 
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,
 /// PeerReport). A controller that names it is not granted it.
