@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/base/motion.h"
+#include "core/base/time.h"
+
+namespace tendon {
+
+/// Where a port of a coupling stands. Only `kEngaged` has a force of the coupling, apart from the fade out of it and
+/// from a robot that holds its place.
+enum class PortPhase : std::uint8_t {
+  kAlone = 1,  ///< has no peer
+  kCoupled,    ///< hears its peer; no force; waits for the operator's act
+  kAligning,   ///< (absolute maps, which there are none of yet)
+  kEngaged,    ///< the law
+  kClutched,   ///< the leader is free; the follower stays where it is
+  kLost,       ///< was engaged, and its peer fell silent; never engaged again without an act
+  kFault,      ///< its device is not armed, disarmed or has a fault: no force
+};
+
+/// What one port of a coupling tells the other, once a period. It may be sent as seldom as one likes, late, twice, in
+/// any order: the highest `sequence` of the highest `epoch` counts. Vectors are in the SENDER's base frame and scale;
+/// the receiver maps them (PoseMap).
+struct PortState {
+  std::uint64_t epoch = 0;          ///< of the sender, > 0: above every one before when it starts anew (Purse)
+  std::uint64_t sequence = 0;       ///< the sender's period in it: 1, 2, …
+  std::uint64_t answers_epoch = 0;  ///< the receiver's epoch that `answers`, `given` and `taken` belong to; 0: none yet
+  std::uint64_t answers = 0;        ///< sequence of the receiver's newest state in use; 0: none yet
+  Duration time{};                  ///< the sender's own: only differences are used; ± 2⁶⁰ ns
+  Duration round_trip{};            ///< that the sender has measured, ≥ 0; 0: not yet
+  PortPhase phase = PortPhase::kAlone;
+  std::uint64_t engagement = 0;  ///< number of the leader's act that the phase belongs to: 1, 2, …; 0: none yet
+  std::uint32_t buttons = 0;     ///< bit i: button i is held
+  Vec3 position = Vec3::Zero();  ///< m, u: from the sender's offset, so that the peer needs to know no offset of it
+  Vec3 velocity = Vec3::Zero();  ///< m/s, of u: zero while it is frozen
+  Vec3 force = Vec3::Zero();     ///< N, that its device exerts on whoever holds it, really applied
+  std::optional<Vec3> contact_force{};  ///< N, of the surroundings on its tool, as measured; empty: not measured
+  double account = 0;                   ///< J, PurseMessage::account
+  double need = 0;                      ///< J, PurseMessage::need; 0: it has no purse
+  double given = 0;                     ///< J, PurseMessage::given
+  double taken = 0;                     ///< J, PurseMessage::taken
+};
+
+}  // namespace tendon
