@@ -225,6 +225,8 @@ bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
 }
 bool read(const pb::Rearm& from, Rearm& to) noexcept { return read_device(from.device(), to.device); }
 bool read(const pb::Disarm& from, Disarm& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Engage& from, Engage& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Disengage& from, Disengage& to) noexcept { return read_device(from.device(), to.device); }
 bool read(const pb::Describe& from, Describe& to) noexcept {
   to.handle = from.handle();
   return read_device(from.device(), to.device);
@@ -265,6 +267,9 @@ void write_request(const LeaseLost& from, pb::Control& to) {
   write_lease(from, *to.mutable_lease_lost());
   to.mutable_lease_lost()->set_to(clip(from.to, limits::kMaxName));
 }
+void write_request(const Couple& from, pb::Control& to) { write(from, *to.mutable_couple()); }
+void write_request(const Engage& from, pb::Control& to) { to.mutable_engage()->set_device(from.device); }
+void write_request(const Disengage& from, pb::Control& to) { to.mutable_disengage()->set_device(from.device); }
 void write_request(const SetStateDeadband& from, pb::Control& to) {
   auto& out = *to.mutable_set_state_deadband();
   out.set_share(from.share);
@@ -302,6 +307,12 @@ bool read(const pb::Control& from, Control& to) {
                                     .max_silence = std::chrono::microseconds(asked.max_silence_us())};
       return to.id > 0 && bounded(asked.share()) && bounded(asked.floor_mps());
     }
+    case pb::Control::kCouple:
+      return read_request<Couple>(from.couple(), to);
+    case pb::Control::kEngage:
+      return read_request<Engage>(from.engage(), to);
+    case pb::Control::kDisengage:
+      return read_request<Disengage>(from.disengage(), to);
     case pb::Control::OP_NOT_SET:
       break;
   }
