@@ -42,6 +42,7 @@ struct GripStep {
 struct HandleStep {
   std::optional<TurnStep> turn{};  ///< empty: the device does not measure its orientation
   std::optional<GripStep> grip{};  ///< empty: it has no gripper
+  std::optional<Joints> joints{};  ///< empty: the device does not tell them; no law looks at them
 };
 
 /// One haptic step: its input and its result. It holds enough to take the step again (tests/tools/replay).
@@ -71,6 +72,8 @@ struct Step {
   const TurnStep* turn() const noexcept { return handle && handle->turn ? &*handle->turn : nullptr; }
   GripStep* grip() noexcept { return handle && handle->grip ? &*handle->grip : nullptr; }
   const GripStep* grip() const noexcept { return handle && handle->grip ? &*handle->grip : nullptr; }
+  /// Null when the device does not tell its joints.
+  const Joints* joints() const noexcept { return handle && handle->joints ? &*handle->joints : nullptr; }
 };
 
 /// What the rest of a handle has measured, and what its other motors have held since the step before.

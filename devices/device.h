@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/motion.h"
 #include "devices/counts.h"
@@ -27,7 +28,8 @@ struct DeviceInfo {
     bool operator==(const Gripper&) const = default;
   };
   std::optional<Gripper> gripper{};
-  Duration watchdog{};  ///< the force drops to zero when no command comes for this long; 0 = none
+  std::vector<std::string> joints{};  ///< names of its joints, at most Joints::kMost; empty: it does not tell them
+  Duration watchdog{};                ///< the force drops to zero when no command comes for this long; 0 = none
 };
 
 /// One encoder reading.
@@ -84,6 +86,11 @@ class Device {
 
   /// Samples the position. Empty when the device did not answer.
   virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;
+
+  /// The joints of `info().joints` at the sample that `read` has just given, and how fast each turns while the handle
+  /// moves at `velocity` (m/s). Near a singular pose these speeds grow beyond all bounds. Called for a device that names
+  /// joints only. Realtime-safe.
+  virtual Joints joints(const Vec3& /*velocity*/) const noexcept { return {}; }
 
   /// Commands `force` (N, on the hand) and returns **the force really written**, after every clamp and rounding of the
   /// device. The device holds it until the next `apply`, or until its own watchdog ends it. The energy ledger counts

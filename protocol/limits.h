@@ -49,6 +49,7 @@ inline constexpr int kMaxClaims = 16;
 inline constexpr std::size_t kMaxLabel = 24;
 /// Named buttons of a device.
 inline constexpr std::size_t kMaxButtons = 16;
+inline constexpr std::size_t kMaxJoints = 8;
 
 /// Bytes of UTF-8. With these the largest Hello without claims (674 bytes before padding) and the largest Welcome
 /// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) and

@@ -18,6 +18,7 @@
 #include "core/base/time.h"
 #include "core/remote/channel_rule.h"
 #include "core/remote/remote_force.h"
+#include "core/teleoperation/port_state.h"
 #include "protocol/limits.h"
 
 // What peers say to each other, as plain values. tendon.proto holds the same nouns as bytes, WIRE.md
@@ -80,6 +81,8 @@ struct DeviceState {
   std::optional<Grip> grip{};            ///< empty: it has no gripper
   std::optional<double> grip_applied{};  ///< N, on the fingers, > 0 opens them; empty: the gripper has no motor
   std::optional<Vec3> hand_force{};      ///< N, of the hand on the handle; empty: it has no force sensor
+  /// In the order of HandleDescription::joints. Only to a client that named kFeatureJoints; empty: it tells none.
+  std::optional<Joints> joints{};
 };
 
 /// Client → server, unreliable, newest wins for each device and channel: the force that the physics engine wants.
@@ -195,6 +198,13 @@ struct PeerReport {
   LinkReport link{};               ///< `number`: 1, 2, 3 … of the channel; the forces are the channel's
 };
 
+/// Either way, unreliable: one end of a coupling of two devices, told to the other. For each device and channel the
+/// highest sequence of the highest epoch wins. Only between peers that both named kFeatureTeleoperation.
+struct PortFrame : PortState {
+  std::uint32_t device = 0;  ///< of the server of the session, whichever way this goes
+  std::uint32_t channel = 0;
+};
+
 /// Client → server, reliable: how many states of a device per second this client wants. The server sends
 /// the nearest rate that divides its own, and never more.
 struct SetStateRate {
@@ -247,7 +257,39 @@ struct LeaseLost {
   std::string to;  ///< name of the one that is; at most 64 bytes
 };
 
-using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband>;
+/// Client → server, reliable: my device is the other end of this one, and my end is like this. Only from one that claimed
+/// the channel.
+struct Couple {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+  PortRole role = PortRole::kLeader;  ///< of the sender
+  CouplingMethod method = CouplingMethod::kPositionPosition;
+  double position_scale = 1;  ///< follower over leader
+  double force_scale = 1;     ///< leader over follower
+  Quat rotation{};            ///< turns the leader's base frame into the follower's
+  std::uint32_t axes = 7;     ///< bits 1, 2, 4: x, y, z of the leader's frame are coupled
+  double stiffness = 0;       ///< N/m; these as the leader feels them
+  double mutual_damping = 0;  ///< N·s/m
+  double damping = 0;         ///< N·s/m
+  bool adapt_to_delay = false;
+  bool purse = false;
+  Duration period{};  ///< between two PortStates; travels in whole µs; > 0, at most 10 s
+
+  bool operator==(const Couple&) const = default;
+};
+
+/// Client → server, reliable: the operator's act, which couples the handles. Only from a controller of the device.
+struct Engage {
+  std::uint32_t device = 0;
+};
+
+/// Client → server, reliable: the end of that. Only from a controller of the device.
+struct Disengage {
+  std::uint32_t device = 0;
+};
+
+using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband,
+                             Couple, Engage, Disengage>;
 
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes
@@ -293,6 +335,9 @@ struct HandleDescription {
   double max_gripper_force = 0;          ///< N, on the fingers; 0 = it has no motor
   std::string group{};                   ///< devices of one body have the same; at most 24 bytes; empty: by itself
   Hand hand = Hand::kAny;
+  /// Names of the joints, by their place in DeviceState::joints; at most 8 of at most 24 bytes. Only to a client that
+  /// named kFeatureJoints; empty: the device tells none.
+  std::vector<std::string> joints{};
 };
 
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.
@@ -302,6 +347,12 @@ inline constexpr std::string_view kFeatureChannels = "channels";
 
 /// A feature: the client is told how the device lies before the operator, its buttons' names, and which are held.
 inline constexpr std::string_view kFeatureHandle = "handle";
+
+/// A feature: the client is told the angles of the device's joints in each state, and their names in HandleDescription.
+inline constexpr std::string_view kFeatureJoints = "joints";
+
+/// A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways.
+inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,
 /// PeerReport). A controller that names it is not granted it.

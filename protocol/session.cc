@@ -29,11 +29,13 @@ class Newest {
     mine.value = value;
     mine.waiting = true;
   }
-  /// As `put`; false, and nothing is changed, when `number` is not higher than any before in its stream.
-  bool put_if_newer(const Value& value, std::uint64_t number) {
+  /// As `put`; false, and nothing is changed, when `number` is not higher than any before of the highest epoch of its
+  /// stream.
+  bool put_if_newer(const Value& value, std::uint64_t number, std::uint64_t epoch = 0) {
     Stream& mine = stream(value);
-    if (mine.number && number <= *mine.number) return false;
-    mine.number = number;
+    const std::pair both(epoch, number);
+    if (mine.number && both <= *mine.number) return false;
+    mine.number = both;
     put(value);
     return true;
   }
@@ -54,7 +56,7 @@ class Newest {
   struct Stream {
     Value value;
     bool waiting = false;
-    std::optional<std::uint64_t> number;
+    std::optional<std::pair<std::uint64_t, std::uint64_t>> number;  ///< epoch first
   };
 
   static bool same(const DeviceState& a, const DeviceState& b) noexcept { return a.device == b.device; }
@@ -104,6 +106,7 @@ struct Session::State {
   std::optional<LinkReport> report_to_send;
   Newest<DeviceReport> device_reports_to_send;
   Newest<PeerReport> peer_reports_to_send;
+  Newest<PortFrame> ports_to_send;
   OutgoingRequests asked;
   Bye bye;
   int byes_left = 0;
@@ -126,6 +129,7 @@ struct Session::State {
   std::optional<LinkReport> report_arrived;
   Newest<DeviceReport> device_reports_arrived;
   Newest<PeerReport> peer_reports_arrived;
+  Newest<PortFrame> ports_arrived;
   std::optional<Closed> closed;
 
   Suite suite() const noexcept { return sealer ? Suite::kNoise : Suite::kPlain; }
@@ -151,6 +155,9 @@ struct Session::State {
   void take(const PeerReport& report, bool /*newest*/) {
     stats.stale += peer_reports_arrived.put_if_newer(report, report.link.number) ? 0 : 1;
   }
+  void take(const PortFrame& port, bool /*newest*/) {
+    stats.stale += ports_arrived.put_if_newer(port, port.sequence, port.epoch) ? 0 : 1;
+  }
   void take(const Control& control, bool /*newest*/) { stats.invalid += answering.take(control) ? 0 : 1; }
   void take(const ControlAck& ack, bool /*newest*/) { stats.invalid += asked.acknowledge(ack) ? 0 : 1; }
   void take(const Bye& said, bool newest);
@@ -158,7 +165,8 @@ struct Session::State {
   bool silent_too_long(LocalTime now) const noexcept { return !last_sent || now - *last_sent >= config.keep_alive; }
   bool something_to_say(LocalTime now) const noexcept {
     return !states_to_send.empty() || !forces_to_send.empty() || report_to_send || !device_reports_to_send.empty() ||
-           !peer_reports_to_send.empty() || answering.next_due() || asked.next_due(now) || silent_too_long(now);
+           !peer_reports_to_send.empty() || !ports_to_send.empty() || answering.next_due() || asked.next_due(now) ||
+           silent_too_long(now);
   }
   bool too_old(LocalTime now) const noexcept {
     return sealer && (now - opened >= config.life || next_packet >= config.max_datagrams);
@@ -309,6 +317,8 @@ void Session::send(const DeviceReport& report) { state_->device_reports_to_send.
 
 void Session::send(const PeerReport& report) { state_->peer_reports_to_send.put(report); }
 
+void Session::send(const PortFrame& port) { state_->ports_to_send.put(port); }
+
 std::optional<std::uint32_t> Session::request(const Request& request) { return state_->asked.add(request); }
 
 void Session::answer(std::uint32_t id, Code code, std::string detail, Duration wait) {
@@ -374,6 +384,7 @@ std::size_t Session::State::sent(LocalTime now, const Header& header,
 /// and a force always fit together.
 void Session::State::fill(LocalTime now) {
   while (states_to_send.first() && writer.add(*states_to_send.first())) states_to_send.take();
+  while (ports_to_send.first() && writer.add(*ports_to_send.first())) ports_to_send.take();
   while (forces_to_send.first() && writer.add(*forces_to_send.first())) forces_to_send.take();
   for (const ControlAck* ack = answering.next_due(); ack && writer.add(*ack); ack = answering.next_due()) {
     answering.sent(ack->id);
@@ -414,6 +425,7 @@ std::optional<Session::Event> Session::next_event() {
                            .handle = std::move(ack->handle)};
   }
   if (!my.forces_arrived.empty()) return ForceArrived{.command = my.forces_arrived.take()};
+  if (!my.ports_arrived.empty()) return PortArrived{.port = my.ports_arrived.take()};
   if (my.report_arrived) return ReportArrived{.report = *std::exchange(my.report_arrived, std::nullopt)};
   if (!my.device_reports_arrived.empty()) return DeviceReportArrived{.report = my.device_reports_arrived.take()};
   if (!my.peer_reports_arrived.empty()) return PeerReportArrived{.report = my.peer_reports_arrived.take()};

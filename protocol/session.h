@@ -44,15 +44,15 @@ struct LinkStats {
 /// One open conversation between a client and a server; both ends use this class. Bytes and instants go in, bytes and
 /// events come out (sans-I/O, pull). It has no socket, clock, thread or randomness of its own.
 ///
-/// * States, forces and reports are unreliable, and the newest wins, separately for each device and channel: `send`
+/// * States, forces, ports and reports are unreliable, and the newest wins, separately for each device and channel: `send`
 ///   replaces a value that has not left yet; a received value older than the newest is dropped and counted.
 /// * Requests are reliable and in order: each is resent until it is answered. No order is promised between requests,
 ///   states and forces.
 /// * Every datagram carries its sending time and an Echo, so each one received gives a round trip and an ack vector.
 /// * Our own silence is filled with keep-alives; too long a silence of the peer ends the conversation.
 ///
-/// No queue is unbounded: there is room for one state and one report of each device, one force and one report of each
-/// channel, one report of the link and limits::kRequestWindow requests each way. A newer event replaces one of its kind
+/// No queue is unbounded: there is room for one state and one report of each device, one force, one port and one
+/// report of each channel, one report of the link and limits::kRequestWindow requests each way. A newer event replaces one of its kind
 /// that was not taken out in time.
 ///
 /// SESSION.md describes the behaviour over time, WIRE.md the bytes.
@@ -109,6 +109,9 @@ class Session {
   struct PeerReportArrived {
     PeerReport report;
   };
+  struct PortArrived {
+    PortFrame port;
+  };
   struct RequestArrived {
     std::uint32_t id;
     Request request;
@@ -126,7 +129,7 @@ class Session {
     std::string reason;
   };
   using Event = std::variant<StateArrived, ForceArrived, ReportArrived, DeviceReportArrived, PeerReportArrived,
-                             RequestArrived, RequestAnswered, Closed>;
+                             PortArrived, RequestArrived, RequestAnswered, Closed>;
 
   // In.
   /// Takes any bytes. A datagram that does not belong to this conversation, or is malformed, is counted and dropped.
@@ -138,6 +141,7 @@ class Session {
   void send(const LinkReport& report);
   void send(const DeviceReport& report);
   void send(const PeerReport& report);
+  void send(const PortFrame& port);
   /// Queues a reliable request and returns its id; empty when limits::kRequestWindow are open. A request is open until
   /// its RequestAnswered has been taken out.
   std::optional<std::uint32_t> request(const Request& request);

@@ -25,6 +25,8 @@ void put_handle(DeviceState& state, const StepRecord& record, const DeviceInfo& 
     state.grip = grip->hand;
     if (info.gripper && info.gripper->max_force > 0) state.grip_applied = grip->applied;
   }
+  state.joints.reset();
+  if (const Joints* const joints = record.joints()) state.joints = *joints;
 }
 
 /// Writes every field of `state`.
@@ -61,10 +63,15 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
                        (device.info().gripper && device.info().gripper->max_force > 0)) {
   if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
   if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
-  if (device.info().measures_orientation || device.info().gripper) rest_.emplace(device.info());
+  const DeviceInfo& info = device.info();
+  if (info.measures_orientation || info.gripper || !info.joints.empty()) rest_.emplace(info);
 }
 
-HapticLoop::Rest::Rest(const DeviceInfo& info) : turning(info.angular_resolution), opening(0) {}
+HapticLoop::Rest::Rest(const DeviceInfo& info)
+    : turns_or_grips(info.measures_orientation || info.gripper),
+      has_joints(!info.joints.empty()),
+      turning(info.angular_resolution),
+      opening(0) {}
 
 void HapticLoop::take_mail(LocalTime now) noexcept {
   std::array<HapticOrder, Mailboxes::kOrders> released;
@@ -133,17 +140,29 @@ void HapticLoop::take_step(LocalTime now, StepRecord& record) noexcept {
   if (controller_.coupling() != nullptr) controller_.notice(sample ? sample->buttons : buttons_, device_.armed());
   if (!sample) {
     const HandleSample handle{.torque = applied_.torque, .grip_force = applied_.grip};
-    static_cast<Step&>(record) = controller_.step_unseen(now, applied_.force, rest_ ? &handle : nullptr);
+    const bool whole = rest_ && rest_->turns_or_grips;
+    static_cast<Step&>(record) = controller_.step_unseen(now, applied_.force, whole ? &handle : nullptr);
     return;
   }
   const Motion hand{sample->at, sample->position, velocity_.observe(sample->at, sample->position)};
   buttons_ = sample->buttons;
   if (rest_) {
-    const HandleSample handle = handle_in(*sample);
-    controller_.step_into(record, hand, applied_.force, sample->hand_force, &handle);
+    take_rest(*sample, hand, record);
   } else {
     controller_.step_into(record, hand, applied_.force, sample->hand_force);
   }
+}
+
+void HapticLoop::take_rest(const PositionSample& sample, const Motion& hand, StepRecord& record) noexcept {
+  if (rest_->turns_or_grips) {
+    const HandleSample handle = handle_in(sample);
+    controller_.step_into(record, hand, applied_.force, sample.hand_force, &handle);
+  } else {
+    controller_.step_into(record, hand, applied_.force, sample.hand_force);
+  }
+  if (!rest_->has_joints) return;
+  if (!record.handle) record.handle.emplace();
+  record.handle->joints = device_.joints(hand.velocity);
 }
 
 void HapticLoop::command(StepRecord& record) noexcept {

@@ -50,9 +50,11 @@ class HapticLoop {
   Stats stats() const noexcept;
 
  private:
-  /// What is estimated of a handle that has more than a position.
+  /// What is estimated of a device that tells more than a position.
   struct Rest {
     explicit Rest(const DeviceInfo& info);
+    bool turns_or_grips;
+    bool has_joints;
     VelocityEstimator turning;
     VelocityEstimatorOf<1> opening;
     Vec3 turned = Vec3::Zero();  ///< rad: the sum of all turns so far
@@ -61,6 +63,7 @@ class HapticLoop {
 
   void take_mail(LocalTime now) noexcept;
   HandleSample handle_in(const PositionSample& sample) noexcept;
+  void take_rest(const PositionSample& sample, const Motion& hand, StepRecord& record) noexcept;
   void take_step(LocalTime now, StepRecord& record) noexcept;
   void command(StepRecord& record) noexcept;
   void command_all(StepRecord& record) noexcept;
@@ -75,7 +78,7 @@ class HapticLoop {
   HapticController controller_;
   VelocityEstimator velocity_;
   double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp
-  std::optional<Rest> rest_;       ///< empty: the device has a position only
+  std::optional<Rest> rest_;       ///< empty: the device tells a position only
   bool has_more_motors_;           ///< than those of its position
   std::optional<PortState> peer_;  ///< of a coupling: what came since the step before
   Effort applied_;

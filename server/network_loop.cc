@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -203,6 +204,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 contains(welcome.features, kFeatureChannels),
                 contains(welcome.features, kFeatureDiagnostics),
                 contains(welcome.features, kFeatureHandle),
+                contains(welcome.features, kFeatureJoints),
                 std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},
@@ -329,6 +331,10 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
   const bool tells =
       state.force_wanted && stiffness && !stiffness->isZero(0) && (stiffness->array().abs() <= limits::kMaxValue).all();
   if (!tells) stiffness.reset();
+  const auto fits = [](double value) { return std::abs(value) <= limits::kMaxValue; };
+  if (state.joints &&
+      !(std::ranges::all_of(state.joints->angle, fits) && std::ranges::all_of(state.joints->velocity, fits)))
+    state.joints.reset();
 }
 
 /// But for the buttons.
@@ -361,6 +367,7 @@ void NetworkLoop::publish(LocalTime now) {
         told.stiffness_wanted.reset();
       }
       if (!guest.sees_handle) leave_out_handle(told);
+      if (!guest.sees_joints) told.joints.reset();
       told.buttons = view->pressed;
       if (view->deadband && !view->deadband->passes(told)) {
         ++stats_.foretold;

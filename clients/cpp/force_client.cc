@@ -158,6 +158,7 @@ void ForceClient::greet(LocalTime now) {
   hello.name = config_.name;
   hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels), std::string(kFeatureHandle)};
   if (config_.diagnostics) hello.features.emplace_back(kFeatureDiagnostics);
+  if (config_.joints) hello.features.emplace_back(kFeatureJoints);
   if (claims()) hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
   connection_.greet(now, hello);
   stats_.phase = Phase::kGreeting;

@@ -115,6 +115,8 @@ class ForceClient {
     /// For an observer: ask for the forces that the engines want (DeviceState::force_wanted), and once a second for
     /// reports on the device's loop and its engines. A server that does not know this feature leaves them out.
     bool diagnostics = false;
+    /// Ask for the joints of the device (DeviceState::joints, HandleDescription::joints): 16 bytes each in every state.
+    bool joints = false;
     /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;

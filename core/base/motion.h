@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 
 #include "core/base/time.h"
 
@@ -36,6 +38,22 @@ struct Grip {
   double velocity = 0;  ///< rad/s, an estimate
 
   bool operator==(const Grip&) const = default;
+};
+
+/// The joints of the mechanism that carries the handle, at one instant.
+struct Joints {
+  static constexpr std::size_t kMost = 8;
+  std::size_t count = 0;                 ///< at most kMost; the numbers beyond are 0
+  std::array<double, kMost> angle{};     ///< rad
+  std::array<double, kMost> velocity{};  ///< rad/s, an estimate
+
+  /// Three of them, as most devices have.
+  static Joints three(const Vec3& angles, const Vec3& velocities) noexcept {
+    return {.count = 3,
+            .angle = {angles[0], angles[1], angles[2]},
+            .velocity = {velocities[0], velocities[1], velocities[2]}};
+  }
+  bool operator==(const Joints&) const = default;
 };
 
 /// What the motors of a handle exert on the hand.

@@ -14,13 +14,6 @@
 
 namespace tendon {
 
-enum class PortRole : std::uint8_t { kLeader, kFollower };
-
-enum class CouplingMethod : std::uint8_t {
-  kPositionPosition,  ///< a spring and a damper at both ends (PositionPosition), with a purse
-  kPositionForce,     ///< the follower's spring; the leader feels the contact that the follower measures
-};
-
 /// One end of a coupling between two devices: engage, clutch and loss of the peer, the map, the law and the purse. Both
 /// ends are this class, each in the haptic loop of its device; the network only carries PortStates.
 ///

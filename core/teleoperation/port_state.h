@@ -21,6 +21,13 @@ enum class PortPhase : std::uint8_t {
   kFault,      ///< its device is not armed, disarmed or has a fault: no force
 };
 
+enum class PortRole : std::uint8_t { kLeader, kFollower };
+
+enum class CouplingMethod : std::uint8_t {
+  kPositionPosition,  ///< a spring and a damper at both ends (PositionPosition), with a purse
+  kPositionForce,     ///< the follower's spring; the leader feels the contact that the follower measures
+};
+
 /// What one port of a coupling tells the other, once a period. It may be sent as seldom as one likes, late, twice, in
 /// any order: the highest `sequence` of the highest `epoch` counts. Vectors are in the SENDER's base frame and scale;
 /// the receiver maps them (PoseMap).

@@ -43,6 +43,7 @@ FalconDevice::FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe)
             .max_force = 8,  // from CHAI3D's device table; ±4096 counts give 16 N along z, 6 to 8 N across
             .position_resolution = 43e-6,
             .force_resolution = 0.01,  // one count of each motor, within 50 mm of the centre
+            .joints = {"thigh 1", "thigh 2", "thigh 3"},
             .watchdog = Duration::zero()},
       firmware_(std::move(config.firmware)),
       dialogue_(std::move(pipe)),
@@ -95,6 +96,10 @@ std::optional<PositionSample> FalconDevice::read(LocalTime now) noexcept {
                         .position = pose_->position - falcon::kCentre,
                         .hand_force = std::nullopt,
                         .buttons = newest_->buttons};
+}
+
+Joints FalconDevice::joints(const Vec3& velocity) const noexcept {
+  return pose_ ? Joints::three(pose_->angles, pose_->jacobian * velocity) : Joints{};
 }
 
 void FalconDevice::receive() noexcept {

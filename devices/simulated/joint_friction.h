@@ -37,6 +37,10 @@ class JointFriction {
   /// stays there.
   Friction least_at(const Vec3& position) const noexcept;
 
+  const Mechanism& mechanism() const noexcept { return mechanism_; }
+  /// m, where the middle of the mechanism's workspace is, device base frame.
+  const Vec3& centre() const noexcept { return centre_; }
+
   /// The torques (N·m) with which the least Coulomb friction anywhere is `coulomb` (N). They turn a handle's friction
   /// into friction of this mechanism's joints when nothing else is known about it.
   static Vec3 torques(const Mechanism::Kind& mechanism, double coulomb);

@@ -27,8 +27,16 @@ double reach_of(const Mechanism::Arm& arm) {
   return kShareOfArmsReach * std::min({stretched, folded, arm.upper_arm});
 }
 
-/// The closed form, with γ = q₃ − q₂ in (−90°, 90°).
-Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
+/// The elbow, in the plane of the arm.
+struct Elbow {
+  double r;          ///< m, from the turntable's axis to the handle
+  double cos_gamma;  ///< of γ = q₃ − q₂ in (−90°, 90°)
+  double q2;
+  double q3;
+};
+
+/// The closed form.
+Elbow elbow_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
   const double r = std::hypot(x.x(), x.z() + arm.upper_arm);
   const double up = x.y() - arm.forearm;
   const double sin_gamma =
@@ -36,8 +44,16 @@ Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
   const double gamma = std::asin(sin_gamma);
   const double cos_gamma = std::cos(gamma);
   const double q2 = std::atan2(up, r) - std::atan2(-arm.forearm * cos_gamma, arm.upper_arm + arm.forearm * sin_gamma);
-  const double q3 = q2 + gamma;
+  return {.r = r, .cos_gamma = cos_gamma, .q2 = q2, .q3 = q2 + gamma};
+}
 
+Vec3 angles_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
+  const Elbow elbow = elbow_of(arm, x);
+  return {std::atan2(x.x(), x.z() + arm.upper_arm), elbow.q2, elbow.q3};
+}
+
+Mat3 jacobian_of(const Mechanism::Arm& arm, const Vec3& x) noexcept {
+  const auto [r, cos_gamma, q2, q3] = elbow_of(arm, x);
   const Vec3 out(x.x() / r, 0, (x.z() + arm.upper_arm) / r);  // from the turntable's axis to the handle
   const Vec3 aside(out.z(), 0, -out.x());
   Mat3 jacobian;
@@ -62,9 +78,25 @@ Mechanism::Mechanism(const Kind& kind) : kind_(kind), reach_(kFalconReach), leve
   levers_ = Vec3(arm->upper_arm + reach_, arm->upper_arm, arm->forearm);
 }
 
-Mat3 Mechanism::jacobian(const Vec3& position) const noexcept {
+Vec3 Mechanism::within_reach(const Vec3& position) const noexcept {
   const double distance = position.norm();
-  const Vec3 within = distance > reach_ ? Vec3(position * (reach_ / distance)) : position;
+  return distance > reach_ ? Vec3(position * (reach_ / distance)) : position;
+}
+
+Vec3 Mechanism::angles(const Vec3& position) const noexcept {
+  const Vec3 within = within_reach(position);
+  if (const auto* arm = std::get_if<Arm>(&kind_)) return angles_of(*arm, within);
+  const std::optional<falcon::Pose> pose = falcon::pose_at(falcon::kCentre + within);
+  return pose ? pose->angles : Vec3(Vec3::Zero());  // never empty within kFalconReach
+}
+
+std::array<std::string_view, 3> Mechanism::joints() const noexcept {
+  if (std::holds_alternative<Arm>(kind_)) return {"turntable", "upper arm", "forearm"};
+  return {"thigh 1", "thigh 2", "thigh 3"};
+}
+
+Mat3 Mechanism::jacobian(const Vec3& position) const noexcept {
+  const Vec3 within = within_reach(position);
   if (const auto* arm = std::get_if<Arm>(&kind_)) return jacobian_of(*arm, within);
   const std::optional<falcon::Pose> pose = falcon::pose_at(falcon::kCentre + within);
   return pose ? pose->jacobian : Mat3(Mat3::Zero());  // never empty within kFalconReach

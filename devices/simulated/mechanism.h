@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <string_view>
 #include <variant>
 
 #include "core/base/motion.h"
 
 namespace tendon {
 
-/// The three joints that carry a handle. For their friction it is enough to know how fast each turns when the handle
-/// moves:
+/// The three joints that carry a handle: their angles q, and how fast each turns when the handle moves:
 ///
 ///     dq/dt = J(x) dx/dt,      J in rad/m, x in m in the device base frame, from the middle of the workspace
 ///
@@ -42,6 +43,12 @@ class Mechanism {
   /// J at `position`.
   Mat3 jacobian(const Vec3& position) const noexcept;
 
+  /// rad, q at `position`; outside the workspace of its nearest point.
+  Vec3 angles(const Vec3& position) const noexcept;
+
+  /// The names of q₁, q₂ and q₃.
+  std::array<std::string_view, 3> joints() const noexcept;
+
   /// m, radius of the workspace.
   double reach() const noexcept { return reach_; }
 
@@ -50,6 +57,8 @@ class Mechanism {
   const Vec3& levers() const noexcept { return levers_; }
 
  private:
+  Vec3 within_reach(const Vec3& position) const noexcept;
+
   Kind kind_;
   double reach_;
   Vec3 levers_;

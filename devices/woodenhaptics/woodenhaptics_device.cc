@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "devices/woodenhaptics/woodenhaptics_device.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -66,6 +67,7 @@ DeviceInfo WoodenHapticsDevice::info_of(const Model& model) {
           .max_force = model.max_force,
           .position_resolution = (centre->jacobian * radians.asDiagonal()).colwise().norm().maxCoeff(),
           .force_resolution = force,
+          .joints = {"A", "B", "C"},  // kinematics.h
           .watchdog = kWatchdog};
 }
 
@@ -110,6 +112,10 @@ std::optional<PositionSample> WoodenHapticsDevice::read(LocalTime now) noexcept 
                         .position = pose_.position,
                         .hand_force = std::nullopt,
                         .buttons = woodenhaptics::switch_is_closed(*newest_) ? 1U : 0U};
+}
+
+Joints WoodenHapticsDevice::joints(const Vec3& velocity) const noexcept {
+  return Joints::three(pose_.angles, pose_.jacobian.inverse() * velocity);
 }
 
 void WoodenHapticsDevice::receive() noexcept {

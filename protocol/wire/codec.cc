@@ -51,7 +51,7 @@ pb::Datagram& new_datagram(google::protobuf::Arena& arena) {
 /// One small Datagram for each kind of frame. Protobuf defines the concatenation of two messages as their merge, so a
 /// datagram with several frames is written piece by piece, and each piece keeps its objects for the next datagram.
 struct DataWriter::Pieces {
-  pb::Datagram head, state, force, control, ack, bye, report, device_report, peer_report;
+  pb::Datagram head, state, force, control, ack, bye, report, device_report, peer_report, port;
   pb::Frame& state_frame = *state.add_frames();
   pb::Frame& force_frame = *force.add_frames();
   pb::Frame& control_frame = *control.add_frames();
@@ -60,6 +60,7 @@ struct DataWriter::Pieces {
   pb::Frame& report_frame = *report.add_frames();
   pb::Frame& device_report_frame = *device_report.add_frames();
   pb::Frame& peer_report_frame = *peer_report.add_frames();
+  pb::Frame& port_frame = *port.add_frames();
 };
 
 DataWriter::DataWriter() : pieces_(std::make_unique<Pieces>()) {}
@@ -131,6 +132,11 @@ bool DataWriter::add(const PeerReport& report) {
   return append(pieces_->peer_report);
 }
 
+bool DataWriter::add(const PortFrame& port) {
+  wire::write(port, *pieces_->port_frame.mutable_port_state());
+  return append(pieces_->port);
+}
+
 /// Parsed objects live in an arena whose first block is ours, so a state or a force needs no heap. One `Reset` frees
 /// all objects that the 1200 bytes of a hostile datagram can create.
 struct DataReader::Memory {
@@ -187,6 +193,9 @@ const DataContent* DataReader::read(std::span<const std::byte> body) {
         break;
       case pb::Frame::kPeerReport:
         take<PeerReport>(frame.peer_report(), content);
+        break;
+      case pb::Frame::kPortState:
+        take<PortFrame>(frame.port_state(), content);
         break;
       case pb::Frame::BODY_NOT_SET:
         break;  // a frame of a newer peer

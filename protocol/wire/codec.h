@@ -48,6 +48,7 @@ class DataWriter {
   bool add(const LinkReport& report);
   bool add(const DeviceReport& report);
   bool add(const PeerReport& report);
+  bool add(const PortFrame& port);
 
   std::size_t size() const noexcept { return size_; }
 

@@ -98,6 +98,32 @@ void write(const Mat3& k, Entries& to) {
   }
 }
 
+static_assert(limits::kMaxJoints == Joints::kMost);
+
+bool read(const Entries& angles, const Entries& velocities, std::optional<Joints>& to) noexcept {
+  constexpr int kMost = static_cast<int>(Joints::kMost);
+  const auto good = [](const Entries& entries) {
+    return entries.size() <= kMost && std::all_of(entries.begin(), entries.end(), bounded);
+  };
+  to.reset();
+  if (!good(angles) || !good(velocities)) return false;
+  if (angles.empty()) return true;
+  Joints& joints = to.emplace();
+  joints.count = static_cast<std::size_t>(angles.size());
+  std::copy(angles.begin(), angles.end(), joints.angle.begin());
+  std::copy_n(velocities.begin(), std::min(angles.size(), velocities.size()), joints.velocity.begin());
+  return true;
+}
+
+void write(const std::optional<Joints>& from, Entries& angles, Entries& velocities) {
+  angles.Clear();
+  velocities.Clear();
+  for (std::size_t i = 0; from && i < from->count; ++i) {
+    angles.Add(from->angle[i]);
+    velocities.Add(from->velocity[i]);
+  }
+}
+
 bool in_time(Duration d) noexcept { return d >= -limits::kMaxTime && d <= limits::kMaxTime; }
 
 bool read(std::int64_t ns, LocalTime& to) noexcept { return read_time(ns, to); }
@@ -150,6 +176,16 @@ void write_features(const std::vector<std::string>& from, Texts& to) {
     if (to.size() == limits::kMaxFeatures) break;
     *to.Add() = clip(feature, limits::kMaxFeature);
   }
+}
+
+bool read_labels(const Texts& from, std::size_t most, std::vector<std::string>& to) {
+  to.assign(from.begin(), from.end());
+  return to.size() <= most &&
+         std::all_of(to.begin(), to.end(), [](const auto& text) { return text.size() <= limits::kMaxLabel; });
+}
+
+void write_labels(const std::vector<std::string>& from, std::size_t most, Texts& to) {
+  for (std::size_t i = 0; i < std::min(from.size(), most); ++i) *to.Add() = clip(from[i], limits::kMaxLabel);
 }
 
 bool parse(std::span<const std::byte> from, google::protobuf::MessageLite& to) {

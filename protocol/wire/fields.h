@@ -37,6 +37,10 @@ bool read(const Entries& from, Mat3& to) noexcept;
 /// The shortest of the three forms that says the same.
 void write(const Mat3& from, Entries& to);
 
+/// The angles and velocities of joints. Missing velocities are 0, those without an angle are left out; no angle: empty.
+bool read(const Entries& angles, const Entries& velocities, std::optional<Joints>& to) noexcept;
+void write(const std::optional<Joints>& from, Entries& angles, Entries& velocities);
+
 /// A clock reading.
 bool read(std::int64_t ns, LocalTime& to) noexcept;
 bool read(std::int64_t ns, PeerTime& to) noexcept;
@@ -68,6 +72,10 @@ using Texts = google::protobuf::RepeatedPtrField<std::string>;
 bool read_features(const Texts& from, std::vector<std::string>& to);
 /// Cut to the bounds of the wire.
 void write_features(const std::vector<std::string>& from, Texts& to);
+
+/// At most `most` names.
+bool read_labels(const Texts& from, std::size_t most, std::vector<std::string>& to);
+void write_labels(const std::vector<std::string>& from, std::size_t most, Texts& to);
 
 /// Parses without printing: protobuf prints a line for every text that is not UTF-8, and a stranger must not be able to
 /// fill our log.

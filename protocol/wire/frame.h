@@ -42,6 +42,7 @@ struct Bye {
   std::string reason;
 };
 
-using Frame = std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport>;
+using Frame =
+    std::variant<DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport, PortFrame>;
 
 }  // namespace tendon

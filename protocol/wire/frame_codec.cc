@@ -69,7 +69,8 @@ bool read(const pb::DeviceState& from, DeviceState& to) noexcept {
     if (!read(from.stiffness_wanted_npm(), stiffness) || !(stiffness.array().abs() <= limits::kMaxValue).all())
       return false;
   }
-  return read_handle(from, to) && read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
+  return read_handle(from, to) && read(from.joint_rad(), from.joint_velocity_radps(), to.joints) &&
+         read(from.sampled_ns(), to.sampled) && read(from.position_m(), to.position) &&
          read(from.velocity_mps(), to.velocity) && read(from.force_applied_n(), to.force_applied) &&
          bounded(to.energy) && (unbounded_force || bounded(to.permitted_force)) && to.permitted_force >= 0 &&
          read(from.force_age_ns(), to.force_age) && read(from.mode(), to.mode) &&
@@ -99,6 +100,7 @@ void write(const DeviceState& from, pb::DeviceState& to) {
   to.clear_stiffness_wanted_npm();
   if (from.stiffness_wanted) write(*from.stiffness_wanted, *to.mutable_stiffness_wanted_npm());
   write_handle(from, to);
+  write(from.joints, *to.mutable_joint_rad(), *to.mutable_joint_velocity_radps());
 }
 
 namespace {
@@ -223,6 +225,8 @@ bool read(const pb::SetStateRate& from, SetStateRate& to) noexcept {
 }
 bool read(const pb::Rearm& from, Rearm& to) noexcept { return read_device(from.device(), to.device); }
 bool read(const pb::Disarm& from, Disarm& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Engage& from, Engage& to) noexcept { return read_device(from.device(), to.device); }
+bool read(const pb::Disengage& from, Disengage& to) noexcept { return read_device(from.device(), to.device); }
 bool read(const pb::Describe& from, Describe& to) noexcept {
   to.handle = from.handle();
   return read_device(from.device(), to.device);
@@ -263,6 +267,9 @@ void write_request(const LeaseLost& from, pb::Control& to) {
   write_lease(from, *to.mutable_lease_lost());
   to.mutable_lease_lost()->set_to(clip(from.to, limits::kMaxName));
 }
+void write_request(const Couple& from, pb::Control& to) { write(from, *to.mutable_couple()); }
+void write_request(const Engage& from, pb::Control& to) { to.mutable_engage()->set_device(from.device); }
+void write_request(const Disengage& from, pb::Control& to) { to.mutable_disengage()->set_device(from.device); }
 void write_request(const SetStateDeadband& from, pb::Control& to) {
   auto& out = *to.mutable_set_state_deadband();
   out.set_share(from.share);
@@ -300,6 +307,12 @@ bool read(const pb::Control& from, Control& to) {
                                     .max_silence = std::chrono::microseconds(asked.max_silence_us())};
       return to.id > 0 && bounded(asked.share()) && bounded(asked.floor_mps());
     }
+    case pb::Control::kCouple:
+      return read_request<Couple>(from.couple(), to);
+    case pb::Control::kEngage:
+      return read_request<Engage>(from.engage(), to);
+    case pb::Control::kDisengage:
+      return read_request<Disengage>(from.disengage(), to);
     case pb::Control::OP_NOT_SET:
       break;
   }
@@ -374,10 +387,8 @@ void write(const DeviceDescription& from, pb::DeviceDescription& to) {
 bool read(const pb::HandleDescription& from, HandleDescription& to) {
   const bool has_axes = from.has_operator_from_device();
   if (has_axes && !read(from.operator_from_device(), to.operator_from_device.emplace())) return false;
-  if (from.buttons_size() > static_cast<int>(limits::kMaxButtons)) return false;
-  for (const auto& name : from.buttons()) {
-    if (!read(name, limits::kMaxLabel, to.buttons.emplace_back())) return false;
-  }
+  if (!read_labels(from.buttons(), limits::kMaxButtons, to.buttons)) return false;
+  if (!read_labels(from.joints(), limits::kMaxJoints, to.joints)) return false;
   to.orientation_measured = from.orientation_measured();
   if (from.has_gripper_open_rad() && !read_size(from.gripper_open_rad(), to.gripper_open.emplace())) return false;
   if (!read(from.group(), limits::kMaxLabel, to.group)) return false;
@@ -388,10 +399,8 @@ bool read(const pb::HandleDescription& from, HandleDescription& to) {
 void write(const HandleDescription& from, pb::HandleDescription& to) {
   to.set_device(from.device);
   if (from.operator_from_device) write(*from.operator_from_device, *to.mutable_operator_from_device());
-  for (const std::string& name : from.buttons) {
-    if (to.buttons_size() == static_cast<int>(limits::kMaxButtons)) break;
-    to.add_buttons(clip(name, limits::kMaxLabel));
-  }
+  write_labels(from.buttons, limits::kMaxButtons, *to.mutable_buttons());
+  write_labels(from.joints, limits::kMaxJoints, *to.mutable_joints());
   to.set_orientation_measured(from.orientation_measured);
   to.set_max_torque_nm(from.max_torque);
   if (from.gripper_open) to.set_gripper_open_rad(*from.gripper_open);

@@ -27,5 +27,9 @@ bool read(const pb::DeviceReport& from, DeviceReport& to);
 void write(const DeviceReport& from, pb::DeviceReport& to);
 bool read(const pb::PeerReport& from, PeerReport& to);
 void write(const PeerReport& from, pb::PeerReport& to);
+bool read(const pb::PortState& from, PortFrame& to) noexcept;
+void write(const PortFrame& from, pb::PortState& to);
+bool read(const pb::Couple& from, Couple& to) noexcept;
+void write(const Couple& from, pb::Couple& to);
 
 }  // namespace tendon::wire

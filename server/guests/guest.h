@@ -50,6 +50,7 @@ struct Guest {
   bool can_lose;            ///< it can be told that it has lost a lease
   bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
   bool sees_handle;         ///< … and kFeatureHandle
+  bool sees_joints;         ///< … and kFeatureJoints
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost

@@ -51,7 +51,11 @@ Outcome describe(LocalTime /*now*/, const Asker& asker, const Describe& wanted) 
     return {.code = Code::kInvalid, .detail = "there are " + std::to_string(asker.devices.size()) + " devices"};
   }
   const ServedDevice& device = asker.devices[wanted.device];
-  if (wanted.handle) return {.handle = device.handle};
+  if (wanted.handle) {
+    HandleDescription handle = device.handle;
+    if (!asker.guest.sees_joints) handle.joints.clear();
+    return {.handle = std::move(handle)};
+  }
   DeviceDescription about = device.about;
   for (std::size_t i = 0; i < device.channels.size(); ++i) {
     const Guest* const holder = guest_of(asker.guests, device.channels[i].holder);

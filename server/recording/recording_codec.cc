@@ -141,6 +141,17 @@ Message parse(std::string_view bytes) {
   return message;
 }
 
+Joints joints_in(const pb::Step& in) {
+  const auto count = static_cast<std::size_t>(in.joint_rad_size());
+  if (count > Joints::kMost || in.joint_velocity_radps_size() != in.joint_rad_size())
+    throw std::invalid_argument("step " + std::to_string(in.tick()) + " has " + std::to_string(count) + " joints and " +
+                                std::to_string(in.joint_velocity_radps_size()) + " velocities of joints");
+  Joints joints{.count = count};
+  std::copy(in.joint_rad().begin(), in.joint_rad().end(), joints.angle.begin());
+  std::copy(in.joint_velocity_radps().begin(), in.joint_velocity_radps().end(), joints.velocity.begin());
+  return joints;
+}
+
 }  // namespace
 
 std::string schema_data() {
@@ -192,6 +203,12 @@ std::string encode(const StepRecord& step) {
   out.set_buttons(step.buttons);
   if (const TurnStep* const turn = step.turn()) put(out.mutable_turn(), *turn);
   if (const GripStep* const grip = step.grip()) put(out.mutable_grip(), *grip);
+  if (const Joints* const joints = step.joints()) {
+    for (std::size_t i = 0; i < joints->count; ++i) {
+      out.add_joint_rad(joints->angle[i]);
+      out.add_joint_velocity_radps(joints->velocity[i]);
+    }
+  }
   if (!step.stiffness.isZero(0)) {
     for (const auto row : step.stiffness.rowwise()) {
       for (const double entry : row) out.add_stiffness_wanted_n_per_m(entry);
@@ -277,9 +294,10 @@ StepRecord decode_step(std::string_view message, LocalTime at) {
   out.longest_hold = Duration(in.longest_hold_ns());
   out.assumption_broken = in.assumption_broken();
   out.buttons = in.buttons();
-  if (in.has_turn() || in.has_grip()) out.handle.emplace();
+  if (in.has_turn() || in.has_grip() || in.joint_rad_size() > 0) out.handle.emplace();
   if (in.has_turn()) out.handle->turn = turn_step(in.turn());
   if (in.has_grip()) out.handle->grip = grip_step(in.grip());
+  if (in.joint_rad_size() > 0) out.handle->joints = joints_in(in);
   if (const int entries = in.stiffness_wanted_n_per_m_size(); entries > 0) {
     if (entries != 9)
       throw std::invalid_argument("step " + std::to_string(in.tick()) + " has a stiffness of " +

@@ -101,6 +101,10 @@ void print(Line& line, const DeviceState& state) {
   if (state.grip) line << "grip" << state.grip->opening << state.grip->velocity;
   if (state.grip_applied) line << "grip-force" << *state.grip_applied;
   if (state.hand_force) line << "hand" << *state.hand_force;
+  if (const auto& joints = state.joints) {
+    line << "joints" << static_cast<std::uint32_t>(joints->count);
+    for (std::size_t i = 0; i < joints->count; ++i) line << joints->angle[i] << joints->velocity[i];
+  }
 }
 
 void print(Line& line, const LocalModel& model) {
@@ -150,6 +154,7 @@ void print(Line& line, const ControlAck& ack) {
   line << "handle";
   if (const auto& q = ack.handle->operator_from_device) line << "axes" << *q;
   line.put_texts(ack.handle->buttons);
+  line.put_texts(ack.handle->joints);
   line << std::uint32_t{ack.handle->orientation_measured} << ack.handle->max_torque;
   if (ack.handle->gripper_open) line << "gripper" << *ack.handle->gripper_open;
   line << ack.handle->max_gripper_force;

@@ -35,6 +35,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else if (const auto* state = std::get_if<Session::StateArrived>(&*event)) {
       fuzz::require(state->state.position.allFinite() && state->state.velocity.allFinite());
       fuzz::require(!state->state.force_wanted || state->state.force_wanted->allFinite());
+      if (const auto& joints = state->state.joints) {
+        fuzz::require(joints->count > 0 && joints->count <= Joints::kMost);
+        for (const double angle : joints->angle) fuzz::require(std::isfinite(angle));
+        for (const double velocity : joints->velocity) fuzz::require(std::isfinite(velocity));
+      }
       fuzz::require(!state->state.stiffness_wanted || state->state.stiffness_wanted->allFinite());
     } else if (const auto* device = std::get_if<Session::DeviceReportArrived>(&*event)) {
       std::uint64_t uncounted = device->report.steps;

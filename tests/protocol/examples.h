@@ -220,6 +220,13 @@ inline DeviceState state_with_handle() {
   return state;
 }
 
+/// To a client that named "joints": three of them, two turn.
+inline DeviceState state_with_joints() {
+  DeviceState state = examples::state();
+  state.joints = Joints::three({0.5, -0.25, 1.5}, {0.125, 0, -2});
+  return state;
+}
+
 /// A detent about one axis, and soft fingers.
 inline ForceCommand force_with_torque() {
   ForceCommand command = force();
@@ -242,6 +249,13 @@ inline HandleDescription handle_description() {
           .max_gripper_force = 8,
           .group = "arms",
           .hand = Hand::kRight};
+}
+
+/// To a client that named "joints": those of a Phantom's arm.
+inline ControlAck joints_described(std::uint32_t id) {
+  ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
+  ack.handle = HandleDescription{.device = 1, .joints = {"turntable", "upper arm", "forearm"}};
+  return ack;
 }
 
 inline ControlAck handle_described(std::uint32_t id) {
@@ -339,6 +353,8 @@ inline std::vector<Named> datagrams() {
       {"control-ack-handle", data(66, {}, handle_described(14))},
       {"state-handle", data(67, {}, state_with_handle())},
       {"force-torque", data(68, {}, force_with_torque())},
+      {"state-joints", data(69, {}, state_with_joints())},
+      {"control-ack-joints", data(70, {}, joints_described(14))},
   };
 }
 

@@ -196,6 +196,15 @@ TEST_F(Handshake, AWelcomeToAVersionThatWasNotOfferedIsIgnored) {
   EXPECT_FALSE(a_.outcome().has_value());
 }
 
+TEST_F(Handshake, TheConnectionIdOfAnAnswerIsNotChecked) {
+  a_.receive(now_, examples::answer_datagram(0, examples::welcome()));
+  ASSERT_TRUE(a_.outcome() && std::holds_alternative<ClientHandshake::Accepted>(*a_.outcome()));
+  EXPECT_EQ(std::get<ClientHandshake::Accepted>(*a_.outcome()).connection_id, 0U);
+  ClientHandshake refused(client_config(), now_);
+  refused.receive(now_, examples::answer_datagram(7, examples::refused()));
+  EXPECT_TRUE(refused.outcome() && std::holds_alternative<Refused>(*refused.outcome()));
+}
+
 TEST_F(Handshake, WhatAnswersAnotherAttemptIsIgnored) {
   const auto other = examples::sixteen(0x10);
   for (const Answer& said : {Answer(examples::welcome()), Answer(examples::refused())}) {

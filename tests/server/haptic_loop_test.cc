@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "devices/safety/safe_device.h"
+#include "devices/simulated/simulated_device.h"
 
 namespace tendon {
 namespace {
@@ -121,6 +122,38 @@ TEST(HapticLoop, TheButtonsAreInTheRecordAndTheStateOfTheirStep) {
   handle.plugged = true;
   handle.buttons = 0;
   EXPECT_EQ(pushed.steps(1).buttons, 0U);
+}
+
+/// A hand that circles, on a device with these joints or without them.
+SimulatedDevice::Config circling(bool jointed) {
+  SimulatedDevice::Config config;
+  config.mass = 0.1;
+  config.max_force = 8;
+  config.start_velocity = {0.05, 0.02, 0};
+  if (jointed) config.joint_friction = {.mechanism = Mechanism::Falcon{}, .coulomb = Vec3::Constant(1e-4)};
+  return config;
+}
+
+TEST(HapticLoop, JointsAreInTheRecordAndTheStateAndChangeNothingElse) {
+  SimulatedDevice plain(circling(true));
+  const Mechanism mechanism(Mechanism::Falcon{});
+  SafeDevice::Config safety;
+  safety.arming.by = SafeDevice::Arming::By::kStart;
+  SafeDevice safe(safety, plain);
+  Pushed world(safe);
+  for (int i = 0; i < 50; ++i) {
+    const StepRecord record = world.steps(1);
+    ASSERT_NE(record.joints(), nullptr);
+    EXPECT_FALSE(record.turn() || record.grip());
+    const Vec3 angles = mechanism.angles(record.hand.position);
+    const Vec3 speeds = mechanism.jacobian(record.hand.position) * record.hand.velocity;
+    EXPECT_EQ(*record.joints(), Joints::three(angles, speeds));
+    EXPECT_EQ(world.mail->state.take()->joints, *record.joints());
+  }
+  SimulatedDevice none(circling(false));
+  Pushed other(none);
+  EXPECT_EQ(other.steps(3).joints(), nullptr);
+  EXPECT_EQ(other.mail->state.take()->joints, std::nullopt);
 }
 
 TEST(HapticLoop, ADisarmedDeviceIsHomedAtOnceAndArmedAgainByAnOrderOnly) {

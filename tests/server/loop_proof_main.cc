@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What loop_proof_test.cc counts instructions of: the haptic loop's step, at first of a point, then of a handle that
-// turns and grips. A line for each. Callgrind counts within `step_in_turn`, and writes a file each time it returns.
+// turns and grips, then of a point that tells its joints. A line for each. Callgrind counts within `step_in_turn`, and writes a file each time it returns.
 #include <iostream>
 #include <memory>
+#include <string_view>
 
 #include "core/base/rotation.h"
+#include "devices/falcon/kinematics.h"
 #include "server/haptic_loop.h"
 
 using namespace tendon;
@@ -20,8 +22,9 @@ double swing(std::uint64_t tick, std::uint64_t period) {
 
 class Handle final : public Device {
  public:
-  explicit Handle(bool whole) : whole_(whole) {
+  Handle(bool whole, bool jointed) : whole_(whole) {
     info_.max_force = 8;
+    if (jointed) info_.joints = {"thigh 1", "thigh 2", "thigh 3"};
     if (!whole) return;
     info_.measures_orientation = true;
     info_.max_torque = 0.3;
@@ -39,12 +42,17 @@ class Handle final : public Device {
     }
     return sample;
   }
+  /// What a Falcon's driver does, which has found its pose in `read`.
+  Joints joints(const Vec3& velocity) const noexcept override {
+    return Joints::three(pose_->angles, pose_->jacobian * velocity);
+  }
   Vec3 apply(const Vec3& force) noexcept override { return force; }
   Effort apply_all(const Effort& effort) noexcept override { return effort; }
 
  private:
   DeviceInfo info_;
   bool whole_;
+  std::optional<falcon::Pose> pose_ = falcon::pose_at(falcon::kCentre);
   std::uint64_t tick_ = 0;
 };
 
@@ -94,13 +102,14 @@ extern "C" [[gnu::noinline]] void step_in_turn(HapticLoop& loop, Mailboxes& mail
 }
 
 int main() {
-  for (const bool whole : {false, true}) {
-    Handle device(whole);
+  for (const std::string_view kind : {"point", "handle", "joints"}) {
+    const bool whole = kind == "handle";
+    Handle device(whole, kind == "joints");
     const auto mail = std::make_unique<Mailboxes>();
     HapticLoop loop(config_of(whole), device, *mail);
     LocalTime now{};
     step_in_turn(loop, *mail, whole, now, 1000);
     step_in_turn(loop, *mail, whole, now, 3000);
-    std::cout << (whole ? "handle" : "point") << '\n';
+    std::cout << kind << '\n';
   }
 }

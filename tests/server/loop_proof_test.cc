@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What a haptic step costs, in instructions by callgrind: of a point, which pays next to nothing for what other handles
-// can do, and of a handle that turns and grips.
+// can do, of a handle that turns and grips, and of a point that tells its joints.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -21,16 +21,20 @@ using LoopProof = testing::InstructionTest;
 
 TEST_F(LoopProof, APointsStepIsNoSlowerAndAWholeHandleCostsTwoAndAHalf) {
   const auto counted = testing::count_instructions(TENDON_LOOP_PROOF, "", "step_in_turn");
-  ASSERT_EQ(counted.size(), 2U);
+  ASSERT_EQ(counted.size(), 3U);
   const double point = counted[0].instructions / kSteps;
   const double handle = counted[1].instructions / kSteps;
+  const double jointed = counted[2].instructions / kSteps;
   std::cout << "a step: of a point " << point << " instructions (" << kBeforeHandles
             << " before there were handles), of a "
-            << "handle that turns and grips " << handle << ": " << handle / point << " times as many\n";
+            << "handle that turns and grips " << handle << ": " << handle / point << " times as many; of a point "
+            << "with three joints " << jointed << "\n";
   EXPECT_LT(point, 1.02 * kBeforeHandles);
   EXPECT_GT(point, 0.5 * kBeforeHandles) << "this is no step";
   EXPECT_LT(handle, 2.5 * point);
   EXPECT_GT(handle, 1.5 * point) << "this is no handle";
+  EXPECT_LT(jointed, 1.12 * point);
+  EXPECT_GT(jointed, point) << "these are no joints";
 }
 
 }  // namespace

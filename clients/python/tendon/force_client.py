@@ -19,6 +19,7 @@ from .messages import (
     FEATURE_CHANNELS,
     FEATURE_DIAGNOSTICS,
     FEATURE_HANDLE,
+    FEATURE_JOINTS,
     FEATURE_LOCAL_MODEL,
     NEVER,
     Claim,
@@ -105,6 +106,9 @@ class Config:
     diagnostics: bool = False
     """For an observer: ask for the forces that the engines want (`DeviceState.force_wanted`), and once a second for
     reports on the device's loop and its engines. A server that does not know this feature leaves them out."""
+    joints: bool = False
+    """Ask for the joints of the device (`DeviceState.joints`, `HandleDescription.joints`): 16 bytes each in every
+    state."""
     patience_s: float = 2.0
     """How long one attempt waits for an answer to its Hellos."""
     retry_min_s: float = 0.1
@@ -415,6 +419,8 @@ class ForceClient:
 
     def _greet(self, now: int) -> None:
         features: tuple[str, ...] = (FEATURE_LOCAL_MODEL, FEATURE_CHANNELS, FEATURE_HANDLE)
+        if self.config.joints:
+            features += (FEATURE_JOINTS,)
         if self.config.diagnostics:
             features += (FEATURE_DIAGNOSTICS,)
         hello = Hello(self.config.role, self.config.name, features, claims=self._claims())

@@ -25,6 +25,7 @@ MAX_NAME = 64
 MAX_LABEL = 24
 """Bytes of UTF-8 in the name of a device or a channel."""
 MAX_BUTTONS = 16
+MAX_JOINTS = 8
 """Named buttons of a device."""
 MAX_DEVICES = 16
 MAX_CHANNELS = 8

@@ -31,6 +31,7 @@ FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
 
 FEATURE_HANDLE = "handle"
+FEATURE_JOINTS = "joints"
 """The client is told how the device lies before the operator, its buttons, orientation, gripper and torques, and may ask
 for torque and grip force."""
 
@@ -104,6 +105,14 @@ class Grip:
 
 
 @dataclass(frozen=True, slots=True)
+class Joints:
+    """The joints that carry the handle, in the order of HandleDescription.joints."""
+
+    angles: tuple[float, ...]  # rad
+    velocities: tuple[float, ...]  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceState:
     """Server → client, newest wins: the device at one haptic step."""
 
@@ -129,6 +138,7 @@ class DeviceState:
     grip: Grip | None = None
     grip_applied: float | None = None  # N on the fingers, > 0 opens them; likewise
     hand_force: Vec3 | None = None  # N, of the hand on the handle, as a force sensor measures it
+    joints: Joints | None = None  # None: the device tells none, or nobody asked (FEATURE_JOINTS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,6 +338,8 @@ class HandleDescription:
     group: str = ""
     """Devices of one body (two arms, five fingers) have the same; empty: by itself."""
     hand: Hand = Hand.ANY
+    joints: Sequence[str] = ()
+    """Names of the joints, in the order of DeviceState.joints; empty: none is told (FEATURE_JOINTS)."""
 
 
 @dataclass(frozen=True, slots=True)

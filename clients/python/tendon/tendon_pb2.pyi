@@ -213,7 +213,7 @@ class DeviceReport(_message.Message):
     def __init__(self, number: _Optional[int] = ..., until_ns: _Optional[int] = ..., span_ns: _Optional[int] = ..., device: _Optional[int] = ..., steps: _Optional[int] = ..., missed: _Optional[int] = ..., overruns: _Optional[int] = ..., unseen: _Optional[int] = ..., lateness_us_log2: _Optional[_Iterable[int]] = ..., safety: _Optional[_Union[Safety, str]] = ..., fault: _Optional[str] = ..., degraded: _Optional[str] = ...) -> None: ...
 
 class DeviceState(_message.Message):
-    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "stiffness_wanted_npm", "tick", "torque_applied_nm", "velocity_mps"]
+    __slots__ = ["angular_velocity_radps", "buttons", "channel", "device", "energy_j", "force_age_ns", "force_applied_n", "force_sequence", "force_wanted_n", "gripper_force_applied_n", "gripper_rad", "gripper_velocity_radps", "hand_force_n", "joint_rad", "joint_velocity_radps", "mode", "orientation", "permitted_force_n", "position_m", "reasons", "sampled_ns", "stiffness_wanted_npm", "tick", "torque_applied_nm", "velocity_mps"]
     ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
@@ -227,6 +227,8 @@ class DeviceState(_message.Message):
     GRIPPER_RAD_FIELD_NUMBER: _ClassVar[int]
     GRIPPER_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
     HAND_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    JOINT_RAD_FIELD_NUMBER: _ClassVar[int]
+    JOINT_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
     ORIENTATION_FIELD_NUMBER: _ClassVar[int]
     PERMITTED_FORCE_N_FIELD_NUMBER: _ClassVar[int]
@@ -250,6 +252,8 @@ class DeviceState(_message.Message):
     gripper_rad: float
     gripper_velocity_radps: float
     hand_force_n: Vec3
+    joint_rad: _containers.RepeatedScalarFieldContainer[float]
+    joint_velocity_radps: _containers.RepeatedScalarFieldContainer[float]
     mode: Mode
     orientation: Quat
     permitted_force_n: float
@@ -260,7 +264,7 @@ class DeviceState(_message.Message):
     tick: int
     torque_applied_nm: Vec3
     velocity_mps: Vec3
-    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_wanted_npm: _Optional[_Iterable[float]] = ...) -> None: ...
+    def __init__(self, tick: _Optional[int] = ..., sampled_ns: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_applied_n: _Optional[_Union[Vec3, _Mapping]] = ..., energy_j: _Optional[float] = ..., permitted_force_n: _Optional[float] = ..., reasons: _Optional[int] = ..., force_sequence: _Optional[int] = ..., force_age_ns: _Optional[int] = ..., mode: _Optional[_Union[Mode, str]] = ..., device: _Optional[int] = ..., channel: _Optional[int] = ..., force_wanted_n: _Optional[_Union[Vec3, _Mapping]] = ..., orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., buttons: _Optional[int] = ..., torque_applied_nm: _Optional[_Union[Vec3, _Mapping]] = ..., gripper_rad: _Optional[float] = ..., gripper_velocity_radps: _Optional[float] = ..., gripper_force_applied_n: _Optional[float] = ..., hand_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., joint_rad: _Optional[_Iterable[float]] = ..., joint_velocity_radps: _Optional[_Iterable[float]] = ..., stiffness_wanted_npm: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Disarm(_message.Message):
     __slots__ = ["device"]
@@ -357,12 +361,13 @@ class Grant(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
 
 class HandleDescription(_message.Message):
-    __slots__ = ["buttons", "device", "gripper_open_rad", "group", "hand", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured"]
+    __slots__ = ["buttons", "device", "gripper_open_rad", "group", "hand", "joints", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured"]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     GRIPPER_OPEN_RAD_FIELD_NUMBER: _ClassVar[int]
     GROUP_FIELD_NUMBER: _ClassVar[int]
     HAND_FIELD_NUMBER: _ClassVar[int]
+    JOINTS_FIELD_NUMBER: _ClassVar[int]
     MAX_GRIPPER_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     MAX_TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
     OPERATOR_FROM_DEVICE_FIELD_NUMBER: _ClassVar[int]
@@ -372,11 +377,12 @@ class HandleDescription(_message.Message):
     gripper_open_rad: float
     group: str
     hand: Hand
+    joints: _containers.RepeatedScalarFieldContainer[str]
     max_gripper_force_n: float
     max_torque_nm: float
     operator_from_device: Quat
     orientation_measured: bool
-    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ..., group: _Optional[str] = ..., hand: _Optional[_Union[Hand, str]] = ...) -> None: ...
+    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ..., group: _Optional[str] = ..., hand: _Optional[_Union[Hand, str]] = ..., joints: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]

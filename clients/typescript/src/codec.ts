@@ -266,6 +266,11 @@ function readHandleOf(from: pb.DeviceState): Partial<DeviceState> {
   };
 }
 
+/** What only a client with the feature `joints` is told. */
+function readJoints({ jointRad: angles, jointVelocityRadps: told }: pb.DeviceState): Partial<DeviceState> {
+  return angles.length > 0 ? { joints: { angles, velocities: angles.map((_, i) => told[i] ?? 0) } } : {};
+}
+
 function readState(from: pb.DeviceState): DeviceState | undefined {
   const state: DeviceState = {
     tick: from.tick,
@@ -285,9 +290,12 @@ function readState(from: pb.DeviceState): DeviceState | undefined {
     ...(from.stiffnessWantedNpm.length > 0 && { stiffnessWanted: from.stiffnessWantedNpm }),
     buttons: from.buttons,
     ...readHandleOf(from),
+    ...readJoints(from),
   };
   const { turning, forceWanted, torqueApplied, handForce } = state;
-  const good = [forceWanted, torqueApplied, handForce, from.angularVelocityRadps].every((v) => !v || isVec3(v)) &&
+  const joints = [from.jointRad, from.jointVelocityRadps];
+  const good = joints.every((values) => values.length <= limits.kMaxJoints && values.every(isBounded)) &&
+    [forceWanted, torqueApplied, handForce, from.angularVelocityRadps].every((v) => !v || isVec3(v)) &&
     (!turning || isRotation(turning.orientation)) && (!state.stiffnessWanted || isStiffness(state.stiffnessWanted)) &&
     [from.gripperRad, from.gripperVelocityRadps, from.gripperForceAppliedN].every((n) => n === undefined || isBounded(n)) &&
     isTime(state.sampledNs) && isVec3(state.position) && isVec3(state.velocity) &&
@@ -322,6 +330,7 @@ const writeState = (from: DeviceState): pb.DeviceState =>
     ...(from.grip && { gripperRad: from.grip.opening, gripperVelocityRadps: from.grip.velocity }),
     ...(from.gripApplied !== undefined && { gripperForceAppliedN: from.gripApplied }),
     ...(from.handForce && { handForceN: writeVec3(from.handForce) }),
+    ...(from.joints && { jointRad: [...from.joints.angles], jointVelocityRadps: [...from.joints.velocities] }),
   });
 
 function readContact({ normal, gapM, table }: pb.Contact): Contact {
@@ -454,13 +463,16 @@ function writeDescription(from: DeviceDescription): pb.DeviceDescription {
 function readHandle(from: pb.HandleDescription): HandleDescription | undefined {
   const { device, buttons, operatorFromDevice: axes, orientationMeasured, gripperOpenRad: gripperOpen } = from;
   const { maxTorqueNm: maxTorque, maxGripperForceN: maxGripperForce, group, hand } = from;
-  const good = isDevice(device) && isText(group, limits.kMaxLabel) && (hand === pb.Hand.ANY || isEnum(hand, pb.HandSchema)) && buttons.length <= limits.kMaxButtons &&
-    buttons.every((name) => isText(name, limits.kMaxLabel)) && (!axes || isRotation(axes)) &&
+  const { joints } = from;
+  const good = isDevice(device) && isText(group, limits.kMaxLabel) && (hand === pb.Hand.ANY || isEnum(hand, pb.HandSchema)) &&
+    buttons.length <= limits.kMaxButtons && joints.length <= limits.kMaxJoints &&
+    [...buttons, ...joints].every((name) => isText(name, limits.kMaxLabel)) && (!axes || isRotation(axes)) &&
     [maxTorque, gripperOpen ?? 0, maxGripperForce].every(isMagnitude);
   if (!good) return undefined;
   return {
     device, buttons: [...buttons], orientationMeasured, maxTorque, maxGripperForce, group, hand,
     ...(axes && { operatorFromDevice: readQuat(axes) }), ...(gripperOpen !== undefined && { gripperOpen }),
+    ...(joints.length > 0 && { joints: [...joints] }),
   };
 }
 
@@ -476,6 +488,7 @@ function writeHandle(from: HandleDescription): pb.HandleDescription {
     maxGripperForceN: maxGripperForce,
     group: clip(from.group, limits.kMaxLabel),
     hand: from.hand,
+    joints: (from.joints ?? []).slice(0, limits.kMaxJoints).map((name) => clip(name, limits.kMaxLabel)),
   });
 }
 

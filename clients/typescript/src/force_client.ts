@@ -7,7 +7,7 @@ import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureLocalModel, kProtocolVersion, Role,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kProtocolVersion, Role,
   type DeviceDescription, type DeviceReport, type DeviceState, type Grant, type HandleDescription, type Hello,
   type LinkReport, type PeerReport, type Request, type StateDeadband, type Vec3, type Welcome,
 } from "./messages.js";
@@ -58,6 +58,8 @@ export interface ClientConfig {
    * the device's loop and its engines. A server that does not know this feature leaves them out.
    */
   readonly diagnostics?: boolean;
+  /** Ask for the joints of the device (DeviceState.joints, HandleDescription.joints): 16 bytes each in every state. */
+  readonly joints?: boolean;
   /** The Hellos of one attempt go unanswered for so long before it is given up. */
   readonly patienceMs?: number;
   /** First wait before the next attempt. */
@@ -114,7 +116,7 @@ const kAskLeaseAgain = fromMilliseconds(50);
 
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
   name: "guest", device: "", channel: "", takeLease: false, rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false,
-  patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
+  joints: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
 };
 
 /** The numbers of a client that names no device and no channel. */
@@ -341,13 +343,16 @@ export class ForceClient {
   }
 
   #greet(now: Nanoseconds): void {
-    const { name, device, channel, diagnostics } = this.#config;
+    const { name, device, channel, diagnostics, joints } = this.#config;
     const hello: Hello = {
       versionMin: kProtocolVersion,
       versionMax: kProtocolVersion,
       role: this.#role,
       name,
-      features: [kFeatureLocalModel, kFeatureChannels, kFeatureHandle, ...(diagnostics ? [kFeatureDiagnostics] : [])],
+      features: [
+        kFeatureLocalModel, kFeatureChannels, kFeatureHandle, ...(joints ? [kFeatureJoints] : []),
+        ...(diagnostics ? [kFeatureDiagnostics] : []),
+      ],
       claims: this.#claims ? [{ device, channel, role: this.#role }] : [],
     };
     this.#handshake = new ClientHandshake(hello, this.#config.key, this.#config.random, now);

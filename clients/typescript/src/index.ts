@@ -9,7 +9,7 @@ export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
   ChannelRule, Code, Hand, Mode, reasonNames, Role, Safety, type ChannelDescription, type Contact, type Delays,
-  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type Grip, type HandleDescription,
+  type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type Grip, type HandleDescription, type Joints,
   type LinkReport, type PeerReport, type Quat, type StateDeadband, type Stiffness, type Turning, type Vec3, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";

@@ -25,6 +25,7 @@ export const kMaxName = 64;
 export const kMaxLabel = 24;
 /** Named buttons of a device. */
 export const kMaxButtons = 16;
+export const kMaxJoints = 8;
 export const kMaxDevices = 16;
 export const kMaxChannels = 8;
 export const kMaxClaims = 16;

@@ -20,6 +20,9 @@ export const kFeatureChannels = "channels";
  */
 export const kFeatureHandle = "handle";
 
+/** Whoever offers this is told the joints of the device, with `joints` of a client's config. */
+export const kFeatureJoints = "joints";
+
 /** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
 export const kFeatureDiagnostics = "diagnostics";
 
@@ -52,6 +55,14 @@ export interface Grip {
   readonly opening: number;
   /** rad/s */
   readonly velocity: number;
+}
+
+/** The joints that carry the handle, in the order of HandleDescription.joints. */
+export interface Joints {
+  /** rad */
+  readonly angles: readonly number[];
+  /** rad/s, as many */
+  readonly velocities: readonly number[];
 }
 
 /** The device at one haptic step. */
@@ -95,6 +106,8 @@ export interface DeviceState {
   readonly gripApplied?: number | undefined;
   /** N of the hand on the handle, as a force sensor measures it. */
   readonly handForce?: Vec3 | undefined;
+  /** Absent: the device tells none, or nobody asked (kFeatureJoints). */
+  readonly joints?: Joints | undefined;
 }
 
 /**
@@ -245,6 +258,8 @@ export interface HandleDescription {
   /** Devices of one body (two arms, five fingers) have the same; empty: by itself. */
   readonly group: string;
   readonly hand: Hand;
+  /** Names of the joints, in the order of DeviceState.joints; absent: none is told (kFeatureJoints). */
+  readonly joints?: readonly string[] | undefined;
 }
 
 /** Two quantiles of a delay; below zero only where two clocks had to be compared. */

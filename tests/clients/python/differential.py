@@ -83,6 +83,10 @@ def _handle_of(state: DeviceState) -> list[object]:
         words += ["grip-force", _double(state.grip_applied)]
     if state.hand_force is not None:
         words += ["hand", *_vector(state.hand_force)]
+    if state.joints is not None:
+        words += ["joints", len(state.joints.angles)]
+        for angle, velocity in zip(state.joints.angles, state.joints.velocities):
+            words += [_double(angle), _double(velocity)]
     return words
 
 
@@ -136,6 +140,7 @@ def _frame(frame: Frame) -> list[object]:
             axes = frame.handle.operator_from_device
             words += ["handle"] if axes is None else ["handle", "axes", *map(_double, axes)]
             words += [len(frame.handle.buttons), *map(_text, frame.handle.buttons)]
+            words += [len(frame.handle.joints), *map(_text, frame.handle.joints)]
             words += [int(frame.handle.orientation_measured), _double(frame.handle.max_torque)]
             opens = frame.handle.gripper_open
             words += [] if opens is None else ["gripper", _double(opens)]

@@ -55,6 +55,12 @@ def test_named_places_are_claimed_in_every_hello(names, claims):
     assert hello.features == ("local-model", "channels", "handle")
 
 
+def test_joints_are_asked_for_by_those_who_want_them():
+    stage = Stage(Config(joints=True))
+    stage.run(100 * MS)
+    assert stage.server.hellos[0].features == ("local-model", "channels", "handle", "joints")
+
+
 def test_forces_orders_leases_and_rates_name_the_granted_place():
     stage = named(state_hz=250)
     stage.run(100 * MS)

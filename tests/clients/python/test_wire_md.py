@@ -2,7 +2,7 @@
 """The bytes of WIRE.md are what this client writes, and what it reads."""
 
 from dataclasses import replace
-from math import nan
+from math import inf, nan
 
 import pytest
 from wire_md import PAGE, golden_datagrams
@@ -23,6 +23,7 @@ from tendon.messages import (
     Grip,
     Hand,
     HandleDescription,
+    Joints,
     Hello,
     LinkReport,
     LocalModel,
@@ -126,6 +127,8 @@ HANDLE = HandleDescription(
     group="arms",
     hand=Hand.RIGHT,
 )
+STATE_JOINTS = replace(STATE, joints=Joints((0.5, -0.25, 1.5), (0.125, 0.0, -2.0)))
+NAMED_JOINTS = HandleDescription(1, joints=("turntable", "upper arm", "forearm"))
 WALL = ((800.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5), stiffness_wanted=WALL)
 DEVICE_REPORT = DeviceReport(
@@ -155,6 +158,8 @@ FRAMES = {
     "state-wanted": (60, None, [STATE_WANTED]),
     "state-buttons": (64, None, [STATE_BUTTONS]),
     "state-handle": (67, None, [STATE_HANDLE]),
+    "state-joints": (69, None, [STATE_JOINTS]),
+    "control-ack-joints": (70, None, [ControlAck(14, Code.OK, handle=NAMED_JOINTS)]),
     "force-torque": (68, None, [FORCE_TORQUE]),
     "control-ack-handle": (66, None, [ControlAck(14, Code.OK, handle=HANDLE)]),
     "device-report": (61, None, [DEVICE_REPORT]),
@@ -257,6 +262,9 @@ def out_of_bounds():
     yield "position", state(position=(1.1e12, 0.0, 0.0))
     yield "velocity NaN", state(velocity=(0.0, nan, 0.0))
     yield "force infinite", state(force_applied=(0.0, 0.0, float("-inf")))
+    yield "joint not a number", state(joints=Joints((nan,), (0.0,)))
+    yield "velocity of a joint infinite", state(joints=Joints((0.0,), (inf,)))
+    yield "nine joints", state(joints=Joints((0.0,) * 9, (0.0,) * 8))
     yield "energy NaN", state(energy=nan)
     yield "permitted force negative", state(permitted_force=-1.0)
     yield "permitted force NaN", state(permitted_force=nan)

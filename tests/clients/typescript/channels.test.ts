@@ -71,6 +71,12 @@ describe("devices and channels", () => {
     assert.deepEqual([world.client.phase, world.client.description], ["open", undefined]);
   });
 
+  it("joints are asked for by those who want them", () => {
+    const { world } = controller(1, kFair, { joints: true }, {});
+    world.runMs(100);
+    assert.deepEqual(world.server.hellos[0]!.hello.features, ["local-model", "channels", "handle", "joints"]);
+  });
+
   it("the handle is described where the server knows that, anew each session", () => {
     const kHandle: HandleDescription = {
       device: 0, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward"],

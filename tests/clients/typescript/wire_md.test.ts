@@ -141,6 +141,15 @@ describe("WIRE.md", () => {
     });
   });
 
+  it("state-joints and control-ack-joints say what the page says", () => {
+    const [state] = contentOf("state-joints").frames;
+    assert.ok(state?.kind === "state");
+    assert.deepEqual(state.value.joints, { angles: [0.5, -0.25, 1.5], velocities: [0.125, 0, -2] });
+    const [ack] = contentOf("control-ack-joints").frames;
+    assert.ok(ack?.kind === "controlAck");
+    assert.deepEqual(ack.value.handle?.joints, ["turntable", "upper arm", "forearm"]);
+  });
+
   it("state-handle and force-torque say what the page says", () => {
     const [state] = contentOf("state-handle").frames;
     assert.ok(state?.kind === "state");

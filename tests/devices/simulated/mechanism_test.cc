@@ -57,6 +57,33 @@ TEST(Mechanism, AnArmsJacobianInvertsTheDerivativeOfItsHandle) {
   }
 }
 
+TEST(Mechanism, AnArmsAnglesAreThoseThatCarryItsHandle) {
+  for (const Mechanism::Arm& arm : {kPhantom, kUneven}) {
+    const Mechanism mechanism(arm);
+    Dice dice(5);
+    int within = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const Vec3 q = dice.vector(0.5);
+      const Vec3 x = handle_of(arm, q);
+      if (x.norm() > mechanism.reach()) continue;
+      ++within;
+      ASSERT_LT((mechanism.angles(x) - q).norm(), 1e-12) << x.transpose();
+    }
+    EXPECT_GT(within, 500);
+    const Vec3 far = 2 * mechanism.reach() * Vec3::UnitX();
+    EXPECT_LT((mechanism.angles(far) - mechanism.angles(far / 2)).norm(), 1e-12) << "of the nearest place";
+  }
+}
+
+TEST(Mechanism, TheFalconsAnglesAreThoseOfItsKinematics) {
+  const Mechanism mechanism(Mechanism::Falcon{});
+  Dice dice(6);
+  for (int i = 0; i < 100; ++i) {
+    const Vec3 x = dice.vector(0.025);
+    ASSERT_EQ(mechanism.angles(x), falcon::pose_at(falcon::kCentre + x)->angles);
+  }
+}
+
 TEST(Mechanism, TheFalconsJacobianIsThatOfItsKinematics) {
   const Mechanism mechanism(Mechanism::Falcon{});
   Dice dice(2);

@@ -105,6 +105,28 @@ TEST(WoodenHapticsDevice, PositionsAreThoseOfTheTipRelativeToTheCentre) {
   }
 }
 
+TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
+  Dice dice(4);
+  for (const char* name : {"woodenhaptics_v2019", "polhem_v1"}) {
+    const woodenhaptics::Model& model = *woodenhaptics::find_model(name);
+    Bench bench({.model = name});
+    ASSERT_EQ(bench.device.info().joints, (std::vector<std::string>{"A", "B", "C"}));
+    ASSERT_TRUE(bench.reaches(State::kHomed, 1s));
+    for (int i = 0; i < 100; ++i) {
+      bench.move_to(0.06 * dice.direction());
+      bench.run(3ms);
+      ASSERT_TRUE(bench.sample);
+      const Vec3 velocity = 0.2 * dice.direction();
+      const Joints joints = bench.device.joints(velocity);
+      ASSERT_EQ(joints.count, 3U);
+      const auto pose = woodenhaptics::pose_with(model, Vec3(joints.angle[0], joints.angle[1], joints.angle[2]));
+      ASSERT_LT((pose.position - bench.sample->position).norm(), 1e-12);
+      const Vec3 speeds(joints.velocity[0], joints.velocity[1], joints.velocity[2]);
+      ASSERT_LT((pose.jacobian * speeds - velocity).norm(), 1e-12);
+    }
+  }
+}
+
 // 16 bits are one turn of the body: the arm goes round twice and half.
 TEST(WoodenHapticsDevice, CountersThatWrapAreFollowed) {
   for (const double turns : {2.5, -2.5}) {

@@ -144,6 +144,7 @@ class Maker {
       const std::string name = (path.empty() ? type.name() : path) + '.' + field.name();
       if (field.is_repeated() && reflection.FieldSize(message, &field) == 0) continue;  // a later example has some
       if (fresh(name)) mutate(message, field, name);
+      lengthen(message, field, name);
       if (field.cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
       const std::string& inner_type = field.message_type()->name();
       const bool is_choice = type.name() == "Frame" || type.name() == "Answer" || type.name() == "Control";
@@ -158,6 +159,34 @@ class Maker {
     }
   }
 
+  /// Rotations and normals have the length 1 ± 0.001: values right within and right beyond that.
+  void lengthen(Message& message, const FieldDescriptor& field, const std::string& path) {
+    const bool turns = field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && field.message_type()->name() == "Quat";
+    if (!turns && field.name() != "normal") return;
+    const auto& reflection = *message.GetReflection();
+    if (!reflection.HasField(message, &field) || !fresh(path + " length")) return;
+    const std::string original = message.SerializeAsString();
+    for (const auto& [length, accepted] :
+         {std::pair{"0.99899", false}, {"0.99901", true}, {"1.00099", true}, {"1.00101", false}}) {
+      Message& vector = *reflection.MutableMessage(&message, &field);
+      const auto& type = *vector.GetDescriptor();
+      const auto& parts = *vector.GetReflection();
+      for (int i = 0; i < type.field_count(); ++i) {
+        const double part = parts.GetDouble(vector, type.field(i));
+        if (part != 0) parts.SetDouble(&vector, type.field(i), part * std::stod(length));
+      }
+      add(path, std::string("length ") + length, accepted);
+      message.ParseFromString(original);
+    }
+  }
+
+  /// The root as it is now.
+  void add(const std::string& path, const std::string& value, bool accepted) {
+    const std::string bytes = root_->SerializeAsString();
+    const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());
+    out_.push_back({root_->GetDescriptor()->name(), path, value, accepted, {begin, begin + bytes.size()}});
+  }
+
   bool fresh(const std::string& path) { return paths_.insert(path).second; }
 
   void mutate(Message& message, const FieldDescriptor& field, const std::string& path) {
@@ -166,12 +195,10 @@ class Maker {
     if (found == bounds_.end() && !is_enum) return;
     const std::string original = message.SerializeAsString();
     const auto& reflection = *message.GetReflection();
-    const auto add = [&](const std::string& value, bool accepted, const std::function<void()>& change) {
+    const auto changed = [&](const std::string& value, bool accepted, const std::function<void()>& change) {
       if (accepted && is_bound_to_others(path)) return;
       change();
-      const std::string bytes = root_->SerializeAsString();
-      const auto* const begin = reinterpret_cast<const std::byte*>(bytes.data());
-      out_.push_back({root_->GetDescriptor()->name(), path, value, accepted, {begin, begin + bytes.size()}});
+      add(path, value, accepted);
       message.ParseFromString(original);
     };
     if (is_enum) {
@@ -179,8 +206,8 @@ class Maker {
       const int last = type.value(type.value_count() - 1)->number();
       const int least = type.value(0)->name().ends_with("_UNSPECIFIED") ? 1 : 0;
       for (const int value : {0, 1, last, last + 1}) {
-        add(std::to_string(value), value >= least && value <= last,
-            [&] { reflection.SetEnumValue(&message, &field, value); });
+        changed(std::to_string(value), value >= least && value <= last,
+                [&] { reflection.SetEnumValue(&message, &field, value); });
       }
       return;
     }
@@ -191,7 +218,7 @@ class Maker {
         std::ostringstream words;
         words.precision(17);
         words << value;
-        add(words.str(), accepted, [&] {
+        changed(words.str(), accepted, [&] {
           if (field.is_repeated()) return reflection.SetRepeatedDouble(&message, &field, 0, value);
           reflection.SetDouble(&message, &field, value);
         });
@@ -208,7 +235,7 @@ class Maker {
       set(std::numeric_limits<double>::quiet_NaN(), false);
     } else if (bound.value) {
       const auto set = [&](std::int64_t value, bool accepted) {
-        add(std::to_string(value), accepted, [&] {
+        changed(std::to_string(value), accepted, [&] {
           switch (field.cpp_type()) {
             case FieldDescriptor::CPPTYPE_INT64:
               return reflection.SetInt64(&message, &field, value);
@@ -231,7 +258,7 @@ class Maker {
     }
     if (bound.bytes) {
       for (const std::int64_t size : {whole(bound.bytes->most), whole(bound.bytes->most) + 1}) {
-        add(std::to_string(size) + " bytes", size <= whole(bound.bytes->most), [&] {
+        changed(std::to_string(size) + " bytes", size <= whole(bound.bytes->most), [&] {
           const std::string text(static_cast<std::size_t>(size), 'x');
           if (field.is_repeated()) return reflection.SetRepeatedString(&message, &field, 0, text);
           reflection.SetString(&message, &field, text);
@@ -239,7 +266,7 @@ class Maker {
       }
     }
     const auto resized = [&](int size, bool accepted) {
-      add(std::to_string(size) + " entries", accepted, [&] { resize(message, field, size); });
+      changed(std::to_string(size) + " entries", accepted, [&] { resize(message, field, size); });
     };
     for (const int size : bound.entries) resized(size, true);
     for (const int size : bound.too_few_or_many) resized(size, false);

@@ -43,6 +43,14 @@ TEST(Codec, AStateOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"infinite opening", [](DeviceState& s) { s.grip->opening = kInf; }},
       {"NaN velocity of the grip", [](DeviceState& s) { s.grip->velocity = kNan; }},
       {"huge grip force", [](DeviceState& s) { s.grip_applied = -1.001e12; }},
+      {"NaN joint",
+       [](DeviceState& s) {
+         s.joints = Joints::three({0, kNan, 0}, {0, 0, 0});
+       }},
+      {"infinite velocity of a joint",
+       [](DeviceState& s) {
+         s.joints = Joints::three({0, 0, 0}, {0, 0, kInf});
+       }},
       {"NaN force of the hand", [](DeviceState& s) { s.hand_force->y() = kNan; }},
   };
   for (const BadState& bad : cases) {

@@ -74,6 +74,13 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   if (*rc::gen::arbitrary<bool>()) in.grip = {.opening = any_value(), .velocity = any_value()};
   if (*rc::gen::arbitrary<bool>()) in.grip_applied = any_value();
   if (*rc::gen::arbitrary<bool>()) in.hand_force = any_vector();
+  if (const std::size_t count = *rc::gen::inRange<std::size_t>(0, Joints::kMost + 1); count > 0) {
+    in.joints = Joints{.count = count};
+    for (std::size_t i = 0; i < count; ++i) {
+      in.joints->angle[i] = any_value();
+      in.joints->velocity[i] = any_value();
+    }
+  }
 
   DataReader reader;
   const DataContent* content = read(reader, data(1, {}, in));
@@ -88,6 +95,7 @@ RC_GTEST_PROP(Codec, AStateComesOutAsItWentIn, ()) {
   RC_ASSERT((out.grip == in.grip));
   RC_ASSERT(out.grip_applied == in.grip_applied);
   RC_ASSERT(out.hand_force == in.hand_force);
+  RC_ASSERT(out.joints == in.joints);
   RC_ASSERT(out.tick == in.tick);
   RC_ASSERT((out.sampled == in.sampled));
   RC_ASSERT(out.position == in.position);

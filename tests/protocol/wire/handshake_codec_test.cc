@@ -119,7 +119,8 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
                                     .gripper_open = 0.3,
                                     .max_gripper_force = 1e12,
                                     .group = std::string(limits::kMaxName, 'g'),
-                                    .hand = Hand::kRight};
+                                    .hand = Hand::kRight,
+                                    .joints = std::vector(limits::kMaxJoints + 1, std::string(limits::kMaxName, 'j'))};
   std::array<std::byte, kMaxDatagram> buffer;
   DataWriter writer;
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime},
@@ -138,6 +139,7 @@ TEST(Codec, TheLongestDescriptionOfAHandleFitsIntoADatagramOfItsOwn) {
   EXPECT_EQ(handle->max_gripper_force, 1e12);
   EXPECT_EQ(handle->group.size(), limits::kMaxLabel);
   EXPECT_EQ(handle->hand, Hand::kRight);
+  EXPECT_EQ(handle->joints, std::vector(limits::kMaxJoints, std::string(limits::kMaxLabel, 'j')));
   EXPECT_EQ(handle->buttons.size(), limits::kMaxButtons);
   EXPECT_EQ(handle->buttons.back().size(), limits::kMaxLabel);
 }
@@ -167,7 +169,10 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
                     .torque_applied = vector,
                     .grip = Grip{.opening = 0.1, .velocity = -0.1},
                     .grip_applied = 0.1,
-                    .hand_force = vector};
+                    .hand_force = vector,
+                    .joints = Joints{.count = Joints::kMost, .angle = {}, .velocity = {}}};
+  state.joints->angle.fill(-0.1);
+  state.joints->velocity.fill(0.1);
   ForceTable table{.first = -0.1, .step = 0.1, .size = ForceTable::kMaxEntries, .force = {}};
   table.force.fill(0.1);
   ForceCommand force{.sequence = ~std::uint64_t{0},
@@ -194,15 +199,32 @@ TEST(Codec, AStateAndAForceAlwaysFitTogetherIntoASealedDatagram) {
   writer.begin(std::span(buffer).first(kMaxDatagram - crypto::kTagSize), {}, LocalTime{limits::kMaxTime}, echo);
   const std::size_t empty = writer.size();
   ASSERT_TRUE(writer.add(state));
-  EXPECT_EQ(writer.size() - empty, 431U);
+  EXPECT_EQ(writer.size() - empty, 565U);
   ASSERT_TRUE(writer.add(force));
-  EXPECT_EQ(writer.size() + crypto::kTagSize, 1045U);
+  EXPECT_EQ(writer.size() + crypto::kTagSize, 1179U);
 
   DataReader reader;
   const DataContent* content = reader.read(std::span(buffer).subspan(kHeaderSize, writer.size() - kHeaderSize));
   ASSERT_NE(content, nullptr);
   EXPECT_EQ(content->frames.size(), 2U);
   EXPECT_EQ(content->invalid, 0U);
+}
+
+TEST(Codec, AMissingVelocityOfAJointIs0AndOneWithoutAnAngleSaysNothing) {
+  constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
+  const auto read_joints = [](int angles, int velocities) -> std::optional<Joints> {
+    RawProtobuf state;
+    state.varint(11, 2);
+    for (int i = 0; i < angles; ++i) state.fixed64(23, kOne);
+    for (int i = 0; i < velocities; ++i) state.fixed64(24, kOne);
+    DataReader reader;
+    const auto* content = reader.read(datagram_with(RawProtobuf().message(1, state)));
+    if (content == nullptr || content->frames.empty()) return {};
+    return std::get<DeviceState>(content->frames[0]).joints;
+  };
+  EXPECT_EQ(read_joints(2, 1), (Joints{.count = 2, .angle = {1, 1}, .velocity = {1}}));
+  EXPECT_EQ(read_joints(1, 3), (Joints{.count = 1, .angle = {1}, .velocity = {1}}));
+  EXPECT_EQ(read_joints(0, 1), std::nullopt);
 }
 
 TEST(Codec, AVelocityOfWhatIsNotMeasuredSaysNothing) {

@@ -437,6 +437,25 @@ std::string key_files() {
   };
   std::string counting;
   for (unsigned i = 0; i < 32; ++i) counting += hex(std::array{static_cast<std::byte>(i)});
+  // So many different bytes, in no order that repeats; and so many different steps between bytes that differ.
+  const auto different_bytes = [](unsigned count) {
+    std::string out;
+    for (unsigned i = 0; i < 32; ++i) {
+      const unsigned j = i < count ? i : 5 * i % count;
+      out += hex(std::array{static_cast<std::byte>(37 * j * j + 101 * j + 129)});
+    }
+    return out;
+  };
+  const auto different_steps = [](unsigned count) {
+    std::string out;
+    unsigned byte = 129;
+    for (unsigned i = 0; i < 32; ++i) {
+      out += hex(std::array{static_cast<std::byte>(byte)});
+      const unsigned j = i % count;
+      byte += 37 * j * j + 11 * j + 3;
+    }
+    return out;
+  };
   struct Case {
     std::string_view name;
     std::string text;
@@ -458,6 +477,10 @@ std::string key_files() {
       {"weak: zeros", "controller " + repeated("00", 32) + "\n"},
       {"weak: a few bytes again and again", "controller " + repeated("0123456789abcdef", 4) + "\n"},
       {"weak: counting", "controller " + counting + "\n"},
+      {"18 different bytes", "controller " + different_bytes(18) + "\n"},
+      {"weak: 17 different bytes", "controller " + different_bytes(17) + "\n"},
+      {"18 different steps", "controller " + different_steps(18) + "\n"},
+      {"weak: 17 different steps", "controller " + different_steps(17) + "\n"},
       {"weak: text", "controller " + hex(text_bytes("The quick brown fox jumps over !")) + "\n"},
   };
   std::vector<std::string> out;

@@ -167,5 +167,34 @@ TEST_F(Handle, IsSeenOnlyByThoseThatNamedTheFeature) {
   }
 }
 
+/// Those who name `joints` see them and their names; to others a state has no more bytes than before.
+TEST_F(Handle, JointsAreToldToThoseThatNamedTheFeature) {
+  for (const bool asks : {false, true}) {
+    NetworkLoop::Config config;
+    config.keys = {wall_, screen_};
+    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
+    config.handles = {{.buttons = {"right"}, .joints = {"upper", "lower"}}};
+    restart(config);
+    look_.joints = Joints{.count = 2, .angle = {0.5, -0.25}, .velocity = {0.125, 2}};
+    DeviceState seen;
+    Client b{std::make_unique<End>(wire_, parse_address("192.0.2.2:4000")), nullptr};
+    ForceClient::Config observer = config_of(screen_, ++seed_);
+    observer.joints = asks;
+    b.client = std::make_unique<ForceClient>(
+        *b.end, server_.self, observer, [&seen](const DeviceState& state, const LinkStats&) { seen = state; }, now_);
+    run(milliseconds(500), {&b});
+    EXPECT_GT(seen.tick, 100U);
+    EXPECT_EQ(seen.joints, asks ? look_.joints : std::nullopt);
+    ASSERT_TRUE(b.client->handle().has_value());
+    EXPECT_EQ(b.client->handle()->joints, asks ? config.handles[0].joints : std::vector<std::string>{});
+
+    const std::uint64_t before = seen.tick;
+    look_.joints->velocity[1] = std::numeric_limits<double>::infinity();  // in a singular pose
+    run(milliseconds(100), {&b});
+    EXPECT_GT(seen.tick, before + 50) << "a number that no frame carries costs no state";
+    EXPECT_EQ(seen.joints, std::nullopt);
+  }
+}
+
 }  // namespace
 }  // namespace tendon

@@ -80,7 +80,11 @@ inline StepRecord sample_step(std::uint64_t tick) {
                                  .permitted = 1.5,
                                  .energy = 1e-3};
   }
-  if (step.handle && !step.handle->turn && !step.handle->grip) step.handle.reset();
+  if (tick % 4 == 3) {
+    if (!step.handle) step.handle.emplace();
+    step.handle->joints = Joints::three({0.1, t, -0.3}, {t, -2, 3});
+  }
+  if (step.handle && !step.handle->turn && !step.handle->grip && !step.handle->joints) step.handle.reset();
   step.longest_hold = std::chrono::microseconds(2000 + tick);
   step.assumption_broken = tick % 11 == 0;
   if (tick % 4 < 2) step.stiffness << 500, -1, 2, -1, 600, 3, 2, 3.5, 700 + t;
@@ -129,7 +133,8 @@ inline bool same(const std::optional<HandleStep>& a, const std::optional<HandleS
            same(x.force, y.force) && same(x.applied, y.applied) && same(x.permitted, y.permitted) &&
            same(x.energy, y.energy);
   };
-  return (!a->turn || same_turn(*a->turn, *b->turn)) && (!a->grip || same_grip(*a->grip, *b->grip));
+  return a->joints == b->joints && (!a->turn || same_turn(*a->turn, *b->turn)) &&
+         (!a->grip || same_grip(*a->grip, *b->grip));
 }
 inline bool same(const StepRecord& a, const StepRecord& b) {
   return a.tick == b.tick && a.scheduled == b.scheduled && a.hand.at == b.hand.at &&

@@ -123,7 +123,8 @@ void check_roaming(ServerGuest& guest, Conversation& talk) {
 bool tells_of_the_handle(const pb::DeviceState& state) {
   return state.buttons() != 0 || state.has_orientation() || state.has_angular_velocity_radps() ||
          state.has_torque_applied_nm() || state.has_gripper_rad() || state.has_gripper_velocity_radps() ||
-         state.has_gripper_force_applied_n() || state.has_hand_force_n();
+         state.has_gripper_force_applied_n() || state.has_hand_force_n() || !state.joint_rad().empty() ||
+         !state.joint_velocity_radps().empty();
 }
 
 void check_states(Report& report, const Conversation& talk) {

@@ -29,7 +29,7 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
   wanted.reasons = Reasons::from_bits(recorded.reasons.bits() & kUpstream);
   wanted.age = recorded.force_age;
   wanted.channel = recorded.channel;
-  if (recorded.handle) wanted.handle.emplace();
+  if (recorded.turn() || recorded.grip()) wanted.handle.emplace();
   if (recorded.turn()) wanted.handle->torque = recorded.turn()->wanted;
   if (recorded.grip()) wanted.handle->grip = recorded.grip()->wanted;
   return wanted;
@@ -37,7 +37,7 @@ ForceChannels::Wanted wanted_in(const StepRecord& recorded) {
 
 /// Empty for a device that has a position only.
 std::optional<HandleSample> handle_in(const StepRecord& recorded, const Effort& held) {
-  if (!recorded.handle) return std::nullopt;
+  if (!recorded.turn() && !recorded.grip()) return std::nullopt;
   HandleSample handle{.torque = held.torque, .grip_force = held.grip};
   if (recorded.turn()) handle.turning = recorded.turn()->hand;
   if (recorded.grip()) handle.grip = recorded.grip()->hand;

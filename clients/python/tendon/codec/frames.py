@@ -26,6 +26,7 @@ from ..messages import (
     GiveLease,
     Grip,
     HandleDescription,
+    Joints,
     LeaseLost,
     LinkReport,
     LocalModel,
@@ -56,6 +57,15 @@ def _read_grip(message: pb.DeviceState) -> Grip | None:
     return grip if message.HasField("gripper_rad") else None
 
 
+def _read_joints(message: pb.DeviceState) -> Joints | None:
+    angles = tuple(fields.number(angle) for angle in message.joint_rad)
+    told = tuple(fields.number(velocity) for velocity in message.joint_velocity_radps)
+    if max(len(angles), len(told)) > limits.MAX_JOINTS:
+        raise fields.OutOfBounds
+    velocities = told[: len(angles)] + (0.0,) * (len(angles) - len(told))
+    return Joints(angles, velocities) if angles else None
+
+
 def _read_state(message: pb.DeviceState) -> DeviceState:
     permitted = message.permitted_force_n
     return DeviceState(
@@ -82,6 +92,7 @@ def _read_state(message: pb.DeviceState) -> DeviceState:
         if message.HasField("gripper_force_applied_n")
         else None,
         hand_force=fields.vector(message.hand_force_n) if message.HasField("hand_force_n") else None,
+        joints=_read_joints(message),
     )
 
 
@@ -268,11 +279,13 @@ def _write_description(description: DeviceDescription) -> pb.DeviceDescription:
 
 def _read_handle(message: pb.HandleDescription) -> HandleDescription:
     fields.whole(len(message.buttons), 0, limits.MAX_BUTTONS)
+    fields.whole(len(message.joints), 0, limits.MAX_JOINTS)
     axes = message.operator_from_device
     return HandleDescription(
         device=fields.device(message.device),
         operator_from_device=fields.quaternion(axes) if message.HasField("operator_from_device") else None,
         buttons=tuple(fields.text(name, limits.MAX_LABEL) for name in message.buttons),
+        joints=tuple(fields.text(name, limits.MAX_LABEL) for name in message.joints),
         orientation_measured=message.orientation_measured,
         max_torque=fields.magnitude(message.max_torque_nm),
         gripper_open=fields.magnitude(message.gripper_open_rad) if message.HasField("gripper_open_rad") else None,
@@ -289,6 +302,7 @@ def _write_handle(handle: HandleDescription) -> pb.HandleDescription:
         device=handle.device,
         operator_from_device=None if axes is None else _write_quaternion(axes),
         buttons=names,
+        joints=[fields.clip(name, limits.MAX_LABEL) for name in handle.joints[: limits.MAX_JOINTS]],
         orientation_measured=handle.orientation_measured,
         max_torque_nm=handle.max_torque,
         gripper_open_rad=handle.gripper_open,
@@ -506,6 +520,8 @@ def write(frame: Frame) -> pb.Frame:
             gripper_velocity_radps=None if frame.grip is None else frame.grip.velocity,
             gripper_force_applied_n=frame.grip_applied,
             hand_force_n=None if frame.hand_force is None else _write_vector(frame.hand_force),
+            joint_rad=None if frame.joints is None else frame.joints.angles,
+            joint_velocity_radps=None if frame.joints is None else frame.joints.velocities,
         )
         return pb.Frame(state=state)
     if isinstance(frame, Control):

@@ -124,10 +124,10 @@ impl Attempt {
         let answer = decode(&ANSWER, &text).ok().filter(|answer| fits(&ANSWER, answer))?;
         if let Some(refused) = answer.sub(2) {
             let outcome = Outcome::Refused { code: refused.whole(1), detail: refused.text(2).to_string() };
-            return if connection == 0 { Some(outcome) } else { None };
+            return Some(outcome);
         }
         let welcome: &Node = answer.sub(1)?;
-        if connection == 0 || welcome.whole(1) != VERSION {
+        if welcome.whole(1) != VERSION {
             return None;
         }
         let granted =

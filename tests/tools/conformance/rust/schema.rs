@@ -68,6 +68,8 @@ pub static STATE: Schema = message(&[
     Field(20, Real, Optional, SIGNED),
     Field(21, Real, Optional, SIGNED),
     Field(22, Sub(&VECTOR), Optional, Any),
+    Field(23, Real, Many(|count| count <= 8), SIGNED),
+    Field(24, Real, Many(|count| count <= 8), SIGNED),
     Field(25, Real, Many(|count| count == 0 || entries_of_a_stiffness(count)), SIGNED),
 ]);
 
@@ -174,6 +176,7 @@ static HANDLE_DESCRIPTION: Schema = message(&[
     Field(7, Real, One, POSITIVE),
     Field(8, Text, One, Bytes(24)),
     Field(9, Enum, One, Whole(0, 2)),
+    Field(10, Text, Many(|count| count <= 8), Bytes(24)),
 ]);
 
 pub static CONTROL_ACK: Schema = message(&[

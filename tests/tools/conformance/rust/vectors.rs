@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::noise::{self, Handshake, Key};
 use crate::opening::{header, Attempt, Outcome, Welcome};
 use crate::protobuf::{decode, fits, Node, Value, Writer};
-use crate::schema::{usable_time, ANSWER, DATAGRAM, ECHO, FORCE, FRAME, ROTATION_MODEL};
+use crate::schema::{usable_time, ANSWER, DATAGRAM, ECHO, FORCE, FRAME};
 use crate::session::{Counters, Event, Session, Window};
 use crate::Spring;
 
@@ -354,38 +354,4 @@ fn an_attempt_keeps_to_its_random_and_to_its_suite() {
     assert!(matches!(attempt.receive(&bytes, 0), Outcome::Nothing));
     bytes[3] = 0;
     assert!(matches!(attempt.receive(&bytes, 0), Outcome::Welcome(_)));
-}
-
-/// bounds.json has the ends of each part, not those of the norm.
-#[test]
-fn a_quaternion_has_a_norm_of_1_within_a_thousandth() {
-    for (norm, accepted) in [(0.9985, false), (0.9995, true), (1.0005, true), (1.0015, false)] {
-        let mut turn = Writer::default();
-        turn.reals(1, &[0.6 * norm, 0.0, 0.8 * norm, 0.0]);
-        turn.packed(2, &[0.0]);
-        let node = decode(&ROTATION_MODEL, &turn.0).unwrap();
-        assert_eq!(fits(&ROTATION_MODEL, &node), accepted, "{}", norm);
-    }
-}
-
-/// key_files.json has clear cases, not the ends.
-#[test]
-fn a_key_has_18_different_bytes_and_18_different_steps() {
-    let text = |key: &[u8]| format!("controller {}", key.iter().map(|b| format!("{:02x}", b)).collect::<String>());
-    // Steps that grow, so all of them differ; the first `different` bytes again and again would repeat them.
-    let bytes_of = |different: usize| {
-        let some: Vec<u8> = (0..different).map(|i| (i * (i + 1) / 2 + 128) as u8).collect();
-        (0..32).map(|i| some[if i < different { i } else { (i * 7 + i / 3) % different }]).collect::<Vec<u8>>()
-    };
-    assert!(noise::read_key(&text(&bytes_of(18))).is_ok());
-    assert!(noise::read_key(&text(&bytes_of(17))).is_err());
-    let steps_of = |different: usize| {
-        let mut key = vec![128u8];
-        for i in 0..31 {
-            key.push(key[i].wrapping_add((2 * (i % different) + 1) as u8));
-        }
-        key
-    };
-    assert!(noise::read_key(&text(&steps_of(18))).is_ok());
-    assert!(noise::read_key(&text(&steps_of(17))).is_err());
 }
