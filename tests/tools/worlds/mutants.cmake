@@ -47,10 +47,10 @@ tendon_mutant(wrong-clock SOURCE protocol/session.cc LIBRARY tendon_protocol
   ORACLES "round-trip")
 # An older force replaces a newer one.
 tendon_mutant(older-force SOURCE protocol/session.cc LIBRARY tendon_protocol
-  REPLACE "number <= *mine.number" "number == *mine.number"
+  REPLACE "both <= *mine.number" "both == *mine.number"
   ORACLES "newest")
 # Who was refused or lost never comes back.
-tendon_mutant(no-return SOURCE protocol/connection.cc LIBRARY tendon_client
+tendon_mutant(no-return SOURCE protocol/connection.cc LIBRARY tendon_protocol
   REPLACE "now >= retry_" "false"
   ORACLES "calm|recovery")
 # Datagrams of the next key open, but that key never becomes the present one: the one after it is unknown.
