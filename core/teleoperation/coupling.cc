@@ -11,18 +11,12 @@ namespace tendon {
 
 namespace {
 
-/// Gaps between states are remembered for one to two of these.
-constexpr Duration kRecovery = std::chrono::seconds(5);
-/// A longer gap is no habit of the network but a loss.
-constexpr Duration kMostGap = std::chrono::milliseconds(100);
-
 /// K, D and B of this end.
-PositionPosition<3>::Config spring_of(const Coupling::Config& config) {
+PositionPosition<3>::Config spring_of(const Coupling::Config& config, const PoseMap& map) {
   PositionPosition<3>::Config spring = config.spring;
   // The leader of a position–force coupling has no spring: the follower's is not in a loop with the delay.
   if (config.method == CouplingMethod::kPositionForce) spring.adapt_to_delay = false;
   if (config.role == PortRole::kLeader) return spring;
-  const PoseMap map(config.map);
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = map.stiffness_at_follower(*value);
   }
@@ -38,13 +32,11 @@ std::optional<Purse> purse_of(const Coupling::Config& config, const PoseMap& map
   return Purse(purse);
 }
 
-bool within(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
+// False for what is not a number.
 bool within(double value, double low, double high) noexcept { return value >= low && value <= high; }
+bool within(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
 
-Vec3 shortened(const Vec3& force, double most) noexcept {
-  const double size = force.stableNorm();
-  return size > most ? Vec3(force * (most / size)) : force;
-}
+bool has(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
 }  // namespace
 
@@ -61,7 +53,7 @@ bool is_sound(const PortState& state) noexcept {
 }
 
 Coupling::Coupling(const Config& config)
-    : config_(config), map_(config.map), spring_(spring_of(config)), purse_(purse_of(config, map_)) {
+    : config_(config), map_(config.map), spring_(spring_of(config, map_)), purse_(purse_of(config, map_)) {
   const auto refuse_of = [&](bool there, const char* field, PortRole only) {
     expect(!there || config.role == only, field, 1,
            only == PortRole::kLeader ? "none: only a leader has one" : "none: only a follower has one");
@@ -79,14 +71,33 @@ Coupling::Coupling(const Config& config)
   expect_above_zero(seconds(config.peer_period), "peer_period");
 }
 
+Vec3 Coupling::mapped(const Vec3& displacement) const noexcept {
+  return leads() ? map_.to_leader(displacement) : map_.to_follower(displacement);
+}
+
+Vec3 Coupling::coupled(const Vec3& vector) const noexcept {
+  return leads() ? map_.coupled_at_leader(vector) : map_.coupled_at_follower(vector);
+}
+
+Vec3 Coupling::bounded(const Vec3& force) const noexcept {
+  const double most = config_.spring.max_force;
+  const double size = force.stableNorm();
+  return size > most ? Vec3(force * (most / size)) : force;
+}
+
+bool Coupling::live() const noexcept { return phase_ == PortPhase::kEngaged && (!leads() || answered_); }
+double Coupling::account() const noexcept { return purse_ ? purse_->account() : 0; }
+bool Coupling::contact_measured() const noexcept { return newest_.contact_force.has_value(); }
+std::uint64_t Coupling::refused() const noexcept { return refused_; }
+
 void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
-  if (!is_sound(peer)) {
+  const bool ours = peer.answers_epoch == config_.spring.epoch;
+  if (!is_sound(peer) || (ours && peer.answers > sequence_)) {
     ++refused_;
     return;
   }
-  const bool new_epoch = peer.epoch > peer_.epoch;
-  if (!new_epoch && (peer.epoch < peer_.epoch || peer.sequence <= peer_.sequence)) return;
-  // Either all of a state is taken or nothing: purse and spring hear of the same epochs.
+  const bool anew = peer.epoch > newest_.epoch;
+  if (!anew && (peer.epoch < newest_.epoch || peer.sequence <= newest_.sequence)) return;
   if (purse_) {
     const std::uint64_t before = purse_->refused();
     purse_->receive(0, {.epoch = peer.epoch,
@@ -101,7 +112,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
       return;
     }
   }
-  const std::uint64_t before = spring_.refused();
+  // It refuses none of those that are left: either all of a state is taken or nothing.
   spring_.receive({.epoch = peer.epoch,
                    .sequence = peer.sequence,
                    .answers_epoch = peer.answers_epoch,
@@ -110,221 +121,211 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
                    .round_trip = peer.round_trip,
                    .position = mapped(peer.position),
                    .velocity = mapped(peer.velocity)});
-  if (spring_.refused() != before) {
-    ++refused_;
-    return;
+  if (anew) {
+    peer_anew_ = true;
+    gap_ = gap_before_ = Duration::zero();
+    stretch_began_ = now;
+  } else if (phase_ != PortPhase::kLost && phase_ != PortPhase::kAlone) {
+    if (now - stretch_began_ >= kGapsKept) {
+      stretch_began_ = now;
+      gap_before_ = std::exchange(gap_, Duration::zero());
+    }
+    gap_ = std::max(gap_, std::min(now - arrived_, kMostGap));
   }
-  if (new_epoch) {
-    begin_epoch(peer);
-  } else {
-    gap_ = std::max(gap_, std::min(now - peer_at_, kMostGap));
-  }
-  peer_ = peer;
-  peer_at_ = now;
-  const bool follows = phase_ == PortPhase::kCoupled || phase_ == PortPhase::kEngaged;
-  if (!leads() && !follows) seen_ = std::max(seen_, peer.engagement);
+  newest_ = peer;
+  arrived_ = now;
 }
 
-/// A peer that starts anew knows of no act, and the first act heard of may be an old one.
-void Coupling::begin_epoch(const PortState& peer) noexcept {
-  if (phase_ == PortPhase::kEngaged || phase_ == PortPhase::kClutched) leave(PortPhase::kCoupled);
-  seen_ = peer.engagement;
-  gap_ = gap_before_ = Duration::zero();
+Duration Coupling::patience() const noexcept {
+  return std::max({kStale, 3 * config_.peer_period, 2 * std::max(gap_, gap_before_)});
+}
+
+/// Whether the peer's newest state was made after it heard what we sent in that period.
+bool Coupling::heard_since(std::uint64_t sequence) const noexcept {
+  return newest_.answers_epoch == config_.spring.epoch && newest_.answers >= sequence;
+}
+
+/// Whether the peer is engaged by our act, and knows that it is ours.
+bool Coupling::peer_serves() const noexcept {
+  return newest_.answers_epoch == config_.spring.epoch && newest_.engagement == engagement_ &&
+         (newest_.phase == PortPhase::kEngaged || (!leads() && newest_.phase == PortPhase::kClutched));
+}
+
+bool Coupling::peer_is_ready() const noexcept {
+  return newest_.phase == PortPhase::kCoupled || newest_.phase == PortPhase::kEngaged ||
+         newest_.phase == PortPhase::kClutched;
+}
+
+void Coupling::leave(PortPhase to) noexcept {
+  phase_ = to;
+  answered_ = toggled_ = false;
 }
 
 bool Coupling::engage() noexcept {
   if (!leads()) return false;
-  if (phase_ == PortPhase::kEngaged || phase_ == PortPhase::kClutched) return true;
-  const bool peer_ready = peer_.phase == PortPhase::kCoupled || peer_.phase == PortPhase::kEngaged;
-  if (phase_ != PortPhase::kCoupled || !fresh() || !peer_ready) return false;
+  if (in_act()) return true;
+  if (phase_ != PortPhase::kCoupled || !fresh_ || !ready_ || !peer_is_ready()) return false;
+  leave(PortPhase::kEngaged);
   ++engagement_;
-  phase_ = PortPhase::kEngaged;
-  joined_ = wants_clutch_ = after_clutch_ = false;
+  act_sequence_ = sequence_ + 1;
   acted_at_ = now_;
+  u_.setZero();
   return true;
 }
 
 void Coupling::disengage() noexcept {
-  if (phase_ == PortPhase::kEngaged || phase_ == PortPhase::kClutched) leave(PortPhase::kCoupled);
-}
-
-Duration Coupling::stale_after() const noexcept {
-  return std::max({kStale, 3 * config_.peer_period, 2 * std::max(gap_, gap_before_)});
-}
-
-bool Coupling::peer_is_in_act() const noexcept {
-  const bool in = peer_.phase == PortPhase::kEngaged || (!leads() && peer_.phase == PortPhase::kClutched);
-  return in && peer_.engagement == engagement_;
-}
-
-void Coupling::watch(LocalTime now) noexcept {
-  elapsed_ = now_ == LocalTime{} ? Duration::zero() : std::max(now - now_, Duration::zero());
-  now_ = now;
-  age_ = heard() ? now - peer_at_ : Duration::zero();
-  if (now - stretch_began_ < kRecovery) return;
-  stretch_began_ = now;
-  gap_before_ = std::exchange(gap_, Duration::zero());
-}
-
-void Coupling::take_buttons(std::uint32_t buttons) noexcept {
-  const std::uint32_t pressed = buttons & ~std::exchange(buttons_, buttons);
-  const auto has = [](std::uint32_t set, std::uint32_t bit) { return (set >> bit & 1) != 0; };
-  if (config_.clutch) {
-    const Button& clutch = *config_.clutch;
-    if (!clutch.toggles) {
-      wants_clutch_ = has(buttons, clutch.bit);
-    } else if (has(pressed, clutch.bit)) {
-      wants_clutch_ = !wants_clutch_;
-    }
-  }
-  if (config_.engage_by && has(pressed, *config_.engage_by)) engage();
-}
-
-void Coupling::leave(PortPhase next) noexcept {
-  stop_living();
-  phase_ = next;
-  joined_ = after_clutch_ = false;
-  if (!leads() && next != PortPhase::kCoupled) seen_ = std::max(seen_, peer_.engagement);
-}
-
-void Coupling::stop_living() noexcept {
-  if (!std::exchange(live_, false)) return;
-  fading_ = fade_from_ = given_;
-  gain_ = 0;
-  u_velocity_.setZero();
+  if (in_act()) leave(PortPhase::kCoupled);
 }
 
 /// The table of phases; see the header.
-void Coupling::change_phase(bool ready) noexcept {
+void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcept {
+  elapsed_ = sequence_ > 0 ? std::max(now - now_, Duration::zero()) : Duration::zero();
+  now_ = now;
+  ready_ = ready;
+  ++sequence_;
+  const Duration age = heard() ? now - arrived_ : Duration::max();
+  fresh_ = age <= patience();
+  silent_ = age > patience() + kStale;
+  const bool gone = age > patience() + kLostAfter;
+  if (std::exchange(peer_anew_, false)) {
+    seen_ = 0;
+    if (in_act()) leave(PortPhase::kCoupled);
+  }
   if (!ready) {
-    if (phase_ != PortPhase::kFault) leave(PortPhase::kFault);
-    held_at_.reset();
-    return;
+    leave(PortPhase::kFault);
+  } else if (phase_ == PortPhase::kFault) {
+    phase_ = PortPhase::kAlone;
   }
-  if (phase_ == PortPhase::kFault) phase_ = PortPhase::kAlone;
-  const bool silent = !heard() || age_ > stale_after() + kLostAfter;
-  switch (phase_) {
-    case PortPhase::kAlone:
-      if (!silent) phase_ = PortPhase::kCoupled;
-      break;
-    case PortPhase::kLost:
-      if (fresh()) phase_ = PortPhase::kCoupled;
-      break;
-    case PortPhase::kCoupled:
-      if (silent) {
-        phase_ = PortPhase::kAlone;
-      } else if (!leads() && fresh() && peer_.phase == PortPhase::kEngaged && peer_.engagement > seen_) {
-        phase_ = PortPhase::kEngaged;
-        engagement_ = seen_ = peer_.engagement;
-      }
-      break;
-    case PortPhase::kEngaged:
-    case PortPhase::kClutched:
-      if (silent) {
-        leave(PortPhase::kLost);
-      } else if (peer_is_in_act()) {
-        joined_ = true;
-        if (leads()) phase_ = wants_clutch_ ? PortPhase::kClutched : PortPhase::kEngaged;
-      } else if (joined_ || !leads() || now_ - acted_at_ > kAnswerWithin) {
-        leave(PortPhase::kCoupled);
-      }
-      break;
-    case PortPhase::kAligning:
-    case PortPhase::kFault:
-      break;
+  if (phase_ == PortPhase::kAlone && fresh_) phase_ = PortPhase::kCoupled;
+  if (phase_ == PortPhase::kCoupled && gone) phase_ = PortPhase::kAlone;
+  if (in_act() && gone) {
+    leave(PortPhase::kLost);
+    lost_sequence_ = sequence_;
   }
-  if (phase_ == PortPhase::kClutched && live_) {
-    stop_living();
-    after_clutch_ = true;
+  if (phase_ == PortPhase::kLost && fresh_ && heard_since(lost_sequence_)) phase_ = PortPhase::kCoupled;
+  leads() ? advance_leader(buttons) : advance_follower();
+  buttons_ = buttons;
+}
+
+void Coupling::advance_leader(std::uint32_t buttons) noexcept {
+  const auto pressed = [&](std::uint32_t bit) { return has(buttons, bit) && !has(buttons_, bit); };
+  if (in_act()) {
+    if (peer_serves()) {
+      answered_ = true;
+    } else if (answered_ || !peer_is_ready() || heard_since(act_sequence_) || now_ - acted_at_ > kAnswerWithin) {
+      leave(PortPhase::kCoupled);
+    }
   }
+  if (config_.engage_by && pressed(*config_.engage_by)) engage();
+  if (!config_.clutch || !in_act()) return;
+  if (pressed(config_.clutch->bit)) toggled_ = !toggled_;
+  const bool clutched = config_.clutch->toggles ? toggled_ : has(buttons, config_.clutch->bit);
+  phase_ = clutched ? PortPhase::kClutched : PortPhase::kEngaged;
 }
 
-Vec3 Coupling::mapped(const Vec3& displacement) const noexcept {
-  return leads() ? map_.to_leader(displacement) : map_.to_follower(displacement);
+void Coupling::advance_follower() noexcept {
+  if (in_act() && !peer_serves()) leave(PortPhase::kCoupled);
+  const bool acted = newest_.phase == PortPhase::kEngaged || newest_.phase == PortPhase::kClutched;
+  const bool ours = newest_.answers_epoch == config_.spring.epoch;
+  if (phase_ == PortPhase::kCoupled && fresh_ && acted && ours && newest_.engagement > seen_) {
+    leave(PortPhase::kEngaged);
+    engagement_ = newest_.engagement;
+    new_act_ = true;
+  }
+  seen_ = std::max(seen_, newest_.engagement);
 }
 
-Vec3 Coupling::coupled(const Vec3& vector) const noexcept {
-  return leads() ? map_.coupled_at_leader(vector) : map_.coupled_at_follower(vector);
+/// Whether the law makes the force.
+bool Coupling::driven() const noexcept { return live() && (!silent_ || config_.holds_place); }
+
+/// p₀ follows the handle while u stands still, and the other way round.
+void Coupling::place(const Vec3& position) noexcept {
+  if (new_act_) u_ = mapped(newest_.position);
+  if (live() && was_live_ && !new_act_) {
+    u_ = position - offset_;
+  } else {
+    offset_ = position - u_;
+  }
+  was_live_ = live();
 }
 
-/// Keeps u as it is for the peer, or sets it to where the law has no force.
-void Coupling::live_on(const Vec3& position) noexcept {
-  const bool should = phase_ == PortPhase::kEngaged && joined_ && peer_is_in_act();
-  if (!should || live_) return;
-  live_ = true;
-  if (!std::exchange(after_clutch_, false)) u_ = mapped(peer_.position);
-  offset_ = position - u_;
-  gain_ = 0;
-}
-
-/// Of whole gain. The spring counts periods, so it is asked in each.
-Demand<3> Coupling::law(const Vec3& displacement, const Vec3& velocity) noexcept {
-  Demand<3> demand = spring_.command(displacement, velocity);
+/// Of whole gain, along the coupled axes. The spring counts periods, so it is asked in each.
+Demand<3> Coupling::law(const Vec3& velocity) noexcept {
+  const Vec3 speed = coupled(velocity);
+  Demand<3> demand = spring_.command(coupled(u_), speed);
   if (leads() && config_.method == CouplingMethod::kPositionForce) {
-    demand.force = shortened(
-        map_.force_to_leader(peer_.contact_force.value_or(Vec3::Zero())) - config_.spring.own_damping * velocity,
-        config_.spring.max_force);
+    const Vec3 contact = newest_.contact_force.value_or(Vec3::Zero());
+    demand.force = bounded(map_.force_to_leader(contact) - config_.spring.own_damping * speed);
     demand.stiffness.setZero();
   }
-  demand.force = coupled(demand.force);
   for (int i = 0; i < 3; ++i) demand.stiffness.col(i) = coupled(demand.stiffness.col(i));
   return demand;
 }
 
-/// A robot's own spring to the place where it is to stay. No network is in it, so its stiffness is whole.
-Vec3 Coupling::hold(const Motion& hand) noexcept {
-  if (!held_at_) held_at_ = hand.position;
-  const double stiffness = map_.stiffness_at_follower(config_.spring.stiffness);
-  const double damping = map_.stiffness_at_follower(config_.spring.own_damping);
-  return shortened(stiffness * (*held_at_ - hand.position) - damping * hand.velocity, config_.spring.max_force);
-}
-
-Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
-  watch(hand.at);
-  take_buttons(buttons);
-  change_phase(ready);
-  live_on(hand.position);
-  if (live_) {
-    u_ = hand.position - offset_;
-    u_velocity_ = hand.velocity;
-  }
-  Demand<3> demand = law(u_, u_velocity_);
-  const bool felt = live_ && (config_.holds_place || age_ <= stale_after() + kStale);
-  const double step = seconds(elapsed_) / seconds(felt ? config_.ramp : kFade);
-  gain_ = live_ ? std::clamp(gain_ + (felt ? step : -step), 0.0, 1.0) : 0;
+/// The law as far as its ramp has come, and the place of a robot as far as it has not. No network is between a robot and
+/// its place, so that spring has its whole stiffness.
+Demand<3> Coupling::blended(const Motion& hand) noexcept {
+  Demand<3> demand = law(hand.velocity);
   demand.force *= gain_;
   demand.stiffness *= gain_;
-  given_ = demand.force;
-
-  const double left = seconds(elapsed_) / seconds(kFade);
-  const double size = fading_.norm();
-  const double less = left * fade_from_.norm();
-  fading_ = size > less ? Vec3(fading_ * ((size - less) / size)) : Vec3(Vec3::Zero());
-  demand.force += fading_;
-  if (config_.holds_place && ready) {
-    if (gain_ < 1) {
-      demand.force += (1 - gain_) * hold(hand);
-    } else {
-      held_at_.reset();
-    }
-  }
-  if (!ready) return {Vec3::Zero() + 0 * hand.position};
+  if (!place_) return demand;
+  const double stiffness = map_.stiffness_at_follower(config_.spring.stiffness);
+  const double damping = map_.stiffness_at_follower(config_.spring.own_damping);
+  demand.force += (1 - gain_) * bounded(stiffness * (*place_ - hand.position) - damping * hand.velocity);
+  demand.stiffness += (1 - gain_) * stiffness * Mat3::Identity();
   return demand;
 }
 
-void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
-  watch(now);
-  change_phase(ready);
+Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
+  advance(hand.at, buttons, ready);
+  if (!within(hand.position) || !within(hand.velocity)) {
+    skip();
+    return {Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
+  }
+  place(hand.position);
+  u_velocity_ = live() ? hand.velocity : Vec3(Vec3::Zero());
+
+  const bool turned = driven() != was_driven_ || new_act_;
+  const bool ended = !driven() || (was_driven_ && new_act_);
+  was_driven_ = driven();
+  new_act_ = false;
+  if (turned || !driven()) gain_ = 0;
+  if (driven() && !turned) gain_ = std::min(1.0, gain_ + seconds(elapsed_) / seconds(config_.ramp));
+  if (phase_ == PortPhase::kFault || gain_ == 1) {
+    place_.reset();
+  } else if (config_.holds_place && (!place_ || (turned && ended))) {
+    place_ = hand.position;
+  }
+
+  Demand<3> demand = blended(hand);
+  fade_ = turned ? 1 : std::max(0.0, fade_ - seconds(elapsed_) / seconds(kFade));
+  if (phase_ == PortPhase::kFault) fade_ = 0;
+  if (turned) left_ = last_ - demand.force;
+  if (fade_ > 0) demand.force = bounded(demand.force + fade_ * left_);
+  last_ = demand.force;
+  return demand;
+}
+
+/// A period that has no position: no force, and the longer that is so, the more of the ramp is to be gone again.
+void Coupling::skip() noexcept {
+  spring_.command(coupled(u_), Vec3::Zero());
   u_velocity_.setZero();
-  law(u_, u_velocity_);
-  gain_ = 0;
-  given_.setZero();
-  fading_.setZero();
+  was_live_ = was_live_ && live();
+  was_driven_ = was_driven_ && driven();
+  last_.setZero();
+  const double share = seconds(elapsed_) / seconds(kFade);
+  gain_ = std::max(0.0, gain_ - share);
+  fade_ = std::max(0.0, fade_ - share);
+}
+
+void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
+  advance(now, buttons_, ready);
+  skip();
 }
 
 Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
   if (!purse_) return {};
-  const bool giving = live_ && phase_ == PortPhase::kEngaged && peer_.phase == PortPhase::kEngaged;
+  const bool giving = live() && !silent_ && newest_.phase == PortPhase::kEngaged;
   return purse_->settle({.payable = payable, .loss = loss, .elapsed = elapsed, .giving = giving});
 }
 
@@ -342,8 +343,8 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
   state.buttons = buttons_;
   state.position = u_;
   state.velocity = u_velocity_;
-  state.force = applied;
-  state.contact_force = contact;
+  if (within(applied)) state.force = applied;
+  if (contact && within(*contact)) state.contact_force = contact;
   if (purse_) {
     const PurseMessage paid = purse_->message(0);
     state.account = paid.account;
@@ -353,10 +354,5 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
   }
   return state;
 }
-
-bool Coupling::live() const noexcept { return live_; }
-double Coupling::account() const noexcept { return purse_ ? purse_->account() : 0; }
-bool Coupling::contact_measured() const noexcept { return peer_.contact_force.has_value(); }
-std::uint64_t Coupling::refused() const noexcept { return refused_; }
 
 }  // namespace tendon

@@ -27,50 +27,57 @@ namespace tendon {
 ///     send(coupling.message(applied, contact))
 ///
 /// **Displacements.** Each end has an offset p₀ and tells u = p − p₀, in its own axes. While an end is not *live* its u
-/// stands still, and p₀ moves with the handle. An end is live when it and its peer are engaged by the same act. On
-/// becoming live by an act u is set to the peer's u as mapped, so that the law's force is zero at that moment; after a
-/// clutch u goes on from where it stood, so that nothing moves at the other end, however often it is pressed.
+/// stands still, and p₀ moves with the handle. The leader is live while it is engaged and the follower has answered the
+/// act; the follower while it is engaged. The follower sets its u to the leader's as mapped when it becomes live, so that
+/// the law has no force at that moment; the leader's u begins each act at 0 and goes on from where it stood, after a
+/// clutch too. So nothing moves at the other end, however often the clutch is pressed.
 ///
 /// **Phases** (PortPhase), `ready` = the device is seen, armed and without fault:
 ///
-///     alone    → coupled   a state of the peer has come;  coupled → alone   none has for as long as the ladder says
+///     alone    → coupled   the peer is fresh;  coupled → alone   it is silent for as long as the last rung says
 ///     coupled  → engaged   leader: the act (engage(), or its button pressed), while ready and the peer is coupled,
-///                          engaged or clutched, and fresh. follower: ready, and the leader is engaged by an act that
-///                          is newer than any the follower has seen before
+///                          engaged or clutched, and fresh. follower: ready, the peer fresh, and engaged or clutched by
+///                          an act that is newer than any that the follower has heard of, in any phase, and that was
+///                          made for the follower's present epoch
 ///     engaged  → clutched  leader: its clutch is held (or toggled); the follower stays engaged and holds its place
 ///     clutched → engaged   leader: released
-///     engaged, clutched → coupled    disengage(); or the peer is not engaged or clutched by this act any more; or
-///                          (leader) the peer has not answered the act for kAnswerWithin
+///     engaged, clutched → coupled    disengage(); or the peer starts anew, or is not engaged or clutched by this act any
+///                          more; or (leader) the peer has heard the act and is not engaged by it, is not ready, or has
+///                          not answered for kAnswerWithin
 ///     engaged, clutched → lost       the ladder
-///     lost     → coupled   the peer is fresh again; engaged only by another act
+///     lost     → coupled   the peer is fresh again, and its state answers one of ours that said so: both ways work, and
+///                          no act that was made before it knew can engage us any more
 ///     any      → fault     not ready;  fault → coupled (alone, without a peer) when ready again
 ///
-/// The force of a port that becomes live is multiplied by a ramp 0 → 1 within `ramp`; one that stops being live, or is
-/// clutched, fades within kFade. (A cut by the limiter is faster.)
+/// The force of a port that becomes live is multiplied by a ramp 0 → 1 within `ramp`. Whenever what makes the force
+/// changes, what the force was before is faded out within kFade: no act, clutch, loss or takeover makes a step. A fault
+/// ends the force at once. (So does the limiter, when it has to.) Periods without a position lower the ramp as fast.
 ///
 /// **Ladder.** Age: how long ago the newest state came. v = max(3 periods of the peer, 20 ms, twice the longest gap
-/// of at most 100 ms between two newer states lately):
+/// of at most kMostGap between two newer states lately):
 ///
-///     age > v            the peer's velocity counts as zero
+///     age > v            the peer's velocity counts as zero (PositionPosition does so at 20 ms already)
 ///     age > v + 20 ms    the force fades within kFade; with `holds_place` (a robot) it stays: the last place is held
 ///     age > v + 250 ms   phase lost. Force zero; with `holds_place` the place where the TOOL is now is held
 ///
-/// A robot (`holds_place`) holds its place with its own spring whenever it is ready and not live.
+/// A robot (`holds_place`) holds the place where it stopped being live, with its own spring of whole K and B along all
+/// axes, whenever it is ready and not live; the ramp blends it with the law.
 ///
 /// A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is safe.
 ///
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
-/// law, with a K that does not adapt to the delay, because the leader has no spring; the leader's force is s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact
-/// (`contact_measured`).
-/// All forces of the coupling are bounded by max_force.
+/// law, with a K that does not adapt to the delay, because the leader has no spring; the leader's force is
+/// s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact (`contact_measured`). All forces of the coupling are bounded by max_force.
 ///
-/// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while it is live, not clutched. Its
-/// `joule` is the map's. Method position-position needs it for the pair to be passive; without it a limiter at each end
+/// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while both ends are live
+/// (clutched is not) and the peer is not silent. Its `joule` is the map's. Method position-position needs it for the pair to be passive; without it a limiter at each end
 /// keeps each by itself passive, and the follower cannot move.
 ///
-/// **Bad input.** A state with a value that is not finite or out of its bounds changes nothing and is counted in
-/// `refused`. A hand that is not finite gives a demand that is not finite, which the limiter turns to zero.
+/// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent, or
+/// that the purse refuses, changes nothing and is counted in `refused`. One that is not newer is passed over. A hand
+/// that is not finite, or beyond 10¹² m or m/s, gives a demand that is not finite, which the limiter turns to zero; it
+/// moves nothing else. A force or contact that is not finite is told as 0 or as not measured.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Coupling {
@@ -79,6 +86,8 @@ class Coupling {
   static constexpr Duration kAnswerWithin = std::chrono::seconds(5);
   static constexpr Duration kStale = std::chrono::milliseconds(20);  ///< least v, and from v to the second rung
   static constexpr Duration kLostAfter = std::chrono::milliseconds(250);
+  static constexpr Duration kMostGap = std::chrono::milliseconds(100);  ///< a longer one counts as this
+  static constexpr Duration kGapsKept = std::chrono::seconds(5);        ///< lately: the last one to two of these
 
   struct Button {
     std::uint32_t bit = 0;  ///< ≤ 31
@@ -131,21 +140,24 @@ class Coupling {
 
  private:
   bool leads() const noexcept { return config_.role == PortRole::kLeader; }
-  bool heard() const noexcept { return peer_.epoch > 0; }
-  bool fresh() const noexcept { return heard() && age_ <= stale_after(); }
-  bool peer_is_in_act() const noexcept;
-  Duration stale_after() const noexcept;
-  void begin_epoch(const PortState& peer) noexcept;
-  void watch(LocalTime now) noexcept;
-  void take_buttons(std::uint32_t buttons) noexcept;
-  void change_phase(bool ready) noexcept;
-  void leave(PortPhase next) noexcept;
-  void stop_living() noexcept;
-  void live_on(const Vec3& position) noexcept;
+  bool heard() const noexcept { return newest_.sequence > 0; }
+  bool in_act() const noexcept { return phase_ == PortPhase::kEngaged || phase_ == PortPhase::kClutched; }
+  bool heard_since(std::uint64_t sequence) const noexcept;
+  bool peer_serves() const noexcept;
+  bool peer_is_ready() const noexcept;
+  bool driven() const noexcept;
+  Duration patience() const noexcept;
+  void advance(LocalTime now, std::uint32_t buttons, bool ready) noexcept;
+  void advance_leader(std::uint32_t buttons) noexcept;
+  void advance_follower() noexcept;
+  void leave(PortPhase to) noexcept;
+  void place(const Vec3& position) noexcept;
+  void skip() noexcept;
+  Demand<3> law(const Vec3& velocity) noexcept;
+  Demand<3> blended(const Motion& hand) noexcept;
   Vec3 mapped(const Vec3& displacement) const noexcept;
   Vec3 coupled(const Vec3& vector) const noexcept;
-  Demand<3> law(const Vec3& displacement, const Vec3& velocity) noexcept;
-  Vec3 hold(const Motion& hand) noexcept;
+  Vec3 bounded(const Vec3& force) const noexcept;
 
   Config config_;
   PoseMap map_;
@@ -153,33 +165,40 @@ class Coupling {
   std::optional<Purse> purse_;
 
   PortPhase phase_ = PortPhase::kAlone;
+  std::uint64_t sequence_ = 0;    ///< periods
   std::uint64_t engagement_ = 0;  ///< of the newest act: made (leader), followed (follower)
   std::uint64_t seen_ = 0;        ///< follower: no act up to this one engages it any more
-  bool joined_ = false;           ///< leader: the follower has answered the act
-  bool wants_clutch_ = false;
-  bool after_clutch_ = false;  ///< u goes on from where it stood
-  bool live_ = false;
-  std::uint32_t buttons_ = 0;
-
-  PortState peer_;         ///< newest; epoch 0: none
-  LocalTime peer_at_{};    ///< when it came
-  Duration gap_{};         ///< longest between two newer states: of this stretch of kRecovery
-  Duration gap_before_{};  ///< … and of the one before
-  LocalTime stretch_began_{};
-  Duration age_{};
-  LocalTime now_{};
+  bool answered_ = false;         ///< leader: the follower is engaged by our act
+  bool toggled_ = false;
+  bool ready_ = false;
+  std::uint64_t act_sequence_ = 0;   ///< the first period that tells of our act
+  std::uint64_t lost_sequence_ = 0;  ///< the first period that tells of our loss
   LocalTime acted_at_{};
-  Duration elapsed_{};
+  std::uint32_t buttons_ = ~std::uint32_t{0};  ///< at first all: a button that was held all along is not pressed
+  LocalTime now_{};                            ///< of the newest period
+  Duration elapsed_{};                         ///< since the one before
+
+  PortState newest_;  ///< of the peer; sequence 0: none
+  LocalTime arrived_{};
+  bool peer_anew_ = false;  ///< it has another epoch than in the last period
+  Duration gap_{};          ///< longest between two newer states: of this stretch of kGapsKept
+  Duration gap_before_{};   ///< … and of the one before
+  LocalTime stretch_began_{};
+  bool fresh_ = false;
+  bool silent_ = false;  ///< the second rung
+  std::uint64_t refused_ = 0;
 
   Vec3 offset_ = Vec3::Zero();  ///< m, p₀
   Vec3 u_ = Vec3::Zero();       ///< m
   Vec3 u_velocity_ = Vec3::Zero();
-  double gain_ = 0;                ///< of the law, 0 … 1
-  Vec3 given_ = Vec3::Zero();      ///< N, of the law in this period, with its gain
-  Vec3 fading_ = Vec3::Zero();     ///< N, what is left of the law's force when it ended
-  Vec3 fade_from_ = Vec3::Zero();  ///< N, of that at its end
-  std::optional<Vec3> held_at_{};  ///< m: the place that a robot holds
-  std::uint64_t refused_ = 0;
+  bool was_live_ = false;
+  bool new_act_ = false;         ///< follower: this period is the first by its act
+  std::optional<Vec3> place_{};  ///< m: where a robot stays
+  bool was_driven_ = false;
+  double gain_ = 0;           ///< of the law
+  double fade_ = 0;           ///< of `left_`
+  Vec3 left_ = Vec3::Zero();  ///< N, by which the force was above the present one when what drives it changed
+  Vec3 last_ = Vec3::Zero();  ///< N, wanted last
 };
 
 }  // namespace tendon

@@ -10,7 +10,7 @@ namespace tendon {
 PoseMap::PoseMap(const Config& config)
     : position_scale_(config.position_scale),
       force_scale_(config.force_scale),
-      rotation_(matrix_of(config.rotation)),
+      rotation_(matrix_of(unit(config.rotation))),
       axes_(config.axes[0] ? 1 : 0, config.axes[1] ? 1 : 0, config.axes[2] ? 1 : 0) {
   const auto scale = [](double value, const char* field) {
     expect(value >= 0.01 && value <= 100, field, value, "0.01 to 100");

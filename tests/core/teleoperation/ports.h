@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/control/limiter.h"
+#include "core/ledger/energy_ledger.h"
+#include "core/teleoperation/coupling.h"
+#include "tests/core/teleoperation/link.h"
+#include "tests/core/teleoperation/pair.h"
+
+namespace tendon {
+
+/// One device with its coupling and its limiter: three bodies, one along each axis of its base frame.
+struct PortSetup {
+  Coupling::Config coupling{};
+  double mass = 0.075;
+  Friction friction{.coulomb = 0.02, .viscous = 0.26};
+  int every = 1;                         ///< ms
+  std::array<Surroundings, 3> around{};  ///< what holds it or what it runs into, along each axis
+  std::function<Vec3(double)> path{};    ///< t, s → m: the handle is led there and ignores forces
+  double encoder_step = 0;               ///< m; 0: exact
+  bool measures_contact = false;
+};
+
+/// The springs, purse and period that both ends of these tests have.
+inline Coupling::Config coupling_of(PortRole role) {
+  Coupling::Config config;
+  config.role = role;
+  config.spring = {.stiffness = 400, .own_damping = 4, .period = std::chrono::milliseconds(1)};
+  config.purse = Purse::Config{.max_power = 100, .max_account = 10};
+  return config;
+}
+
+class Port {
+ public:
+  explicit Port(const PortSetup& with) : setup(with), truth(with.friction) {
+    for (std::size_t i = 0; i < 3; ++i) bodies_.emplace_back(Body(with.mass, with.friction, with.around[i]));
+    begin(1);
+    if (setup.path) put(setup.path(0));
+  }
+
+  /// The server starts anew: nothing is left of coupling and account.
+  void begin(std::uint64_t epoch) {
+    auto config = setup.coupling;
+    config.spring.epoch = epoch;
+    config.spring.period = setup.every * std::chrono::milliseconds(1);
+    coupling.emplace(config);
+    LimiterConfig with{.law = Law::kAolPlus, .friction = setup.friction, .longest_hold = config.spring.period};
+    with.shared_account = true;
+    limiter.emplace(with);
+    applied.setZero();
+    speed_.setZero();
+  }
+
+  Vec3 x() const { return {bodies_[0].x, bodies_[1].x, bodies_[2].x}; }
+  Vec3 measured() const {
+    const double step = setup.encoder_step;
+    return step > 0 ? Vec3(step * (x() / step).array().round()) : x();
+  }
+  /// Of the surroundings on the tool.
+  Vec3 outside() const { return {bodies_[0].outside, bodies_[1].outside, bodies_[2].outside}; }
+
+  void put(const Vec3& x) {
+    for (int i = 0; i < 3; ++i) bodies_[static_cast<std::size_t>(i)].x = x[i];
+  }
+
+  static LocalTime at(int now) { return LocalTime(std::chrono::seconds(100) + std::chrono::milliseconds(now)); }
+
+  /// Everything of a period but the network: what came was received before.
+  PortState step(int now) {
+    const double length = setup.every * 1e-3;
+    const Duration held = setup.every * std::chrono::milliseconds(1);
+    if (began_) {
+      const Vec3 before = measured();
+      const Vec3 true_before = x();
+      if (setup.path) {
+        put(setup.path(now * 1e-3));
+      } else {
+        for (int i = 0; i < 3; ++i) {
+          bodies_[static_cast<std::size_t>(i)].advance(applied[i], now * 1e-3 - length, length);
+        }
+      }
+      const Vec3 dx = measured() - before;
+      speed_ = dx / length;
+      limiter->observe({applied, dx, held});
+      truth.observe(applied, Vec3(x() - true_before), held);
+    }
+    began_ = true;
+    least_account = std::min(least_account, limiter->payable());
+    if (seen) {
+      demand = coupling->command({at(now), measured(), speed_}, buttons, ready);
+    } else {
+      coupling->command_unseen(at(now), ready);
+      demand = {Vec3::Zero()};
+    }
+    const double loss = limiter->worst_loss(demand.force);
+    const Purse::Settlement settled = coupling->settle(limiter->payable(), loss, held);
+    limiter->credit(settled.credit);
+    limiter->withdraw(settled.withdraw);
+    paid = settled.withdraw;
+    const LimitedForce<3> limited = limiter->limit(demand);
+    applied = ready && seen ? limited.force : Vec3(Vec3::Zero());
+    cut = !limited.reasons.empty();
+    least_account = std::min(least_account, limiter->payable());
+    return coupling->message(applied, setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt);
+  }
+
+  PortSetup setup;
+  std::optional<Coupling> coupling;
+  std::optional<Limiter> limiter;
+  EnergyLedger truth;
+  std::uint32_t buttons = 0;
+  bool ready = true;
+  bool seen = true;
+  Demand<3> demand{Vec3::Zero()};
+  Vec3 applied = Vec3::Zero();
+  bool cut = false;
+  double paid = 0;  ///< J, in this period
+  double least_account = std::numeric_limits<double>::infinity();
+
+ private:
+  std::vector<Body> bodies_;
+  Vec3 speed_ = Vec3::Zero();
+  bool began_ = false;
+};
+
+/// Two ports and the network between them, in virtual time: a tick is 1 ms.
+class Ports {
+ public:
+  Ports(const PortSetup& of_leader, const PortSetup& of_follower, const Network& network_there,
+        const Network& network_back)
+      : leader(of_leader), follower(of_follower), there(network_there), back(network_back) {}
+  Ports(const PortSetup& of_leader, const PortSetup& of_follower)
+      : Ports(of_leader, of_follower, {.delay = 0, .seed = 1}, {.delay = 0, .seed = 2}) {}
+
+  /// `look(now)` after every tick.
+  template <class Look>
+  void run(int ticks, Look look) {
+    for (const int last = now + ticks; now < last; ++now) {
+      if (now % leader.setup.every == 0) turn(leader, back, there, cut_there, told_there);
+      if (now % follower.setup.every == 0) turn(follower, there, back, cut_back, told_back);
+      const auto& map = leader.setup.coupling.map;
+      const double joule = map.force_scale / map.position_scale;
+      least_sum = std::min(least_sum, leader.truth.energy() + joule * follower.truth.energy());
+      look(now);
+    }
+  }
+  void run(int ticks) {
+    run(ticks, [](int) {});
+  }
+
+  /// Until the leader is live by a new act; false when it is not within a second.
+  bool engage() {
+    run(50);
+    if (!leader.coupling->engage()) return false;
+    for (int i = 0; i < 1000 && !leader.coupling->live(); ++i) run(1);
+    return leader.coupling->live() && follower.coupling->live();
+  }
+
+  double least_account() const { return std::min(leader.least_account, follower.least_account); }
+
+  Port leader;
+  Port follower;
+  Link<PortState> there;  ///< leader → follower
+  Link<PortState> back;
+  bool cut_there = false;
+  bool cut_back = false;
+  PortState told_there{};  ///< newest sent
+  PortState told_back{};
+  int copies = 1;  ///< of each state that is sent
+  int now = 0;
+  double least_sum = 0;  ///< J, W_l + (s_f/s_x) W_f
+
+ private:
+  void turn(Port& port, Link<PortState>& in, Link<PortState>& out, bool cut, PortState& told) {
+    in.deliver(now, [&](const PortState& state) { port.coupling->receive(state, Port::at(now)); });
+    told = port.step(now);
+    for (int i = 0; i < copies && !cut; ++i) out.send(now, told);
+  }
+};
+
+/// J: accounts may be so far below zero, by rounding.
+inline constexpr double kRounding = -1e-9;
+
+}  // namespace tendon
