@@ -52,10 +52,22 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
       admission_({.keys = config.keys.size(), .max_observers = config.max_observers}),
       next_connection_id_(config.first_connection_id) {
   half_open_.reserve(config.max_half_open);
+  for (std::size_t i = 0; i < std::min(config.couplings.size(), devices_.size()); ++i) {
+    devices_[i].coupling = config.couplings[i];
+  }
   config_.secret = {};  // the doorman has taken what it needs
 }
 
 LocalTime NetworkLoop::turn(LocalTime now) {
+  if (!std::exchange(dials_, true)) {
+    for (Config::Dial& dial : config_.dials) {
+      const auto out = [this](LocalTime at, const Address& to, std::span<const std::byte> datagram) {
+        send(at, kGuest, to, datagram);
+      };
+      dialled_.push_back({dial.device, std::make_unique<Peer>(dial.peer, out, now)});
+      dial.peer.seed = {};
+    }
+  }
   // The newest states leave first: a state waits for no system call.
   publish(now);
   const bool more = drain(now);
@@ -70,8 +82,8 @@ LocalTime NetworkLoop::turn(LocalTime now) {
   stats_.half_open_forgotten +=
       std::erase_if(half_open_, [&](const Guest& guest) { return now - guest.arrived >= config_.half_open_timeout; });
 
+  LocalTime next = turn_peers(now);
   if (more) return now;
-  LocalTime next = LocalTime::max();
   for (const Guest& guest : guests_) next = std::min(next, guest.session.next_tick());
   return next;
 }
@@ -100,6 +112,7 @@ void NetworkLoop::receive(LocalTime now, const Address& from, std::span<const st
   };
   const auto header = decode_header(datagram);
   if (header && header->type == DatagramType::kHello) return greet(now, from, datagram);
+  if (receive_of_peer(now, from, datagram)) return tap_from(kGuest);
   if (!header || header->type != DatagramType::kData) {
     ++stats_.malformed;
     return tap_from(kStranger);
@@ -205,6 +218,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 contains(welcome.features, kFeatureDiagnostics),
                 contains(welcome.features, kFeatureHandle),
                 contains(welcome.features, kFeatureJoints),
+                contains(welcome.features, kFeatureTeleoperation),
                 std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},
@@ -350,6 +364,7 @@ void leave_out_handle(DeviceState& state) {
 
 void NetworkLoop::publish(LocalTime now) {
   for (std::uint32_t number = 0; number < devices_.size(); ++number) {
+    if (devices_[number].coupling) publish_port(now, number);
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
@@ -357,7 +372,7 @@ void NetworkLoop::publish(LocalTime now) {
     leave_out_what_no_frame_carries(all);
     for (Guest& guest : guests_) {
       View* const view = view_of(guest, number);
-      if (view == nullptr) continue;
+      if (view == nullptr || (guest.coupled && guest.coupled->device == number)) continue;
       if (guest.sees_handle) view->pressed |= state->buttons;
       const std::uint64_t one_in = guest.adaptation ? guest.adaptation->one_in() : 1;
       if (state->tick - view->last_state < std::max(view->state_every, one_in)) continue;
@@ -386,6 +401,7 @@ void NetworkLoop::take_events(LocalTime now, Guest& guest) {
   while (const auto event = guest.session.next_event()) {
     std::visit(Overloaded{
                    [&](const Session::ForceArrived& arrived) { take_force(now, guest, arrived.command); },
+                   [&](const Session::PortArrived& arrived) { take_port(now, guest, arrived.port); },
                    [&](const Session::RequestArrived& arrived) { answer(now, guest, arrived.id, arrived.request); },
                    [&](const Session::Closed& closed) {
                      if (closed.code == Code::kTimedOut) ++stats_.timed_out;
@@ -452,6 +468,54 @@ void NetworkLoop::take_force(LocalTime now, Guest& guest, const ForceCommand& co
   ++stats_.forces;
 }
 
+/// The other end of a device, while its client holds the channel.
+void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) {
+  const bool coupled = guest.coupled && guest.coupled->device == port.device && guest.coupled->channel == port.channel;
+  if (!coupled || leases_.holder(port.device, port.channel) != guest.id()) {
+    ++stats_.denied;
+    return;
+  }
+  leases_.renew(now, port.device, port.channel);
+  devices_[port.device].mail->port_in.put(port);
+}
+
+/// Our end of a coupling goes to whoever has the other one.
+void NetworkLoop::publish_port(LocalTime now, std::uint32_t device) {
+  const PortState* const port = devices_[device].mail->port_out.take();
+  if (port == nullptr) return;
+  for (const Dialled& dialled : dialled_) {
+    if (dialled.device == device) dialled.peer->send(now, *port);
+  }
+  for (Guest& guest : guests_) {
+    if (guest.gone || !guest.coupled || guest.coupled->device != device) continue;
+    PortFrame frame;
+    static_cast<PortState&>(frame) = *port;
+    frame.device = device;
+    frame.channel = guest.coupled->channel;
+    guest.session.send(frame);
+  }
+}
+
+/// Whether the datagram is of a server that this one has dialled.
+bool NetworkLoop::receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram) {
+  for (Dialled& dialled : dialled_) {
+    if (!dialled.peer->is_from_server(from, datagram)) continue;
+    dialled.peer->receive(now, from, datagram);
+    if (const auto port = dialled.peer->take()) devices_[dialled.device].mail->port_in.put(*port);
+    return true;
+  }
+  return false;
+}
+
+LocalTime NetworkLoop::turn_peers(LocalTime now) {
+  LocalTime next = LocalTime::max();
+  for (Dialled& dialled : dialled_) {
+    next = std::min(next, dialled.peer->turn(now));
+    for (Peer::Notice& said : dialled.peer->take_notices()) notice(said.warning, std::move(said.text));
+  }
+  return next;
+}
+
 /// Notices the forces that the session has refused. A refused force names no channel, so it counts for every channel
 /// that the guest holds.
 void NetworkLoop::take_refused(Guest& guest) {
@@ -497,6 +561,7 @@ void NetworkLoop::leave(Guest& guest, const std::string& how) {
 }
 
 void NetworkLoop::close(LocalTime now) {
+  for (Dialled& dialled : dialled_) dialled.peer->close(now);
   for (Guest& guest : guests_) {
     guest.session.close(Code::kShutdown, "the server is going down");
     send_all(now, guest);

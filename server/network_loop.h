@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +18,7 @@
 #include "server/guests/admission.h"
 #include "server/guests/guest.h"
 #include "server/guests/leases.h"
+#include "server/guests/peer.h"
 #include "server/guests/reports.h"
 #include "server/mailboxes.h"
 #include "server/recording/datagram_sieve.h"
@@ -53,6 +55,14 @@ class NetworkLoop {
     /// What guests are told of each device; its number is its place, `holder` does not count.
     std::vector<DeviceDescription> devices{};
     std::vector<HandleDescription> handles{};  ///< likewise; fewer: of the others nothing is known
+    /// Likewise; empty: that device is not to be coupled.
+    std::vector<std::optional<Couple>> couplings{};
+    /// The servers that this one dials.
+    struct Dial {
+      std::uint32_t device = 0;  ///< ours
+      Peer::Config peer;
+    };
+    std::vector<Dial> dials{};
     /// Clients that need not wait for the end of a lease: the names of their keys, without keys their own.
     std::vector<std::string> takeover{};
     /// Each costs a state datagram of some 250 bytes per haptic step. Where there are several keys, one key has at most
@@ -152,6 +162,10 @@ class NetworkLoop {
   void open(LocalTime now, Guest guest);
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
+  void take_port(LocalTime now, Guest& guest, const PortFrame& port);
+  bool receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram);
+  LocalTime turn_peers(LocalTime now);
+  void publish_port(LocalTime now, std::uint32_t device);
   void take_refused(Guest& guest);
   void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);
@@ -179,6 +193,13 @@ class NetworkLoop {
   Reports reports_;
   std::vector<Guest> guests_;
   std::vector<Guest> half_open_;  ///< oldest first
+  /// A server that this one dials, and for which of its devices.
+  struct Dialled {
+    std::uint32_t device;
+    std::unique_ptr<Peer> peer;
+  };
+  std::vector<Dialled> dialled_;
+  bool dials_ = false;
   std::uint32_t next_connection_id_;
 
   Stats stats_;

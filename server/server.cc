@@ -13,6 +13,7 @@
 #include "core/base/frames.h"
 #include "server/build_info.h"
 #include "server/device_factory.h"
+#include "server/guests/couple.h"
 #include "server/machine/clock.h"
 #include "server/machine/log.h"
 #include "server/machine/randomness.h"
@@ -189,6 +190,22 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
     config.devices.push_back(description_of(runtime->scene, info));
     config.handles.push_back(handle_of(runtime->scene, info));
   }
+  for (std::uint32_t number = 0; number < devices.size(); ++number) {
+    const Scene& of_device = devices[number]->scene;
+    auto& coupling = config.couplings.emplace_back();
+    if (!of_device.teleoperation) continue;
+    coupling = couple_of(*of_device.loop.control.coupling);
+    const Scene::Teleoperation& peer = *of_device.teleoperation;
+    if (!peer.dial) continue;
+    Peer::Config dialled{.server = *peer.dial,
+                         .name = of_device.name,
+                         .device = peer.device,
+                         .channel = peer.channel,
+                         .couple = *coupling};
+    if (peer.key) dialled.key = read_key(*peer.key).key;
+    fill_random(dialled.seed.bytes);
+    config.dials.push_back({number, dialled});
+  }
   config.takeover = scene.network.takeover;
   config.max_observers = scene.network.max_observers;
   config.controller_timeout = scene.network.controller_timeout;
@@ -338,6 +355,7 @@ void Server::drain_to_recorder(LocalTime now) {
       // The haptic thread pushes what the coupling did before the step.
       for (const PortRecord* port = runtime.mail.ports.front(); port != nullptr && port->tick <= step->tick;
            port = runtime.mail.ports.front()) {
+        report_phase(runtime, port->sent.phase);
         if (recorder_) recorder_->record(*port, device);
         runtime.mail.ports.pop();
       }
@@ -425,6 +443,14 @@ void Server::report_counts(DeviceRuntime& runtime) {
     log::warn(prefix(runtime) + std::string(row.name) + ": " + std::to_string(now[row.count] - before[row.count]) +
               " more (" + std::string(row.meaning) + ")");
   }
+}
+
+/// Says where its end of a coupling stands, when that has changed.
+void Server::report_phase(DeviceRuntime& runtime, PortPhase phase) {
+  if (std::exchange(runtime.told_phase, phase) == phase) return;
+  const bool trouble = phase == PortPhase::kLost || phase == PortPhase::kFault;
+  const std::string text = prefix(runtime) + "teleoperation: " + std::string(to_string(phase));
+  trouble ? log::warn(text) : log::info(text);
 }
 
 void Server::report_trouble(DeviceRuntime& runtime) {

@@ -95,6 +95,7 @@ class Server {
     DeviceCounts told_counts;
     std::uint64_t told_steps_lost = 0;
     std::uint64_t told_ports_lost = 0;
+    PortPhase told_phase = PortPhase::kAlone;
   };
   using DeviceRuntimes = std::vector<std::unique_ptr<DeviceRuntime>>;
 
@@ -112,6 +113,7 @@ class Server {
   void tell_of_recording();
   void report_health(LocalTime now, DeviceRuntime& runtime);
   void report_counts(DeviceRuntime& runtime);
+  void report_phase(DeviceRuntime& runtime, PortPhase phase);
   void report_trouble(DeviceRuntime& runtime);
   void report_safety(DeviceRuntime& runtime);
   void save_flight(DeviceRuntime& runtime);

@@ -40,6 +40,26 @@ bool has(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >>
 
 }  // namespace
 
+std::string_view to_string(PortPhase phase) noexcept {
+  switch (phase) {
+    case PortPhase::kAlone:
+      return "alone: nothing is heard of the other end";
+    case PortPhase::kCoupled:
+      return "coupled: waits for the leader's act";
+    case PortPhase::kAligning:
+      return "aligning";
+    case PortPhase::kEngaged:
+      return "engaged";
+    case PortPhase::kClutched:
+      return "clutched";
+    case PortPhase::kLost:
+      return "lost: the other end fell silent";
+    case PortPhase::kFault:
+      return "waits until its device gives forces";
+  }
+  return "unknown";
+}
+
 bool is_sound(const PortState& state) noexcept {
   constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
   constexpr double kAccount = PurseMessage::kMostAccount;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "core/base/motion.h"
 #include "core/base/time.h"
@@ -20,6 +21,9 @@ enum class PortPhase : std::uint8_t {
   kLost,       ///< was engaged, and its peer fell silent; never engaged again without an act
   kFault,      ///< its device is not armed, disarmed or has a fault: no force
 };
+
+/// For people: "engaged"; with what is waited for.
+std::string_view to_string(PortPhase phase) noexcept;
 
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 

@@ -51,6 +51,7 @@ struct Guest {
   bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
   bool sees_handle;         ///< … and kFeatureHandle
   bool sees_joints;         ///< … and kFeatureJoints
+  bool may_couple;          ///< … and kFeatureTeleoperation
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost
@@ -63,6 +64,7 @@ struct Guest {
   RefusedForces refused{};           ///< since its session opened
   RefusedForces refused_told{};      ///< … as of the newest report
   bool hopeless = false;             ///< as it was told to the operator
+  std::optional<Seat> coupled{};     ///< its device is the other end of this one
   bool gone = false;                 ///< it has left, and is forgotten at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
@@ -100,8 +102,9 @@ struct ServedDevice {
   Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
-  std::optional<Health> told{};  ///< to observers, last; empty before there was any
-  std::uint64_t reports = 0;     ///< told so far
+  std::optional<Couple> coupling{};  ///< what our end is like; empty: it is not to be coupled
+  std::optional<Health> told{};      ///< to observers, last; empty before there was any
+  std::uint64_t reports = 0;         ///< told so far
 };
 
 /// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of

@@ -10,6 +10,8 @@
 #include <utility>
 #include <variant>
 
+#include "server/guests/couple.h"
+
 namespace tendon {
 
 namespace {
@@ -39,6 +41,9 @@ Outcome order(const Asker& asker, std::uint32_t device, HapticOrder::Kind kind, 
 }
 
 Outcome rearm(LocalTime /*now*/, const Asker& asker, const Rearm& wanted) {
+  if (asker.guest.coupled && asker.guest.coupled->device == wanted.device) {
+    return {.code = Code::kDenied, .detail = "each end of a coupling is armed at its own place"};
+  }
   return order(asker, wanted.device, HapticOrder::Kind::kRearm, "rearmed");
 }
 
@@ -79,6 +84,41 @@ Outcome give_lease(LocalTime /*now*/, const Asker& asker, const GiveLease& given
 
 Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /*news*/) {
   return {.code = Code::kUnsupported, .detail = "that is the server's to say"};
+}
+
+/// A device has one other end: the client that was first.
+Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
+  if (!asker.guest.may_couple) {
+    return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature teleoperation"};
+  }
+  const ServedDevice& device = asker.devices[theirs.device];
+  if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+  for (const Guest& guest : asker.guests) {
+    if (guest.gone || guest.id() == asker.guest.id()) continue;
+    if (guest.coupled && guest.coupled->device == theirs.device) {
+      return {.code = Code::kBusy, .detail = "it is coupled with \"" + guest.name + "\""};
+    }
+  }
+  std::string difference = first_difference(theirs, *device.coupling);
+  if (!difference.empty()) return {.code = Code::kInvalid, .detail = std::move(difference)};
+  asker.guest.coupled = Seat{.device = theirs.device, .channel = theirs.channel, .role = Role::kController};
+  return {.warning = "coupled with \"" + asker.guest.name + "\""};
+}
+
+Outcome engage(LocalTime /*now*/, const Asker& asker, const Engage& wanted) {
+  const auto& coupling = asker.devices[wanted.device].coupling;
+  if (!coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+  if (coupling->role != PortRole::kLeader) {
+    return {.code = Code::kUnsupported, .detail = "this device is the follower: the leader engages"};
+  }
+  return order(asker, wanted.device, HapticOrder::Kind::kEngage, "told to engage");
+}
+
+Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted) {
+  if (!asker.devices[wanted.device].coupling) {
+    return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+  }
+  return order(asker, wanted.device, HapticOrder::Kind::kDisengage, "told to disengage");
 }
 
 /// Who may ask.
@@ -137,6 +177,9 @@ constexpr std::array kRequests = {
     row<GiveLease, From::kClaimants, give_lease>("give a lease"),
     row<LeaseLost, From::kAnybody, lease_lost>("lose a lease"),
     row<SetStateDeadband, From::kAnybody, set_state_deadband>("set the state deadband"),
+    row<Couple, From::kClaimants, couple>("couple a device"),
+    row<Engage, From::kControllers, engage>("engage a coupling"),
+    row<Disengage, From::kControllers, disengage>("disengage a coupling"),
 };
 static_assert(kRequests.size() == std::variant_size_v<Request>);
 constexpr bool in_order() {

@@ -32,23 +32,6 @@ struct Descriptor {
   int fd;
 };
 
-ClientKey read_one(const std::filesystem::path& path) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  struct stat status {};
-  std::string text(kMaxKeyFile, '\0');
-  const ssize_t size = file.fd < 0 || ::fstat(file.fd, &status) != 0 ? -1 : ::read(file.fd, text.data(), text.size());
-  if (size < 0) throw std::runtime_error(path.string() + ": cannot read it: " + system_message());
-  if (const auto reason = why_not_regular(status.st_mode)) {
-    throw std::runtime_error(path.string() + ": cannot read it: " + *reason);
-  }
-  text.resize(static_cast<std::size_t>(size));
-  try {
-    return read_key_file(text, status.st_mode, path.stem().string());
-  } catch (const std::invalid_argument& refused) {
-    throw std::runtime_error(path.string() + ": " + refused.what());
-  }
-}
-
 /// False, with errno, when not all of `text` could be written.
 bool write_whole(int descriptor, std::string_view text) {
   while (!text.empty()) {
@@ -70,6 +53,23 @@ bool give_name(const std::string& from, const std::filesystem::path& to) {
 
 }  // namespace
 
+ClientKey read_key(const std::filesystem::path& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat status {};
+  std::string text(kMaxKeyFile, '\0');
+  const ssize_t size = file.fd < 0 || ::fstat(file.fd, &status) != 0 ? -1 : ::read(file.fd, text.data(), text.size());
+  if (size < 0) throw std::runtime_error(path.string() + ": cannot read it: " + system_message());
+  if (const auto reason = why_not_regular(status.st_mode)) {
+    throw std::runtime_error(path.string() + ": cannot read it: " + *reason);
+  }
+  text.resize(static_cast<std::size_t>(size));
+  try {
+    return read_key_file(text, status.st_mode, path.stem().string());
+  } catch (const std::invalid_argument& refused) {
+    throw std::runtime_error(path.string() + ": " + refused.what());
+  }
+}
+
 std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder) {
   std::error_code problem;
   std::vector<std::filesystem::path> files;
@@ -85,7 +85,7 @@ std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder) {
   }
   std::sort(files.begin(), files.end());
   std::vector<ClientKey> keys;
-  for (const std::filesystem::path& file : files) keys.push_back(read_one(file));
+  for (const std::filesystem::path& file : files) keys.push_back(read_key(file));
   return keys;
 }
 

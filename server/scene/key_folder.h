@@ -13,6 +13,9 @@ namespace tendon {
 /// readable by others, no regular file, no key file, or weak.
 std::vector<ClientKey> read_key_folder(const std::filesystem::path& folder);
 
+/// The key of one file, with the name of the file as its own; throws likewise.
+ClientKey read_key(const std::filesystem::path& file);
+
 /// Writes a new key file that only its owner may read. Throws std::runtime_error when it cannot, or when there is such
 /// a file already; nothing is left behind then: the key is written under another name first.
 void write_key_file(const std::filesystem::path& file, const ClientKey& key);

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/guests/couple.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/expect.h"
+#include "core/base/rotation.h"
+
+namespace tendon {
+namespace {
+
+/// Of relative size: what writing a scene twice cannot do.
+constexpr double kAlike = 1e-9;
+
+bool alike(double a, double b) { return std::abs(a - b) <= kAlike * std::max(std::abs(a), std::abs(b)); }
+
+std::string name(PortRole role) { return role == PortRole::kLeader ? "leader" : "follower"; }
+std::string name(CouplingMethod method) {
+  return method == CouplingMethod::kPositionPosition ? "position-position" : "position-force";
+}
+std::string name(bool there) { return there ? "true" : "false"; }
+std::string name(double value) { return shortest(value); }
+std::string axes(std::uint32_t bits) {
+  std::string text;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    if ((bits >> axis & 1) != 0) text += "xyz"[axis];
+  }
+  return text;
+}
+
+std::string differ(const std::string& key, const std::string& yours, const std::string& mine) {
+  return key + ": yours " + yours + ", mine " + mine;
+}
+
+}  // namespace
+
+Couple couple_of(const Coupling::Config& config) {
+  Couple couple;
+  couple.role = config.role;
+  couple.method = config.method;
+  couple.position_scale = config.map.position_scale;
+  couple.force_scale = config.map.force_scale;
+  couple.rotation = config.map.rotation;
+  couple.axes = 0;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) couple.axes |= config.map.axes[axis] ? 1U << axis : 0U;
+  couple.stiffness = config.spring.stiffness;
+  couple.mutual_damping = config.spring.damping;
+  couple.damping = config.spring.own_damping;
+  couple.adapt_to_delay = config.spring.adapt_to_delay;
+  couple.purse = config.purse.has_value();
+  couple.period = config.spring.period;
+  return couple;
+}
+
+std::string first_difference(const Couple& theirs, const Couple& mine) {
+  if (theirs.role == mine.role) return "role: yours and mine " + name(mine.role) + ", expected one of each";
+  if (theirs.method != mine.method) return differ("method", name(theirs.method), name(mine.method));
+  struct Row {
+    const char* key;
+    double Couple::*value;
+  };
+  constexpr Row kRows[] = {{"map.position_scale", &Couple::position_scale},
+                           {"map.force_scale", &Couple::force_scale},
+                           {"coupling.stiffness_n_per_m", &Couple::stiffness},
+                           {"coupling.damping_n_s_per_m", &Couple::damping},
+                           {"coupling.mutual_damping_n_s_per_m", &Couple::mutual_damping}};
+  for (const Row& row : kRows) {
+    const double yours = theirs.*row.value;
+    if (!alike(yours, mine.*row.value)) return differ(row.key, name(yours), name(mine.*row.value));
+  }
+  if (turn_between(theirs.rotation, mine.rotation).norm() > kAlike) {
+    const auto degrees = [](const Quat& q) {
+      const Vec3 turn = rotation_vector(q) * (180 / 3.14159265358979323846);
+      return "[" + rounded(turn.x(), 6) + ", " + rounded(turn.y(), 6) + ", " + rounded(turn.z(), 6) + "]";
+    };
+    return differ("map.rotation_deg", degrees(theirs.rotation), degrees(mine.rotation));
+  }
+  if (theirs.axes != mine.axes) return differ("map.axes", axes(theirs.axes), axes(mine.axes));
+  if (theirs.adapt_to_delay != mine.adapt_to_delay) {
+    return differ("coupling.adapt_to_delay", name(theirs.adapt_to_delay), name(mine.adapt_to_delay));
+  }
+  if (theirs.purse != mine.purse) return differ("purse", name(theirs.purse), name(mine.purse));
+  return {};
+}
+
+}  // namespace tendon
