@@ -25,6 +25,7 @@ from .messages import (
     LinkReport,
     LinkStats,
     PeerReport,
+    PortState,
     Request,
 )
 from .replay_window import ReplayWindow
@@ -277,6 +278,8 @@ class Session:
                 return
             self._newest_diagnosis[stream] = number
             self._diagnoses_arrived[stream] = frame
+        elif isinstance(frame, PortState):
+            pass  # for a client that has said Couple
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):
