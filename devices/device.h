@@ -87,10 +87,10 @@ class Device {
   /// Samples the position. Empty when the device did not answer.
   virtual std::optional<PositionSample> read(LocalTime now) noexcept = 0;
 
-  /// The joints of `info().joints` at the sample that `read` has just given, and how fast each turns while the handle
-  /// moves at `velocity` (m/s). Near a singular pose these speeds grow beyond all bounds. Called for a device that names
+  /// The joints of `info().joints` at `hand`, which is at the sample that `read` has just given, and how fast each turns
+  /// while the handle moves at that velocity. Near a singular pose these speeds grow beyond all bounds. Called for a device that names
   /// joints only. Realtime-safe.
-  virtual Joints joints(const Vec3& /*velocity*/) const noexcept { return {}; }
+  virtual Joints joints(const Motion& /*hand*/) const noexcept { return {}; }
 
   /// Commands `force` (N, on the hand) and returns **the force really written**, after every clamp and rounding of the
   /// device. The device holds it until the next `apply`, or until its own watchdog ends it. The energy ledger counts

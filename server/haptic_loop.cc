@@ -162,7 +162,7 @@ void HapticLoop::take_rest(const PositionSample& sample, const Motion& hand, Ste
   }
   if (!rest_->has_joints) return;
   if (!record.handle) record.handle.emplace();
-  record.handle->joints = device_.joints(hand.velocity);
+  record.handle->joints = device_.joints(hand);
 }
 
 void HapticLoop::command(StepRecord& record) noexcept {

@@ -98,8 +98,8 @@ std::optional<PositionSample> FalconDevice::read(LocalTime now) noexcept {
                         .buttons = newest_->buttons};
 }
 
-Joints FalconDevice::joints(const Vec3& velocity) const noexcept {
-  return pose_ ? Joints::three(pose_->angles, pose_->jacobian * velocity) : Joints{};
+Joints FalconDevice::joints(const Motion& hand) const noexcept {
+  return pose_ ? Joints::three(pose_->angles, pose_->jacobian * hand.velocity) : Joints{};
 }
 
 void FalconDevice::receive() noexcept {

@@ -124,7 +124,7 @@ class SafeDevice final : public Device {
   SafeDevice(const Config& config, Device& device);
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  Joints joints(const Vec3& velocity) const noexcept override { return device_.joints(velocity); }
+  Joints joints(const Motion& hand) const noexcept override { return device_.joints(hand); }
   State state() const noexcept override { return device_.state(); }
   DeviceCounts counts() const noexcept override { return device_.counts(); }
   void arm() noexcept override;

@@ -152,4 +152,14 @@ JointFriction::Slide JointFriction::step(const Vec3& position, const Vec3& v0, c
   return slide;
 }
 
+Joints JointFriction::at(const Motion& hand) const noexcept {
+  const Vec3 position = hand.position - centre_;
+  return Joints::three(mechanism_.angles(position), mechanism_.jacobian(position) * hand.velocity);
+}
+
+void JointFriction::name(std::vector<std::string>& joints) const {
+  const auto names = mechanism_.joints();
+  joints.assign(names.begin(), names.end());
+}
+
 }  // namespace tendon

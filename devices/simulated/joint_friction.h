@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "core/base/motion.h"
 #include "core/ledger/friction.h"
 #include "devices/simulated/mechanism.h"
@@ -37,9 +40,10 @@ class JointFriction {
   /// stays there.
   Friction least_at(const Vec3& position) const noexcept;
 
-  const Mechanism& mechanism() const noexcept { return mechanism_; }
-  /// m, where the middle of the mechanism's workspace is, device base frame.
-  const Vec3& centre() const noexcept { return centre_; }
+  /// The joints of the mechanism, while the handle is where `hand` says.
+  Joints at(const Motion& hand) const noexcept;
+  /// Writes their names.
+  void name(std::vector<std::string>& joints) const;
 
   /// The torques (N·m) with which the least Coulomb friction anywhere is `coulomb` (N). They turn a handle's friction
   /// into friction of this mechanism's joints when nothing else is known about it.

@@ -108,10 +108,7 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
            .position_resolution = config_.encoder_step.value_or(0),
            .watchdog = config_.watchdog.value_or(Duration::zero())};
-  if (joints_) {
-    const auto names = joints_->mechanism().joints();
-    info_.joints.assign(names.begin(), names.end());
-  }
+  if (joints_) joints_->name(info_.joints);
   if (config_.rotation) {
     info_.measures_orientation = true;
     info_.max_torque = config_.rotation->max_torque.value_or(0);
@@ -140,7 +137,9 @@ std::optional<PositionSample> SimulatedDevice::read(LocalTime now) noexcept {
     last_read_ = now;
     settle_energies();
   }
-  PositionSample sample{now, sensed_position(), {}};
+  PositionSample sample{now, truth_.position, {}};
+  if (config_.structural_mode) sample.position += truth_.deflection;
+  if (config_.encoder_step) sample.position = counted(sample.position, *config_.encoder_step);
   if (config_.force_sensor) sample.hand_force = sensed_force();
   if (config_.button_after) sample.buttons = lived_ >= *config_.button_after ? 1 : 0;
   if (has_more_) sense_more(sample);
@@ -159,20 +158,6 @@ void SimulatedDevice::sense_more(PositionSample& sample) const noexcept {
   sample.buttons |= pressed();
   if (rotation_) sample.orientation = rotation_->sample();
   if (gripper_) sample.opening = gripper_->sample();
-}
-
-Vec3 SimulatedDevice::sensed_position() const noexcept {
-  Vec3 position = truth_.position;
-  if (config_.structural_mode) position += truth_.deflection;
-  if (config_.encoder_step) position = counted(position, *config_.encoder_step);
-  return position;
-}
-
-Joints SimulatedDevice::joints(const Vec3& velocity) const noexcept {
-  if (!joints_) return {};
-  const Vec3 position = sensed_position() - joints_->centre();
-  const Mechanism& mechanism = joints_->mechanism();
-  return Joints::three(mechanism.angles(position), mechanism.jacobian(position) * velocity);
 }
 
 Vec3 SimulatedDevice::sensed_force() const noexcept {

@@ -166,7 +166,7 @@ class SimulatedDevice final : public Device {
   /// Always answers.
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   /// Of a device with `joint_friction`: those of its mechanism, at the position that `read` gave.
-  Joints joints(const Vec3& velocity) const noexcept override;
+  Joints joints(const Motion& hand) const noexcept override { return joints_ ? joints_->at(hand) : Joints{}; }
 
   /// Returns the force after saturation. A force with a component that is not finite is no force:
   /// zero is held and returned. It ends torque and grip.
@@ -209,7 +209,6 @@ class SimulatedDevice final : public Device {
     double resistance = 0;
   };
 
-  Vec3 sensed_position() const noexcept;
   Vec3 sensed_force() const noexcept;
   std::uint32_t pressed() const noexcept;
   // Kept out of line, so that a device without such parts pays a branch for them.

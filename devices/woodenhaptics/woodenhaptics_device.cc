@@ -114,8 +114,8 @@ std::optional<PositionSample> WoodenHapticsDevice::read(LocalTime now) noexcept 
                         .buttons = woodenhaptics::switch_is_closed(*newest_) ? 1U : 0U};
 }
 
-Joints WoodenHapticsDevice::joints(const Vec3& velocity) const noexcept {
-  return Joints::three(pose_.angles, pose_.jacobian.inverse() * velocity);
+Joints WoodenHapticsDevice::joints(const Motion& hand) const noexcept {
+  return Joints::three(pose_.angles, pose_.jacobian.inverse() * hand.velocity);
 }
 
 void WoodenHapticsDevice::receive() noexcept {

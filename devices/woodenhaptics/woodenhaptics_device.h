@@ -67,7 +67,7 @@ class WoodenHapticsDevice final : public Device {
   State state() const noexcept override { return state_.load(std::memory_order_relaxed); }
   DeviceCounts counts() const noexcept override { return dialogue_.counts(); }
   std::optional<PositionSample> read(LocalTime now) noexcept override;
-  Joints joints(const Vec3& velocity) const noexcept override;
+  Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
 
  private:

@@ -43,8 +43,8 @@ class Handle final : public Device {
     return sample;
   }
   /// What a Falcon's driver does, which has found its pose in `read`.
-  Joints joints(const Vec3& velocity) const noexcept override {
-    return Joints::three(pose_->angles, pose_->jacobian * velocity);
+  Joints joints(const Motion& hand) const noexcept override {
+    return Joints::three(pose_->angles, pose_->jacobian * hand.velocity);
   }
   Vec3 apply(const Vec3& force) noexcept override { return force; }
   Effort apply_all(const Effort& effort) noexcept override { return effort; }

@@ -115,7 +115,7 @@ TEST(FalconDevice, JointsAreTheThighsOfItsPose) {
   Dice dice(2);
   Bench bench({.has_firmware = true, .is_homed = true});
   ASSERT_EQ(bench.device.info().joints, (std::vector<std::string>{"thigh 1", "thigh 2", "thigh 3"}));
-  EXPECT_EQ(bench.device.joints(Vec3::Zero()), Joints{}) << "not known yet";
+  EXPECT_EQ(bench.device.joints({}), Joints{}) << "not known yet";
   ASSERT_TRUE(bench.reaches(State::kHomed, 200ms));
   for (int i = 0; i < 100; ++i) {
     bench.move_to(0.045 * dice.direction());
@@ -124,7 +124,7 @@ TEST(FalconDevice, JointsAreTheThighsOfItsPose) {
     const auto pose = falcon::pose_at(falcon::kCentre + bench.sample->position);
     const Vec3 velocity = 0.2 * dice.direction();
     const Vec3 speeds = pose->jacobian * velocity;
-    const Joints joints = bench.device.joints(velocity);
+    const Joints joints = bench.device.joints({.velocity = velocity});
     ASSERT_EQ(joints.count, 3U);
     for (std::size_t leg = 0; leg < 3; ++leg) {
       ASSERT_NEAR(joints.angle[leg], pose->angles[static_cast<Eigen::Index>(leg)], 1e-6);

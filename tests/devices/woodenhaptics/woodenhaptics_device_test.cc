@@ -117,7 +117,7 @@ TEST(WoodenHapticsDevice, JointsCarryTheTipAndTurnAsItMoves) {
       bench.run(3ms);
       ASSERT_TRUE(bench.sample);
       const Vec3 velocity = 0.2 * dice.direction();
-      const Joints joints = bench.device.joints(velocity);
+      const Joints joints = bench.device.joints({.velocity = velocity});
       ASSERT_EQ(joints.count, 3U);
       const auto pose = woodenhaptics::pose_with(model, Vec3(joints.angle[0], joints.angle[1], joints.angle[2]));
       ASSERT_LT((pose.position - bench.sample->position).norm(), 1e-12);
