@@ -117,7 +117,7 @@ class Waves final : public Connection {
   }
 
  private:
-  static constexpr WavePort<3>::Config kConfig = {.impedance = 4, .drift_rate = 2, .period = kPeriod};
+  static constexpr WavePort<3>::Config kConfig = {.impedance = 4, .period = kPeriod};
   WavePort<3> leader_{kConfig};
   WavePort<3> follower_{kConfig};
   Link<WaveMessage<3>> there_;
