@@ -130,6 +130,14 @@ TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
   const auto paid_back = port.observe({Vec<1>(-2), Vec<1>(1e-3), kPeriod});
   EXPECT_NEAR(port.energy(), 0, 1e-15);
   EXPECT_NEAR(paid_back.energy, 1e-3, 1e-15);
+  // Due were (B Δx − T F)/√(2B), 0.5 mm √(N·s/m) and 2 of them. A wave that the device did not use pays for the rest.
+  for (std::uint64_t i = 1; i <= 400; ++i) {
+    const auto n = static_cast<double>(i);
+    port.receive({i, i * 1ms, Vec<1>(1e-3 * n), 0.5e-3 * n});
+    port.command(Vec<1>(0));
+    port.observe({Vec<1>(0), Vec<1>(0), kPeriod});
+  }
+  EXPECT_NEAR(port.observe({Vec<1>(0), Vec<1>(0), kPeriod}).integral[0], 2.5e-3, 1e-9);
 }
 
 TEST(WaveVariables, PassOverWhatIsNotFiniteOrOutOfPlace) {
@@ -153,6 +161,9 @@ TEST(WaveVariables, MakeNoMoreOfASumThanTheEnergyThatCameWithIt) {
   WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
   port.receive({1, 1ms, Vec<1>(kT), 0.125 * kT});  // a wave of 1 would take T/2
   EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 2 * 0.5, 1e-12);
+  port.observe({Vec<1>(1), Vec<1>(0), kPeriod});
+  port.receive({2, 2ms, Vec<1>(kT), kT});
+  EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 2 * 0.5, 1e-12) << "the other half of the sum, paid for since";
 }
 
 TEST(WaveVariables, SayWhatIsWrongWithTheirConfiguration) {
