@@ -220,6 +220,11 @@ TEST(ModelMediated, FindsItUnderFrictionAndNoiseFarFromTheOrigin) {
   }
 }
 
+// A press of 2 N is 1 mm there, no more than friction tilts a slide: K can be off, but not what the hand feels.
+TEST(ModelMediated, FeelsRightOnAWallTooHardToMeasure) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) ASSERT_LT(slide(seed, 2000, 0.3).worst_force, 0.15) << seed;
+}
+
 TEST(ModelMediated, APressWithoutSlidingIsAsFarOffAsFrictionTiltsIt) {
   SurfaceEstimator<3> estimator(kEstimator);
   SurfaceModel<3> found;
