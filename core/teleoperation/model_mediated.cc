@@ -72,6 +72,12 @@ Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
   return left > 0.1 && normal.dot(mean) > kWidest * left ? Vec<N>(normal / left) : mean;
 }
 
+// m, as deep as the tool may be inside the surface and feel nothing.
+template <int N>
+double SurfaceEstimator<N>::unseen() const noexcept {
+  return 2 * config_.contact_force / std::max(model_.stiffness, least_stiffness()) + config_.position_noise;
+}
+
 template <int N>
 SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N>& force) noexcept {
   ++model_.sequence;
@@ -80,8 +86,7 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
   if (size < config_.contact_force) {
     touching_ = false;
     // Where a contact would have been felt for sure there is nothing: the surface is gone up to here.
-    const double unseen = 2 * config_.contact_force / std::max(model_.stiffness, least_stiffness());
-    if (model_.depth(position) > unseen + config_.position_noise) model_.offset = model_.normal.dot(position);
+    if (model_.depth(position) > unseen()) model_.offset = model_.normal.dot(position);
     return model_;
   }
   if (!touching_) {
@@ -89,7 +94,10 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
     weight_ = samples_ = 0;
     origin_ = position;
     moments_ = Moments{};
-    model_.stiffness = config_.first_stiffness;
+    const double off = std::abs(model_.normal.dot(position) - model_.offset);
+    const bool expected = known_ && off <= unseen() + config_.least_spread;
+    if (!expected) model_.stiffness = config_.first_stiffness;
+    known_ = true;
   }
   ++samples_;
   weight_ = weight_ * portable::exp(-1 / config_.memory) + 1;

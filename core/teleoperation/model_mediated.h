@@ -35,7 +35,7 @@ struct SurfaceModel {
 /// `least_spread` on its principal axes say what lies in the surface, and friction is what is left of f. Where it does
 /// not spread (a press without sliding) the mean force is the normal, tilted by friction; n is never farther from it
 /// than a friction of 0.75 can tilt it. Until the tool has moved enough within the contact for a slope to be seen, K is
-/// `first_stiffness`; after that it is kept between a tenth of that and `max_stiffness`. d is such that the model's
+/// `first_stiffness`, or what it was when this contact begins where the last surface was; after that it is kept between a tenth of that and `max_stiffness`. d is such that the model's
 /// force at the newest sample is n·f.
 ///
 /// Out of contact the last surface stays: it is where the next contact is expected. But where the tool is deeper in it
@@ -81,11 +81,13 @@ class SurfaceEstimator {
   };
 
   Vec<N> find_normal() const noexcept;
+  double unseen() const noexcept;
   double least_stiffness() const noexcept { return config_.first_stiffness / 10; }
 
   Config config_;
   SurfaceModel<N> model_;
   bool touching_ = false;
+  bool known_ = false;              ///< there was a contact
   double weight_ = 0;               ///< Σ of fading weights
   Vec<N> origin_ = Vec<N>::Zero();  ///< m, where the contact began
   double samples_ = 0;              ///< of this contact
