@@ -85,8 +85,11 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
   if (!position.allFinite() || !std::isfinite(size)) return model_;
   if (size < config_.contact_force) {
     touching_ = false;
-    // Where a contact would have been felt for sure there is nothing: the surface is gone up to here.
-    if (model_.depth(position) > unseen()) model_.offset = model_.normal.dot(position);
+    // A contact would have been felt here for sure.
+    if (model_.depth(position) > unseen()) {
+      model_.stiffness = 0;
+      known_ = false;
+    }
     return model_;
   }
   if (!touching_) {

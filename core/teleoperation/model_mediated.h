@@ -35,12 +35,13 @@ struct SurfaceModel {
 /// `least_spread` on its principal axes say what lies in the surface, and friction is what is left of f. Where it does
 /// not spread (a press without sliding) the mean force is the normal, tilted by friction; n is never farther from it
 /// than a friction of 0.75 can tilt it. Until the tool has moved enough within the contact for a slope to be seen, K is
-/// `first_stiffness`, or what it was when this contact begins where the last surface was; after that it is kept between a tenth of that and `max_stiffness`. d is such that the model's
-/// force at the newest sample is n·f.
+/// `first_stiffness`, or what it was when this contact begins where the last surface was; after that it is kept between
+/// a tenth of first_stiffness and `max_stiffness`. d is such that the model's force at the newest sample is n·f.
 ///
-/// Out of contact the last surface stays: it is where the next contact is expected. But where the tool is deeper in it
-/// than 2 contact_force/K + position_noise and feels nothing, it is gone up to there: d becomes n·x. Such a change
-/// takes energy out of the model, so a SurfaceRenderer follows it at once.
+/// Out of contact the last surface stays: it is where the next contact is expected. But when the tool is deeper in it
+/// than 2 contact_force/K + position_noise and feels nothing, it is gone: K is 0 until the next contact. That takes
+/// energy out of the model, so a SurfaceRenderer follows it at once. (To move d to the tool is not enough: the hand is
+/// ahead of the tool by a round trip, and would be let go by a share of its depth in each of them.)
 ///
 /// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours.
 ///

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include "core/control/aol.h"
 #include "core/teleoperation/model_mediated.h"
@@ -19,6 +20,7 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/core/teleoperation/link.h"
 #include "tests/core/teleoperation/pair.h"
+#include "tests/support/dice.h"
 
 namespace tendon {
 namespace {
@@ -104,7 +106,8 @@ class Direct final : public Following {
 
 class Waves final : public Connection {
  public:
-  explicit Waves(const Network& network) : there_(network), back_(other_way(network)) {}
+  explicit Waves(const Network& network, double impedance = 4)
+      : config_{.impedance = impedance, .period = kPeriod}, there_(network), back_(other_way(network)) {}
   void deliver(int now) override {
     there_.deliver(now, [this](const WaveMessage<3>& m) { follower_.receive(m); });
     back_.deliver(now, [this](const WaveMessage<3>& m) { leader_.receive(m); });
@@ -119,9 +122,9 @@ class Waves final : public Connection {
   }
 
  private:
-  static constexpr WavePort<3>::Config kConfig = {.impedance = 4, .period = kPeriod};
-  WavePort<3> leader_{kConfig};
-  WavePort<3> follower_{kConfig};
+  WavePort<3>::Config config_;
+  WavePort<3> leader_{config_};
+  WavePort<3> follower_{config_};
   Link<WaveMessage<3>> there_;
   Link<WaveMessage<3>> back_;
 };
@@ -336,16 +339,26 @@ double pressing(double t, double hold) {
   return 0.03 * (ramp(0.7) - ramp(1 + hold) + ramp(5.7 + hold));
 }
 
-PressedTwice press(Connection& connection, double hold, double removed = std::numeric_limits<double>::infinity()) {
+struct Pressing {
+  double hold;                                               // s, of each press
+  double removed = std::numeric_limits<double>::infinity();  // s, when the wall is
+  double hand = kHand;                                       // N/m
+  double tool_mass = 0.3;                                    // kg
+  Friction tool_friction = {.coulomb = 0, .viscous = 2};
+};
+
+PressedTwice press(Connection& connection, const Pressing& pressed) {
+  const auto [hold, removed, stiffness, tool_mass, tool_friction] = pressed;
   const double end = 6 + 2 * hold;
-  Body leader(0.075, kFriction,
-              {.stiffness = kHand, .damping = 2, .reference = [hold](double t) { return pressing(t, hold); }});
+  Body leader(0.075, kFriction, {.stiffness = stiffness, .damping = 2, .reference = [until = hold](double t) {
+                                   return pressing(t, until);
+                                 }});
   Body follower(
-      0.3, {.coulomb = 0, .viscous = 2},
-      {.stiffness = kWall, .reference = [removed](double t) { return t < removed ? 0.01 : 1.0; }, .wall = true});
+      tool_mass, tool_friction,
+      {.stiffness = kWall, .reference = [gone = removed](double t) { return t < gone ? 0.01 : 1.0; }, .wall = true});
   Aol<1, 3> law({{kFriction}, kPeriod});
   EnergyLedger hand_ledger(kFriction);
-  EnergyLedger tool_ledger({.coulomb = 0, .viscous = 2});
+  EnergyLedger tool_ledger(tool_friction);
   HighPass ripple(50);
   HighPass unrest(20);
   Sight hand{Vec3::Zero(), Vec3::Zero()};
@@ -414,7 +427,7 @@ void press_through(const Named& method, Check check) {
   for (const bool bad : {false, true}) {
     for (const int periods : {0, 1, 3, 10, 50, 200, 600}) {
       const Network network = round_trip_of(periods, bad);
-      const PressedTwice found = press(*method.make(network), 9 + 0.02 * periods);
+      const PressedTwice found = press(*method.make(network), {.hold = 9 + 0.02 * periods});
       std::cout << method.name << (bad ? ", bad" : "") << ", " << periods << " ms: felt " << found.first << ", "
                 << found.second << " N, wall " << found.contact << " N, ripple " << found.ripple * 1e3 << " mN, unrest "
                 << found.unrest * 1e3 << " mm/s, tool " << found.tool * 1e3 << " mJ, pair " << found.pair * 1e3
@@ -471,12 +484,63 @@ TEST(TwoPortWorld, ARemovedWallIsGoneSoonAfterTheToolIsPastIt) {
     for (const int periods : {0, 10, 50, 200, 600}) {
       const Network network = round_trip_of(periods, bad);
       const double hold = 9 + 0.02 * periods;
-      const PressedTwice found = press(*make<Surfaces>(network), hold, 6 + 1.5 * hold);
+      const PressedTwice found = press(*make<Surfaces>(network), {.hold = hold, .removed = 6 + 1.5 * hold});
       const double most = (periods + 2 * network.jitter) * kT + 0.05;
       std::cout << periods << (bad ? " ms, bad" : " ms") << ": gone " << found.gone * 1e3 << " ms after\n";
       EXPECT_LE(found.gone, most) << periods;
       EXPECT_NEAR(found.second, 0, 0.2) << periods;
     }
+  }
+}
+
+// ---- 21 drawn hands: felt force over that of a rigid link ---------------------------------------------------------
+
+struct Shares {
+  double least = 1, median = 0;
+  double unrest = 0;  // m/s, the worst
+  double pair = 0;    // J, the worst
+};
+
+template <class Make>
+Shares over_hands(std::uint64_t first_seed, Pressing pressing, Make make_connection) {
+  std::vector<double> shares;
+  Shares found;
+  for (std::uint64_t seed = first_seed; seed < first_seed + 21; ++seed) {
+    Dice dice(seed);
+    pressing.hand = dice.within(150, 600);
+    const PressedTwice one = press(*make_connection(seed), pressing);
+    EXPECT_GE(one.hand, -1e-12) << seed;
+    shares.push_back(one.second * (1 / pressing.hand + 1 / kWall) / 0.02);
+    found.unrest = std::max(found.unrest, one.unrest);
+    found.pair = std::min(found.pair, one.pair);
+  }
+  std::sort(shares.begin(), shares.end());
+  found.least = shares.front();
+  found.median = shares[shares.size() / 2];
+  std::cout << "seeds " << first_seed << " …: share " << found.median << ", least " << found.least << "; unrest "
+            << found.unrest * 1e3 << " mm/s; pair " << found.pair * 1e3 << " mJ\n";
+  return found;
+}
+
+TEST(TwoPortWorld, ASurfaceIsFeltByAnyHandOnTheSecondPressAt600Ms) {
+  for (const std::uint64_t first_seed : {1001, 1, 5001}) {
+    const Shares found = over_hands(first_seed, {.hold = 3}, [](std::uint64_t seed) {
+      return make<Surfaces>({.delay = 300, .jitter = 60, .loss = 0.1, .seed = seed});
+    });
+    EXPECT_GE(found.median, 0.93);
+    EXPECT_GE(found.least, 0.9);
+  }
+}
+
+TEST(TwoPortWorld, TwoDevicesOnWavesOf10At200MsFeelAQuarterAndAreQuiet) {
+  for (const std::uint64_t first_seed : {1001, 1}) {
+    const Shares found =
+        over_hands(first_seed, {.hold = 5, .tool_mass = 0.075, .tool_friction = kFriction}, [](std::uint64_t seed) {
+          return std::make_unique<Waves>(Network{.delay = 100, .jitter = 20, .loss = 0.1, .seed = seed}, 10.0);
+        });
+    EXPECT_GE(found.median, 0.23);
+    EXPECT_LT(found.unrest, 2e-3);
+    EXPECT_GE(found.pair, -1e-12);
   }
 }
 
