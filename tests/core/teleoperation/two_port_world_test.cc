@@ -342,20 +342,24 @@ double pressing(double t, double hold) {
 struct Pressing {
   double hold;                                               // s, of each press
   double removed = std::numeric_limits<double>::infinity();  // s, when the wall is
+  double wall_speed = 0;                                     // m/s, to the hand, for 0.4 s from hold on
   double hand = kHand;                                       // N/m
   double tool_mass = 0.3;                                    // kg
   Friction tool_friction = {.coulomb = 0, .viscous = 2};
 };
 
 PressedTwice press(Connection& connection, const Pressing& pressed) {
-  const auto [hold, removed, stiffness, tool_mass, tool_friction] = pressed;
+  const auto [hold, removed, wall_speed, stiffness, tool_mass, tool_friction] = pressed;
   const double end = 6 + 2 * hold;
   Body leader(0.075, kFriction, {.stiffness = stiffness, .damping = 2, .reference = [until = hold](double t) {
                                    return pressing(t, until);
                                  }});
-  Body follower(
-      tool_mass, tool_friction,
-      {.stiffness = kWall, .reference = [gone = removed](double t) { return t < gone ? 0.01 : 1.0; }, .wall = true});
+  Body follower(tool_mass, tool_friction,
+                {.stiffness = kWall,
+                 .reference = [until = hold,
+                               speed = wall_speed](double t) { return 0.01 - speed * std::clamp(t - until, 0.0, 0.4); },
+                 .wall = true,
+                 .until = removed});
   Aol<1, 3> law({{kFriction}, kPeriod});
   EnergyLedger hand_ledger(kFriction);
   EnergyLedger tool_ledger(tool_friction);
@@ -489,6 +493,18 @@ TEST(TwoPortWorld, ARemovedWallIsGoneSoonAfterTheToolIsPastIt) {
       std::cout << periods << (bad ? " ms, bad" : " ms") << ": gone " << found.gone * 1e3 << " ms after\n";
       EXPECT_LE(found.gone, most) << periods;
       EXPECT_NEAR(found.second, 0, 0.2) << periods;
+    }
+  }
+}
+
+TEST(TwoPortWorld, AWallThatComesNearerIsWhereItIsOnTheNextPress) {
+  for (const bool bad : {false, true}) {
+    for (const int periods : {0, 10, 50, 200, 600}) {
+      const Network network = round_trip_of(periods, bad);
+      const PressedTwice found = press(*make<Surfaces>(network), {.hold = 9 + 0.02 * periods, .wall_speed = 0.02});
+      std::cout << periods << (bad ? " ms, bad" : " ms") << ": felt " << found.first << ", " << found.second << " N\n";
+      EXPECT_NEAR(found.second, 1.4 * kRigid, 0.03 * 1.4 * kRigid) << periods << ": the wall is 8 mm nearer";
+      EXPECT_GE(found.hand, -1e-12) << periods;
     }
   }
 }

@@ -19,17 +19,19 @@ class WavePair {
   struct Config {
     WavePort<1>::Config port{.impedance = 4, .period = std::chrono::milliseconds(1)};
     double mass = 0.075;
+    double tool_mass = 0.075;
     Friction friction{.coulomb = 0, .viscous = 0.26};
     Surroundings hand{};
     Surroundings tool{};
     std::function<double(double)> path{};  ///< t, s → m: the leader is led there and ignores forces
     Network there{};                       ///< in periods
     Network back{};
+    double tool_encoder_step = 0;  ///< m; 0: exact
   };
 
   explicit WavePair(const Config& config)
-      : leader(config, config.hand, config.path),
-        follower(config, config.tool, {}),
+      : leader(config, config.mass, config.hand, config.path, 0),
+        follower(config, config.tool_mass, config.tool, {}, config.tool_encoder_step),
         there_(config.there),
         back_(config.back) {}
 
@@ -54,24 +56,29 @@ class WavePair {
   }
 
   struct End {
-    End(const Config& config, const Surroundings& around, std::function<double(double)> led)
-        : port(config.port), body(config.mass, config.friction, around), path(std::move(led)) {}
+    End(const Config& config, double mass, const Surroundings& around, std::function<double(double)> led, double step)
+        : port(config.port), body(mass, config.friction, around), path(std::move(led)), encoder_step(step) {}
 
     WaveMessage<1> advance(int now) {
       const double before = body.x;
+      const double seen_before = seen();
       if (path) {
         body.x = path(now * 1e-3);
       } else {
         body.advance(force, (now - 1) * 1e-3, 1e-3);
       }
-      speed = (body.x - before) / 1e-3;
+      const double moved = seen() - seen_before;
+      speed = moved / 1e-3;
       taken -= force * (body.x - before);
-      return port.observe({Vec<1>(force), Vec<1>(body.x - before), std::chrono::milliseconds(1)});
+      return port.observe({Vec<1>(force), Vec<1>(moved), std::chrono::milliseconds(1)});
     }
+
+    double seen() const { return encoder_step > 0 ? encoder_step * std::round(body.x / encoder_step) : body.x; }
 
     WavePort<1> port;
     Body body;
     std::function<double(double)> path;
+    double encoder_step;
     double force = 0;  ///< N, on the handle
     double speed = 0;  ///< m/s, mean of the last period
     double taken = 0;  ///< J, that the port has taken in
@@ -100,8 +107,8 @@ struct Presses {
   double least_sum = 0;          ///< J
 };
 
-/// A hand of `hand` N/m presses at a wall of `wall` N/m that begins at 10 mm. A line of 600 ms needs a minute to come to
-/// rest.
+/// A hand of `hand` N/m presses at a wall of `wall` N/m that begins at 10 mm. A line of 600 ms needs a minute to come
+/// to rest.
 inline Presses press(WavePair::Config config, double hand = 400, double wall = 500, double hold = 9) {
   config.hand = {.stiffness = hand, .damping = 2, .reference = [hold](double t) { return two_presses(t, hold); }};
   config.tool = {.stiffness = wall, .reference = [](double) { return 0.01; }, .wall = true};
