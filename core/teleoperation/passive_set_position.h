@@ -31,14 +31,15 @@ struct SetPosition {
 /// force. It is tight: with K = 2.2 b/T a motion is found that takes E below zero (see the tests). With B > 0 the whole
 /// is shortened to the limiter's bound.
 ///
-/// **bounded_acceleration**, as in AolPlus: for devices with next to no damping (b = 0.005 N·s/m: K ≤ 10 N/m). The hand's
-/// acceleration is at most `most`, and friction of `shaping_viscous` in place of b says how stiff the spring may be:
-/// K ≤ 2 shaping_viscous/T_max. What an OutputBound with that travel allows is the other bound on F; an interval that
-/// breaks the assumption, or none yet, leaves the plain bound of b. For exact positions, and forces held from now on.
+/// **bounded_acceleration**, as in AolPlus: for devices with next to no damping (b = 0.005 N·s/m: K ≤ 10 N/m). The
+/// hand's acceleration is at most `most`, and friction of `shaping_viscous` in place of b says how stiff the spring may
+/// be: K ≤ 2 shaping_viscous/T_max. What an OutputBound with that travel allows is the other bound on F; an interval
+/// that breaks the assumption, or none yet, leaves the plain bound of b. For exact positions, and forces held from now
+/// on.
 ///
-/// **K falls with the delay**, K ≤ 2B/T_loop, once `loop_delay` was told: a stiffer spring to a late position is passive,
-/// but buzzes. B is `damping`, rendered here; 0: K stays. K follows with 100 ms, so that no step is felt; a change under
-/// stretch is paid from E like a jump.
+/// **K falls with the delay**, K ≤ 2B/T_loop, once `loop_delay` was told: a stiffer spring to a late position is
+/// passive, but buzzes. B is `damping`, rendered here; 0: K stays. K follows with 100 ms, so that no step is felt; a
+/// change under stretch is paid from E like a jump.
 ///
 /// Source: Lee and Huang, IEEE T-RO 26(2), 2010 (recalled, not re-read). Differs from what is recalled of it: they book
 /// the dissipation once per message as D_min = b (max x − min x)²/(t_{k+1} − t_k), here it is booked in each period as

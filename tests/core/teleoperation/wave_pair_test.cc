@@ -67,6 +67,17 @@ TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
   }
 }
 
+// Nothing is late, but what is lost leaves gaps that the playout has to wait for: else it stands still in each of them.
+TEST(WavePair, WaitsForGapsAndHoldsWithoutRipple) {
+  for (const double loss : {0.1, 0.3}) {
+    const Presses held = press(line(20, 0, loss, 1), kHand, kWall);
+    std::cout << loss * 100 << " % lost: " << held.second << " N; ripple " << held.ripple * 1e3 << " mN\n";
+    EXPECT_GT(held.second, 0.97 * felt(one_way(20, 10e-3))) << loss;
+    EXPECT_LT(held.second, 1.03 * felt(one_way(20, 0))) << loss;
+    EXPECT_LT(held.ripple, 0.02) << loss;
+  }
+}
+
 // Of short lines and stiff walls, where sampled waves rang.
 TEST(WavePair, DoesNotRingOnShortLinesWhateverItsImpedance) {
   for (const double impedance : {1.0, 4.0, 10.0}) {
