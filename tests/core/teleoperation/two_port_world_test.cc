@@ -539,7 +539,7 @@ Shares over_hands(std::uint64_t first_seed, Pressing pressing, Make make_connect
 }
 
 TEST(TwoPortWorld, ASurfaceIsFeltByAnyHandOnTheSecondPressAt600Ms) {
-  for (const std::uint64_t first_seed : {1001, 1, 5001}) {
+  for (const std::uint64_t first_seed : {1001U, 1U, 5001U}) {
     const Shares found = over_hands(first_seed, {.hold = 3}, [](std::uint64_t seed) {
       return make<Surfaces>({.delay = 300, .jitter = 60, .loss = 0.1, .seed = seed});
     });
@@ -549,7 +549,7 @@ TEST(TwoPortWorld, ASurfaceIsFeltByAnyHandOnTheSecondPressAt600Ms) {
 }
 
 TEST(TwoPortWorld, TwoDevicesOnWavesOf10At200MsFeelAQuarterAndAreQuiet) {
-  for (const std::uint64_t first_seed : {1001, 1}) {
+  for (const std::uint64_t first_seed : {1001U, 1U}) {
     const Shares found =
         over_hands(first_seed, {.hold = 5, .tool_mass = 0.075, .tool_friction = kFriction}, [](std::uint64_t seed) {
           return std::make_unique<Waves>(Network{.delay = 100, .jitter = 20, .loss = 0.1, .seed = seed}, 10.0);

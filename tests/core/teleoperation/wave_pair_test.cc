@@ -48,7 +48,7 @@ TEST(WavePair, HoldsTheForceThatItsStiffnessSays) {
 // keeps the line moving: 0.20 N felt for 0.25 N at the wall after a minute.
 TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
   for (const int round_trip : {0, 1, 3, 10, 50, 200, 600}) {
-    for (const std::uint64_t seed : {1, 2}) {
+    for (const std::uint64_t seed : {1U, 2U}) {
       const int jitter = std::max(5, round_trip / 10);
       const Presses held = press(line(round_trip, jitter, 0.1, seed), kHand, kWall, 9 + 0.1 * round_trip);
       const double tolerance = round_trip < 600 ? 0.03 : 0.25;
