@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/teleoperation/model_mediated.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -26,9 +27,55 @@ SurfaceEstimator<N>::SurfaceEstimator(const Config& config) : config_(config) {
   expect_above_zero(config.first_stiffness, "first_stiffness");
   expect_above_zero(config.max_stiffness, "max_stiffness");
   expect_above_zero(config.least_travel, "least_travel");
+  expect_above_zero(config.least_spread, "least_spread");
+  expect_not_negative(config.position_noise, "position_noise");
   expect_above_zero(config.memory, "memory");
   expect(config.max_stiffness >= config.first_stiffness, "max_stiffness", config.max_stiffness,
          "no less than first_stiffness, " + shortest(config.first_stiffness) + " N/m");
+}
+
+template <int N>
+void SurfaceEstimator<N>::Moments::add(double share, const Vec<N>& y, const Vec<N>& f) noexcept {
+  const Vec<N> from_place = y - place;
+  const Vec<N> from_force = f - force;
+  place += share * from_place;
+  force += share * from_force;
+  places = (1 - share) * (places + share * from_place * from_place.transpose());
+  forces = (1 - share) * (forces + share * from_force * from_force.transpose());
+  both = (1 - share) * (both + share * from_place * from_force.transpose());
+}
+
+// The mean force, and the normal until now with four times the memory, without what lies along the directions in which
+// the undeformed surface under the tool spreads.
+template <int N>
+Vec<N> SurfaceEstimator<N>::find_normal() const noexcept {
+  const double size = moments_.force.norm();
+  if (!(size > 0)) return model_.normal;
+  const Vec<N> mean = moments_.force / size;
+  const double share = 1 / std::min(samples_, 4 * config_.memory + 1);
+  Vec<N> normal = model_.normal + share * (mean - model_.normal);
+  if constexpr (N > 1) {
+    const bool known = model_.stiffness > least_stiffness();
+    const double compliance = 1 / (known ? model_.stiffness : config_.first_stiffness);
+    const Mat<N> cross = compliance * moments_.both;
+    const Mat<N> surface = moments_.places + cross + cross.transpose() + compliance * compliance * moments_.forces;
+    const Eigen::SelfAdjointEigenSolver<Mat<N>> axes(surface);
+    for (int i = 1; i < N; ++i) {  // never the smallest
+      const Vec<N> axis = axes.eigenvectors().col(i);
+      const bool spread = axes.eigenvalues()[i] >= config_.least_spread * config_.least_spread;
+      const double along = mean.dot(axis);
+      if (spread && along * along <= 0.5) normal -= normal.dot(axis) * axis;
+    }
+  }
+  const double left = normal.norm();
+  constexpr double kWidest = 0.8;  // the cosine of a friction of 0.75
+  return left > 0.1 && normal.dot(mean) > kWidest * left ? Vec<N>(normal / left) : mean;
+}
+
+// m, as deep as the tool may be inside the surface and feel nothing.
+template <int N>
+double SurfaceEstimator<N>::unseen() const noexcept {
+  return 2 * config_.contact_force / std::max(model_.stiffness, least_stiffness()) + config_.position_noise;
 }
 
 template <int N>
@@ -38,32 +85,45 @@ SurfaceModel<N> SurfaceEstimator<N>::observe(const Vec<N>& position, const Vec<N
   if (!position.allFinite() || !std::isfinite(size)) return model_;
   if (size < config_.contact_force) {
     touching_ = false;
+    // A contact would have been felt here for sure.
+    if (model_.depth(position) > unseen()) {
+      model_.stiffness = 0;
+      known_ = false;
+    }
     return model_;
   }
   if (!touching_) {
     touching_ = true;
-    weight_ = mean_along_ = mean_force_ = variance_ = covariance_ = 0;
-    model_.stiffness = config_.first_stiffness;
+    weight_ = samples_ = 0;
+    origin_ = position;
+    moments_ = Moments{};
+    const double off = std::abs(model_.normal.dot(position) - model_.offset);
+    const bool expected = known_ && off <= unseen() + config_.least_spread;
+    if (!expected) model_.stiffness = config_.first_stiffness;
+    known_ = true;
   }
-  model_.normal = force / size;
-  const double along = model_.normal.dot(position);
-
-  // Means and moments about them, with weights that fade: nothing cancels however far from the origin.
+  ++samples_;
   weight_ = weight_ * portable::exp(-1 / config_.memory) + 1;
-  const double share = 1 / weight_;
-  const double from_mean = along - mean_along_;
-  const double force_from_mean = size - mean_force_;
-  mean_along_ += share * from_mean;
-  mean_force_ += share * force_from_mean;
-  variance_ = (1 - share) * (variance_ + share * from_mean * from_mean);
-  covariance_ = (1 - share) * (covariance_ + share * from_mean * force_from_mean);
+  moments_.add(1 / weight_, position - origin_, force);
+  model_.normal = find_normal();
 
-  if (variance_ >= config_.least_travel * config_.least_travel) {
-    model_.stiffness = std::clamp(-covariance_ / variance_, 0.0, config_.max_stiffness);
+  const double variance = model_.normal.dot(moments_.places * model_.normal);
+  if (variance >= config_.least_travel * config_.least_travel) {
+    const double covariance = model_.normal.dot(moments_.both * model_.normal);
+    model_.stiffness = std::clamp(-covariance / variance, least_stiffness(), config_.max_stiffness);
   }
   // Through the newest sample, which is what the hand is to feel now.
-  if (model_.stiffness > 0) model_.offset = along + size / model_.stiffness;
+  const double push = std::max(model_.normal.dot(force), 0.0);
+  model_.offset = model_.normal.dot(position) + push / model_.stiffness;
   return model_;
+}
+
+template <int N>
+double SurfaceEstimator<N>::friction() const noexcept {
+  const double push = model_.normal.dot(moments_.force);
+  const Mat<N> squares = moments_.forces + moments_.force * moments_.force.transpose();
+  const double along = model_.normal.dot(squares * model_.normal);
+  return push > 0 && along > 0 ? std::sqrt(std::max(squares.trace() - along, 0.0) / along) : 0;
 }
 
 template <int N>

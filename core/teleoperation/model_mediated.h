@@ -26,15 +26,24 @@ struct SurfaceModel {
 /// Finds the surface that a tool touches, from where it is and what it feels: the follower's end of model-mediated
 /// teleoperation.
 ///
-///     n = f/‖f‖;   K and d: least squares of ‖f‖ = K d − K (n·x) over the contact, older samples fading out
+///     n:       the mean force and the normal until now, less what lies along where x + f/K spreads
+///     K and d: least squares of n·f = K d − K (n·x) over the contact, older samples fading out
 ///
 /// with f the force of the surroundings on the tool (N), at position x (m). Contact is ‖f‖ ≥ contact_force; a new
-/// contact starts afresh. Until the tool has moved enough within the contact for a slope to be seen, K is
-/// `first_stiffness`; after that it is kept between zero and `max_stiffness`. Out of contact the last surface stays: it
-/// is where the next contact is expected.
+/// contact starts afresh, and its moments are about its first point, so it does not matter how far the origin is. On a
+/// springy surface with friction x + f/K is a point of the plane n·x = d, moved along it; so from a spread of
+/// `least_spread` on its principal axes say what lies in the surface, and friction is what is left of f. Where it does
+/// not spread (a press without sliding) the mean force is the normal, tilted by friction; n is never farther from it
+/// than a friction of 0.75 can tilt it. Until the tool has moved enough within the contact for a slope to be seen, K is
+/// `first_stiffness`, or what it was when this contact begins where the last surface was; after that it is kept between
+/// a tenth of first_stiffness and `max_stiffness`. d is such that the model's force at the newest sample is n·f.
 ///
-/// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours, the
-/// simplest that does.
+/// Out of contact the last surface stays: it is where the next contact is expected. But when the tool is deeper in it
+/// than 2 contact_force/K + position_noise and feels nothing, it is gone: K is 0 until the next contact. That takes
+/// energy out of the model, so a SurfaceRenderer follows it at once. (To move d to the tool is not enough: the hand is
+/// ahead of the tool by a round trip, and would be let go by a share of its depth in each of them.)
+///
+/// Source: the idea of Mitra and Niemeyer, IJRR 27(2), 2008 (recalled, not re-read); the estimator is ours.
 ///
 /// Samples that are not finite are passed over. Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
@@ -45,7 +54,9 @@ class SurfaceEstimator {
     double first_stiffness = 0;  ///< N/m; > 0
     double max_stiffness = 0;    ///< N/m; ≥ first_stiffness
     double least_travel = 0;     ///< m, standard deviation of n·x from which on a slope is believed; > 0
-    double memory = 0;           ///< samples after which one has faded to 1/e; ≥ 1
+    double memory = 0;           ///< samples after which one has faded to 1/e; > 0
+    double least_spread = 1e-3;  ///< m, standard deviation along a direction from which on it lies in the surface; > 0
+    double position_noise = 0;   ///< m, ≥ 0: a tool that is no deeper than this inside a surface may be outside it
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -54,15 +65,34 @@ class SurfaceEstimator {
   /// One sample; returns the surface as it is known now, to be sent when it seems worth it.
   SurfaceModel<N> observe(const Vec<N>& position, const Vec<N>& force) noexcept;
 
+  /// Root mean square of what of f is along the surface, over that of what is across it: μ while the tool slides, and
+  /// with what noise adds. 0 before the first contact.
+  double friction() const noexcept;
+
  private:
+  /// Fading means, and moments about them.
+  struct Moments {
+    Vec<N> place = Vec<N>::Zero();   ///< m, from where the contact began
+    Vec<N> force = Vec<N>::Zero();   ///< N
+    Mat<N> places = Mat<N>::Zero();  ///< m²
+    Mat<N> forces = Mat<N>::Zero();  ///< N²
+    Mat<N> both = Mat<N>::Zero();    ///< N·m: places by rows, forces by columns
+
+    void add(double share, const Vec<N>& y, const Vec<N>& f) noexcept;
+  };
+
+  Vec<N> find_normal() const noexcept;
+  double unseen() const noexcept;
+  double least_stiffness() const noexcept { return config_.first_stiffness / 10; }
+
   Config config_;
   SurfaceModel<N> model_;
   bool touching_ = false;
-  double weight_ = 0;      ///< Σ of fading weights
-  double mean_along_ = 0;  ///< of n·x, m
-  double mean_force_ = 0;  ///< N
-  double variance_ = 0;    ///< of n·x, m²
-  double covariance_ = 0;  ///< of n·x and ‖f‖, N·m
+  bool known_ = false;              ///< there was a contact
+  double weight_ = 0;               ///< Σ of fading weights
+  Vec<N> origin_ = Vec<N>::Zero();  ///< m, where the contact began
+  double samples_ = 0;              ///< of this contact
+  Moments moments_;
 };
 
 /// Renders a surface at the leader at the full rate, whatever the network does: energy can only enter when the model

@@ -45,6 +45,7 @@ LeaderMessage<N> PassivityLeader<N>::observe(const Interval<N>& interval) noexce
 template <int N>
 PassivityFollower<N>::PassivityFollower(const Config& config) : config_(config) {
   expect_not_negative(config.drift_rate, "drift_rate");
+  expect_not_negative(config.stiffness, "stiffness");
   expect_above_zero(seconds(config.period), "period");
 }
 
@@ -65,10 +66,21 @@ auto PassivityFollower<N>::step(const Vec<N>& force) noexcept -> Command {
   Vec<N> velocity = fresh_ ? newest_.velocity : Vec<N>::Zero();
   fresh_ = false;
   velocity += config_.drift_rate * (newest_.displacement - displacement_ - period * velocity);
-  const double excess = force.dot(velocity) - std::max(energy(), 0.0) / period;  // W
-  if (excess > 0 && force.squaredNorm() > 0) velocity -= excess / force.squaredNorm() * force;
+  const double spring = 0.5 * config_.stiffness * period;   // the spring gains ½K T² v², in W: times v²
+  const double allowed = std::max(energy(), 0.0) / period;  // W
+  const double excess = force.dot(velocity) + spring * velocity.squaredNorm() - allowed;
+  if (excess > 0 && spring > 0) {
+    // The condition is a ball of radius r round −f/(K T); |from_centre|² − r² = excess / spring.
+    const Vec<N> from_centre = velocity + force / (2 * spring);
+    const double distance = from_centre.norm();
+    const double beyond = excess / spring;
+    const double radius = std::sqrt(std::max(distance * distance - beyond, 0.0));
+    velocity -= beyond / (distance * (distance + radius)) * from_centre;
+  } else if (excess > 0 && force.squaredNorm() > 0) {
+    velocity -= excess / force.squaredNorm() * force;
+  }
 
-  const double out = period * force.dot(velocity);
+  const double out = period * (force.dot(velocity) + spring * velocity.squaredNorm());
   (out > 0 ? out_ : sent_.energy_in) += std::abs(out);
   displacement_ += period * velocity;
   sent_.force = -force;

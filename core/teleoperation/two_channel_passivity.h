@@ -73,10 +73,13 @@ class PassivityLeader {
 
 /// The follower's end: the velocity to make the tool follow, given the force that this takes.
 ///
-///     v = v_received + λ (x_received − ∫ v dt) − β f,   β ≥ 0 the least with   T f·v ≤ E_in,leader(received) − E_out
+///     v = v_received + λ (x_received − ∫ v dt) − β f,   β ≥ 0 the least with
+///     T f·v + ½ K T² v² ≤ E = E_in,leader(received) − E_out
 ///
-/// f is the force on the tool (N), in the same period and really applied; β an admittance in parallel (m/(N·s)). Both
-/// f and v are known when they are booked, so that this end is exact. The second term gives back the displacement
+/// f is the force on the tool (N), in the same period and really applied; β an admittance in parallel (m/(N·s)). K is
+/// the stiffness of the controller's spring whose far end moves by T v: its force rises by K T v meanwhile, which costs
+/// ½ K T² v² (J) and is booked. With K > 0 the velocity that breaks the condition goes to the nearest that keeps it.
+/// Both sides are known when they are booked, so that this end is exact. The second term gives back the displacement
 /// that the β of earlier periods, or lost messages, have taken away (about 40 mm in a few seconds without); it stands
 /// under the same condition as the rest, so drift is corrected with what energy there is and waits when there is none.
 /// A period without a newer message has v_received = 0.
@@ -92,6 +95,7 @@ class PassivityFollower {
   struct Config {
     double drift_rate = 0;  ///< λ, 1/s; ≥ 0; 0 corrects no drift
     Duration period{};      ///< T; > 0
+    double stiffness = 0;   ///< K of the tool's controller, N/m; ≥ 0; 0: the force does not change within a period
   };
 
   struct Command {

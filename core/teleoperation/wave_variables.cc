@@ -5,34 +5,77 @@
 #include <cmath>
 
 #include "core/base/expect.h"
+#include "core/base/portable_math.h"
 
 namespace tendon {
 
 template <int N>
-WavePort<N>::WavePort(const Config& config) : config_(config), root_(std::sqrt(2 * config.impedance)) {
+WavePort<N>::WavePort(const Config& config)
+    : config_(config), root_(std::sqrt(2 * config.impedance)), means_(1), clock_(config.max_playout) {
   expect_above_zero(config.impedance, "impedance");
-  expect_not_negative(config.drift_rate, "drift_rate");
   expect_above_zero(seconds(config.period), "period");
+  expect_not_negative(seconds(config.max_playout), "max_playout");
+  const double means = seconds(config.smoothing) / seconds(config.period);
+  expect(means >= 1 && means <= static_cast<double>(kMost), "smoothing", seconds(config.smoothing),
+         "1 to 256 periods of " + shortest(seconds(config.period)) + " s");
+  means_ = static_cast<std::size_t>(portable::round(means));
+  for (Vec<N>& sum : played_) sum.setZero();
 }
 
 template <int N>
 void WavePort<N>::receive(const WaveMessage<N>& message) noexcept {
-  if (message.sequence <= newest_.sequence) return;
-  if (!message.wave.allFinite() || !message.integral.allFinite() || !std::isfinite(message.energy)) return;
-  newest_ = message;
-  fresh_ = true;
+  if (!message.integral.allFinite() || !std::isfinite(message.energy)) return;
+  // Its place, from the back: nearly always the last.
+  std::size_t place = count_;
+  while (place > 0 && heard(place - 1).sequence >= message.sequence) --place;
+  if (place == 0) return;  // its time has been played
+  if (place < count_ && (heard(place).sequence == message.sequence || heard(place).time <= message.time)) return;
+  const WaveMessage<N>& before = heard(place - 1);
+  if (message.time <= before.time) return;
+  newest_energy_ = std::max(newest_energy_, message.energy);
+
+  const Duration now = sent_.time;
+  if (place == count_) {
+    const auto steps = static_cast<double>(message.sequence - before.sequence);
+    const double gap = seconds(message.time - before.time) * (1 - 1 / steps);
+    clock_.heard(now, message.time, joined_ ? from_seconds(gap) : Duration::zero());
+    joined_ = true;
+  }
+  if (count_ == kMost) {
+    begin_ = (begin_ + 1) % kMost;
+    --count_;
+    --place;
+  }
+  for (std::size_t k = count_; k > place; --k) heard(k) = heard(k - 1);
+  heard(place) = message;
+  ++count_;
+}
+
+template <int N>
+Vec<N> WavePort<N>::sum_at(Duration time) noexcept {
+  while (count_ > 1 && heard(1).time <= time) {
+    begin_ = (begin_ + 1) % kMost;
+    --count_;
+  }
+  const WaveMessage<N>& before = heard(0);
+  if (count_ == 1 || time <= before.time) return before.integral;
+  const WaveMessage<N>& after = heard(1);
+  const double share = seconds(time - before.time) / seconds(after.time - before.time);
+  return before.integral + share * (after.integral - before.integral);
 }
 
 template <int N>
 Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
-  const double period = seconds(config_.period);
-  wave_ = fresh_ ? newest_.wave : Vec<N>::Zero();
-  fresh_ = false;
-  wave_ += config_.drift_rate * (newest_.integral - used_integral_ - period * wave_);
+  const Vec<N> sum = sum_at(clock_.advance(sent_.time));
+  const Vec<N> step = (sum - played_[next_]) / static_cast<double>(means_);
+  played_[next_] = sum;
+  next_ = (next_ + 1) % means_;
+  wave_ = step / seconds(config_.period) + (mean_ - used_integral_) / seconds(config_.smoothing);
+  mean_ += step;
 
-  const double left = std::max(newest_.energy - used_energy_, 0.0);
-  const double power = wave_.squaredNorm() / 2;
-  if (period * power > left) wave_ *= std::sqrt(left / (period * power));
+  const double left = std::max(newest_energy_ - used_energy_, 0.0);
+  const double energy = seconds(config_.period) * wave_.squaredNorm() / 2;
+  if (energy > left) wave_ *= std::sqrt(left / energy);
   return {root_ * wave_ - config_.impedance * velocity};
 }
 
@@ -40,22 +83,25 @@ template <int N>
 WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval) noexcept {
   const double held = seconds(interval.held);
   ++sent_.sequence;
-  sent_.wave.setZero();
-  if (!(held > 0) || !interval.applied.allFinite() || !interval.dx.allFinite()) return sent_;
+  if (!(held > 0)) return sent_;
+  sent_.time += interval.held;
+  if (!interval.applied.allFinite() || !interval.dx.allFinite()) return sent_;
 
   // A period that was longer than planned can have used no more than there was.
-  const double used = std::min(held * wave_.squaredNorm() / 2, std::max(newest_.energy - used_energy_, 0.0));
+  const double used = std::min(held * wave_.squaredNorm() / 2, std::max(newest_energy_ - used_energy_, 0.0));
   used_energy_ += used;
   used_integral_ += held * wave_;
   account_ += used - interval.applied.dot(interval.dx);
 
-  sent_.wave = (config_.impedance / held * interval.dx - interval.applied) / root_;
-  const double cost = held * sent_.wave.squaredNorm() / 2;
+  const Vec<N> due = (config_.impedance * interval.dx - held * interval.applied) / root_;
+  const Vec<N> wave = due / held + unsent_ / seconds(config_.smoothing);
+  const double cost = held * wave.squaredNorm() / 2;
   const double affordable = std::clamp(account_, 0.0, cost);
-  if (affordable < cost) sent_.wave *= std::sqrt(affordable / cost);
+  const Vec<N> step = affordable < cost ? Vec<N>(held * std::sqrt(affordable / cost) * wave) : Vec<N>(held * wave);
+  unsent_ += due - step;
   account_ -= affordable;
   sent_.energy += affordable;
-  sent_.integral += held * sent_.wave;
+  sent_.integral += step;
   return sent_;
 }
 

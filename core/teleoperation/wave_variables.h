@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/control/stability_controller.h"
+#include "core/teleoperation/playout_clock.h"
 
 namespace tendon {
 
@@ -11,9 +15,9 @@ namespace tendon {
 /// permanent.
 template <int N>
 struct WaveMessage {
-  std::uint64_t sequence = 0;        ///< 1, 2, …; a message with one that is not above the newest is dropped
-  Vec<N> wave = Vec<N>::Zero();      ///< √W: half its square is a power
-  Vec<N> integral = Vec<N>::Zero();  ///< √W·s, ∫ wave dt: what position drift is corrected with
+  std::uint64_t sequence = 0;        ///< 1, 2, …: the periods of the sender; one that came before is dropped
+  Duration time{};                   ///< of the sender since it began; grows with `sequence`
+  Vec<N> integral = Vec<N>::Zero();  ///< √W·s, ∫ wave dt; half the square of a wave is a power
   double energy = 0;  ///< J, ∫ ‖wave‖²/2 dt, never decreasing: the most that may be made of the waves
 };
 
@@ -29,40 +33,48 @@ struct WaveMessage {
 /// In this sign both ends have the same equations, so one class serves as both. Niemeyer and Slotine's F is −F at
 /// the leader and F at the follower; u is what the leader sends and w what the follower sends.
 ///
+/// **Played out.** What is sent are the sums I = ∫ wave dt and ∫ wave²/2 dt. The receiver plays I out, straight between
+/// the messages that came, at the moment τ that PlayoutClock says, and takes the mean Ī over the last W:
+///
+///     r̂ = ΔĪ / T + (Ī − ∫ r̂ dt) / W,      T r̂²/2 ≤ energy − ∫ r̂²/2 dt
+///
+/// A wave of the same sum that varies less has less energy than what was sent (Cauchy–Schwarz), so the bound on the
+/// right hardly ever acts; it is there for what no assumption covers. The second term is zero but after such a cut or a
+/// period of another length. Nothing of the sum is lost by jitter, loss or order, and so neither is the place: both
+/// ends end up where they began to within (their friction)/K, K below. When nothing more comes, r̂ is zero after W.
+///
 /// **Passive in sampled time.** The account A of the port (J) books what really went through it,
 ///
 ///     A += T r̂²/2 − T s²/2 − F·Δx
 ///
-/// and s is shortened where it would take A below zero. So A + A' + (what is on the way in both directions) is exactly
-/// what the two ends have put in, and none of its parts is negative, except that A is when the motion in one period
-/// was another than v promised; then nothing is sent until it has been earned back. (The limiter at the device is
-/// what bounds the leader's port in every case.)
+/// and s is shortened where it would take A below zero; what was left out of its sum is sent as soon as A has it again.
+/// So A + A' + (what is on the way in both directions) is exactly what the two ends have put in, and none of its parts
+/// is negative, except that A is when the motion in one period was another than v promised; then nothing is sent until
+/// it has been earned back. (The limiter at the device is what bounds the leader's port in every case.)
 ///
-/// **Loss, delay that varies, reordering.** For a period in which no newer message came the wave is zero: passive,
-/// since it uses less than was sent. (To hold the last wave would be to use its energy twice.) What this leaves of
-/// the sender's ∫ wave dt is made good with the rate λ,
+/// **What it feels like.** A spring of K = B/d with the inertia B d, and a damper B when it is let move fast. d is the
+/// least way from `observe` to the `command` that uses it plus the playout D, the mean of both directions, plus
+/// T + (W − T)/2. So a hand of k_h pressing by Δx at something of k_w feels
 ///
-///     r̂ = wave + λ (integral − ∫ r̂ dt),     T r̂²/2 ≤ energy − ∫ r̂²/2 dt
-///
-/// and paid from the waves that were sent and not used: so the correction of position drift is passive, too.
-///
-/// The price: the connection feels like a damper B in free motion, and waves are reflected at an end whose own
-/// impedance is not B.
+///     F = Δx / (1/k_h + d/B + 1/k_w)
 ///
 /// Source: Niemeyer and Slotine, IEEE J. Oceanic Eng. 16(1), 1991, and IJRR 23(9), 2004 (both recalled, not re-read);
-/// control.md 7. The energy counter, and the account for sampled ports, are ours.
+/// control.md 7. Playing out the sum, the energy counter, and the account for sampled ports, are ours.
 ///
-/// A message or an interval that is not finite is passed over; when `velocity` is not finite, neither is the demand,
-/// and the law at the port answers it with zero force.
+/// A message or an interval that is not finite is passed over, and so is a message whose time does not lie between
+/// those of its neighbours; when `velocity` is not finite, neither is the demand, and the law at the port answers it
+/// with zero force.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 template <int N>
 class WavePort {
  public:
   struct Config {
-    double impedance = 0;   ///< B, N·s/m; > 0
-    double drift_rate = 0;  ///< λ, 1/s; ≥ 0; 0 corrects no drift. Well below 1 / (round trip)
-    Duration period{};      ///< T for which a command is to be held; > 0. Intervals are booked as long as they were
+    double impedance = 0;                                ///< B, N·s/m; > 0
+    Duration period{};                                   ///< T for which a command is to be held; > 0
+    Duration smoothing = std::chrono::milliseconds(20);  ///< W; ≥ T and ≤ 256 T, rounded to a whole number of T
+    /// The most that D may be; ≥ 0. Messages that wait for more than 255 periods of the sender are played early.
+    Duration max_playout = std::chrono::milliseconds(60);
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -71,7 +83,7 @@ class WavePort {
   /// A message of the other end has come, in whatever order.
   void receive(const WaveMessage<N>& message) noexcept;
 
-  /// The force to want in the period that begins.
+  /// The force to want in the period that begins: once in each.
   Demand<N> command(const Vec<N>& velocity) noexcept;
 
   /// The interval that has just ended; returns what to send.
@@ -80,16 +92,35 @@ class WavePort {
   /// A, J.
   double energy() const noexcept { return account_; }
 
+  /// D in use, but for what the clock still has to steer.
+  Duration playout() const noexcept { return clock_.playout(); }
+
  private:
+  static constexpr std::size_t kMost = 256;
+
+  WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }
+  Vec<N> sum_at(Duration time) noexcept;
+
   Config config_;
-  double root_;  ///< √(2B)
-  WaveMessage<N> newest_;
-  bool fresh_ = false;            ///< `newest_` has not been used
+  double root_;        ///< √(2B)
+  std::size_t means_;  ///< W/T
+  PlayoutClock clock_;
+
+  std::array<WaveMessage<N>, kMost> heard_{};  ///< a ring, in their order; the first is before the time played out
+  std::size_t begin_ = 0;
+  std::size_t count_ = 1;               ///< the sender's start counts as heard
+  bool joined_ = false;                 ///< a message has come
+  std::array<Vec<N>, kMost> played_{};  ///< a ring of the last W/T values of I
+  std::size_t next_ = 0;
+  Vec<N> mean_ = Vec<N>::Zero();  ///< Ī
+
   Vec<N> wave_ = Vec<N>::Zero();  ///< r̂ of this period
   Vec<N> used_integral_ = Vec<N>::Zero();
   double used_energy_ = 0;
+  double newest_energy_ = 0;
   double account_ = 0;
   WaveMessage<N> sent_;
+  Vec<N> unsent_ = Vec<N>::Zero();  ///< of ∫ wave dt, left out for want of energy
 };
 
 }  // namespace tendon

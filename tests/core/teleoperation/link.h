@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "tests/support/dice.h"
@@ -15,6 +16,13 @@ struct Network {
   int jitter = 0;   ///< 0 … jitter is added to the delay of each message by itself: they overtake each other
   double loss = 0;  ///< probability
   std::uint64_t seed = 1;
+  double repeated = 0;  ///< probability that a message comes once more, up to 1000 periods later
+  /// From this period on the delay is so much longer.
+  int longer_from = std::numeric_limits<int>::max();
+  int longer_by = 0;
+  /// What is sent from this period on, and before the other, is lost.
+  int cut_from = std::numeric_limits<int>::max();
+  int cut_until = 0;
 };
 
 /// One direction of a bad network between two loops that run in step. Virtual time: the number of the period.
@@ -26,7 +34,12 @@ class Link {
   void send(int now, const Message& message) {
     const bool lost = dice_.chance(network_.loss);
     const int extra = static_cast<int>(dice_.within(0, network_.jitter + 1));
-    if (!lost) under_way_.push_back({now + network_.delay + extra, message});
+    if (lost || (now >= network_.cut_from && now < network_.cut_until)) return;
+    const int at = now + network_.delay + extra + (now >= network_.longer_from ? network_.longer_by : 0);
+    under_way_.push_back({at, message});
+    if (network_.repeated > 0 && dice_.chance(network_.repeated)) {
+      under_way_.push_back({at + static_cast<int>(dice_.within(0, 1000)), message});
+    }
   }
 
   /// Calls `receive` with every message that arrives in period `now`.

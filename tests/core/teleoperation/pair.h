@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -23,6 +22,8 @@ struct Surroundings {
   double damping = 0;                         ///< N·s/m
   std::function<double(double)> reference{};  ///< t, s → m: where the spring is at rest; empty: 0
   bool wall = false;                          ///< only while x is beyond `reference`
+  /// s: from then on there is nothing; the hand has let go, or the wall was removed.
+  double until = std::numeric_limits<double>::infinity();
 };
 
 /// A device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v), by the implicit midpoint rule
@@ -49,7 +50,7 @@ class Body {
     const double rest_speed = around_.reference && !around_.wall
                                   ? (around_.reference(middle + h) - around_.reference(middle - h)) / (2 * h)
                                   : 0;
-    const bool touches = !around_.wall || x > rest;
+    const bool touches = middle < around_.until && (!around_.wall || x > rest);
     const double k = touches ? around_.stiffness : 0;
     const double c = touches ? around_.damping : 0;
     const double push = force + k * (rest - x) + c * rest_speed;
@@ -78,6 +79,7 @@ struct EndConfig {
   PositionPosition<3>::Config spring{.stiffness = 400, .own_damping = 4};
   Surroundings around{};
   std::function<double(double)> path{};  ///< t, s → m: the handle is led there and ignores forces
+  double encoder_step = 0;               ///< m; 0: exact
 };
 
 struct PairConfig {
@@ -87,12 +89,6 @@ struct PairConfig {
   double force_scale = 1;     ///< s_f; the springs' K, D, B are the caller's to scale: K_l = s_x s_f K_f
   Network there{};            ///< in tenths of a millisecond
   Network back{};
-  double encoder_step = 0;  ///< m, of both ends; 0: exact
-  /// From this time on, s, each way takes so many more tenths of a millisecond.
-  double longer_from = std::numeric_limits<double>::infinity();
-  int longer_by = 0;
-  double cut_from = std::numeric_limits<double>::infinity();  ///< s: nothing is sent for cut_for
-  double cut_for = 0;
   bool limited = true;  ///< false: no limiter and no purse
   double max_account = 10;
   double max_power = 100;
@@ -138,21 +134,18 @@ class Pair {
         leader(config.leader, purse_of(config, config.force_scale / config.position_scale)),
         follower(config.follower, purse_of(config, config.position_scale / config.force_scale)),
         there_(config.there),
-        back_(config.back),
-        later_there_(longer(config.there, config.longer_by)),
-        later_back_(longer(config.back, config.longer_by)) {}
+        back_(config.back) {}
 
   /// Runs for `duration` s; `look(t)` after every millisecond.
   template <class Look>
   void run(double duration, Look look) {
     const int last = now_ + static_cast<int>(std::lround(duration * 1e4));
     for (; now_ < last; ++now_) {
-      const bool later = time() >= config_.longer_from;
       if (now_ % config_.leader.period == 0) {
-        step(leader, {&back_, &later_back_}, later ? later_there_ : there_, 1 / config_.position_scale);
+        step(leader, back_, there_, 1 / config_.position_scale);
       }
       if (now_ % config_.follower.period == 0) {
-        step(follower, {&there_, &later_there_}, later ? later_back_ : back_, config_.position_scale);
+        step(follower, there_, back_, config_.position_scale);
       }
       const double sum =
           leader.ledger.energy() + config_.force_scale / config_.position_scale * follower.ledger.energy();
@@ -180,12 +173,7 @@ class Pair {
     return purse;
   }
 
-  static Network longer(Network network, int by) {
-    network.delay += by;
-    return network;
-  }
-
-  void step(End& end, const std::array<Link<Message>*, 2>& in, Link<Message>& out, double scale) {
+  void step(End& end, Link<Message>& in, Link<Message>& out, double scale) {
     const double length = end.config.period * 1e-4;
     const Duration held = end.config.period * std::chrono::microseconds(100);
     if (end.periods > 0) {
@@ -203,14 +191,12 @@ class Pair {
     }
     ++end.periods;
     least_account = std::min(least_account, end.limiter.payable());
-    for (Link<Message>* link : in) {
-      link->deliver(now_, [&](Message message) {
-        message.motion.position *= scale;
-        message.motion.velocity *= scale;
-        end.spring.receive(message.motion);
-        end.purse.receive(0, message.purse);
-      });
-    }
+    in.deliver(now_, [&](Message message) {
+      message.motion.position *= scale;
+      message.motion.velocity *= scale;
+      end.spring.receive(message.motion);
+      end.purse.receive(0, message.purse);
+    });
     const Demand<3> wanted = end.spring.command(Vec3(measured(end), 0, 0), Vec3(end.speed, 0, 0));
     end.wanted = wanted.force.x();
     if (config_.limited) {
@@ -222,13 +208,11 @@ class Pair {
     } else {
       end.applied = std::clamp(end.wanted, -100.0, 100.0);
     }
-    if (time() < config_.cut_from || time() >= config_.cut_from + config_.cut_for) {
-      out.send(now_, {end.purse.message(0), end.spring.message()});
-    }
+    out.send(now_, {end.purse.message(0), end.spring.message()});
   }
 
-  double measured(const End& end) const {
-    const double step = config_.encoder_step;
+  static double measured(const End& end) {
+    const double step = end.config.encoder_step;
     return step > 0 ? step * std::round(end.body.x / step) : end.body.x;
   }
 
@@ -243,8 +227,6 @@ class Pair {
  private:
   Link<Message> there_;
   Link<Message> back_;
-  Link<Message> later_there_;
-  Link<Message> later_back_;
   int now_ = 0;
 };
 

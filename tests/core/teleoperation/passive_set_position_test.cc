@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/control/aol_plus.h"
 #include "core/ledger/output_bound.h"
 #include "tests/support/dice.h"
 
@@ -145,6 +146,95 @@ TEST(PassiveSetPosition, FollowsTheSetPositionAsFarAsEnergyLasts) {
   EXPECT_NEAR(spring.energy(), 2.28e-3 + 4.28e-3 - 1e-3 / (4 * 0.26), 1e-15);
 }
 
+// ---- devices with next to no damping -------------------------------------------------------------------------------
+
+constexpr Friction kSlippery = {.coulomb = 0, .viscous = 0.005};
+constexpr PassiveSetPosition<3>::Config kStiff = {
+    .stiffness = 300,
+    .friction = kSlippery,
+    .longest_hold = kPeriod,
+    .damping = 0,
+    .bounded_acceleration = PassiveSetPosition<3>::BoundedAcceleration{.most = 40, .shaping_viscous = 0.26}};
+
+// The worst motion of a hand that accelerates by at most `truth`, m/s², against set positions that jump.
+double least_energy(std::uint64_t seed, double truth, int& clipped, std::uint64_t& broken) {
+  Dice dice(seed);
+  PassiveSetPosition<3> spring(kStiff);
+  AolPlus<1, 3>::Parts parts;
+  parts.bounded_acceleration = AolPlus<1, 3>::BoundedAcceleration{.most = {40}, .shaping_viscous = {0.26}};
+  AolPlus<1, 3> limiter({{kSlippery}, kPeriod, parts});
+  Vec3 x = Vec3::Zero();
+  Vec3 v = Vec3::Zero();
+  double least = 0;
+  const double greed = dice.uniform();
+  for (std::uint64_t i = 1; i <= 3000; ++i) {
+    if (dice.chance(0.02)) spring.receive({i, 0.02 * dice.direction()});
+    const auto wanted = spring.command(x);
+    const auto limited = limiter.limit(wanted);
+    if (!limited.reasons.empty() && limited.force.norm() < wanted.force.norm() * (1 - 1e-9) - 1e-9) ++clipped;
+    Vec3 push = dice.direction() * truth * dice.uniform();
+    if (wanted.force.norm() > 0 && dice.chance(greed)) push = truth * wanted.force.normalized();
+    // The mean velocity of an interval changes by no more than the acceleration.
+    const Vec3 dx = kT * (v + kT * push);
+    v += kT * push;
+    if (x.norm() > 0.02 && v.dot(x) > 0) v -= std::min(kT * truth, v.norm()) * v.normalized();
+    const Interval<3> interval{wanted.force, dx, kPeriod};
+    spring.observe(interval);
+    limiter.observe(interval);
+    least = std::min(least, spring.energy());
+    x += dx;
+  }
+  broken += spring.broken_assumptions();
+  return least;
+}
+
+// Before: at most 10 N/m with a friction of 0.005 N·s/m.
+TEST(PassiveSetPosition, HoldsAStiffSpringOnADeviceWithNextToNoDamping) {
+  auto without = kStiff;
+  without.bounded_acceleration.reset();
+  EXPECT_THROW(PassiveSetPosition<3>{without}, std::invalid_argument);
+  int clipped = 0;
+  std::uint64_t broken = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    ASSERT_GE(least_energy(seed, 15, clipped, broken), -1e-12) << seed;
+  }
+  EXPECT_EQ(clipped, 0) << "by a limiter that assumes the same";
+  EXPECT_EQ(broken, 0U);
+}
+
+TEST(PassiveSetPosition, SeesAHandThatAcceleratesMoreThanAssumed) {
+  int clipped = 0;
+  std::uint64_t broken = 0;
+  double least = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    least = std::min(least, least_energy(seed, 400, clipped, broken));
+  }
+  EXPECT_GT(broken, 0U);
+  EXPECT_LT(least, -1e-6) << "the assumption is needed";
+}
+
+TEST(PassiveSetPosition, FeelsAStiffSpringThere) {
+  PassiveSetPosition<3> spring(kStiff);
+  for (int i = 0; i < 3; ++i) spring.observe({Vec3(-2, 0, 0), Vec3(1e-3, 0, 0), kPeriod});
+  spring.receive({1, Vec3(-0.005, 0, 0)});
+  EXPECT_NEAR(spring.command(Vec3::Zero()).force.x(), -1.5, 1e-9);
+}
+
+TEST(PassiveSetPosition, LowersItsStiffnessToWhatTheLoopBears) {
+  PassiveSetPosition<1> spring({.stiffness = 500, .friction = kFriction, .longest_hold = kPeriod, .damping = 4});
+  EXPECT_EQ(spring.stiffness(), 500);
+  spring.loop_delay(200ms);
+  for (int i = 0; i < 2000; ++i) spring.command(Vec<1>(0));
+  EXPECT_NEAR(spring.stiffness(), 40, 1e-6);
+  spring.loop_delay(-1ms);
+  spring.loop_delay(1ms);
+  for (int i = 0; i < 2000; ++i) spring.command(Vec<1>(0));
+  EXPECT_NEAR(spring.stiffness(), 500, 1e-5);
+  for (int i = 0; i < 10; ++i) spring.observe({Vec<1>(-2), Vec<1>(1e-3), kPeriod});
+  spring.receive({1, Vec<1>(0.002)});
+  EXPECT_NEAR(spring.command(Vec<1>(0), Vec<1>(0.1)).force[0], 500 * 0.002 - 0.4, 1e-4);
+}
+
 TEST(PassiveSetPosition, PassesOverWhatIsNotFiniteOrOld) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   PassiveSetPosition<1> spring({100, kFriction, kPeriod});
@@ -164,6 +254,12 @@ TEST(PassiveSetPosition, AsksForASpringThatFrictionCanHold) {
   EXPECT_THROW(PassiveSetPosition<1>({520, kFriction, 2ms}), std::invalid_argument);
   EXPECT_THROW(PassiveSetPosition<1>({0, kFriction, kPeriod}), std::invalid_argument);
   EXPECT_THROW(PassiveSetPosition<1>({100, kFriction, Duration::zero()}), std::invalid_argument);
+  EXPECT_THROW(PassiveSetPosition<1>({100, kFriction, kPeriod, -1}), std::invalid_argument);
+  auto config = kStiff;
+  config.bounded_acceleration->shaping_viscous = 0.004;
+  EXPECT_THROW(PassiveSetPosition<3>{config}, std::invalid_argument);
+  config.bounded_acceleration = {{.most = 0, .shaping_viscous = 0.26}};
+  EXPECT_THROW(PassiveSetPosition<3>{config}, std::invalid_argument);
 }
 
 }  // namespace

@@ -127,6 +127,44 @@ TEST(TwoChannelPassivity, IsPassiveForEveryMotionAndEveryForce) {
   }
 }
 
+// The tool is stuck, and the controller's spring of 1000 N/m leans on it. Returns the least energy of both ends, J.
+double least_with_a_spring(double booked_stiffness, double drift_rate) {
+  constexpr double kStiffness = 1000;
+  PassivityLeader<1> leader({.max_damping = 1e9, .period = kPeriod});
+  PassivityFollower<1> follower({.drift_rate = drift_rate, .period = kPeriod, .stiffness = booked_stiffness});
+  Link<LeaderMessage<1>> there({.delay = 20, .jitter = 20, .loss = 0.7, .seed = 1});
+  Link<FollowerMessage<1>> back({.delay = 20, .jitter = 20, .loss = 0.7, .seed = 2});
+  double energy = 0;
+  double least = 0;
+  double x = 0;
+  for (int i = 0; i < 5000; ++i) {
+    there.deliver(i, [&](const auto& m) { follower.receive(m); });
+    back.deliver(i, [&](const auto& m) { leader.receive(m); });
+    const Vec<1> v(0.1 * std::sin(2 * std::numbers::pi * 0.8 * i * kT));
+    const Vec<1> force = leader.command(v).force;
+    energy -= force[0] * v[0] * kT;
+    there.send(i, leader.observe({force, v * kT, kPeriod}));
+    const auto step = follower.step(Vec<1>(kStiffness * x));
+    const double next = x + step.velocity[0] * kT;
+    energy -= 0.5 * kStiffness * (next * next - x * x);
+    x = next;
+    back.send(i, step.message);
+    least = std::min(least, energy);
+  }
+  return least;
+}
+
+TEST(TwoChannelPassivity, IsPassiveWithTheControllersSpringBehindIt) {
+  for (const double drift_rate : {5.0, 100.0}) {
+    const double without = least_with_a_spring(0, drift_rate);
+    const double with = least_with_a_spring(1000, drift_rate);
+    std::cout << "spring of 1000 N/m, drift rate " << drift_rate << ": least energy " << without
+              << " J when it is not booked, " << with << " J when it is\n";
+    EXPECT_LT(without, -1e-5);
+    EXPECT_GE(with, -1e-9);
+  }
+}
+
 TEST(TwoChannelPassivity, BooksTheForceReallyAppliedAndNotTheOneItWanted) {
   PassivityLeader<1> leader({.max_damping = 10, .period = kPeriod});
   leader.receive({1, Vec<1>(5), 1});
@@ -164,6 +202,7 @@ TEST(TwoChannelPassivity, SaysWhatIsWrongWithItsConfiguration) {
   EXPECT_THROW(PassivityLeader<1>({.max_damping = 0, .period = kPeriod}), std::invalid_argument);
   EXPECT_THROW(PassivityLeader<1>({.max_damping = 1, .period = Duration::zero()}), std::invalid_argument);
   EXPECT_THROW(PassivityFollower<1>({.drift_rate = -1, .period = kPeriod}), std::invalid_argument);
+  EXPECT_THROW(PassivityFollower<1>({.period = kPeriod, .stiffness = -1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a hand feels of a line of waves: held force, ripple, inertia, and where the other end is afterwards.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <numbers>
+
+#include "tests/core/teleoperation/wave_pair.h"
+
+namespace tendon {
+namespace {
+
+constexpr double kHand = 400;
+constexpr double kWall = 500;
+constexpr double kDeep = 0.02;  // m, that the hand wants to be behind the wall
+
+WavePair::Config line(int round_trip, int jitter, double loss, std::uint64_t seed) {
+  WavePair::Config config;
+  config.there = {.delay = round_trip / 2, .jitter = jitter, .loss = loss, .seed = seed};
+  config.back = {.delay = round_trip - round_trip / 2, .jitter = jitter, .loss = loss, .seed = seed + 1000};
+  return config;
+}
+
+// d of the header, s: half the round trip, the playout, and T + (W − T)/2 with T = 1 ms and W = 20 ms.
+double one_way(int round_trip, double playout) { return round_trip * 0.5e-3 + playout + 10.5e-3; }
+
+double felt(double d, double impedance = 4) { return kDeep / (1 / kHand + d / impedance + 1 / kWall); }
+
+// Before the sums were played out: 0.00 to 0.53 N, with 0.6 N of ripple at 3 ms.
+TEST(WavePair, HoldsTheForceThatItsStiffnessSays) {
+  for (const int round_trip : {0, 1, 3, 10, 50, 200, 600}) {
+    const Presses held = press(line(round_trip, 0, 0, 1), kHand, kWall, 9 + 0.1 * round_trip);
+    const double expected = felt(one_way(round_trip, 0));
+    std::cout << "round trip " << round_trip << " ms: " << held.first << " and " << held.second << " N, predicted "
+              << expected << "; ripple " << held.ripple * 1e3 << " mN\n";
+    EXPECT_NEAR(held.first, expected, 0.03 * expected) << round_trip;
+    EXPECT_NEAR(held.second, expected, 0.03 * expected) << round_trip;
+    EXPECT_NEAR(held.contact, expected, 0.03 * expected) << round_trip;
+    EXPECT_LT(held.ripple, 0.02) << round_trip;
+    EXPECT_GE(held.least_sum, -1e-9) << round_trip;
+  }
+}
+
+// Before: 0.12 to 0.23 N with 0.1 N of ripple, at every round trip. At 600 ms with 60 ms of jitter a steered playout
+// keeps the line moving: 0.20 N felt for 0.25 N at the wall after a minute.
+TEST(WavePair, HoldsItThroughJitterLossAndReordering) {
+  for (const int round_trip : {0, 1, 3, 10, 50, 200, 600}) {
+    for (const std::uint64_t seed : {1U, 2U}) {
+      const int jitter = std::max(5, round_trip / 10);
+      const Presses held = press(line(round_trip, jitter, 0.1, seed), kHand, kWall, 9 + 0.1 * round_trip);
+      const double tolerance = round_trip < 600 ? 0.03 : 0.25;
+      const double least = felt(one_way(round_trip, 1e-3 * jitter + 2e-3));
+      if (seed == 1) {
+        std::cout << "round trip " << round_trip << " ms, jitter " << jitter << " ms, 10 % lost: " << held.first
+                  << " and " << held.second << " N; ripple " << held.ripple * 1e3 << " mN\n";
+      }
+      EXPECT_GT(held.first, (1 - tolerance) * least) << round_trip;
+      EXPECT_GT(held.second, (1 - tolerance) * least) << round_trip;
+      EXPECT_LT(held.second, 1.03 * felt(one_way(round_trip, 0))) << round_trip;
+      EXPECT_NEAR(held.contact, held.second, tolerance * held.second) << round_trip;
+      EXPECT_LT(held.ripple, 0.02) << round_trip;
+      EXPECT_GE(held.least_sum, -1e-9) << round_trip;
+    }
+  }
+}
+
+// Nothing is late, but what is lost leaves gaps that the playout has to wait for: else it stands still in each of them.
+TEST(WavePair, WaitsForGapsAndHoldsWithoutRipple) {
+  for (const double loss : {0.1, 0.3}) {
+    const Presses held = press(line(20, 0, loss, 1), kHand, kWall);
+    std::cout << loss * 100 << " % lost: " << held.second << " N; ripple " << held.ripple * 1e3 << " mN\n";
+    EXPECT_GT(held.second, 0.97 * felt(one_way(20, 10e-3))) << loss;
+    EXPECT_LT(held.second, 1.03 * felt(one_way(20, 0))) << loss;
+    EXPECT_LT(held.ripple, 0.02) << loss;
+  }
+}
+
+// Of short lines and stiff walls, where sampled waves rang.
+TEST(WavePair, DoesNotRingOnShortLinesWhateverItsImpedance) {
+  for (const double impedance : {1.0, 4.0, 10.0}) {
+    for (const double wall : {500.0, 5000.0}) {
+      for (const int round_trip : {0, 1, 3}) {
+        WavePair::Config config = line(round_trip, 0, 0, 1);
+        config.port.impedance = impedance;
+        const Presses held = press(config, kHand, wall);
+        EXPECT_LT(held.ripple, 0.02) << impedance << ' ' << wall << ' ' << round_trip;
+        EXPECT_GE(held.least_sum, -1e-9) << impedance << ' ' << wall << ' ' << round_trip;
+      }
+    }
+  }
+}
+
+TEST(WavePair, FeelsLikeTheInertiaOfItsLineAndTheOtherDevice) {
+  for (const int round_trip : {0, 10, 50, 200}) {
+    WavePair::Config config = line(round_trip, 0, 0, 1);
+    const double w = 2 * std::numbers::pi * 0.25;  // well below where the line has a wave length
+    config.path = [w](double t) { return 0.02 * (1 - std::cos(w * t)); };
+    WavePair pair(config);
+    double against = 0;
+    double squares = 0;
+    pair.run(24, [&](double t) {
+      if (t < 12) return;
+      const double acceleration = 0.02 * w * w * std::cos(w * (t + 0.5e-3));  // in the middle of the hold
+      against -= pair.leader.force * acceleration;
+      squares += acceleration * acceleration;
+    });
+    const double inertia = against / squares - config.mass;
+    const double expected = config.port.impedance * one_way(round_trip, 0);
+    std::cout << "round trip " << round_trip << " ms: inertia " << inertia << " kg, B d " << expected << "\n";
+    EXPECT_NEAR(inertia, expected, 0.2 * expected) << round_trip;
+  }
+}
+
+// A hand waves for a minute and comes to rest: the tool is where the hand is, but for what friction can hold.
+TEST(WavePair, ComesToRestWhereTheHandIsHoweverMuchWasLost) {
+  for (const double loss : {0.0, 0.01, 0.1, 0.3}) {
+    WavePair::Config config = line(50, 5, loss, 7);
+    config.friction.coulomb = 0.02;
+    config.hand = {.stiffness = kHand, .damping = 2, .reference = [](double t) {
+                     return t < 60 ? 0.02 * std::sin(2 * std::numbers::pi * t) : 0.0;
+                   }};
+    WavePair pair(config);
+    pair.run(66, [](double) {});
+    const double apart = std::abs(pair.follower.body.x - pair.leader.body.x);
+    const double stiffness = config.port.impedance / one_way(50, 10e-3);
+    std::cout << loss * 100 << " % lost: " << apart * 1e3 << " mm apart, friction holds "
+              << 2 * config.friction.coulomb / stiffness * 1e3 << " mm\n";
+    EXPECT_LE(apart, 2 * config.friction.coulomb / stiffness);
+    EXPECT_GE(pair.least_sum, -1e-9);
+  }
+}
+
+// The peer falls silent while the hand presses: what is left of its waves is played within D + W and nothing after.
+TEST(WavePair, ASilentPeerIsADamperAfterTheSmoothing) {
+  WavePort<1> port({.impedance = 4, .period = std::chrono::milliseconds(1)});
+  for (std::uint64_t i = 1; i <= 100; ++i) {
+    port.command(Vec<1>(0));
+    port.observe({Vec<1>(0), Vec<1>(0), std::chrono::milliseconds(1)});
+    const auto n = static_cast<double>(i);
+    port.receive({i, i * std::chrono::milliseconds(1), Vec<1>(1e-3 * n), 0.5e-3 * n});
+  }
+  EXPECT_NEAR(port.command(Vec<1>(0)).force[0], std::sqrt(8.0), 1e-9) << "a steady wave of 1";
+  port.observe({Vec<1>(0), Vec<1>(0), std::chrono::milliseconds(1)});
+  for (int i = 0; i < 21; ++i) {
+    port.command(Vec<1>(0));
+    port.observe({Vec<1>(0), Vec<1>(0), std::chrono::milliseconds(1)});
+  }
+  EXPECT_NEAR(port.command(Vec<1>(0)).force[0], 0, 1e-9);
+  EXPECT_NEAR(port.command(Vec<1>(0.1)).force[0], -0.4, 1e-9);
+}
+
+}  // namespace
+}  // namespace tendon
