@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <vector>
+#include <list>
 
 #include "tests/support/dice.h"
 
@@ -45,7 +45,7 @@ class Link {
   };
   Network network_;
   Dice dice_;
-  std::vector<Parcel> under_way_;
+  std::list<Parcel> under_way_;  // a vector would move all of them each time
 };
 
 }  // namespace tendon
