@@ -191,6 +191,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   const bool gone = age > patience() + kLostAfter;
   if (std::exchange(peer_anew_, false)) {
     seen_ = 0;
+    if (!leads()) engagement_ = 0;
     if (in_act()) leave(PortPhase::kCoupled);
   }
   if (!ready) {

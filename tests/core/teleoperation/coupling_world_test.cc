@@ -145,7 +145,7 @@ class CouplingWorld {
 
   void happen() {
     ports_.leader.buttons &= ~(1U << 7);
-    if (dice_.chance(8e-3)) act();
+    if (dice_.chance(8e-3) && ports_.now % ports_.leader.setup.every == 0) act();
     if (dice_.chance(8e-3)) ports_.leader.buttons ^= 1U << 4;
     disturb(ports_.leader, leader_, ports_.cut_there);
     disturb(ports_.follower, follower_, ports_.cut_back);
@@ -191,7 +191,9 @@ class CouplingWorld {
       breaks(made == acts_.end() || made->second < watch.since, "act");
       live_ += period;
     }
-    if (ours && told.engagement == watch.told.engagement && !(live && watch.live)) {
+    const bool same_act = told.engagement == watch.told.engagement &&
+                          (leads || told.answers_epoch == watch.told.answers_epoch);  // the leader numbers its acts
+    if (ours && same_act && !(live && watch.live)) {
       breaks(told.position != watch.told.position, "still");
     }
     if (ours && !live) breaks(told.given > watch.told.given, "gives");
@@ -212,7 +214,7 @@ class CouplingWorld {
       if (watch.not_live_for > 55 && !robot) breaks(wanted.norm() > 0, "idle");
     }
     const bool steady = port.seen && port.ready && watch.stepped && ours;
-    if (steady && live != watch.live) breaks((wanted - watch.wanted).norm() > 1e-9, "step");
+    if (steady && live != watch.live) breaks((wanted - watch.wanted).norm() > 0.021 * period * most, "step");
     watch.stepped = port.seen && port.ready;
     watch.wanted = wanted;
     watch.live = live;
