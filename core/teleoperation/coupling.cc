@@ -28,6 +28,8 @@ std::optional<Purse> purse_of(const Coupling::Config& config, const PoseMap& map
   Purse::Config purse = *config.purse;
   purse.peers = 1;
   purse.joule[0] = config.role == PortRole::kLeader ? map.leader_joule() : map.follower_joule();
+  // The same at both ends: the end whose joules are worth less would else be left with too little.
+  if (config.role == PortRole::kFollower) purse.start *= map.follower_joule();
   purse.epoch = config.spring.epoch;
   return Purse(purse);
 }
@@ -209,6 +211,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   const bool gone = age > patience() + kLostAfter;
   if (std::exchange(peer_anew_, false)) {
     seen_ = 0;
+    if (!leads()) engagement_ = 0;
     if (in_act()) leave(PortPhase::kCoupled);
   }
   if (!ready) {

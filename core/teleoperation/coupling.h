@@ -28,9 +28,9 @@ namespace tendon {
 ///
 /// **Displacements.** Each end has an offset p₀ and tells u = p − p₀, in its own axes. While an end is not *live* its u
 /// stands still, and p₀ moves with the handle. The leader is live while it is engaged and the follower has answered the
-/// act; the follower while it is engaged. The follower sets its u to the leader's as mapped when it becomes live, so that
-/// the law has no force at that moment; the leader's u begins each act at 0 and goes on from where it stood, after a
-/// clutch too. So nothing moves at the other end, however often the clutch is pressed.
+/// act; the follower while it is engaged. When it becomes live the follower sets its u to the leader's as mapped, so
+/// that the law has no force at that moment; the leader's u begins each act at 0 and goes on from where it stood, after
+/// a clutch too. So nothing moves at the other end, however often the clutch is pressed.
 ///
 /// **Phases** (PortPhase), `ready` = the device is seen, armed and without fault:
 ///
@@ -41,12 +41,12 @@ namespace tendon {
 ///                          made for the follower's present epoch
 ///     engaged  → clutched  leader: its clutch is held (or toggled); the follower stays engaged and holds its place
 ///     clutched → engaged   leader: released
-///     engaged, clutched → coupled    disengage(); or the peer starts anew, or is not engaged or clutched by this act any
-///                          more; or (leader) the peer has heard the act and is not engaged by it, is not ready, or has
-///                          not answered for kAnswerWithin
+///     engaged, clutched → coupled    disengage(); or the peer starts anew, or is not engaged or clutched by this act
+///                          any more; or (leader) the peer has heard the act and is not engaged by it, is not ready, or
+///                          has not answered for kAnswerWithin
 ///     engaged, clutched → lost       the ladder
-///     lost     → coupled   the peer is fresh again, and its state answers one of ours that said so: both ways work, and
-///                          no act that was made before it knew can engage us any more
+///     lost     → coupled   the peer is fresh again, and its state answers one of ours that said so: both ways work,
+///                          and no act that was made before it knew can engage us any more
 ///     any      → fault     not ready;  fault → coupled (alone, without a peer) when ready again
 ///
 /// The force of a port that becomes live is multiplied by a ramp 0 → 1 within `ramp`. Whenever what makes the force
@@ -68,11 +68,12 @@ namespace tendon {
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
 /// law, with a K that does not adapt to the delay, because the leader has no spring; the leader's force is
-/// s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact (`contact_measured`). All forces of the coupling are bounded by max_force.
+/// s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact (`contact_measured`). All forces of the
+/// coupling are bounded by max_force.
 ///
-/// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while both ends are live
-/// (clutched is not) and the peer is not silent. Its `joule` is the map's. Method position-position needs it for the pair to be passive; without it a limiter at each end
-/// keeps each by itself passive, and the follower cannot move.
+/// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while it is live and its
+/// peer is engaged (not clutched) and not silent. Its `joule` is the map's. Method position-position needs it for the
+/// pair to be passive; without it a limiter at each end keeps each by itself passive, and the follower cannot move.
 ///
 /// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent, or
 /// that the purse refuses, changes nothing and is counted in `refused`. One that is not newer is passed over. A hand
@@ -100,7 +101,9 @@ class Coupling {
     PoseMap::Config map{};
     /// stiffness, damping, own_damping: the LEADER's; max_force this end's. period, epoch: this end's.
     PositionPosition<3>::Config spring{};
-    std::optional<Purse::Config> purse{};      ///< peers 1; joule and epoch are set from map and spring
+    /// start: the LEADER's J, the follower's is worth as much; max_power, max_account: this end's. peers, joule and epoch
+    /// are set from map and spring.
+    std::optional<Purse::Config> purse{};
     std::optional<Button> clutch{};            ///< leader only
     std::optional<std::uint32_t> engage_by{};  ///< leader: bit of the button whose press is the act; empty: engage()
     Duration ramp = std::chrono::milliseconds(300);       ///< > 0

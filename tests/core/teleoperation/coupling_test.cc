@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two couplings between two devices: phases, engagement by an act alone, the ladder. coupling_force_test.cc has what is
-// felt, coupling_world_test.cc the search.
+// Two couplings between two devices: phases, engagement by an act alone, the clutch, bad input. coupling_loss_test.cc has
+// the ladder, coupling_force_test.cc what is felt, coupling_world_test.cc the search.
 #include "core/teleoperation/coupling.h"
 
 #include <gtest/gtest.h>
@@ -21,24 +21,47 @@ using std::chrono::milliseconds;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-PortSetup setup_of(PortRole role) {
-  PortSetup setup;
-  setup.coupling = coupling_of(role);
-  return setup;
-}
+/// One port whose peer is played by the test.
+class Played {
+ public:
+  explicit Played(Coupling::Config config) : port(config) {}
+
+  /// The peer's state of this period, as a good peer would make it.
+  PortState state(PortPhase phase, std::uint64_t engagement = 0) {
+    PortState peer;
+    peer.epoch = 5;
+    peer.sequence = ++sequence;
+    peer.answers_epoch = told.epoch;
+    peer.answers = told.sequence;
+    peer.time = milliseconds(sequence);
+    peer.phase = phase;
+    peer.engagement = engagement;
+    return peer;
+  }
+  void hear(const PortState& peer) { port.receive(peer, Port::at(now)); }
+  Demand<3> step(const Vec3& x = Vec3::Zero(), std::uint32_t buttons = 0, bool ready = true) {
+    const Demand<3> demand = port.command({Port::at(now), x, Vec3::Zero()}, buttons, ready);
+    told = port.message(Vec3::Zero(), std::nullopt);
+    ++now;
+    return demand;
+  }
+
+  Coupling port;
+  PortState told;
+  std::uint64_t sequence = 0;
+  int now = 0;
+};
 
 TEST(Coupling, IsAloneThenCoupledAndEngagedOnlyByTheAct) {
-  Ports ports(setup_of(PortRole::kLeader), setup_of(PortRole::kFollower), {.delay = 10, .seed = 1},
-              {.delay = 10, .seed = 2});
+  Ports ports = far_apart(10);
   EXPECT_FALSE(ports.leader.coupling->engage());
   ports.run(1);
-  EXPECT_EQ(ports.leader.coupling->phase(), PortPhase::kAlone);
-  ports.run(1000);
-  EXPECT_EQ(ports.leader.coupling->phase(), PortPhase::kCoupled);
-  EXPECT_EQ(ports.follower.coupling->phase(), PortPhase::kCoupled);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kAlone);
+  expect_no_engagement(ports, 1000, "nobody acted");
+  expect_coupled(ports, "after a second");
   EXPECT_FALSE(ports.follower.coupling->engage()) << "the leader's business";
   EXPECT_TRUE(ports.leader.coupling->engage());
-  EXPECT_EQ(ports.leader.coupling->phase(), PortPhase::kEngaged);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kEngaged);
   ports.run(11);
   EXPECT_TRUE(ports.follower.coupling->live()) << "one way later";
   EXPECT_FALSE(ports.leader.coupling->live());
@@ -46,6 +69,332 @@ TEST(Coupling, IsAloneThenCoupledAndEngagedOnlyByTheAct) {
   EXPECT_TRUE(ports.leader.coupling->live()) << "a round trip later";
   EXPECT_TRUE(ports.leader.coupling->engage()) << "it was already";
   EXPECT_EQ(ports.told_there.engagement, 1U);
+}
+
+TEST(Coupling, AButtonIsTheActWhenItIsPressedAndNotWhileItIsHeld) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  leader.coupling.engage_by = 3;
+  Ports ports(leader, port_of(PortRole::kFollower));
+  ports.leader.buttons = 1U << 3;
+  expect_no_engagement(ports, 100, "held since before the start");
+  ports.leader.buttons = 1U << 2;
+  expect_no_engagement(ports, 100, "another button");
+  ports.leader.buttons |= 1U << 3;
+  ports.run(3);
+  EXPECT_TRUE(ports.leader.coupling->live());
+  ports.follower.coupling->disengage();
+  ports.run(3);
+  expect_no_engagement(ports, 100, "still held");
+}
+
+TEST(Coupling, TheActIsRefusedUnlessBothAreReadyAndFresh) {
+  Ports ports = far_apart(0);
+  ports.run(50);
+  ports.leader.ready = false;
+  ports.run(1);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kFault);
+  EXPECT_FALSE(ports.leader.coupling->engage());
+  ports.leader.ready = true;
+  ports.follower.ready = false;
+  ports.run(2);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kCoupled);
+  EXPECT_FALSE(ports.leader.coupling->engage()) << "the follower has a fault";
+  ports.follower.ready = true;
+  ports.run(2);
+  ports.cut_back = true;
+  ports.run(21);
+  EXPECT_TRUE(ports.leader.coupling->engage()) << "fresh: 20 ms";
+  ports.leader.coupling->disengage();
+  ports.run(1);
+  EXPECT_FALSE(ports.leader.coupling->engage()) << "21 ms";
+  ports.run(300);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kAlone);
+  EXPECT_FALSE(ports.leader.coupling->engage());
+}
+
+TEST(Coupling, AFaultOfEitherDisengagesBothAndItsEndEngagesNobody) {
+  for (const bool leads : {true, false}) {
+    Ports ports = far_apart(5);
+    ASSERT_TRUE(ports.engage());
+    Port& port = leads ? ports.leader : ports.follower;
+    port.ready = false;
+    ports.run(1);
+    EXPECT_EQ(phase(port), PortPhase::kFault);
+    EXPECT_EQ(port.demand.force, Vec3(Vec3::Zero()));
+    port.ready = true;
+    ports.run(7);
+    expect_no_engagement(ports, 500, "a fault of one period");
+    expect_coupled(ports, "after the fault");
+    EXPECT_TRUE(ports.engage());
+  }
+}
+
+TEST(Coupling, AnActThatAFollowerHeardInItsFaultNeverEngagesIt) {
+  Played follower(coupling_of(PortRole::kFollower));
+  follower.step();
+  follower.hear(follower.state(PortPhase::kCoupled));
+  follower.step();
+  follower.hear(follower.state(PortPhase::kEngaged, 1));
+  follower.step(Vec3::Zero(), 0, false);
+  for (int n = 0; n < 100; ++n) {
+    follower.hear(follower.state(PortPhase::kEngaged, 1));
+    follower.step();
+    EXPECT_EQ(follower.port.phase(), PortPhase::kCoupled);
+  }
+  follower.hear(follower.state(PortPhase::kEngaged, 2));
+  follower.step();
+  EXPECT_TRUE(follower.port.live()) << "another act";
+}
+
+TEST(Coupling, ALeaderWaitsForTheAnswerButNotForOneThatDeclines) {
+  const auto engaged = [] {
+    Played leader(coupling_of(PortRole::kLeader));
+    leader.step();
+    leader.hear(leader.state(PortPhase::kCoupled));
+    leader.step();
+    EXPECT_TRUE(leader.port.engage());
+    leader.step();
+    return leader;
+  };
+  Played leader = engaged();
+  int waited = 0;
+  for (; leader.port.phase() == PortPhase::kEngaged && waited < 10'000; ++waited) {
+    PortState late = leader.state(PortPhase::kCoupled);
+    late.answers = 2;  // made before it heard of the act
+    leader.hear(late);
+    leader.step();
+  }
+  EXPECT_EQ(leader.port.phase(), PortPhase::kCoupled);
+  EXPECT_NEAR(waited, 5000, 1);
+
+  leader = engaged();
+  leader.hear(leader.state(PortPhase::kCoupled));
+  leader.step();
+  EXPECT_EQ(leader.port.phase(), PortPhase::kCoupled) << "it heard the act and is not engaged";
+
+  leader = engaged();
+  PortState fault = leader.state(PortPhase::kFault);
+  fault.answers = 2;
+  leader.hear(fault);
+  leader.step();
+  EXPECT_EQ(leader.port.phase(), PortPhase::kCoupled) << "it cannot answer";
+}
+
+TEST(Coupling, DisengagingEitherEndDisengagesBoth) {
+  for (const bool leads : {true, false}) {
+    Ports ports = far_apart(20);
+    ASSERT_TRUE(ports.engage());
+    (leads ? ports.leader : ports.follower).coupling->disengage();
+    ports.run(42);
+    expect_no_engagement(ports, 1000, "disengaged");
+    EXPECT_TRUE(ports.engage());
+  }
+}
+
+TEST(Coupling, TheClutchFreesTheLeaderAndKeepsItsDisplacement) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  leader.path = [](double t) { return Vec3(0.1 * t, 0, 0); };
+  leader.coupling.clutch = Coupling::Button{.bit = 1};
+  Ports ports(leader, port_of(PortRole::kFollower));
+  ASSERT_TRUE(ports.engage());
+  ports.run(400);
+  const double before = ports.told_there.position.x();
+  EXPECT_NEAR(before, 0.04, 0.001);
+  ports.leader.buttons = 2;
+  ports.run(1);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kClutched);
+  EXPECT_FALSE(ports.leader.coupling->live());
+  EXPECT_EQ(ports.told_there.position.x(), before);
+  EXPECT_EQ(ports.told_there.velocity, Vec3(Vec3::Zero()));
+  double paid = 0;
+  ports.run(700, [&](int) { paid += ports.leader.paid + ports.follower.paid; });
+  EXPECT_EQ(paid, 0) << "nothing is given while clutched";
+  EXPECT_EQ(ports.leader.demand.force, Vec3(Vec3::Zero()));
+  EXPECT_EQ(ports.told_there.position.x(), before);
+  EXPECT_EQ(phase(ports.follower), PortPhase::kEngaged);
+  EXPECT_NEAR(ports.follower.x().x(), before, 1e-4) << "it holds its place";
+  ports.leader.buttons = 0;
+  ports.run(1);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kEngaged);
+  EXPECT_EQ(ports.told_there.position.x(), before) << "in the period of the release, too";
+  ports.run(1);
+  EXPECT_NEAR(ports.told_there.position.x(), before + 1e-4, 1e-12);
+}
+
+TEST(Coupling, AClutchThatTogglesStaysUntilItIsPressedAgain) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  leader.coupling.clutch = Coupling::Button{.bit = 31, .toggles = true};
+  Ports ports(leader, port_of(PortRole::kFollower));
+  ASSERT_TRUE(ports.engage());
+  const auto press = [&] {
+    ports.leader.buttons = 1U << 31;
+    ports.run(5);
+    ports.leader.buttons = 0;
+    ports.run(5);
+  };
+  press();
+  EXPECT_EQ(phase(ports.leader), PortPhase::kClutched);
+  press();
+  EXPECT_EQ(phase(ports.leader), PortPhase::kEngaged);
+  press();
+  ports.leader.coupling->disengage();
+  ports.run(5);
+  ASSERT_TRUE(ports.engage());
+  EXPECT_EQ(phase(ports.leader), PortPhase::kEngaged) << "a new act begins unclutched";
+}
+
+TEST(Coupling, TheActCanBeMadeWithTheClutchHeld) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  leader.coupling.clutch = Coupling::Button{.bit = 0};
+  Ports ports(leader, port_of(PortRole::kFollower));
+  ports.run(50);
+  ports.leader.buttons = 1;
+  EXPECT_TRUE(ports.leader.coupling->engage());
+  ports.run(6000);
+  EXPECT_EQ(phase(ports.leader), PortPhase::kClutched);
+  EXPECT_EQ(phase(ports.follower), PortPhase::kEngaged);
+  ports.leader.buttons = 0;
+  ports.run(2);
+  EXPECT_TRUE(ports.leader.coupling->live());
+}
+
+TEST(Coupling, AStateWithAValueOutOfItsBoundsChangesNothing) {
+  using Change = void (*)(PortState&);
+  const std::vector<Change> changes = {
+      [](PortState& s) { s.epoch = 0; },
+      [](PortState& s) { s.sequence = 0; },
+      [](PortState& s) { s.answers += 1; },
+      [](PortState& s) { s.time = std::chrono::hours(1'000'000); },
+      [](PortState& s) { s.time = -std::chrono::hours(1'000'000); },
+      [](PortState& s) { s.round_trip = milliseconds(-1); },
+      [](PortState& s) { s.round_trip = milliseconds(10'001); },
+      [](PortState& s) { s.phase = PortPhase{0}; },
+      [](PortState& s) { s.phase = PortPhase{8}; },
+      [](PortState& s) { s.position.y() = kNan; },
+      [](PortState& s) { s.position.x() = 1.1e12; },
+      [](PortState& s) { s.velocity.z() = -std::numeric_limits<double>::infinity(); },
+      [](PortState& s) { s.force.x() = kNan; },
+      [](PortState& s) { s.contact_force = Vec3(0, kNan, 0); },
+      [](PortState& s) { s.account = -1001; },
+      [](PortState& s) { s.need = -1e-9; },
+      [](PortState& s) { s.need = kNan; },
+      [](PortState& s) { s.given = 1e7; },
+      [](PortState& s) { s.given = 0.001; },  // it has given more before
+      [](PortState& s) { s.taken = 0.5; },    // we have given nothing
+  };
+  for (std::size_t n = 0; n < changes.size(); ++n) {
+    Played leader(coupling_of(PortRole::kLeader));
+    leader.step();
+    PortState good = leader.state(PortPhase::kCoupled);
+    good.given = 0.002;
+    leader.hear(good);
+    leader.step();
+    PortState bad = leader.state(PortPhase::kFault);
+    bad.given = 0.003;
+    changes[n](bad);
+    leader.hear(bad);
+    EXPECT_EQ(leader.port.refused(), 1U) << n;
+    leader.step();
+    EXPECT_TRUE(leader.port.engage()) << n << ": it would be refused after a fault";
+    EXPECT_EQ(leader.told.answers, 1U) << n;
+    EXPECT_EQ(leader.told.taken, 0.002) << n;
+    PortState next = leader.state(PortPhase::kCoupled);
+    next.given = 0.003;
+    leader.hear(next);
+    EXPECT_EQ(leader.port.refused(), 1U) << n << ": a good one is heard again";
+  }
+}
+
+TEST(Coupling, AHandThatIsNotFiniteMovesNothing) {
+  Ports ports = far_apart(0);
+  ASSERT_TRUE(ports.engage());
+  ports.run(500);
+  for (const Vec3& bad : {Vec3(kNan, 0, 0), Vec3(0, 1e13, 0)}) {
+    for (int n = 0; n < 3; ++n) {
+      const Demand<3> demand = ports.leader.coupling->command({Port::at(ports.now), bad, Vec3::Zero()}, 0, true);
+      EXPECT_FALSE(demand.force.allFinite());
+      EXPECT_EQ(ports.leader.limiter->limit(demand).force, Vec3(Vec3::Zero()));
+    }
+  }
+  ports.run(100);
+  EXPECT_TRUE(ports.leader.coupling->live());
+  EXPECT_EQ(ports.told_there.position, Vec3(Vec3::Zero()));
+  const PortState told = ports.leader.coupling->message(Vec3(kNan, 0, 0), Vec3(0, kNan, 0));
+  EXPECT_EQ(told.force, Vec3(Vec3::Zero()));
+  EXPECT_FALSE(told.contact_force.has_value()) << "not measured is not zero";
+}
+
+TEST(Coupling, PeriodsWithoutAPositionHaveNoForceAndKeepThePhase) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  PortSetup follower = port_of(PortRole::kFollower);
+  leader.path = [](double t) { return Vec3(t < 0.5 ? 0 : 0.01, 0, 0); };
+  follower.path = [](double) { return Vec3(Vec3::Zero()); };
+  Ports ports(leader, follower);
+  ASSERT_TRUE(ports.engage());
+  ports.run(1000);
+  const double before = ports.follower.demand.force.x();
+  ports.follower.seen = false;
+  ports.run(1);
+  ports.follower.seen = true;
+  ports.run(1);
+  EXPECT_NEAR(ports.follower.demand.force.x(), before, 0.03 * before) << "one period does not undo the ramp";
+  ports.follower.seen = false;
+  ports.run(60);
+  ports.follower.seen = true;
+  ports.run(1);
+  EXPECT_LT(ports.follower.demand.force.x(), 0.01 * before) << "sixty do";
+  EXPECT_TRUE(ports.follower.coupling->live());
+  ports.follower.seen = false;
+  ports.cut_there = true;
+  ports.run(272);
+  EXPECT_EQ(phase(ports.follower), PortPhase::kLost) << "the ladder goes on";
+}
+
+TEST(Coupling, AFollowerThatIsEngagedInAnUnseenPeriodStillTakesTheLeadersPlace) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  leader.path = [](double) { return Vec3(0.3, 0, 0); };
+  PortSetup follower = port_of(PortRole::kFollower);
+  follower.path = [](double t) { return Vec3(0.1 * t, 0, 0); };
+  Ports ports(leader, follower);
+  ASSERT_TRUE(ports.engage());
+  ports.run(500);
+  ports.leader.coupling->disengage();
+  ports.run(100);
+  ports.follower.seen = false;
+  ASSERT_TRUE(ports.leader.coupling->engage());
+  ports.run(5);
+  ports.follower.seen = true;
+  ports.run(1);
+  EXPECT_NEAR(ports.told_back.position.x(), 0, 1e-12);
+}
+
+TEST(Coupling, RefusesImpossibleConfigurations) {
+  const auto says = [](PortRole role, auto change) {
+    auto config = coupling_of(role);
+    change(config);
+    return complaint([&] { Coupling coupling(config); });
+  };
+  const auto leader = PortRole::kLeader;
+  const auto follower = PortRole::kFollower;
+  EXPECT_EQ(says(leader, [](auto&) {}), "");
+  EXPECT_NE(says(leader, [](auto& c) { c.ramp = {}; }).find("ramp"), std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.peer_period = {}; }).find("peer_period"), std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.map.force_scale = 0; }).find("force_scale"), std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.spring.stiffness = -1; }).find("stiffness"), std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.purse->max_power = 0; }).find("max_power"), std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.clutch = Coupling::Button{.bit = 32}; }).find("clutch.bit = 32"),
+            std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.engage_by = 32; }).find("engage_by = 32"), std::string::npos);
+  EXPECT_NE(says(leader,
+                 [](auto& c) {
+                   c.clutch = Coupling::Button{.bit = 2};
+                   c.engage_by = 2;
+                 })
+                .find("engage_by = 2"),
+            std::string::npos);
+  EXPECT_NE(says(leader, [](auto& c) { c.holds_place = true; }).find("holds_place"), std::string::npos);
+  EXPECT_NE(says(follower, [](auto& c) { c.clutch = Coupling::Button{.bit = 2}; }).find("clutch"), std::string::npos);
+  EXPECT_NE(says(follower, [](auto& c) { c.engage_by = 2; }).find("engage_by"), std::string::npos);
 }
 
 }  // namespace

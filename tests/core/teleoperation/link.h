@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <vector>
+#include <list>
 
 #include "tests/support/dice.h"
 
@@ -58,7 +58,7 @@ class Link {
   };
   Network network_;
   Dice dice_;
-  std::vector<Parcel> under_way_;
+  std::list<Parcel> under_way_;  // a vector would move all of them each time
 };
 
 }  // namespace tendon

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -187,6 +190,38 @@ class Ports {
     for (int i = 0; i < copies && !cut; ++i) out.send(now, told);
   }
 };
+
+/// Of the ports in these tests, as they are without anything special.
+inline PortSetup port_of(PortRole role) {
+  PortSetup setup;
+  setup.coupling = coupling_of(role);
+  return setup;
+}
+
+inline Ports far_apart(int one_way) {
+  return {port_of(PortRole::kLeader),
+          port_of(PortRole::kFollower),
+          {.delay = one_way, .seed = 1},
+          {.delay = one_way, .seed = 2}};
+}
+
+inline PortPhase phase(const Port& port) { return port.coupling->phase(); }
+
+inline void expect_coupled(const Ports& ports, const std::string& when) {
+  EXPECT_EQ(phase(ports.leader), PortPhase::kCoupled) << when;
+  EXPECT_EQ(phase(ports.follower), PortPhase::kCoupled) << when;
+}
+
+/// Runs, and expects that no end is engaged in any period.
+inline void expect_no_engagement(Ports& ports, int ticks, const std::string& when) {
+  bool engaged = false;
+  ports.run(ticks, [&](int) {
+    for (const Port* port : {&ports.leader, &ports.follower}) {
+      engaged = engaged || phase(*port) == PortPhase::kEngaged || phase(*port) == PortPhase::kClutched;
+    }
+  });
+  EXPECT_FALSE(engaged) << when;
+}
 
 /// J: accounts may be so far below zero, by rounding.
 inline constexpr double kRounding = -1e-9;

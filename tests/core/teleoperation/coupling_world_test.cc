@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Two couplings in drawn worlds: devices, maps, networks, hands; acts, clutches, losses, restarts, faults, replays. No
+// account and no pair gives out energy, and nothing happens without an act. mutants.cmake plants faults in coupling.cc,
+// each of which these worlds must name.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/rotation.h"
+#include "tests/core/teleoperation/ports.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+namespace {
+
+/// Says which promise a world breaks first; empty: none.
+class CouplingWorld {
+ public:
+  explicit CouplingWorld(std::uint64_t seed) : dice_(seed), ports_(draw()) {}
+
+  std::string run(int ticks) {
+    for (int n = 0; n < ticks && broken_.empty(); ++n) {
+      happen();
+      ports_.run(1, [&](int) { look(); });
+    }
+    return broken_;
+  }
+
+  int acts() const { return acts_made_; }
+  int live() const { return live_; }  ///< ms, of both ends
+  int losses() const { return losses_; }
+  double least_account() const { return ports_.least_account(); }
+  double least_sum() const { return ports_.least_sum; }
+
+ private:
+  /// What was seen of one port.
+  struct Watch {
+    PortState told{};
+    bool live = false;
+    int not_live_for = 1000;  ///< ms
+    int live_for = 0;         ///< ms
+    bool from_rest = false;   ///< it had no force when it became live
+    int since = 0;            ///< acts before this engage it no more
+    Vec3 wanted = Vec3::Zero();
+    bool stepped = true;  ///< `wanted` is of a period with a position
+    int unready_for = 0;  ///< ms that are left
+    int cut_for = 0;      ///< ms that are left of its way out
+    std::uint64_t epoch = 1;
+  };
+
+  Network network() {
+    return {.delay = dice_.chance(0.3) ? 0 : static_cast<int>(dice_.decades(0, 2)),
+            .jitter = dice_.chance(0.3) ? 0 : static_cast<int>(dice_.decades(0, 1.7)),
+            .loss = dice_.chance(0.3) ? 0 : dice_.uniform() * 0.6,
+            .seed = dice_.bits()};
+  }
+
+  std::function<double(double)> wave() {
+    const double size = dice_.decades(-3, -1.3);
+    const double often = dice_.decades(-0.3, 1.3);
+    const double late = dice_.within(0, 6);
+    return [=](double t) { return size * std::sin(often * t + late); };
+  }
+
+  void draw_surroundings(PortSetup& setup) {
+    if (dice_.chance(0.25)) {  // the worst hand: it goes where it likes
+      const auto x = wave();
+      const auto y = wave();
+      setup.path = [=](double t) { return Vec3(x(t), y(t), 0); };
+      return;
+    }
+    for (Surroundings& axis : setup.around) {
+      axis.stiffness = dice_.chance(0.3) ? 0 : dice_.decades(1, 4);
+      axis.damping = dice_.chance(0.5) ? 0 : dice_.within(0, 5);
+      axis.wall = dice_.chance(0.3);
+      if (axis.wall) axis.damping = 0;
+      if (dice_.chance(0.7)) axis.reference = wave();
+      if (axis.wall) axis.reference = [](double) { return 0.005; };  // one that moves does work
+    }
+  }
+
+  Ports draw() {
+    PortSetup leader = port_of(PortRole::kLeader);
+    auto& led = leader.coupling;
+    led.spring.stiffness = dice_.decades(1.5, 3.3);
+    led.spring.own_damping = dice_.within(1, 8);
+    led.spring.damping = dice_.chance(0.5) ? 0 : dice_.within(0, 5);
+    led.spring.adapt_to_delay = dice_.chance(0.7);
+    led.spring.max_force = dice_.decades(0, 1.3);
+    led.ramp = dice_.milliseconds(100, 500);
+    led.method = dice_.chance(0.85) ? CouplingMethod::kPositionPosition : CouplingMethod::kPositionForce;
+    if (dice_.chance(0.5)) {
+      led.map.position_scale = dice_.decades(-1, 1);
+      led.map.force_scale = dice_.decades(-1, 1);
+    }
+    if (dice_.chance(0.5)) led.map.rotation = rotation_by(dice_.direction() * dice_.within(0, 3));
+    if (dice_.chance(0.3)) led.map.axes[dice_.bits() % 3] = false;
+    PortSetup follower = leader;
+    follower.coupling.role = PortRole::kFollower;
+    follower.coupling.holds_place = dice_.chance(0.25);
+    follower.measures_contact = dice_.chance(0.7);
+    led.clutch = Coupling::Button{.bit = 4, .toggles = dice_.chance(0.3)};
+    if (dice_.chance(0.5)) led.engage_by = 7;
+    for (PortSetup* setup : {&leader, &follower}) {
+      setup->friction = {dice_.chance(0.3) ? 0.0 : dice_.decades(-3, -1), dice_.decades(-1.3, 0.3)};
+      setup->mass = dice_.decades(-1.3, -0.5);
+      setup->every = dice_.chance(0.8) ? 1 : 2;
+      draw_surroundings(*setup);
+    }
+    leader.coupling.peer_period = std::chrono::milliseconds(follower.every);
+    follower.coupling.peer_period = std::chrono::milliseconds(leader.every);
+    return {leader, follower, network(), network()};
+  }
+
+  void act() {
+    Port& leader = ports_.leader;
+    acting_ = ports_.now;
+    if (leader.setup.coupling.engage_by) {
+      leader.buttons |= 1U << 7;
+    } else {
+      leader.coupling->engage();
+    }
+  }
+
+  void disturb(Port& port, Watch& watch, bool& cut) {
+    if (dice_.chance(5e-4)) {
+      port.begin(++watch.epoch);
+      watch.since = ports_.now;
+      watch.stepped = false;
+    }
+    if (dice_.chance(5e-4)) watch.unready_for = static_cast<int>(dice_.decades(0, 2));
+    port.ready = watch.unready_for-- <= 0;
+    port.seen = !dice_.chance(2e-3);
+    if (dice_.chance(1e-3)) watch.cut_for = static_cast<int>(dice_.decades(1, 3));
+    cut = watch.cut_for-- > 0;
+    if (dice_.chance(2e-4)) port.coupling->disengage();
+  }
+
+  void happen() {
+    ports_.leader.buttons &= ~(1U << 7);
+    if (dice_.chance(8e-3) && ports_.now % ports_.leader.setup.every == 0) act();
+    if (dice_.chance(8e-3)) ports_.leader.buttons ^= 1U << 4;
+    disturb(ports_.leader, leader_, ports_.cut_there);
+    disturb(ports_.follower, follower_, ports_.cut_back);
+    ports_.copies = dice_.chance(0.1) ? 2 : 1;
+    if (dice_.chance(0.02)) {
+      there_.push_back(ports_.told_there);
+      back_.push_back(ports_.told_back);
+      ports_.there.send(ports_.now, there_[dice_.bits() % there_.size()]);
+      ports_.back.send(ports_.now, back_[dice_.bits() % back_.size()]);
+    }
+  }
+
+  void breaks(bool is, const char* promise) {
+    if (is && broken_.empty()) broken_ = promise;
+  }
+
+  void look() {
+    const PortState& led = ports_.told_there;
+    const bool anew = led.epoch != leader_.told.epoch;
+    if (led.engagement > (anew ? 0 : leader_.told.engagement)) {
+      breaks(acting_ != ports_.now, "act");
+      acts_[{led.epoch, led.engagement}] = ports_.now;
+      ++acts_made_;
+    }
+    breaks(!(ports_.least_account() >= kRounding), "account");
+    breaks(!(ports_.least_sum >= kRounding), "pair");
+    if (ports_.now % ports_.leader.setup.every == 0) look(ports_.leader, ports_.told_there, leader_, true);
+    if (ports_.now % ports_.follower.setup.every == 0) look(ports_.follower, ports_.told_back, follower_, false);
+  }
+
+  void look(const Port& port, const PortState& told, Watch& watch, bool leads) {
+    const bool live = port.coupling->live();
+    const bool ours = told.epoch == watch.told.epoch;
+    const int period = port.setup.every;
+    const Vec3& wanted = port.demand.force;
+    breaks(!wanted.allFinite() || !port.applied.allFinite(), "finite");
+    if (told.phase == PortPhase::kLost && watch.told.phase != PortPhase::kLost) {
+      watch.since = ports_.now;
+      ++losses_;
+    }
+    if (live) {
+      const auto made = acts_.find({leads ? told.epoch : told.answers_epoch, told.engagement});
+      breaks(made == acts_.end() || made->second < watch.since, "act");
+      live_ += period;
+    }
+    const bool same_act = told.engagement == watch.told.engagement &&
+                          (leads || told.answers_epoch == watch.told.answers_epoch);  // the leader numbers its acts
+    if (ours && same_act && !(live && watch.live)) {
+      breaks(told.position != watch.told.position, "still");
+    }
+    if (ours && !live) breaks(told.given > watch.told.given, "gives");
+    if (!ours || (live && !watch.live)) {
+      watch.live_for = 0;
+      watch.from_rest = watch.not_live_for > 55;
+    }
+    const double most = port.setup.coupling.spring.max_force;
+    const bool robot = port.setup.coupling.holds_place;
+    breaks(wanted.norm() > most * (1 + 1e-9), "most");
+    if (live) {
+      const double ramp = watch.live_for / (1e3 * seconds(port.setup.coupling.ramp));
+      if (watch.from_rest && !robot) breaks(wanted.norm() > most * ramp + 1e-9, "ramp");
+      watch.live_for += period;
+      watch.not_live_for = 0;
+    } else {
+      watch.not_live_for += period;
+      if (watch.not_live_for > 55 && !robot) breaks(wanted.norm() > 0, "idle");
+    }
+    const bool steady = port.seen && port.ready && watch.stepped && ours;
+    if (steady && live != watch.live) breaks((wanted - watch.wanted).norm() > 0.021 * period * most, "step");
+    watch.stepped = port.seen && port.ready;
+    watch.wanted = wanted;
+    watch.live = live;
+    watch.told = told;
+  }
+
+  Dice dice_;
+  Ports ports_;
+  Watch leader_;
+  Watch follower_;
+  std::map<std::pair<std::uint64_t, std::uint64_t>, int> acts_;  ///< (leader's epoch, engagement) → when
+  std::vector<PortState> there_;
+  std::vector<PortState> back_;
+  int acting_ = -1;
+  int acts_made_ = 0;
+  int live_ = 0;
+  int losses_ = 0;
+  std::string broken_;
+};
+
+void expect_worlds_keep_their_promises(std::uint64_t worlds, int ticks) {
+  long acts = 0;
+  long live = 0;
+  long losses = 0;
+  double account = 0;
+  double sum = 0;
+  for (std::uint64_t seed = 1; seed <= worlds; ++seed) {
+    CouplingWorld world(seed);
+    const std::string broken = world.run(ticks);
+    ASSERT_EQ(broken, "") << "seed " << seed << " breaks \"" << broken << "\": account " << world.least_account()
+                          << " J, pair " << world.least_sum() << " J";
+    acts += world.acts();
+    live += world.live();
+    losses += world.losses();
+    account = std::min(account, world.least_account());
+    sum = std::min(sum, world.least_sum());
+  }
+  std::cout << worlds << " worlds of " << ticks << " ms: " << acts << " acts, " << losses << " losses, " << live / 1000
+            << " s live, least account " << account << " J, least pair " << sum << " J\n";
+  EXPECT_GT(acts, static_cast<long>(worlds)) << "nobody acted: nothing was tested";
+  EXPECT_GT(live, static_cast<long>(worlds) * 500);
+  EXPECT_GT(losses, static_cast<long>(worlds) / 10);
+}
+
+TEST(CouplingWorlds, NoAccountNoPairAndNoForceWithoutAnAct) { expect_worlds_keep_their_promises(400, 3000); }
+
+// By hand: --gtest_also_run_disabled_tests --gtest_filter='*Thousands*'
+TEST(CouplingWorlds, DISABLED_Thousands) { expect_worlds_keep_their_promises(20'000, 3000); }
+
+}  // namespace
+}  // namespace tendon
