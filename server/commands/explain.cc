@@ -294,6 +294,36 @@ Explanation explain(const Scene& listed, const std::function<Duration()>& proces
   return out;
 }
 
+namespace {
+
+/// N/m, the stiffest that a hand feels through this limiter: 2 b/T.
+double operational_stiffness(const LimiterConfig& limiter) {
+  return 2 * limiter.friction.viscous / seconds(limiter.longest_hold);
+}
+
+/// What the coupling is at some round trips, if the other end is like this one.
+void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
+  const bool leads = coupling.role == PortRole::kLeader;
+  const bool springs = coupling.method == CouplingMethod::kPositionPosition;
+  const auto& spring = coupling.spring;
+  text << "teleoperation: the " << (leads ? "leader" : "follower") << " of a "
+       << (springs ? "position-position" : "position-force") << " coupling"
+       << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
+  if (!springs) return;
+  text << "  the two limiters let no stiffness above " << std::llround(operational_stiffness(limiter) / 2)
+       << " N/m be felt, if the other end is like this one\n"
+       << "  round trip      stiffness   in free motion like a damper of\n";
+  for (const int ms : {2, 10, 50, 200, 600}) {
+    const double loop = ms * 1e-3;
+    const double quiet = spring.adapt_to_delay ? 2 * spring.own_damping / loop : spring.stiffness;
+    const double stiffness = std::min(spring.stiffness, quiet);
+    text << std::setw(9) << ms << " ms" << std::setw(11) << std::llround(stiffness) << " N/m" << std::setw(11)
+         << std::setprecision(3) << stiffness * loop + 2 * spring.own_damping << " N·s/m\n";
+  }
+}
+
+}  // namespace
+
 std::string in_words(const Scene& scene, const Explanation& explanation) {
   const auto [parts, step_ns, device_ns, resolution_ns] = explanation;
   std::size_t width = 0;
@@ -315,8 +345,9 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
   text << "a whole step: " << std::llround(step_ns) << " ns of processor time, of which " << std::llround(device_ns)
        << " ns are the simulated device"
        << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? ", which stands in for the real one" : "")
-       << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n"
-       << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
+       << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n";
+  if (const auto& coupling = scene.loop.control.coupling) put_coupling(*coupling, scene.loop.control.limiter, text);
+  text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "
        << (scene.recording ? "a recording" : "no recording") << '\n';
   return text.str();

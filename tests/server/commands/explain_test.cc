@@ -26,7 +26,7 @@ std::function<Duration()> ticking() {
 /// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
 std::set<std::string> optional_parts() {
   std::set<std::string> keys = {"device.hand", "device.rotation", "device.gripper", "loop.max_speed_m_per_s",
-                                "safety",      "limiter",         "admittance"};
+                                "safety",      "limiter",         "admittance",     "teleoperation"};
   std::istringstream reference(scene_reference());
   std::string table;
   for (std::string line; std::getline(reference, line);) {

@@ -123,8 +123,8 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
   }
   EXPECT_EQ(
       error_of_minimal_and("[other]\nzzzzzz = 1\n"),
-      "s.toml:4: other: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, network, "
-      "recording");
+      "s.toml:4: other: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, "
+      "teleoperation, network, recording");
 }
 
 TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {

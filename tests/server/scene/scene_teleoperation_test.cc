@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// [teleoperation]: what a coupling is, and what is refused.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "core/base/rotation.h"
+#include "server/scene/scene.h"
+#include "tests/server/scene/scene_text.h"
+
+namespace tendon {
+namespace {
+
+using namespace std::chrono_literals;
+
+const std::string kLeader =
+    "[teleoperation]\n"
+    "role = \"leader\"\n"
+    "[teleoperation.coupling]\n"
+    "stiffness_n_per_m = 400\n"
+    "damping_n_s_per_m = 4\n"
+    "[teleoperation.purse]\n";
+
+TEST(SceneTeleoperation, WithoutItsTableThereIsNone) {
+  const Scene scene = minimal_and("");
+  EXPECT_FALSE(scene.teleoperation || scene.loop.control.coupling);
+  EXPECT_FALSE(scene.loop.control.limiter.shared_account);
+}
+
+TEST(SceneTeleoperation, HasWhatItListsAndTheRestIsSimple) {
+  const Scene scene = minimal_and(kLeader);
+  ASSERT_TRUE(scene.teleoperation && scene.loop.control.coupling);
+  EXPECT_FALSE(scene.teleoperation->dial || scene.teleoperation->key);
+  const Coupling::Config& coupling = *scene.loop.control.coupling;
+  EXPECT_EQ(coupling.role, PortRole::kLeader);
+  EXPECT_EQ(coupling.method, CouplingMethod::kPositionPosition);
+  EXPECT_EQ(coupling.map.position_scale, 1);
+  EXPECT_EQ(coupling.map.axes, (std::array{true, true, true}));
+  EXPECT_EQ(coupling.spring.stiffness, 400);
+  EXPECT_EQ(coupling.spring.own_damping, 4);
+  EXPECT_EQ(coupling.spring.period, 1ms);
+  EXPECT_EQ(coupling.spring.max_force, scene.loop.control.max_force);
+  EXPECT_TRUE(coupling.spring.adapt_to_delay && coupling.purse);
+  EXPECT_FALSE(coupling.clutch || coupling.engage_by || coupling.holds_place);
+  EXPECT_TRUE(scene.loop.control.limiter.shared_account);
+}
+
+TEST(SceneTeleoperation, TakesEveryKeyInItsUnit) {
+  const Scene scene = minimal_and(R"([teleoperation]
+role = "follower"
+method = "position-force"
+dial = "[::1]:47999"
+device = "right"
+channel = "robot"
+on_loss = "hold"
+[teleoperation.map]
+position_scale = 0.5
+force_scale = 2
+rotation_deg = [0, 0, 90]
+axes = "xz"
+[teleoperation.coupling]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mutual_damping_n_s_per_m = 1
+adapt_to_delay = false
+max_force_n = 2
+[teleoperation.purse]
+max_account_mj = 50
+max_power_w = 1
+[teleoperation.engage]
+ramp_ms = 100
+)");
+  EXPECT_EQ(to_string(*scene.teleoperation->dial), "[::1]:47999");
+  EXPECT_EQ(scene.teleoperation->device, "right");
+  EXPECT_EQ(scene.teleoperation->channel, "robot");
+  const Coupling::Config& coupling = *scene.loop.control.coupling;
+  EXPECT_EQ(coupling.method, CouplingMethod::kPositionForce);
+  EXPECT_TRUE(coupling.holds_place);
+  EXPECT_EQ(coupling.map.position_scale, 0.5);
+  EXPECT_EQ(coupling.map.force_scale, 2);
+  EXPECT_LT((rotated(coupling.map.rotation, Vec3(1, 0, 0)) - Vec3(0, 1, 0)).norm(), 1e-15);
+  EXPECT_EQ(coupling.map.axes, (std::array{true, false, true}));
+  EXPECT_EQ(coupling.spring.damping, 1);
+  EXPECT_FALSE(coupling.spring.adapt_to_delay);
+  EXPECT_EQ(coupling.spring.max_force, 2);
+  EXPECT_EQ(coupling.purse->max_account, 0.05);
+  EXPECT_EQ(coupling.purse->max_power, 1);
+  EXPECT_EQ(coupling.ramp, 100ms);
+}
+
+TEST(SceneTeleoperation, OfALeaderTheButtons) {
+  const Scene scene = minimal_and(kLeader + R"([teleoperation.clutch]
+button = 1
+toggle = true
+[teleoperation.engage]
+by = "button"
+button = 0
+)");
+  const Coupling::Config& coupling = *scene.loop.control.coupling;
+  EXPECT_EQ(coupling.clutch->bit, 1U);
+  EXPECT_TRUE(coupling.clutch->toggles);
+  EXPECT_EQ(coupling.engage_by, 0U);
+}
+
+TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
+  const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
+  EXPECT_EQ(
+      refusal("[teleoperation]\nrole = \"leader\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
+              "damping_n_s_per_m = 4\n"),
+      "s.toml:4: teleoperation.purse: missing, expected this table: behind a limiter of its own a follower cannot "
+      "move unless the leader pays");
+  EXPECT_EQ(refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
+            "s.toml:11: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
+            "account that a purse can share");
+  EXPECT_EQ(
+      refusal(kLeader + "[teleoperation.map]\naxes = \"zx\"\n"),
+      "s.toml:11: teleoperation.map.axes: expected one or more of the letters x, y, z, in this order, found \"zx\"");
+  EXPECT_EQ(refusal(kLeader + "[teleoperation.engage]\nby = \"button\"\n"),
+            "s.toml:11: teleoperation.engage.by: expected \"button\" together with button, or \"request\" without");
+  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\ndial = \"192.0.2.7:47100\"\n[teleoperation.coupling]\n"
+                    "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
+            "s.toml:6: teleoperation.dial: expected an address of this machine, or a key besides: nothing crosses a "
+            "network in the clear");
+  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\nkey = \"a.key\"\n[teleoperation.coupling]\n"
+                    "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
+            "s.toml:6: teleoperation.key: expected none without dial: who is dialled lets in by [network] keys");
+  EXPECT_EQ(refusal("[teleoperation]\nrole = \"leader\"\non_loss = \"hold\"\n[teleoperation.coupling]\n"
+                    "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.purse]\n"),
+            "s.toml:6: teleoperation.on_loss: expected \"release\": a hand holds the leader");
+  EXPECT_EQ(refusal("[teleoperation]\nrole = \"follower\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
+                    "damping_n_s_per_m = 4\n[teleoperation.purse]\n[teleoperation.clutch]\nbutton = 1\n"),
+            "s.toml:10: teleoperation.clutch: expected none: the leader clutches");
+}
+
+}  // namespace
+}  // namespace tendon
