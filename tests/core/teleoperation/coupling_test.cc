@@ -153,10 +153,15 @@ TEST(Coupling, DisengagingEitherEndDisengagesBoth) {
   for (const bool leads : {true, false}) {
     Ports ports = far_apart(20);
     ASSERT_TRUE(ports.engage());
+    ports.leader.put(Vec3(0.01, 0, 0));
+    ports.run(1);
+    EXPECT_GT(ports.told_there.position.norm(), 5e-3);
     (leads ? ports.leader : ports.follower).coupling->disengage();
     ports.run(42);
     expect_no_engagement(ports, 1000, "disengaged");
+    ports.leader.put(Vec3(0.02, 0, 0));
     EXPECT_TRUE(ports.engage());
+    EXPECT_LT(ports.told_there.position.norm(), 1e-3) << "each act begins at 0";
   }
 }
 
