@@ -219,13 +219,17 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   } else if (phase_ == PortPhase::kFault) {
     phase_ = PortPhase::kAlone;
   }
-  if (phase_ == PortPhase::kAlone && fresh_) phase_ = PortPhase::kCoupled;
   if (phase_ == PortPhase::kCoupled && gone) phase_ = PortPhase::kAlone;
   if (in_act() && gone) {
     leave(PortPhase::kLost);
     lost_sequence_ = sequence_;
   }
-  if (phase_ == PortPhase::kLost && fresh_ && heard_since(lost_sequence_)) phase_ = PortPhase::kCoupled;
+  // A fault after the loss does not make the peer know of it.
+  const bool told = lost_sequence_ == 0 || heard_since(lost_sequence_);
+  if ((phase_ == PortPhase::kAlone || phase_ == PortPhase::kLost) && fresh_ && told) {
+    phase_ = PortPhase::kCoupled;
+    lost_sequence_ = 0;
+  }
   leads() ? advance_leader(buttons) : advance_follower();
   buttons_ = buttons;
 }

@@ -47,7 +47,8 @@ namespace tendon {
 ///     engaged, clutched → lost       the ladder
 ///     lost     → coupled   the peer is fresh again, and its state answers one of ours that said so: both ways work,
 ///                          and no act that was made before it knew can engage us any more
-///     any      → fault     not ready;  fault → coupled (alone, without a peer) when ready again
+///     any      → fault     not ready;  fault → coupled when ready again (alone, without a peer or before it knows of a
+///                          loss)
 ///
 /// The force of a port that becomes live is multiplied by a ramp 0 → 1 within `ramp`. Whenever what makes the force
 /// changes, what the force was before is faded out within kFade: no act, clutch, loss or takeover makes a step. A fault
@@ -175,7 +176,7 @@ class Coupling {
   bool toggled_ = false;
   bool ready_ = false;
   std::uint64_t act_sequence_ = 0;   ///< the first period that tells of our act
-  std::uint64_t lost_sequence_ = 0;  ///< the first period that tells of our loss
+  std::uint64_t lost_sequence_ = 0;  ///< the first period that tells of our loss; 0: none, or the peer knows
   LocalTime acted_at_{};
   std::uint32_t buttons_ = ~std::uint32_t{0};  ///< at first all: a button that was held all along is not pressed
   LocalTime now_{};                            ///< of the newest period

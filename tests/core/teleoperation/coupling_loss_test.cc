@@ -181,6 +181,58 @@ TEST(Coupling, AnActFromBeforeTheLossThatComesAfterItEngagesNobody) {
   }
 }
 
+TEST(Coupling, AFaultAfterTheLossDoesNotMakeThePeerKnowOfIt) {
+  Played follower(coupling_of(PortRole::kFollower));
+  follower.step();
+  follower.hear(follower.state(PortPhase::kCoupled));
+  follower.step();
+  const PortState then = follower.state(PortPhase::kEngaged, 1);
+  follower.hear(then);
+  follower.step();
+  ASSERT_TRUE(follower.port.live());
+  for (int n = 0; n < 300; ++n) follower.step();
+  ASSERT_EQ(follower.port.phase(), PortPhase::kLost);
+  follower.step(Vec3::Zero(), 0, false);
+  for (int n = 0; n < 20; ++n) {
+    PortState act = follower.state(PortPhase::kEngaged, 2);
+    act.answers = then.answers;  // it was made before the loss
+    follower.hear(act);
+    follower.step();
+    EXPECT_EQ(follower.port.phase(), PortPhase::kAlone);
+  }
+  follower.hear(follower.state(PortPhase::kCoupled, 2));
+  follower.step();
+  EXPECT_EQ(follower.port.phase(), PortPhase::kCoupled) << "the leader knows";
+}
+
+TEST(Coupling, AnAnswerToAFormerActOrToAFormerLeaderIsNone) {
+  Ports ports = far_apart(50);
+  ports.run(200);
+  ASSERT_TRUE(ports.engage());
+  ports.leader.coupling->disengage();
+  ASSERT_TRUE(ports.leader.coupling->engage());
+  for (int n = 0; n < 100; ++n) {
+    ports.run(1);
+    EXPECT_FALSE(ports.leader.coupling->live()) << n << ": the follower has not heard of the second act";
+  }
+  ports.run(2);
+  EXPECT_TRUE(ports.leader.coupling->live());
+
+  auto config = coupling_of(PortRole::kLeader);
+  config.spring.epoch = 2;
+  Played leader(config);
+  leader.step();
+  leader.hear(leader.state(PortPhase::kCoupled));
+  leader.step();
+  ASSERT_TRUE(leader.port.engage());
+  leader.step();
+  PortState old = leader.state(PortPhase::kEngaged, 1);
+  old.answers_epoch = 1;
+  leader.hear(old);
+  leader.step();
+  EXPECT_FALSE(leader.port.live());
+}
+
 TEST(Coupling, OldStatesThatComeLateOrTwiceEngageNobody) {
   Ports ports = far_apart(3);
   std::vector<PortState> there;

@@ -21,37 +21,6 @@ using std::chrono::milliseconds;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// One port whose peer is played by the test.
-class Played {
- public:
-  explicit Played(Coupling::Config config) : port(config) {}
-
-  /// The peer's state of this period, as a good peer would make it.
-  PortState state(PortPhase phase, std::uint64_t engagement = 0) {
-    PortState peer;
-    peer.epoch = 5;
-    peer.sequence = ++sequence;
-    peer.answers_epoch = told.epoch;
-    peer.answers = told.sequence;
-    peer.time = milliseconds(sequence);
-    peer.phase = phase;
-    peer.engagement = engagement;
-    return peer;
-  }
-  void hear(const PortState& peer) { port.receive(peer, Port::at(now)); }
-  Demand<3> step(const Vec3& x = Vec3::Zero(), std::uint32_t buttons = 0, bool ready = true) {
-    const Demand<3> demand = port.command({Port::at(now), x, Vec3::Zero()}, buttons, ready);
-    told = port.message(Vec3::Zero(), std::nullopt);
-    ++now;
-    return demand;
-  }
-
-  Coupling port;
-  PortState told;
-  std::uint64_t sequence = 0;
-  int now = 0;
-};
-
 TEST(Coupling, IsAloneThenCoupledAndEngagedOnlyByTheAct) {
   Ports ports = far_apart(10);
   EXPECT_FALSE(ports.leader.coupling->engage());
@@ -184,10 +153,15 @@ TEST(Coupling, DisengagingEitherEndDisengagesBoth) {
   for (const bool leads : {true, false}) {
     Ports ports = far_apart(20);
     ASSERT_TRUE(ports.engage());
+    ports.leader.put(Vec3(0.01, 0, 0));
+    ports.run(1);
+    EXPECT_GT(ports.told_there.position.norm(), 5e-3);
     (leads ? ports.leader : ports.follower).coupling->disengage();
     ports.run(42);
     expect_no_engagement(ports, 1000, "disengaged");
+    ports.leader.put(Vec3(0.02, 0, 0));
     EXPECT_TRUE(ports.engage());
+    EXPECT_LT(ports.told_there.position.norm(), 1e-3) << "each act begins at 0";
   }
 }
 

@@ -223,6 +223,37 @@ inline void expect_no_engagement(Ports& ports, int ticks, const std::string& whe
   EXPECT_FALSE(engaged) << when;
 }
 
+/// One port whose peer is played by the test.
+class Played {
+ public:
+  explicit Played(Coupling::Config config) : port(config) {}
+
+  /// The peer's state of this period, as a good peer would make it.
+  PortState state(PortPhase phase, std::uint64_t engagement = 0) {
+    PortState peer;
+    peer.epoch = 5;
+    peer.sequence = ++sequence;
+    peer.answers_epoch = told.epoch;
+    peer.answers = told.sequence;
+    peer.time = std::chrono::milliseconds(sequence);
+    peer.phase = phase;
+    peer.engagement = engagement;
+    return peer;
+  }
+  void hear(const PortState& peer) { port.receive(peer, Port::at(now)); }
+  Demand<3> step(const Vec3& x = Vec3::Zero(), std::uint32_t buttons = 0, bool ready = true) {
+    const Demand<3> demand = port.command({Port::at(now), x, Vec3::Zero()}, buttons, ready);
+    told = port.message(Vec3::Zero(), std::nullopt);
+    ++now;
+    return demand;
+  }
+
+  Coupling port;
+  PortState told;
+  std::uint64_t sequence = 0;
+  int now = 0;
+};
+
 /// J: accounts may be so far below zero, by rounding.
 inline constexpr double kRounding = -1e-9;
 
