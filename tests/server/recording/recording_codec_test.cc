@@ -8,10 +8,17 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "core/base/reason.h"
 #include "recording.pb.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/recorder.h"
+#include "server/recording/recording_reader.h"
 #include "tests/server/recording/recording_samples.h"
 
 namespace tendon {
@@ -86,6 +93,75 @@ TEST(RecordingCodec, KeepsWhatFitsOfADatagramThatWasTooLarge) {
   const auto read = recording::decode_datagram(recording::encode(datagram), testing::ms(1));
   EXPECT_EQ(read.size, 60'000U);
   EXPECT_EQ(read.bytes, datagram.bytes);
+}
+
+PortRecord a_port() {
+  PortRecord port;
+  port.tick = 77;
+  port.at = testing::ms(77);
+  port.settled = {.credit = 1.25e-3, .withdraw = 0.5e-3};
+  port.stiffness = 128;
+  port.round_trip = std::chrono::milliseconds(50);
+  port.sent.epoch = 5;
+  port.sent.sequence = 77;
+  port.sent.answers_epoch = 4;
+  port.sent.answers = 60;
+  port.sent.time = Duration(-3);
+  port.sent.round_trip = Duration(9);
+  port.sent.phase = PortPhase::kClutched;
+  port.sent.engagement = 2;
+  port.sent.buttons = 3;
+  port.sent.position = {1, -2, 3};
+  port.sent.velocity = {4, 5, -6};
+  port.sent.force = {-7, 8, 9};
+  port.sent.account = 0.125;
+  port.sent.need = 0.25;
+  port.sent.given = 0.5;
+  port.sent.taken = 0.75;
+  port.peer = port.sent;
+  port.peer->contact_force = Vec3(0.5, 0, -0.5);
+  return port;
+}
+
+TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
+  const PortRecord port = a_port();
+  const PortRecord read = recording::decode_port(recording::encode(port), port.at);
+  EXPECT_EQ(recording::encode(read), recording::encode(port));
+  EXPECT_EQ(read.at, port.at);
+  EXPECT_EQ(read.settled.credit, port.settled.credit);
+  EXPECT_EQ(read.settled.withdraw, port.settled.withdraw);
+  EXPECT_EQ(read.sent.phase, PortPhase::kClutched);
+  EXPECT_EQ(read.sent.position, port.sent.position);
+  EXPECT_EQ(read.sent.time, port.sent.time);
+  EXPECT_EQ(read.sent.taken, 0.75);
+  EXPECT_FALSE(read.sent.contact_force);
+  ASSERT_TRUE(read.peer);
+  EXPECT_EQ(read.peer->contact_force, port.peer->contact_force);
+  PortRecord alone = port;
+  alone.peer.reset();
+  EXPECT_FALSE(recording::decode_port(recording::encode(alone), port.at).peer);
+  PortRecord odd = port;
+  odd.sent.phase = static_cast<PortPhase>(8);
+  EXPECT_THROW(recording::decode_port(recording::encode(odd), port.at), std::invalid_argument);
+}
+
+TEST(RecordingCodec, APortIsInTheFileBeforeItsStepAndOnlyOfACoupledDevice) {
+  for (const bool coupled : {true, false}) {
+    MemorySink sink;
+    Recorder::Config config = testing::sample_config();
+    config.ports = coupled;
+    Recorder recorder(config, sink);
+    if (coupled) recorder.record(a_port());
+    recorder.record(testing::sample_step(77));
+    recorder.close();
+    const auto bytes = sink.bytes();
+    RecordingReader reader(
+        std::make_unique<std::istringstream>(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())),
+        "x");
+    std::vector<std::size_t> kinds;
+    while (const auto record = reader.next()) kinds.push_back(record->index());
+    EXPECT_EQ(kinds, coupled ? (std::vector<std::size_t>{0, 4, 1}) : (std::vector<std::size_t>{0, 1}));
+  }
 }
 
 }  // namespace
