@@ -273,6 +273,14 @@ void set_falcon(std::vector<Scene>& scenes, const OptionalPath& firmware, bool a
   if (firmware && !any) throw std::runtime_error("--falcon-firmware: no scene has [device] kind = \"falcon\"");
 }
 
+/// Of the one scene that dials.
+void dial_instead(std::vector<Scene>& scenes, const Address& server) {
+  const auto dials = [](const Scene& scene) { return scene.teleoperation && scene.teleoperation->dial; };
+  const auto found = std::find_if(scenes.begin(), scenes.end(), dials);
+  if (found == scenes.end()) throw std::invalid_argument("--dial: expected a scene with [teleoperation] dial");
+  found->teleoperation->dial = server;
+}
+
 /// As settings of the scene, so that the recording has them too.
 std::vector<std::string> without_limiter_settings(const Scene& scene) {
   if (scene.driver().moves_a_hand) {
@@ -317,6 +325,7 @@ int main(int argc, char** argv) {
   std::vector<std::filesystem::path> scene_files;
   std::string record;
   std::string listen;
+  std::string dial;
   double duration_s = 0;
   bool without_limiter = false;
   bool json = false;
@@ -328,6 +337,7 @@ int main(int argc, char** argv) {
                  "Record to this MCAP file, whatever the scene's [recording] says. A file that is there is never "
                  "overwritten: run.mcap goes on as run-2.mcap");
   app.add_option("--listen", listen, "HOST:PORT to listen on, whatever the scene says; port 0 lets the system choose");
+  app.add_option("--dial", dial, "HOST:PORT of the server to couple with, instead of that of [teleoperation]");
   app.add_option("--duration-s", duration_s,
                  "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM");
   app.add_flag("--without-limiter", without_limiter, "Switch the output limiter off. Simulated devices only");
@@ -400,6 +410,7 @@ int main(int argc, char** argv) {
     std::vector<Scene> scenes = read_scenes(scene_files, without_limiter ? without_limiter_settings : Overrides());
     if (!record.empty()) scenes.front().recording = Scene::Recording{.path = record};
     if (!listen.empty()) scenes.front().network.listen = parse_address(listen);
+    if (!dial.empty()) dial_instead(scenes, parse_address(dial));
     set_falcon(scenes, firmware_file, accept_unknown_firmware);
     return run(scenes, duration_s, json);
   } catch (const std::exception& problem) {

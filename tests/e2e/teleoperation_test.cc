@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "tests/e2e/stage/process.h"
+#include "tests/e2e/stage/stage.h"
+#include "tests/server/scratch_folder.h"
+
+// A hand that leads the device of another server, in real processes.
+
+namespace tendon::e2e {
+namespace {
+
+std::filesystem::path scene(const std::string& name) { return demo_scene().parent_path() / name; }
+
+/// Every force of both ends was within its limiter's bound, and every step is the same when it is taken again.
+void expect_sound(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  const Recording recording = read_recording(file);
+  EXPECT_GT(recording.steps.size(), 500U);
+  Process replay(program("tendon-replay"), {file.string(), "--json"}, folder);
+  EXPECT_EQ(replay.wait(), 0) << replay.out() << replay.err();
+  EXPECT_EQ(count_in(replay.out(), "same"), recording.steps.size()) << replay.out();
+}
+
+TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
+  const testing::ScratchFolder folder;
+  const auto followed = folder.path() / "follower.mcap";
+  const auto led = folder.path() / "leader.mcap";
+  Server follower(folder.path(), scene("follower.toml"), {"--record", followed.string()});
+  Service network("tendon-inject",
+                  {"--listen", "127.0.0.1:0", "--to", follower.address(), "--seed", "7", "--profile",
+                   "delay=uniform(15ms,25ms) loss=2%", "--json"},
+                  folder.path(), "ready", "listen");
+  Server leader(folder.path(), scene("leader.toml"), {"--record", led.string(), "--dial", network.address()});
+  leader.process().wait_for_line("teleoperation: coupled");
+  leader.process().wait_for_line("teleoperation: engaged");
+  follower.process().wait_for_line("teleoperation: engaged");
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  leader.stop();
+  follower.process().wait_for_line("teleoperation: lost");
+  follower.stop();
+  expect_sound(led, folder.path());
+  expect_sound(followed, folder.path());
+
+  const Recording hand = read_recording(led);
+  const Recording tool = read_recording(followed);
+  const auto spread = [](const Recording& recording) {
+    double low = 0;
+    double high = 0;
+    const double start = recording.steps.front().hand.position.x();
+    for (const StepRecord& step : recording.steps) {
+      low = std::min(low, step.hand.position.x() - start);
+      high = std::max(high, step.hand.position.x() - start);
+    }
+    return high - low;
+  };
+  EXPECT_GT(spread(hand), 0.01);
+  EXPECT_GT(spread(tool), 0.5 * spread(hand)) << "it follows";
+}
+
+TEST(Teleoperation, AFollowerThatWasKilledIsCoupledAgainAndEngagedByNobody) {
+  const testing::ScratchFolder folder;
+  auto follower = std::make_unique<Server>(folder.path(), scene("follower.toml"));
+  const std::string address = follower->address();
+  Server leader(folder.path(), scene("leader.toml"), {"--dial", address});
+  leader.process().wait_for_line("teleoperation: engaged");
+  follower->process().signal(SIGKILL);
+  follower.reset();
+  leader.process().wait_for_line("teleoperation: lost");
+  Service again("tendond", {scene("follower.toml").string(), "--listen", address, "--json"}, folder.path(), "listening",
+                "address");
+  leader.process().wait_for_line("teleoperation: coupled");
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_EQ(leader.stop().find("engaged"), std::string::npos);
+  EXPECT_EQ(again.process().err().find("engaged"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tendon::e2e
