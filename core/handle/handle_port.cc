@@ -21,13 +21,18 @@ HandlePort<Blocks, Size>::HandlePort(const Config& config)
     : limits_(config.law != Law::kNone),
       law_({.friction = config.friction,
             .longest_hold = config.longest_hold,
-            .parts = config.law == Law::kAolPlus ? config.parts : typename Plus::Parts{}}),
+            .parts = config.law == Law::kAolPlus ? config.parts : typename Plus::Parts{},
+            .shared_account = config.shared_account}),
       longest_hold_(config.longest_hold),
       first_(OutputBound::of(config.friction[0], config.longest_hold)),
       viscous_(config.friction[0].viscous) {
   if (config.law != Law::kAolPlus && config.law != Law::kAol && config.law != Law::kNone) {
     throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
                                 "\" knows a point only: expected aol+, aol or none for a handle that turns or grips");
+  }
+  if (config.shared_account && !limits_) {
+    throw std::invalid_argument("law \"" + std::string(info(config.law).name) +
+                                "\" has no account that a purse could share: expected aol or aol+ for a handle");
   }
   if (limits_ && config.follow_holds) holds_.emplace(config.longest_hold, *config.follow_holds);
 }
@@ -79,7 +84,8 @@ WrenchPort::Config wrench_config(const LimiterConfig& point, const RotationLimit
   WrenchPort::Config config{.law = point.law,
                             .friction = {point.friction, rotation.friction},
                             .longest_hold = point.longest_hold,
-                            .follow_holds = point.follow_holds};
+                            .follow_holds = point.follow_holds,
+                            .shared_account = point.shared_account};
   const auto& parts = point.parts;
   if (const auto& cap = parts.energy_cap) config.parts.energy_cap = {cap->energy, cap->most_contact};
   if (const auto& robust = parts.robust_ledger) {
@@ -107,7 +113,8 @@ GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip)
   GripPort::Config config{.law = point.law,
                           .friction = {grip.friction},
                           .longest_hold = point.longest_hold,
-                          .follow_holds = point.follow_holds};
+                          .follow_holds = point.follow_holds,
+                          .shared_account = point.shared_account};
   if (const auto& cap = point.parts.energy_cap) config.parts.energy_cap = {cap->energy, cap->most_contact};
   if (const auto& knee = point.parts.knee) config.parts.knee = {knee->start};
   if (const auto& reserve = point.parts.latency_reserve) config.parts.latency_reserve = {reserve->holds};

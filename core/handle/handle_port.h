@@ -26,7 +26,7 @@ namespace tendon {
 /// up to (‖τ‖T/b_r)²/48 of the interval's viscous friction more than is booked: a bound of friction that is 2 % below
 /// the truth covers it while ‖τ‖ ≤ b_r/T.
 ///
-/// Satisfies StabilityController. Thread-safe: no. Realtime-safe: all but the constructor.
+/// Satisfies StabilityController and SharesAccount. Thread-safe: no. Realtime-safe: all but the constructor.
 template <int Blocks, int Size = 1>
 class HandlePort {
  public:
@@ -39,9 +39,12 @@ class HandlePort {
     Duration longest_hold{};  ///< T_max; > 0
     std::optional<HoldBound::Follow> follow_holds = HoldBound::Follow{};
     typename Plus::Parts parts{};  ///< of kAolPlus
+    /// Other ports pay into the account; the energy cap then leaves room for what they pay (AolPlus::Cap).
+    bool shared_account = false;
   };
 
-  /// Throws std::invalid_argument naming the field; so for a law that is not one of the three.
+  /// Throws std::invalid_argument naming the field; so for a law that is not one of the three, and for a
+  /// `shared_account` of law none.
   explicit HandlePort(const Config& config);
 
   void observe(const Interval<kSize>& interval) noexcept;
@@ -52,6 +55,20 @@ class HandlePort {
   LimitedForce<kSize> limit(const Demand<kSize>& wanted) noexcept;
 
   double energy() const noexcept { return law_.energy(); }
+
+  /// SharesAccount, J; `force` is N, or a wrench. A wrench has one account to pay into for force and torque. Law none
+  /// passes over `credit` and `withdraw`; its `payable` is 0 and its `worst_loss` +∞.
+  void credit(double energy) noexcept {
+    if (limits_) law_.credit(energy);
+  }
+  void withdraw(double energy) noexcept {
+    if (limits_) law_.withdraw(energy);
+  }
+  double payable() const noexcept { return limits_ ? law_.payable() : 0.0; }
+  double worst_loss(const Vec<kSize>& force) const noexcept {
+    return limits_ ? law_.worst_loss(force) : std::numeric_limits<double>::infinity();
+  }
+
   void adapt(const std::array<Friction, Blocks>& friction) noexcept { law_.adapt(friction); }
 
   /// T: the next force may be held for so long.
@@ -74,7 +91,8 @@ using WrenchPort = HandlePort<2, 3>;
 /// The account of a gripper.
 using GripPort = HandlePort<1>;
 
-/// The configuration of a wrench for the law, friction of movement, holds and parts of `point`, and these of rotation.
+/// The configuration of a wrench for the law, friction of movement, holds, parts and shared account of `point`, and these
+/// of rotation.
 struct RotationLimits {
   Friction friction{};                                        ///< τ_c, N·m, and b_r, N·m·s/rad: lower bounds
   double max_torque = 0;                                      ///< N·m, > 0
@@ -95,7 +113,7 @@ struct GripLimits {
   double max_slew = std::numeric_limits<double>::infinity();  ///< N/s, > 0
 };
 /// The parts energy_cap, knee and latency_reserve of `point` hold for the gripper too; the others are about the
-/// position.
+/// position. Its account is shared where that of `point` is, by a purse of its own.
 GripPort::Config grip_config(const LimiterConfig& point, const GripLimits& grip);
 
 /// What the memoryless limits leave of a wrench, and why: the first share s and then the second, s ≤ 1 the largest with
