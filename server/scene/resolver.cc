@@ -366,6 +366,10 @@ class SceneResolver {
       blame("teleoperation.purse", {"limiter.kind"},
             "expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no account that a purse can share");
     }
+    if (coupling.purse && control.limiter.parts.latency_reserve) {
+      blame("limiter.latency_reserve", {},
+            "expected none with teleoperation.purse: the reserve is not proved for an account that ports share");
+    }
     control.limiter.shared_account = coupling.purse.has_value();
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;
