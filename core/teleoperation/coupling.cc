@@ -289,8 +289,8 @@ Demand<3> Coupling::law(const Vec3& velocity) noexcept {
   return demand;
 }
 
-/// The law as far as its ramp has come, and the place of a robot as far as it has not. No network is between a robot and
-/// its place, so that spring has its whole stiffness.
+/// The law as far as its ramp has come, and the place of a robot as far as it has not. No network is between a robot
+/// and its place, so that spring has its whole stiffness.
 Demand<3> Coupling::blended(const Motion& hand) noexcept {
   Demand<3> demand = law(hand.velocity);
   demand.force *= gain_;

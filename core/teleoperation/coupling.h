@@ -102,8 +102,8 @@ class Coupling {
     PoseMap::Config map{};
     /// stiffness, damping, own_damping: the LEADER's; max_force this end's. period, epoch: this end's.
     PositionPosition<3>::Config spring{};
-    /// start: the LEADER's J, the follower's is worth as much; max_power, max_account: this end's. peers, joule and epoch
-    /// are set from map and spring.
+    /// start: the LEADER's J, the follower's is worth as much; max_power, max_account: this end's. peers, joule and
+    /// epoch are set from map and spring.
     std::optional<Purse::Config> purse{};
     std::optional<Button> clutch{};            ///< leader only
     std::optional<std::uint32_t> engage_by{};  ///< leader: bit of the button whose press is the act; empty: engage()

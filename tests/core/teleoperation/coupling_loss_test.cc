@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What two couplings do when their peer falls silent, comes back, starts anew, or is heard late and twice: the ladder, and
-// no engagement without an act.
+// What two couplings do when their peer falls silent, comes back, starts anew, or is heard late and twice: the ladder,
+// and no engagement without an act.
 #include <gtest/gtest.h>
 
 #include <optional>

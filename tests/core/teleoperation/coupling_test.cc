@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two couplings between two devices: phases, engagement by an act alone, the clutch, bad input. coupling_loss_test.cc has
-// the ladder, coupling_force_test.cc what is felt, coupling_world_test.cc the search.
+// Two couplings between two devices: phases, engagement by an act alone, the clutch, bad input. coupling_loss_test.cc
+// has the ladder, coupling_force_test.cc what is felt, coupling_world_test.cc the search.
 #include "core/teleoperation/coupling.h"
 
 #include <gtest/gtest.h>

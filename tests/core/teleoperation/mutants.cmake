@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Can the promises of coupling_world_test.cc fail? Each mutant is that test with one fault planted in coupling.cc: a copy
-# in which one text was replaced by another, linked ahead of the library. The worlds must name the promise that it breaks.
+# Can the promises of coupling_world_test.cc fail? Each mutant is that test with one fault planted in coupling.cc: a
+# copy in which one text was replaced by another, linked ahead of the library. The worlds must name the promise that it
+# breaks.
 
 # coupling_mutant(name "text" "by" promise): without semicolons; promise is what the worlds say, a|b.
 function(coupling_mutant name from to promise)
