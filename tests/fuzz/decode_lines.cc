@@ -142,15 +142,6 @@ void print(Line& line, const Control& control) {
     line << "rearm";
   } else if (std::holds_alternative<Disarm>(*control.request)) {
     line << "disarm";
-  } else if (const auto* couple = std::get_if<Couple>(&*control.request)) {
-    line << "couple" << (couple->role == PortRole::kLeader ? 1U : 2U)
-         << (couple->method == CouplingMethod::kPositionPosition ? 1U : 2U) << couple->position_scale
-         << couple->force_scale << couple->rotation << couple->axes << couple->stiffness << couple->mutual_damping
-         << couple->damping << std::uint32_t{couple->adapt_to_delay} << std::uint32_t{couple->purse} << couple->period;
-  } else if (std::holds_alternative<Engage>(*control.request)) {
-    line << "engage";
-  } else if (std::holds_alternative<Disengage>(*control.request)) {
-    line << "disengage";
   } else {
     line << "other";
   }
@@ -202,14 +193,6 @@ void print(Line& line, const PeerReport& report) {
   line << "peer" << report.device << report.channel;
   line.put_text(report.name) << report.state_one_in << std::uint32_t{report.forces_refused};
   print(line, report.link);
-}
-
-void print(Line& line, const PortFrame& port) {
-  line << "port" << port.device << port.channel << port.epoch << port.sequence << port.answers_epoch << port.answers
-       << port.time << port.round_trip << static_cast<std::uint32_t>(port.phase) << port.engagement << port.buttons
-       << port.position << port.velocity << port.force;
-  if (port.contact_force) line << "contact" << *port.contact_force;
-  line << port.account << port.need << port.given << port.taken;
 }
 
 void print(Line& line, const Welcome& welcome) {

@@ -51,8 +51,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else if (const auto* peer_report = std::get_if<Session::PeerReportArrived>(&*event)) {
       fuzz::require(peer_report->report.state_one_in > 0 && peer_report->report.link.number > 0);
       fuzz::require(peer_report->report.name.size() <= limits::kMaxName);
-    } else if (const auto* port = std::get_if<Session::PortArrived>(&*event)) {
-      fuzz::require(is_sound(port->port) && port->port.device < limits::kMaxDevices);
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
       session.answer(request->id, Code::kOk, {});
     }

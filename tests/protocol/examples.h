@@ -227,50 +227,6 @@ inline DeviceState state_with_joints() {
   return state;
 }
 
-// To a peer that named "teleoperation".
-
-/// A follower that presses something, and has been paid.
-inline PortFrame port() {
-  PortFrame port;
-  port.device = 1;
-  port.channel = 2;
-  port.epoch = 1'700'000'000'000'000'000;
-  port.sequence = 2500;
-  port.answers_epoch = 1'600'000'000'000'000'000;
-  port.answers = 2478;
-  port.time = Duration{2'500'000'000};
-  port.round_trip = Duration{44'000'000};
-  port.phase = PortPhase::kEngaged;
-  port.engagement = 3;
-  port.buttons = 2;
-  port.position = {0.0125, 0, -0.5};
-  port.velocity = {0.25, 0, 0};
-  port.force = {2, 0, -0.5};
-  port.contact_force = Vec3(-2, 0, 0.5);
-  port.account = 0.03125;
-  port.need = 0.015625;
-  port.given = 0.5;
-  port.taken = 0.75;
-  return port;
-}
-
-inline Couple couple() {
-  return {.device = 1,
-          .channel = 2,
-          .role = PortRole::kLeader,
-          .method = CouplingMethod::kPositionPosition,
-          .position_scale = 0.5,
-          .force_scale = 2,
-          .rotation = {.w = 0.6, .x = 0, .y = 0.8, .z = 0},
-          .axes = 5,
-          .stiffness = 400,
-          .mutual_damping = 0.5,
-          .damping = 4,
-          .adapt_to_delay = true,
-          .purse = true,
-          .period = std::chrono::milliseconds(1)};
-}
-
 /// A detent about one axis, and soft fingers.
 inline ForceCommand force_with_torque() {
   ForceCommand command = force();
@@ -399,10 +355,6 @@ inline std::vector<Named> datagrams() {
       {"force-torque", data(68, {}, force_with_torque())},
       {"state-joints", data(69, {}, state_with_joints())},
       {"control-ack-joints", data(70, {}, joints_described(14))},
-      {"control-couple", data(71, {}, Control{.id = 15, .request = couple()})},
-      {"port", data(72, {}, port())},
-      {"control-engage", data(73, {}, Control{.id = 16, .request = Engage{.device = 1}})},
-      {"control-disengage", data(74, {}, Control{.id = 17, .request = Disengage{.device = 1}})},
   };
 }
 

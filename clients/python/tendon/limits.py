@@ -47,10 +47,3 @@ PACKET_NUMBERS = 1 << 60
 """Packet numbers are below this: a nonce is never used twice."""
 LIFE_NS = 24 * 3600 * 1_000_000_000
 """Age of a session of suite 1."""
-
-# Of a coupling.
-MIN_SCALE = 0.01
-MAX_SCALE = 100.0
-MAX_ACCOUNT_J = 1e3
-MAX_TOTAL_J = 1e6
-MAX_ROUND_TRIP_NS = 10_000_000_000

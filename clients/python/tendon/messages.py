@@ -35,8 +35,6 @@ FEATURE_JOINTS = "joints"
 """The client is told how the device lies before the operator, its buttons, orientation, gripper and torques, and may ask
 for torque and grip force."""
 
-FEATURE_TELEOPERATION = "teleoperation"
-"""The client may be the other end of a coupling."""
 FEATURE_DIAGNOSTICS = "diagnostics"
 """An observer is told the forces asked for, and the state of loops and engines (DeviceReport, PeerReport)."""
 
@@ -276,60 +274,7 @@ class SetStateDeadband:
     max_silence_us: int = 20_000  # 1000 … 20 000; 0 = every state is sent, as before this was asked
 
 
-class PortRole(IntEnum):
-    """Which end of a coupling."""
-
-    LEADER = 1
-    FOLLOWER = 2
-
-
-class CouplingMethod(IntEnum):
-    """The law between the two devices of a coupling."""
-
-    POSITION_POSITION = 1
-    POSITION_FORCE = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Couple:
-    """Client → server, reliable: the client's device is the other end of this one, and its end is like this.
-
-    Stiffness and dampings are as the leader feels them.
-    """
-
-    role: PortRole  # of the sender
-    method: CouplingMethod
-    position_scale: float  # follower over leader: 0.01 … 100
-    force_scale: float  # leader over follower: 0.01 … 100
-    rotation: Quat  # turns the leader's base frame into the follower's
-    axes: int  # bits 1, 2, 4: x, y, z of the leader's frame are coupled
-    stiffness: float  # N/m
-    mutual_damping: float  # N·s/m
-    damping: float  # N·s/m
-    adapt_to_delay: bool
-    purse: bool  # it pays and is paid
-    period_us: int  # between two PortStates
-    device: int = 0
-    channel: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Engage:
-    """Client → server, reliable: the operator's act, at the leader. Only from a controller of the device."""
-
-    device: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Disengage:
-    """Client → server, reliable: the end of that, at either end. Only from a controller of the device."""
-
-    device: int = 0
-
-
-Request = Union[
-    SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband, Couple, Engage, Disengage
-]
+Request = Union[SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband]
 
 
 class ChannelRule(IntEnum):
@@ -514,44 +459,7 @@ class PeerReport:
     link: LinkReport  # number: 1, 2, 3 … of the channel; the forces are the channel's
 
 
-class PortPhase(IntEnum):
-    """Where an end of a coupling stands."""
-
-    ALONE = 1
-    COUPLED = 2
-    ALIGNING = 3
-    ENGAGED = 4
-    CLUTCHED = 5
-    LOST = 6
-    FAULT = 7
-
-
-@dataclass(frozen=True, slots=True)
-class PortState:
-    """Either way, newest wins: one end of a coupling, told to the other. Vectors are in the sender's frame and scale."""
-
-    device: int  # of the server of the session, whichever way this goes
-    channel: int
-    epoch: int
-    sequence: int
-    answers_epoch: int
-    answers: int
-    time_ns: int  # of the sender's clock
-    round_trip_ns: int
-    phase: PortPhase
-    engagement: int
-    buttons: int
-    position: Vec3  # m, from the sender's offset
-    velocity: Vec3  # m/s
-    force: Vec3  # N, on whoever holds its handle
-    contact_force: Vec3 | None  # N, on its tool; None: not measured
-    account: float  # J
-    need: float  # J
-    given: float  # J
-    taken: float  # J
-
-
-Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport, PortState]
+Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport]
 
 
 @dataclass(frozen=True, slots=True)

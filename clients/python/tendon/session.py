@@ -25,7 +25,6 @@ from .messages import (
     LinkReport,
     LinkStats,
     PeerReport,
-    PortState,
     Request,
 )
 from .replay_window import ReplayWindow
@@ -278,8 +277,6 @@ class Session:
                 return
             self._newest_diagnosis[stream] = number
             self._diagnoses_arrived[stream] = frame
-        elif isinstance(frame, PortState):
-            pass  # for a client that has said Couple
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):

@@ -10,7 +10,6 @@ import {
 import {
   readDeviceReport, readPeerReport, readReport, writeDeviceReport, writePeerReport, writeReport,
 } from "./codec_reports.js";
-import { isCouple, readCouple, readPort, writeCouple, writePort } from "./codec_ports.js";
 import {
   areFeatures, clip, isEnum, isText, readQuat, readVec3, writeFeatures, writeQuat, writeVec3,
 } from "./fields.js";
@@ -18,7 +17,7 @@ import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
   Claim, Contact, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello,
-  LinkReport, LocalModel, PeerReport, PortState, Refused, Request, Torque, Welcome,
+  LinkReport, LocalModel, PeerReport, Refused, Request, Torque, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -62,8 +61,7 @@ export type Frame =
   | { readonly kind: "bye"; readonly value: Bye }
   | { readonly kind: "report"; readonly value: LinkReport }
   | { readonly kind: "deviceReport"; readonly value: DeviceReport }
-  | { readonly kind: "peerReport"; readonly value: PeerReport }
-  | { readonly kind: "portState"; readonly value: PortState };
+  | { readonly kind: "peerReport"; readonly value: PeerReport };
 
 /** What a Data datagram holds. */
 export interface DataContent {
@@ -215,10 +213,6 @@ function readBody(body: Body): Frame | undefined {
       const value = readPeerReport(body.value);
       return value && { kind: "peerReport", value };
     }
-    case "portState": {
-      const value = readPort(body.value);
-      return value && { kind: "portState", value };
-    }
   }
 }
 
@@ -247,8 +241,6 @@ function writeBody(frame: Frame): Body {
       return { case: "deviceReport", value: writeDeviceReport(frame.value) };
     case "peerReport":
       return { case: "peerReport", value: writePeerReport(frame.value) };
-    case "portState":
-      return { case: "portState", value: writePort(frame.value) };
   }
 }
 
@@ -424,7 +416,6 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
 
 /** Its values are within bounds. */
 function isRequest(request: Request): boolean {
-  if (request.kind === "couple") return isCouple(request.couple);
   if (request.kind === "setStateDeadband") return isBounded(request.share) && isBounded(request.floor);
   return isDevice(request.device) && (!("channel" in request) || isChannel(request.channel)) &&
     (!("to" in request) || isText(request.to, limits.kMaxName));
@@ -505,10 +496,6 @@ function readRequest(op: pb.Control["op"]): Request | undefined {
   switch (op.case) {
     case "setStateRate":
       return { kind: op.case, hz: op.value.hz, device: op.value.device };
-    case "couple":
-      return { kind: op.case, couple: readCouple(op.value) };
-    case "engage":
-    case "disengage":
     case "rearm":
     case "disarm":
       return { kind: op.case, device: op.value.device };
@@ -534,12 +521,6 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
       return { case: request.kind, value: create(pb.SetStateRateSchema, { hz: request.hz, device: request.device }) };
     case "rearm":
       return { case: request.kind, value: create(pb.RearmSchema, { device: request.device }) };
-    case "couple":
-      return { case: request.kind, value: writeCouple(request.couple) };
-    case "engage":
-      return { case: request.kind, value: create(pb.EngageSchema, { device: request.device }) };
-    case "disengage":
-      return { case: request.kind, value: create(pb.DisengageSchema, { device: request.device }) };
     case "disarm":
       return { case: request.kind, value: create(pb.DisarmSchema, { device: request.device }) };
     case "describe":

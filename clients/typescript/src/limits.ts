@@ -44,11 +44,3 @@ export const kMaxOneIn = 1000;
 export const kMaxTimeoutMs = 3_600_000;
 /** How many times a Bye is sent. */
 export const kByes = 3;
-
-// Of a coupling.
-export const kMinScale = 0.01;
-export const kMaxScale = 100;
-/** J. */
-export const kMaxAccount = 1e3;
-export const kMaxTotal = 1e6;
-export const kMaxRoundTripNs = 10_000_000_000n;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
 // frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
-import { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Role, Safety } from "./gen/tendon_pb.js";
+import { ChannelRule, Code, Hand, Mode, Role, Safety } from "./gen/tendon_pb.js";
 import type { Nanoseconds } from "./time.js";
 
-export { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Role, Safety };
+export { ChannelRule, Code, Hand, Mode, Role, Safety };
 
 /** The version of the wire that this client speaks. */
 export const kProtocolVersion = 1;
@@ -22,9 +22,6 @@ export const kFeatureHandle = "handle";
 
 /** Whoever offers this is told the joints of the device, with `joints` of a client's config. */
 export const kFeatureJoints = "joints";
-
-/** A feature: the client may be the other end of a coupling. */
-export const kFeatureTeleoperation = "teleoperation";
 
 /** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
 export const kFeatureDiagnostics = "diagnostics";
@@ -199,68 +196,11 @@ export interface StateDeadband {
   readonly maxSilenceUs: number;
 }
 
-/** What one end of a coupling is like. Stiffness and dampings are as the leader feels them. */
-export interface Couple {
-  /** Of the sender. */
-  readonly role: PortRole;
-  readonly method: CouplingMethod;
-  /** Follower over leader, and leader over follower: 0.01 … 100. */
-  readonly positionScale: number;
-  readonly forceScale: number;
-  /** Turns the leader's base frame into the follower's. */
-  readonly rotation: Quat;
-  /** Bits 1, 2, 4: x, y, z of the leader's frame are coupled. */
-  readonly axes: number;
-  /** N/m and N·s/m. */
-  readonly stiffness: number;
-  readonly mutualDamping: number;
-  readonly damping: number;
-  readonly adaptToDelay: boolean;
-  /** It pays and is paid. */
-  readonly purse: boolean;
-  /** Between two PortStates. */
-  readonly periodUs: number;
-  readonly device: number;
-  readonly channel: number;
-}
-
-/** Either way, newest wins: one end of a coupling, told to the other. Vectors are in the sender's frame and scale. */
-export interface PortState {
-  /** Of the server of the session, whichever way this goes. */
-  readonly device: number;
-  readonly channel: number;
-  readonly epoch: bigint;
-  readonly sequence: bigint;
-  readonly answersEpoch: bigint;
-  readonly answers: bigint;
-  /** ns, of the sender's clock. */
-  readonly timeNs: bigint;
-  readonly roundTripNs: bigint;
-  readonly phase: PortPhase;
-  readonly engagement: bigint;
-  readonly buttons: number;
-  /** m from the sender's offset, m/s, and N on whoever holds its handle. */
-  readonly position: Vec3;
-  readonly velocity: Vec3;
-  readonly force: Vec3;
-  /** N on its tool; absent: not measured. */
-  readonly contactForce?: Vec3;
-  /** J. */
-  readonly account: number;
-  readonly need: number;
-  readonly given: number;
-  readonly taken: number;
-}
-
 /**
  * Reliable. Client → server: set the rate of a device's states; clear a latched fault; no force until then;
  * describe the device; take or give up a channel's lease; set the deadband of states. Server → client: a lease is lost.
  */
 export type Request =
-  /** The client's device is the other end of this one. Only for a server that has agreed to kFeatureTeleoperation. */
-  | { readonly kind: "couple"; readonly couple: Couple }
-  /** The leader's act, and its end. */
-  | { readonly kind: "engage" | "disengage"; readonly device: number }
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
   | { readonly kind: "rearm" | "disarm"; readonly device: number }
   /** With `handle` the answer is a HandleDescription. Only for a server that has agreed to kFeatureHandle. */

@@ -360,8 +360,6 @@ export class Session {
         }
         return;
       }
-      case "portState":
-        return; // for a client that has said couple
       case "control":
         this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
         return;

@@ -26,16 +26,12 @@ from tendon.messages import (
     ControlAck,
     DeviceReport,
     DeviceState,
-    Couple,
     Disarm,
-    Disengage,
-    Engage,
     ForceCommand,
     Frame,
     LinkReport,
     Mat3,
     PeerReport,
-    PortState,
     Rearm,
     Refused,
     SetStateDeadband,
@@ -137,16 +133,7 @@ def _frame(frame: Frame) -> list[object]:
             asked = frame.request
             words = ["control", frame.id, "deadband", _double(asked.share), _double(asked.floor)]
             return [*words, asked.max_silence_us * 1000]
-        if isinstance(frame.request, Couple):
-            couple = frame.request
-            return [
-                *("control", frame.id, "couple", int(couple.role), int(couple.method)),
-                *(_double(couple.position_scale), _double(couple.force_scale), *map(_double, couple.rotation), couple.axes),
-                *(_double(couple.stiffness), _double(couple.mutual_damping), _double(couple.damping)),
-                *(int(couple.adapt_to_delay), int(couple.purse), couple.period_us * 1000),
-            ]
-        words = {Rearm: "rearm", Disarm: "disarm", Engage: "engage", Disengage: "disengage"}
-        return ["control", frame.id, words.get(type(frame.request), "other")]
+        return ["control", frame.id, {Rearm: "rearm", Disarm: "disarm"}.get(type(frame.request), "other")]
     if isinstance(frame, ControlAck):
         words = ["ack", frame.id, int(frame.code), _text(frame.detail)]
         if frame.handle is not None:
@@ -173,15 +160,6 @@ def _frame(frame: Frame) -> list[object]:
         return [
             *("peer", frame.device, frame.channel, _text(frame.name), frame.state_one_in, int(frame.forces_refused)),
             *_report(frame.link),
-        ]
-    if isinstance(frame, PortState):
-        contact = frame.contact_force
-        return [
-            *("port", frame.device, frame.channel, frame.epoch, frame.sequence, frame.answers_epoch, frame.answers),
-            *(frame.time_ns, frame.round_trip_ns, int(frame.phase), frame.engagement, frame.buttons),
-            *(*_vector(frame.position), *_vector(frame.velocity), *_vector(frame.force)),
-            *([] if contact is None else ["contact", *_vector(contact)]),
-            *map(_double, (frame.account, frame.need, frame.given, frame.taken)),
         ]
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]

@@ -31,12 +31,6 @@ def magnitude(value: float) -> float:
     return value
 
 
-def within(value: float, least: float, most: float) -> float:
-    if not least <= value <= most:  # nor is NaN
-        raise OutOfBounds
-    return value
-
-
 def vector(message: pb.Vec3) -> Vec3:
     x, y, z = message.x, message.y, message.z
     most = limits.MAX_VALUE
