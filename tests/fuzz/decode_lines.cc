@@ -142,6 +142,14 @@ void print(Line& line, const Control& control) {
     line << "rearm";
   } else if (std::holds_alternative<Disarm>(*control.request)) {
     line << "disarm";
+  } else if (const auto* couple = std::get_if<Couple>(&*control.request)) {
+    line << "couple" << couple->device << couple->channel << couple->role << couple->method << couple->position_scale
+         << couple->force_scale << couple->rotation << couple->axes << couple->stiffness << couple->mutual_damping
+         << couple->damping << std::uint32_t{couple->adapt_to_delay} << std::uint32_t{couple->purse} << couple->period;
+  } else if (const auto* engage = std::get_if<Engage>(&*control.request)) {
+    line << "engage" << engage->device;
+  } else if (const auto* disengage = std::get_if<Disengage>(&*control.request)) {
+    line << "disengage" << disengage->device;
   } else {
     line << "other";
   }
@@ -193,6 +201,14 @@ void print(Line& line, const PeerReport& report) {
   line << "peer" << report.device << report.channel;
   line.put_text(report.name) << report.state_one_in << std::uint32_t{report.forces_refused};
   print(line, report.link);
+}
+
+void print(Line& line, const PortFrame& port) {
+  line << "port" << port.device << port.channel << port.epoch << port.sequence << port.answers_epoch << port.answers
+       << port.time << port.round_trip << port.phase << port.engagement << port.buttons << port.position
+       << port.velocity << port.force;
+  if (port.contact_force) line << "contact" << *port.contact_force;
+  line << port.account << port.need << port.given << port.taken;
 }
 
 void print(Line& line, const Welcome& welcome) {

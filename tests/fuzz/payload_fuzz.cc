@@ -51,7 +51,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else if (const auto* peer_report = std::get_if<Session::PeerReportArrived>(&*event)) {
       fuzz::require(peer_report->report.state_one_in > 0 && peer_report->report.link.number > 0);
       fuzz::require(peer_report->report.name.size() <= limits::kMaxName);
+    } else if (const auto* port = std::get_if<Session::PortArrived>(&*event)) {
+      fuzz::require(is_sound(port->port));
+      fuzz::require(port->port.device < limits::kMaxDevices && port->port.channel < limits::kMaxChannels);
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
+      if (const auto* couple = std::get_if<Couple>(&request->request)) {
+        fuzz::require(couple->position_scale >= 0.01 && couple->force_scale >= 0.01 && couple->stiffness >= 0);
+        fuzz::require(couple->axes >= 1 && couple->axes <= 7 && couple->period > Duration::zero());
+      }
       session.answer(request->id, Code::kOk, {});
     }
   }

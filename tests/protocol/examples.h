@@ -258,6 +258,59 @@ inline ControlAck joints_described(std::uint32_t id) {
   return ack;
 }
 
+// Between peers that both named "teleoperation".
+
+/// A leader pulls its follower by 2 mm; the follower measures no contact, so that it is not this one.
+inline PortFrame port() {
+  PortFrame port;
+  port.device = 1;
+  port.channel = 1;
+  port.epoch = 5;
+  port.sequence = 1000;
+  port.answers_epoch = 3;
+  port.answers = 960;
+  port.time = Duration{1'000'000'000};
+  port.round_trip = std::chrono::milliseconds(40);
+  port.phase = PortPhase::kEngaged;
+  port.engagement = 2;
+  port.buttons = 0b10;
+  port.position = {0.01, 0, -0.02};
+  port.velocity = {0.5, 0, 0};
+  port.force = {-0.75, 0, 0};
+  port.account = 0.125;
+  port.need = 0.0625;
+  port.given = 1.5;
+  port.taken = 0.5;
+  return port;
+}
+
+/// A follower that presses with its tool, and has no purse.
+inline PortFrame port_in_contact() {
+  PortFrame port = examples::port();
+  port.contact_force = Vec3(-2, 0, 0.5);
+  port.account = -0.25;
+  port.need = port.given = port.taken = 0;
+  return port;
+}
+
+/// The other end makes half as large moves, and is turned by 106° about y.
+inline Couple couple() {
+  return {.device = 1,
+          .channel = 1,
+          .role = PortRole::kFollower,
+          .method = CouplingMethod::kPositionForce,
+          .position_scale = 0.5,
+          .force_scale = 2,
+          .rotation = {.w = 0.6, .x = 0, .y = 0.8, .z = 0},
+          .axes = 5,
+          .stiffness = 400,
+          .mutual_damping = 2,
+          .damping = 4,
+          .adapt_to_delay = true,
+          .purse = true,
+          .period = std::chrono::milliseconds(1)};
+}
+
 inline ControlAck handle_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = handle_description();
@@ -355,6 +408,11 @@ inline std::vector<Named> datagrams() {
       {"force-torque", data(68, {}, force_with_torque())},
       {"state-joints", data(69, {}, state_with_joints())},
       {"control-ack-joints", data(70, {}, joints_described(14))},
+      {"port", data(71, {}, port())},
+      {"port-contact", data(72, {}, port_in_contact())},
+      {"control-couple", data(73, {}, Control{.id = 15, .request = couple()})},
+      {"control-engage", data(74, {}, Control{.id = 16, .request = Engage{.device = 1}})},
+      {"control-disengage", data(75, {}, Control{.id = 17, .request = Disengage{.device = 1}})},
   };
 }
 

@@ -225,6 +225,66 @@ TEST_F(TwoEnds, ReportsOnDevicesAndEnginesAreNewestWinsEachForItself) {
   EXPECT_EQ(a_.stats().stale, 2U);
 }
 
+TEST_F(TwoEnds, OfPortsTheHighestSequenceOfTheHighestEpochWins) {
+  const auto port = [](std::uint32_t channel, std::uint64_t epoch, std::uint64_t sequence) {
+    PortFrame made = examples::port();
+    made.channel = channel;
+    made.epoch = epoch;
+    made.sequence = sequence;
+    return made;
+  };
+  z_.send(port(0, 5, 8));
+  z_.send(port(1, 2, 3));
+  z_.send(port(0, 5, 9));  // replaces the first, which has not left
+  z_.send(state(8));
+  const auto together = pull(z_, now_);
+  EXPECT_EQ(together.size(), 1U) << "ports go beside states";
+  deliver(a_, now_, together);
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_a.size(), 3U);
+  EXPECT_EQ(std::get<Session::PortArrived>(at_a[0]).port.sequence, 9U);
+  EXPECT_EQ(std::get<Session::PortArrived>(at_a[1]).port.channel, 1U);
+  EXPECT_EQ(a_.stats().stale, 0U);
+
+  for (const auto& old : {port(0, 5, 9), port(0, 5, 8), port(0, 4, 100)}) {
+    z_.send(old);
+    deliver(a_, now_, pull(z_, now_));
+  }
+  EXPECT_TRUE(events(a_).empty());
+  EXPECT_EQ(a_.stats().stale, 3U);
+
+  z_.send(port(0, 6, 1));  // it has begun anew
+  deliver(a_, now_, pull(z_, now_));
+  const auto anew = events(a_);
+  ASSERT_EQ(anew.size(), 1U);
+  EXPECT_EQ(std::get<Session::PortArrived>(anew[0]).port.epoch, 6U);
+}
+
+TEST_F(TwoEnds, PortsGoEitherWayAndOfThoseNotTakenOutTheNewestIsLeft) {
+  PortFrame port = examples::port();
+  a_.send(port);
+  deliver(z_, now_, pull(a_, now_));
+  ++port.sequence;
+  a_.send(port);
+  deliver(z_, now_, pull(a_, now_));
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 1U);
+  EXPECT_EQ(std::get<Session::PortArrived>(at_z[0]).port.sequence, port.sequence);
+}
+
+TEST_F(TwoEnds, CouplingsAreAskedForAndAnsweredInOrder) {
+  ASSERT_TRUE(a_.request(examples::couple()));
+  ASSERT_TRUE(a_.request(Engage{.device = 1}));
+  ASSERT_TRUE(a_.request(Disengage{.device = 1}));
+  deliver(z_, now_, pull(a_, now_));
+  const auto at_z = events(z_);
+  ASSERT_EQ(at_z.size(), 3U);
+  const auto asked = [&](std::size_t i) { return std::get<Session::RequestArrived>(at_z[i]).request; };
+  EXPECT_EQ(std::get<Couple>(asked(0)), examples::couple());
+  EXPECT_EQ(std::get<Engage>(asked(1)).device, 1U);
+  EXPECT_EQ(std::get<Disengage>(asked(2)).device, 1U);
+}
+
 TEST_F(TwoEnds, ReportsOfAllDevicesAndChannelsLeaveInAsManyDatagramsAsTheyNeed) {
   for (std::uint32_t device = 0; device < limits::kMaxDevices; ++device) {
     DeviceReport report = examples::device_report();

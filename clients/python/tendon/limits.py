@@ -36,6 +36,13 @@ MAX_FEATURES = 16
 MAX_DETAIL = 128
 """Bytes of UTF-8 in the sentence of a refusal, an answer or a Bye."""
 MAX_LOOP_HZ = 1_000_000
+MAX_ROUND_TRIP_NS = 10_000_000_000
+"""Longest round trip that an end of a coupling tells."""
+MAX_ACCOUNT = 1e3
+MAX_TOTAL = 1e6
+"""Joules in the account of an end of a coupling, and in the totals that it pays and is paid."""
+MIN_SCALE = 0.01
+MAX_SCALE = 100.0
 LATENESS_BUCKETS = 24
 """Buckets in the histogram of a loop's lateness."""
 MAX_ONE_IN = 1000

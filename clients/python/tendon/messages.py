@@ -35,6 +35,9 @@ FEATURE_JOINTS = "joints"
 """The client is told how the device lies before the operator, its buttons, orientation, gripper and torques, and may ask
 for torque and grip force."""
 
+FEATURE_TELEOPERATION = "teleoperation"
+"""The client may be the other end of a coupling: it says Couple, and PortStates go both ways."""
+
 FEATURE_DIAGNOSTICS = "diagnostics"
 """An observer is told the forces asked for, and the state of loops and engines (DeviceReport, PeerReport)."""
 
@@ -274,7 +277,106 @@ class SetStateDeadband:
     max_silence_us: int = 20_000  # 1000 … 20 000; 0 = every state is sent, as before this was asked
 
 
-Request = Union[SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband]
+class PortRole(IntEnum):
+    """Which end of a coupling."""
+
+    LEADER = 1
+    FOLLOWER = 2
+
+
+class CouplingMethod(IntEnum):
+    """How two handles are coupled."""
+
+    POSITION_POSITION = 1  # a spring and a damper at both ends
+    POSITION_FORCE = 2  # the follower's spring; the leader feels the contact that the follower measures
+
+
+class PortPhase(IntEnum):
+    """Where an end of a coupling stands."""
+
+    ALONE = 1  # it has no peer
+    COUPLED = 2  # it hears its peer, and waits for the operator's act; no force
+    ALIGNING = 3
+    ENGAGED = 4  # the law
+    CLUTCHED = 5  # the leader is free, the follower stays where it is
+    LOST = 6  # it was engaged, and its peer fell silent; engaged again only by another act
+    FAULT = 7  # its device gives no force
+
+
+@dataclass(frozen=True, slots=True)
+class PortState:
+    """Either way, newest wins (the highest sequence of the highest epoch of a device and channel): one end of a coupling,
+    told to the other. Vectors are in the base frame and the scale of the sender's device (FEATURE_TELEOPERATION)."""
+
+    device: int  # of the server of the session, whichever way this goes
+    channel: int
+    epoch: int  # of the sender, > 0; above every one before when it starts anew
+    sequence: int  # 1, 2, 3 … within an epoch
+    answers_epoch: int  # the receiver's epoch that `answers`, `given` and `taken` belong to; 0: none yet
+    answers: int  # sequence of the receiver's newest state in use; 0: none yet
+    time_ns: int  # the sender's clock: only differences are used
+    round_trip_ns: int  # as the sender has measured it; 0: not yet
+    phase: PortPhase
+    engagement: int = 0  # number of the leader's act that the phase belongs to; 0: none yet
+    buttons: int = 0  # bit i is set while button i is held
+    position: Vec3 = ZERO  # m, from the sender's offset
+    velocity: Vec3 = ZERO  # m/s, zero while the position is frozen
+    force: Vec3 = ZERO  # N, on whoever holds the sender's handle, really applied
+    contact_force: Vec3 | None = None  # N, of the surroundings on its tool; None: not measured, which is not zero
+    account: float = 0.0  # J, what it may still give out, after paying
+    need: float = 0.0  # J, for the force that it wants; 0: it has no purse
+    given: float = 0.0  # J, total paid to the receiver
+    taken: float = 0.0  # J, the receiver's total that was heard of, in the receiver's joules
+
+
+@dataclass(frozen=True, slots=True)
+class Couple:
+    """Client → server, reliable: my device is the other end of this one, and my end is like this. Only from one that claimed
+    the channel, and to a server that has agreed to FEATURE_TELEOPERATION."""
+
+    device: int
+    channel: int
+    role: PortRole  # of the sender
+    method: CouplingMethod
+    position_scale: float  # follower over leader: 0.01 … 100
+    force_scale: float  # leader over follower: 0.01 … 100
+    rotation: Quat  # turns the leader's base frame into the follower's
+    axes: int  # bits 1, 2, 4: x, y, z of the leader's frame are coupled
+    stiffness: float  # N/m, as the leader feels it; so are the next two
+    mutual_damping: float  # N·s/m, between the handles
+    damping: float  # N·s/m, of each handle by itself
+    adapt_to_delay: bool
+    purse: bool  # it pays and is paid
+    period_us: int  # between two PortStates
+
+
+@dataclass(frozen=True, slots=True)
+class Engage:
+    """Client → server, reliable: the operator's act, which couples the handles. Only from a controller of the device."""
+
+    device: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Disengage:
+    """Client → server, reliable: the end of that. Only from a controller of the device."""
+
+    device: int = 0
+
+
+Request = Union[
+    SetStateRate,
+    Rearm,
+    Disarm,
+    Describe,
+    TakeLease,
+    GiveLease,
+    LeaseLost,
+    SetStateDeadband,
+    Couple,
+    Engage,
+    Disengage,
+]
 
 
 class ChannelRule(IntEnum):
@@ -459,7 +561,7 @@ class PeerReport:
     link: LinkReport  # number: 1, 2, 3 … of the channel; the forces are the channel's
 
 
-Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport]
+Frame = Union[DeviceState, ForceCommand, Control, ControlAck, Bye, LinkReport, DeviceReport, PeerReport, PortState]
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from .messages import (
     LinkReport,
     LinkStats,
     PeerReport,
+    PortState,
     Request,
 )
 from .replay_window import ReplayWindow
@@ -47,7 +48,7 @@ class Closed:
     reason: str
 
 
-Event = Union[DeviceState, ForceCommand, LinkReport, DeviceReport, PeerReport, Control, ControlAck, Closed]
+Event = Union[DeviceState, ForceCommand, LinkReport, DeviceReport, PeerReport, PortState, Control, ControlAck, Closed]
 """A Control is a request that has arrived and wants an answer, a ControlAck the answer to one of ours."""
 
 
@@ -62,8 +63,8 @@ class Session:
     Use: `receive` what arrives and `tick` when `next_turn()` is due; then pull `next_event` and
     `next_datagram` until they are empty. `now` never goes back.
 
-    Nothing queues without a bound: there is room for one state, one force, one report (on each device and channel) and
-    limits.REQUEST_WINDOW requests each way; a newer one replaces one of its kind that was not taken out.
+    Nothing queues without a bound: there is room for one state, one force, one report and one port (of each device and channel)
+    and limits.REQUEST_WINDOW requests each way; a newer one replaces one of its kind that was not taken out.
     """
 
     def __init__(self, connection_id: int, opened: int, cipher: Cipher | None = None) -> None:
@@ -83,6 +84,7 @@ class Session:
         self._force_to_send: ForceCommand | None = None
         self._report_to_send: LinkReport | None = None
         self._diagnoses_to_send: dict[tuple[int, int], DeviceReport | PeerReport] = {}
+        self._ports_to_send: dict[tuple[int, int], PortState] = {}  # by device and channel
         self._asked = OutgoingRequests()
         self._bye: Bye | None = None
         self._byes_left = 0
@@ -96,6 +98,7 @@ class Session:
         self._newest_sequence: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_report = 0
         self._newest_diagnosis: dict[tuple[int, int], int] = {}  # by _stream
+        self._newest_port: dict[tuple[int, int], tuple[int, int]] = {}  # epoch and sequence, by device and channel
         self._newest_echoed = -1  # newest packet of ours that the peer has echoed
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
@@ -104,6 +107,7 @@ class Session:
         self._force_arrived: ForceCommand | None = None
         self._report_arrived: LinkReport | None = None
         self._diagnoses_arrived: dict[tuple[int, int], DeviceReport | PeerReport] = {}
+        self._ports_arrived: dict[tuple[int, int], PortState] = {}
         self._closed: Closed | None = None
 
     # ---- In ----
@@ -146,7 +150,7 @@ class Session:
             return
         self._accept(now, number, content)
 
-    def send(self, frame: DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport) -> None:
+    def send(self, frame: DeviceState | ForceCommand | LinkReport | DeviceReport | PeerReport | PortState) -> None:
         """Queues a frame in place of the one of its kind that has not left yet."""
         if isinstance(frame, ForceCommand):
             self._force_to_send = frame
@@ -154,6 +158,8 @@ class Session:
             self._report_to_send = frame
         elif isinstance(frame, (DeviceReport, PeerReport)):
             self._diagnoses_to_send[_stream(frame)] = frame
+        elif isinstance(frame, PortState):
+            self._ports_to_send[(frame.device, frame.channel)] = frame
         else:
             self._state_to_send = frame
 
@@ -209,6 +215,8 @@ class Session:
         event: Event | None = self._answering.next() or self._asked.next_answer()
         if event is None:
             event, self._force_arrived = self._force_arrived, None
+        if event is None and self._ports_arrived:
+            event = self._ports_arrived.pop(min(self._ports_arrived))
         if event is None:
             event, self._report_arrived = self._report_arrived, None
         if event is None and self._diagnoses_arrived:
@@ -277,6 +285,13 @@ class Session:
                 return
             self._newest_diagnosis[stream] = number
             self._diagnoses_arrived[stream] = frame
+        elif isinstance(frame, PortState):
+            place, age = (frame.device, frame.channel), (frame.epoch, frame.sequence)
+            if age <= self._newest_port.get(place, (0, 0)):
+                self.stats.stale += 1
+                return
+            self._newest_port[place] = age
+            self._ports_arrived[place] = frame
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):
@@ -318,6 +333,7 @@ class Session:
             or self._state_to_send is not None
             or self._report_to_send is not None
             or bool(self._diagnoses_to_send)
+            or bool(self._ports_to_send)
             or self._last_sent is None
             or now - self._last_sent >= KEEP_ALIVE_NS
             or self._asked.next_due() <= now
@@ -344,6 +360,8 @@ class Session:
 
         if self._state_to_send is not None and add(self._state_to_send):
             self._state_to_send = None
+        while self._ports_to_send and add(self._ports_to_send[min(self._ports_to_send)]):
+            del self._ports_to_send[min(self._ports_to_send)]
         if self._force_to_send is not None and add(self._force_to_send):
             self._force_to_send = None
         for ack in self._answering.due():

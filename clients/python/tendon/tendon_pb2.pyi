@@ -18,6 +18,9 @@ CODE_SHUTDOWN: Code
 CODE_TIMED_OUT: Code
 CODE_UNSPECIFIED: Code
 CODE_UNSUPPORTED: Code
+COUPLING_METHOD_POSITION_FORCE: CouplingMethod
+COUPLING_METHOD_POSITION_POSITION: CouplingMethod
+COUPLING_METHOD_UNSPECIFIED: CouplingMethod
 DESCRIPTOR: _descriptor.FileDescriptor
 HAND_ANY: Hand
 HAND_LEFT: Hand
@@ -29,6 +32,17 @@ MODE_HOLDING: Mode
 MODE_IDLE: Mode
 MODE_SAFE_STOP: Mode
 MODE_UNSPECIFIED: Mode
+PORT_PHASE_ALIGNING: PortPhase
+PORT_PHASE_ALONE: PortPhase
+PORT_PHASE_CLUTCHED: PortPhase
+PORT_PHASE_COUPLED: PortPhase
+PORT_PHASE_ENGAGED: PortPhase
+PORT_PHASE_FAULT: PortPhase
+PORT_PHASE_LOST: PortPhase
+PORT_PHASE_UNSPECIFIED: PortPhase
+PORT_ROLE_FOLLOWER: PortRole
+PORT_ROLE_LEADER: PortRole
+PORT_ROLE_UNSPECIFIED: PortRole
 ROLE_CONTROLLER: Role
 ROLE_OBSERVER: Role
 ROLE_UNSPECIFIED: Role
@@ -91,9 +105,12 @@ class Contact(_message.Message):
     def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., gap_m: _Optional[float] = ..., table: _Optional[_Union[ForceTable, _Mapping]] = ...) -> None: ...
 
 class Control(_message.Message):
-    __slots__ = ["describe", "disarm", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
+    __slots__ = ["couple", "describe", "disarm", "disengage", "engage", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
+    COUPLE_FIELD_NUMBER: _ClassVar[int]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
     DISARM_FIELD_NUMBER: _ClassVar[int]
+    DISENGAGE_FIELD_NUMBER: _ClassVar[int]
+    ENGAGE_FIELD_NUMBER: _ClassVar[int]
     GIVE_LEASE_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
@@ -101,8 +118,11 @@ class Control(_message.Message):
     SET_STATE_DEADBAND_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
     TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
+    couple: Couple
     describe: Describe
     disarm: Disarm
+    disengage: Disengage
+    engage: Engage
     give_lease: GiveLease
     id: int
     lease_lost: LeaseLost
@@ -110,7 +130,7 @@ class Control(_message.Message):
     set_state_deadband: SetStateDeadband
     set_state_rate: SetStateRate
     take_lease: TakeLease
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
     __slots__ = ["code", "detail", "device", "handle", "id", "wait_ms"]
@@ -127,6 +147,38 @@ class ControlAck(_message.Message):
     id: int
     wait_ms: int
     def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., wait_ms: _Optional[int] = ..., device: _Optional[_Union[DeviceDescription, _Mapping]] = ..., handle: _Optional[_Union[HandleDescription, _Mapping]] = ...) -> None: ...
+
+class Couple(_message.Message):
+    __slots__ = ["adapt_to_delay", "axes", "channel", "damping_nspm", "device", "force_scale", "method", "mutual_damping_nspm", "period_us", "position_scale", "purse", "role", "rotation", "stiffness_npm"]
+    ADAPT_TO_DELAY_FIELD_NUMBER: _ClassVar[int]
+    AXES_FIELD_NUMBER: _ClassVar[int]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DAMPING_NSPM_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    FORCE_SCALE_FIELD_NUMBER: _ClassVar[int]
+    METHOD_FIELD_NUMBER: _ClassVar[int]
+    MUTUAL_DAMPING_NSPM_FIELD_NUMBER: _ClassVar[int]
+    PERIOD_US_FIELD_NUMBER: _ClassVar[int]
+    POSITION_SCALE_FIELD_NUMBER: _ClassVar[int]
+    PURSE_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    ROTATION_FIELD_NUMBER: _ClassVar[int]
+    STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    adapt_to_delay: bool
+    axes: int
+    channel: int
+    damping_nspm: float
+    device: int
+    force_scale: float
+    method: CouplingMethod
+    mutual_damping_nspm: float
+    period_us: int
+    position_scale: float
+    purse: bool
+    role: PortRole
+    rotation: Quat
+    stiffness_npm: float
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[PortRole, str]] = ..., method: _Optional[_Union[CouplingMethod, str]] = ..., position_scale: _Optional[float] = ..., force_scale: _Optional[float] = ..., rotation: _Optional[_Union[Quat, _Mapping]] = ..., axes: _Optional[int] = ..., stiffness_npm: _Optional[float] = ..., mutual_damping_nspm: _Optional[float] = ..., damping_nspm: _Optional[float] = ..., adapt_to_delay: bool = ..., purse: bool = ..., period_us: _Optional[int] = ...) -> None: ...
 
 class Datagram(_message.Message):
     __slots__ = ["echo", "frames", "tx_time_ns"]
@@ -272,6 +324,12 @@ class Disarm(_message.Message):
     device: int
     def __init__(self, device: _Optional[int] = ...) -> None: ...
 
+class Disengage(_message.Message):
+    __slots__ = ["device"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    def __init__(self, device: _Optional[int] = ...) -> None: ...
+
 class Echo(_message.Message):
     __slots__ = ["peer_packet_number", "peer_tx_time_ns", "received_mask", "rx_time_ns"]
     PEER_PACKET_NUMBER_FIELD_NUMBER: _ClassVar[int]
@@ -283,6 +341,12 @@ class Echo(_message.Message):
     received_mask: int
     rx_time_ns: int
     def __init__(self, peer_tx_time_ns: _Optional[int] = ..., rx_time_ns: _Optional[int] = ..., peer_packet_number: _Optional[int] = ..., received_mask: _Optional[int] = ...) -> None: ...
+
+class Engage(_message.Message):
+    __slots__ = ["device"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    def __init__(self, device: _Optional[int] = ...) -> None: ...
 
 class ForceCommand(_message.Message):
     __slots__ = ["based_on_tick", "channel", "device", "error_n", "force_n", "gripper_force_n", "model", "rotation_model", "sequence", "topology_changed", "torque_nm", "valid_for_us"]
@@ -323,13 +387,14 @@ class ForceTable(_message.Message):
     def __init__(self, first_depth_m: _Optional[float] = ..., step_m: _Optional[float] = ..., force_n: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Frame(_message.Message):
-    __slots__ = ["bye", "control", "control_ack", "device_report", "force", "peer_report", "report", "state"]
+    __slots__ = ["bye", "control", "control_ack", "device_report", "force", "peer_report", "port_state", "report", "state"]
     BYE_FIELD_NUMBER: _ClassVar[int]
     CONTROL_ACK_FIELD_NUMBER: _ClassVar[int]
     CONTROL_FIELD_NUMBER: _ClassVar[int]
     DEVICE_REPORT_FIELD_NUMBER: _ClassVar[int]
     FORCE_FIELD_NUMBER: _ClassVar[int]
     PEER_REPORT_FIELD_NUMBER: _ClassVar[int]
+    PORT_STATE_FIELD_NUMBER: _ClassVar[int]
     REPORT_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     bye: Bye
@@ -338,9 +403,10 @@ class Frame(_message.Message):
     device_report: DeviceReport
     force: ForceCommand
     peer_report: PeerReport
+    port_state: PortState
     report: LinkReport
     state: DeviceState
-    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ...) -> None: ...
+    def __init__(self, state: _Optional[_Union[DeviceState, _Mapping]] = ..., force: _Optional[_Union[ForceCommand, _Mapping]] = ..., control: _Optional[_Union[Control, _Mapping]] = ..., control_ack: _Optional[_Union[ControlAck, _Mapping]] = ..., bye: _Optional[_Union[Bye, _Mapping]] = ..., report: _Optional[_Union[LinkReport, _Mapping]] = ..., device_report: _Optional[_Union[DeviceReport, _Mapping]] = ..., peer_report: _Optional[_Union[PeerReport, _Mapping]] = ..., port_state: _Optional[_Union[PortState, _Mapping]] = ...) -> None: ...
 
 class GiveLease(_message.Message):
     __slots__ = ["channel", "device"]
@@ -492,6 +558,48 @@ class PeerReport(_message.Message):
     state_one_in: int
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
 
+class PortState(_message.Message):
+    __slots__ = ["account_j", "answers", "answers_epoch", "buttons", "channel", "contact_force_n", "device", "engagement", "epoch", "force_n", "given_j", "need_j", "phase", "position_m", "round_trip_ns", "sequence", "taken_j", "time_ns", "velocity_mps"]
+    ACCOUNT_J_FIELD_NUMBER: _ClassVar[int]
+    ANSWERS_EPOCH_FIELD_NUMBER: _ClassVar[int]
+    ANSWERS_FIELD_NUMBER: _ClassVar[int]
+    BUTTONS_FIELD_NUMBER: _ClassVar[int]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    CONTACT_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ENGAGEMENT_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    GIVEN_J_FIELD_NUMBER: _ClassVar[int]
+    NEED_J_FIELD_NUMBER: _ClassVar[int]
+    PHASE_FIELD_NUMBER: _ClassVar[int]
+    POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    ROUND_TRIP_NS_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    TAKEN_J_FIELD_NUMBER: _ClassVar[int]
+    TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    account_j: float
+    answers: int
+    answers_epoch: int
+    buttons: int
+    channel: int
+    contact_force_n: Vec3
+    device: int
+    engagement: int
+    epoch: int
+    force_n: Vec3
+    given_j: float
+    need_j: float
+    phase: PortPhase
+    position_m: Vec3
+    round_trip_ns: int
+    sequence: int
+    taken_j: float
+    time_ns: int
+    velocity_mps: Vec3
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., answers_epoch: _Optional[int] = ..., answers: _Optional[int] = ..., time_ns: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., phase: _Optional[_Union[PortPhase, str]] = ..., engagement: _Optional[int] = ..., buttons: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., contact_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., account_j: _Optional[float] = ..., need_j: _Optional[float] = ..., given_j: _Optional[float] = ..., taken_j: _Optional[float] = ...) -> None: ...
+
 class Quat(_message.Message):
     __slots__ = ["w", "x", "y", "z"]
     W_FIELD_NUMBER: _ClassVar[int]
@@ -593,10 +701,19 @@ class Welcome(_message.Message):
 class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
+class PortRole(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class CouplingMethod(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
 class Hand(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class ChannelRule(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class PortPhase(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class Safety(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values to protobuf and back: no file but this one, codec_reports.ts and fields.ts knows the generated messages.
+// Values to protobuf and back: no file but this one, codec_*.ts and fields.ts knows the generated messages.
 // Encoding trusts its input, except that texts and lists are cut to their bounds. Decoding trusts nothing: undefined for
 // what it refuses, and never throws.
 import { create, fromBinary, toBinary, type DescMessage, type MessageShape } from "@bufbuild/protobuf";
@@ -10,6 +10,7 @@ import {
 import {
   readDeviceReport, readPeerReport, readReport, writeDeviceReport, writePeerReport, writeReport,
 } from "./codec_reports.js";
+import { readCouple, readPort, writeCouple, writePort } from "./codec_ports.js";
 import {
   areFeatures, clip, isEnum, isText, readQuat, readVec3, writeFeatures, writeQuat, writeVec3,
 } from "./fields.js";
@@ -17,7 +18,7 @@ import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
   Claim, Contact, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello,
-  LinkReport, LocalModel, PeerReport, Refused, Request, Torque, Welcome,
+  LinkReport, LocalModel, PeerReport, PortState, Refused, Request, Torque, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -61,7 +62,8 @@ export type Frame =
   | { readonly kind: "bye"; readonly value: Bye }
   | { readonly kind: "report"; readonly value: LinkReport }
   | { readonly kind: "deviceReport"; readonly value: DeviceReport }
-  | { readonly kind: "peerReport"; readonly value: PeerReport };
+  | { readonly kind: "peerReport"; readonly value: PeerReport }
+  | { readonly kind: "port"; readonly value: PortState };
 
 /** What a Data datagram holds. */
 export interface DataContent {
@@ -182,7 +184,8 @@ function readBody(body: Body): Frame | undefined {
     case "control": {
       const { id, op } = body.value;
       const request = readRequest(op);
-      const good = id > 0 && (!request || isRequest(request));
+      const isLost = op.case === "couple" && !request; // it is known, and out of bounds
+      const good = id > 0 && !isLost && (!request || isRequest(request));
       return good ? { kind: "control", value: { id, request } } : undefined;
     }
     case "controlAck": {
@@ -213,6 +216,10 @@ function readBody(body: Body): Frame | undefined {
       const value = readPeerReport(body.value);
       return value && { kind: "peerReport", value };
     }
+    case "portState": {
+      const value = readPort(body.value);
+      return value && { kind: "port", value };
+    }
   }
 }
 
@@ -241,6 +248,8 @@ function writeBody(frame: Frame): Body {
       return { case: "deviceReport", value: writeDeviceReport(frame.value) };
     case "peerReport":
       return { case: "peerReport", value: writePeerReport(frame.value) };
+    case "port":
+      return { case: "portState", value: writePort(frame.value) };
   }
 }
 
@@ -498,7 +507,13 @@ function readRequest(op: pb.Control["op"]): Request | undefined {
       return { kind: op.case, hz: op.value.hz, device: op.value.device };
     case "rearm":
     case "disarm":
+    case "engage":
+    case "disengage":
       return { kind: op.case, device: op.value.device };
+    case "couple": {
+      const couple = readCouple(op.value);
+      return couple && { kind: op.case, ...couple };
+    }
     case "describe":
       return { kind: op.case, device: op.value.device, ...(op.value.handle && { handle: true }) };
     case "takeLease":
@@ -523,6 +538,14 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
       return { case: request.kind, value: create(pb.RearmSchema, { device: request.device }) };
     case "disarm":
       return { case: request.kind, value: create(pb.DisarmSchema, { device: request.device }) };
+    case "engage":
+      return { case: request.kind, value: create(pb.EngageSchema, { device: request.device }) };
+    case "disengage":
+      return { case: request.kind, value: create(pb.DisengageSchema, { device: request.device }) };
+    case "couple": {
+      const { kind, ...couple } = request;
+      return { case: kind, value: writeCouple(couple) };
+    }
     case "describe":
       return { case: request.kind, value: create(pb.DescribeSchema, { device: request.device, handle: request.handle ?? false }) };
     case "takeLease":

@@ -36,6 +36,14 @@ export const kMaxFeatures = 16;
 export const kMaxFeature = 32;
 /** Bytes of UTF-8 in one sentence: the reason of a refusal, an answer or a Bye. */
 export const kMaxDetail = 128;
+/** Longest round trip that an end of a coupling tells. */
+export const kMaxRoundTripNs = 10_000_000_000n;
+/** J in the account of an end of a coupling, and in the totals that it pays and is paid. */
+export const kMaxAccount = 1e3;
+export const kMaxTotal = 1e6;
+/** Of positions and forces, from one end of a coupling to the other. */
+export const kMinScale = 0.01;
+export const kMaxScale = 100;
 export const kMaxLoopHz = 1_000_000;
 /** Buckets in the histogram of a loop's lateness. */
 export const kLatenessBuckets = 24;

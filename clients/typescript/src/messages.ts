@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What peers say to each other, as plain values; protocol/WIRE.md has the same nouns as bytes. SI units, device base
 // frame. A force is what the device exerts ON THE HAND: a wall that resists motion along +x sends −x.
-import { ChannelRule, Code, Hand, Mode, Role, Safety } from "./gen/tendon_pb.js";
+import { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Role, Safety } from "./gen/tendon_pb.js";
 import type { Nanoseconds } from "./time.js";
 
-export { ChannelRule, Code, Hand, Mode, Role, Safety };
+export { ChannelRule, Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, Role, Safety };
 
 /** The version of the wire that this client speaks. */
 export const kProtocolVersion = 1;
@@ -22,6 +22,9 @@ export const kFeatureHandle = "handle";
 
 /** Whoever offers this is told the joints of the device, with `joints` of a client's config. */
 export const kFeatureJoints = "joints";
+
+/** A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. */
+export const kFeatureTeleoperation = "teleoperation";
 
 /** A feature: an observer wants to be told what the engines ask for, how the loop does, and how each engine does. */
 export const kFeatureDiagnostics = "diagnostics";
@@ -197,12 +200,79 @@ export interface StateDeadband {
 }
 
 /**
+ * Either way, newest wins (the highest sequence of the highest epoch of a device and channel): one end of a coupling,
+ * told to the other. Vectors are in the base frame and the scale of the sender's device.
+ */
+export interface PortState {
+  /** Of the server of the session, whichever way this goes. */
+  readonly device: number;
+  readonly channel: number;
+  /** Of the sender, > 0: above every one before when it starts anew. */
+  readonly epoch: bigint;
+  /** 1, 2, 3 … within an epoch. */
+  readonly sequence: bigint;
+  /** The receiver's epoch that `answers`, `given` and `taken` belong to; 0: none yet. */
+  readonly answersEpoch: bigint;
+  /** Sequence of the receiver's newest state in use; 0: none yet. */
+  readonly answers: bigint;
+  /** The sender's clock: only differences are used. */
+  readonly timeNs: Nanoseconds;
+  /** As the sender has measured it; 0: not yet. */
+  readonly roundTripNs: Nanoseconds;
+  readonly phase: PortPhase;
+  /** Number of the leader's act that the phase belongs to; 0: none yet. */
+  readonly engagement: bigint;
+  /** Bit i is set while button i is held. */
+  readonly buttons: number;
+  /** m, from the sender's offset, and m/s: zero while the position is frozen. */
+  readonly position: Vec3;
+  readonly velocity: Vec3;
+  /** N, on whoever holds the sender's handle, really applied. */
+  readonly force: Vec3;
+  /** N, of the surroundings on its tool; absent: not measured, which is not zero. */
+  readonly contactForce?: Vec3 | undefined;
+  /** J, what it may still give out, after paying, and what it needs for the force that it wants; 0: it has no purse. */
+  readonly account: number;
+  readonly need: number;
+  /** J, total paid to the receiver, and the receiver's total that was heard of, in the receiver's joules. */
+  readonly given: number;
+  readonly taken: number;
+}
+
+/** What the sender's end of a coupling is like. Only to a server that has agreed to kFeatureTeleoperation. */
+export interface Couple {
+  readonly device: number;
+  readonly channel: number;
+  /** Of the sender. */
+  readonly role: PortRole;
+  readonly method: CouplingMethod;
+  /** Follower over leader, and leader over follower: 0.01 … 100. */
+  readonly positionScale: number;
+  readonly forceScale: number;
+  /** Turns the leader's base frame into the follower's. */
+  readonly rotation: Quat;
+  /** Bits 1, 2, 4: x, y, z of the leader's frame are coupled. */
+  readonly axes: number;
+  /** N/m and N·s/m, as the leader feels them: of the spring and the damper between the handles, and of each by itself. */
+  readonly stiffness: number;
+  readonly mutualDamping: number;
+  readonly damping: number;
+  readonly adaptToDelay: boolean;
+  /** It pays and is paid. */
+  readonly purse: boolean;
+  /** Between two PortStates. */
+  readonly periodUs: number;
+}
+
+/**
  * Reliable. Client → server: set the rate of a device's states; clear a latched fault; no force until then;
- * describe the device; take or give up a channel's lease; set the deadband of states. Server → client: a lease is lost.
+ * describe the device; take or give up a channel's lease; set the deadband of states; be the other end of a device; the
+ * operator's act that couples the handles, and its end. Server → client: a lease is lost.
  */
 export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
-  | { readonly kind: "rearm" | "disarm"; readonly device: number }
+  | { readonly kind: "rearm" | "disarm" | "engage" | "disengage"; readonly device: number }
+  | ({ readonly kind: "couple" } & Couple)
   /** With `handle` the answer is a HandleDescription. Only for a server that has agreed to kFeatureHandle. */
   | { readonly kind: "describe"; readonly device: number; readonly handle?: boolean }
   | { readonly kind: "takeLease" | "giveLease"; readonly device: number; readonly channel: number }

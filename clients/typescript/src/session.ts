@@ -5,7 +5,7 @@ import {
 import { CipherSuite, DatagramType, decodeHeader, kHeaderSize, concat } from "./datagram.js";
 import { kByes, kMaxDatagram, kMaxPacketNumber } from "./limits.js";
 import {
-  Code, type DeviceReport, type DeviceState, type ForceCommand, type LinkReport, type PeerReport, type Request,
+  Code, type DeviceReport, type DeviceState, type ForceCommand, type LinkReport, type PeerReport, type PortState, type Request,
 } from "./messages.js";
 import { ReplayWindow } from "./replay_window.js";
 import { IncomingRequests, OutgoingRequests } from "./requests.js";
@@ -59,6 +59,7 @@ function streamOf({ kind, value }: Diagnosis): string {
 function numberOf({ kind, value }: Diagnosis): bigint {
   return kind === "deviceReport" ? value.number : value.link.number;
 }
+const placeOf = ({ device, channel }: PortState): string => `${device}/${channel}`;
 /** Removes and returns the entry that was put in first. */
 function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
   for (const [key, value] of from) {
@@ -74,6 +75,7 @@ export type SessionEvent =
   | { readonly kind: "force"; readonly command: ForceCommand }
   | { readonly kind: "report"; readonly report: LinkReport }
   | Diagnosis
+  | { readonly kind: "port"; readonly port: PortState }
   | { readonly kind: "request"; readonly id: number; readonly request: Request }
   | ({ readonly kind: "answered" } & ControlAck)
   /** As the peer said Bye; Code.TIMED_OUT: it fell silent; Code.EXPIRED: too old. The last event. */
@@ -119,6 +121,8 @@ export class Session {
   #forceToSend: ForceCommand | undefined;
   #reportToSend: LinkReport | undefined;
   readonly #diagnosesToSend = new Map<string, Diagnosis>();
+  /** Of each device and channel, likewise of those that have arrived. */
+  readonly #portsToSend = new Map<string, PortState>();
   readonly #asked = new OutgoingRequests();
   #bye: Frame | undefined;
   #byesLeft = 0;
@@ -132,6 +136,7 @@ export class Session {
   readonly #newestSequence = new Map<string, bigint>();
   #newestReport = 0n;
   readonly #newestDiagnosis = new Map<string, bigint>();
+  readonly #newestPort = new Map<string, PortState>();
   /** Newest packet of ours that the peer has echoed. */
   #newestEchoed = -1n;
   readonly #answering = new IncomingRequests();
@@ -142,6 +147,7 @@ export class Session {
   #forceArrived: ForceCommand | undefined;
   #reportArrived: LinkReport | undefined;
   readonly #diagnosesArrived = new Map<string, Diagnosis>();
+  readonly #portsArrived = new Map<string, PortState>();
   #closed: SessionEvent | undefined;
 
   /** `opened` is the instant of the handshake's end. The first datagram is due at once. */
@@ -207,6 +213,9 @@ export class Session {
   sendDiagnosis(diagnosis: Diagnosis): void {
     this.#diagnosesToSend.set(streamOf(diagnosis), diagnosis);
   }
+  sendPort(port: PortState): void {
+    this.#portsToSend.set(placeOf(port), port);
+  }
   /** Queues a reliable request and returns its id; undefined when 16 are open. */
   request(request: Request): number | undefined {
     return this.#asked.add(request);
@@ -258,6 +267,8 @@ export class Session {
     const command = this.#forceArrived;
     this.#forceArrived = undefined;
     if (command) return { kind: "force", command };
+    const port = takeFirst(this.#portsArrived);
+    if (port) return { kind: "port", port };
     const report = this.#reportArrived;
     this.#reportArrived = undefined;
     if (report) return { kind: "report", report };
@@ -360,6 +371,17 @@ export class Session {
         }
         return;
       }
+      case "port": {
+        const { epoch, sequence } = frame.value;
+        const newest = this.#newestPort.get(placeOf(frame.value));
+        if (!newest || epoch > newest.epoch || (epoch === newest.epoch && sequence > newest.sequence)) {
+          this.#newestPort.set(placeOf(frame.value), frame.value);
+          this.#portsArrived.set(placeOf(frame.value), frame.value);
+        } else {
+          ++this.stats.stale;
+        }
+        return;
+      }
       case "control":
         this.stats.invalid += this.#answering.take(frame.value) ? 0 : 1;
         return;
@@ -376,7 +398,7 @@ export class Session {
   #somethingToSay(now: Nanoseconds): boolean {
     const silentTooLong = this.#lastSent === undefined || now - this.#lastSent >= this.#config.keepAlive;
     return silentTooLong || this.#stateToSend !== undefined || this.#forceToSend !== undefined ||
-      this.#reportToSend !== undefined || this.#diagnosesToSend.size > 0 ||
+      this.#reportToSend !== undefined || this.#diagnosesToSend.size > 0 || this.#portsToSend.size > 0 ||
       this.#answering.nextDue() !== undefined || this.#asked.nextDue(now) !== undefined;
   }
 
@@ -398,6 +420,10 @@ export class Session {
       add(this.#bye);
     } else {
       if (this.#stateToSend && add({ kind: "state", value: this.#stateToSend })) this.#stateToSend = undefined;
+      for (const [place, port] of this.#portsToSend) {
+        if (!add({ kind: "port", value: port })) break;
+        this.#portsToSend.delete(place);
+      }
       if (this.#forceToSend && add({ kind: "force", value: this.#forceToSend })) this.#forceToSend = undefined;
       for (let ack; (ack = this.#answering.nextDue()) && add({ kind: "controlAck", value: ack }); ) {
         this.#answering.sent(ack.id);

@@ -24,14 +24,18 @@ from tendon.messages import (
     Bye,
     Control,
     ControlAck,
+    Couple,
     DeviceReport,
     DeviceState,
     Disarm,
+    Disengage,
+    Engage,
     ForceCommand,
     Frame,
     LinkReport,
     Mat3,
     PeerReport,
+    PortState,
     Rearm,
     Refused,
     SetStateDeadband,
@@ -133,6 +137,16 @@ def _frame(frame: Frame) -> list[object]:
             asked = frame.request
             words = ["control", frame.id, "deadband", _double(asked.share), _double(asked.floor)]
             return [*words, asked.max_silence_us * 1000]
+        if isinstance(frame.request, Couple):
+            c = frame.request
+            return [
+                *("control", frame.id, "couple", c.device, c.channel, int(c.role) - 1, int(c.method) - 1),
+                *map(_double, (c.position_scale, c.force_scale, *c.rotation)),
+                *(c.axes, *map(_double, (c.stiffness, c.mutual_damping, c.damping))),
+                *(int(c.adapt_to_delay), int(c.purse), c.period_us * 1000),
+            ]
+        if isinstance(frame.request, (Engage, Disengage)):
+            return ["control", frame.id, type(frame.request).__name__.lower(), frame.request.device]
         return ["control", frame.id, {Rearm: "rearm", Disarm: "disarm"}.get(type(frame.request), "other")]
     if isinstance(frame, ControlAck):
         words = ["ack", frame.id, int(frame.code), _text(frame.detail)]
@@ -160,6 +174,14 @@ def _frame(frame: Frame) -> list[object]:
         return [
             *("peer", frame.device, frame.channel, _text(frame.name), frame.state_one_in, int(frame.forces_refused)),
             *_report(frame.link),
+        ]
+    if isinstance(frame, PortState):
+        return [
+            *("port", frame.device, frame.channel, frame.epoch, frame.sequence, frame.answers_epoch, frame.answers),
+            *(frame.time_ns, frame.round_trip_ns, int(frame.phase), frame.engagement, frame.buttons),
+            *(*_vector(frame.position), *_vector(frame.velocity), *_vector(frame.force)),
+            *([] if frame.contact_force is None else ["contact", *_vector(frame.contact_force)]),
+            *map(_double, (frame.account, frame.need, frame.given, frame.taken)),
         ]
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]

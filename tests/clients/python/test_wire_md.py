@@ -24,11 +24,18 @@ from tendon.messages import (
     Hand,
     HandleDescription,
     Joints,
+    Couple,
+    CouplingMethod,
+    Disengage,
+    Engage,
     Hello,
     LinkReport,
     LocalModel,
     Mode,
     PeerReport,
+    PortPhase,
+    PortRole,
+    PortState,
     Refused,
     Role,
     RotationModel,
@@ -146,7 +153,49 @@ DEVICE_REPORT = DeviceReport(
     degraded="the log thread does not follow",
 )
 PEER_REPORT = PeerReport(device=1, channel=1, name="wall", state_one_in=4, forces_refused=True, link=REPORT)
+PORT = PortState(
+    device=1,
+    channel=1,
+    epoch=5,
+    sequence=1000,
+    answers_epoch=3,
+    answers=960,
+    time_ns=1_000_000_000,
+    round_trip_ns=40_000_000,
+    phase=PortPhase.ENGAGED,
+    engagement=2,
+    buttons=2,
+    position=(0.01, 0.0, -0.02),
+    velocity=(0.5, 0.0, 0.0),
+    force=(-0.75, 0.0, 0.0),
+    account=0.125,
+    need=0.0625,
+    given=1.5,
+    taken=0.5,
+)
+PORT_CONTACT = replace(PORT, contact_force=(-2.0, 0.0, 0.5), account=-0.25, need=0.0, given=0.0, taken=0.0)
+COUPLE = Couple(
+    device=1,
+    channel=1,
+    role=PortRole.FOLLOWER,
+    method=CouplingMethod.POSITION_FORCE,
+    position_scale=0.5,
+    force_scale=2.0,
+    rotation=(0.6, 0.0, 0.8, 0.0),
+    axes=5,
+    stiffness=400.0,
+    mutual_damping=2.0,
+    damping=4.0,
+    adapt_to_delay=True,
+    purse=True,
+    period_us=1000,
+)
 FRAMES = {
+    "port": (71, None, [PORT]),
+    "port-contact": (72, None, [PORT_CONTACT]),
+    "control-couple": (73, None, [Control(15, COUPLE)]),
+    "control-engage": (74, None, [Control(16, Engage(1))]),
+    "control-disengage": (75, None, [Control(17, Disengage(1))]),
     "keep-alive": (0, None, []),
     "state": (42, ECHO, [STATE]),
     "force": (43, ECHO, [FORCE]),
@@ -303,6 +352,31 @@ def out_of_bounds():
     yield "one in none", replace(PEER_REPORT, state_one_in=0)
     yield "one in 1001", replace(PEER_REPORT, state_one_in=1001)
     yield "peer report 0", replace(PEER_REPORT, link=replace(REPORT, number=0))
+    yield "port of device 16", replace(PORT, device=16)
+    yield "port of channel 8", replace(PORT, channel=8)
+    yield "epoch 0", replace(PORT, epoch=0)
+    yield "port 0", replace(PORT, sequence=0)
+    yield "time of a port", replace(PORT, time_ns=2**60 + 1)
+    yield "round trip of more than 10 s", replace(PORT, round_trip_ns=10_000_000_001)
+    yield "phase 0", replace(PORT, phase=0)
+    yield "phase 8", replace(PORT, phase=8)
+    yield "contact NaN", replace(PORT, contact_force=(0.0, nan, 0.0))
+    yield "account", replace(PORT, account=-1000.1)
+    yield "account NaN", replace(PORT, account=nan)
+    yield "need", replace(PORT, need=-0.1)
+    yield "given", replace(PORT, given=1e6 + 1)
+    yield "taken", replace(PORT, taken=-0.1)
+    yield "role 0", Control(1, replace(COUPLE, role=0))
+    yield "method 3", Control(1, replace(COUPLE, method=3))
+    yield "a scale below a hundredth", Control(1, replace(COUPLE, position_scale=0.0099))
+    yield "a scale above a hundred", Control(1, replace(COUPLE, force_scale=100.1))
+    yield "a rotation that is none", Control(1, replace(COUPLE, rotation=(0.602, 0.0, 0.8, 0.0)))
+    yield "no axis", Control(1, replace(COUPLE, axes=0))
+    yield "a fourth axis", Control(1, replace(COUPLE, axes=8))
+    yield "stiffness below zero", Control(1, replace(COUPLE, stiffness=-1.0))
+    yield "no period", Control(1, replace(COUPLE, period_us=0))
+    yield "engage device 16", Control(1, Engage(16))
+    yield "disengage device 16", Control(1, Disengage(16))
     yield "request 0", Control(0, SetStateRate(1))
     yield "answer to 0", ControlAck(0, Code.OK)
     yield "code 0", ControlAck(1, 0)

@@ -15,7 +15,10 @@ import {
   concat, DatagramType, decodeAnswer, decodeHeader, decodeHello, decodeRetry, encodeAnswer, encodeHello, encodeRetry,
   kHeaderSize,
 } from "../../../clients/typescript/src/datagram.js";
-import { Code, Hand, Mode, reasonNames, Role, Safety, type DeviceReport, type PeerReport } from "../../../clients/typescript/src/messages.js";
+import {
+  Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, reasonNames, Role, Safety, type Couple, type DeviceReport,
+  type PeerReport, type PortState,
+} from "../../../clients/typescript/src/messages.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { toHex } from "./support/bytes.js";
 import { kRoot } from "./support/paths.js";
@@ -233,6 +236,56 @@ describe("WIRE.md", () => {
       const content = decodeData(concat(encodeHead(1n, undefined), frame, good));
       assert.equal(content?.invalid, 1, `frame ${i}`);
       assert.equal(content?.frames.length, 1, `frame ${i}`);
+    }
+  });
+
+  const kPort: PortState = {
+    device: 1, channel: 1, epoch: 5n, sequence: 1000n, answersEpoch: 3n, answers: 960n, timeNs: 1_000_000_000n,
+    roundTripNs: 40_000_000n, phase: PortPhase.ENGAGED, engagement: 2n, buttons: 2, position: { x: 0.01, y: 0, z: -0.02 },
+    velocity: { x: 0.5, y: 0, z: 0 }, force: { x: -0.75, y: 0, z: 0 }, account: 0.125, need: 0.0625, given: 1.5, taken: 0.5,
+  };
+  const kCouple: Couple = {
+    device: 1, channel: 1, role: PortRole.FOLLOWER, method: CouplingMethod.POSITION_FORCE, positionScale: 0.5, forceScale: 2,
+    rotation: { w: 0.6, x: 0, y: 0.8, z: 0 }, axes: 5, stiffness: 400, mutualDamping: 2, damping: 4, adaptToDelay: true,
+    purse: true, periodUs: 1000,
+  };
+
+  it("port and port-contact say what the page says", () => {
+    assert.deepEqual(contentOf("port").frames, [{ kind: "port", value: kPort }]);
+    const value = { ...kPort, contactForce: { x: -2, y: 0, z: 0.5 }, account: -0.25, need: 0, given: 0, taken: 0 };
+    assert.deepEqual(contentOf("port-contact").frames, [{ kind: "port", value }]);
+  });
+
+  it("control-couple, control-engage and control-disengage say what the page says", () => {
+    const requestOf = (name: string): unknown => contentOf(name).frames.map((frame) => frame.kind === "control" && frame.value);
+    assert.deepEqual(requestOf("control-couple"), [{ id: 15, request: { kind: "couple", ...kCouple } }]);
+    assert.deepEqual(requestOf("control-engage"), [{ id: 16, request: { kind: "engage", device: 1 } }]);
+    assert.deepEqual(requestOf("control-disengage"), [{ id: 17, request: { kind: "disengage", device: 1 } }]);
+  });
+
+  it("a port or a couple out of bounds is left out and counted", () => {
+    const ports: Partial<PortState>[] = [
+      { device: 16 }, { channel: 8 }, { epoch: 0n }, { sequence: 0n }, { timeNs: 2n ** 60n + 1n }, { roundTripNs: 10_000_000_001n },
+      { phase: 0 as PortPhase }, { phase: 8 as PortPhase }, { position: { x: NaN, y: 0, z: 0 } }, { velocity: { x: 0, y: Infinity, z: 0 } },
+      { force: { x: 0, y: 0, z: 1.1e12 } }, { contactForce: { x: NaN, y: 0, z: 0 } }, { account: 1000.1 }, { account: -1000.1 },
+      { account: NaN }, { need: -0.1 }, { need: 1000.1 }, { given: -0.1 }, { given: 1e6 + 1 }, { taken: -0.1 }, { taken: Infinity },
+    ];
+    const couples: Partial<Couple>[] = [
+      { device: 16 }, { channel: 8 }, { role: 0 as PortRole }, { role: 3 as PortRole }, { method: 0 as CouplingMethod },
+      { method: 3 as CouplingMethod }, { positionScale: 0.0099 }, { positionScale: NaN }, { forceScale: 100.1 },
+      { rotation: { w: 0.602, x: 0, y: 0.8, z: 0 } }, { axes: 0 }, { axes: 8 }, { stiffness: -1 }, { mutualDamping: Infinity },
+      { damping: NaN }, { periodUs: 0 }, { periodUs: 10_000_001 },
+    ];
+    const frames = [
+      ...ports.map((change) => encodeFrame({ kind: "port", value: { ...kPort, ...change } })),
+      ...couples.map((change) =>
+        encodeFrame({ kind: "control", value: { id: 1, request: { kind: "couple", ...kCouple, ...change } } })),
+    ];
+    for (const [i, frame] of frames.entries()) {
+      const good = encodeFrame({ kind: "port", value: kPort });
+      const content = decodeData(concat(encodeHead(1n, undefined), frame, good));
+      assert.equal(content?.invalid, 1, `frame ${i}`);
+      assert.deepEqual(content?.frames, [{ kind: "port", value: kPort }], `frame ${i}`);
     }
   });
 

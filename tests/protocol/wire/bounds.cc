@@ -119,7 +119,7 @@ std::int64_t whole(const std::string& text) {
 /// What depends on another field too: what is right beyond the bound is refused all the same.
 bool is_bound_to_others(const std::string& path) {
   static const std::regex kOthers(
-      R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|at_orientation)\..*)");
+      R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|at_orientation|rotation)\..*)");
   return std::regex_match(path, kOthers);
 }
 

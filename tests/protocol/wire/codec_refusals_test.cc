@@ -211,6 +211,92 @@ TEST(Codec, AReportOnADeviceOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   EXPECT_EQ(read_raw(7, good().text(9, zeros + '\0')), 0U) << "25 buckets";
 }
 
+TEST(Codec, APortOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  struct BadPort {
+    const char* what;
+    void (*spoil)(PortFrame&);
+  };
+  const BadPort cases[] = {
+      {"device 16", [](PortFrame& p) { p.device = limits::kMaxDevices; }},
+      {"channel 8", [](PortFrame& p) { p.channel = limits::kMaxChannels; }},
+      {"epoch 0", [](PortFrame& p) { p.epoch = 0; }},
+      {"sequence 0", [](PortFrame& p) { p.sequence = 0; }},
+      {"late time", [](PortFrame& p) { p.time = limits::kMaxTime + Duration{1}; }},
+      {"early time", [](PortFrame& p) { p.time = -limits::kMaxTime - Duration{1}; }},
+      {"a round trip below zero", [](PortFrame& p) { p.round_trip = Duration{-1}; }},
+      {"an endless round trip", [](PortFrame& p) { p.round_trip = PortState::kMostRoundTrip + Duration{1}; }},
+      {"phase 0", [](PortFrame& p) { p.phase = PortPhase{0}; }},
+      {"phase 8", [](PortFrame& p) { p.phase = PortPhase{8}; }},
+      {"NaN position", [](PortFrame& p) { p.position.x() = kNan; }},
+      {"infinite velocity", [](PortFrame& p) { p.velocity.y() = kInf; }},
+      {"huge force", [](PortFrame& p) { p.force.z() = 1.001e12; }},
+      {"NaN contact", [](PortFrame& p) { p.contact_force->z() = kNan; }},
+      {"a huge account", [](PortFrame& p) { p.account = 1001; }},
+      {"a huge debt", [](PortFrame& p) { p.account = -1001; }},
+      {"NaN account", [](PortFrame& p) { p.account = kNan; }},
+      {"a need below zero", [](PortFrame& p) { p.need = -1e-9; }},
+      {"a huge need", [](PortFrame& p) { p.need = 1001; }},
+      {"given less than nothing", [](PortFrame& p) { p.given = -1e-9; }},
+      {"a million joules and one", [](PortFrame& p) { p.given = 1'000'001; }},
+      {"NaN given", [](PortFrame& p) { p.given = kNan; }},
+      {"taken less than nothing", [](PortFrame& p) { p.taken = -1e-9; }},
+      {"infinite taken", [](PortFrame& p) { p.taken = kInf; }},
+  };
+  for (const BadPort& bad : cases) {
+    PortFrame port = examples::port_in_contact();
+    bad.spoil(port);
+    expect_left_out(port, bad.what);
+  }
+}
+
+TEST(Codec, ACoupleOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  struct BadCouple {
+    const char* what;
+    void (*spoil)(Couple&);
+  };
+  const BadCouple cases[] = {
+      {"device 16", [](Couple& c) { c.device = limits::kMaxDevices; }},
+      {"channel 8", [](Couple& c) { c.channel = limits::kMaxChannels; }},
+      {"NaN scale", [](Couple& c) { c.position_scale = kNan; }},
+      {"a hundredth is the least scale", [](Couple& c) { c.position_scale = 0.0099; }},
+      {"a hundred is the largest", [](Couple& c) { c.force_scale = 100.1; }},
+      {"no force", [](Couple& c) { c.force_scale = 0; }},
+      {"a rotation that is none", [](Couple& c) { c.rotation.w = 0.602; }},
+      {"NaN rotation", [](Couple& c) { c.rotation.x = kNan; }},
+      {"no axis", [](Couple& c) { c.axes = 0; }},
+      {"a fourth axis", [](Couple& c) { c.axes = 8; }},
+      {"stiffness below zero", [](Couple& c) { c.stiffness = -1; }},
+      {"infinite stiffness", [](Couple& c) { c.stiffness = kInf; }},
+      {"NaN damping", [](Couple& c) { c.damping = kNan; }},
+      {"damping below zero", [](Couple& c) { c.damping = -1; }},
+      {"mutual damping below zero", [](Couple& c) { c.mutual_damping = -1; }},
+      {"no period", [](Couple& c) { c.period = Duration{}; }},
+      {"a period of more than 10 s", [](Couple& c) { c.period = std::chrono::seconds(10) + Duration{1}; }},
+  };
+  for (const BadCouple& bad : cases) {
+    Couple couple = examples::couple();
+    bad.spoil(couple);
+    expect_left_out(Control{.id = 1, .request = couple}, bad.what);
+  }
+}
+
+TEST(Codec, ACoupleWithoutARoleAMethodOrARotationIsRefused) {
+  const auto couple = [](std::uint64_t role, std::uint64_t method, bool rotation) {
+    constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0
+    RawProtobuf raw;
+    raw.varint(3, role).varint(4, method).fixed64(5, kOne).fixed64(6, kOne).varint(8, 7).varint(14, 1000);
+    if (rotation) raw.message(7, RawProtobuf().fixed64(1, kOne));
+    return read_raw(3, RawProtobuf().varint(1, 1).message(11, raw));
+  };
+  EXPECT_EQ(couple(1, 1, true), 1U);
+  EXPECT_EQ(couple(2, 2, true), 1U);
+  EXPECT_EQ(couple(0, 1, true), 0U);
+  EXPECT_EQ(couple(3, 1, true), 0U);
+  EXPECT_EQ(couple(1, 0, true), 0U);
+  EXPECT_EQ(couple(1, 3, true), 0U);
+  EXPECT_EQ(couple(1, 1, false), 0U);
+}
+
 TEST(Codec, ZerosAtTheEndOfAHistogramDoNotTravel) {
   DeviceReport report = examples::device_report();
   const std::size_t before = data(1, {}, report).size();

@@ -10,6 +10,7 @@
 
 #include "core/base/rotation.h"
 #include "protocol/limits.h"
+#include "protocol/secrets/crypto.h"
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
 
@@ -307,6 +308,95 @@ RC_GTEST_PROP(Codec, AReportOnAnEngineComesOutAsItWentIn, ()) {
   RC_ASSERT(out.state_one_in == in.state_one_in);
   RC_ASSERT(out.forces_refused == in.forces_refused);
   assert_same(out.link, in.link);
+}
+
+RC_GTEST_PROP(Codec, APortComesOutAsItWentIn, ()) {
+  const auto between = [](double least, double most) {
+    return least + (most - least) * (*rc::gen::inRange(0, 1'000'001) / 1e6);
+  };
+  PortFrame in;
+  in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
+  in.epoch = *rc::gen::inRange<std::uint64_t>(1, ~std::uint64_t{0});
+  in.sequence = *rc::gen::inRange<std::uint64_t>(1, ~std::uint64_t{0});
+  in.answers_epoch = *rc::gen::arbitrary<std::uint64_t>();
+  in.answers = *rc::gen::arbitrary<std::uint64_t>();
+  in.time = any_time();
+  in.round_trip = Duration{*rc::gen::inRange<std::int64_t>(0, PortState::kMostRoundTrip.count() + 1)};
+  in.phase = static_cast<PortPhase>(*rc::gen::inRange(1, 8));
+  in.engagement = *rc::gen::arbitrary<std::uint64_t>();
+  in.buttons = *rc::gen::arbitrary<std::uint32_t>();
+  in.position = any_vector();
+  in.velocity = any_vector();
+  in.force = any_vector();
+  if (*rc::gen::arbitrary<bool>()) in.contact_force = any_vector();
+  in.account = between(-1e3, 1e3);
+  in.need = between(0, 1e3);
+  in.given = between(0, 1e6);
+  in.taken = between(0, 1e6);
+
+  const PortFrame out = there(in);
+  RC_ASSERT(out.device == in.device);
+  RC_ASSERT(out.channel == in.channel);
+  RC_ASSERT(out.epoch == in.epoch);
+  RC_ASSERT(out.sequence == in.sequence);
+  RC_ASSERT(out.answers_epoch == in.answers_epoch);
+  RC_ASSERT(out.answers == in.answers);
+  RC_ASSERT((out.time == in.time && out.round_trip == in.round_trip));
+  RC_ASSERT((out.phase == in.phase));
+  RC_ASSERT(out.engagement == in.engagement);
+  RC_ASSERT(out.buttons == in.buttons);
+  RC_ASSERT((out.position == in.position && out.velocity == in.velocity && out.force == in.force));
+  RC_ASSERT(out.contact_force == in.contact_force);
+  RC_ASSERT(out.account == in.account);
+  RC_ASSERT(out.need == in.need);
+  RC_ASSERT(out.given == in.given);
+  RC_ASSERT(out.taken == in.taken);
+}
+
+RC_GTEST_PROP(Codec, ACoupleComesOutAsItWentIn, ()) {
+  const auto scale = [] { return *rc::gen::inRange(1, 10'001) / 100.0; };
+  Couple in;
+  in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
+  in.role = *rc::gen::arbitrary<bool>() ? PortRole::kLeader : PortRole::kFollower;
+  in.method = *rc::gen::arbitrary<bool>() ? CouplingMethod::kPositionPosition : CouplingMethod::kPositionForce;
+  in.position_scale = scale();
+  in.force_scale = scale();
+  in.rotation = any_rotation();
+  in.axes = *rc::gen::inRange(1U, 8U);
+  in.stiffness = std::abs(any_value());
+  in.mutual_damping = std::abs(any_value());
+  in.damping = std::abs(any_value());
+  in.adapt_to_delay = *rc::gen::arbitrary<bool>();
+  in.purse = *rc::gen::arbitrary<bool>();
+  in.period = std::chrono::microseconds(*rc::gen::inRange(1, 10'000'001));
+  const auto out = there(Control{.id = 1, .request = in});
+  RC_ASSERT(std::get<Couple>(*out.request) == in);
+}
+
+TEST(Codec, EngageAndDisengageComeOutAsTheyWentIn) {
+  EXPECT_EQ(std::get<Engage>(*there(Control{.id = 1, .request = Engage{.device = 15}}).request).device, 15U);
+  EXPECT_EQ(std::get<Disengage>(*there(Control{.id = 1, .request = Disengage{.device = 15}}).request).device, 15U);
+}
+
+/// With the tag of suite 1, and an echo, as it is on its way.
+TEST(Codec, APortTakes238BytesAndAtMost311AndFitsBesideAState) {
+  const auto sealed = [](const auto&... frames) {
+    return data(1'000'000, examples::echo(), frames...).size() + crypto::kTagSize;
+  };
+  PortFrame usual = examples::port();
+  usual.position = usual.velocity = usual.force = {0.1, -0.2, 0.3};
+  EXPECT_EQ(sealed(usual), 238U);
+
+  PortFrame most = usual;
+  most.device = limits::kMaxDevices - 1;
+  most.channel = limits::kMaxChannels - 1;
+  most.epoch = most.sequence = most.answers_epoch = most.answers = most.engagement = ~std::uint64_t{0};
+  most.round_trip = PortState::kMostRoundTrip;
+  most.contact_force = Vec3(0.1, -0.2, 0.3);
+  EXPECT_EQ(sealed(most), 311U);
+  EXPECT_LE(sealed(examples::state_with_handle(), most), kMaxDatagram);
 }
 
 TEST(Codec, SeveralFramesAndAnEchoShareOneDatagram) {

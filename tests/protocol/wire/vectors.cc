@@ -168,6 +168,11 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"description of a handle", false, 270, 0, at(270, examples::handle_described(15))},
       {"a handle with all there is", false, 271, 0, at(271, examples::state_with_handle())},
       {"torque and grip force", true, 272, 0, at(272, examples::force_with_torque())},
+      {"one end of a coupling", true, 273, 0, at(273, examples::port())},
+      {"its other end beside a state", false, 274, 0, at(274, examples::state(), examples::port_in_contact())},
+      {"couple a device", true, 275, 0, request(275, 15, examples::couple())},
+      {"engage", true, 276, 0, request(276, 16, Engage{.device = 1})},
+      {"disengage", true, 277, 0, request(277, 17, Disengage{.device = 1})},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

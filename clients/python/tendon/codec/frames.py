@@ -14,12 +14,15 @@ from ..messages import (
     Contact,
     Control,
     ControlAck,
+    Couple,
     Delays,
     Describe,
     DeviceDescription,
     DeviceReport,
     DeviceState,
     Disarm,
+    Disengage,
+    Engage,
     ForceCommand,
     ForceTable,
     Frame,
@@ -31,6 +34,7 @@ from ..messages import (
     LinkReport,
     LocalModel,
     PeerReport,
+    PortState,
     Quat,
     Rearm,
     Request,
@@ -42,7 +46,7 @@ from ..messages import (
     Turning,
     Vec3,
 )
-from . import fields
+from . import fields, ports
 
 
 def _read_turning(message: pb.DeviceState) -> Turning | None:
@@ -201,6 +205,12 @@ def _read_control(message: pb.Control) -> Control:
     elif op == "set_state_deadband":
         asked = message.set_state_deadband
         request = SetStateDeadband(fields.number(asked.share), fields.number(asked.floor_mps), asked.max_silence_us)
+    elif op == "couple":
+        request = ports.read_couple(message.couple)
+    elif op == "engage":
+        request = Engage(fields.device(message.engage.device))
+    elif op == "disengage":
+        request = Disengage(fields.device(message.disengage.device))
     return Control(id=fields.whole(message.id, 1, 2**32), request=request)
 
 
@@ -474,6 +484,12 @@ def _write_control(frame: Control) -> pb.Control:
         control.set_state_deadband.CopyFrom(
             pb.SetStateDeadband(share=request.share, floor_mps=request.floor, max_silence_us=request.max_silence_us)
         )
+    elif isinstance(request, Couple):
+        control.couple.CopyFrom(ports.write_couple(request))
+    elif isinstance(request, Engage):
+        control.engage.CopyFrom(pb.Engage(device=request.device))
+    elif isinstance(request, Disengage):
+        control.disengage.CopyFrom(pb.Disengage(device=request.device))
     return control
 
 
@@ -542,6 +558,8 @@ def write(frame: Frame) -> pb.Frame:
         return pb.Frame(device_report=_write_device_report(frame))
     if isinstance(frame, PeerReport):
         return pb.Frame(peer_report=_write_peer_report(frame))
+    if isinstance(frame, PortState):
+        return pb.Frame(port_state=ports.write_port(frame))
     bye = pb.Bye(code=cast(pb.Code, frame.code), reason=fields.clip(frame.reason, limits.MAX_DETAIL))
     return pb.Frame(bye=bye)
 
@@ -564,4 +582,6 @@ def read(message: pb.Frame) -> Frame | None:
         return _read_device_report(message.device_report)
     if body == "peer_report":
         return _read_peer_report(message.peer_report)
+    if body == "port_state":
+        return ports.read_port(message.port_state)
     return None  # a frame of a newer peer

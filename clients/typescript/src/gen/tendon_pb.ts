@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByLfAgoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SABCBgoEYm9keSInCgRWZWMzEgkKAXgYASABKAESCQoBeRgCIAEoARIJCgF6GAMgASgBIjIKBFF1YXQSCQoBdxgBIAEoARIJCgF4GAIgASgBEgkKAXkYAyABKAESCQoBehgEIAEoASK8BgoLRGV2aWNlU3RhdGUSDAoEdGljaxgBIAEoBBISCgpzYW1wbGVkX25zGAIgASgQEiMKCnBvc2l0aW9uX20YAyABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYBCABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9mb3JjZV9hcHBsaWVkX24YBSABKAsyDy50ZW5kb24udjEuVmVjMxIQCghlbmVyZ3lfahgGIAEoARIZChFwZXJtaXR0ZWRfZm9yY2VfbhgHIAEoARIPCgdyZWFzb25zGAggASgHEhYKDmZvcmNlX3NlcXVlbmNlGAkgASgEEhQKDGZvcmNlX2FnZV9ucxgKIAEoBBIdCgRtb2RlGAsgASgOMg8udGVuZG9uLnYxLk1vZGUSDgoGZGV2aWNlGAwgASgNEg8KB2NoYW5uZWwYDSABKA0SJwoOZm9yY2Vfd2FudGVkX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIkCgtvcmllbnRhdGlvbhgPIAEoCzIPLnRlbmRvbi52MS5RdWF0Ei8KFmFuZ3VsYXJfdmVsb2NpdHlfcmFkcHMYECABKAsyDy50ZW5kb24udjEuVmVjMxIPCgdidXR0b25zGBEgASgHEioKEXRvcnF1ZV9hcHBsaWVkX25tGBIgASgLMg8udGVuZG9uLnYxLlZlYzMSGAoLZ3JpcHBlcl9yYWQYEyABKAFIAIgBARIjChZncmlwcGVyX3ZlbG9jaXR5X3JhZHBzGBQgASgBSAGIAQESJAoXZ3JpcHBlcl9mb3JjZV9hcHBsaWVkX24YFSABKAFIAogBARIlCgxoYW5kX2ZvcmNlX24YFiABKAsyDy50ZW5kb24udjEuVmVjMxIVCglqb2ludF9yYWQYFyADKAFCAhABEiAKFGpvaW50X3ZlbG9jaXR5X3JhZHBzGBggAygBQgIQARIgChRzdGlmZm5lc3Nfd2FudGVkX25wbRgZIAMoAUICEAFCDgoMX2dyaXBwZXJfcmFkQhkKF19ncmlwcGVyX3ZlbG9jaXR5X3JhZHBzQhoKGF9ncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbiL6AgoMRm9yY2VDb21tYW5kEhAKCHNlcXVlbmNlGAEgASgEEhUKDWJhc2VkX29uX3RpY2sYAiABKAQSIAoHZm9yY2VfbhgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKBW1vZGVsGAQgASgLMhUudGVuZG9uLnYxLkxvY2FsTW9kZWwSFAoMdmFsaWRfZm9yX3VzGAUgASgNEg4KBmRldmljZRgGIAEoDRIPCgdjaGFubmVsGAcgASgNEhgKEHRvcG9sb2d5X2NoYW5nZWQYCCABKAgSFAoHZXJyb3JfbhgJIAEoAUgAiAEBEiIKCXRvcnF1ZV9ubRgKIAEoCzIPLnRlbmRvbi52MS5WZWMzEhwKD2dyaXBwZXJfZm9yY2VfbhgLIAEoAUgBiAEBEjAKDnJvdGF0aW9uX21vZGVsGA4gASgLMhgudGVuZG9uLnYxLlJvdGF0aW9uTW9kZWxCCgoIX2Vycm9yX25CEgoQX2dyaXBwZXJfZm9yY2VfbiJeCg1Sb3RhdGlvbk1vZGVsEicKDmF0X29yaWVudGF0aW9uGAEgASgLMg8udGVuZG9uLnYxLlF1YXQSJAoYYW5ndWxhcl9zdGlmZm5lc3Nfbm1wcmFkGAIgAygBQgIQASKbAQoKTG9jYWxNb2RlbBIdCgRhdF9tGAEgASgLMg8udGVuZG9uLnYxLlZlYzMSGQoNc3RpZmZuZXNzX25wbRgCIAMoAUICEAESGwoOdmFsaWRfcmFkaXVzX20YAyABKAFIAIgBARIjCgdjb250YWN0GAQgASgLMhIudGVuZG9uLnYxLkNvbnRhY3RCEQoPX3ZhbGlkX3JhZGl1c19tIl8KB0NvbnRhY3QSHwoGbm9ybWFsGAEgASgLMg8udGVuZG9uLnYxLlZlYzMSDQoFZ2FwX20YAiABKAESJAoFdGFibGUYAyABKAsyFS50ZW5kb24udjEuRm9yY2VUYWJsZSJICgpGb3JjZVRhYmxlEhUKDWZpcnN0X2RlcHRoX20YASABKAESDgoGc3RlcF9tGAIgASgBEhMKB2ZvcmNlX24YAyADKAFCAhABIv4CCgdDb250cm9sEgoKAmlkGAEgASgNEjEKDnNldF9zdGF0ZV9yYXRlGAIgASgLMhcudGVuZG9uLnYxLlNldFN0YXRlUmF0ZUgAEiEKBXJlYXJtGAMgASgLMhAudGVuZG9uLnYxLlJlYXJtSAASJwoIZGVzY3JpYmUYBCABKAsyEy50ZW5kb24udjEuRGVzY3JpYmVIABIqCgp0YWtlX2xlYXNlGAUgASgLMhQudGVuZG9uLnYxLlRha2VMZWFzZUgAEioKCmdpdmVfbGVhc2UYBiABKAsyFC50ZW5kb24udjEuR2l2ZUxlYXNlSAASOQoSc2V0X3N0YXRlX2RlYWRiYW5kGAggASgLMhsudGVuZG9uLnYxLlNldFN0YXRlRGVhZGJhbmRIABIjCgZkaXNhcm0YCSABKAsyES50ZW5kb24udjEuRGlzYXJtSAASKgoKbGVhc2VfbG9zdBgHIAEoCzIULnRlbmRvbi52MS5MZWFzZUxvc3RIAEIECgJvcCIqCgxTZXRTdGF0ZVJhdGUSCgoCaHoYASABKA0SDgoGZGV2aWNlGAIgASgNIkwKEFNldFN0YXRlRGVhZGJhbmQSDQoFc2hhcmUYASABKAESEQoJZmxvb3JfbXBzGAIgASgBEhYKDm1heF9zaWxlbmNlX3VzGAMgASgNIhcKBVJlYXJtEg4KBmRldmljZRgBIAEoDSIYCgZEaXNhcm0SDgoGZGV2aWNlGAEgASgNIioKCERlc2NyaWJlEg4KBmRldmljZRgBIAEoDRIOCgZoYW5kbGUYAiABKAgiLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkitAEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbhIsCgZoYW5kbGUYBiABKAsyHC50ZW5kb24udjEuSGFuZGxlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiKnAgoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCRIcChRvcmllbnRhdGlvbl9tZWFzdXJlZBgEIAEoCBIVCg1tYXhfdG9ycXVlX25tGAUgASgBEh0KEGdyaXBwZXJfb3Blbl9yYWQYBiABKAFIAIgBARIbChNtYXhfZ3JpcHBlcl9mb3JjZV9uGAcgASgBEg0KBWdyb3VwGAggASgJEh0KBGhhbmQYCSABKA4yDy50ZW5kb24udjEuSGFuZBIOCgZqb2ludHMYCiADKAlCEwoRX2dyaXBwZXJfb3Blbl9yYWQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIi9AEKDERldmljZVJlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZkZXZpY2UYBCABKA0SDQoFc3RlcHMYBSABKAQSDgoGbWlzc2VkGAYgASgEEhAKCG92ZXJydW5zGAcgASgEEg4KBnVuc2VlbhgIIAEoBBIcChBsYXRlbmVzc191c19sb2cyGAkgAygEQgIQARIhCgZzYWZldHkYCiABKA4yES50ZW5kb24udjEuU2FmZXR5Eg0KBWZhdWx0GAsgASgJEhAKCGRlZ3JhZGVkGAwgASgJIo4BCgpQZWVyUmVwb3J0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgwKBG5hbWUYAyABKAkSFAoMc3RhdGVfb25lX2luGAQgASgNEhYKDmZvcmNlc19yZWZ1c2VkGAUgASgIEiMKBGxpbmsYBiABKAsyFS50ZW5kb24udjEuTGlua1JlcG9ydCKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqMwoESGFuZBIMCghIQU5EX0FOWRAAEg0KCUhBTkRfTEVGVBABEg4KCkhBTkRfUklHSFQQAipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqvAEKBlNhZmV0eRIWChJTQUZFVFlfVU5TUEVDSUZJRUQQABIRCg1TQUZFVFlfQUJTRU5UEAESEgoOU0FGRVRZX09QRU5JTkcQAhITCg9TQUZFVFlfRklSTVdBUkUQAxISCg5TQUZFVFlfVU5IT01FRBAEEhAKDFNBRkVUWV9IT01FRBAFEhAKDFNBRkVUWV9BUk1FRBAGEhAKDFNBRkVUWV9GQVVMVBAHEhQKEFNBRkVUWV9VTkdVQVJERUQQCCq9AQoEQ29kZRIUChBDT0RFX1VOU1BFQ0lGSUVEEAASCwoHQ09ERV9PSxABEhAKDENPREVfSU5WQUxJRBACEhQKEENPREVfVU5TVVBQT1JURUQQAxINCglDT0RFX0JVU1kQBBIPCgtDT0RFX0RFTklFRBAFEhEKDUNPREVfU0hVVERPV04QBhISCg5DT0RFX1RJTUVEX09VVBAHEhAKDENPREVfRVhQSVJFRBAIEhEKDUNPREVfUkVQTEFDRUQQCSpECgRSb2xlEhQKEFJPTEVfVU5TUEVDSUZJRUQQABIRCg1ST0xFX09CU0VSVkVSEAESEwoPUk9MRV9DT05UUk9MTEVSEAJiBnByb3RvMw");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByKLAwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIAEIGCgRib2R5IicKBFZlYzMSCQoBeBgBIAEoARIJCgF5GAIgASgBEgkKAXoYAyABKAEiMgoEUXVhdBIJCgF3GAEgASgBEgkKAXgYAiABKAESCQoBeRgDIAEoARIJCgF6GAQgASgBIrwGCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKC29yaWVudGF0aW9uGA8gASgLMg8udGVuZG9uLnYxLlF1YXQSLwoWYW5ndWxhcl92ZWxvY2l0eV9yYWRwcxgQIAEoCzIPLnRlbmRvbi52MS5WZWMzEg8KB2J1dHRvbnMYESABKAcSKgoRdG9ycXVlX2FwcGxpZWRfbm0YEiABKAsyDy50ZW5kb24udjEuVmVjMxIYCgtncmlwcGVyX3JhZBgTIAEoAUgAiAEBEiMKFmdyaXBwZXJfdmVsb2NpdHlfcmFkcHMYFCABKAFIAYgBARIkChdncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbhgVIAEoAUgCiAEBEiUKDGhhbmRfZm9yY2VfbhgWIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKCWpvaW50X3JhZBgXIAMoAUICEAESIAoUam9pbnRfdmVsb2NpdHlfcmFkcHMYGCADKAFCAhABEiAKFHN0aWZmbmVzc193YW50ZWRfbnBtGBkgAygBQgIQAUIOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi8wMKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIjCgZjb3VwbGUYCyABKAsyES50ZW5kb24udjEuQ291cGxlSAASIwoGZW5nYWdlGAwgASgLMhEudGVuZG9uLnYxLkVuZ2FnZUgAEikKCWRpc2VuZ2FnZRgNIAEoCzIULnRlbmRvbi52MS5EaXNlbmdhZ2VIABIqCgpsZWFzZV9sb3N0GAcgASgLMhQudGVuZG9uLnYxLkxlYXNlTG9zdEgAQgQKAm9wIioKDFNldFN0YXRlUmF0ZRIKCgJoehgBIAEoDRIOCgZkZXZpY2UYAiABKA0iTAoQU2V0U3RhdGVEZWFkYmFuZBINCgVzaGFyZRgBIAEoARIRCglmbG9vcl9tcHMYAiABKAESFgoObWF4X3NpbGVuY2VfdXMYAyABKA0iFwoFUmVhcm0SDgoGZGV2aWNlGAEgASgNIhgKBkRpc2FybRIOCgZkZXZpY2UYASABKA0i2QIKBkNvdXBsZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIhCgRyb2xlGAMgASgOMhMudGVuZG9uLnYxLlBvcnRSb2xlEikKBm1ldGhvZBgEIAEoDjIZLnRlbmRvbi52MS5Db3VwbGluZ01ldGhvZBIWCg5wb3NpdGlvbl9zY2FsZRgFIAEoARITCgtmb3JjZV9zY2FsZRgGIAEoARIhCghyb3RhdGlvbhgHIAEoCzIPLnRlbmRvbi52MS5RdWF0EgwKBGF4ZXMYCCABKA0SFQoNc3RpZmZuZXNzX25wbRgJIAEoARIbChNtdXR1YWxfZGFtcGluZ19uc3BtGAogASgBEhQKDGRhbXBpbmdfbnNwbRgLIAEoARIWCg5hZGFwdF90b19kZWxheRgMIAEoCBINCgVwdXJzZRgNIAEoCBIRCglwZXJpb2RfdXMYDiABKA0iGAoGRW5nYWdlEg4KBmRldmljZRgBIAEoDSIbCglEaXNlbmdhZ2USDgoGZGV2aWNlGAEgASgNIioKCERlc2NyaWJlEg4KBmRldmljZRgBIAEoDRIOCgZoYW5kbGUYAiABKAgiLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkitAEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbhIsCgZoYW5kbGUYBiABKAsyHC50ZW5kb24udjEuSGFuZGxlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiKnAgoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCRIcChRvcmllbnRhdGlvbl9tZWFzdXJlZBgEIAEoCBIVCg1tYXhfdG9ycXVlX25tGAUgASgBEh0KEGdyaXBwZXJfb3Blbl9yYWQYBiABKAFIAIgBARIbChNtYXhfZ3JpcHBlcl9mb3JjZV9uGAcgASgBEg0KBWdyb3VwGAggASgJEh0KBGhhbmQYCSABKA4yDy50ZW5kb24udjEuSGFuZBIOCgZqb2ludHMYCiADKAlCEwoRX2dyaXBwZXJfb3Blbl9yYWQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIixAMKCVBvcnRTdGF0ZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVlcG9jaBgDIAEoBBIQCghzZXF1ZW5jZRgEIAEoBBIVCg1hbnN3ZXJzX2Vwb2NoGAUgASgEEg8KB2Fuc3dlcnMYBiABKAQSDwoHdGltZV9ucxgHIAEoEBIVCg1yb3VuZF90cmlwX25zGAggASgEEiMKBXBoYXNlGAkgASgOMhQudGVuZG9uLnYxLlBvcnRQaGFzZRISCgplbmdhZ2VtZW50GAogASgEEg8KB2J1dHRvbnMYCyABKAcSIwoKcG9zaXRpb25fbRgMIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgNIAEoCzIPLnRlbmRvbi52MS5WZWMzEiAKB2ZvcmNlX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9jb250YWN0X2ZvcmNlX24YDyABKAsyDy50ZW5kb24udjEuVmVjMxIRCglhY2NvdW50X2oYECABKAESDgoGbmVlZF9qGBEgASgBEg8KB2dpdmVuX2oYEiABKAESDwoHdGFrZW5fahgTIAEoASL0AQoMRGV2aWNlUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmRldmljZRgEIAEoDRINCgVzdGVwcxgFIAEoBBIOCgZtaXNzZWQYBiABKAQSEAoIb3ZlcnJ1bnMYByABKAQSDgoGdW5zZWVuGAggASgEEhwKEGxhdGVuZXNzX3VzX2xvZzIYCSADKARCAhABEiEKBnNhZmV0eRgKIAEoDjIRLnRlbmRvbi52MS5TYWZldHkSDQoFZmF1bHQYCyABKAkSEAoIZGVncmFkZWQYDCABKAkijgEKClBlZXJSZXBvcnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SDAoEbmFtZRgDIAEoCRIUCgxzdGF0ZV9vbmVfaW4YBCABKA0SFgoOZm9yY2VzX3JlZnVzZWQYBSABKAgSIwoEbGluaxgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0IpIBCgVIZWxsbxITCgt2ZXJzaW9uX21pbhgBIAEoDRITCgt2ZXJzaW9uX21heBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSDAoEbmFtZRgEIAEoCRIQCghmZWF0dXJlcxgFIAMoCRIgCgZjbGFpbXMYBiADKAsyEC50ZW5kb24udjEuQ2xhaW0iRwoFQ2xhaW0SDgoGZGV2aWNlGAEgASgJEg8KB2NoYW5uZWwYAiABKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlIl4KBkFuc3dlchIlCgd3ZWxjb21lGAEgASgLMhIudGVuZG9uLnYxLldlbGNvbWVIABIlCgdyZWZ1c2VkGAIgASgLMhIudGVuZG9uLnYxLlJlZnVzZWRIAEIGCgRib2R5IusBCgdXZWxjb21lEg8KB3ZlcnNpb24YASABKA0SEAoIZmVhdHVyZXMYAiADKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEhMKC2RldmljZV9uYW1lGAQgASgJEhMKC21heF9mb3JjZV9uGAUgASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgGIAEoARIPCgdsb29wX2h6GAcgASgNEhIKCnRpbWVvdXRfbXMYCCABKA0SDgoGc2VydmVyGAkgASgJEiAKBmdyYW50cxgKIAMoCzIQLnRlbmRvbi52MS5HcmFudCJHCgVHcmFudBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiYgoHUmVmdXNlZBIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAIgASgJEhMKC3ZlcnNpb25fbWluGAMgASgNEhMKC3ZlcnNpb25fbWF4GAQgASgNKoUBCgRNb2RlEhQKEE1PREVfVU5TUEVDSUZJRUQQABINCglNT0RFX0lETEUQARIPCgtNT0RFX0FDVElWRRACEhAKDE1PREVfSE9MRElORxADEhEKDU1PREVfREVDQVlJTkcQBBISCg5NT0RFX1NBRkVfU1RPUBAFEg4KCk1PREVfRkFVTFQQBipTCghQb3J0Um9sZRIZChVQT1JUX1JPTEVfVU5TUEVDSUZJRUQQABIUChBQT1JUX1JPTEVfTEVBREVSEAESFgoSUE9SVF9ST0xFX0ZPTExPV0VSEAIqfAoOQ291cGxpbmdNZXRob2QSHwobQ09VUExJTkdfTUVUSE9EX1VOU1BFQ0lGSUVEEAASJQohQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX1BPU0lUSU9OEAESIgoeQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX0ZPUkNFEAIqMwoESGFuZBIMCghIQU5EX0FOWRAAEg0KCUhBTkRfTEVGVBABEg4KCkhBTkRfUklHSFQQAipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqygEKCVBvcnRQaGFzZRIaChZQT1JUX1BIQVNFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9QSEFTRV9BTE9ORRABEhYKElBPUlRfUEhBU0VfQ09VUExFRBACEhcKE1BPUlRfUEhBU0VfQUxJR05JTkcQAxIWChJQT1JUX1BIQVNFX0VOR0FHRUQQBBIXChNQT1JUX1BIQVNFX0NMVVRDSEVEEAUSEwoPUE9SVF9QSEFTRV9MT1NUEAYSFAoQUE9SVF9QSEFTRV9GQVVMVBAHKrwBCgZTYWZldHkSFgoSU0FGRVRZX1VOU1BFQ0lGSUVEEAASEQoNU0FGRVRZX0FCU0VOVBABEhIKDlNBRkVUWV9PUEVOSU5HEAISEwoPU0FGRVRZX0ZJUk1XQVJFEAMSEgoOU0FGRVRZX1VOSE9NRUQQBBIQCgxTQUZFVFlfSE9NRUQQBRIQCgxTQUZFVFlfQVJNRUQQBhIQCgxTQUZFVFlfRkFVTFQQBxIUChBTQUZFVFlfVU5HVUFSREVEEAgqvQEKBENvZGUSFAoQQ09ERV9VTlNQRUNJRklFRBAAEgsKB0NPREVfT0sQARIQCgxDT0RFX0lOVkFMSUQQAhIUChBDT0RFX1VOU1VQUE9SVEVEEAMSDQoJQ09ERV9CVVNZEAQSDwoLQ09ERV9ERU5JRUQQBRIRCg1DT0RFX1NIVVRET1dOEAYSEgoOQ09ERV9USU1FRF9PVVQQBxIQCgxDT0RFX0VYUElSRUQQCBIRCg1DT0RFX1JFUExBQ0VEEAkqRAoEUm9sZRIUChBST0xFX1VOU1BFQ0lGSUVEEAASEQoNUk9MRV9PQlNFUlZFUhABEhMKD1JPTEVfQ09OVFJPTExFUhACYgZwcm90bzM");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -161,6 +161,15 @@ export type Frame = Message<"tendon.v1.Frame"> & {
      */
     value: PeerReport;
     case: "peerReport";
+  } | {
+    /**
+     * Only between peers that both named the feature "teleoperation", either way, unreliable: of each device and channel
+     * the highest sequence of the highest epoch wins
+     *
+     * @generated from field: tendon.v1.PortState port_state = 9;
+     */
+    value: PortState;
+    case: "portState";
   } | { case: undefined; value?: undefined };
 };
 
@@ -748,6 +757,24 @@ export type Control = Message<"tendon.v1.Control"> & {
     case: "disarm";
   } | {
     /**
+     * @generated from field: tendon.v1.Couple couple = 11;
+     */
+    value: Couple;
+    case: "couple";
+  } | {
+    /**
+     * @generated from field: tendon.v1.Engage engage = 12;
+     */
+    value: Engage;
+    case: "engage";
+  } | {
+    /**
+     * @generated from field: tendon.v1.Disengage disengage = 13;
+     */
+    value: Disengage;
+    case: "disengage";
+  } | {
+    /**
      * server → client
      *
      * @generated from field: tendon.v1.LeaseLost lease_lost = 7;
@@ -874,6 +901,160 @@ export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
   messageDesc(file_tendon, 15);
 
 /**
+ * My device is the other end of this one: what my end is like. From whoever has claimed the channel as a controller, to a
+ * server that granted "teleoperation". CODE_OK: they fit; the client is sent no states any more but PortStates, and sends
+ * them. CODE_INVALID: the first thing that differs, in words. CODE_UNSUPPORTED: that device is not to be coupled.
+ * CODE_BUSY: it is coupled with another client.
+ *
+ * @generated from message tendon.v1.Couple
+ */
+export type Couple = Message<"tendon.v1.Couple"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0, 7]
+   *
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * of the sender: the other end has the other one
+   *
+   * @generated from field: tendon.v1.PortRole role = 3;
+   */
+  role: PortRole;
+
+  /**
+   * @generated from field: tendon.v1.CouplingMethod method = 4;
+   */
+  method: CouplingMethod;
+
+  /**
+   * [0.01, 100]: follower over leader
+   *
+   * @generated from field: double position_scale = 5;
+   */
+  positionScale: number;
+
+  /**
+   * [0.01, 100]: leader over follower
+   *
+   * @generated from field: double force_scale = 6;
+   */
+  forceScale: number;
+
+  /**
+   * turns the leader's base frame into the follower's; absent is refused
+   *
+   * @generated from field: tendon.v1.Quat rotation = 7;
+   */
+  rotation?: Quat | undefined;
+
+  /**
+   * [1, 7]: bits 1, 2, 4: x, y, z of the leader's frame are coupled
+   *
+   * @generated from field: uint32 axes = 8;
+   */
+  axes: number;
+
+  /**
+   * [0, 1e12]: these as the leader feels them
+   *
+   * @generated from field: double stiffness_npm = 9;
+   */
+  stiffnessNpm: number;
+
+  /**
+   * [0, 1e12]
+   *
+   * @generated from field: double mutual_damping_nspm = 10;
+   */
+  mutualDampingNspm: number;
+
+  /**
+   * [0, 1e12]
+   *
+   * @generated from field: double damping_nspm = 11;
+   */
+  dampingNspm: number;
+
+  /**
+   * @generated from field: bool adapt_to_delay = 12;
+   */
+  adaptToDelay: boolean;
+
+  /**
+   * it pays and is paid
+   *
+   * @generated from field: bool purse = 13;
+   */
+  purse: boolean;
+
+  /**
+   * [1, 10000000]: between two PortStates
+   *
+   * @generated from field: uint32 period_us = 14;
+   */
+  periodUs: number;
+};
+
+/**
+ * Describes the message tendon.v1.Couple.
+ * Use `create(CoupleSchema)` to create a new message.
+ */
+export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
+  messageDesc(file_tendon, 16);
+
+/**
+ * The operator's act: couples the handles, at the leader's server. Only from a controller of the device. CODE_OK: the
+ * device's loop has the order. CODE_UNSUPPORTED: that device has no coupling, or is the follower.
+ *
+ * @generated from message tendon.v1.Engage
+ */
+export type Engage = Message<"tendon.v1.Engage"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+};
+
+/**
+ * Describes the message tendon.v1.Engage.
+ * Use `create(EngageSchema)` to create a new message.
+ */
+export const EngageSchema: GenMessage<Engage> = /*@__PURE__*/
+  messageDesc(file_tendon, 17);
+
+/**
+ * Ends that, at either end. Only from a controller of the device.
+ *
+ * @generated from message tendon.v1.Disengage
+ */
+export type Disengage = Message<"tendon.v1.Disengage"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+};
+
+/**
+ * Describes the message tendon.v1.Disengage.
+ * Use `create(DisengageSchema)` to create a new message.
+ */
+export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
+  messageDesc(file_tendon, 18);
+
+/**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
  *
  * @generated from message tendon.v1.Describe
@@ -899,7 +1080,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 16);
+  messageDesc(file_tendon, 19);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -928,7 +1109,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 20);
 
 /**
  * I do not want to be it any more.
@@ -956,7 +1137,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 21);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -991,7 +1172,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 22);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -1043,7 +1224,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 23);
 
 /**
  * What a device is and can do.
@@ -1146,7 +1327,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 24);
 
 /**
  * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
@@ -1230,7 +1411,7 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
  * Use `create(HandleDescriptionSchema)` to create a new message.
  */
 export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 25);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -1270,7 +1451,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 26);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -1294,7 +1475,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 27);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1478,7 +1659,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1504,7 +1685,153 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 29);
+
+/**
+ * One end of a coupling of two devices, told to the other. Vectors are in the base frame and the scale of the SENDER's
+ * device. How it is used core/teleoperation/coupling.h says.
+ *
+ * @generated from message tendon.v1.PortState
+ */
+export type PortState = Message<"tendon.v1.PortState"> & {
+  /**
+   * [0, 15]: of the server of the session, whichever way this goes
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0, 7]
+   *
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * [1, …]: of the sender; above every one before when it starts anew
+   *
+   * @generated from field: uint64 epoch = 3;
+   */
+  epoch: bigint;
+
+  /**
+   * [1, …]: 1, 2, 3 … within an epoch: its haptic steps
+   *
+   * @generated from field: uint64 sequence = 4;
+   */
+  sequence: bigint;
+
+  /**
+   * the receiver's epoch that the next one, given_j and taken_j belong to; 0: none yet
+   *
+   * @generated from field: uint64 answers_epoch = 5;
+   */
+  answersEpoch: bigint;
+
+  /**
+   * sequence of the receiver's newest state in use; 0: none yet
+   *
+   * @generated from field: uint64 answers = 6;
+   */
+  answers: bigint;
+
+  /**
+   * [-2^60, 2^60]: of the sender's clock; only differences are used
+   *
+   * @generated from field: sfixed64 time_ns = 7;
+   */
+  timeNs: bigint;
+
+  /**
+   * [0, 10000000000]: that the sender has measured; 0: not yet
+   *
+   * @generated from field: uint64 round_trip_ns = 8;
+   */
+  roundTripNs: bigint;
+
+  /**
+   * @generated from field: tendon.v1.PortPhase phase = 9;
+   */
+  phase: PortPhase;
+
+  /**
+   * number of the leader's act that the phase belongs to; 0: none yet
+   *
+   * @generated from field: uint64 engagement = 10;
+   */
+  engagement: bigint;
+
+  /**
+   * bit i: button i is held
+   *
+   * @generated from field: fixed32 buttons = 11;
+   */
+  buttons: number;
+
+  /**
+   * from the sender's offset
+   *
+   * @generated from field: tendon.v1.Vec3 position_m = 12;
+   */
+  positionM?: Vec3 | undefined;
+
+  /**
+   * zero while the position is frozen
+   *
+   * @generated from field: tendon.v1.Vec3 velocity_mps = 13;
+   */
+  velocityMps?: Vec3 | undefined;
+
+  /**
+   * on whoever holds its handle, really applied
+   *
+   * @generated from field: tendon.v1.Vec3 force_n = 14;
+   */
+  forceN?: Vec3 | undefined;
+
+  /**
+   * of the surroundings on its tool; absent: not measured
+   *
+   * @generated from field: tendon.v1.Vec3 contact_force_n = 15;
+   */
+  contactForceN?: Vec3 | undefined;
+
+  /**
+   * [-1e3, 1e3]: its account after giving
+   *
+   * @generated from field: double account_j = 16;
+   */
+  accountJ: number;
+
+  /**
+   * [0, 1e3]: what it needs for the force that it wants; 0: it has no purse
+   *
+   * @generated from field: double need_j = 17;
+   */
+  needJ: number;
+
+  /**
+   * [0, 1e6]: total given to the receiver; never falls within two epochs
+   *
+   * @generated from field: double given_j = 18;
+   */
+  givenJ: number;
+
+  /**
+   * [0, 1e6]: the receiver's total that was heard of, in the receiver's joules
+   *
+   * @generated from field: double taken_j = 19;
+   */
+  takenJ: number;
+};
+
+/**
+ * Describes the message tendon.v1.PortState.
+ * Use `create(PortStateSchema)` to create a new message.
+ */
+export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
+  messageDesc(file_tendon, 30);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -1604,7 +1931,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 31);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -1660,7 +1987,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 32);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -1710,7 +2037,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 33);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -1743,7 +2070,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 34);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -1772,7 +2099,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 35);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -1852,7 +2179,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 32);
+  messageDesc(file_tendon, 36);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -1885,7 +2212,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 33);
+  messageDesc(file_tendon, 37);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -1921,7 +2248,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 34);
+  messageDesc(file_tendon, 38);
 
 /**
  * @generated from enum tendon.v1.Mode
@@ -1984,6 +2311,62 @@ export const ModeSchema: GenEnum<Mode> = /*@__PURE__*/
   enumDesc(file_tendon, 0);
 
 /**
+ * @generated from enum tendon.v1.PortRole
+ */
+export enum PortRole {
+  /**
+   * refused
+   *
+   * @generated from enum value: PORT_ROLE_UNSPECIFIED = 0;
+   */
+  UNSPECIFIED = 0,
+
+  /**
+   * @generated from enum value: PORT_ROLE_LEADER = 1;
+   */
+  LEADER = 1,
+
+  /**
+   * @generated from enum value: PORT_ROLE_FOLLOWER = 2;
+   */
+  FOLLOWER = 2,
+}
+
+/**
+ * Describes the enum tendon.v1.PortRole.
+ */
+export const PortRoleSchema: GenEnum<PortRole> = /*@__PURE__*/
+  enumDesc(file_tendon, 1);
+
+/**
+ * @generated from enum tendon.v1.CouplingMethod
+ */
+export enum CouplingMethod {
+  /**
+   * refused
+   *
+   * @generated from enum value: COUPLING_METHOD_UNSPECIFIED = 0;
+   */
+  UNSPECIFIED = 0,
+
+  /**
+   * @generated from enum value: COUPLING_METHOD_POSITION_POSITION = 1;
+   */
+  POSITION_POSITION = 1,
+
+  /**
+   * @generated from enum value: COUPLING_METHOD_POSITION_FORCE = 2;
+   */
+  POSITION_FORCE = 2,
+}
+
+/**
+ * Describes the enum tendon.v1.CouplingMethod.
+ */
+export const CouplingMethodSchema: GenEnum<CouplingMethod> = /*@__PURE__*/
+  enumDesc(file_tendon, 2);
+
+/**
  * Which hand holds a device.
  *
  * @generated from enum tendon.v1.Hand
@@ -2009,7 +2392,7 @@ export enum Hand {
  * Describes the enum tendon.v1.Hand.
  */
 export const HandSchema: GenEnum<Hand> = /*@__PURE__*/
-  enumDesc(file_tendon, 1);
+  enumDesc(file_tendon, 3);
 
 /**
  * How a device makes one force of its channels': those of the sum, and the first fresh one of those with a priority,
@@ -2044,7 +2427,74 @@ export enum ChannelRule {
  * Describes the enum tendon.v1.ChannelRule.
  */
 export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
-  enumDesc(file_tendon, 2);
+  enumDesc(file_tendon, 4);
+
+/**
+ * Where an end of a coupling stands.
+ *
+ * @generated from enum tendon.v1.PortPhase
+ */
+export enum PortPhase {
+  /**
+   * refused
+   *
+   * @generated from enum value: PORT_PHASE_UNSPECIFIED = 0;
+   */
+  UNSPECIFIED = 0,
+
+  /**
+   * it has no peer
+   *
+   * @generated from enum value: PORT_PHASE_ALONE = 1;
+   */
+  ALONE = 1,
+
+  /**
+   * it hears its peer, and waits for the operator's act; no force
+   *
+   * @generated from enum value: PORT_PHASE_COUPLED = 2;
+   */
+  COUPLED = 2,
+
+  /**
+   * @generated from enum value: PORT_PHASE_ALIGNING = 3;
+   */
+  ALIGNING = 3,
+
+  /**
+   * the law
+   *
+   * @generated from enum value: PORT_PHASE_ENGAGED = 4;
+   */
+  ENGAGED = 4,
+
+  /**
+   * the leader is free, the follower stays where it is
+   *
+   * @generated from enum value: PORT_PHASE_CLUTCHED = 5;
+   */
+  CLUTCHED = 5,
+
+  /**
+   * it was engaged, and its peer fell silent; engaged again only by another act
+   *
+   * @generated from enum value: PORT_PHASE_LOST = 6;
+   */
+  LOST = 6,
+
+  /**
+   * its device gives no force
+   *
+   * @generated from enum value: PORT_PHASE_FAULT = 7;
+   */
+  FAULT = 7,
+}
+
+/**
+ * Describes the enum tendon.v1.PortPhase.
+ */
+export const PortPhaseSchema: GenEnum<PortPhase> = /*@__PURE__*/
+  enumDesc(file_tendon, 5);
 
 /**
  * Where a device stands between the plug and the force.
@@ -2120,7 +2570,7 @@ export enum Safety {
  * Describes the enum tendon.v1.Safety.
  */
 export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
-  enumDesc(file_tendon, 3);
+  enumDesc(file_tendon, 6);
 
 /**
  * @generated from enum tendon.v1.Code
@@ -2199,7 +2649,7 @@ export enum Code {
  * Describes the enum tendon.v1.Code.
  */
 export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
-  enumDesc(file_tendon, 4);
+  enumDesc(file_tendon, 7);
 
 /**
  * @generated from enum tendon.v1.Role
@@ -2231,5 +2681,5 @@ export enum Role {
  * Describes the enum tendon.v1.Role.
  */
 export const RoleSchema: GenEnum<Role> = /*@__PURE__*/
-  enumDesc(file_tendon, 5);
+  enumDesc(file_tendon, 8);
 

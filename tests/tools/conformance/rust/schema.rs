@@ -119,6 +119,23 @@ static LEASE_LOST: Schema =
 static DEADBAND: Schema =
     message(&[Field(1, Real, One, SIGNED), Field(2, Real, One, SIGNED), Field(3, Unsigned32, One, Any)]);
 
+static COUPLE: Schema = message(&[
+    Field(1, Unsigned32, One, DEVICE),
+    Field(2, Unsigned32, One, CHANNEL),
+    Field(3, Enum, One, Whole(1, 2)),
+    Field(4, Enum, One, Whole(1, 2)),
+    Field(5, Real, One, Between(0.01, 100.0)),
+    Field(6, Real, One, Between(0.01, 100.0)),
+    Field(7, Sub(&QUATERNION), Required, Any),
+    Field(8, Unsigned32, One, Whole(1, 7)),
+    Field(9, Real, One, POSITIVE),
+    Field(10, Real, One, POSITIVE),
+    Field(11, Real, One, POSITIVE),
+    Field(12, Bool, One, Any),
+    Field(13, Bool, One, Any),
+    Field(14, Unsigned32, One, Whole(1, 10_000_000)),
+]);
+
 pub static CONTROL: Schema = Schema {
     fields: &[
         Field(1, Unsigned32, One, Whole(1, MOST)),
@@ -130,8 +147,11 @@ pub static CONTROL: Schema = Schema {
         Field(7, Sub(&LEASE_LOST), Optional, Any),
         Field(8, Sub(&DEADBAND), Optional, Any),
         Field(9, Sub(&OF_DEVICE), Optional, Any),
+        Field(11, Sub(&COUPLE), Optional, Any),
+        Field(12, Sub(&OF_DEVICE), Optional, Any),
+        Field(13, Sub(&OF_DEVICE), Optional, Any),
     ],
-    oneof: &[2, 3, 4, 5, 6, 7, 8, 9],
+    oneof: &[2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13],
     rule: |_| true,
 };
 
@@ -239,6 +259,28 @@ pub static PEER_REPORT: Schema = message(&[
     Field(6, Sub(&LINK_REPORT), Required, Any),
 ]);
 
+pub static PORT_STATE: Schema = message(&[
+    Field(1, Unsigned32, One, DEVICE),
+    Field(2, Unsigned32, One, CHANNEL),
+    Field(3, Unsigned64, One, Whole(1, MOST)),
+    Field(4, Unsigned64, One, Whole(1, MOST)),
+    Field(5, Unsigned64, One, Any),
+    Field(6, Unsigned64, One, Any),
+    Field(7, Fixed64, One, TIME),
+    Field(8, Unsigned64, One, Whole(0, 10_000_000_000)),
+    Field(9, Enum, One, Whole(1, 7)),
+    Field(10, Unsigned64, One, Any),
+    Field(11, Fixed32, One, Any),
+    Field(12, Sub(&VECTOR), Optional, Any),
+    Field(13, Sub(&VECTOR), Optional, Any),
+    Field(14, Sub(&VECTOR), Optional, Any),
+    Field(15, Sub(&VECTOR), Optional, Any),
+    Field(16, Real, One, Between(-1e3, 1e3)),
+    Field(17, Real, One, Between(0.0, 1e3)),
+    Field(18, Real, One, Between(0.0, 1e6)),
+    Field(19, Real, One, Between(0.0, 1e6)),
+]);
+
 pub static FRAME: Schema = Schema {
     fields: &[
         Field(1, Sub(&STATE), Optional, Any),
@@ -249,8 +291,9 @@ pub static FRAME: Schema = Schema {
         Field(6, Sub(&LINK_REPORT), Optional, Any),
         Field(7, Sub(&DEVICE_REPORT), Optional, Any),
         Field(8, Sub(&PEER_REPORT), Optional, Any),
+        Field(9, Sub(&PORT_STATE), Optional, Any),
     ],
-    oneof: &[1, 2, 3, 4, 5, 6, 7, 8],
+    oneof: &[1, 2, 3, 4, 5, 6, 7, 8, 9],
     rule: |_| true,
 };
 
