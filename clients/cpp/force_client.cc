@@ -312,6 +312,7 @@ bool ForceClient::call(LocalTime now) {
       return false;
     }
     const Touch touch = physics_(state);
+    if (touch.unknown) return false;
     if (connection_.session() != nullptr) send(now, touch, state);  // unless the callback has called stop()
     return true;
   } catch (...) {

@@ -43,6 +43,8 @@ struct Touch {
   /// spring is positive. Only in answer to a state with an orientation.
   std::optional<Mat3> angular_stiffness{};
   std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
+  /// The engine knows no force: nothing is sent, because a zero would look known. The rest does not matter.
+  bool unknown = false;
 };
 
 /// The physics engine as a function: device state in, force out. It may take its time: while it computes, newer states

@@ -236,7 +236,7 @@ bool Guest::end(LocalTime now, Duration duration) {
 
 /// One session for each callback, by the name of its device; "" is whatever the options name.
 template <typename Callback>
-int run_with(const Options& options, const std::map<std::string, Callback>& callbacks) {
+int run_with(const Options& options, const std::map<std::string, Callback>& callbacks, bool* heard = nullptr) {
   try {
     const StopSignals signals;
     const LocalTime start = read_clock();
@@ -247,6 +247,7 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
       transports.push_back(&guests.emplace_back(options, device, callback, start).transport());
     }
     LocalTime now = start;
+    LocalTime quiet = heard != nullptr ? start + options.silence : LocalTime::max();
     while (now < end && stop_asked == 0) {
       LocalTime next = end;
       for (Guest& guest : guests) {
@@ -256,6 +257,12 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
           return 1;
         }
         next = std::min(next, *due);
+      }
+      if (heard != nullptr) {
+        const bool answered = std::exchange(*heard, false);
+        if (!answered && now >= quiet) options.on_silence(now);
+        if (answered || now >= quiet) quiet = now + options.silence;
+        next = std::min(next, quiet);
       }
       UdpTransport::wait_for_any(transports, std::min(next - now, kLongestWait));
       now = read_clock();
@@ -271,12 +278,28 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
 
 }  // namespace
 
-int run(const Options& options, Physics physics) { return run_with<Physics>(options, {{"", std::move(physics)}}); }
+int run(const Options& options, Physics physics) {
+  if (!options.on_silence || !physics) return run_with<Physics>(options, {{"", std::move(physics)}});
+  if (options.silence < std::chrono::milliseconds(1)) {
+    std::cerr << options.client.name << ": silence: expected at least 1 ms\n";
+    return 1;
+  }
+  bool heard = false;
+  const auto hears = [&](const DeviceState& hand) {
+    heard = true;
+    return physics(hand);
+  };
+  return run_with<Physics>(options, {{"", hears}}, &heard);
+}
 int run(const Options& options, Watch watch) { return run_with<Watch>(options, {{"", std::move(watch)}}); }
 
 int run(const Options& options, const std::map<std::string, Physics>& physics) {
   if (physics.empty() || physics.contains("") || !options.client.device.empty()) {
     std::cerr << options.client.name << ": this program names its devices itself\n";
+    return 1;
+  }
+  if (options.on_silence) {
+    std::cerr << options.client.name << ": on_silence is for one device alone\n";
     return 1;
   }
   return run_with(options, physics);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 
@@ -15,6 +16,10 @@ struct Options {
   ForceClient::Config client;             ///< `seed` is replaced by one from the system
   Duration duration{};                    ///< ends after this time; 0 = at SIGINT or SIGTERM
   bool json = false;                      ///< the closing summary as one JSON object on stdout, not as text on stderr
+  /// Called with read_clock()'s time (machine.h) whenever `silence` (at least 1 ms) has passed without a state for the
+  /// callback, also before the first: what must not go on without a hand stops there. For one device alone.
+  std::function<void(LocalTime now)> on_silence{};
+  Duration silence = std::chrono::milliseconds(10);
 };
 
 /// Runs a guest in real time, on this thread, until it is told to stop (Options::duration, SIGINT or SIGTERM); then it

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 export { TouchableScene, type SceneConfig, type SceneStats } from "./touchable_scene.js";
+export { Arm } from "./arm.js";
 export { zUp } from "./rotation.js";
 export type { Coupling } from "./tool.js";

@@ -14,7 +14,7 @@ from .force_client import Config
 from .guest import AnyClient
 from .messages import NEVER, DeviceState, Instant, Touch
 
-Physics = Callable[[DeviceState], Awaitable[Union[Touch, Sequence[float]]]]
+Physics = Callable[[DeviceState], Awaitable[Union[Touch, Sequence[float], None]]]
 
 
 class Client(AnyClient):
@@ -56,7 +56,8 @@ class Client(AnyClient):
     async def drive(self, physics: Physics, duration_s: float | None = None) -> None:
         """Answers every state with the result of `physics`. Raises RefusedForGood, and whatever `physics` raises."""
         async for hand in self.states(duration_s):
-            self.send(hand, await physics(hand))
+            if (touch := await physics(hand)) is not None:
+                self.send(hand, touch)
 
     async def __aenter__(self) -> Client:
         asyncio.get_running_loop().add_reader(self._guest.socket, self._turn)

@@ -113,6 +113,7 @@ def run(
     *,
     physics: Physics | Mapping[str, Physics] | None = None,
     watch: Watch | None = None,
+    on_silence: Callable[[int], object] | None = None,
 ) -> int:
     """Runs a controller (`physics`) or an observer (`watch`) until it is told to stop: --duration-s, SIGINT or SIGTERM.
     Then it says Bye. Returns an exit code:
@@ -134,6 +135,8 @@ def run(
         raise TypeError("run: expected physics or watch")
     logging.basicConfig(format=f"{options.name}: %(message)s", level=logging.INFO)
     if isinstance(physics, Mapping):
+        if on_silence is not None:
+            raise TypeError("run: on_silence is for one device")
         return _run_several(options, physics)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     start = time.monotonic()
@@ -143,14 +146,15 @@ def run(
             try:
                 reported: LinkReport | None = None
                 told: dict[int | None, DeviceReport | PeerReport] = {}  # by channel; None: of the device
-                for hand in client.states(options.duration_s or None):
+                for hand in client.states(options.duration_s or None, on_silence):
                     if options.json and client.report is not reported:
                         reported = client.report
                         _print_report(reported)
                     if options.json:
                         _print_diagnoses(client.device_report, client.peer_reports, told)
                     if physics is not None:
-                        client.send(hand, physics(hand))
+                        if (touch := physics(hand)) is not None:
+                            client.send(hand, touch)
                     elif watch is not None:
                         watch(hand, client.stats.link)
             except KeyboardInterrupt:
@@ -200,7 +204,8 @@ async def _touch_several(options: argparse.Namespace, physics: Mapping[str, Phys
             if options.json and client.report is not reported:
                 reported = client.report
                 _print_report(reported, device)
-            client.send(hand, physics[device](hand))
+            if (touch := physics[device](hand)) is not None:
+                client.send(hand, touch)
 
     async with AsyncExitStack() as stack:
         clients: dict[str, aio.Client] = {}

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import Union
 
+from .expect import expect
 from .guest import AnyClient
 from .messages import NEVER, DeviceState, Touch
 
-Physics = Callable[[DeviceState], Union[Touch, Sequence[float]]]
-"""The physics engine as a function: device state in, force (and stiffness) out."""
+Physics = Callable[[DeviceState], Union[Touch, Sequence[float], None]]
+"""The physics engine as a function: device state in, force (and stiffness) out. None: it knows none, and nothing is sent."""
 
 
 class Client(AnyClient):
@@ -32,27 +33,50 @@ class Client(AnyClient):
     takes an engine that computes for 2 s between two states for dead. (`tendon.aio` has no such limit.)
     """
 
-    def states(self, duration_s: float | None = None) -> Iterator[DeviceState]:
+    def states(
+        self,
+        duration_s: float | None = None,
+        on_silence: Callable[[int], object] | None = None,
+        silence_s: float = 0.01,
+    ) -> Iterator[DeviceState]:
         """The newest state, at Config.rate_hz or as soon after as there is a new one; older ones are skipped.
-        Ends after `duration_s`, or never. Raises RefusedForGood."""
+        Ends after `duration_s`, or never. `on_silence(now)` is called whenever `silence_s` has passed without a state
+        to hand out, also before the first, with time.monotonic_ns(): what must not go on without a hand stops there.
+        Raises RefusedForGood, and whatever `on_silence` raises."""
+        expect(0.001 <= silence_s <= 10, "silence_s", silence_s, "0.001 to 10")
         guest, core = self._guest, self._guest.core
+        silence_ns = NEVER if on_silence is None else silence_s * 1e9
         now = time.monotonic_ns()
         end = NEVER if duration_s is None else now + duration_s * 1e9
+        quiet = now + silence_ns
         while now < end:
             guest.turn(now)
             guest.raise_if_refused()
             state = core.next_state(now)
             if state is not None:
                 yield state
+            elif on_silence is not None and now >= quiet:
+                on_silence(now)
             else:
-                wait_s = (min(core.next_turn(), core.next_state_due(), end) - now) / 1e9
+                wait_s = (min(core.next_turn(), core.next_state_due(), end, quiet) - now) / 1e9
                 select.select([guest.socket], [], [], max(wait_s, 0))
+                now = time.monotonic_ns()
+                continue
             now = time.monotonic_ns()
+            quiet = now + silence_ns
 
-    def drive(self, physics: Physics, duration_s: float | None = None) -> None:
-        """Answers every state with the result of `physics`. Raises RefusedForGood, and whatever `physics` raises."""
-        for hand in self.states(duration_s):
-            self.send(hand, physics(hand))
+    def drive(
+        self,
+        physics: Physics,
+        duration_s: float | None = None,
+        on_silence: Callable[[int], object] | None = None,
+        silence_s: float = 0.01,
+    ) -> None:
+        """Answers every state with the result of `physics`; the rest as for states(). Raises RefusedForGood, and
+        whatever `physics` raises."""
+        for hand in self.states(duration_s, on_silence, silence_s):
+            if (touch := physics(hand)) is not None:
+                self.send(hand, touch)
 
     def close(self) -> None:
         """Says Bye, so that the server need not wait for a timeout."""

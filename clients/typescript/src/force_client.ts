@@ -15,8 +15,8 @@ import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
 import { earliest, fromMilliseconds, kNever, latest, type Nanoseconds } from "./time.js";
 
-/** The physics engine, seen from here. While it computes, newer states replace older ones. */
-export type Physics = (hand: DeviceState) => Vec3 | Touch;
+/** The physics engine, seen from here. While it computes, newer states replace older ones. null: it knows no force, and none is sent. */
+export type Physics = (hand: DeviceState) => Vec3 | Touch | null;
 
 /** An onlooker: device state and the state of the link in, nothing out. */
 export type Watch = (hand: DeviceState, link: Readonly<LinkStats>) => void;
@@ -506,6 +506,7 @@ export class ForceClient {
       this.#watch?.(hand, this.#session!.stats);
       if (!this.#physics) return false;
       const touch = this.#physics(hand);
+      if (touch === null) return false;
       if (!touch) throw new TypeError(`physics: expected {x, y, z} or {force: {x, y, z}}, got ${touch}`);
       this.#answer(now, "force" in touch ? touch : { force: touch }, hand);
       return true;

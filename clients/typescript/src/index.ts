@@ -5,6 +5,7 @@ export {
   ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch,
 } from "./force_client.js";
 export type { Touch } from "./answer.js";
+export { Follower, type FollowerConfig, type Following, type Pose, type ToolContact } from "./follower.js";
 export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
