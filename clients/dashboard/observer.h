@@ -7,8 +7,8 @@
 #include <set>
 #include <string>
 
-#include "protocol/connection.h"
 #include "clients/dashboard/board.h"
+#include "protocol/connection.h"
 #include "protocol/link.h"
 #include "protocol/secrets/crypto.h"
 #include "protocol/session.h"

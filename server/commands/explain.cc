@@ -301,7 +301,7 @@ double operational_stiffness(const LimiterConfig& limiter) {
   return 2 * limiter.friction.viscous / seconds(limiter.longest_hold);
 }
 
-/// What the coupling is at some round trips, if the other end is like this one.
+/// Says how stiff and how heavy the coupling is at some round trips, if the other end is like this one.
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
   const bool springs = coupling.method == CouplingMethod::kPositionPosition;

@@ -62,7 +62,7 @@ async function injector(test: TestContext, programs: string, listen: string, to:
   return network;
 }
 
-it("an arm in MuJoCo follows a far hand, is felt, and moves by the act alone", async (test) => {
+it("an arm in MuJoCo follows a far hand, is felt, and waits for the act", async (test) => {
   const tendond = findTendond(test);
   if (!tendond) return;
   const folder = mkdtempSync(join(tmpdir(), "robot-"));

@@ -256,7 +256,7 @@ describe("WIRE.md", () => {
     assert.deepEqual(contentOf("port-contact").frames, [{ kind: "port", value }]);
   });
 
-  it("control-couple, control-engage and control-disengage say what the page says", () => {
+  it("couple, engage and disengage say what the page says", () => {
     const requestOf = (name: string): unknown => contentOf(name).frames.map((frame) => frame.kind === "control" && frame.value);
     assert.deepEqual(requestOf("control-couple"), [{ id: 15, request: { kind: "couple", ...kCouple } }]);
     assert.deepEqual(requestOf("control-engage"), [{ id: 16, request: { kind: "engage", device: 1 } }]);

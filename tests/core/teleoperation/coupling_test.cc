@@ -324,7 +324,7 @@ TEST(Coupling, PeriodsWithoutAPositionHaveNoForceAndKeepThePhase) {
   EXPECT_EQ(phase(ports.follower), PortPhase::kLost) << "the ladder goes on";
 }
 
-TEST(Coupling, AFollowerThatIsEngagedInAnUnseenPeriodStillTakesTheLeadersPlace) {
+TEST(Coupling, AFollowerEngagedInAnUnseenPeriodTakesTheLeadersPlace) {
   PortSetup leader = port_of(PortRole::kLeader);
   leader.path = [](double) { return Vec3(0.3, 0, 0); };
   PortSetup follower = port_of(PortRole::kFollower);

@@ -20,7 +20,7 @@ struct Network {
   /// From this period on the delay is so much longer.
   int longer_from = std::numeric_limits<int>::max();
   int longer_by = 0;
-  /// What is sent from this period on, and before the other, is lost.
+  /// Messages that are sent from this period on, and before the other, are lost.
   int cut_from = std::numeric_limits<int>::max();
   int cut_until = 0;
 };

@@ -121,10 +121,9 @@ TEST(SceneError, FindsAnUnknownKeyInEveryTable) {
     EXPECT_TRUE(error_of(text).starts_with("s.toml:" + line + ": " + table + ".zzzzzz: unknown key; known here: "))
         << error_of(text);
   }
-  EXPECT_EQ(
-      error_of_minimal_and("[other]\nzzzzzz = 1\n"),
-      "s.toml:4: other: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, "
-      "teleoperation, network, recording");
+  EXPECT_EQ(error_of_minimal_and("[other]\nzzzzzz = 1\n"),
+            "s.toml:4: other: unknown table; known here: device, loop, safety, limiter, admittance, force, channel, "
+            "teleoperation, network, recording");
 }
 
 TEST(SceneError, TheKeysOfOneKindOfMotionAreUnknownToAnother) {
