@@ -110,6 +110,10 @@ bool ForceClient::rearm() { return give_order(Rearm{.device = place_.device}); }
 
 bool ForceClient::disarm() { return give_order(Disarm{.device = place_.device}); }
 
+bool ForceClient::engage() { return give_order(Engage{.device = place_.device}); }
+
+bool ForceClient::disengage() { return give_order(Disengage{.device = place_.device}); }
+
 bool ForceClient::take_lease() {
   Session* const session = connection_.session();
   if (session == nullptr) return false;

@@ -186,8 +186,12 @@ class ForceClient {
   bool rearm();
   /// Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm().
   bool disarm();
+  /// The operator's act of a coupling, at the leader's server ([teleoperation]), and its end, at either's. False as for
+  /// rearm().
+  bool engage();
+  bool disengage();
 
-  /// What the server has said to the newest rearm() or disarm() of the present session; empty until then.
+  /// What the server has said to the newest of these four of the present session; empty until then.
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.
@@ -258,7 +262,7 @@ class ForceClient {
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
   std::optional<HandleDescription> handle_;
-  std::optional<std::uint32_t> order_;  ///< the newest rearm or disarm: number of the request
+  std::optional<std::uint32_t> order_;  ///< the newest rearm, disarm, engage or disengage: number of the request
   std::optional<Session::RequestAnswered> order_answer_;
   Grant place_;  ///< the numbers of our device and channel
   bool holds_ = false;

@@ -31,6 +31,8 @@ from .messages import (
     DeviceReport,
     DeviceState,
     Disarm,
+    Disengage,
+    Engage,
     ForceCommand,
     GiveLease,
     Grant,
@@ -315,6 +317,14 @@ class ForceClient:
     def disarm(self) -> bool:
         """Asks the server for no force, from the device's next step on, until somebody rearms. False as for rearm()."""
         return self._session is not None and self._session.request(Disarm(self._place.device)) is not None
+
+    def engage(self) -> bool:
+        """The operator's act of a coupling, at the leader's server ([teleoperation]). False as for rearm()."""
+        return self._session is not None and self._session.request(Engage(self._place.device)) is not None
+
+    def disengage(self) -> bool:
+        """The end of that, at either end's server. False as for rearm()."""
+        return self._session is not None and self._session.request(Disengage(self._place.device)) is not None
 
     def take_lease(self) -> bool:
         """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.

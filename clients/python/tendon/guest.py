@@ -206,6 +206,14 @@ class AnyClient:
         """Asks the server for no force of its device until somebody rearms. False when there is no session."""
         return self._ask(self._guest.core.disarm)
 
+    def engage(self) -> bool:
+        """The operator's act of a coupling, at the leader's server. False when there is no session."""
+        return self._ask(self._guest.core.engage)
+
+    def disengage(self) -> bool:
+        """The end of that, at either end's server. False when there is no session."""
+        return self._ask(self._guest.core.disengage)
+
     def take_lease(self) -> bool:
         """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.
         False when there is no session."""

@@ -45,6 +45,9 @@ export interface Guest {
   stats(): ClientStats;
   rearm(): boolean;
   disarm(): boolean;
+  /** The operator's act of a coupling, at the leader's server, and its end. */
+  engage(): boolean;
+  disengage(): boolean;
   /** Asks for the channel's lease, once more when it is lost before the answer; or gives it up. */
   takeLease(): boolean;
   giveLease(): boolean;
@@ -144,6 +147,12 @@ class RealTimeGuest implements Guest {
   }
   disarm(): boolean {
     return this.#ask(() => this.#client.disarm());
+  }
+  engage(): boolean {
+    return this.#ask(() => this.#client.engage());
+  }
+  disengage(): boolean {
+    return this.#ask(() => this.#client.disengage());
   }
   takeLease(): boolean {
     return this.#ask(() => this.#client.takeLease());

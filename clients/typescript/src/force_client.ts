@@ -273,6 +273,15 @@ export class ForceClient {
     return this.#session?.request({ kind: "disarm", device: this.#place.device }) !== undefined;
   }
 
+  /** The operator's act of a coupling, at the leader's server ([teleoperation]). False as for rearm(). */
+  engage(): boolean {
+    return this.#session?.request({ kind: "engage", device: this.#place.device }) !== undefined;
+  }
+  /** The end of that, at either end's server. False as for rearm(). */
+  disengage(): boolean {
+    return this.#session?.request({ kind: "disengage", device: this.#place.device }) !== undefined;
+  }
+
   /** The channel takes our forces; while it does not, the physics is not called. */
   get holds(): boolean {
     return this.#holds;

@@ -354,7 +354,11 @@ TEST(ForceClient, AnOperatorSendsNoForceAndHearsTheAnswerToItsOrder) {
   EXPECT_FALSE(world.a->order_answer()) << "that was the one before";
   world.run(kSecond);
   EXPECT_TRUE(world.a->order_answer());
-  ASSERT_EQ(world.z->requests.size(), 2U);
+  ASSERT_TRUE(world.a->engage() && world.a->disengage());
+  world.run(kSecond);
+  ASSERT_EQ(world.z->requests.size(), 4U);
+  EXPECT_TRUE(std::holds_alternative<Engage>(world.z->requests[2]));
+  EXPECT_TRUE(std::holds_alternative<Disengage>(world.z->requests[3]));
   EXPECT_TRUE(std::holds_alternative<Disarm>(world.z->requests[0]));
   EXPECT_TRUE(std::holds_alternative<Rearm>(world.z->requests[1]));
   EXPECT_TRUE(world.z->forces.empty());

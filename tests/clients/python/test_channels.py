@@ -14,6 +14,8 @@ from tendon.messages import (
     Claim,
     Describe,
     Disarm,
+    Disengage,
+    Engage,
     GiveLease,
     Grant,
     LeaseLost,
@@ -64,11 +66,13 @@ def test_joints_are_asked_for_by_those_who_want_them():
 def test_forces_orders_leases_and_rates_name_the_granted_place():
     stage = named(state_hz=250)
     stage.run(100 * MS)
-    for ask in (stage.client.rearm, stage.client.disarm, stage.client.take_lease, stage.client.give_lease):
+    client = stage.client
+    for ask in (client.rearm, client.disarm, client.engage, client.disengage, client.take_lease, client.give_lease):
         assert ask()
     stage.run(100 * MS)
     asked = [control.request for control in stage.requests]
-    assert asked == [Describe(1), SetStateRate(250, 1), Rearm(1), Disarm(1), TakeLease(1, 2), GiveLease(1, 2)]
+    orders = [Rearm(1), Disarm(1), Engage(1), Disengage(1)]
+    assert asked == [Describe(1), SetStateRate(250, 1), *orders, TakeLease(1, 2), GiveLease(1, 2)]
     assert {(force.device, force.channel) for force in stage.forces} == {(1, 2)}
 
 

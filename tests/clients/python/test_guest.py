@@ -86,7 +86,7 @@ def test_a_datagram_found_late_in_a_turn_is_not_taken_for_older(monkeypatch):
 
 
 @pytest.mark.parametrize("kind", [Client, aio.Client])
-@pytest.mark.parametrize("order", ["rearm", "disarm", "take_lease", "give_lease"])
+@pytest.mark.parametrize("order", ["rearm", "disarm", "engage", "disengage", "take_lease", "give_lease"])
 def test_what_a_client_asks_for_leaves_at_once(kind, order, monkeypatch):
     client = kind("127.0.0.1:9")
     client._guest.socket.close()

@@ -38,12 +38,14 @@ describe("devices and channels", () => {
     assert.ok(hello.features.includes("channels"));
     assert.equal(world.client.holds, true);
     assert.ok(seen.length > 100);
-    for (const ask of ["rearm", "disarm", "giveLease", "takeLease"] as const) assert.equal(world.client[ask](), true);
+    for (const ask of ["rearm", "disarm", "engage", "disengage", "giveLease", "takeLease"] as const) {
+      assert.equal(world.client[ask](), true);
+    }
     world.runMs(20);
     const device = kPlace.device;
     assert.deepEqual(world.server.requests, [
       { kind: "describe", device }, { kind: "setStateRate", hz: 500, device }, { kind: "rearm", device },
-      { kind: "disarm", device }, { kind: "giveLease", ...kPlace }, { kind: "takeLease", ...kPlace },
+      { kind: "disarm", device }, { kind: "engage", device }, { kind: "disengage", device }, { kind: "giveLease", ...kPlace }, { kind: "takeLease", ...kPlace },
     ]);
     assert.ok(world.server.forces.length > 100);
     for (const { command } of world.server.forces) assert.deepEqual([command.device, command.channel], [1, 2]);
