@@ -45,7 +45,8 @@ describe("devices and channels", () => {
     const device = kPlace.device;
     assert.deepEqual(world.server.requests, [
       { kind: "describe", device }, { kind: "setStateRate", hz: 500, device }, { kind: "rearm", device },
-      { kind: "disarm", device }, { kind: "engage", device }, { kind: "disengage", device }, { kind: "giveLease", ...kPlace }, { kind: "takeLease", ...kPlace },
+      { kind: "disarm", device }, { kind: "engage", device }, { kind: "disengage", device },
+      { kind: "giveLease", ...kPlace }, { kind: "takeLease", ...kPlace },
     ]);
     assert.ok(world.server.forces.length > 100);
     for (const { command } of world.server.forces) assert.deepEqual([command.device, command.channel], [1, 2]);
