@@ -104,7 +104,9 @@ void check_felt(const Touch& touch, const Json& feels) {
     EXPECT_NEAR(touch.contact->gap, feels["gap"], 1e-9);
   }
   ASSERT_EQ(touch.torque.has_value(), feels.contains("torque"));
-  if (touch.torque) EXPECT_TRUE(near(*touch.torque, feels["torque"]));
+  if (touch.torque) {
+    EXPECT_TRUE(near(*touch.torque, feels["torque"]));
+  }
   EXPECT_NEAR(touch.grip_force.value_or(0), feels.value("grip_force", 0.), 1e-9);
 }
 
@@ -120,7 +122,9 @@ void check_target(const std::optional<Pose>& target, const Json& step) {
     EXPECT_NEAR(target->orientation->y, expected.y, 1e-9);
     EXPECT_NEAR(target->orientation->z, expected.z, 1e-9);
   }
-  if (step.contains("target_grip")) EXPECT_NEAR(target->grip.value(), step["target_grip"], 1e-9);
+  if (step.contains("target_grip")) {
+    EXPECT_NEAR(target->grip.value(), step["target_grip"], 1e-9);
+  }
 }
 
 void check(Follower& follow, const Json& step, const Json& now) {
@@ -134,7 +138,9 @@ void check(Follower& follow, const Json& step, const Json& now) {
                step);
   EXPECT_EQ(static_cast<int>(follow.phase()), step["phase"].get<int>());
   if (step.contains("touch")) check_felt(follow.touch(contact_of(step["touch"])), step["feels"]);
-  if (step.contains("words")) EXPECT_EQ(follow.words(), step["words"].get<std::string>());
+  if (step.contains("words")) {
+    EXPECT_EQ(follow.words(), step["words"].get<std::string>());
+  }
 }
 
 TEST(Follower, AnswersAsTheSharedCasesSay) {
