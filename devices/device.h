@@ -75,8 +75,8 @@ class Device {
   /// The operator wants no forces until the next `arm`. A safety layer (SafeDevice) gives none from the next `apply`
   /// on. For any other device the control law asks for none (HapticController::disarm); the default does nothing.
   virtual void disarm() noexcept {}
-  /// Whether the newest `apply` gave what was asked for: it is ready, and no safety layer has it disarmed.
-  virtual bool armed() const noexcept { return state() == State::kHomed; }
+  /// False while a safety layer keeps the force at zero (SafeDevice). A device without one gives what it is asked for.
+  virtual bool armed() const noexcept;
   /// How often `arm` has been granted. Each time clears the fault before it.
   virtual std::uint32_t times_armed() const noexcept { return 0; }
   /// How often the device has ended the force by itself because of a fault (SafeDevice).

@@ -139,7 +139,7 @@ def test_the_gallery_shows_each_example_with_a_command_in_both_languages():
         in_python = [word.replace("build/release/bin/", "clients/python/examples/") for word in commands[:1]]
         assert commands == [commands[0], in_python[0].replace(name, f"{name}.py")]
     assert {path.stem for path in IN_CPP.glob("*.cc")} == {path.stem for path in EXAMPLES.glob("*.py")}
-    assert {path.stem for path in IN_CPP.glob("*.cc")} == {*RENDERING, "echo_motion"}
+    assert {path.stem for path in IN_CPP.glob("*.cc")} == {*RENDERING, "echo_motion", "robot"}
 
 
 @pytest.mark.skipif(shutil.which("gnuplot") is None, reason="no gnuplot: apt-get install gnuplot-nox")

@@ -111,11 +111,12 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
       "s.toml:4: teleoperation.purse: missing, expected this table: behind a limiter of its own a follower cannot "
       "move unless the leader pays");
   EXPECT_EQ(refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
-            "s.toml:11: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
+            "s.toml:5: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
             "account that a purse can share");
-  EXPECT_EQ(refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
-            "s.toml:6: limiter.latency_reserve: expected none with teleoperation.purse: the reserve is not proved for an "
-            "account that ports share");
+  EXPECT_EQ(
+      refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
+      "s.toml:6: limiter.latency_reserve: expected none with teleoperation.purse: the reserve is not proved for an "
+      "account that ports share");
   EXPECT_EQ(
       refusal(kLeader + "[teleoperation.map]\naxes = \"zx\"\n"),
       "s.toml:11: teleoperation.map.axes: expected one or more of the letters x, y, z, in this order, found \"zx\"");
