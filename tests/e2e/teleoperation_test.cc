@@ -32,9 +32,8 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
   const auto led = folder.path() / "leader.mcap";
   Server follower(folder.path(), scene("follower.toml"), {"--record", followed.string()});
   Service network("tendon-inject",
-                  {"--listen", "127.0.0.1:0", "--to", follower.address(), "--seed", "7", "--profile",
-                   "delay=uniform(15ms,25ms) loss=2%", "--json"},
-                  folder.path(), "ready", "listen");
+                  {"--to", follower.address(), "--seed", "7", "--profile", "delay=uniform(15ms,25ms) loss=2%"},
+                  folder.path(), "start", "listen");
   Server leader(folder.path(), scene("leader.toml"), {"--record", led.string(), "--dial", network.address()});
   leader.process().wait_for_line("teleoperation: coupled");
   leader.process().wait_for_line("teleoperation: engaged");
@@ -71,12 +70,18 @@ TEST(Teleoperation, AFollowerThatWasKilledIsCoupledAgainAndEngagedByNobody) {
   follower->process().signal(SIGKILL);
   follower.reset();
   leader.process().wait_for_line("teleoperation: lost");
-  Service again("tendond", {scene("follower.toml").string(), "--listen", address, "--json"}, folder.path(), "listening",
-                "address");
+  Process again(program("tendond"),
+                {scene("follower.toml").string(), "--listen", address, "--duration-s", "60", "--json"}, folder.path());
   leader.process().wait_for_line("teleoperation: coupled");
   std::this_thread::sleep_for(std::chrono::seconds(1));
-  EXPECT_EQ(leader.stop().find("engaged"), std::string::npos);
-  EXPECT_EQ(again.process().err().find("engaged"), std::string::npos);
+  leader.stop();
+  const std::string& said = leader.process().err();
+  const std::size_t first = said.find("teleoperation: engaged");
+  EXPECT_EQ(said.find("teleoperation: engaged", first + 1), std::string::npos) << said;
+  again.signal(SIGTERM);
+  EXPECT_EQ(again.wait(), 0);
+  EXPECT_NE(again.err().find("teleoperation: coupled"), std::string::npos) << again.err();
+  EXPECT_EQ(again.err().find("engaged"), std::string::npos) << again.err();
 }
 
 }  // namespace
