@@ -35,8 +35,8 @@ std::optional<Purse> purse_of(const Coupling::Config& config, const PoseMap& map
 }
 
 // False for what is not a number.
-bool within(double value, double low, double high) noexcept { return value >= low && value <= high; }
-bool within(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
+bool fits(double value, double low, double high) noexcept { return value >= low && value <= high; }
+bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
 
 bool has(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
@@ -68,10 +68,10 @@ bool is_sound(const PortState& state) noexcept {
   constexpr double kTotal = PurseMessage::kMostTotal;
   return state.epoch > 0 && state.sequence > 0 && state.time >= -kMostTime && state.time <= kMostTime &&
          state.round_trip >= Duration::zero() && state.round_trip <= PortState::kMostRoundTrip &&
-         state.phase >= PortPhase::kAlone && state.phase <= PortPhase::kFault && within(state.position) &&
-         within(state.velocity) && within(state.force) && (!state.contact_force || within(*state.contact_force)) &&
-         within(state.account, -kAccount, kAccount) && within(state.need, 0, kAccount) &&
-         within(state.given, 0, kTotal) && within(state.taken, 0, kTotal);
+         state.phase >= PortPhase::kAlone && state.phase <= PortPhase::kFault && fits(state.position) &&
+         fits(state.velocity) && fits(state.force) && (!state.contact_force || fits(*state.contact_force)) &&
+         fits(state.account, -kAccount, kAccount) && fits(state.need, 0, kAccount) && fits(state.given, 0, kTotal) &&
+         fits(state.taken, 0, kTotal);
 }
 
 Coupling::Coupling(const Config& config)
@@ -305,7 +305,7 @@ Demand<3> Coupling::blended(const Motion& hand) noexcept {
 
 Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
   advance(hand.at, buttons, ready);
-  if (!within(hand.position) || !within(hand.velocity)) {
+  if (!fits(hand.position) || !fits(hand.velocity)) {
     skip();
     return {Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
   }
@@ -370,8 +370,8 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
   state.buttons = buttons_;
   state.position = u_;
   state.velocity = u_velocity_;
-  if (within(applied)) state.force = applied;
-  if (contact && within(*contact)) state.contact_force = contact;
+  if (fits(applied)) state.force = applied;
+  if (contact && fits(*contact)) state.contact_force = contact;
   if (purse_) {
     const PurseMessage paid = purse_->message(0);
     state.account = paid.account;
