@@ -158,7 +158,9 @@ TEST(Follower, AnswersAsTheSharedCasesSay) {
 }
 
 TEST(Follower, AnImpossibleConfigIsRefusedWithTheField) {
-  for (const Json& one : cases()["refused"]) {
+  const Json suite = cases();
+  ASSERT_FALSE(suite["refused"].empty());
+  for (const Json& one : suite["refused"]) {
     try {
       Follower{config(one["config"])};
       ADD_FAILURE() << one["what"];
