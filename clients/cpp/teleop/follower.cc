@@ -52,7 +52,7 @@ const Follower::Config& checked(const Follower::Config& config) {
   expect_between(0, 10, "ramp_s", config.ramp_s);
   expect_between(0.001, 1000, "grip_ratio", config.grip_ratio);
   expect_between(0.001, 100, "grip_speed", config.grip_speed);
-  expect_between(1, 100000, "rate_hz", config.rate_hz);
+  expect(config.rate_hz >= 1 && config.rate_hz <= 100000, "rate_hz", config.rate_hz, "1 to 100000");
   return config;
 }
 
