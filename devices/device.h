@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/motion.h"
+#include "core/base/output.h"
 #include "devices/counts.h"
 
 namespace tendon {
@@ -29,7 +30,8 @@ struct DeviceInfo {
   };
   std::optional<Gripper> gripper{};
   std::vector<std::string> joints{};  ///< names of its joints, at most Joints::kMost; empty: it does not tell them
-  Duration watchdog{};                ///< the force drops to zero when no command comes for this long; 0 = none
+  std::vector<OutputDescription> outputs{};  ///< lamps and vibration, at most 8; empty: none
+  Duration watchdog{};                       ///< the force drops to zero when no command comes for this long; 0 = none
 };
 
 /// One encoder reading.
@@ -101,6 +103,10 @@ class Device {
   /// was really written. Called in place of `apply` when `info` names a torque or a gripper with a motor; a device that
   /// has neither gives no torque and no grip.
   virtual Effort apply_all(const Effort& effort) noexcept { return {.force = apply(effort.force)}; }
+
+  /// Sets `info().outputs[output]`. What is no output of the device, or of another kind, changes nothing; the default
+  /// has none. Not part of any ledger: no output is a motor of the position.
+  virtual void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept;
 };
 
 }  // namespace tendon

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/output.h"
 #include "core/base/time.h"
 
 // Every bound of the wire, each with its reason. Both ends must agree on them: they are part of the protocol (WIRE.md
@@ -50,6 +51,13 @@ inline constexpr std::size_t kMaxLabel = 24;
 /// Named buttons of a device.
 inline constexpr std::size_t kMaxButtons = 16;
 inline constexpr std::size_t kMaxJoints = 8;
+inline constexpr std::size_t kMaxOutputs = kMostOutputs;
+
+/// The longest pulse of a vibration: nobody feels a longer one, and it cannot be left on.
+inline constexpr Duration kMaxVibration = std::chrono::seconds(10);
+/// Hz: below, a pulse is a motion; above, no skin feels it.
+inline constexpr double kMinVibrationHz = 20;
+inline constexpr double kMaxVibrationHz = 1000;
 
 /// Bytes of UTF-8. With these the largest Hello without claims (674 bytes before padding) and the largest Welcome
 /// (874) stay below the 1200 bytes of a datagram, with room to grow. Sixteen claims with the longest names (896) and

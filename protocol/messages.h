@@ -14,6 +14,7 @@
 
 #include "core/base/mode.h"
 #include "core/base/motion.h"
+#include "core/base/output.h"
 #include "core/base/reason.h"
 #include "core/base/time.h"
 #include "core/remote/channel_rule.h"
@@ -230,6 +231,14 @@ struct Disarm {
   std::uint32_t device = 0;
 };
 
+/// Client → server, reliable: sets a lamp, or starts a pulse. Only from a controller of the device that holds a channel
+/// of it, to a server that has agreed to kFeatureOutputs.
+struct SetOutput {
+  std::uint32_t device = 0;
+  std::uint32_t output = 0;  ///< its number in HandleDescription::outputs
+  OutputSetting setting{};   ///< a pulse's duration travels in whole ms, rounded up
+};
+
 /// Client → server, reliable: what a device is and can do; answered with a DeviceDescription, or, when `handle` is
 /// asked for, with a HandleDescription. The latter only of a server that has agreed to kFeatureHandle: an older one
 /// does not know the difference.
@@ -289,7 +298,7 @@ struct Disengage {
 };
 
 using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband,
-                             Couple, Engage, Disengage>;
+                             Couple, Engage, Disengage, SetOutput>;
 
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes
@@ -338,6 +347,9 @@ struct HandleDescription {
   /// Names of the joints, by their place in DeviceState::joints; at most 8 of at most 24 bytes. Only to a client that
   /// named kFeatureJoints; empty: the device tells none.
   std::vector<std::string> joints{};
+  /// What SetOutput sets, by number; at most 8, with names of at most 24 bytes. Only to a client that named
+  /// kFeatureOutputs; empty: there are none.
+  std::vector<OutputDescription> outputs{};
 };
 
 /// A feature: the client may send a local model with its forces, and the server follows the hand with it.
@@ -350,6 +362,9 @@ inline constexpr std::string_view kFeatureHandle = "handle";
 
 /// A feature: the client is told the angles of the device's joints in each state, and their names in HandleDescription.
 inline constexpr std::string_view kFeatureJoints = "joints";
+
+/// A feature: the client is told the outputs of the device (lamps, vibration), and may set them.
+inline constexpr std::string_view kFeatureOutputs = "outputs";
 
 /// A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";

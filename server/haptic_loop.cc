@@ -83,11 +83,13 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
       case HapticOrder::Kind::kRelease:
         controller_.release(now, order->source, order->channel);
         released[releases++] = *order;
+        if (order->source == outputs_of_) turn_outputs_off(now);
         break;
       case HapticOrder::Kind::kDisarm:
         disarmed_ = true;
         controller_.disarm();
         device_.disarm();
+        turn_outputs_off(now);
         break;
       case HapticOrder::Kind::kRearm:
         disarmed_ = false;
@@ -99,6 +101,10 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         break;
       case HapticOrder::Kind::kDisengage:
         if (Coupling* const coupling = controller_.coupling()) coupling->disengage();
+        break;
+      case HapticOrder::Kind::kOutput:
+        outputs_of_ = order->source;
+        device_.set_output(now, order->output, order->setting);
         break;
     }
     mail_.orders.pop();
@@ -116,6 +122,13 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   // The last force of a source that has gone may still lie in its box, and must not count as fresh. Releasing twice
   // does no harm, because the number of a source is never used again.
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
+}
+
+/// Those that nobody has set are off already.
+void HapticLoop::turn_outputs_off(LocalTime now) noexcept {
+  outputs_of_ = 0;
+  const auto& outputs = device_.info().outputs;
+  for (std::uint32_t i = 0; i < outputs.size(); ++i) device_.set_output(now, i, off(outputs[i].kind));
 }
 
 HandleSample HapticLoop::handle_in(const PositionSample& sample) noexcept {

@@ -69,6 +69,7 @@ class HapticLoop {
   void command_all(StepRecord& record) noexcept;
   void watch_device() noexcept;
   void rearm() noexcept;
+  void turn_outputs_off(LocalTime now) noexcept;
   void publish(const StepRecord& record) noexcept;
   void publish_port(const StepRecord& record) noexcept;
 
@@ -86,9 +87,10 @@ class HapticLoop {
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
-  bool rearmed_ = false;       ///< since the last record
-  bool disarmed_ = false;      ///< by an order, which only an order ends
-  std::uint32_t buttons_ = 0;  ///< as the device last said
+  bool rearmed_ = false;          ///< since the last record
+  std::uint32_t outputs_of_ = 0;  ///< connection id of who set the device's outputs; 0: all are off
+  bool disarmed_ = false;         ///< by an order, which only an order ends
+  std::uint32_t buttons_ = 0;     ///< as the device last said
   std::uint32_t device_faults_ = 0;
 
   Counter steps_;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/output.h"
 #include "core/exchange/flight_recorder.h"
 #include "core/exchange/latest.h"
 #include "core/exchange/spsc_ring.h"
@@ -26,10 +27,13 @@ struct HapticOrder {
     kDisarm,     ///< no force until kRearm
     kEngage,     ///< the operator's act of a coupling
     kDisengage,  ///< … and its end
+    kOutput,     ///< `source` sets `output` to `setting`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
   std::uint32_t source = 0;
+  std::uint32_t output = 0;
+  OutputSetting setting{};
 };
 
 /// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else

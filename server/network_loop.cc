@@ -219,6 +219,7 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 contains(welcome.features, kFeatureHandle),
                 contains(welcome.features, kFeatureJoints),
                 contains(welcome.features, kFeatureTeleoperation),
+                contains(welcome.features, kFeatureOutputs),
                 std::move(seats),
                 std::move(views),
                 {bytes.begin(), bytes.end()},

@@ -49,6 +49,7 @@ HandleDescription handle_of(const Scene& scene, const DeviceInfo& device) {
   const std::string_view axes = scene.axes.empty() ? scene.driver().axes : scene.axes;
   if (!axes.empty()) handle.operator_from_device = quaternion_of(operator_from_device(axes));
   handle.joints = device.joints;
+  handle.outputs = device.outputs;
   handle.buttons.assign(scene.driver().buttons.begin(), scene.driver().buttons.end());
   handle.orientation_measured = device.measures_orientation;
   handle.max_torque = device.max_torque;

@@ -114,6 +114,11 @@ bool ForceClient::engage() { return give_order(Engage{.device = place_.device});
 
 bool ForceClient::disengage() { return give_order(Disengage{.device = place_.device}); }
 
+bool ForceClient::set_output(std::uint32_t output, const OutputSetting& setting) {
+  const SetOutput wanted{.device = place_.device, .output = output, .setting = setting};
+  return agreed_to(kFeatureOutputs) && in_bounds(wanted) && give_order(wanted);
+}
+
 bool ForceClient::take_lease() {
   Session* const session = connection_.session();
   if (session == nullptr) return false;
@@ -163,6 +168,7 @@ void ForceClient::greet(LocalTime now) {
   hello.features = {std::string(kFeatureLocalModel), std::string(kFeatureChannels), std::string(kFeatureHandle)};
   if (config_.diagnostics) hello.features.emplace_back(kFeatureDiagnostics);
   if (config_.joints) hello.features.emplace_back(kFeatureJoints);
+  if (config_.outputs) hello.features.emplace_back(kFeatureOutputs);
   if (claims()) hello.claims = {{.device = config_.device, .channel = config_.channel, .role = role_}};
   connection_.greet(now, hello);
   stats_.phase = Phase::kGreeting;

@@ -119,6 +119,8 @@ class ForceClient {
     bool diagnostics = false;
     /// Ask for the joints of the device (DeviceState::joints, HandleDescription::joints): 16 bytes each in every state.
     bool joints = false;
+    /// Ask for the outputs of the device (HandleDescription::outputs), to set them with `set_output`.
+    bool outputs = false;
     /// With a Watch: be a controller that sends no force. It may rearm, disarm and hold a
     /// channel.
     bool operates = false;
@@ -190,8 +192,11 @@ class ForceClient {
   /// rearm().
   bool engage();
   bool disengage();
+  /// Sets a lamp of the device, or starts a pulse of vibration (`handle()->outputs`). For whoever `holds()`. False as
+  /// for rearm(), without Config::outputs, when the server does not know kFeatureOutputs, and out of bounds.
+  bool set_output(std::uint32_t output, const OutputSetting& setting);
 
-  /// What the server has said to the newest of these four of the present session; empty until then.
+  /// What the server has said to the newest of these five of the present session; empty until then.
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.
@@ -262,7 +267,7 @@ class ForceClient {
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;
   std::optional<HandleDescription> handle_;
-  std::optional<std::uint32_t> order_;  ///< the newest rearm, disarm, engage or disengage: number of the request
+  std::optional<std::uint32_t> order_;  ///< the newest order, but for leases: number of the request
   std::optional<Session::RequestAnswered> order_answer_;
   Grant place_;  ///< the numbers of our device and channel
   bool holds_ = false;

@@ -44,6 +44,7 @@ FalconDevice::FalconDevice(Config config, std::unique_ptr<usb::Pipe> pipe)
             .position_resolution = 43e-6,
             .force_resolution = 0.01,  // one count of each motor, within 50 mm of the centre
             .joints = {"thigh 1", "thigh 2", "thigh 3"},
+            .outputs = {{.name = "ring", .kind = OutputKind::kLamp}},
             .watchdog = Duration::zero()},
       firmware_(std::move(config.firmware)),
       dialogue_(std::move(pipe)),
@@ -216,10 +217,22 @@ Vec3 FalconDevice::apply(const Vec3& force) noexcept {
   const Counts wanted = ready ? falcon::counts_for(*pose_, force) : kNoTorque;
   const bool exerts = wanted != kNoTorque;
   if (dialogue_.may_send(exerts)) {
-    const falcon::Command command{.torque = wanted, .homing = true, .lamps = ready ? falcon::kGreen : falcon::kRed};
+    const falcon::Command command{.torque = wanted, .homing = true, .lamps = ready ? ready_lamps_ : falcon::kRed};
     if (dialogue_.send(falcon::encode(command), exerts)) held_ = wanted;
   }
   return pose_ && dialogue_.holds_force() ? falcon::force_of(*pose_, held_) : Vec3::Zero();
+}
+
+/// The light-emitting diodes are on or off: each by its half of the colour. Red without another tells that the device is
+/// not ready, whoever sets the ring.
+void FalconDevice::set_output(LocalTime /*now*/, std::uint32_t output, const OutputSetting& setting) noexcept {
+  const auto* const colour = std::get_if<LampColour>(&setting);
+  if (output != 0 || colour == nullptr) return;
+  const auto lit = [rgb = colour->rgb](unsigned shift, std::uint8_t lamp) -> unsigned {
+    return ((rgb >> shift) & 0x80) != 0 ? lamp : 0U;
+  };
+  const unsigned lamps = lit(16, falcon::kRed) | lit(8, falcon::kGreen) | lit(0, falcon::kBlue);
+  ready_lamps_ = lamps == 0 || lamps == falcon::kRed ? falcon::kGreen : static_cast<std::uint8_t>(lamps);
 }
 
 namespace falcon {

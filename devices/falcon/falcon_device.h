@@ -59,6 +59,10 @@ class FalconDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Joints joints(const Motion& hand) const noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
+  /// The ring of light-emitting diodes is its one output, "ring": red, green and blue, each on from half its strength.
+  /// It shows that colour while the device may give a force, and green when the colour is off or red alone. Red alone
+  /// says that the device is not ready, and no client can change that.
+  void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
 
  private:
   void enter(State state) noexcept;
@@ -86,13 +90,14 @@ class FalconDevice final : public Device {
 
   // From kOpening on
   falcon::ReplyParser parser_;
-  std::optional<falcon::Reply> newest_{};  ///< the last reply that was believed
-  bool fresh_ = false;                     ///< newest_ came in this `read`, and belongs to a position
-  int homed_replies_ = 0;                  ///< in a row that say "homed"; below 0: that many that say the contrary
-  bool moved_origin_ = false;              ///< the encoders have lost count since the device was homed
-  std::optional<falcon::Pose> pose_{};     ///< the last one that is known; of newest_ when
-  bool located_ = false;                   ///< newest_ belongs to a position
-  falcon::Counts held_{};                  ///< the torques that were sent last
+  std::optional<falcon::Reply> newest_{};      ///< the last reply that was believed
+  bool fresh_ = false;                         ///< newest_ came in this `read`, and belongs to a position
+  int homed_replies_ = 0;                      ///< in a row that say "homed"; below 0: that many that say the contrary
+  bool moved_origin_ = false;                  ///< the encoders have lost count since the device was homed
+  std::optional<falcon::Pose> pose_{};         ///< the last one that is known; of newest_ when
+  bool located_ = false;                       ///< newest_ belongs to a position
+  falcon::Counts held_{};                      ///< the torques that were sent last
+  std::uint8_t ready_lamps_ = falcon::kGreen;  ///< while the device may give a force
 };
 
 namespace falcon {

@@ -135,6 +135,9 @@ class SafeDevice final : public Device {
   std::optional<PositionSample> read(LocalTime now) noexcept override;
   Vec3 apply(const Vec3& force) noexcept override;
   Effort apply_all(const Effort& effort) noexcept override;
+  void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override {
+    device_.set_output(now, output, setting);
+  }
 
   Status status() const noexcept;
 

@@ -117,6 +117,8 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   }
   if (config_.gripper) gripper_.emplace(*std::exchange(config_.gripper, std::nullopt));
   if (gripper_) info_.gripper = gripper_->info();
+  if (!config_.outputs.empty()) outputs_ = SimulatedOutputs(config_.outputs);
+  info_.outputs = config_.outputs;
   turns_or_grips_ = rotation_ || gripper_;
   has_more_ = turns_or_grips_ || !config_.presses.empty();
 

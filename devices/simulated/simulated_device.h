@@ -16,6 +16,7 @@
 #include "devices/simulated/joint_friction.h"
 #include "devices/simulated/operator_hand.h"
 #include "devices/simulated/simulated_gripper.h"
+#include "devices/simulated/simulated_outputs.h"
 #include "devices/simulated/simulated_rotation.h"
 
 namespace tendon {
@@ -131,6 +132,7 @@ class SimulatedDevice final : public Device {
     std::optional<SimulatedRotation::Config> rotation{};
     /// The handle has a gripper. Its energy balance is one of its own.
     std::optional<SimulatedGripper::Config> gripper{};
+    std::vector<OutputDescription> outputs{};  ///< lamps and vibration, at most kMostOutputs
 
     /// > 0. 50 µs is 20 substeps per haptic period at 1 kHz. It puts the stiffness at which a sampled spring loses
     /// stability (75 g, 1 kHz) within 1.4e-6 of the exact one at 0.26 N·s/m, and 2.8e-5 at 5. The error goes with the
@@ -177,9 +179,12 @@ class SimulatedDevice final : public Device {
   /// component that is not finite is none.
   Effort apply_all(const Effort& effort) noexcept override;
 
+  void set_output(LocalTime now, std::uint32_t output, const OutputSetting& setting) noexcept override;
+
   const Truth& truth() const noexcept { return truth_; }
   const SimulatedRotation* rotation() const noexcept { return rotation_ ? &*rotation_ : nullptr; }
   const SimulatedGripper* gripper() const noexcept { return gripper_ ? &*gripper_ : nullptr; }
+  const SimulatedOutputs& outputs() const noexcept { return outputs_; }
 
  private:
   /// Of the amplifier, over one substep of length h with the time constant τ.
@@ -241,6 +246,7 @@ class SimulatedDevice final : public Device {
   std::optional<JointFriction> joints_;
   std::optional<SimulatedRotation> rotation_;
   std::optional<SimulatedGripper> gripper_;
+  SimulatedOutputs outputs_;
   bool turns_or_grips_ = false;  ///< it has one of these two
   bool has_more_ = false;        ///< … or presses
   Substeps take_substeps_;

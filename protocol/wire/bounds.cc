@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <variant>
 
 #include "core/base/arithmetic.h"
 #include "core/base/rotation.h"
@@ -51,6 +52,16 @@ bool in_bounds(const ForceCommand& command) noexcept {
   return all_bounded(command.force) && (!command.model || in_bounds(*command.model)) &&
          (!command.error || (bounded(*command.error) && *command.error >= 0)) &&
          (!command.torque || in_bounds(*command.torque)) && (!command.grip_force || bounded(*command.grip_force));
+}
+
+bool in_bounds(const SetOutput& wanted) noexcept {
+  if (wanted.output >= limits::kMaxOutputs) return false;
+  if (const auto* const lamp = std::get_if<LampColour>(&wanted.setting)) return lamp->rgb <= 0xFFFFFF;
+  const Vibration& pulse = std::get<Vibration>(wanted.setting);
+  const bool own = pulse.frequency == 0;
+  return pulse.amplitude >= 0 && pulse.amplitude <= 1 && pulse.duration >= Duration::zero() &&
+         pulse.duration <= limits::kMaxVibration &&
+         (own || (pulse.frequency >= limits::kMinVibrationHz && pulse.frequency <= limits::kMaxVibrationHz));
 }
 
 bool is_finite(const ForceCommand& command) noexcept {

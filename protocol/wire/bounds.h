@@ -20,6 +20,9 @@ inline bool bounded(double value) noexcept { return std::abs(value) <= limits::k
 /// (WIRE.md).
 bool in_bounds(const ForceCommand& command) noexcept;
 
+/// Whether a receiver accepts that setting; the number of the device is another matter.
+bool in_bounds(const SetOutput& wanted) noexcept;
+
 /// Whether `command` holds no NaN, and no infinity except as a model's `valid_radius`.
 bool is_finite(const ForceCommand& command) noexcept;
 

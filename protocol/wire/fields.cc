@@ -145,6 +145,8 @@ bool read(pb::Hand from, Hand& to) noexcept {
   return from == pb::HAND_ANY || read_enum(from, Hand::kRight, to);
 }
 
+bool read(pb::OutputKind from, OutputKind& to) noexcept { return read_enum(from, OutputKind::kVibration, to); }
+
 bool read_device(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxDevices; }
 bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept { return (to = from) < limits::kMaxChannels; }
 

@@ -58,6 +58,7 @@ bool read(pb::Code from, Code& to) noexcept;
 bool read(pb::Safety from, Safety& to) noexcept;
 bool read(pb::ChannelRule from, ChannelRule& to) noexcept;
 bool read(pb::Hand from, Hand& to) noexcept;
+bool read(pb::OutputKind from, OutputKind& to) noexcept;
 
 bool read_device(std::uint32_t from, std::uint32_t& to) noexcept;
 bool read_channel(std::uint32_t from, std::uint32_t& to) noexcept;

@@ -231,6 +231,20 @@ bool read(const pb::Describe& from, Describe& to) noexcept {
   to.handle = from.handle();
   return read_device(from.device(), to.device);
 }
+/// A setting of neither kind is refused.
+bool read(const pb::SetOutput& from, SetOutput& to) noexcept {
+  to.output = from.output();
+  if (from.setting_case() == pb::SetOutput::kVibration) {
+    const pb::Vibration& pulse = from.vibration();
+    to.setting = Vibration{.amplitude = pulse.amplitude(),
+                           .frequency = pulse.frequency_hz(),
+                           .duration = std::chrono::milliseconds(pulse.duration_ms())};
+  } else {
+    to.setting = LampColour{from.rgb()};
+    if (from.setting_case() != pb::SetOutput::kRgb) return false;
+  }
+  return read_device(from.device(), to.device) && in_bounds(to);
+}
 template <class Message, class Lease>
 bool read_lease(const Message& from, Lease& to) noexcept {
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel);
@@ -270,6 +284,20 @@ void write_request(const LeaseLost& from, pb::Control& to) {
 void write_request(const Couple& from, pb::Control& to) { write(from, *to.mutable_couple()); }
 void write_request(const Engage& from, pb::Control& to) { to.mutable_engage()->set_device(from.device); }
 void write_request(const Disengage& from, pb::Control& to) { to.mutable_disengage()->set_device(from.device); }
+void write_request(const SetOutput& from, pb::Control& to) {
+  pb::SetOutput& out = *to.mutable_set_output();
+  out.set_device(from.device);
+  out.set_output(from.output);
+  if (const auto* const lamp = std::get_if<LampColour>(&from.setting)) return out.set_rgb(lamp->rgb);
+  const Vibration& pulse = std::get<Vibration>(from.setting);
+  out.mutable_vibration()->set_amplitude(pulse.amplitude);
+  out.mutable_vibration()->set_frequency_hz(pulse.frequency);
+  // A value out of range stays one: a cast could make it look valid.
+  const bool possible = pulse.duration >= Duration::zero() && pulse.duration <= limits::kMaxVibration;
+  const auto ms = std::chrono::ceil<std::chrono::milliseconds>(pulse.duration).count();
+  const auto told = possible ? static_cast<std::uint32_t>(ms) : std::numeric_limits<std::uint32_t>::max();
+  out.mutable_vibration()->set_duration_ms(told);
+}
 void write_request(const SetStateDeadband& from, pb::Control& to) {
   auto& out = *to.mutable_set_state_deadband();
   out.set_share(from.share);
@@ -292,6 +320,8 @@ bool read(const pb::Control& from, Control& to) {
       return read_request<Rearm>(from.rearm(), to);
     case pb::Control::kDisarm:
       return read_request<Disarm>(from.disarm(), to);
+    case pb::Control::kSetOutput:
+      return read_request<SetOutput>(from.set_output(), to);
     case pb::Control::kDescribe:
       return read_request<Describe>(from.describe(), to);
     case pb::Control::kTakeLease:
@@ -389,6 +419,11 @@ bool read(const pb::HandleDescription& from, HandleDescription& to) {
   if (has_axes && !read(from.operator_from_device(), to.operator_from_device.emplace())) return false;
   if (!read_labels(from.buttons(), limits::kMaxButtons, to.buttons)) return false;
   if (!read_labels(from.joints(), limits::kMaxJoints, to.joints)) return false;
+  if (from.outputs_size() > static_cast<int>(limits::kMaxOutputs)) return false;
+  for (const pb::OutputDescription& output : from.outputs()) {
+    OutputDescription& described = to.outputs.emplace_back();
+    if (!read(output.name(), limits::kMaxLabel, described.name) || !read(output.kind(), described.kind)) return false;
+  }
   to.orientation_measured = from.orientation_measured();
   if (from.has_gripper_open_rad() && !read_size(from.gripper_open_rad(), to.gripper_open.emplace())) return false;
   if (!read(from.group(), limits::kMaxLabel, to.group)) return false;
@@ -401,6 +436,12 @@ void write(const HandleDescription& from, pb::HandleDescription& to) {
   if (from.operator_from_device) write(*from.operator_from_device, *to.mutable_operator_from_device());
   write_labels(from.buttons, limits::kMaxButtons, *to.mutable_buttons());
   write_labels(from.joints, limits::kMaxJoints, *to.mutable_joints());
+  for (const OutputDescription& output : from.outputs) {
+    if (to.outputs_size() == static_cast<int>(limits::kMaxOutputs)) break;
+    pb::OutputDescription& described = *to.add_outputs();
+    described.set_name(clip(output.name, limits::kMaxLabel));
+    described.set_kind(static_cast<pb::OutputKind>(output.kind));
+  }
   to.set_orientation_measured(from.orientation_measured);
   to.set_max_torque_nm(from.max_torque);
   if (from.gripper_open) to.set_gripper_open_rad(*from.gripper_open);

@@ -52,6 +52,7 @@ struct Guest {
   bool sees_handle;         ///< … and kFeatureHandle
   bool sees_joints;         ///< … and kFeatureJoints
   bool may_couple;          ///< … and kFeatureTeleoperation
+  bool sees_outputs;        ///< … and kFeatureOutputs
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
   std::vector<std::byte> answer;  ///< to its Hello, for when it was lost

@@ -15,7 +15,7 @@ void Leases::give(std::uint32_t device, std::uint32_t channel, std::uint32_t gue
   if (held.holder != guest) return;
   // A full ring means that 16 orders wait because the haptic thread stands still. The age of the force then has the
   // same effect a little later.
-  devices_[device].mail->orders.try_push({HapticOrder::Kind::kRelease, channel, guest});
+  devices_[device].mail->orders.try_push({.kind = HapticOrder::Kind::kRelease, .channel = channel, .source = guest});
   held.holder = 0;
   held.lateness.end();
 }

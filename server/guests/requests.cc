@@ -36,7 +36,7 @@ Outcome set_state_deadband(LocalTime /*now*/, const Asker& asker, const SetState
 }
 
 Outcome order(const Asker& asker, std::uint32_t device, HapticOrder::Kind kind, const char* done) {
-  if (!asker.devices[device].mail->orders.try_push({kind})) return {.code = Code::kBusy};
+  if (!asker.devices[device].mail->orders.try_push({.kind = kind})) return {.code = Code::kBusy};
   return {.warning = std::string(done) + " by \"" + asker.guest.name + "\""};
 }
 
@@ -59,6 +59,7 @@ Outcome describe(LocalTime /*now*/, const Asker& asker, const Describe& wanted) 
   if (wanted.handle) {
     HandleDescription handle = device.handle;
     if (!asker.guest.sees_joints) handle.joints.clear();
+    if (!asker.guest.sees_outputs) handle.outputs.clear();
     return {.handle = std::move(handle)};
   }
   DeviceDescription about = device.about;
@@ -121,6 +122,33 @@ Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted
   return order(asker, wanted.device, HapticOrder::Kind::kDisengage, "told to disengage");
 }
 
+/// Nobody sets the lamps of a device whose forces are another's.
+Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wanted) {
+  if (!asker.guest.sees_outputs) {
+    return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature outputs"};
+  }
+  const ServedDevice& device = asker.devices[wanted.device];
+  const auto is_held = [&](const ServedChannel& channel) { return channel.holder == asker.guest.id(); };
+  if (std::ranges::none_of(device.channels, is_held)) {
+    return {.code = Code::kDenied, .detail = "only the holder of a channel of the device may set an output"};
+  }
+  const auto& outputs = device.handle.outputs;
+  if (wanted.output >= outputs.size()) {
+    return {.code = Code::kInvalid, .detail = "the device has " + std::to_string(outputs.size()) + " outputs"};
+  }
+  if (kind_of(wanted.setting) != outputs[wanted.output].kind) {
+    const bool lamp = outputs[wanted.output].kind == OutputKind::kLamp;
+    return {.code = Code::kInvalid,
+            .detail = "output " + std::to_string(wanted.output) +
+                      (lamp ? " is a lamp: expected rgb" : " vibrates: expected vibration")};
+  }
+  const HapticOrder order{.kind = HapticOrder::Kind::kOutput,
+                          .source = asker.guest.id(),
+                          .output = wanted.output,
+                          .setting = wanted.setting};
+  return {.code = device.mail->orders.try_push(order) ? Code::kOk : Code::kBusy};
+}
+
 /// Who may ask.
 enum class From : std::uint8_t {
   kAnybody,
@@ -180,6 +208,7 @@ constexpr std::array kRequests = {
     row<Couple, From::kClaimants, couple>("couple a device"),
     row<Engage, From::kControllers, engage>("engage a coupling"),
     row<Disengage, From::kControllers, disengage>("disengage a coupling"),
+    row<SetOutput, From::kControllers, set_output>("set an output"),
 };
 static_assert(kRequests.size() == std::variant_size_v<Request>);
 constexpr bool in_order() {

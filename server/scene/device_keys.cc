@@ -356,6 +356,12 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
                 });
     hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft.motion); });
   });
+  keys.tables("output", draft.simulated.outputs, kMostOutputs, [](Table& outputs, OutputDescription& output) {
+    outputs.key("name", output.name, Label{}, "for people", kRequired);
+    outputs.key("kind", output.kind,
+                Names<OutputKind>{{{"lamp", OutputKind::kLamp}, {"vibration", OutputKind::kVibration}}},
+                "what the clients that hold the device may set; a simulated device only remembers it", kRequired);
+  });
   keys.part("rotation", config.rotation,
             [&draft](Table& rotation, SimulatedRotation::Config& part) { declare_rotation(rotation, draft, part); });
   keys.part("gripper", config.gripper,
