@@ -150,6 +150,12 @@ void print(Line& line, const Control& control) {
     line << "engage" << engage->device;
   } else if (const auto* disengage = std::get_if<Disengage>(&*control.request)) {
     line << "disengage" << disengage->device;
+  } else if (const auto* wanted = std::get_if<SetOutput>(&*control.request)) {
+    line << "output" << wanted->device << wanted->output;
+    if (const auto* lamp = std::get_if<LampColour>(&wanted->setting)) line << "rgb" << lamp->rgb;
+    if (const auto* pulse = std::get_if<Vibration>(&wanted->setting)) {
+      line << "vibration" << pulse->amplitude << pulse->frequency << pulse->duration;
+    }
   } else {
     line << "other";
   }
@@ -163,6 +169,10 @@ void print(Line& line, const ControlAck& ack) {
   if (const auto& q = ack.handle->operator_from_device) line << "axes" << *q;
   line.put_texts(ack.handle->buttons);
   line.put_texts(ack.handle->joints);
+  for (const OutputDescription& output : ack.handle->outputs) {
+    line << "output" << static_cast<std::uint32_t>(output.kind);
+    line.put_text(output.name);
+  }
   line << std::uint32_t{ack.handle->orientation_measured} << ack.handle->max_torque;
   if (ack.handle->gripper_open) line << "gripper" << *ack.handle->gripper_open;
   line << ack.handle->max_gripper_force;

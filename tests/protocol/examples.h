@@ -258,6 +258,21 @@ inline ControlAck joints_described(std::uint32_t id) {
   return ack;
 }
 
+/// To a client that named "outputs".
+inline ControlAck outputs_described(std::uint32_t id) {
+  ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
+  ack.handle = HandleDescription{.device = 1};
+  ack.handle->outputs = {{.name = "ring", .kind = OutputKind::kLamp}, {.name = "tip", .kind = OutputKind::kVibration}};
+  return ack;
+}
+
+inline SetOutput lamp() { return {.device = 1, .output = 0, .setting = LampColour{0xFF8000}}; }
+
+inline SetOutput vibration() {
+  const Vibration pulse{.amplitude = 0.5, .frequency = 200, .duration = std::chrono::milliseconds(40)};
+  return {.device = 1, .output = 1, .setting = pulse};
+}
+
 // Between peers that both named "teleoperation".
 
 /// A leader pulls its follower by 2 mm; the follower measures no contact, so that it is not this one.
@@ -413,6 +428,9 @@ inline std::vector<Named> datagrams() {
       {"control-couple", data(73, {}, Control{.id = 15, .request = couple()})},
       {"control-engage", data(74, {}, Control{.id = 16, .request = Engage{.device = 1}})},
       {"control-disengage", data(75, {}, Control{.id = 17, .request = Disengage{.device = 1}})},
+      {"control-set-output-lamp", data(76, {}, Control{.id = 18, .request = lamp()})},
+      {"control-set-output-vibration", data(77, {}, Control{.id = 19, .request = vibration()})},
+      {"control-ack-outputs", data(78, {}, outputs_described(14))},
   };
 }
 

@@ -101,7 +101,7 @@ struct Pushed {
     }
     return last;
   }
-  void order(HapticOrder::Kind kind) { ASSERT_TRUE(mail->orders.try_push({kind})); }
+  void order(HapticOrder::Kind kind) { ASSERT_TRUE(mail->orders.try_push({.kind = kind})); }
 
   std::unique_ptr<Mailboxes> mail = std::make_unique<Mailboxes>();
   HapticLoop loop;
@@ -154,6 +154,39 @@ TEST(HapticLoop, JointsAreInTheRecordAndTheStateAndChangeNothingElse) {
   Pushed other(none);
   EXPECT_EQ(other.steps(3).joints(), nullptr);
   EXPECT_EQ(other.mail->state.take()->joints, std::nullopt);
+}
+
+TEST(HapticLoop, OutputsAreOffWhenWhoSetThemHasGoneOrTheDeviceIsDisarmed) {
+  SimulatedDevice::Config config = circling(false);
+  config.outputs = {{.name = "ring", .kind = OutputKind::kLamp}, {.name = "tip", .kind = OutputKind::kVibration}};
+  SimulatedDevice plain(config);
+  SafeDevice safe({}, plain);
+  Pushed world(safe);
+  const auto set = [&] {
+    const auto tell = [&](std::uint32_t output, const OutputSetting& setting) {
+      const HapticOrder order{.kind = Kind::kOutput, .source = 7, .output = output, .setting = setting};
+      ASSERT_TRUE(world.mail->orders.try_push(order));
+    };
+    tell(0, LampColour{0xFF});
+    tell(1, Vibration{.amplitude = 1, .duration = std::chrono::seconds(10)});
+    world.steps(1);
+    ASSERT_EQ(plain.outputs().colour(0), 0xFFU);
+    ASSERT_EQ(plain.outputs().amplitude(world.now, 1), 1);
+  };
+  const auto expect_off = [&] {
+    world.steps(1);
+    EXPECT_EQ(plain.outputs().colour(0), 0U);
+    EXPECT_EQ(plain.outputs().amplitude(world.now, 1), 0);
+  };
+  set();
+  ASSERT_TRUE(world.mail->orders.try_push({.kind = Kind::kRelease, .source = 8}));
+  world.steps(1);
+  EXPECT_EQ(plain.outputs().colour(0), 0xFFU) << "another has gone";
+  ASSERT_TRUE(world.mail->orders.try_push({.kind = Kind::kRelease, .source = 7}));
+  expect_off();
+  set();
+  world.order(Kind::kDisarm);
+  expect_off();
 }
 
 TEST(HapticLoop, ADisarmedDeviceIsHomedAtOnceAndArmedAgainByAnOrderOnly) {

@@ -12,6 +12,7 @@ from enum import Enum
 
 from . import limits
 from .answer import Answer, read_touch
+from .codec.frames import is_setting
 from .deadband import Deadband, ForceDeadband, check_state_deadband, foretell
 from .expect import expect
 from .handshake import ClientHandshake
@@ -20,6 +21,7 @@ from .messages import (
     FEATURE_DIAGNOSTICS,
     FEATURE_HANDLE,
     FEATURE_JOINTS,
+    FEATURE_OUTPUTS,
     FEATURE_LOCAL_MODEL,
     NEVER,
     Claim,
@@ -32,6 +34,9 @@ from .messages import (
     DeviceState,
     Disarm,
     Disengage,
+    LampColour,
+    SetOutput,
+    Vibration,
     Engage,
     ForceCommand,
     GiveLease,
@@ -111,6 +116,9 @@ class Config:
     joints: bool = False
     """Ask for the joints of the device (`DeviceState.joints`, `HandleDescription.joints`): 16 bytes each in every
     state."""
+    outputs: bool = False
+    """Ask for the outputs of the device (`HandleDescription.outputs`: lamps, vibration), to set them with
+    `set_output`."""
     patience_s: float = 2.0
     """How long one attempt waits for an answer to its Hellos."""
     retry_min_s: float = 0.1
@@ -326,6 +334,22 @@ class ForceClient:
         """The end of that, at either end's server. False as for rearm()."""
         return self._session is not None and self._session.request(Disengage(self._place.device)) is not None
 
+    def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
+        """Sets a lamp of the device, or starts a pulse of vibration (`handle.outputs`). For whoever `holds`. False as
+        for rearm(), and without `Config.outputs`; ValueError when the setting is out of its bounds."""
+        if not 0 <= output < limits.MAX_OUTPUTS or not is_setting(setting):
+            raise ValueError(
+                f"set_output({output}, {setting}): expected output 0 … 7, rgb 0 … 0xFFFFFF, amplitude 0 … 1, "
+                "frequency 0 or 20 … 1000 Hz, duration_ms 0 … 10000"
+            )
+        wanted = SetOutput(self._place.device, output, setting)
+        return (
+            self.welcome is not None
+            and FEATURE_OUTPUTS in self.welcome.features
+            and self._session is not None
+            and self._session.request(wanted) is not None
+        )
+
     def take_lease(self) -> bool:
         """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.
         False as for rearm()."""
@@ -431,6 +455,8 @@ class ForceClient:
         features: tuple[str, ...] = (FEATURE_LOCAL_MODEL, FEATURE_CHANNELS, FEATURE_HANDLE)
         if self.config.joints:
             features += (FEATURE_JOINTS,)
+        if self.config.outputs:
+            features += (FEATURE_OUTPUTS,)
         if self.config.diagnostics:
             features += (FEATURE_DIAGNOSTICS,)
         hello = Hello(self.config.role, self.config.name, features, claims=self._claims())

@@ -13,7 +13,7 @@ from typing import Any
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
-from .messages import Code, DeviceDescription, DeviceReport, DeviceState, HandleDescription, LinkReport, PeerReport, Touch, Welcome
+from .messages import Code, DeviceDescription, DeviceReport, DeviceState, HandleDescription, LampColour, LinkReport, PeerReport, Touch, Vibration, Welcome
 
 log = logging.getLogger("tendon")
 
@@ -213,6 +213,11 @@ class AnyClient:
     def disengage(self) -> bool:
         """The end of that, at either end's server. False when there is no session."""
         return self._ask(self._guest.core.disengage)
+
+    def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
+        """Sets a lamp of the device, or starts a pulse of vibration (`handle.outputs`, asked for with
+        `Config.outputs`). False when there is no session to ask in, or it does not know outputs."""
+        return self._ask(lambda: self._guest.core.set_output(output, setting))
 
     def take_lease(self) -> bool:
         """Asks for the channel's lease, and once more when it is lost before the answer; `holds` tells the result.

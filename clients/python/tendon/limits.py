@@ -26,6 +26,11 @@ MAX_LABEL = 24
 """Bytes of UTF-8 in the name of a device or a channel."""
 MAX_BUTTONS = 16
 MAX_JOINTS = 8
+MAX_OUTPUTS = 8
+MAX_VIBRATION_MS = 10_000
+"""The longest pulse: nobody feels a longer one, and it cannot be left on."""
+MIN_VIBRATION_HZ = 20.0
+MAX_VIBRATION_HZ = 1000.0
 """Named buttons of a device."""
 MAX_DEVICES = 16
 MAX_CHANNELS = 8

@@ -31,9 +31,14 @@ FEATURE_LOCAL_MODEL = "local-model"
 """The client may send a local model with its forces, and the server follows the hand with it."""
 
 FEATURE_HANDLE = "handle"
-FEATURE_JOINTS = "joints"
 """The client is told how the device lies before the operator, its buttons, orientation, gripper and torques, and may ask
 for torque and grip force."""
+
+FEATURE_JOINTS = "joints"
+"""The client is told the angles of the device's joints in each state, and their names."""
+
+FEATURE_OUTPUTS = "outputs"
+"""The client is told the outputs of the device (lamps, vibration), and may set them."""
 
 FEATURE_TELEOPERATION = "teleoperation"
 """The client may be the other end of a coupling: it says Couple, and PortStates go both ways."""
@@ -364,6 +369,47 @@ class Disengage:
     device: int = 0
 
 
+class OutputKind(IntEnum):
+    """What an output is."""
+
+    LAMP = 1
+    VIBRATION = 2  # not by the motors of the position
+
+
+@dataclass(frozen=True, slots=True)
+class OutputDescription:
+    """What a device shows or does beside its forces."""
+
+    name: str
+    kind: OutputKind
+
+
+@dataclass(frozen=True, slots=True)
+class LampColour:
+    """The colour of a lamp."""
+
+    rgb: int = 0  # 0xRRGGBB; 0 = off: it shows what the device itself shows
+
+
+@dataclass(frozen=True, slots=True)
+class Vibration:
+    """A pulse, which ends by itself."""
+
+    amplitude: float = 0.0  # 0 … 1 of the strongest that the output can; 0 = off
+    frequency: float = 0.0  # Hz, 20 … 1000; 0 = the output's own
+    duration_ms: int = 0  # 0 … 10 000
+
+
+@dataclass(frozen=True, slots=True)
+class SetOutput:
+    """Client → server, reliable: sets a lamp, or starts a pulse. Only from a controller of the device that holds a
+    channel of it, to a server that has agreed to FEATURE_OUTPUTS."""
+
+    device: int
+    output: int  # its number in HandleDescription.outputs
+    setting: LampColour | Vibration
+
+
 Request = Union[
     SetStateRate,
     Rearm,
@@ -376,6 +422,7 @@ Request = Union[
     Couple,
     Engage,
     Disengage,
+    SetOutput,
 ]
 
 
@@ -442,6 +489,8 @@ class HandleDescription:
     hand: Hand = Hand.ANY
     joints: Sequence[str] = ()
     """Names of the joints, in the order of DeviceState.joints; empty: none is told (FEATURE_JOINTS)."""
+    outputs: Sequence[OutputDescription] = ()
+    """What SetOutput sets, by number; empty: there are none, or nobody asked (FEATURE_OUTPUTS)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,9 @@ MODE_HOLDING: Mode
 MODE_IDLE: Mode
 MODE_SAFE_STOP: Mode
 MODE_UNSPECIFIED: Mode
+OUTPUT_LAMP: OutputKind
+OUTPUT_UNSPECIFIED: OutputKind
+OUTPUT_VIBRATION: OutputKind
 PORT_PHASE_ALIGNING: PortPhase
 PORT_PHASE_ALONE: PortPhase
 PORT_PHASE_CLUTCHED: PortPhase
@@ -105,7 +108,7 @@ class Contact(_message.Message):
     def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., gap_m: _Optional[float] = ..., table: _Optional[_Union[ForceTable, _Mapping]] = ...) -> None: ...
 
 class Control(_message.Message):
-    __slots__ = ["couple", "describe", "disarm", "disengage", "engage", "give_lease", "id", "lease_lost", "rearm", "set_state_deadband", "set_state_rate", "take_lease"]
+    __slots__ = ["couple", "describe", "disarm", "disengage", "engage", "give_lease", "id", "lease_lost", "rearm", "set_output", "set_state_deadband", "set_state_rate", "take_lease"]
     COUPLE_FIELD_NUMBER: _ClassVar[int]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
     DISARM_FIELD_NUMBER: _ClassVar[int]
@@ -115,6 +118,7 @@ class Control(_message.Message):
     ID_FIELD_NUMBER: _ClassVar[int]
     LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
     REARM_FIELD_NUMBER: _ClassVar[int]
+    SET_OUTPUT_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_DEADBAND_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
     TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
@@ -127,10 +131,11 @@ class Control(_message.Message):
     id: int
     lease_lost: LeaseLost
     rearm: Rearm
+    set_output: SetOutput
     set_state_deadband: SetStateDeadband
     set_state_rate: SetStateRate
     take_lease: TakeLease
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., set_output: _Optional[_Union[SetOutput, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
     __slots__ = ["code", "detail", "device", "handle", "id", "wait_ms"]
@@ -427,7 +432,7 @@ class Grant(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[Role, str]] = ...) -> None: ...
 
 class HandleDescription(_message.Message):
-    __slots__ = ["buttons", "device", "gripper_open_rad", "group", "hand", "joints", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured"]
+    __slots__ = ["buttons", "device", "gripper_open_rad", "group", "hand", "joints", "max_gripper_force_n", "max_torque_nm", "operator_from_device", "orientation_measured", "outputs"]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     GRIPPER_OPEN_RAD_FIELD_NUMBER: _ClassVar[int]
@@ -438,6 +443,7 @@ class HandleDescription(_message.Message):
     MAX_TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
     OPERATOR_FROM_DEVICE_FIELD_NUMBER: _ClassVar[int]
     ORIENTATION_MEASURED_FIELD_NUMBER: _ClassVar[int]
+    OUTPUTS_FIELD_NUMBER: _ClassVar[int]
     buttons: _containers.RepeatedScalarFieldContainer[str]
     device: int
     gripper_open_rad: float
@@ -448,7 +454,8 @@ class HandleDescription(_message.Message):
     max_torque_nm: float
     operator_from_device: Quat
     orientation_measured: bool
-    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ..., group: _Optional[str] = ..., hand: _Optional[_Union[Hand, str]] = ..., joints: _Optional[_Iterable[str]] = ...) -> None: ...
+    outputs: _containers.RepeatedCompositeFieldContainer[OutputDescription]
+    def __init__(self, device: _Optional[int] = ..., operator_from_device: _Optional[_Union[Quat, _Mapping]] = ..., buttons: _Optional[_Iterable[str]] = ..., orientation_measured: bool = ..., max_torque_nm: _Optional[float] = ..., gripper_open_rad: _Optional[float] = ..., max_gripper_force_n: _Optional[float] = ..., group: _Optional[str] = ..., hand: _Optional[_Union[Hand, str]] = ..., joints: _Optional[_Iterable[str]] = ..., outputs: _Optional[_Iterable[_Union[OutputDescription, _Mapping]]] = ...) -> None: ...
 
 class Hello(_message.Message):
     __slots__ = ["claims", "features", "name", "role", "version_max", "version_min"]
@@ -541,6 +548,14 @@ class LocalModel(_message.Message):
     stiffness_npm: _containers.RepeatedScalarFieldContainer[float]
     valid_radius_m: float
     def __init__(self, at_m: _Optional[_Union[Vec3, _Mapping]] = ..., stiffness_npm: _Optional[_Iterable[float]] = ..., valid_radius_m: _Optional[float] = ..., contact: _Optional[_Union[Contact, _Mapping]] = ...) -> None: ...
+
+class OutputDescription(_message.Message):
+    __slots__ = ["kind", "name"]
+    KIND_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    kind: OutputKind
+    name: str
+    def __init__(self, name: _Optional[str] = ..., kind: _Optional[_Union[OutputKind, str]] = ...) -> None: ...
 
 class PeerReport(_message.Message):
     __slots__ = ["channel", "device", "forces_refused", "link", "name", "state_one_in"]
@@ -638,6 +653,18 @@ class RotationModel(_message.Message):
     at_orientation: Quat
     def __init__(self, at_orientation: _Optional[_Union[Quat, _Mapping]] = ..., angular_stiffness_nmprad: _Optional[_Iterable[float]] = ...) -> None: ...
 
+class SetOutput(_message.Message):
+    __slots__ = ["device", "output", "rgb", "vibration"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    OUTPUT_FIELD_NUMBER: _ClassVar[int]
+    RGB_FIELD_NUMBER: _ClassVar[int]
+    VIBRATION_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    output: int
+    rgb: int
+    vibration: Vibration
+    def __init__(self, device: _Optional[int] = ..., output: _Optional[int] = ..., rgb: _Optional[int] = ..., vibration: _Optional[_Union[Vibration, _Mapping]] = ...) -> None: ...
+
 class SetStateDeadband(_message.Message):
     __slots__ = ["floor_mps", "max_silence_us", "share"]
     FLOOR_MPS_FIELD_NUMBER: _ClassVar[int]
@@ -674,6 +701,16 @@ class Vec3(_message.Message):
     z: float
     def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
 
+class Vibration(_message.Message):
+    __slots__ = ["amplitude", "duration_ms", "frequency_hz"]
+    AMPLITUDE_FIELD_NUMBER: _ClassVar[int]
+    DURATION_MS_FIELD_NUMBER: _ClassVar[int]
+    FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
+    amplitude: float
+    duration_ms: int
+    frequency_hz: float
+    def __init__(self, amplitude: _Optional[float] = ..., frequency_hz: _Optional[float] = ..., duration_ms: _Optional[int] = ...) -> None: ...
+
 class Welcome(_message.Message):
     __slots__ = ["device_name", "features", "grants", "loop_hz", "max_force_n", "position_resolution_m", "role", "server", "timeout_ms", "version"]
     DEVICE_NAME_FIELD_NUMBER: _ClassVar[int]
@@ -705,6 +742,9 @@ class PortRole(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class CouplingMethod(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = []
+
+class OutputKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = []
 
 class Hand(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

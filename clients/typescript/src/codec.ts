@@ -17,8 +17,8 @@ import {
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
 import type {
-  Claim, Contact, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello,
-  LinkReport, LocalModel, PeerReport, PortState, Refused, Request, Torque, Welcome,
+  Claim, Contact, DeviceDescription, DeviceReport, DeviceState, ForceCommand, Grant, HandleDescription, Hello, LampColour,
+  LinkReport, LocalModel, OutputDescription, PeerReport, PortState, Refused, Request, SetOutput, Torque, Vibration, Welcome,
 } from "./messages.js";
 import type { Nanoseconds } from "./time.js";
 
@@ -184,7 +184,7 @@ function readBody(body: Body): Frame | undefined {
     case "control": {
       const { id, op } = body.value;
       const request = readRequest(op);
-      const isLost = op.case === "couple" && !request; // it is known, and out of bounds
+      const isLost = (op.case === "couple" || op.case === "setOutput") && !request; // it is known, and out of bounds
       const good = id > 0 && !isLost && (!request || isRequest(request));
       return good ? { kind: "control", value: { id, request } } : undefined;
     }
@@ -473,15 +473,17 @@ function readHandle(from: pb.HandleDescription): HandleDescription | undefined {
   const { device, buttons, operatorFromDevice: axes, orientationMeasured, gripperOpenRad: gripperOpen } = from;
   const { maxTorqueNm: maxTorque, maxGripperForceN: maxGripperForce, group, hand } = from;
   const { joints } = from;
+  const outputs = from.outputs.map(({ name, kind }): OutputDescription => ({ name, kind: kind as number }));
   const good = isDevice(device) && isText(group, limits.kMaxLabel) && (hand === pb.Hand.ANY || isEnum(hand, pb.HandSchema)) &&
     buttons.length <= limits.kMaxButtons && joints.length <= limits.kMaxJoints &&
-    [...buttons, ...joints].every((name) => isText(name, limits.kMaxLabel)) && (!axes || isRotation(axes)) &&
+    outputs.length <= limits.kMaxOutputs && from.outputs.every(({ kind }) => isEnum(kind, pb.OutputKindSchema)) &&
+    [...buttons, ...joints, ...outputs.map(({ name }) => name)].every((name) => isText(name, limits.kMaxLabel)) && (!axes || isRotation(axes)) &&
     [maxTorque, gripperOpen ?? 0, maxGripperForce].every(isMagnitude);
   if (!good) return undefined;
   return {
     device, buttons: [...buttons], orientationMeasured, maxTorque, maxGripperForce, group, hand,
     ...(axes && { operatorFromDevice: readQuat(axes) }), ...(gripperOpen !== undefined && { gripperOpen }),
-    ...(joints.length > 0 && { joints: [...joints] }),
+    ...(joints.length > 0 && { joints: [...joints] }), ...(outputs.length > 0 && { outputs }),
   };
 }
 
@@ -498,6 +500,38 @@ function writeHandle(from: HandleDescription): pb.HandleDescription {
     group: clip(from.group, limits.kMaxLabel),
     hand: from.hand,
     joints: (from.joints ?? []).slice(0, limits.kMaxJoints).map((name) => clip(name, limits.kMaxLabel)),
+    outputs: (from.outputs ?? []).slice(0, limits.kMaxOutputs).map(({ name, kind }) =>
+      create(pb.OutputDescriptionSchema, { name: clip(name, limits.kMaxLabel), kind: kind as number })),
+  });
+}
+
+/** Whether a receiver accepts it. */
+export const isSetting = (output: number, setting: LampColour | Vibration): boolean => {
+  if (!Number.isInteger(output) || output < 0 || output >= limits.kMaxOutputs) return false;
+  if ("rgb" in setting) return Number.isInteger(setting.rgb) && setting.rgb >= 0 && setting.rgb <= 0xffffff;
+  const { amplitude, frequency, durationMs } = setting;
+  return amplitude >= 0 && amplitude <= 1 && Number.isInteger(durationMs) && durationMs >= 0 &&
+    durationMs <= limits.kMaxVibrationMs &&
+    (frequency === 0 || (frequency >= limits.kMinVibrationHz && frequency <= limits.kMaxVibrationHz));
+};
+
+function readSetOutput({ device, output, setting: from }: pb.SetOutput): Request | undefined {
+  if (from.case === undefined) return undefined;
+  const setting: LampColour | Vibration = from.case === "rgb" ? { rgb: from.value } :
+    { amplitude: from.value.amplitude, frequency: from.value.frequencyHz, durationMs: from.value.durationMs };
+  return isSetting(output, setting) ? { kind: "setOutput", device, output, setting } : undefined;
+}
+
+function writeSetOutput({ device, output, setting }: SetOutput): pb.SetOutput {
+  return create(pb.SetOutputSchema, {
+    device, output,
+    setting: "rgb" in setting ? { case: "rgb", value: setting.rgb } :
+      {
+        case: "vibration",
+        value: create(pb.VibrationSchema, {
+          amplitude: setting.amplitude, frequencyHz: setting.frequency, durationMs: setting.durationMs,
+        }),
+      },
   });
 }
 
@@ -510,6 +544,8 @@ function readRequest(op: pb.Control["op"]): Request | undefined {
     case "engage":
     case "disengage":
       return { kind: op.case, device: op.value.device };
+    case "setOutput":
+      return readSetOutput(op.value);
     case "couple": {
       const couple = readCouple(op.value);
       return couple && { kind: op.case, ...couple };
@@ -542,6 +578,8 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
       return { case: request.kind, value: create(pb.EngageSchema, { device: request.device }) };
     case "disengage":
       return { case: request.kind, value: create(pb.DisengageSchema, { device: request.device }) };
+    case "setOutput":
+      return { case: request.kind, value: writeSetOutput(request) };
     case "couple": {
       const { kind, ...couple } = request;
       return { case: kind, value: writeCouple(couple) };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 import { ForceClient, type ClientConfig, type ClientStats, type Phase, type Physics, type Watch } from "./force_client.js";
-import type { DeviceDescription, DeviceReport, HandleDescription, LinkReport, PeerReport, Welcome } from "./messages.js";
+import type {
+  DeviceDescription, DeviceReport, HandleDescription, LampColour, LinkReport, PeerReport, Vibration, Welcome,
+} from "./messages.js";
 import { fromMilliseconds, kNever, toMilliseconds, type Nanoseconds } from "./time.js";
 
 /** The way of datagrams to one server. */
@@ -48,6 +50,8 @@ export interface Guest {
   /** The operator's act of a coupling, at the leader's server, and its end. */
   engage(): boolean;
   disengage(): boolean;
+  /** Sets a lamp of the device, or starts a pulse of vibration (`outputs` in the config). */
+  setOutput(output: number, setting: LampColour | Vibration): boolean;
   /** Asks for the channel's lease, once more when it is lost before the answer; or gives it up. */
   takeLease(): boolean;
   giveLease(): boolean;
@@ -153,6 +157,9 @@ class RealTimeGuest implements Guest {
   }
   disengage(): boolean {
     return this.#ask(() => this.#client.disengage());
+  }
+  setOutput(output: number, setting: LampColour | Vibration): boolean {
+    return this.#ask(() => this.#client.setOutput(output, setting));
   }
   takeLease(): boolean {
     return this.#ask(() => this.#client.takeLease());

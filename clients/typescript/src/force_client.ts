@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 import { randomBytes } from "@noble/hashes/utils";
 import { objection, usable, type Touch } from "./answer.js";
-import type { ControlAck } from "./codec.js";
+import { isSetting, type ControlAck } from "./codec.js";
 import { checkForceDeadband, checkStateDeadband, Deadband, foretell, type ForceDeadband } from "./deadband.js";
 import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
 import { kMaxLabel, kMaxLoopHz, kMaxName, kMaxValidForMs } from "./limits.js";
 import {
-  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kProtocolVersion, Role,
-  type DeviceDescription, type DeviceReport, type DeviceState, type Grant, type HandleDescription, type Hello,
-  type LinkReport, type PeerReport, type Request, type StateDeadband, type Vec3, type Welcome,
+  Code, kFeatureChannels, kFeatureDiagnostics, kFeatureHandle, kFeatureJoints, kFeatureLocalModel, kFeatureOutputs, kProtocolVersion, Role,
+  type DeviceDescription, type DeviceReport, type DeviceState, type Grant, type HandleDescription, type Hello, type LampColour,
+  type LinkReport, type PeerReport, type Request, type StateDeadband, type Vec3, type Vibration, type Welcome,
 } from "./messages.js";
 import { kKeySize } from "./noise.js";
 import { Session, type LinkStats } from "./session.js";
@@ -60,6 +60,8 @@ export interface ClientConfig {
   readonly diagnostics?: boolean;
   /** Ask for the joints of the device (DeviceState.joints, HandleDescription.joints): 16 bytes each in every state. */
   readonly joints?: boolean;
+  /** Ask for the outputs of the device (HandleDescription.outputs: lamps, vibration), to set them with setOutput(). */
+  readonly outputs?: boolean;
   /** The Hellos of one attempt go unanswered for so long before it is given up. */
   readonly patienceMs?: number;
   /** First wait before the next attempt. */
@@ -116,7 +118,7 @@ const kAskLeaseAgain = fromMilliseconds(50);
 
 const kDefaults: Required<Omit<ClientConfig, "key" | "deadband" | "stateDeadband">> = {
   name: "guest", device: "", channel: "", takeLease: false, rateHz: 0, stateHz: 0, validForMs: 0, diagnostics: false,
-  joints: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
+  joints: false, outputs: false, patienceMs: 2000, retryMinMs: 100, retryMaxMs: 2000, random: randomBytes,
 };
 
 /** The numbers of a client that names no device and no channel. */
@@ -282,6 +284,19 @@ export class ForceClient {
     return this.#session?.request({ kind: "disengage", device: this.#place.device }) !== undefined;
   }
 
+  /**
+   * Sets a lamp of the device, or starts a pulse of vibration (HandleDescription.outputs). For whoever `holds`. False as
+   * for rearm(), and without `outputs` in the config; a RangeError when the setting is out of its bounds.
+   */
+  setOutput(output: number, setting: LampColour | Vibration): boolean {
+    if (!isSetting(output, setting)) {
+      throw new RangeError(`setOutput(${output}, ${JSON.stringify(setting)}): expected output 0 … 7, rgb 0 … 0xffffff, ` +
+        "amplitude 0 … 1, frequency 0 or 20 … 1000 Hz, durationMs 0 … 10000");
+    }
+    const request: Request = { kind: "setOutput", device: this.#place.device, output, setting };
+    return this.welcome?.features.includes(kFeatureOutputs) === true && this.#session?.request(request) !== undefined;
+  }
+
   /** The channel takes our forces; while it does not, the physics is not called. */
   get holds(): boolean {
     return this.#holds;
@@ -352,7 +367,7 @@ export class ForceClient {
   }
 
   #greet(now: Nanoseconds): void {
-    const { name, device, channel, diagnostics, joints } = this.#config;
+    const { name, device, channel, diagnostics, joints, outputs } = this.#config;
     const hello: Hello = {
       versionMin: kProtocolVersion,
       versionMax: kProtocolVersion,
@@ -360,6 +375,7 @@ export class ForceClient {
       name,
       features: [
         kFeatureLocalModel, kFeatureChannels, kFeatureHandle, ...(joints ? [kFeatureJoints] : []),
+        ...(outputs ? [kFeatureOutputs] : []),
         ...(diagnostics ? [kFeatureDiagnostics] : []),
       ],
       claims: this.#claims ? [{ device, channel, role: this.#role }] : [],

@@ -9,9 +9,10 @@ export { Follower, type FollowerConfig, type Following, type Pose, type ToolCont
 export type { ForceDeadband } from "./deadband.js";
 export { parseKeyFile, type ClientKey } from "./key_file.js";
 export {
-  ChannelRule, Code, Hand, Mode, reasonNames, Role, Safety, type ChannelDescription, type Contact, type Delays,
+  ChannelRule, Code, Hand, Mode, OutputKind, reasonNames, Role, Safety, type ChannelDescription, type Contact, type Delays,
   type DeviceDescription, type DeviceReport, type DeviceState, type ForceTable, type Grip, type HandleDescription, type Joints,
-  type LinkReport, type PeerReport, type Quat, type StateDeadband, type Stiffness, type Turning, type Vec3, type Welcome,
+  type LampColour, type LinkReport, type OutputDescription, type PeerReport, type Quat, type StateDeadband, type Stiffness,
+  type Turning, type Vec3, type Vibration, type Welcome,
 } from "./messages.js";
 export type { LinkStats } from "./session.js";
 export type { Nanoseconds } from "./time.js";

@@ -26,6 +26,12 @@ export const kMaxLabel = 24;
 /** Named buttons of a device. */
 export const kMaxButtons = 16;
 export const kMaxJoints = 8;
+export const kMaxOutputs = 8;
+/** The longest pulse of a vibration, ms: nobody feels a longer one, and it cannot be left on. */
+export const kMaxVibrationMs = 10_000;
+/** Hz. */
+export const kMinVibrationHz = 20;
+export const kMaxVibrationHz = 1000;
 export const kMaxDevices = 16;
 export const kMaxChannels = 8;
 export const kMaxClaims = 16;

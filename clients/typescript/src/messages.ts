@@ -22,6 +22,8 @@ export const kFeatureHandle = "handle";
 
 /** Whoever offers this is told the joints of the device, with `joints` of a client's config. */
 export const kFeatureJoints = "joints";
+/** Whoever offers this is told the outputs of the device, with `outputs` of a client's config, and may set them. */
+export const kFeatureOutputs = "outputs";
 
 /** A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. */
 export const kFeatureTeleoperation = "teleoperation";
@@ -264,6 +266,40 @@ export interface Couple {
   readonly periodUs: number;
 }
 
+/** What an output is: a lamp, or vibration by something else than the motors of the position. */
+export enum OutputKind {
+  LAMP = 1,
+  VIBRATION = 2,
+}
+
+/** What a device shows or does beside its forces. */
+export interface OutputDescription {
+  readonly name: string;
+  readonly kind: OutputKind;
+}
+
+/** 0xRRGGBB; 0 = off: the lamp shows what the device itself shows. */
+export interface LampColour {
+  readonly rgb: number;
+}
+
+/** A pulse, which ends by itself. */
+export interface Vibration {
+  /** 0 … 1 of the strongest that the output can; 0 = off. */
+  readonly amplitude: number;
+  /** Hz, 20 … 1000; 0 = the output's own. */
+  readonly frequency: number;
+  /** 0 … 10 000. */
+  readonly durationMs: number;
+}
+
+/** Sets the output of this number in HandleDescription.outputs. */
+export interface SetOutput {
+  readonly device: number;
+  readonly output: number;
+  readonly setting: LampColour | Vibration;
+}
+
 /**
  * Reliable. Client → server: set the rate of a device's states; clear a latched fault; no force until then;
  * describe the device; take or give up a channel's lease; set the deadband of states; be the other end of a device; the
@@ -273,6 +309,8 @@ export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
   | { readonly kind: "rearm" | "disarm" | "engage" | "disengage"; readonly device: number }
   | ({ readonly kind: "couple" } & Couple)
+  /** From whoever holds a channel of the device, to a server that has agreed to kFeatureOutputs. */
+  | ({ readonly kind: "setOutput" } & SetOutput)
   /** With `handle` the answer is a HandleDescription. Only for a server that has agreed to kFeatureHandle. */
   | { readonly kind: "describe"; readonly device: number; readonly handle?: boolean }
   | { readonly kind: "takeLease" | "giveLease"; readonly device: number; readonly channel: number }
@@ -330,6 +368,8 @@ export interface HandleDescription {
   readonly hand: Hand;
   /** Names of the joints, in the order of DeviceState.joints; absent: none is told (kFeatureJoints). */
   readonly joints?: readonly string[] | undefined;
+  /** What SetOutput sets, by number; absent: there are none, or nobody asked (kFeatureOutputs). */
+  readonly outputs?: readonly OutputDescription[] | undefined;
 }
 
 /** Two quantiles of a delay; below zero only where two clocks had to be compared. */

@@ -32,12 +32,14 @@ from tendon.messages import (
     Engage,
     ForceCommand,
     Frame,
+    LampColour,
     LinkReport,
     Mat3,
     PeerReport,
     PortState,
     Rearm,
     Refused,
+    SetOutput,
     SetStateDeadband,
     SetStateRate,
     Vec3,
@@ -147,6 +149,14 @@ def _frame(frame: Frame) -> list[object]:
             ]
         if isinstance(frame.request, (Engage, Disengage)):
             return ["control", frame.id, type(frame.request).__name__.lower(), frame.request.device]
+        if isinstance(frame.request, SetOutput):
+            wanted = frame.request
+            words = ["control", frame.id, "output", wanted.device, wanted.output]
+            if isinstance(wanted.setting, LampColour):
+                return [*words, "rgb", wanted.setting.rgb]
+            pulse = wanted.setting
+            doubles = map(_double, (pulse.amplitude, pulse.frequency))
+            return [*words, "vibration", *doubles, pulse.duration_ms * 1_000_000]
         return ["control", frame.id, {Rearm: "rearm", Disarm: "disarm"}.get(type(frame.request), "other")]
     if isinstance(frame, ControlAck):
         words = ["ack", frame.id, int(frame.code), _text(frame.detail)]
@@ -155,6 +165,8 @@ def _frame(frame: Frame) -> list[object]:
             words += ["handle"] if axes is None else ["handle", "axes", *map(_double, axes)]
             words += [len(frame.handle.buttons), *map(_text, frame.handle.buttons)]
             words += [len(frame.handle.joints), *map(_text, frame.handle.joints)]
+            for output in frame.handle.outputs:
+                words += ["output", int(output.kind), _text(output.name)]
             words += [int(frame.handle.orientation_measured), _double(frame.handle.max_torque)]
             opens = frame.handle.gripper_open
             words += [] if opens is None else ["gripper", _double(opens)]

@@ -9,7 +9,7 @@ import pytest
 from stage import DESCRIPTION, HANDLE, KEPT, Stage
 from world import MS, SECOND
 
-from tendon import Code, Config, Phase, Role, Touch
+from tendon import Code, Config, LampColour, Phase, Role, Touch, Vibration
 from tendon.messages import (
     Claim,
     Describe,
@@ -20,6 +20,7 @@ from tendon.messages import (
     Grant,
     LeaseLost,
     Rearm,
+    SetOutput,
     SetStateRate,
     TakeLease,
 )
@@ -61,6 +62,25 @@ def test_joints_are_asked_for_by_those_who_want_them():
     stage = Stage(Config(joints=True))
     stage.run(100 * MS)
     assert stage.server.hellos[0].features == ("local-model", "channels", "handle", "joints")
+
+
+def test_outputs_are_set_by_those_who_asked_for_them_and_within_their_bounds():
+    stage = named(outputs=True)
+    stage.server.features = ("local-model", "outputs")
+    stage.run(100 * MS)
+    assert "outputs" in stage.server.hellos[0].features
+    client = stage.client
+    wanted = [(1, LampColour(0xFF)), (2, Vibration(0.5, 200.0, 40))]
+    assert all(client.set_output(*one) for one in wanted)
+    stage.run(100 * MS)
+    sent = [control.request for control in stage.requests if isinstance(control.request, SetOutput)]
+    assert sent == [SetOutput(1, *one) for one in wanted]
+    for output, setting in [(8, LampColour(1)), (0, LampColour(0x1000000)), (0, Vibration(1.5)), (0, Vibration(1.0, 10.0))]:
+        with pytest.raises(ValueError, match="set_output"):
+            client.set_output(output, setting)
+    plain = named()
+    plain.run(100 * MS)
+    assert not plain.client.set_output(0, LampColour(1)), "it did not ask for outputs"
 
 
 def test_forces_orders_leases_and_rates_name_the_granted_place():

@@ -24,6 +24,7 @@ from tendon.messages import (
     Hand,
     HandleDescription,
     Joints,
+    LampColour,
     Couple,
     CouplingMethod,
     Disengage,
@@ -32,6 +33,8 @@ from tendon.messages import (
     LinkReport,
     LocalModel,
     Mode,
+    OutputDescription,
+    OutputKind,
     PeerReport,
     PortPhase,
     PortRole,
@@ -40,10 +43,12 @@ from tendon.messages import (
     Role,
     RotationModel,
     Safety,
+    SetOutput,
     SetStateDeadband,
     SetStateRate,
     Torque,
     Turning,
+    Vibration,
     Welcome,
 )
 
@@ -135,6 +140,10 @@ HANDLE = HandleDescription(
     hand=Hand.RIGHT,
 )
 STATE_JOINTS = replace(STATE, joints=Joints((0.5, -0.25, 1.5), (0.125, 0.0, -2.0)))
+PULSE = Vibration(0.5, 200.0, 40)
+OUTPUTS = HandleDescription(
+    1, outputs=(OutputDescription("ring", OutputKind.LAMP), OutputDescription("tip", OutputKind.VIBRATION))
+)
 NAMED_JOINTS = HandleDescription(1, joints=("turntable", "upper arm", "forearm"))
 WALL = ((800.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 STATE_WANTED = replace(STATE, force_wanted=(-8.0, 0.0, 0.5), stiffness_wanted=WALL)
@@ -196,6 +205,9 @@ FRAMES = {
     "control-couple": (73, None, [Control(15, COUPLE)]),
     "control-engage": (74, None, [Control(16, Engage(1))]),
     "control-disengage": (75, None, [Control(17, Disengage(1))]),
+    "control-set-output-lamp": (76, None, [Control(18, SetOutput(1, 0, LampColour(0xFF8000)))]),
+    "control-set-output-vibration": (77, None, [Control(19, SetOutput(1, 1, PULSE))]),
+    "control-ack-outputs": (78, None, [ControlAck(14, Code.OK, handle=OUTPUTS)]),
     "keep-alive": (0, None, []),
     "state": (42, ECHO, [STATE]),
     "force": (43, ECHO, [FORCE]),
@@ -377,6 +389,16 @@ def out_of_bounds():
     yield "no period", Control(1, replace(COUPLE, period_us=0))
     yield "engage device 16", Control(1, Engage(16))
     yield "disengage device 16", Control(1, Disengage(16))
+    yield "output 8", Control(1, SetOutput(1, 8, LampColour(1)))
+    yield "a colour of more than three bytes", Control(1, SetOutput(1, 0, LampColour(0x1000000)))
+    yield "amplitude above 1", Control(1, SetOutput(1, 1, replace(PULSE, amplitude=1.01)))
+    yield "amplitude below 0", Control(1, SetOutput(1, 1, replace(PULSE, amplitude=-0.01)))
+    yield "amplitude NaN", Control(1, SetOutput(1, 1, replace(PULSE, amplitude=nan)))
+    yield "a frequency below 20", Control(1, SetOutput(1, 1, replace(PULSE, frequency=19.9)))
+    yield "a frequency above 1000", Control(1, SetOutput(1, 1, replace(PULSE, frequency=1001.0)))
+    yield "a pulse of more than 10 s", Control(1, SetOutput(1, 1, replace(PULSE, duration_ms=10_001)))
+    yield "an output of no kind", ControlAck(1, Code.OK, handle=replace(OUTPUTS, outputs=(OutputDescription("x", 0),)))
+    yield "nine outputs", ControlAck(1, Code.OK, handle=replace(OUTPUTS, outputs=OUTPUTS.outputs * 4 + OUTPUTS.outputs[:1]))
     yield "request 0", Control(0, SetStateRate(1))
     yield "answer to 0", ControlAck(0, Code.OK)
     yield "code 0", ControlAck(1, 0)

@@ -80,6 +80,23 @@ describe("devices and channels", () => {
     assert.deepEqual(world.server.hellos[0]!.hello.features, ["local-model", "channels", "handle", "joints"]);
   });
 
+  it("outputs are set by those who asked for them, and within their bounds", () => {
+    for (const outputs of [true, false]) {
+      const { world } = controller(1, kFair, { outputs }, { features: ["local-model", "outputs"] });
+      world.runMs(100);
+      assert.equal(world.server.hellos[0]!.hello.features.includes("outputs"), outputs);
+      const setting = { amplitude: 0.5, frequency: 200, durationMs: 40 };
+      const sent = world.client.setOutput(2, setting);
+      world.runMs(20);
+      const requests = world.server.requests.filter(({ kind }) => kind === "setOutput");
+      if (outputs) assert.equal(sent, true);
+      if (outputs) assert.deepEqual(requests, [{ kind: "setOutput", device: 0, output: 2, setting }]);
+      for (const [output, wrong] of [[8, { rgb: 1 }], [0, { rgb: 0x1000000 }], [0, { ...setting, amplitude: 1.5 }]] as const) {
+        assert.throws(() => world.client.setOutput(output, wrong), /setOutput/);
+      }
+    }
+  });
+
   it("the handle is described where the server knows that, anew each session", () => {
     const kHandle: HandleDescription = {
       device: 0, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward"],

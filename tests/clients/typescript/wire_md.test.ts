@@ -16,7 +16,7 @@ import {
   kHeaderSize,
 } from "../../../clients/typescript/src/datagram.js";
 import {
-  Code, CouplingMethod, Hand, Mode, PortPhase, PortRole, reasonNames, Role, Safety, type Couple, type DeviceReport,
+  Code, CouplingMethod, Hand, Mode, OutputKind, PortPhase, PortRole, reasonNames, Role, Safety, type Couple, type DeviceReport,
   type PeerReport, type PortState,
 } from "../../../clients/typescript/src/messages.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
@@ -261,6 +261,18 @@ describe("WIRE.md", () => {
     assert.deepEqual(requestOf("control-couple"), [{ id: 15, request: { kind: "couple", ...kCouple } }]);
     assert.deepEqual(requestOf("control-engage"), [{ id: 16, request: { kind: "engage", device: 1 } }]);
     assert.deepEqual(requestOf("control-disengage"), [{ id: 17, request: { kind: "disengage", device: 1 } }]);
+  });
+
+  it("lamp, pulse and outputs say what the page says", () => {
+    const requestOf = (name: string): unknown => contentOf(name).frames.map((frame) => frame.kind === "control" && frame.value);
+    assert.deepEqual(requestOf("control-set-output-lamp"),
+      [{ id: 18, request: { kind: "setOutput", device: 1, output: 0, setting: { rgb: 0xff8000 } } }]);
+    const setting = { amplitude: 0.5, frequency: 200, durationMs: 40 };
+    assert.deepEqual(requestOf("control-set-output-vibration"),
+      [{ id: 19, request: { kind: "setOutput", device: 1, output: 1, setting } }]);
+    const [ack] = contentOf("control-ack-outputs").frames;
+    const outputs = [{ name: "ring", kind: OutputKind.LAMP }, { name: "tip", kind: OutputKind.VIBRATION }];
+    assert.deepEqual(ack?.kind === "controlAck" && ack.value.handle?.outputs, outputs);
   });
 
   it("a port or a couple out of bounds is left out and counted", () => {

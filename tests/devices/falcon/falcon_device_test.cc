@@ -78,6 +78,27 @@ TEST(FalconDevice, FromThePlugToTheForceItTakesEveryStep) {
   EXPECT_NEAR((bench.written - bench.falcon.force()).norm(), 0, 1e-3);  // it knows its place to half a count
 }
 
+TEST(FalconDevice, ItsRingShowsAClientsColourButNeverRedAloneWhileReady) {
+  Bench bench({.has_firmware = true});
+  bench.falcon.plug();
+  ASSERT_TRUE(bench.reaches(State::kUnhomed, 1s, kForce));
+  const auto shows = [&](const OutputSetting& setting) {
+    bench.device.set_output({}, 0, setting);
+    bench.run(10ms, kForce);
+    return bench.falcon.lamps();
+  };
+  EXPECT_EQ(shows(LampColour{0x0000FF}), falcon::kRed) << "it is not ready";
+  bench.falcon.pull_through();
+  ASSERT_TRUE(bench.reaches(State::kHomed, 100ms, kForce));
+  bench.run(10ms, kForce);
+  EXPECT_EQ(bench.falcon.lamps(), falcon::kBlue);
+  EXPECT_EQ(shows(LampColour{0x80FF7F}), falcon::kRed | falcon::kGreen) << "from half its strength";
+  EXPECT_EQ(shows(LampColour{0xFF0000}), falcon::kGreen);
+  EXPECT_EQ(shows(LampColour{0xFFFFFF}), falcon::kRed | falcon::kGreen | falcon::kBlue);
+  EXPECT_EQ(shows(Vibration{.amplitude = 1}), falcon::kRed | falcon::kGreen | falcon::kBlue) << "it cannot";
+  EXPECT_EQ(shows(LampColour{0}), falcon::kGreen);
+}
+
 TEST(FalconDevice, OneThatHasItsFirmwareIsNotGivenItAgain) {
   Bench bench({.has_firmware = true});
   EXPECT_TRUE(bench.reaches(State::kUnhomed, 200ms));

@@ -280,6 +280,39 @@ TEST(Codec, ACoupleOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
   }
 }
 
+TEST(Codec, ASettingOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  struct BadSetting {
+    const char* what;
+    std::uint32_t output;
+    OutputSetting setting;
+  };
+  const auto pulse = [](double amplitude, double frequency, Duration duration) {
+    return Vibration{.amplitude = amplitude, .frequency = frequency, .duration = duration};
+  };
+  using namespace std::chrono_literals;
+  const BadSetting cases[] = {
+      {"output 8", limits::kMaxOutputs, LampColour{1}},
+      {"a colour of more than three bytes", 0, LampColour{0x1000000}},
+      {"amplitude above 1", 1, pulse(1.01, 0, 1ms)},
+      {"amplitude below 0", 1, pulse(-0.01, 0, 1ms)},
+      {"NaN amplitude", 1, pulse(kNan, 0, 1ms)},
+      {"a frequency below 20 Hz", 1, pulse(1, 19.9, 1ms)},
+      {"a frequency above 1000 Hz", 1, pulse(1, 1001, 1ms)},
+      {"NaN frequency", 1, pulse(1, kNan, 1ms)},
+      {"a pulse of more than 10 s", 1, pulse(1, 0, 10s + 1ns)},
+      {"a pulse of less than nothing", 1, pulse(1, 0, -1ms)},
+  };
+  for (const BadSetting& bad : cases) {
+    const SetOutput wanted{.device = 1, .output = bad.output, .setting = bad.setting};
+    EXPECT_FALSE(in_bounds(wanted)) << bad.what;
+    DataReader reader;
+    const auto* content = read(reader, data(1, {}, Control{.id = 1, .request = wanted}, examples::force()));
+    ASSERT_NE(content, nullptr) << bad.what;
+    EXPECT_EQ(content->invalid, 1U) << bad.what;
+    ASSERT_EQ(content->frames.size(), 1U) << bad.what;
+  }
+}
+
 TEST(Codec, ACoupleWithoutARoleAMethodOrARotationIsRefused) {
   const auto couple = [](std::uint64_t role, std::uint64_t method, bool rotation) {
     constexpr std::uint64_t kOne = 0x3ff0'0000'0000'0000;  // 1.0

@@ -380,6 +380,15 @@ TEST(Codec, EngageAndDisengageComeOutAsTheyWentIn) {
   EXPECT_EQ(std::get<Disengage>(*there(Control{.id = 1, .request = Disengage{.device = 15}}).request).device, 15U);
 }
 
+TEST(Codec, ASettingComesOutAsItWentIn) {
+  for (const SetOutput& in : {examples::lamp(), examples::vibration()}) {
+    const auto out = std::get<SetOutput>(*there(Control{.id = 1, .request = in}).request);
+    EXPECT_EQ(out.device, in.device);
+    EXPECT_EQ(out.output, in.output);
+    EXPECT_EQ(out.setting, in.setting);
+  }
+}
+
 /// With the tag of suite 1, and an echo, as it is on its way.
 TEST(Codec, APortTakes238BytesAndAtMost311AndFitsBesideAState) {
   const auto sealed = [](const auto&... frames) {

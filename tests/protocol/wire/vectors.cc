@@ -173,6 +173,9 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"couple a device", true, 275, 0, request(275, 15, examples::couple())},
       {"engage", true, 276, 0, request(276, 16, Engage{.device = 1})},
       {"disengage", true, 277, 0, request(277, 17, Disengage{.device = 1})},
+      {"set a lamp", true, 278, 0, request(278, 18, examples::lamp())},
+      {"start a pulse", true, 279, 0, request(279, 19, examples::vibration())},
+      {"outputs of a device", false, 280, 0, at(280, examples::outputs_described(15))},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

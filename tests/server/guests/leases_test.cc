@@ -143,7 +143,7 @@ TEST_F(TwoDevices, AControllerArmsAndDisarmsWhileAnotherHoldsTheLease) {
 TEST_F(TwoDevices, WhoCannotBeDisarmedAtOnceIsToldToAskAgain) {
   Client a = controller_of(wall_, "192.0.2.1:4000", "right", "guidance");
   run(milliseconds(300), {&a});
-  while (second_->orders.try_push({HapticOrder::Kind::kRelease})) {
+  while (second_->orders.try_push({.kind = HapticOrder::Kind::kRelease})) {
   }
   loop_->take_notices();
   ASSERT_TRUE(a.client->disarm());

@@ -152,6 +152,22 @@ TEST(SceneHandle, AListOfPressesIsWhatTheHandDoesAndTheDeadManMayBeOneOfThem) {
             std::string::npos);
 }
 
+TEST(SceneHandle, ASimulatedDeviceHasTheOutputsThatItLists) {
+  const std::string hand = "[device.hand]\nprofile = \"stylus\"\n";
+  EXPECT_TRUE(minimal_and(hand).simulated().outputs.empty());
+  const auto outputs = minimal_and(hand +
+                                   "[[device.output]]\nname = \"ring\"\nkind = \"lamp\"\n"
+                                   "[[device.output]]\nname = \"tip\"\nkind = \"vibration\"\n")
+                           .simulated()
+                           .outputs;
+  ASSERT_EQ(outputs.size(), 2U);
+  EXPECT_EQ(outputs[0], (OutputDescription{.name = "ring", .kind = OutputKind::kLamp}));
+  EXPECT_EQ(outputs[1], (OutputDescription{.name = "tip", .kind = OutputKind::kVibration}));
+  const std::string wrong = hand + "[[device.output]]\nname = \"ring\"\nkind = \"light\"\n";
+  const std::string said = error_of_minimal_and(wrong);
+  EXPECT_NE(said.find("device.output[0].kind: expected"), std::string::npos) << said;
+}
+
 TEST(SceneHandle, ErrorsNameFileLineAndKey) {
   const std::string finger = "[device.gripper.hand]\nstiffness_n_per_m = 1\n[device.gripper.hand.motion]\n";
   const struct {

@@ -12,7 +12,7 @@ from google.protobuf.message import DecodeError
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import ChannelRule, Code, Hand, Mat3, Mode, Quat, Role, Safety, Vec3
+from ..messages import ChannelRule, Code, Hand, Mat3, Mode, OutputKind, Quat, Role, Safety, Vec3
 
 
 class OutOfBounds(Exception):
@@ -111,6 +111,7 @@ CODES: dict[int, Code] = {int(code): code for code in Code}
 ROLES: dict[int, Role] = {int(role): role for role in Role}
 SAFETY: dict[int, Safety] = {int(safety): safety for safety in Safety}
 HANDS: dict[int, Hand] = {int(hand): hand for hand in Hand}
+OUTPUT_KINDS: dict[int, OutputKind] = {int(kind): kind for kind in OutputKind}
 RULES: dict[int, ChannelRule] = {int(rule): rule for rule in ChannelRule}
 
 

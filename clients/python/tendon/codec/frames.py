@@ -30,21 +30,25 @@ from ..messages import (
     Grip,
     HandleDescription,
     Joints,
+    LampColour,
     LeaseLost,
     LinkReport,
     LocalModel,
+    OutputDescription,
     PeerReport,
     PortState,
     Quat,
     Rearm,
     Request,
     RotationModel,
+    SetOutput,
     SetStateDeadband,
     SetStateRate,
     TakeLease,
     Torque,
     Turning,
     Vec3,
+    Vibration,
 )
 from . import fields, ports
 
@@ -211,7 +215,34 @@ def _read_control(message: pb.Control) -> Control:
         request = Engage(fields.device(message.engage.device))
     elif op == "disengage":
         request = Disengage(fields.device(message.disengage.device))
+    elif op == "set_output":
+        request = _read_set_output(message.set_output)
     return Control(id=fields.whole(message.id, 1, 2**32), request=request)
+
+
+def _read_set_output(message: pb.SetOutput) -> SetOutput:
+    setting: LampColour | Vibration
+    if message.WhichOneof("setting") == "vibration":
+        pulse = message.vibration
+        setting = Vibration(pulse.amplitude, pulse.frequency_hz, pulse.duration_ms)
+    elif message.WhichOneof("setting") == "rgb":
+        setting = LampColour(message.rgb)
+    else:
+        raise ValueError("an output without a setting")
+    if not is_setting(setting):
+        raise ValueError("a setting out of its bounds")
+    return SetOutput(fields.device(message.device), fields.whole(message.output, 0, limits.MAX_OUTPUTS - 1), setting)
+
+
+def is_setting(setting: LampColour | Vibration) -> bool:
+    """Whether a receiver accepts it."""
+    if isinstance(setting, LampColour):
+        return 0 <= setting.rgb <= 0xFFFFFF
+    return (
+        0 <= setting.amplitude <= 1
+        and 0 <= setting.duration_ms <= limits.MAX_VIBRATION_MS
+        and (setting.frequency == 0 or limits.MIN_VIBRATION_HZ <= setting.frequency <= limits.MAX_VIBRATION_HZ)
+    )
 
 
 def _read_ack(message: pb.ControlAck) -> ControlAck:
@@ -290,12 +321,17 @@ def _write_description(description: DeviceDescription) -> pb.DeviceDescription:
 def _read_handle(message: pb.HandleDescription) -> HandleDescription:
     fields.whole(len(message.buttons), 0, limits.MAX_BUTTONS)
     fields.whole(len(message.joints), 0, limits.MAX_JOINTS)
+    fields.whole(len(message.outputs), 0, limits.MAX_OUTPUTS)
     axes = message.operator_from_device
     return HandleDescription(
         device=fields.device(message.device),
         operator_from_device=fields.quaternion(axes) if message.HasField("operator_from_device") else None,
         buttons=tuple(fields.text(name, limits.MAX_LABEL) for name in message.buttons),
         joints=tuple(fields.text(name, limits.MAX_LABEL) for name in message.joints),
+        outputs=tuple(
+            OutputDescription(fields.text(output.name, limits.MAX_LABEL), fields.enum(fields.OUTPUT_KINDS, output.kind))
+            for output in message.outputs
+        ),
         orientation_measured=message.orientation_measured,
         max_torque=fields.magnitude(message.max_torque_nm),
         gripper_open=fields.magnitude(message.gripper_open_rad) if message.HasField("gripper_open_rad") else None,
@@ -313,6 +349,10 @@ def _write_handle(handle: HandleDescription) -> pb.HandleDescription:
         operator_from_device=None if axes is None else _write_quaternion(axes),
         buttons=names,
         joints=[fields.clip(name, limits.MAX_LABEL) for name in handle.joints[: limits.MAX_JOINTS]],
+        outputs=[
+            pb.OutputDescription(name=fields.clip(output.name, limits.MAX_LABEL), kind=cast(pb.OutputKind, output.kind))
+            for output in handle.outputs[: limits.MAX_OUTPUTS]
+        ],
         orientation_measured=handle.orientation_measured,
         max_torque_nm=handle.max_torque,
         gripper_open_rad=handle.gripper_open,
@@ -490,7 +530,19 @@ def _write_control(frame: Control) -> pb.Control:
         control.engage.CopyFrom(pb.Engage(device=request.device))
     elif isinstance(request, Disengage):
         control.disengage.CopyFrom(pb.Disengage(device=request.device))
+    elif isinstance(request, SetOutput):
+        control.set_output.CopyFrom(_write_set_output(request))
     return control
+
+
+def _write_set_output(request: SetOutput) -> pb.SetOutput:
+    setting = request.setting
+    if isinstance(setting, LampColour):
+        return pb.SetOutput(device=request.device, output=request.output, rgb=setting.rgb)
+    pulse = pb.Vibration(
+        amplitude=setting.amplitude, frequency_hz=setting.frequency, duration_ms=setting.duration_ms
+    )
+    return pb.SetOutput(device=request.device, output=request.output, vibration=pulse)
 
 
 def write(frame: Frame) -> pb.Frame:

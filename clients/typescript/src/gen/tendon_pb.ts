@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByKLAwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIAEIGCgRib2R5IicKBFZlYzMSCQoBeBgBIAEoARIJCgF5GAIgASgBEgkKAXoYAyABKAEiMgoEUXVhdBIJCgF3GAEgASgBEgkKAXgYAiABKAESCQoBeRgDIAEoARIJCgF6GAQgASgBIrwGCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKC29yaWVudGF0aW9uGA8gASgLMg8udGVuZG9uLnYxLlF1YXQSLwoWYW5ndWxhcl92ZWxvY2l0eV9yYWRwcxgQIAEoCzIPLnRlbmRvbi52MS5WZWMzEg8KB2J1dHRvbnMYESABKAcSKgoRdG9ycXVlX2FwcGxpZWRfbm0YEiABKAsyDy50ZW5kb24udjEuVmVjMxIYCgtncmlwcGVyX3JhZBgTIAEoAUgAiAEBEiMKFmdyaXBwZXJfdmVsb2NpdHlfcmFkcHMYFCABKAFIAYgBARIkChdncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbhgVIAEoAUgCiAEBEiUKDGhhbmRfZm9yY2VfbhgWIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKCWpvaW50X3JhZBgXIAMoAUICEAESIAoUam9pbnRfdmVsb2NpdHlfcmFkcHMYGCADKAFCAhABEiAKFHN0aWZmbmVzc193YW50ZWRfbnBtGBkgAygBQgIQAUIOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi8wMKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIjCgZjb3VwbGUYCyABKAsyES50ZW5kb24udjEuQ291cGxlSAASIwoGZW5nYWdlGAwgASgLMhEudGVuZG9uLnYxLkVuZ2FnZUgAEikKCWRpc2VuZ2FnZRgNIAEoCzIULnRlbmRvbi52MS5EaXNlbmdhZ2VIABIqCgpsZWFzZV9sb3N0GAcgASgLMhQudGVuZG9uLnYxLkxlYXNlTG9zdEgAQgQKAm9wIioKDFNldFN0YXRlUmF0ZRIKCgJoehgBIAEoDRIOCgZkZXZpY2UYAiABKA0iTAoQU2V0U3RhdGVEZWFkYmFuZBINCgVzaGFyZRgBIAEoARIRCglmbG9vcl9tcHMYAiABKAESFgoObWF4X3NpbGVuY2VfdXMYAyABKA0iFwoFUmVhcm0SDgoGZGV2aWNlGAEgASgNIhgKBkRpc2FybRIOCgZkZXZpY2UYASABKA0i2QIKBkNvdXBsZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIhCgRyb2xlGAMgASgOMhMudGVuZG9uLnYxLlBvcnRSb2xlEikKBm1ldGhvZBgEIAEoDjIZLnRlbmRvbi52MS5Db3VwbGluZ01ldGhvZBIWCg5wb3NpdGlvbl9zY2FsZRgFIAEoARITCgtmb3JjZV9zY2FsZRgGIAEoARIhCghyb3RhdGlvbhgHIAEoCzIPLnRlbmRvbi52MS5RdWF0EgwKBGF4ZXMYCCABKA0SFQoNc3RpZmZuZXNzX25wbRgJIAEoARIbChNtdXR1YWxfZGFtcGluZ19uc3BtGAogASgBEhQKDGRhbXBpbmdfbnNwbRgLIAEoARIWCg5hZGFwdF90b19kZWxheRgMIAEoCBINCgVwdXJzZRgNIAEoCBIRCglwZXJpb2RfdXMYDiABKA0iGAoGRW5nYWdlEg4KBmRldmljZRgBIAEoDSIbCglEaXNlbmdhZ2USDgoGZGV2aWNlGAEgASgNIioKCERlc2NyaWJlEg4KBmRldmljZRgBIAEoDRIOCgZoYW5kbGUYAiABKAgiLAoJVGFrZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIiwKCUdpdmVMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSI4CglMZWFzZUxvc3QSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SCgoCdG8YAyABKAkitAEKCkNvbnRyb2xBY2sSCgoCaWQYASABKA0SHQoEY29kZRgCIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgDIAEoCRIPCgd3YWl0X21zGAQgASgNEiwKBmRldmljZRgFIAEoCzIcLnRlbmRvbi52MS5EZXZpY2VEZXNjcmlwdGlvbhIsCgZoYW5kbGUYBiABKAsyHC50ZW5kb24udjEuSGFuZGxlRGVzY3JpcHRpb24i6gIKEURldmljZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRIMCgRuYW1lGAIgASgJEg0KBW1vZGVsGAMgASgJEhQKDHBvc2l0aW9uX2RvZhgEIAEoDRIRCglmb3JjZV9kb2YYBSABKA0SKAoPd29ya3NwYWNlX21pbl9tGAYgASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPd29ya3NwYWNlX21heF9tGAcgASgLMg8udGVuZG9uLnYxLlZlYzMSEwoLbWF4X2ZvcmNlX24YCCABKAESGgoSY29udGludW91c19mb3JjZV9uGAkgASgBEhkKEW1heF9zdGlmZm5lc3NfbnBtGAogASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgLIAEoARIPCgdsb29wX2h6GAwgASgNEi8KCGNoYW5uZWxzGA0gAygLMh0udGVuZG9uLnYxLkNoYW5uZWxEZXNjcmlwdGlvbiKnAgoRSGFuZGxlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEi0KFG9wZXJhdG9yX2Zyb21fZGV2aWNlGAIgASgLMg8udGVuZG9uLnYxLlF1YXQSDwoHYnV0dG9ucxgDIAMoCRIcChRvcmllbnRhdGlvbl9tZWFzdXJlZBgEIAEoCBIVCg1tYXhfdG9ycXVlX25tGAUgASgBEh0KEGdyaXBwZXJfb3Blbl9yYWQYBiABKAFIAIgBARIbChNtYXhfZ3JpcHBlcl9mb3JjZV9uGAcgASgBEg0KBWdyb3VwGAggASgJEh0KBGhhbmQYCSABKA4yDy50ZW5kb24udjEuSGFuZBIOCgZqb2ludHMYCiADKAlCEwoRX2dyaXBwZXJfb3Blbl9yYWQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIixAMKCVBvcnRTdGF0ZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVlcG9jaBgDIAEoBBIQCghzZXF1ZW5jZRgEIAEoBBIVCg1hbnN3ZXJzX2Vwb2NoGAUgASgEEg8KB2Fuc3dlcnMYBiABKAQSDwoHdGltZV9ucxgHIAEoEBIVCg1yb3VuZF90cmlwX25zGAggASgEEiMKBXBoYXNlGAkgASgOMhQudGVuZG9uLnYxLlBvcnRQaGFzZRISCgplbmdhZ2VtZW50GAogASgEEg8KB2J1dHRvbnMYCyABKAcSIwoKcG9zaXRpb25fbRgMIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgNIAEoCzIPLnRlbmRvbi52MS5WZWMzEiAKB2ZvcmNlX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9jb250YWN0X2ZvcmNlX24YDyABKAsyDy50ZW5kb24udjEuVmVjMxIRCglhY2NvdW50X2oYECABKAESDgoGbmVlZF9qGBEgASgBEg8KB2dpdmVuX2oYEiABKAESDwoHdGFrZW5fahgTIAEoASL0AQoMRGV2aWNlUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmRldmljZRgEIAEoDRINCgVzdGVwcxgFIAEoBBIOCgZtaXNzZWQYBiABKAQSEAoIb3ZlcnJ1bnMYByABKAQSDgoGdW5zZWVuGAggASgEEhwKEGxhdGVuZXNzX3VzX2xvZzIYCSADKARCAhABEiEKBnNhZmV0eRgKIAEoDjIRLnRlbmRvbi52MS5TYWZldHkSDQoFZmF1bHQYCyABKAkSEAoIZGVncmFkZWQYDCABKAkijgEKClBlZXJSZXBvcnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SDAoEbmFtZRgDIAEoCRIUCgxzdGF0ZV9vbmVfaW4YBCABKA0SFgoOZm9yY2VzX3JlZnVzZWQYBSABKAgSIwoEbGluaxgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0IpIBCgVIZWxsbxITCgt2ZXJzaW9uX21pbhgBIAEoDRITCgt2ZXJzaW9uX21heBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSDAoEbmFtZRgEIAEoCRIQCghmZWF0dXJlcxgFIAMoCRIgCgZjbGFpbXMYBiADKAsyEC50ZW5kb24udjEuQ2xhaW0iRwoFQ2xhaW0SDgoGZGV2aWNlGAEgASgJEg8KB2NoYW5uZWwYAiABKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlIl4KBkFuc3dlchIlCgd3ZWxjb21lGAEgASgLMhIudGVuZG9uLnYxLldlbGNvbWVIABIlCgdyZWZ1c2VkGAIgASgLMhIudGVuZG9uLnYxLlJlZnVzZWRIAEIGCgRib2R5IusBCgdXZWxjb21lEg8KB3ZlcnNpb24YASABKA0SEAoIZmVhdHVyZXMYAiADKAkSHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEhMKC2RldmljZV9uYW1lGAQgASgJEhMKC21heF9mb3JjZV9uGAUgASgBEh0KFXBvc2l0aW9uX3Jlc29sdXRpb25fbRgGIAEoARIPCgdsb29wX2h6GAcgASgNEhIKCnRpbWVvdXRfbXMYCCABKA0SDgoGc2VydmVyGAkgASgJEiAKBmdyYW50cxgKIAMoCzIQLnRlbmRvbi52MS5HcmFudCJHCgVHcmFudBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiYgoHUmVmdXNlZBIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAIgASgJEhMKC3ZlcnNpb25fbWluGAMgASgNEhMKC3ZlcnNpb25fbWF4GAQgASgNKoUBCgRNb2RlEhQKEE1PREVfVU5TUEVDSUZJRUQQABINCglNT0RFX0lETEUQARIPCgtNT0RFX0FDVElWRRACEhAKDE1PREVfSE9MRElORxADEhEKDU1PREVfREVDQVlJTkcQBBISCg5NT0RFX1NBRkVfU1RPUBAFEg4KCk1PREVfRkFVTFQQBipTCghQb3J0Um9sZRIZChVQT1JUX1JPTEVfVU5TUEVDSUZJRUQQABIUChBQT1JUX1JPTEVfTEVBREVSEAESFgoSUE9SVF9ST0xFX0ZPTExPV0VSEAIqfAoOQ291cGxpbmdNZXRob2QSHwobQ09VUExJTkdfTUVUSE9EX1VOU1BFQ0lGSUVEEAASJQohQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX1BPU0lUSU9OEAESIgoeQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX0ZPUkNFEAIqMwoESGFuZBIMCghIQU5EX0FOWRAAEg0KCUhBTkRfTEVGVBABEg4KCkhBTkRfUklHSFQQAipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqygEKCVBvcnRQaGFzZRIaChZQT1JUX1BIQVNFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9QSEFTRV9BTE9ORRABEhYKElBPUlRfUEhBU0VfQ09VUExFRBACEhcKE1BPUlRfUEhBU0VfQUxJR05JTkcQAxIWChJQT1JUX1BIQVNFX0VOR0FHRUQQBBIXChNQT1JUX1BIQVNFX0NMVVRDSEVEEAUSEwoPUE9SVF9QSEFTRV9MT1NUEAYSFAoQUE9SVF9QSEFTRV9GQVVMVBAHKrwBCgZTYWZldHkSFgoSU0FGRVRZX1VOU1BFQ0lGSUVEEAASEQoNU0FGRVRZX0FCU0VOVBABEhIKDlNBRkVUWV9PUEVOSU5HEAISEwoPU0FGRVRZX0ZJUk1XQVJFEAMSEgoOU0FGRVRZX1VOSE9NRUQQBBIQCgxTQUZFVFlfSE9NRUQQBRIQCgxTQUZFVFlfQVJNRUQQBhIQCgxTQUZFVFlfRkFVTFQQBxIUChBTQUZFVFlfVU5HVUFSREVEEAgqvQEKBENvZGUSFAoQQ09ERV9VTlNQRUNJRklFRBAAEgsKB0NPREVfT0sQARIQCgxDT0RFX0lOVkFMSUQQAhIUChBDT0RFX1VOU1VQUE9SVEVEEAMSDQoJQ09ERV9CVVNZEAQSDwoLQ09ERV9ERU5JRUQQBRIRCg1DT0RFX1NIVVRET1dOEAYSEgoOQ09ERV9USU1FRF9PVVQQBxIQCgxDT0RFX0VYUElSRUQQCBIRCg1DT0RFX1JFUExBQ0VEEAkqRAoEUm9sZRIUChBST0xFX1VOU1BFQ0lGSUVEEAASEQoNUk9MRV9PQlNFUlZFUhABEhMKD1JPTEVfQ09OVFJPTExFUhACYgZwcm90bzM");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByKLAwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIAEIGCgRib2R5IicKBFZlYzMSCQoBeBgBIAEoARIJCgF5GAIgASgBEgkKAXoYAyABKAEiMgoEUXVhdBIJCgF3GAEgASgBEgkKAXgYAiABKAESCQoBeRgDIAEoARIJCgF6GAQgASgBIrwGCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKC29yaWVudGF0aW9uGA8gASgLMg8udGVuZG9uLnYxLlF1YXQSLwoWYW5ndWxhcl92ZWxvY2l0eV9yYWRwcxgQIAEoCzIPLnRlbmRvbi52MS5WZWMzEg8KB2J1dHRvbnMYESABKAcSKgoRdG9ycXVlX2FwcGxpZWRfbm0YEiABKAsyDy50ZW5kb24udjEuVmVjMxIYCgtncmlwcGVyX3JhZBgTIAEoAUgAiAEBEiMKFmdyaXBwZXJfdmVsb2NpdHlfcmFkcHMYFCABKAFIAYgBARIkChdncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbhgVIAEoAUgCiAEBEiUKDGhhbmRfZm9yY2VfbhgWIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKCWpvaW50X3JhZBgXIAMoAUICEAESIAoUam9pbnRfdmVsb2NpdHlfcmFkcHMYGCADKAFCAhABEiAKFHN0aWZmbmVzc193YW50ZWRfbnBtGBkgAygBQgIQAUIOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEinwQKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpzZXRfb3V0cHV0GAogASgLMhQudGVuZG9uLnYxLlNldE91dHB1dEgAEiMKBmNvdXBsZRgLIAEoCzIRLnRlbmRvbi52MS5Db3VwbGVIABIjCgZlbmdhZ2UYDCABKAsyES50ZW5kb24udjEuRW5nYWdlSAASKQoJZGlzZW5nYWdlGA0gASgLMhQudGVuZG9uLnYxLkRpc2VuZ2FnZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSLZAgoGQ291cGxlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEiEKBHJvbGUYAyABKA4yEy50ZW5kb24udjEuUG9ydFJvbGUSKQoGbWV0aG9kGAQgASgOMhkudGVuZG9uLnYxLkNvdXBsaW5nTWV0aG9kEhYKDnBvc2l0aW9uX3NjYWxlGAUgASgBEhMKC2ZvcmNlX3NjYWxlGAYgASgBEiEKCHJvdGF0aW9uGAcgASgLMg8udGVuZG9uLnYxLlF1YXQSDAoEYXhlcxgIIAEoDRIVCg1zdGlmZm5lc3NfbnBtGAkgASgBEhsKE211dHVhbF9kYW1waW5nX25zcG0YCiABKAESFAoMZGFtcGluZ19uc3BtGAsgASgBEhYKDmFkYXB0X3RvX2RlbGF5GAwgASgIEg0KBXB1cnNlGA0gASgIEhEKCXBlcmlvZF91cxgOIAEoDSIYCgZFbmdhZ2USDgoGZGV2aWNlGAEgASgNIhsKCURpc2VuZ2FnZRIOCgZkZXZpY2UYASABKA0icAoJU2V0T3V0cHV0Eg4KBmRldmljZRgBIAEoDRIOCgZvdXRwdXQYAiABKA0SDQoDcmdiGAMgASgHSAASKQoJdmlicmF0aW9uGAQgASgLMhQudGVuZG9uLnYxLlZpYnJhdGlvbkgAQgkKB3NldHRpbmciSQoJVmlicmF0aW9uEhEKCWFtcGxpdHVkZRgBIAEoARIUCgxmcmVxdWVuY3lfaHoYAiABKAESEwoLZHVyYXRpb25fbXMYAyABKA0iKgoIRGVzY3JpYmUSDgoGZGV2aWNlGAEgASgNEg4KBmhhbmRsZRgCIAEoCCIsCglUYWtlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iLAoJR2l2ZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIjgKCUxlYXNlTG9zdBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIKCgJ0bxgDIAEoCSK0AQoKQ29udHJvbEFjaxIKCgJpZBgBIAEoDRIdCgRjb2RlGAIgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAMgASgJEg8KB3dhaXRfbXMYBCABKA0SLAoGZGV2aWNlGAUgASgLMhwudGVuZG9uLnYxLkRldmljZURlc2NyaXB0aW9uEiwKBmhhbmRsZRgGIAEoCzIcLnRlbmRvbi52MS5IYW5kbGVEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uItYCChFIYW5kbGVEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SLQoUb3BlcmF0b3JfZnJvbV9kZXZpY2UYAiABKAsyDy50ZW5kb24udjEuUXVhdBIPCgdidXR0b25zGAMgAygJEhwKFG9yaWVudGF0aW9uX21lYXN1cmVkGAQgASgIEhUKDW1heF90b3JxdWVfbm0YBSABKAESHQoQZ3JpcHBlcl9vcGVuX3JhZBgGIAEoAUgAiAEBEhsKE21heF9ncmlwcGVyX2ZvcmNlX24YByABKAESDQoFZ3JvdXAYCCABKAkSHQoEaGFuZBgJIAEoDjIPLnRlbmRvbi52MS5IYW5kEg4KBmpvaW50cxgKIAMoCRItCgdvdXRwdXRzGAsgAygLMhwudGVuZG9uLnYxLk91dHB1dERlc2NyaXB0aW9uQhMKEV9ncmlwcGVyX29wZW5fcmFkIkYKEU91dHB1dERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSIwoEa2luZBgCIAEoDjIVLnRlbmRvbi52MS5PdXRwdXRLaW5kImoKEkNoYW5uZWxEZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiQKBHJ1bGUYAiABKA4yFi50ZW5kb24udjEuQ2hhbm5lbFJ1bGUSEAoIbGVhc2VfbXMYAyABKA0SDgoGaG9sZGVyGAQgASgJIjQKA0J5ZRIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGcmVhc29uGAIgASgJIt4ECgpMaW5rUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmZvcmNlcxgEIAEoBBITCgtsYXRlX3NlcnZlchgFIAEoBBIUCgxsYXRlX25ldHdvcmsYBiABKAQSEwoLbGF0ZV9lbmdpbmUYByABKAQSFQoNd29yc3RfbGF0ZV9ucxgIIAEoBBIWCg5sb25nZXN0X2dhcF9ucxgJIAEoBBIlCgpyb3VuZF90cmlwGAogASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19zZXJ2ZXIYCyABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX2NsaWVudBgMIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSFwoPY2xvY2tfb2Zmc2V0X25zGA0gASgSEhcKD2Nsb2NrX2RyaWZ0X3BwbRgOIAEoARIWCg5jbG9ja19lcnJvcl9ucxgPIAEoBBIQCghyZWNlaXZlZBgQIAEoBBIMCgRsb3N0GBEgASgEEhEKCXJlb3JkZXJlZBgSIAEoBBISCgpkdXBsaWNhdGVkGBMgASgEEg0KBXdvcmRzGBQgASgJEhQKDGxhdGVfdW5rbm93bhgVIAEoBBIaChJyZWZ1c2VkX25vdF9maW5pdGUYFiABKAQSHQoVcmVmdXNlZF9vdXRfb2ZfYm91bmRzGBcgASgEEhwKFHJlZnVzZWRfdW5rbm93bl90aWNrGBggASgEEhwKFHJlZnVzZWRfb2xkX3NlcXVlbmNlGBkgASgEIisKBkRlbGF5cxIRCgltZWRpYW5fbnMYASABKBISDgoGcDk5X25zGAIgASgSIsQDCglQb3J0U3RhdGUSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SDQoFZXBvY2gYAyABKAQSEAoIc2VxdWVuY2UYBCABKAQSFQoNYW5zd2Vyc19lcG9jaBgFIAEoBBIPCgdhbnN3ZXJzGAYgASgEEg8KB3RpbWVfbnMYByABKBASFQoNcm91bmRfdHJpcF9ucxgIIAEoBBIjCgVwaGFzZRgJIAEoDjIULnRlbmRvbi52MS5Qb3J0UGhhc2USEgoKZW5nYWdlbWVudBgKIAEoBBIPCgdidXR0b25zGAsgASgHEiMKCnBvc2l0aW9uX20YDCABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYDSABKAsyDy50ZW5kb24udjEuVmVjMxIgCgdmb3JjZV9uGA4gASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPY29udGFjdF9mb3JjZV9uGA8gASgLMg8udGVuZG9uLnYxLlZlYzMSEQoJYWNjb3VudF9qGBAgASgBEg4KBm5lZWRfahgRIAEoARIPCgdnaXZlbl9qGBIgASgBEg8KB3Rha2VuX2oYEyABKAEi9AEKDERldmljZVJlcG9ydBIOCgZudW1iZXIYASABKAQSEAoIdW50aWxfbnMYAiABKBASDwoHc3Bhbl9ucxgDIAEoBBIOCgZkZXZpY2UYBCABKA0SDQoFc3RlcHMYBSABKAQSDgoGbWlzc2VkGAYgASgEEhAKCG92ZXJydW5zGAcgASgEEg4KBnVuc2VlbhgIIAEoBBIcChBsYXRlbmVzc191c19sb2cyGAkgAygEQgIQARIhCgZzYWZldHkYCiABKA4yES50ZW5kb24udjEuU2FmZXR5Eg0KBWZhdWx0GAsgASgJEhAKCGRlZ3JhZGVkGAwgASgJIo4BCgpQZWVyUmVwb3J0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgwKBG5hbWUYAyABKAkSFAoMc3RhdGVfb25lX2luGAQgASgNEhYKDmZvcmNlc19yZWZ1c2VkGAUgASgIEiMKBGxpbmsYBiABKAsyFS50ZW5kb24udjEuTGlua1JlcG9ydCKSAQoFSGVsbG8SEwoLdmVyc2lvbl9taW4YASABKA0SEwoLdmVyc2lvbl9tYXgYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlEgwKBG5hbWUYBCABKAkSEAoIZmVhdHVyZXMYBSADKAkSIAoGY2xhaW1zGAYgAygLMhAudGVuZG9uLnYxLkNsYWltIkcKBUNsYWltEg4KBmRldmljZRgBIAEoCRIPCgdjaGFubmVsGAIgASgJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJeCgZBbnN3ZXISJQoHd2VsY29tZRgBIAEoCzISLnRlbmRvbi52MS5XZWxjb21lSAASJQoHcmVmdXNlZBgCIAEoCzISLnRlbmRvbi52MS5SZWZ1c2VkSABCBgoEYm9keSLrAQoHV2VsY29tZRIPCgd2ZXJzaW9uGAEgASgNEhAKCGZlYXR1cmVzGAIgAygJEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRITCgtkZXZpY2VfbmFtZRgEIAEoCRITCgttYXhfZm9yY2VfbhgFIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YBiABKAESDwoHbG9vcF9oehgHIAEoDRISCgp0aW1lb3V0X21zGAggASgNEg4KBnNlcnZlchgJIAEoCRIgCgZncmFudHMYCiADKAsyEC50ZW5kb24udjEuR3JhbnQiRwoFR3JhbnQSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SHQoEcm9sZRgDIAEoDjIPLnRlbmRvbi52MS5Sb2xlImIKB1JlZnVzZWQSHQoEY29kZRgBIAEoDjIPLnRlbmRvbi52MS5Db2RlEg4KBmRldGFpbBgCIAEoCRITCgt2ZXJzaW9uX21pbhgDIAEoDRITCgt2ZXJzaW9uX21heBgEIAEoDSqFAQoETW9kZRIUChBNT0RFX1VOU1BFQ0lGSUVEEAASDQoJTU9ERV9JRExFEAESDwoLTU9ERV9BQ1RJVkUQAhIQCgxNT0RFX0hPTERJTkcQAxIRCg1NT0RFX0RFQ0FZSU5HEAQSEgoOTU9ERV9TQUZFX1NUT1AQBRIOCgpNT0RFX0ZBVUxUEAYqUwoIUG9ydFJvbGUSGQoVUE9SVF9ST0xFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9ST0xFX0xFQURFUhABEhYKElBPUlRfUk9MRV9GT0xMT1dFUhACKnwKDkNvdXBsaW5nTWV0aG9kEh8KG0NPVVBMSU5HX01FVEhPRF9VTlNQRUNJRklFRBAAEiUKIUNPVVBMSU5HX01FVEhPRF9QT1NJVElPTl9QT1NJVElPThABEiIKHkNPVVBMSU5HX01FVEhPRF9QT1NJVElPTl9GT1JDRRACKksKCk91dHB1dEtpbmQSFgoST1VUUFVUX1VOU1BFQ0lGSUVEEAASDwoLT1VUUFVUX0xBTVAQARIUChBPVVRQVVRfVklCUkFUSU9OEAIqMwoESGFuZBIMCghIQU5EX0FOWRAAEg0KCUhBTkRfTEVGVBABEg4KCkhBTkRfUklHSFQQAipcCgtDaGFubmVsUnVsZRIcChhDSEFOTkVMX1JVTEVfVU5TUEVDSUZJRUQQABIUChBDSEFOTkVMX1JVTEVfU1VNEAESGQoVQ0hBTk5FTF9SVUxFX1BSSU9SSVRZEAIqygEKCVBvcnRQaGFzZRIaChZQT1JUX1BIQVNFX1VOU1BFQ0lGSUVEEAASFAoQUE9SVF9QSEFTRV9BTE9ORRABEhYKElBPUlRfUEhBU0VfQ09VUExFRBACEhcKE1BPUlRfUEhBU0VfQUxJR05JTkcQAxIWChJQT1JUX1BIQVNFX0VOR0FHRUQQBBIXChNQT1JUX1BIQVNFX0NMVVRDSEVEEAUSEwoPUE9SVF9QSEFTRV9MT1NUEAYSFAoQUE9SVF9QSEFTRV9GQVVMVBAHKrwBCgZTYWZldHkSFgoSU0FGRVRZX1VOU1BFQ0lGSUVEEAASEQoNU0FGRVRZX0FCU0VOVBABEhIKDlNBRkVUWV9PUEVOSU5HEAISEwoPU0FGRVRZX0ZJUk1XQVJFEAMSEgoOU0FGRVRZX1VOSE9NRUQQBBIQCgxTQUZFVFlfSE9NRUQQBRIQCgxTQUZFVFlfQVJNRUQQBhIQCgxTQUZFVFlfRkFVTFQQBxIUChBTQUZFVFlfVU5HVUFSREVEEAgqvQEKBENvZGUSFAoQQ09ERV9VTlNQRUNJRklFRBAAEgsKB0NPREVfT0sQARIQCgxDT0RFX0lOVkFMSUQQAhIUChBDT0RFX1VOU1VQUE9SVEVEEAMSDQoJQ09ERV9CVVNZEAQSDwoLQ09ERV9ERU5JRUQQBRIRCg1DT0RFX1NIVVRET1dOEAYSEgoOQ09ERV9USU1FRF9PVVQQBxIQCgxDT0RFX0VYUElSRUQQCBIRCg1DT0RFX1JFUExBQ0VEEAkqRAoEUm9sZRIUChBST0xFX1VOU1BFQ0lGSUVEEAASEQoNUk9MRV9PQlNFUlZFUhABEhMKD1JPTEVfQ09OVFJPTExFUhACYgZwcm90bzM");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -757,6 +757,12 @@ export type Control = Message<"tendon.v1.Control"> & {
     case: "disarm";
   } | {
     /**
+     * @generated from field: tendon.v1.SetOutput set_output = 10;
+     */
+    value: SetOutput;
+    case: "setOutput";
+  } | {
+    /**
      * @generated from field: tendon.v1.Couple couple = 11;
      */
     value: Couple;
@@ -1055,6 +1061,92 @@ export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
   messageDesc(file_tendon, 18);
 
 /**
+ * Sets a lamp of the device, or makes it vibrate: from a controller of the device that holds one of its channels. To a
+ * server that granted the feature "outputs". An output that its client has set is off when the client loses its channel
+ * or leaves, and when the device is disarmed. CODE_INVALID: the device has no such output, or not of that kind.
+ *
+ * @generated from message tendon.v1.SetOutput
+ */
+export type SetOutput = Message<"tendon.v1.SetOutput"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0, 7]: number in HandleDescription.outputs
+   *
+   * @generated from field: uint32 output = 2;
+   */
+  output: number;
+
+  /**
+   * one of them, or it is refused
+   *
+   * @generated from oneof tendon.v1.SetOutput.setting
+   */
+  setting: {
+    /**
+     * [0, 16777215]: of a lamp, 0xRRGGBB; 0 = off: it shows what the device itself shows
+     *
+     * @generated from field: fixed32 rgb = 3;
+     */
+    value: number;
+    case: "rgb";
+  } | {
+    /**
+     * @generated from field: tendon.v1.Vibration vibration = 4;
+     */
+    value: Vibration;
+    case: "vibration";
+  } | { case: undefined; value?: undefined };
+};
+
+/**
+ * Describes the message tendon.v1.SetOutput.
+ * Use `create(SetOutputSchema)` to create a new message.
+ */
+export const SetOutputSchema: GenMessage<SetOutput> = /*@__PURE__*/
+  messageDesc(file_tendon, 19);
+
+/**
+ * A pulse. It ends by itself; another one takes its place at once.
+ *
+ * @generated from message tendon.v1.Vibration
+ */
+export type Vibration = Message<"tendon.v1.Vibration"> & {
+  /**
+   * [0, 1]: of the strongest that the output can; 0 = off
+   *
+   * @generated from field: double amplitude = 1;
+   */
+  amplitude: number;
+
+  /**
+   * 0, the output's own, or 20 … 1000
+   *
+   * @generated from field: double frequency_hz = 2;
+   */
+  frequencyHz: number;
+
+  /**
+   * [0, 10000]
+   *
+   * @generated from field: uint32 duration_ms = 3;
+   */
+  durationMs: number;
+};
+
+/**
+ * Describes the message tendon.v1.Vibration.
+ * Use `create(VibrationSchema)` to create a new message.
+ */
+export const VibrationSchema: GenMessage<Vibration> = /*@__PURE__*/
+  messageDesc(file_tendon, 20);
+
+/**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
  *
  * @generated from message tendon.v1.Describe
@@ -1080,7 +1172,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 21);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -1109,7 +1201,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 22);
 
 /**
  * I do not want to be it any more.
@@ -1137,7 +1229,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 23);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -1172,7 +1264,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 24);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -1224,7 +1316,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 25);
 
 /**
  * What a device is and can do.
@@ -1327,7 +1419,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 26);
 
 /**
  * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
@@ -1404,6 +1496,15 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
    * @generated from field: repeated string joints = 10;
    */
   joints: string[];
+
+  /**
+   * Only to a client that named the feature "outputs": what SetOutput can set, by number
+   *
+   * [0, 8] entries
+   *
+   * @generated from field: repeated tendon.v1.OutputDescription outputs = 11;
+   */
+  outputs: OutputDescription[];
 };
 
 /**
@@ -1411,7 +1512,31 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
  * Use `create(HandleDescriptionSchema)` to create a new message.
  */
 export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 27);
+
+/**
+ * @generated from message tendon.v1.OutputDescription
+ */
+export type OutputDescription = Message<"tendon.v1.OutputDescription"> & {
+  /**
+   * [0, 24] bytes
+   *
+   * @generated from field: string name = 1;
+   */
+  name: string;
+
+  /**
+   * @generated from field: tendon.v1.OutputKind kind = 2;
+   */
+  kind: OutputKind;
+};
+
+/**
+ * Describes the message tendon.v1.OutputDescription.
+ * Use `create(OutputDescriptionSchema)` to create a new message.
+ */
+export const OutputDescriptionSchema: GenMessage<OutputDescription> = /*@__PURE__*/
+  messageDesc(file_tendon, 28);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -1451,7 +1576,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 29);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -1475,7 +1600,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 30);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1659,7 +1784,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 31);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1685,7 +1810,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 32);
 
 /**
  * One end of a coupling of two devices, told to the other. Vectors are in the base frame and the scale of the SENDER's
@@ -1831,7 +1956,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
  * Use `create(PortStateSchema)` to create a new message.
  */
 export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 33);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -1931,7 +2056,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 34);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -1987,7 +2112,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 32);
+  messageDesc(file_tendon, 35);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -2037,7 +2162,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 33);
+  messageDesc(file_tendon, 36);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -2070,7 +2195,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 34);
+  messageDesc(file_tendon, 37);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -2099,7 +2224,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 35);
+  messageDesc(file_tendon, 38);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -2179,7 +2304,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 36);
+  messageDesc(file_tendon, 39);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -2212,7 +2337,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 37);
+  messageDesc(file_tendon, 40);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -2248,7 +2373,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 38);
+  messageDesc(file_tendon, 41);
 
 /**
  * @generated from enum tendon.v1.Mode
@@ -2367,6 +2492,36 @@ export const CouplingMethodSchema: GenEnum<CouplingMethod> = /*@__PURE__*/
   enumDesc(file_tendon, 2);
 
 /**
+ * @generated from enum tendon.v1.OutputKind
+ */
+export enum OutputKind {
+  /**
+   * refused
+   *
+   * @generated from enum value: OUTPUT_UNSPECIFIED = 0;
+   */
+  OUTPUT_UNSPECIFIED = 0,
+
+  /**
+   * @generated from enum value: OUTPUT_LAMP = 1;
+   */
+  OUTPUT_LAMP = 1,
+
+  /**
+   * not by the motors of the position
+   *
+   * @generated from enum value: OUTPUT_VIBRATION = 2;
+   */
+  OUTPUT_VIBRATION = 2,
+}
+
+/**
+ * Describes the enum tendon.v1.OutputKind.
+ */
+export const OutputKindSchema: GenEnum<OutputKind> = /*@__PURE__*/
+  enumDesc(file_tendon, 3);
+
+/**
  * Which hand holds a device.
  *
  * @generated from enum tendon.v1.Hand
@@ -2392,7 +2547,7 @@ export enum Hand {
  * Describes the enum tendon.v1.Hand.
  */
 export const HandSchema: GenEnum<Hand> = /*@__PURE__*/
-  enumDesc(file_tendon, 3);
+  enumDesc(file_tendon, 4);
 
 /**
  * How a device makes one force of its channels': those of the sum, and the first fresh one of those with a priority,
@@ -2427,7 +2582,7 @@ export enum ChannelRule {
  * Describes the enum tendon.v1.ChannelRule.
  */
 export const ChannelRuleSchema: GenEnum<ChannelRule> = /*@__PURE__*/
-  enumDesc(file_tendon, 4);
+  enumDesc(file_tendon, 5);
 
 /**
  * Where an end of a coupling stands.
@@ -2494,7 +2649,7 @@ export enum PortPhase {
  * Describes the enum tendon.v1.PortPhase.
  */
 export const PortPhaseSchema: GenEnum<PortPhase> = /*@__PURE__*/
-  enumDesc(file_tendon, 5);
+  enumDesc(file_tendon, 6);
 
 /**
  * Where a device stands between the plug and the force.
@@ -2570,7 +2725,7 @@ export enum Safety {
  * Describes the enum tendon.v1.Safety.
  */
 export const SafetySchema: GenEnum<Safety> = /*@__PURE__*/
-  enumDesc(file_tendon, 6);
+  enumDesc(file_tendon, 7);
 
 /**
  * @generated from enum tendon.v1.Code
@@ -2649,7 +2804,7 @@ export enum Code {
  * Describes the enum tendon.v1.Code.
  */
 export const CodeSchema: GenEnum<Code> = /*@__PURE__*/
-  enumDesc(file_tendon, 7);
+  enumDesc(file_tendon, 8);
 
 /**
  * @generated from enum tendon.v1.Role
@@ -2681,5 +2836,5 @@ export enum Role {
  * Describes the enum tendon.v1.Role.
  */
 export const RoleSchema: GenEnum<Role> = /*@__PURE__*/
-  enumDesc(file_tendon, 8);
+  enumDesc(file_tendon, 9);
 

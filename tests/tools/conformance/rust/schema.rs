@@ -136,6 +136,28 @@ static COUPLE: Schema = message(&[
     Field(14, Unsigned32, One, Whole(1, 10_000_000)),
 ]);
 
+static VIBRATION: Schema = Schema {
+    fields: &[
+        Field(1, Real, One, Between(0.0, 1.0)),
+        Field(2, Real, One, Between(0.0, 1000.0)),
+        Field(3, Unsigned32, One, Whole(0, 10_000)),
+    ],
+    oneof: &[],
+    rule: |node| node.real(2) == 0.0 || node.real(2) >= 20.0,
+};
+
+/// One of the two settings has to be there.
+static SET_OUTPUT: Schema = Schema {
+    fields: &[
+        Field(1, Unsigned32, One, DEVICE),
+        Field(2, Unsigned32, One, Whole(0, 7)),
+        Field(3, Fixed32, Optional, Whole(0, 0xFF_FFFF)),
+        Field(4, Sub(&VIBRATION), Optional, Any),
+    ],
+    oneof: &[3, 4],
+    rule: |node| !node.all(3).is_empty() || node.sub(4).is_some(),
+};
+
 pub static CONTROL: Schema = Schema {
     fields: &[
         Field(1, Unsigned32, One, Whole(1, MOST)),
@@ -147,11 +169,12 @@ pub static CONTROL: Schema = Schema {
         Field(7, Sub(&LEASE_LOST), Optional, Any),
         Field(8, Sub(&DEADBAND), Optional, Any),
         Field(9, Sub(&OF_DEVICE), Optional, Any),
+        Field(10, Sub(&SET_OUTPUT), Optional, Any),
         Field(11, Sub(&COUPLE), Optional, Any),
         Field(12, Sub(&OF_DEVICE), Optional, Any),
         Field(13, Sub(&OF_DEVICE), Optional, Any),
     ],
-    oneof: &[2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13],
+    oneof: &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
     rule: |_| true,
 };
 
@@ -186,6 +209,8 @@ static DEVICE_DESCRIPTION: Schema = Schema {
     },
 };
 
+static OUTPUT: Schema = message(&[Field(1, Text, One, Bytes(24)), Field(2, Enum, One, Whole(1, 2))]);
+
 static HANDLE_DESCRIPTION: Schema = message(&[
     Field(1, Unsigned32, One, DEVICE),
     Field(2, Sub(&QUATERNION), Optional, Any),
@@ -197,6 +222,7 @@ static HANDLE_DESCRIPTION: Schema = message(&[
     Field(8, Text, One, Bytes(24)),
     Field(9, Enum, One, Whole(0, 2)),
     Field(10, Text, Many(|count| count <= 8), Bytes(24)),
+    Field(11, Sub(&OUTPUT), Many(|count| count <= 8), Any),
 ]);
 
 pub static CONTROL_ACK: Schema = message(&[
