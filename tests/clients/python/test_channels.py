@@ -64,7 +64,7 @@ def test_joints_are_asked_for_by_those_who_want_them():
     assert stage.server.hellos[0].features == ("local-model", "channels", "handle", "joints")
 
 
-def test_outputs_are_set_by_those_who_asked_for_them_and_within_their_bounds():
+def test_outputs_are_set_by_those_who_asked_for_them():
     stage = named(outputs=True)
     stage.server.features = ("local-model", "outputs")
     stage.run(100 * MS)

@@ -1125,7 +1125,7 @@ export type Vibration = Message<"tendon.v1.Vibration"> & {
   amplitude: number;
 
   /**
-   * 0, the output's own, or 20 … 1000
+   * [0, 1000]: at least 20, or 0: the output's own
    *
    * @generated from field: double frequency_hz = 2;
    */
