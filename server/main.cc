@@ -281,13 +281,18 @@ void dial_instead(std::vector<Scene>& scenes, const Address& server) {
   found->teleoperation->dial = server;
 }
 
-/// As settings of the scene, so that the recording has them too.
+/// As settings of the scene, so that the recording has them too. A coupling goes without what keeps the pair passive and
+/// quiet: no limiter has an account for its purse.
 std::vector<std::string> without_limiter_settings(const Scene& scene) {
   if (scene.driver().moves_a_hand) {
     throw std::runtime_error("--without-limiter: expected simulated devices only, found " + scene.name + ", a " +
                              std::string(scene.driver().name));
   }
-  return limiter_settings("none", scene.loop.control);
+  std::vector<std::string> settings = limiter_settings("none", scene.loop.control);
+  if (scene.teleoperation) {
+    settings.insert(settings.end(), {"teleoperation.purse=", "teleoperation.coupling.adapt_to_delay=false"});
+  }
+  return settings;
 }
 
 /// The name becomes a file's name and a word in the log.
@@ -340,7 +345,9 @@ int main(int argc, char** argv) {
   app.add_option("--dial", dial, "HOST:PORT of the server to couple with, instead of that of [teleoperation]");
   app.add_option("--duration-s", duration_s,
                  "Stop so many seconds after the first haptic step; 0 = at SIGINT or SIGTERM");
-  app.add_flag("--without-limiter", without_limiter, "Switch the output limiter off. Simulated devices only");
+  app.add_flag(
+      "--without-limiter", without_limiter,
+      "Switch the output limiter off, and a coupling's purse and its heed of the delay. Simulated devices only");
   std::string firmware;
   bool accept_unknown_firmware = false;
   const auto add_firmware = [&](CLI::App& to) {

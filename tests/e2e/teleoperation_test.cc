@@ -61,6 +61,25 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
   EXPECT_GT(spread(tool), 0.5 * spread(hand)) << "it follows";
 }
 
+/// What the two must not do with limiters: it shows that the demonstration demonstrates something.
+TEST(Teleoperation, WithoutLimitersTheSamePairGivesOutEnergyThatNobodyPutIn) {
+  const testing::ScratchFolder folder;
+  const auto led = folder.path() / "leader.mcap";
+  Server follower(folder.path(), scene("follower.toml"), {"--without-limiter"});
+  Service network("tendon-inject",
+                  {"--to", follower.address(), "--seed", "7", "--profile", "delay=uniform(15ms,25ms) loss=2%"},
+                  folder.path(), "start", "listen");
+  Server leader(folder.path(), scene("leader.toml"),
+                {"--record", led.string(), "--dial", network.address(), "--without-limiter"});
+  leader.process().wait_for_line("teleoperation: engaged");
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  leader.stop();
+  follower.stop();
+  double least = 0;
+  for (const StepRecord& step : read_recording(led).steps) least = std::min(least, step.energy);
+  EXPECT_LT(least, -0.1);
+}
+
 TEST(Teleoperation, AFollowerThatWasKilledIsCoupledAgainAndEngagedByNobody) {
   const testing::ScratchFolder folder;
   auto follower = std::make_unique<Server>(folder.path(), scene("follower.toml"));

@@ -59,6 +59,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         fuzz::require(couple->position_scale >= 0.01 && couple->force_scale >= 0.01 && couple->stiffness >= 0);
         fuzz::require(couple->axes >= 1 && couple->axes <= 7 && couple->period > Duration::zero());
       }
+      if (const auto* wanted = std::get_if<SetOutput>(&request->request)) {
+        fuzz::require(in_bounds(*wanted) && wanted->device < limits::kMaxDevices);
+      }
       session.answer(request->id, Code::kOk, {});
     }
   }

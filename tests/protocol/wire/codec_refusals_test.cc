@@ -8,6 +8,7 @@
 #include <string>
 
 #include "protocol/limits.h"
+#include "protocol/wire/bounds.h"
 #include "tests/protocol/examples.h"
 #include "tests/protocol/wire/read_back.h"
 

@@ -174,7 +174,7 @@ TEST_F(Coupled, NeitherAccountFallsBelowZeroOnABadNetwork) {
   EXPECT_GE(leader_->least_energy, -1e-9);
   EXPECT_GE(follower_->least_energy, -1e-9);
   EXPECT_GT(leader_->newest.sent.given, 0);
-  EXPECT_LT(leader_->newest.stiffness, 400) << "2 B over the round trip";
+  EXPECT_LT(leader_->newest.stiffness, 1000) << "2 B over the round trip";
 }
 
 TEST_F(Coupled, ACutNetworkIsLostAndOnlyAnActCouplesAgain) {
@@ -215,7 +215,7 @@ TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
   place({"teleoperation.coupling.stiffness_n_per_m=300"});
   run(seconds(2));
   EXPECT_EQ(leader_->phase(), PortPhase::kAlone);
-  EXPECT_TRUE(leader_->said("coupling.stiffness_n_per_m: yours 300, mine 400"));
+  EXPECT_TRUE(leader_->said("coupling.stiffness_n_per_m: yours 300, mine 1000"));
   EXPECT_EQ(std::count_if(leader_->notices.begin(), leader_->notices.end(),
                           [](const auto& said) { return said.find("yours") != std::string::npos; }),
             1)
@@ -233,7 +233,7 @@ TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
        [](Couple& c) { c.method = CouplingMethod::kPositionForce; }},
       {"map.position_scale: yours 0.5, mine 1", [](Couple& c) { c.position_scale = 0.5; }},
       {"map.force_scale: yours 2, mine 1", [](Couple& c) { c.force_scale = 2; }},
-      {"coupling.stiffness_n_per_m: yours 400.1, mine 400", [](Couple& c) { c.stiffness = 400.1; }},
+      {"coupling.stiffness_n_per_m: yours 1001, mine 1000", [](Couple& c) { c.stiffness = 1001; }},
       {"coupling.damping_n_s_per_m: yours 5, mine 4", [](Couple& c) { c.damping = 5; }},
       {"coupling.mutual_damping_n_s_per_m: yours 1, mine 0", [](Couple& c) { c.mutual_damping = 1; }},
       {"map.rotation_deg: yours [0, 0, 180], mine [0, 0, 0]",
