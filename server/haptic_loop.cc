@@ -74,7 +74,11 @@ HapticLoop::Rest::Rest(const DeviceInfo& info)
       opening(0) {}
 
 void HapticLoop::take_mail(LocalTime now) noexcept {
-  std::array<HapticOrder, Mailboxes::kOrders> released;
+  struct Released {
+    std::uint32_t source;
+    std::uint32_t channel;
+  };
+  std::array<Released, Mailboxes::kOrders> released;
   std::size_t releases = 0;
   for (std::size_t i = 0; i < Mailboxes::kOrders; ++i) {
     const HapticOrder* const order = mail_.orders.front();
@@ -82,7 +86,7 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
     switch (order->kind) {
       case HapticOrder::Kind::kRelease:
         controller_.release(now, order->source, order->channel);
-        released[releases++] = *order;
+        released[releases++] = {.source = order->source, .channel = order->channel};
         if (order->source == outputs_of_) turn_outputs_off(now);
         break;
       case HapticOrder::Kind::kDisarm:

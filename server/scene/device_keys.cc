@@ -222,6 +222,12 @@ void declare_effects(Table& effects, Draft& draft) {
         keys.key("stiffness_n_per_m", mode.stiffness, kAboveZero, "of the spring between motors and handle", kRequired);
         keys.key("damping_n_s_per_m", mode.damping, kZeroOrMore, "of the damper beside the spring");
       });
+  effects.tables("output", device.outputs, kMostOutputs, [](Table& outputs, OutputDescription& output) {
+    outputs.key("name", output.name, Label{}, "for people", kRequired);
+    outputs.key("kind", output.kind,
+                Names<OutputKind>{{{"lamp", OutputKind::kLamp}, {"vibration", OutputKind::kVibration}}},
+                "what the clients that hold the device may set; a simulated device only remembers it", kRequired);
+  });
 }
 
 template <class Point = Vector, class Table>
@@ -355,12 +361,6 @@ void declare(Table& keys, SimulatedDevice::Config& /*device*/, Draft& draft) {
                   presses.key("for_ms", press.length, kAboveZero, "how long it holds it", kRequired);
                 });
     hand.table("motion", [&draft](Table& motion) { declare_motion(motion, draft.motion); });
-  });
-  keys.tables("output", draft.simulated.outputs, kMostOutputs, [](Table& outputs, OutputDescription& output) {
-    outputs.key("name", output.name, Label{}, "for people", kRequired);
-    outputs.key("kind", output.kind,
-                Names<OutputKind>{{{"lamp", OutputKind::kLamp}, {"vibration", OutputKind::kVibration}}},
-                "what the clients that hold the device may set; a simulated device only remembers it", kRequired);
   });
   keys.part("rotation", config.rotation,
             [&draft](Table& rotation, SimulatedRotation::Config& part) { declare_rotation(rotation, draft, part); });

@@ -398,7 +398,6 @@ def out_of_bounds():
     yield "a frequency above 1000", Control(1, SetOutput(1, 1, replace(PULSE, frequency=1001.0)))
     yield "a pulse of more than 10 s", Control(1, SetOutput(1, 1, replace(PULSE, duration_ms=10_001)))
     yield "an output of no kind", ControlAck(1, Code.OK, handle=replace(OUTPUTS, outputs=(OutputDescription("x", 0),)))
-    yield "nine outputs", ControlAck(1, Code.OK, handle=replace(OUTPUTS, outputs=OUTPUTS.outputs * 4 + OUTPUTS.outputs[:1]))
     yield "request 0", Control(0, SetStateRate(1))
     yield "answer to 0", ControlAck(0, Code.OK)
     yield "code 0", ControlAck(1, 0)

@@ -153,19 +153,18 @@ TEST(SceneHandle, AListOfPressesIsWhatTheHandDoesAndTheDeadManMayBeOneOfThem) {
 }
 
 TEST(SceneHandle, ASimulatedDeviceHasTheOutputsThatItLists) {
-  const std::string hand = "[device.hand]\nprofile = \"stylus\"\n";
-  EXPECT_TRUE(minimal_and(hand).simulated().outputs.empty());
-  const auto outputs = minimal_and(hand +
-                                   "[[device.output]]\nname = \"ring\"\nkind = \"lamp\"\n"
-                                   "[[device.output]]\nname = \"tip\"\nkind = \"vibration\"\n")
+  EXPECT_TRUE(minimal_and("").simulated().outputs.empty());
+  const auto outputs = minimal_and(
+                           "[[device.effects.output]]\nname = \"ring\"\nkind = \"lamp\"\n"
+                           "[[device.effects.output]]\nname = \"tip\"\nkind = \"vibration\"\n")
                            .simulated()
                            .outputs;
   ASSERT_EQ(outputs.size(), 2U);
   EXPECT_EQ(outputs[0], (OutputDescription{.name = "ring", .kind = OutputKind::kLamp}));
   EXPECT_EQ(outputs[1], (OutputDescription{.name = "tip", .kind = OutputKind::kVibration}));
-  const std::string wrong = hand + "[[device.output]]\nname = \"ring\"\nkind = \"light\"\n";
+  const std::string wrong = "[[device.effects.output]]\nname = \"ring\"\nkind = \"light\"\n";
   const std::string said = error_of_minimal_and(wrong);
-  EXPECT_NE(said.find("device.output[0].kind: expected"), std::string::npos) << said;
+  EXPECT_NE(said.find("device.effects.output[0].kind: expected"), std::string::npos) << said;
 }
 
 TEST(SceneHandle, ErrorsNameFileLineAndKey) {

@@ -228,9 +228,9 @@ def _read_set_output(message: pb.SetOutput) -> SetOutput:
     elif message.WhichOneof("setting") == "rgb":
         setting = LampColour(message.rgb)
     else:
-        raise ValueError("an output without a setting")
+        raise fields.OutOfBounds  # it says neither
     if not is_setting(setting):
-        raise ValueError("a setting out of its bounds")
+        raise fields.OutOfBounds
     return SetOutput(fields.device(message.device), fields.whole(message.output, 0, limits.MAX_OUTPUTS - 1), setting)
 
 
