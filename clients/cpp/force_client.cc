@@ -116,7 +116,7 @@ bool ForceClient::disengage() { return give_order(Disengage{.device = place_.dev
 
 bool ForceClient::set_output(std::uint32_t output, const OutputSetting& setting) {
   const SetOutput wanted{.device = place_.device, .output = output, .setting = setting};
-  return agreed_to(kFeatureOutputs) && in_bounds(wanted) && give_order(wanted);
+  return welcome_ && agreed_to(kFeatureOutputs) && in_bounds(wanted) && give_order(wanted);
 }
 
 bool ForceClient::take_lease() {
