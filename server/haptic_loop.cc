@@ -59,8 +59,8 @@ HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
       controller_(config.control),
       velocity_(device.info().position_resolution),
       force_rounding_squared_(device.info().force_resolution * device.info().force_resolution),
-      has_more_motors_(device.info().max_torque > 0 ||
-                       (device.info().gripper && device.info().gripper->max_force > 0)) {
+      has_more_motors_(device.info().max_torque > 0 || (device.info().gripper && device.info().gripper->max_force > 0)),
+      has_outputs_(!device.info().outputs.empty()) {
   if (config.period <= Duration::zero()) throw std::invalid_argument("period must be above zero");
   if (config.control.channels.size() > limits::kMaxChannels) throw std::invalid_argument("too many channels");
   const DeviceInfo& info = device.info();
@@ -74,6 +74,7 @@ HapticLoop::Rest::Rest(const DeviceInfo& info)
       opening(0) {}
 
 void HapticLoop::take_mail(LocalTime now) noexcept {
+  if (has_outputs_) set_outputs(now);
   struct Released {
     std::uint32_t source;
     std::uint32_t channel;
@@ -87,13 +88,11 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
       case HapticOrder::Kind::kRelease:
         controller_.release(now, order->source, order->channel);
         released[releases++] = {.source = order->source, .channel = order->channel};
-        if (order->source == outputs_of_) turn_outputs_off(now);
         break;
       case HapticOrder::Kind::kDisarm:
         disarmed_ = true;
         controller_.disarm();
         device_.disarm();
-        turn_outputs_off(now);
         break;
       case HapticOrder::Kind::kRearm:
         disarmed_ = false;
@@ -105,10 +104,6 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         break;
       case HapticOrder::Kind::kDisengage:
         if (Coupling* const coupling = controller_.coupling()) coupling->disengage();
-        break;
-      case HapticOrder::Kind::kOutput:
-        outputs_of_ = order->source;
-        device_.set_output(now, order->output, order->setting);
         break;
     }
     mail_.orders.pop();
@@ -128,11 +123,13 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
 }
 
-/// Those that nobody has set are off already.
-void HapticLoop::turn_outputs_off(LocalTime now) noexcept {
-  outputs_of_ = 0;
-  const auto& outputs = device_.info().outputs;
-  for (std::uint32_t i = 0; i < outputs.size(); ++i) device_.set_output(now, i, off(outputs[i].kind));
+void HapticLoop::set_outputs(LocalTime now) noexcept {
+  const OutputSettings* const wanted = mail_.outputs.take();
+  if (wanted == nullptr) return;
+  for (std::uint32_t i = 0; i < kMostOutputs; ++i) {
+    const OutputSettings::One& one = wanted->of[i];
+    if (one.number != std::exchange(outputs_set_[i], one.number)) device_.set_output(now, i, one.setting);
+  }
 }
 
 HandleSample HapticLoop::handle_in(const PositionSample& sample) noexcept {

@@ -62,6 +62,7 @@ class HapticLoop {
   };
 
   void take_mail(LocalTime now) noexcept;
+  [[gnu::noinline]] void set_outputs(LocalTime now) noexcept;  // a device without any pays a branch
   HandleSample handle_in(const PositionSample& sample) noexcept;
   void take_rest(const PositionSample& sample, const Motion& hand, StepRecord& record) noexcept;
   void take_step(LocalTime now, StepRecord& record) noexcept;
@@ -69,7 +70,6 @@ class HapticLoop {
   void command_all(StepRecord& record) noexcept;
   void watch_device() noexcept;
   void rearm() noexcept;
-  void turn_outputs_off(LocalTime now) noexcept;
   void publish(const StepRecord& record) noexcept;
   void publish_port(const StepRecord& record) noexcept;
 
@@ -81,16 +81,17 @@ class HapticLoop {
   double force_rounding_squared_;  ///< N²: what the device rounds away is no clamp
   std::optional<Rest> rest_;       ///< empty: the device tells a position only
   bool has_more_motors_;           ///< than those of its position
-  std::optional<PortState> peer_;  ///< of a coupling: what came since the step before
+  bool has_outputs_;
+  std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< numbers of the settings that the device has
+  std::optional<PortState> peer_;                          ///< of a coupling: what came since the step before
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};
   bool homed_once_ = false;
   std::uint32_t times_armed_ = 0;
-  bool rearmed_ = false;          ///< since the last record
-  std::uint32_t outputs_of_ = 0;  ///< connection id of who set the device's outputs; 0: all are off
-  bool disarmed_ = false;         ///< by an order, which only an order ends
-  std::uint32_t buttons_ = 0;     ///< as the device last said
+  bool rearmed_ = false;       ///< since the last record
+  bool disarmed_ = false;      ///< by an order, which only an order ends
+  std::uint32_t buttons_ = 0;  ///< as the device last said
   std::uint32_t device_faults_ = 0;
 
   Counter steps_;

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/base/output.h"
 #include "core/exchange/flight_recorder.h"
 #include "core/exchange/latest.h"
 #include "core/exchange/spsc_ring.h"
@@ -15,6 +14,7 @@
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/guests/health.h"
+#include "server/guests/outputs.h"
 #include "server/recording/records.h"
 
 namespace tendon {
@@ -27,13 +27,10 @@ struct HapticOrder {
     kDisarm,     ///< no force until kRearm
     kEngage,     ///< the operator's act of a coupling
     kDisengage,  ///< … and its end
-    kOutput,     ///< `source` sets `output` to `setting`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
   std::uint32_t source = 0;
-  std::uint32_t output = 0;
-  OutputSetting setting{};
 };
 
 /// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else
@@ -41,6 +38,7 @@ struct HapticOrder {
 ///
 ///     network ──forces─▶ haptic      one box for each channel; newest wins: an older force is worth nothing
 ///     network ──orders─▶ haptic      all of them, in order
+///     network ─outputs──▶ haptic     lamps and vibration; newest wins: it says all of them
 ///     network ──port in─▶ haptic     of a coupling: the peer's port; newest wins
 ///     haptic  ──state──▶ network     newest wins
 ///     haptic  ──port out▶ network    of a coupling: this port; newest wins
@@ -71,6 +69,7 @@ struct Mailboxes {
   std::array<Latest<RemoteForce>, limits::kMaxChannels> forces;
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
+  Latest<OutputSettings> outputs;
   Latest<PortState> port_in;
   Latest<PortState> port_out;
   SpscRing<StepRecord> steps;

@@ -51,7 +51,7 @@ inline OutputKind kind_of(const OutputSetting& setting) noexcept {
 }
 
 /// The setting that turns an output of that kind off.
-inline OutputSetting off(OutputKind kind) noexcept {
+inline OutputSetting turned_off(OutputKind kind) noexcept {
   return kind == OutputKind::kLamp ? OutputSetting(LampColour{}) : OutputSetting(Vibration{});
 }
 

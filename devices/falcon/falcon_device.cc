@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <span>
 #include <utility>
+#include <variant>
 
 #include "devices/simulated/profiles.h"
 

@@ -12,7 +12,7 @@ SimulatedOutputs::SimulatedOutputs(const std::vector<OutputDescription>& outputs
   const auto count = static_cast<double>(outputs.size());
   expect(outputs.size() <= kMostOutputs, "outputs", count, "at most 8");
   for (const OutputDescription& output : outputs) {
-    outputs_.push_back({.setting = off(output.kind)});
+    outputs_.push_back({.setting = turned_off(output.kind)});
   }
 }
 

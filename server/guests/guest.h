@@ -104,8 +104,9 @@ struct ServedDevice {
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
   std::optional<Couple> coupling{};  ///< what our end is like; empty: it is not to be coupled
-  std::optional<Health> told{};      ///< to observers, last; empty before there was any
-  std::uint64_t reports = 0;         ///< told so far
+  Outputs outputs{};
+  std::optional<Health> told{};  ///< to observers, last; empty before there was any
+  std::uint64_t reports = 0;     ///< told so far
 };
 
 /// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of

@@ -17,6 +17,9 @@ void Leases::give(std::uint32_t device, std::uint32_t channel, std::uint32_t gue
   // same effect a little later.
   devices_[device].mail->orders.try_push({.kind = HapticOrder::Kind::kRelease, .channel = channel, .source = guest});
   held.holder = 0;
+  if (devices_[device].outputs.turn_off_those_of(guest)) {
+    devices_[device].mail->outputs.put(devices_[device].outputs.settings());
+  }
   held.lateness.end();
 }
 

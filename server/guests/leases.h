@@ -32,7 +32,8 @@ class Leases {
     devices_[device].channels[channel].renewed = now;
   }
 
-  /// The channel is nobody's when it was the guest's, and its force is fresh no longer.
+  /// The channel is nobody's when it was the guest's, its force is fresh no longer, and the outputs of the device that
+  /// it has set are off.
   void give(std::uint32_t device, std::uint32_t channel, std::uint32_t guest);
   /// … all channels of the guest.
   void give_all(std::uint32_t guest);

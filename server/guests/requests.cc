@@ -48,6 +48,8 @@ Outcome rearm(LocalTime /*now*/, const Asker& asker, const Rearm& wanted) {
 }
 
 Outcome disarm(LocalTime /*now*/, const Asker& asker, const Disarm& wanted) {
+  ServedDevice& device = asker.devices[wanted.device];
+  if (device.outputs.turn_off_all()) device.mail->outputs.put(device.outputs.settings());
   return order(asker, wanted.device, HapticOrder::Kind::kDisarm, "disarmed");
 }
 
@@ -127,7 +129,7 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
   if (!asker.guest.sees_outputs) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature outputs"};
   }
-  const ServedDevice& device = asker.devices[wanted.device];
+  ServedDevice& device = asker.devices[wanted.device];
   const auto is_held = [&](const ServedChannel& channel) { return channel.holder == asker.guest.id(); };
   if (std::ranges::none_of(device.channels, is_held)) {
     return {.code = Code::kDenied, .detail = "only the holder of a channel of the device may set an output"};
@@ -142,11 +144,9 @@ Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wante
             .detail = "output " + std::to_string(wanted.output) +
                       (lamp ? " is a lamp: expected rgb" : " vibrates: expected vibration")};
   }
-  const HapticOrder order{.kind = HapticOrder::Kind::kOutput,
-                          .source = asker.guest.id(),
-                          .output = wanted.output,
-                          .setting = wanted.setting};
-  return {.code = device.mail->orders.try_push(order) ? Code::kOk : Code::kBusy};
+  device.outputs.set(asker.guest.id(), wanted.output, wanted.setting);
+  device.mail->outputs.put(device.outputs.settings());
+  return {};
 }
 
 /// Who may ask.

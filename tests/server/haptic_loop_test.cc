@@ -156,37 +156,30 @@ TEST(HapticLoop, JointsAreInTheRecordAndTheStateAndChangeNothingElse) {
   EXPECT_EQ(other.mail->state.take()->joints, std::nullopt);
 }
 
-TEST(HapticLoop, OutputsAreOffWhenWhoSetThemHasGoneOrTheDeviceIsDisarmed) {
+TEST(HapticLoop, EachNewSettingOfAnOutputIsCarriedOutOnce) {
   SimulatedDevice::Config config = circling(false);
   config.outputs = {{.name = "ring", .kind = OutputKind::kLamp}, {.name = "tip", .kind = OutputKind::kVibration}};
   SimulatedDevice plain(config);
   SafeDevice safe({}, plain);
   Pushed world(safe);
-  const auto set = [&] {
-    const auto tell = [&](std::uint32_t output, const OutputSetting& setting) {
-      const HapticOrder order{.kind = Kind::kOutput, .source = 7, .output = output, .setting = setting};
-      ASSERT_TRUE(world.mail->orders.try_push(order));
-    };
-    tell(0, LampColour{0xFF});
-    tell(1, Vibration{.amplitude = 1, .duration = std::chrono::seconds(10)});
-    world.steps(1);
-    ASSERT_EQ(plain.outputs().colour(0), 0xFFU);
-    ASSERT_EQ(plain.outputs().amplitude(world.now, 1), 1);
-  };
-  const auto expect_off = [&] {
-    world.steps(1);
-    EXPECT_EQ(plain.outputs().colour(0), 0U);
-    EXPECT_EQ(plain.outputs().amplitude(world.now, 1), 0);
-  };
-  set();
-  ASSERT_TRUE(world.mail->orders.try_push({.kind = Kind::kRelease, .source = 8}));
+  const Vibration pulse{.amplitude = 1, .frequency = 0, .duration = milliseconds(5)};
+  OutputSettings settings;
+  settings.of[0] = {.number = 1, .setting = LampColour{0xFF}};
+  settings.of[1] = {.number = 1, .setting = pulse};
+  world.mail->outputs.put(settings);
   world.steps(1);
-  EXPECT_EQ(plain.outputs().colour(0), 0xFFU) << "another has gone";
-  ASSERT_TRUE(world.mail->orders.try_push({.kind = Kind::kRelease, .source = 7}));
-  expect_off();
-  set();
-  world.order(Kind::kDisarm);
-  expect_off();
+  EXPECT_EQ(plain.outputs().colour(0), 0xFFU);
+  EXPECT_EQ(plain.outputs().amplitude(world.now, 1), 1);
+  world.steps(10);
+  settings.of[0] = {.number = 2, .setting = LampColour{}};
+  world.mail->outputs.put(settings);
+  world.steps(1);
+  EXPECT_EQ(plain.outputs().colour(0), 0U);
+  EXPECT_EQ(plain.outputs().amplitude(world.now, 1), 0) << "a pulse is not begun again by the setting of a lamp";
+  settings.of[1].number = 2;
+  world.mail->outputs.put(settings);
+  world.steps(1);
+  EXPECT_EQ(plain.outputs().amplitude(world.now, 1), 1) << "the same pulse, asked for again";
 }
 
 TEST(HapticLoop, ADisarmedDeviceIsHomedAtOnceAndArmedAgainByAnOrderOnly) {

@@ -12,7 +12,7 @@ from enum import Enum
 
 from . import limits
 from .answer import Answer, read_touch
-from .codec.frames import is_setting
+from .codec.fields import is_setting
 from .deadband import Deadband, ForceDeadband, check_state_deadband, foretell
 from .expect import expect
 from .handshake import ClientHandshake
@@ -21,8 +21,8 @@ from .messages import (
     FEATURE_DIAGNOSTICS,
     FEATURE_HANDLE,
     FEATURE_JOINTS,
-    FEATURE_OUTPUTS,
     FEATURE_LOCAL_MODEL,
+    FEATURE_OUTPUTS,
     NEVER,
     Claim,
     Code,
@@ -34,9 +34,6 @@ from .messages import (
     DeviceState,
     Disarm,
     Disengage,
-    LampColour,
-    SetOutput,
-    Vibration,
     Engage,
     ForceCommand,
     GiveLease,
@@ -44,6 +41,7 @@ from .messages import (
     HandleDescription,
     Hello,
     Instant,
+    LampColour,
     LeaseLost,
     LinkReport,
     LinkStats,
@@ -51,11 +49,13 @@ from .messages import (
     Rearm,
     Refused,
     Role,
+    SetOutput,
     SetStateDeadband,
     SetStateRate,
     TakeLease,
     Torque,
     Touch,
+    Vibration,
     Welcome,
 )
 from .noise import KEY_SIZE

@@ -13,7 +13,19 @@ from typing import Any
 
 from . import limits
 from .force_client import Config, ForceClient, Phase, Stats
-from .messages import Code, DeviceDescription, DeviceReport, DeviceState, HandleDescription, LampColour, LinkReport, PeerReport, Touch, Vibration, Welcome
+from .messages import (
+    Code,
+    DeviceDescription,
+    DeviceReport,
+    DeviceState,
+    HandleDescription,
+    LampColour,
+    LinkReport,
+    PeerReport,
+    Touch,
+    Vibration,
+    Welcome,
+)
 
 log = logging.getLogger("tendon")
 

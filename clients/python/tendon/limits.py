@@ -25,13 +25,14 @@ MAX_NAME = 64
 MAX_LABEL = 24
 """Bytes of UTF-8 in the name of a device or a channel."""
 MAX_BUTTONS = 16
+"""Named buttons of a device."""
 MAX_JOINTS = 8
 MAX_OUTPUTS = 8
 MAX_VIBRATION_MS = 10_000
 """The longest pulse: nobody feels a longer one, and it cannot be left on."""
 MIN_VIBRATION_HZ = 20.0
 MAX_VIBRATION_HZ = 1000.0
-"""Named buttons of a device."""
+"""Below the least of the two a pulse is a motion; above the other no skin feels it."""
 MAX_DEVICES = 16
 MAX_CHANNELS = 8
 MAX_CLAIMS = 16

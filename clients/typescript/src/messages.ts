@@ -302,8 +302,8 @@ export interface SetOutput {
 
 /**
  * Reliable. Client → server: set the rate of a device's states; clear a latched fault; no force until then;
- * describe the device; take or give up a channel's lease; set the deadband of states; be the other end of a device; the
- * operator's act that couples the handles, and its end. Server → client: a lease is lost.
+ * describe the device; take or give up a channel's lease; set the deadband of states; set a lamp or start a pulse; be the other end
+ * of a device; the operator's act that couples the handles, and its end. Server → client: a lease is lost.
  */
 export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }

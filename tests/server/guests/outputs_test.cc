@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "server/guests/outputs.h"
+
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,38 +11,40 @@ namespace tendon {
 namespace {
 
 using std::chrono::milliseconds;
-using Kind = HapticOrder::Kind;
+using std::chrono::seconds;
 
-/// A server whose device has a lamp and something that vibrates.
-class Outputs : public SealedServer {
+constexpr Vibration kPulse{.amplitude = 0.5, .frequency = 200, .duration = milliseconds(40)};
+
+/// The device "right", with two channels, has a lamp, something that vibrates, and another lamp.
+class OutputsOfADevice : public TwoDevices {
  protected:
-  Outputs() { restart(config()); }
-
-  NetworkLoop::Config config() const {
+  OutputsOfADevice() {
     NetworkLoop::Config config;
     config.keys = {wall_, other_, screen_};
-    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
-    config.handles = {
-        {.outputs = {{.name = "ring", .kind = OutputKind::kLamp}, {.name = "tip", .kind = OutputKind::kVibration}}}};
-    return config;
+    config.devices = {{.name = "left", .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}},
+                      {.name = "right",
+                       .model = "device",
+                       .loop_hz = 1000,
+                       .channels = {{.name = "guidance", .lease = seconds(1)}, {.name = "tissue"}}}};
+    config.handles = {{}, {.outputs = outputs_}};
+    restart(config);
   }
 
-  Client wanting(const std::optional<ClientKey>& key, const std::string& address) {
+  Client wanting(const ClientKey& key, const std::string& address, const std::string& channel, bool outputs = true) {
     Client client{std::make_unique<End>(wire_, parse_address(address)), nullptr};
     ForceClient::Config config = config_of(key, ++seed_);
-    config.outputs = true;
+    config.device = "right";
+    config.channel = channel;
+    config.outputs = outputs;
     client.client = std::make_unique<ForceClient>(
         *client.end, server_.self, config, [](const DeviceState&) { return Touch(Vec3(1, 0, 0)); }, now_);
     return client;
   }
 
-  /// What the device's loop has been told since the last call, of outputs only.
-  std::vector<HapticOrder> settings() const {
-    std::vector<HapticOrder> found;
-    for (; mail_->orders.front() != nullptr; mail_->orders.pop()) {
-      if (mail_->orders.front()->kind == Kind::kOutput) found.push_back(*mail_->orders.front());
-    }
-    return found;
+  /// What the device's loop was told last.
+  OutputSetting told(std::size_t output) {
+    if (const OutputSettings* const news = second_->outputs.take()) newest_ = *news;
+    return newest_.of[output].setting;
   }
 
   /// The answer to that request.
@@ -50,36 +54,38 @@ class Outputs : public SealedServer {
     EXPECT_TRUE(client.client->order_answer());
     return client.client->order_answer().value_or(Session::RequestAnswered{});
   }
+
+  const std::vector<OutputDescription> outputs_ = {{.name = "ring", .kind = OutputKind::kLamp},
+                                                   {.name = "tip", .kind = OutputKind::kVibration},
+                                                   {.name = "base", .kind = OutputKind::kLamp}};
+  OutputSettings newest_;
 };
 
-TEST_F(Outputs, AreDescribedToAClientThatAsksForThemAndToNoOther) {
-  Client wants = wanting(wall_, "192.0.2.1:4000");
-  Client plain = observer(screen_, "192.0.2.2:4000");
+TEST_F(OutputsOfADevice, AreDescribedToAClientThatAsksForThemAndToNoOther) {
+  Client wants = wanting(wall_, "192.0.2.1:4000", "guidance");
+  Client plain = wanting(other_, "192.0.2.2:4000", "tissue", false);
   run(milliseconds(500), {&wants, &plain});
   ASSERT_TRUE(wants.client->handle() && plain.client->handle());
-  EXPECT_EQ(wants.client->handle()->outputs, config().handles[0].outputs);
+  EXPECT_EQ(wants.client->handle()->outputs, outputs_);
   EXPECT_TRUE(plain.client->handle()->outputs.empty());
+  EXPECT_FALSE(plain.client->set_output(0, LampColour{1})) << "it did not ask for outputs";
 }
 
-TEST_F(Outputs, ASettingOfTheHolderReachesTheLoopOfTheDevice) {
-  Client a = wanting(wall_, "192.0.2.1:4000");
+TEST_F(OutputsOfADevice, ASettingOfAHolderReachesTheLoopOfTheDevice) {
+  Client a = wanting(wall_, "192.0.2.1:4000", "guidance");
   run(milliseconds(300), {&a});
   EXPECT_EQ(asked(a, 0, LampColour{0x00FF00}).code, Code::kOk);
-  const Vibration pulse{.amplitude = 0.5, .frequency = 200, .duration = milliseconds(40)};
-  EXPECT_EQ(asked(a, 1, pulse).code, Code::kOk);
-  const auto told = settings();
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_EQ(told[0].setting, OutputSetting(LampColour{0x00FF00}));
-  EXPECT_EQ(told[1].output, 1U);
-  EXPECT_EQ(told[1].setting, OutputSetting(pulse));
+  EXPECT_EQ(asked(a, 1, kPulse).code, Code::kOk);
+  EXPECT_EQ(told(0), OutputSetting(LampColour{0x00FF00}));
+  EXPECT_EQ(told(1), OutputSetting(kPulse));
 }
 
-TEST_F(Outputs, AreRefusedInWordsWhenTheyAreNotThereOrOfAnotherKind) {
-  Client a = wanting(wall_, "192.0.2.1:4000");
+TEST_F(OutputsOfADevice, AreRefusedInWordsWhenTheyAreNotThereOrOfAnotherKind) {
+  Client a = wanting(wall_, "192.0.2.1:4000", "guidance");
   run(milliseconds(300), {&a});
   const std::vector<std::pair<std::pair<std::uint32_t, OutputSetting>, std::string>> cases = {
-      {{2, LampColour{1}}, "the device has 2 outputs"},
-      {{0, Vibration{.amplitude = 1}}, "output 0 is a lamp: expected rgb"},
+      {{3, LampColour{1}}, "the device has 3 outputs"},
+      {{0, kPulse}, "output 0 is a lamp: expected rgb"},
       {{1, LampColour{1}}, "output 1 vibrates: expected vibration"},
   };
   for (const auto& [wanted, words] : cases) {
@@ -87,29 +93,70 @@ TEST_F(Outputs, AreRefusedInWordsWhenTheyAreNotThereOrOfAnotherKind) {
     EXPECT_EQ(answer.code, Code::kInvalid);
     EXPECT_EQ(answer.detail, words);
   }
-  EXPECT_TRUE(settings().empty());
+  EXPECT_EQ(second_->outputs.take(), nullptr);
 }
 
-TEST_F(Outputs, AreNotSetByAClientThatDoesNotHoldTheDevice) {
-  Client holder = wanting(wall_, "192.0.2.1:4000");
+TEST_F(OutputsOfADevice, AreNotSetByAClientThatWaitsForTheLease) {
+  Client holder = wanting(wall_, "192.0.2.1:4000", "guidance");
   run(milliseconds(300), {&holder});
-  Client second = wanting(other_, "192.0.2.2:4000");
-  run(milliseconds(100), {&holder, &second});
-  if (second.client->set_output(0, LampColour{1})) run(milliseconds(50), {&holder, &second});
-  EXPECT_TRUE(settings().empty());
-  ASSERT_TRUE(holder.client->set_output(0, LampColour{1}));
+  Client second = wanting(other_, "192.0.2.2:4000", "guidance");
+  run(milliseconds(300), {&holder, &second});
+  ASSERT_TRUE(second.client->set_output(0, LampColour{1}));
   run(milliseconds(50), {&holder, &second});
-  EXPECT_EQ(settings().size(), 1U);
+  ASSERT_TRUE(second.client->order_answer());
+  EXPECT_EQ(second.client->order_answer()->code, Code::kDenied);
+  EXPECT_EQ(second.client->order_answer()->detail, "only the holder of a channel of the device may set an output");
+  EXPECT_EQ(second_->outputs.take(), nullptr);
 }
 
-TEST_F(Outputs, ASettingOutOfBoundsIsNotSent) {
-  Client a = wanting(wall_, "192.0.2.1:4000");
+TEST_F(OutputsOfADevice, AreOffWhenTheClientThatSetThemGoesAndTheOthersStay) {
+  Client a = wanting(wall_, "192.0.2.1:4000", "guidance");
+  Client b = wanting(other_, "192.0.2.2:4000", "tissue");
+  run(milliseconds(300), {&a, &b});
+  ASSERT_TRUE(a.client->set_output(0, LampColour{1}) && a.client->set_output(1, kPulse));
+  ASSERT_TRUE(b.client->set_output(2, LampColour{2}));
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(told(0), OutputSetting(LampColour{1}));
+  a.client->stop(now_);
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(told(0), OutputSetting(LampColour{}));
+  EXPECT_EQ(told(1), OutputSetting(Vibration{}));
+  EXPECT_EQ(told(2), OutputSetting(LampColour{2})) << "another's";
+  ASSERT_TRUE(b.client->give_lease());
+  run(milliseconds(50), {&b});
+  EXPECT_EQ(told(2), OutputSetting(LampColour{}));
+}
+
+TEST_F(OutputsOfADevice, AreOffWhenItIsDisarmed) {
+  Client a = wanting(wall_, "192.0.2.1:4000", "guidance");
+  run(milliseconds(300), {&a});
+  EXPECT_EQ(asked(a, 0, LampColour{1}).code, Code::kOk);
+  ASSERT_TRUE(a.client->disarm());
+  run(milliseconds(50), {&a});
+  EXPECT_EQ(told(0), OutputSetting(LampColour{}));
+}
+
+TEST_F(OutputsOfADevice, AFloodOfSettingsLeavesRoomForTheOrderToDisarm) {
+  Client a = wanting(wall_, "192.0.2.1:4000", "guidance");
+  Client b = wanting(other_, "192.0.2.2:4000", "tissue");
+  run(milliseconds(300), {&a, &b});
+  int asked = 0;
+  while (a.client->set_output(0, LampColour{1})) ++asked;
+  EXPECT_EQ(asked, 16);
+  run(milliseconds(10), {&a});
+  ASSERT_TRUE(b.client->disarm());
+  run(milliseconds(50), {&a, &b});
+  EXPECT_EQ(b.client->order_answer()->code, Code::kOk);
+}
+
+TEST_F(OutputsOfADevice, ASettingOutOfBoundsIsNotSent) {
+  Client a = wanting(wall_, "192.0.2.1:4000", "guidance");
+  EXPECT_FALSE(a.client->set_output(0, LampColour{1})) << "there is no session yet";
   run(milliseconds(300), {&a});
   EXPECT_FALSE(a.client->set_output(8, LampColour{1}));
   EXPECT_FALSE(a.client->set_output(0, LampColour{0x1000000}));
   EXPECT_FALSE(a.client->set_output(1, Vibration{.amplitude = 1.5}));
-  Client plain = controller(other_, "192.0.2.2:4000");
-  EXPECT_FALSE(plain.client->set_output(0, LampColour{1})) << "it did not ask for outputs";
+  EXPECT_TRUE(a.client->set_output(0, LampColour{1}));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ from google.protobuf.message import DecodeError
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import ChannelRule, Code, Hand, Mat3, Mode, OutputKind, Quat, Role, Safety, Vec3
+from ..messages import ChannelRule, Code, Hand, LampColour, Mat3, Mode, OutputKind, Quat, Role, Safety, Vec3, Vibration
 
 
 class OutOfBounds(Exception):
@@ -48,6 +48,17 @@ def quaternion(message: pb.Quat) -> Quat:
 
 def is_rotation(q: Quat) -> bool:
     return abs(hypot(*q) - 1) <= limits.UNIT_TOLERANCE  # nor is NaN
+
+
+def is_setting(setting: LampColour | Vibration) -> bool:
+    """Whether a receiver accepts it."""
+    if isinstance(setting, LampColour):
+        return 0 <= setting.rgb <= 0xFFFFFF
+    return (
+        0 <= setting.amplitude <= 1
+        and 0 <= setting.duration_ms <= limits.MAX_VIBRATION_MS
+        and (setting.frequency == 0 or limits.MIN_VIBRATION_HZ <= setting.frequency <= limits.MAX_VIBRATION_HZ)
+    )
 
 
 def matrix(entries: Sequence[float]) -> Mat3:

@@ -229,20 +229,9 @@ def _read_set_output(message: pb.SetOutput) -> SetOutput:
         setting = LampColour(message.rgb)
     else:
         raise fields.OutOfBounds  # it says neither
-    if not is_setting(setting):
+    if not fields.is_setting(setting):
         raise fields.OutOfBounds
     return SetOutput(fields.device(message.device), fields.whole(message.output, 0, limits.MAX_OUTPUTS - 1), setting)
-
-
-def is_setting(setting: LampColour | Vibration) -> bool:
-    """Whether a receiver accepts it."""
-    if isinstance(setting, LampColour):
-        return 0 <= setting.rgb <= 0xFFFFFF
-    return (
-        0 <= setting.amplitude <= 1
-        and 0 <= setting.duration_ms <= limits.MAX_VIBRATION_MS
-        and (setting.frequency == 0 or limits.MIN_VIBRATION_HZ <= setting.frequency <= limits.MAX_VIBRATION_HZ)
-    )
 
 
 def _read_ack(message: pb.ControlAck) -> ControlAck:
@@ -539,9 +528,7 @@ def _write_set_output(request: SetOutput) -> pb.SetOutput:
     setting = request.setting
     if isinstance(setting, LampColour):
         return pb.SetOutput(device=request.device, output=request.output, rgb=setting.rgb)
-    pulse = pb.Vibration(
-        amplitude=setting.amplitude, frequency_hz=setting.frequency, duration_ms=setting.duration_ms
-    )
+    pulse = pb.Vibration(amplitude=setting.amplitude, frequency_hz=setting.frequency, duration_ms=setting.duration_ms)
     return pb.SetOutput(device=request.device, output=request.output, vibration=pulse)
 
 

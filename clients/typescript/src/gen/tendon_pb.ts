@@ -1062,8 +1062,8 @@ export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
 
 /**
  * Sets a lamp of the device, or makes it vibrate: from a controller of the device that holds one of its channels. To a
- * server that granted the feature "outputs". An output that its client has set is off when the client loses its channel
- * or leaves, and when the device is disarmed. CODE_INVALID: the device has no such output, or not of that kind.
+ * server that granted the feature "outputs". An output is off again when the client that set it gives a channel of the
+ * device up or loses it, and when the device is disarmed. CODE_INVALID: the device has no such output, or not of that kind.
  *
  * @generated from message tendon.v1.SetOutput
  */
