@@ -95,14 +95,20 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
                        config_.force_delay.value_or(Duration::zero()));
   }
   expect(config_.max_substep > Duration::zero(), "max_substep", seconds(config_.max_substep), "a duration above 0 s");
+  if (config_.environment) {
+    expect(!config_.structural_mode, "structural_mode.handle_mass",
+           config_.structural_mode ? config_.structural_mode->handle_mass : 0, "none beside an environment");
+    environment_.emplace(*std::exchange(config_.environment, std::nullopt));
+  }
   if (config_.hand) hand_.emplace(*std::exchange(config_.hand, std::nullopt));
   for (const Config::Press& press : config_.presses) check(press);
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
   const Rub rub = joints_ ? Rub::kJoints : config_.coulomb_friction ? Rub::kHandle : Rub::kNone;
+  const Far far = config_.structural_mode ? Far::kMode : environment_ ? Far::kEnvironment : Far::kNone;
   take_substeps_ = substeps_with({.rub = rub,
                                   .hand = hand_.has_value(),
                                   .lag = config_.amplifier_bandwidth.has_value(),
-                                  .mode = config_.structural_mode.has_value()});
+                                  .far = far});
 
   info_ = {.name = config_.name,
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),
@@ -164,7 +170,8 @@ void SimulatedDevice::sense_more(PositionSample& sample) const noexcept {
 
 Vec3 SimulatedDevice::sensed_force() const noexcept {
   const auto& resolution = config_.force_sensor->resolution;
-  return resolution ? counted(truth_.hand_force, *resolution) : truth_.hand_force;
+  const Vec3 force = truth_.hand_force + truth_.environment_force;
+  return resolution ? counted(force, *resolution) : force;
 }
 
 Vec3 SimulatedDevice::apply(const Vec3& force) noexcept {
@@ -312,18 +319,21 @@ void SimulatedDevice::slide(Vec3& mean, Vec3& velocity, const Side& side, const 
 
 template <SimulatedDevice::Effects kEffects>
 void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
+  constexpr bool kMode = kEffects.far == Far::kMode;
+  constexpr bool kEnvironment = kEffects.far == Far::kEnvironment;
   const double begin = seconds(lived_);
   double viscous = 0;
   if (config_.viscous_friction) viscous = h / 2 * *config_.viscous_friction;
   Side handle{config_.mass, 0};  // all of the mass, or its side of the structural mode
-  if constexpr (kEffects.mode) handle.mass = config_.structural_mode->handle_mass;
+  if constexpr (kMode) handle.mass = config_.structural_mode->handle_mass;
   if constexpr (kEffects.hand) handle.mass += hand_->mass();
   handle.resistance = handle.mass;
-  if constexpr (!kEffects.mode) handle.resistance += viscous;
+  if constexpr (!kMode) handle.resistance += viscous;
+  if constexpr (kEnvironment) handle.resistance += h / 2 * environment_->damping();
   if constexpr (kEffects.hand) handle.resistance += h / 2 * (hand_->damping() + h / 2 * hand_->stiffness());
   Side motor;
   double coupling = 0;
-  if constexpr (kEffects.mode) {
+  if constexpr (kMode) {
     coupling = h / 2 * (config_.structural_mode->damping + h / 2 * config_.structural_mode->stiffness);
     handle.resistance += coupling;
     motor.mass = config_.mass - config_.structural_mode->handle_mass;
@@ -343,7 +353,13 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
       truth_.device_force = command_;
     }
     Vec3 push = truth_.device_force;
-    if constexpr (kEffects.mode) push = config_.structural_mode->stiffness * truth_.deflection;
+    Vec3 contact;
+    if constexpr (kEnvironment) {
+      const double middle = begin + h * (static_cast<double>(i) + 0.5);
+      contact = environment_->push(middle, truth_.position + h / 2 * v0, v0);
+      push += contact;
+    }
+    if constexpr (kMode) push = config_.structural_mode->stiffness * truth_.deflection;
     Vec3 drive;
     if constexpr (kEffects.hand) {
       drive = hand_->drive(begin + h * (static_cast<double>(i) + 0.5), truth_.position);
@@ -351,7 +367,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
     }
 
     Vec3 mean = handle.mass * v0 + h / 2 * push;
-    if constexpr (kEffects.mode) {
+    if constexpr (kMode) {
       const Vec3 motor_push = truth_.device_force - config_.structural_mode->stiffness * truth_.deflection;
       Vec3 motor_mean = motor.mass * motor_velocity_ + h / 2 * motor_push + coupling / handle.resistance * mean;
       slide<kEffects.rub>(motor_mean, motor_velocity_, motor, motor_push + config_.structural_mode->damping * v0,
@@ -361,6 +377,11 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
       truth_.deflection += h * (motor_mean - mean);
     } else {
       slide<kEffects.rub>(mean, truth_.velocity, handle, push, truth_.position, h);
+    }
+    if constexpr (kEnvironment) {
+      contact += environment_->rub(mean, truth_.velocity, handle.resistance, h) - environment_->damping() * mean;
+      truth_.environment_force = contact;
+      truth_.environment_work += h * contact.dot(mean);
     }
     if constexpr (kEffects.hand) {
       const Vec3 pull = drive - (hand_->damping() + h / 2 * hand_->stiffness()) * mean;

@@ -15,6 +15,7 @@
 #include "devices/simulated/forces_under_way.h"
 #include "devices/simulated/joint_friction.h"
 #include "devices/simulated/operator_hand.h"
+#include "devices/simulated/simulated_environment.h"
 #include "devices/simulated/simulated_gripper.h"
 #include "devices/simulated/simulated_outputs.h"
 #include "devices/simulated/simulated_rotation.h"
@@ -56,6 +57,9 @@ namespace tendon {
 /// here about delays and the watchdog holds for torque and grip too. Of a wrench that is too large, force and torque
 /// are shortened by one share, so it keeps its direction; the grip is clamped by itself.
 ///
+/// **Surroundings** (SimulatedEnvironment) are walls and a medium at the handle: another force on the right, and for the
+/// force sensor a part of what holds the handle. They are taken at the middle of a substep in time and place.
+///
 /// **Integration.** Substeps of equal length h ≤ max_substep; each is one implicit midpoint rule with
 /// set-valued friction (Moreau's time stepping with θ = ½). With v̄ = (v₀ + v₁)/2 it satisfies, exactly,
 ///
@@ -76,7 +80,7 @@ namespace tendon {
 /// transport delay, no amplifier lag, no watchdog ran out), with the E of EnergyLedger fed with the true position of
 /// what the encoder sees and with `least_friction`, up to rounding,
 ///
-///     work of the hand + stored energy at the start ≥ E + stored energy now
+///     work of hand and surroundings + stored energy at the start ≥ E + stored energy now
 ///
 /// where the kinetic energy of the device is stored, and that of the spring between its masses. Under transport delay
 /// it holds with the forces that have reached the motors, and not with those returned: a delayed spring does give out
@@ -107,8 +111,8 @@ class SimulatedDevice final : public Device {
     std::optional<double> max_force;  ///< N, norm of the force vector; its direction is kept
     /// Hz, −3 dB, first order. The motors follow the force that `apply` returned with this lag.
     std::optional<double> amplifier_bandwidth;
-    /// A sensor between handle and hand, as devices of admittance type have. It measures the mean of F_hand over the
-    /// last substep, without noise. The energy balance holds with it.
+    /// A sensor between handle and hand, as devices of admittance type have, and robots at the wrist. It measures the
+    /// mean force of hand and surroundings over the last substep, without noise. The energy balance holds with it.
     struct ForceSensor {
       std::optional<double> resolution;  ///< N, one count per axis; the sample is the centre of the count
     };
@@ -117,6 +121,9 @@ class SimulatedDevice final : public Device {
     /// d_s and d_f, each up to kMostDelay. USB and a device's own loop take 1 to 2 ms. They break the energy balance.
     std::optional<Duration> sample_delay;
     std::optional<Duration> force_delay;
+
+    /// Walls and a medium at the handle; not beside a structural mode. The energy balance holds with it.
+    std::optional<SimulatedEnvironment::Config> environment{};
 
     std::optional<OperatorHand::Config> hand;
     std::optional<Duration> button_after;  ///< so long after the first `read` the hand presses button 0, and holds it
@@ -147,7 +154,9 @@ class SimulatedDevice final : public Device {
     Vec3 deflection = Vec3::Zero();    ///< m, e: the encoder is at position + deflection; 0 without a structural mode
     Vec3 device_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
     Vec3 hand_force = Vec3::Zero();    ///< N, mean over the last substep, on the handle
+    Vec3 environment_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
     double hand_work = 0;              ///< J, ∫ F_hand·dx since the start
+    double environment_work = 0;       ///< J, the same of the surroundings
     double kinetic_energy = 0;         ///< J, of the device alone (the hand's mass is the hand's)
     double spring_energy = 0;          ///< J, of the structural mode
     bool watchdog_fired = false;       ///< it took the force away during the last interval
@@ -194,18 +203,20 @@ class SimulatedDevice final : public Device {
   };
   /// What Coulomb friction there is.
   enum class Rub : std::uint8_t { kNone, kHandle, kJoints };
+  /// What is at the handle besides the hand.
+  enum class Far : std::uint8_t { kNone, kMode, kEnvironment };
   struct Effects {
     Rub rub = Rub::kNone;
     bool hand = false;
     bool lag = false;
-    bool mode = false;
+    Far far = Far::kNone;
 
-    static constexpr std::size_t kHowMany = 24;
+    static constexpr std::size_t kHowMany = 36;
     static constexpr Effects numbered(std::size_t i) {
-      return {static_cast<Rub>(i / 8), (i & 4) != 0, (i & 2) != 0, (i & 1) != 0};
+      return {static_cast<Rub>(i / 12), (i / 6 & 1) != 0, (i / 3 & 1) != 0, static_cast<Far>(i % 3)};
     }
     constexpr std::size_t number() const {
-      return 8 * static_cast<std::size_t>(rub) + (hand ? 4U : 0U) + (lag ? 2U : 0U) + (mode ? 1U : 0U);
+      return 12 * static_cast<std::size_t>(rub) + (hand ? 6U : 0U) + (lag ? 3U : 0U) + static_cast<std::size_t>(far);
     }
   };
   /// A mass in a substep, kg, and what resists its velocity: the mass, and h/2 of all that is in proportion to it.
@@ -243,6 +254,7 @@ class SimulatedDevice final : public Device {
 
   Config config_;
   std::optional<OperatorHand> hand_;
+  std::optional<SimulatedEnvironment> environment_;
   std::optional<JointFriction> joints_;
   std::optional<SimulatedRotation> rotation_;
   std::optional<SimulatedGripper> gripper_;

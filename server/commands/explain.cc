@@ -57,6 +57,8 @@ std::vector<Listable> make_listables() {
   using Device = SimulatedDevice::Config;
   add("device.hand", "the operator: a spring, a damper and a mass",
       [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).hand); });
+  add("device.environment", "walls and a medium that the handle runs into",
+      [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).environment); });
   add("device.rotation", "the handle turns, in the operator's hand", [](Scene& scene) {
     scene.loop.control.rotation.reset();
     return drop(std::get<SimulatedDevice::Config>(scene.device).rotation);

@@ -68,6 +68,7 @@ int main(int argc, char** argv) {
   with("encoder", [](SimulatedDevice::Config& config) { config.encoder_step = 30e-6; });
   with("saturation", [](SimulatedDevice::Config& config) { config.max_force = 8; });
   with("amplifier", [](SimulatedDevice::Config& config) { config.amplifier_bandwidth = 200; });
+  with("environment", [](SimulatedDevice::Config& config) { config.environment.emplace(); });
   with("force sensor", [](SimulatedDevice::Config& config) { config.force_sensor.emplace(); });
   with("watchdog", [](SimulatedDevice::Config& config) { config.watchdog = std::chrono::milliseconds(5); });
   with("sample delay", [](SimulatedDevice::Config& config) { config.sample_delay = std::chrono::milliseconds(1); });

@@ -62,6 +62,24 @@ struct World {
       config.structural_mode = {.handle_mass = config.mass * dice.uniform(0.05, 0.95),
                                 .stiffness = std::pow(10.0, dice.uniform(2, 5)),
                                 .damping = dice.chance(0.2) ? 0 : std::pow(10.0, dice.uniform(-2, 1))};
+    } else if (dice.chance(0.5)) {
+      put_among_walls(dice);
+    }
+  }
+
+  void put_among_walls(Dice& dice) {
+    auto& environment = config.environment.emplace();
+    if (dice.chance(0.5)) environment.damping = dice.uniform(0, 5);
+    if (dice.chance(0.5)) environment.friction = dice.uniform(0, 1);
+    for (int i = 0; i < 3; ++i) {
+      environment.walls.push_back({.point = dice.vector(0.02),
+                                   .normal = dice.vector(1),
+                                   .stiffness = std::pow(10.0, dice.uniform(1, 4)),
+                                   .damping = dice.uniform(0, 5),
+                                   .friction = dice.uniform(0, 1),
+                                   .speed = dice.uniform(-0.1, 0.1),
+                                   .from = from_seconds(dice.uniform(0, 0.1)),
+                                   .until = from_seconds(dice.uniform(0.1, 0.3))});
     }
   }
 
@@ -78,7 +96,7 @@ struct World {
   }
 };
 
-TEST(SimulatedDeviceEnergy, WorkOfTheHandIsNeverLessThanEquation5Demands) {
+TEST(SimulatedDeviceEnergy, WorkOfHandAndWallsIsNeverLessThanEquation5Demands) {
   // 2000 worlds with random devices, hands, forces and intervals; exact position sensing.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
@@ -98,9 +116,10 @@ TEST(SimulatedDeviceEnergy, WorkOfTheHandIsNeverLessThanEquation5Demands) {
       bench.wait(interval);
       const Vec3 dx = motor_side(bench.truth()) - before;
       equation.add(applied, dx, interval);
-      turnover += std::abs(applied.dot(dx)) + std::abs(bench.truth().hand_work);
+      const double brought = bench.truth().hand_work + bench.truth().environment_work;
+      turnover += std::abs(applied.dot(dx)) + std::abs(brought);
 
-      const double balance = bench.truth().hand_work + stored_at_start - stored(bench.truth()) - equation.energy;
+      const double balance = brought + stored_at_start - stored(bench.truth()) - equation.energy;
       least = std::min(least, balance);
       // Rounding grows with the energy that went to and fro: 1e-12 J, and 1e-13 of it where that is above 10 J.
       ASSERT_GE(balance, -1e-12 * std::max(1.0, turnover / 10)) << "seed " << seed << ", step " << step;

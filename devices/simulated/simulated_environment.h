@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "core/base/motion.h"
+#include "core/base/time.h"
+
+namespace tendon {
+
+/// What the handle of a simulated device runs into: the surroundings of a follower's tool. Walls, which may move, come
+/// and go, and a medium that brakes:
+///
+///     F = Σ over walls in contact (F_n n − μ F_n sgn(v_t))  −  b v − f sgn(v)          N, on the handle
+///     F_n = (k d − c v_n)₊ ,    d = n·(p − x) + s (t − t_from) > 0                      m, depth
+///
+/// n is the outward normal of a wall, p a point of it, s its speed along n; v_n = n·v − s and v_t = v − (n·v) n. sgn is
+/// set-valued: friction holds what it can hold.
+///
+/// **Integration.** SimulatedDevice calls, in each substep of length h, `push` at the middle in time and at the place
+/// x₀ + (h/2) v₀, which makes the springs of the walls a position Verlet step: no energy comes or goes for ever. Then
+/// `rub` takes the friction out of the mean velocity, which does work −μ F_n |v_t|, never more than there is motion for.
+///
+/// Thread-safe: no. Realtime-safe: all but the constructor.
+class SimulatedEnvironment {
+ public:
+  static constexpr std::size_t kMostWalls = 16;
+
+  struct Wall {
+    Vec3 point = Vec3::Zero();      ///< m, p: any point of the surface
+    Vec3 normal = Vec3::Zero();     ///< n, out of the wall; its length does not count, > 0
+    double stiffness = 0;           ///< k, N/m, > 0
+    double damping = 0;             ///< c, N·s/m, ≥ 0
+    double friction = 0;            ///< μ, ≥ 0
+    double speed = 0;               ///< s, m/s
+    Duration from{};                ///< it is there from this time on, since the first `read`; ≥ 0
+    std::optional<Duration> until;  ///< … and gone from this one on, > `from`
+  };
+
+  struct Config {
+    double damping = 0;   ///< b, N·s/m, ≥ 0
+    double friction = 0;  ///< f, N, ≥ 0
+    std::vector<Wall> walls;
+  };
+
+  /// Throws std::invalid_argument naming the field ("environment.…"), its value and what was expected.
+  explicit SimulatedEnvironment(Config config);
+
+  /// b.
+  double damping() const noexcept { return config_.damping; }
+
+  /// Σ F_n n at the time `t` (s since the first read), the place `x` and the velocity `v`.
+  Vec3 push(double t, const Vec3& x, const Vec3& v) noexcept;
+
+  /// Friction of the substep whose `push` came before. `mean` is the mean velocity and `end` that at the end, both
+  /// without this friction, and `resistance` (kg) is what an impulse on the handle is divided by. Returns the mean
+  /// force of friction, N.
+  Vec3 rub(Vec3& mean, Vec3& end, double resistance, double h) const noexcept;
+
+ private:
+  Config config_;
+  std::vector<double> pressed_;  ///< N, F_n of each wall in this substep
+};
+
+}  // namespace tendon
