@@ -141,7 +141,6 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
   }
   const Quat* const orientation = handle != nullptr && handle->turning ? &handle->turning->orientation : nullptr;
   ForceChannels::Wanted wanted = held_.wanted(hand, orientation);
-  if (coupling_) add_coupling(hand, wanted);
   take(fresh, hand, applied, hand_force, wanted, handle);
   if (const auto& newest = held_.newest(wanted.channel)) {
     fresh.force_sequence = newest->sequence;
@@ -156,11 +155,18 @@ Step HapticController::step(const Motion& hand, const Vec3& applied, const std::
   if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
   settled_ = settled;
   Step step;
-  take(step, hand, applied, hand_force, wanted, handle);
+  ForceChannels::Wanted given = wanted;
+  take(step, hand, applied, hand_force, given, handle);
   return step;
 }
 
-void HapticController::add_coupling(const Motion& hand, ForceChannels::Wanted& wanted) noexcept {
+void HapticController::add_coupling(const Motion& hand, const Step& step, ForceChannels::Wanted& wanted) noexcept {
+  if (started_) {
+    const Vec3 dx = last_ ? Vec3(hand.position - last_->position) : Vec3(Vec3::Zero());
+    const bool shares = config_.limiter.shared_account;
+    coupling_->observe({step.was_applied, dx, step.held},
+                       shares ? limiter_.payable() : std::numeric_limits<double>::infinity());
+  }
   const Demand<3> demand = coupling_->command(hand, buttons_, ready());
   wanted.force += demand.force;
   wanted.stiffness += demand.stiffness;
@@ -184,11 +190,12 @@ void HapticController::note(const HandleSample& handle, const ForceChannels::Wan
 }
 
 void HapticController::take(Step& step, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-                            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
+                            ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept {
   step.hand = hand;
   step.hand_force = hand_force;
   if (handle != nullptr) note(*handle, wanted, step);
   book(hand, applied, handle, step);
+  if (coupling_) add_coupling(hand, step, wanted);
   last_ = hand;
   if (wrench_) last_orientation_ = handle->turning->orientation;
   if (grip_) last_opening_ = handle->grip->opening;

@@ -208,7 +208,7 @@ class HapticController {
   bool believable(const Motion& hand, const HandleSample* handle) const noexcept;
   Step disbelieve(const Motion& hand, const Vec3& applied, const HandleSample* handle) noexcept;
   void take(Step& step, const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
-            const ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept;
+            ForceChannels::Wanted& wanted, const HandleSample* handle) noexcept;
   void book(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept;
   void book_seen(const Motion& hand, const Vec3& applied, const HandleSample* handle, Step& step) noexcept;
   void book_unseen(const Vec3& applied, const HandleSample* handle, Duration held) noexcept;
@@ -216,7 +216,7 @@ class HapticController {
   void limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
   void limit_wrench(const Vec3& applied, Step& step) noexcept;
   void limit_grip(Step& step) noexcept;
-  void add_coupling(const Motion& hand, ForceChannels::Wanted& wanted) noexcept;
+  void add_coupling(const Motion& hand, const Step& step, ForceChannels::Wanted& wanted) noexcept;
   void settle(const Vec3& wanted, Duration elapsed) noexcept;
   bool ready() const noexcept { return armed_ && !disarmed_ && fault_ == Fault::kNone; }
   static void note(const HandleSample& handle, const ForceChannels::Wanted& wanted, Step& step) noexcept;

@@ -15,7 +15,7 @@ namespace {
 PositionPosition<3>::Config spring_of(const Coupling::Config& config, const PoseMap& map) {
   PositionPosition<3>::Config spring = config.spring;
   // The leader of a position–force coupling has no spring: the follower's is not in a loop with the delay.
-  if (config.method == CouplingMethod::kPositionForce) spring.adapt_to_delay = false;
+  if (config.method != CouplingMethod::kPositionPosition) spring.adapt_to_delay = false;
   if (config.role == PortRole::kLeader) return spring;
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = map.stiffness_at_follower(*value);
@@ -34,6 +34,33 @@ std::optional<Purse> purse_of(const Coupling::Config& config, const PoseMap& map
   return Purse(purse);
 }
 
+std::optional<WavePort<3>> wave_of(const Coupling::Config& config, const PoseMap& map) {
+  if (config.method != CouplingMethod::kWaves) return std::nullopt;
+  const bool leads = config.role == PortRole::kLeader;
+  const double impedance = leads ? config.spring.own_damping : map.stiffness_at_follower(config.spring.own_damping);
+  expect_above_zero(impedance, "own_damping");
+  // Moving at most as fast as max_force/B while max_force is felt.
+  const double max_wave = 2 * config.spring.max_force / std::sqrt(2 * impedance);
+  return WavePort<3>({.impedance = impedance,
+                      .period = config.spring.period,
+                      .smoothing = std::max<Duration>(config.spring.period, std::chrono::milliseconds(20)),
+                      .max_wave = max_wave});
+}
+
+/// The surface that a follower found, in the leader's frame and scale. With m = the coupled part of Rᵀ n_f,
+///     F_l = s_f s_x K_f (d/s_x − m·u_l)₊ m
+SurfaceModel<3> at_leader(const PortSurface& from, const PoseMap& map, std::uint64_t sequence) {
+  const double stiffer = 1 / map.stiffness_at_follower(1);  // s_f s_x
+  const double scale = std::sqrt(stiffer / map.leader_joule());
+  const Vec3 m = scale * map.to_leader(from.normal);
+  const double length = m.norm();
+  if (!(length > 1e-3)) return {.sequence = sequence};  // it lies across the axes that are coupled
+  return {.sequence = sequence,
+          .normal = m / length,
+          .offset = from.offset / (scale * length),
+          .stiffness = stiffer * from.stiffness * length * length};
+}
+
 // False for what is not a number.
 bool fits(double value, double low, double high) noexcept { return value >= low && value <= high; }
 bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
@@ -41,6 +68,20 @@ bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).a
 bool has(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
 }  // namespace
+
+std::string_view to_string(CouplingMethod method) noexcept {
+  switch (method) {
+    case CouplingMethod::kPositionPosition:
+      return "position-position";
+    case CouplingMethod::kPositionForce:
+      return "position-force";
+    case CouplingMethod::kWaves:
+      return "waves";
+    case CouplingMethod::kSurface:
+      return "surface";
+  }
+  return "unknown";
+}
 
 std::string_view to_string(PortPhase phase) noexcept {
   switch (phase) {
@@ -62,6 +103,11 @@ std::string_view to_string(PortPhase phase) noexcept {
   return "unknown";
 }
 
+bool is_sound(const PortSurface& surface) noexcept {
+  return fits(surface.normal.norm(), 0.999, 1.001) && fits(surface.offset, -1e12, 1e12) &&
+         fits(surface.stiffness, 0, 1e12);
+}
+
 bool is_sound(const PortState& state) noexcept {
   constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
   constexpr double kAccount = PurseMessage::kMostAccount;
@@ -71,11 +117,23 @@ bool is_sound(const PortState& state) noexcept {
          state.phase >= PortPhase::kAlone && state.phase <= PortPhase::kFault && fits(state.position) &&
          fits(state.velocity) && fits(state.force) && (!state.contact_force || fits(*state.contact_force)) &&
          fits(state.account, -kAccount, kAccount) && fits(state.need, 0, kAccount) && fits(state.given, 0, kTotal) &&
-         fits(state.taken, 0, kTotal);
+         fits(state.taken, 0, kTotal) && fits(state.wave_integral) && fits(state.wave_energy, 0, kTotal) &&
+         (!state.surface || is_sound(*state.surface));
 }
 
 Coupling::Coupling(const Config& config)
-    : config_(config), map_(config.map), spring_(spring_of(config, map_)), purse_(purse_of(config, map_)) {
+    : config_(config),
+      map_(config.map),
+      spring_(spring_of(config, map_)),
+      purse_(purse_of(config, map_)),
+      wave_(wave_of(config, map_)) {
+  if (config.method == CouplingMethod::kSurface) {
+    if (leads()) {
+      renderer_.emplace();
+    } else {
+      estimator_.emplace(config.surface);
+    }
+  }
   const auto refuse_of = [&](bool there, const char* field, PortRole only) {
     expect(!there || config.role == only, field, 1,
            only == PortRole::kLeader ? "none: only a leader has one" : "none: only a follower has one");
@@ -108,6 +166,13 @@ Vec3 Coupling::bounded(const Vec3& force) const noexcept {
 }
 
 bool Coupling::live() const noexcept { return phase_ == PortPhase::kEngaged && (!leads() || answered_); }
+double Coupling::stiffness() const noexcept {
+  if (renderer_) return newest_.surface ? at_leader(*newest_.surface, map_, 1).stiffness : 0;
+  if (!wave_) return spring_.stiffness();
+  // B/d, with half of the round trip for one way.
+  const double impedance = config_.spring.own_damping * (leads() ? 1 : map_.stiffness_at_follower(1));
+  return impedance / (seconds(round_trip()) / 2 + seconds(wave_->playout() + kLineWaits));
+}
 double Coupling::account() const noexcept { return purse_ ? purse_->account() : 0; }
 bool Coupling::contact_measured() const noexcept { return newest_.contact_force.has_value(); }
 std::uint64_t Coupling::refused() const noexcept { return refused_; }
@@ -143,8 +208,10 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
                    .round_trip = peer.round_trip,
                    .position = mapped(peer.position),
                    .velocity = mapped(peer.velocity)});
+  if (wave_) receive_wave(peer, anew);
   if (anew) {
     peer_anew_ = true;
+    if (renderer_) renderer_.emplace();
     gap_ = gap_before_ = Duration::zero();
     stretch_began_ = now;
   } else if (phase_ != PortPhase::kLost && phase_ != PortPhase::kAlone) {
@@ -156,6 +223,35 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
   }
   newest_ = peer;
   arrived_ = now;
+}
+
+void Coupling::receive_wave(const PortState& peer, bool anew) noexcept {
+  const bool leader = leads();
+  const WaveMessage<3> wave{
+      .sequence = peer.sequence,
+      .time = peer.time,
+      .integral = leader ? map_.wave_to_leader(peer.wave_integral) : map_.wave_to_follower(peer.wave_integral),
+      .energy = peer.wave_energy * (leader ? map_.leader_joule() : map_.follower_joule())};
+  if (anew || !wave_joined_) {
+    wave_->join(wave);
+    wave_joined_ = true;
+  } else {
+    wave_->receive(wave);
+  }
+}
+
+void Coupling::observe(const Interval<3>& interval, double payable) noexcept {
+  payable_ = payable;
+  if (!wave_) return;
+  Interval<3> end{.applied = wave_force_, .dx = Vec3::Zero(), .held = interval.held};
+  if (wave_moves_) {
+    end.dx = coupled(interval.dx);
+    // What limiter and motors cut is a softer end of the line; what the ramp took is not.
+    end.applied = coupled(interval.applied) + wave_force_ - coupled(last_);
+  }
+  sent_wave_ = wave_->observe(end, {.payable = payable, .reserve = loss_, .wanted = wave_force_});
+  taken_ = wave_->taken();
+  given_ = wave_->given();
 }
 
 Duration Coupling::patience() const noexcept {
@@ -192,6 +288,7 @@ bool Coupling::engage() noexcept {
   act_sequence_ = sequence_ + 1;
   acted_at_ = now_;
   u_.setZero();
+  if (renderer_) renderer_.emplace();
   return true;
 }
 
@@ -263,11 +360,17 @@ void Coupling::advance_follower() noexcept {
 }
 
 /// Whether the law makes the force.
-bool Coupling::driven() const noexcept { return live() && (!silent_ || config_.holds_place); }
+bool Coupling::driven() const noexcept { return live() && (!silent_ || (config_.holds_place && !wave_)); }
+
+void Coupling::begin_act() noexcept {
+  u_ = mapped(newest_.position);
+  if (estimator_) estimator_.emplace(config_.surface);
+  surface_.reset();
+}
 
 /// p₀ follows the handle while u stands still, and the other way round.
 void Coupling::place(const Vec3& position) noexcept {
-  if (new_act_) u_ = mapped(newest_.position);
+  if (new_act_) begin_act();
   if (live() && was_live_ && !new_act_) {
     u_ = position - offset_;
   } else {
@@ -276,17 +379,35 @@ void Coupling::place(const Vec3& position) noexcept {
   was_live_ = live();
 }
 
-/// Of whole gain, along the coupled axes. The spring counts periods, so it is asked in each.
+/// Of whole gain, along the coupled axes. Spring and line count periods, so they are asked in each.
 Demand<3> Coupling::law(const Vec3& velocity) noexcept {
   const Vec3 speed = coupled(velocity);
   Demand<3> demand = spring_.command(coupled(u_), speed);
-  if (leads() && config_.method == CouplingMethod::kPositionForce) {
-    const Vec3 contact = newest_.contact_force.value_or(Vec3::Zero());
-    demand.force = bounded(map_.force_to_leader(contact) - config_.spring.own_damping * speed);
-    demand.stiffness.setZero();
+  if (wave_) {
+    demand = line(speed);
+  } else if (leads() && config_.method != CouplingMethod::kPositionPosition) {
+    demand = felt();
+    demand.force = bounded(demand.force - config_.spring.own_damping * speed);
   }
   for (int i = 0; i < 3; ++i) demand.stiffness.col(i) = coupled(demand.stiffness.col(i));
   return demand;
+}
+
+Demand<3> Coupling::line(const Vec3& speed) noexcept {
+  const bool holds = phase_ == PortPhase::kClutched;
+  wave_moves_ = live();
+  Demand<3> demand = wave_->command(wave_moves_ ? speed : Vec3(Vec3::Zero()));
+  demand.force = bounded(demand.force);
+  wave_force_ = wave_moves_ || holds ? demand.force : Vec3(Vec3::Zero());
+  return demand;
+}
+
+/// By the leader, of what the follower touches.
+Demand<3> Coupling::felt() noexcept {
+  if (!renderer_) return {map_.force_to_leader(newest_.contact_force.value_or(Vec3::Zero()))};
+  if (!live()) return {Vec3::Zero()};
+  if (newest_.surface && peer_serves()) renderer_->receive(at_leader(*newest_.surface, map_, newest_.sequence));
+  return renderer_->command(u_, std::max(payable_ - renderer_->energy(u_), 0.0)).demand;
 }
 
 /// The law as far as its ramp has come, and the place of a robot as far as it has not. No network is between a robot
@@ -336,6 +457,12 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
 /// A period that has no position: no force, and the longer that is so, the more of the ramp is to be gone again.
 void Coupling::skip() noexcept {
   spring_.command(coupled(u_), Vec3::Zero());
+  if (wave_) {
+    // Nobody saw the interval that ends now, nor sees the next one: nothing is paid for what the line sends.
+    wave_->observe({.applied = wave_force_, .dx = Vec3::Zero(), .held = elapsed_},
+                   {.payable = -std::numeric_limits<double>::max(), .wanted = wave_force_});
+    line(Vec3::Zero());
+  }
   u_velocity_.setZero();
   was_live_ = was_live_ && live();
   was_driven_ = was_driven_ && driven();
@@ -351,9 +478,15 @@ void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
 }
 
 Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
-  if (!purse_) return {};
+  loss_ = loss;
+  Purse::Settlement settlement{.credit = std::exchange(taken_, 0), .withdraw = std::exchange(given_, 0)};
+  if (!purse_) return settlement;
   const bool giving = live() && !silent_ && newest_.phase == PortPhase::kEngaged;
-  return purse_->settle({.payable = payable, .loss = loss, .elapsed = elapsed, .giving = giving});
+  const double left = payable + settlement.credit - settlement.withdraw;
+  const auto paid = purse_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = giving});
+  settlement.credit += paid.credit;
+  settlement.withdraw += paid.withdraw;
+  return settlement;
 }
 
 PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& contact) noexcept {
@@ -372,6 +505,15 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
   state.velocity = u_velocity_;
   if (fits(applied)) state.force = applied;
   if (contact && fits(*contact)) state.contact_force = contact;
+  if (estimator_ && live() && state.contact_force) {
+    const SurfaceModel<3> found = estimator_->observe(u_, *contact);
+    surface_ = {.normal = found.normal, .offset = found.offset, .stiffness = found.stiffness};
+  }
+  state.surface = surface_;
+  if (wave_) {
+    state.wave_integral = sent_wave_.integral;
+    state.wave_energy = sent_wave_.energy;
+  }
   if (purse_) {
     const PurseMessage paid = purse_->message(0);
     state.account = paid.account;

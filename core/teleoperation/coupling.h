@@ -7,10 +7,12 @@
 
 #include "core/base/motion.h"
 #include "core/control/stability_controller.h"
+#include "core/teleoperation/model_mediated.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/pose_map.h"
 #include "core/teleoperation/position_position.h"
 #include "core/teleoperation/purse.h"
+#include "core/teleoperation/wave_variables.h"
 
 namespace tendon {
 
@@ -19,8 +21,9 @@ namespace tendon {
 ///
 /// **In each period**, in this order:
 ///
-///     limiter.observe(interval)                      the account: L − given + taken
 ///     coupling.receive(state of the peer)            any number, late or twice
+///     limiter.observe(interval)                      the account: L − given + taken
+///     coupling.observe(interval, limiter.payable())
 ///     demand = coupling.command(hand, …)             phases, map, law: the force to want
 ///     settlement = coupling.settle(…)                limiter.credit, limiter.withdraw
 ///     limiter.limit(everything that is wanted)       the bound
@@ -69,12 +72,22 @@ namespace tendon {
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
 /// law, with a K that does not adapt to the delay, because the leader has no spring; the leader's force is
-/// s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact (`contact_measured`). All forces of the
-/// coupling are bounded by max_force.
+/// s_f Rᵀ f_contact − B v, and −B v alone when the peer measures no contact (`contact_measured`). surface: the follower
+/// does the same and finds the surface that its tool touches (SurfaceEstimator, from the contact force); the leader
+/// renders that one at its own rate (SurfaceRenderer, what a change costs is paid from the account), and −B v. The
+/// surface is forgotten with each act. waves: a WavePort of impedance B at both ends, B_f = B/(s_f s_x); K and D are
+/// not used, but for the place of a robot. All forces of the coupling are bounded by max_force.
+///
+/// **Waves and phases.** The line books the force that the law wants, whole, and not what ramp, limiter and motors make
+/// of it: nothing that cuts a force shifts the two places against each other. What it sends is paid from the limiter's
+/// account, and what comes is paid into it, so that the pair is passive whatever was cut. A clutched leader holds its
+/// end of the line where it is: the follower stays there on the line's own spring. An end that is not engaged takes up
+/// what comes and sends nothing.
 ///
 /// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while it is live and its
 /// peer is engaged (not clutched) and not silent. Its `joule` is the map's. Method position-position needs it for the
-/// pair to be passive; without it a limiter at each end keeps each by itself passive, and the follower cannot move.
+/// pair to be passive; without it a limiter at each end keeps each by itself passive, and the follower cannot move. Nor
+/// can a follower of position-force or surface without a purse, if it has a limiter. Waves carry their own energy.
 ///
 /// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent, or
 /// that the purse refuses, changes nothing and is counted in `refused`. One that is not newer is passed over. A hand
@@ -85,11 +98,13 @@ namespace tendon {
 class Coupling {
  public:
   static constexpr Duration kFade = std::chrono::milliseconds(50);
-  static constexpr Duration kAnswerWithin = std::chrono::seconds(5);
+  static constexpr Duration kAnswerWithin = std::chrono::seconds(12);
   static constexpr Duration kStale = std::chrono::milliseconds(20);  ///< least v, and from v to the second rung
   static constexpr Duration kLostAfter = std::chrono::milliseconds(250);
   static constexpr Duration kMostGap = std::chrono::milliseconds(100);  ///< a longer one counts as this
-  static constexpr Duration kGapsKept = std::chrono::seconds(5);        ///< lately: the last one to two of these
+  /// Of a line of waves, besides way and playout: W/2 and the periods.
+  static constexpr Duration kLineWaits = std::chrono::milliseconds(11);
+  static constexpr Duration kGapsKept = std::chrono::seconds(5);  ///< lately: the last one to two of these
 
   struct Button {
     std::uint32_t bit = 0;  ///< ≤ 31
@@ -105,6 +120,9 @@ class Coupling {
     /// start: the LEADER's J, the follower's is worth as much; max_power, max_account: this end's. peers, joule and
     /// epoch are set from map and spring.
     std::optional<Purse::Config> purse{};
+    /// Of method surface; in the follower's scale, and used there only.
+    SurfaceEstimator<3>::Config surface{
+        .contact_force = 0.1, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 300};
     std::optional<Button> clutch{};            ///< leader only
     std::optional<std::uint32_t> engage_by{};  ///< leader: bit of the button whose press is the act; empty: engage()
     Duration ramp = std::chrono::milliseconds(300);       ///< > 0
@@ -123,12 +141,16 @@ class Coupling {
   /// Either end.
   void disengage() noexcept;
 
+  /// The interval that has just ended: where the handle went, m, and the account after it was booked, J
+  /// (SharesAccount::payable; +∞ for a port without a limiter). Not when the interval was not seen.
+  void observe(const Interval<3>& interval, double payable) noexcept;
+
   /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes.
   Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept;
   /// The device gave no position in this period: phases and ladder only. No force.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
-  /// For the limiter, after `command`, before `limit` (share). Nothing is given or credited without a purse.
+  /// For the limiter, after `command`, before `limit` (share). Nothing is given or credited without purse or waves.
   Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
   /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool.
@@ -136,7 +158,7 @@ class Coupling {
 
   PortPhase phase() const noexcept { return phase_; }
   bool live() const noexcept;
-  double stiffness() const noexcept { return spring_.stiffness(); }  ///< K in use at this end, N/m
+  double stiffness() const noexcept;  ///< in use at this end, N/m: K, of waves B/d, of surface that of the model
   Duration round_trip() const noexcept { return spring_.round_trip(); }
   double account() const noexcept;         ///< J; 0 without a purse
   bool contact_measured() const noexcept;  ///< the peer's newest state has a contact force
@@ -158,6 +180,10 @@ class Coupling {
   void place(const Vec3& position) noexcept;
   void skip() noexcept;
   Demand<3> law(const Vec3& velocity) noexcept;
+  Demand<3> line(const Vec3& speed) noexcept;
+  Demand<3> felt() noexcept;
+  void begin_act() noexcept;
+  void receive_wave(const PortState& peer, bool anew) noexcept;
   Demand<3> blended(const Motion& hand) noexcept;
   Vec3 mapped(const Vec3& displacement) const noexcept;
   Vec3 coupled(const Vec3& vector) const noexcept;
@@ -167,6 +193,18 @@ class Coupling {
   PoseMap map_;
   PositionPosition<3> spring_;
   std::optional<Purse> purse_;
+  std::optional<WavePort<3>> wave_;
+  std::optional<SurfaceEstimator<3>> estimator_;  ///< follower
+  std::optional<SurfaceRenderer<3>> renderer_;    ///< leader
+  std::optional<PortSurface> surface_;            ///< follower: found in this act
+  WaveMessage<3> sent_wave_;
+  Vec3 wave_force_ = Vec3::Zero();  ///< N, what the law wants of the line in this period
+  bool wave_moves_ = false;         ///< … and whether the line moves with the handle
+  bool wave_joined_ = false;        ///< to the peer's present epoch
+  double taken_ = 0;                ///< J, by waves, since the last `settle`
+  double given_ = 0;
+  double payable_ = 0;  ///< J, after the newest interval
+  double loss_ = 0;     ///< J, what the limiter needs for the force wanted last
 
   PortPhase phase_ = PortPhase::kAlone;
   std::uint64_t sequence_ = 0;    ///< periods

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -28,8 +29,22 @@ std::string_view to_string(PortPhase phase) noexcept;
 enum class PortRole : std::uint8_t { kLeader, kFollower };
 
 enum class CouplingMethod : std::uint8_t {
-  kPositionPosition,  ///< a spring and a damper at both ends (PositionPosition), with a purse
-  kPositionForce,     ///< the follower's spring; the leader feels the contact that the follower measures
+  kPositionPosition = 1,  ///< a spring and a damper at both ends (PositionPosition), with a purse
+  kPositionForce,         ///< the follower's spring; the leader feels the contact that the follower measures
+  kWaves,                 ///< wave variables, played out (WavePort)
+  kSurface,               ///< position-force, but the leader touches a model of the surface that the follower found
+};
+inline constexpr std::array kCouplingMethods = {CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce,
+                                                CouplingMethod::kWaves, CouplingMethod::kSurface};
+
+/// As scenes and refusals call it: "position-position".
+std::string_view to_string(CouplingMethod method) noexcept;
+
+/// A flat, springy surface as the sender's tool has found it: SurfaceModel in the sender's displacements u.
+struct PortSurface {
+  Vec3 normal = Vec3::UnitX();  ///< of length 1 ± 0.001, out of the surface
+  double offset = 0;            ///< m: the surface is at normal·u = offset
+  double stiffness = 0;         ///< N/m, ≥ 0; 0: there is none
 };
 
 /// What one port of a coupling tells the other, once a period. It may be sent as seldom as one likes, late, twice, in
@@ -50,14 +65,18 @@ struct PortState {
   Vec3 position = Vec3::Zero();  ///< m, u: from the sender's offset, so that the peer needs to know no offset of it
   Vec3 velocity = Vec3::Zero();  ///< m/s, of u: zero while it is frozen
   Vec3 force = Vec3::Zero();     ///< N, that its device exerts on whoever holds it, really applied
-  std::optional<Vec3> contact_force{};  ///< N, of the surroundings on its tool, as measured; empty: not measured
-  double account = 0;                   ///< J, PurseMessage::account
-  double need = 0;                      ///< J, PurseMessage::need; 0: it has no purse
-  double given = 0;                     ///< J, PurseMessage::given
-  double taken = 0;                     ///< J, PurseMessage::taken
+  std::optional<Vec3> contact_force{};   ///< N, of the surroundings on its tool, as measured; empty: not measured
+  double account = 0;                    ///< J, PurseMessage::account
+  double need = 0;                       ///< J, PurseMessage::need; 0: it has no purse
+  double given = 0;                      ///< J, PurseMessage::given
+  double taken = 0;                      ///< J, PurseMessage::taken
+  std::optional<PortSurface> surface{};  ///< what its tool touches, or touched last; empty: nothing yet
+  Vec3 wave_integral = Vec3::Zero();     ///< √W·s, WaveMessage::integral
+  double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of PurseMessage
 };
 
 /// Whether each value is finite and within the bounds that it has above and on the wire (tendon.proto).
 bool is_sound(const PortState& state) noexcept;
+bool is_sound(const PortSurface& surface) noexcept;
 
 }  // namespace tendon

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/teleoperation/pose_map.h"
 
+#include <cmath>
+
 #include "core/base/expect.h"
 #include "core/base/frames.h"
 #include "core/base/rotation.h"
@@ -31,6 +33,14 @@ Vec3 PoseMap::to_leader(const Vec3& displacement) const noexcept {
 
 Vec3 PoseMap::force_to_leader(const Vec3& force) const noexcept {
   return force_scale_ * coupled_at_leader(rotation_.transpose() * force);
+}
+
+Vec3 PoseMap::wave_to_follower(const Vec3& wave) const noexcept {
+  return std::sqrt(follower_joule()) * (rotation_ * coupled_at_leader(wave));
+}
+
+Vec3 PoseMap::wave_to_leader(const Vec3& wave) const noexcept {
+  return std::sqrt(leader_joule()) * coupled_at_leader(rotation_.transpose() * wave);
 }
 
 Vec3 PoseMap::coupled_at_leader(const Vec3& vector) const noexcept { return axes_.cwiseProduct(vector); }

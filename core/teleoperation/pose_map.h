@@ -32,6 +32,9 @@ class PoseMap {
   Vec3 to_follower(const Vec3& displacement) const noexcept;  ///< m, m/s: s_x R (the coupled part of u_l)
   Vec3 to_leader(const Vec3& displacement) const noexcept;    ///< m, m/s: the coupled part of Rᵀ u_f/s_x
   Vec3 force_to_leader(const Vec3& force) const noexcept;     ///< N: s_f (the coupled part of Rᵀ F_f)
+  /// √W: a wave, half of whose square is a power: √(s_x/s_f) R w_l, and back.
+  Vec3 wave_to_follower(const Vec3& wave) const noexcept;
+  Vec3 wave_to_leader(const Vec3& wave) const noexcept;
   /// The part of a vector along the coupled axes, in the frame of either end.
   Vec3 coupled_at_leader(const Vec3& vector) const noexcept;
   Vec3 coupled_at_follower(const Vec3& vector) const noexcept;

@@ -15,11 +15,27 @@ WavePort<N>::WavePort(const Config& config)
   expect_above_zero(config.impedance, "impedance");
   expect_above_zero(seconds(config.period), "period");
   expect_not_negative(seconds(config.max_playout), "max_playout");
+  expect(config.max_wave > 0, "max_wave", config.max_wave, "above 0");
   const double means = seconds(config.smoothing) / seconds(config.period);
   expect(means >= 1 && means <= static_cast<double>(kMost), "smoothing", seconds(config.smoothing),
          "1 to 256 periods of " + shortest(seconds(config.period)) + " s");
   means_ = static_cast<std::size_t>(portable::round(means));
   for (Vec<N>& sum : played_) sum.setZero();
+}
+
+template <int N>
+void WavePort<N>::join(const WaveMessage<N>& first) noexcept {
+  if (!first.integral.allFinite() || !std::isfinite(first.energy)) return;
+  clock_ = PlayoutClock(config_.max_playout);
+  clock_.heard(sent_.time, first.time, Duration::zero());
+  begin_ = 0;
+  count_ = 1;
+  heard_[0] = first;
+  joined_ = true;
+  for (Vec<N>& sum : played_) sum = first.integral;
+  mean_ = used_integral_ = first.integral;
+  newest_energy_ = used_energy_ = first.energy;
+  wave_.setZero();
 }
 
 template <int N>
@@ -72,6 +88,8 @@ Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
   next_ = (next_ + 1) % means_;
   wave_ = step / seconds(config_.period) + (mean_ - used_integral_) / seconds(config_.smoothing);
   mean_ += step;
+  const double length = wave_.stableNorm();
+  if (length > config_.max_wave) wave_ *= config_.max_wave / length;
 
   const double left = std::max(newest_energy_ - used_energy_, 0.0);
   const double energy = seconds(config_.period) * wave_.squaredNorm() / 2;
@@ -80,29 +98,61 @@ Demand<N> WavePort<N>::command(const Vec<N>& velocity) noexcept {
 }
 
 template <int N>
+WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const SharedAccount& account) noexcept {
+  account_ = account.payable + interval.applied.dot(interval.dx);  // which is booked there already
+  return observe(interval, account.wanted - interval.applied, account.reserve);
+}
+
+template <int N>
 WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval) noexcept {
+  return observe(interval, Vec<N>(Vec<N>::Zero()), 0);
+}
+
+template <int N>
+WaveMessage<N> WavePort<N>::observe(const Interval<N>& interval, const Vec<N>& cut, double reserve) noexcept {
   const double held = seconds(interval.held);
   ++sent_.sequence;
+  taken_ = given_ = 0;
   if (!(held > 0)) return sent_;
   sent_.time += interval.held;
-  if (!interval.applied.allFinite() || !interval.dx.allFinite()) return sent_;
+  if (!interval.applied.allFinite() || !interval.dx.allFinite() || !cut.allFinite()) return sent_;
 
   // A period that was longer than planned can have used no more than there was.
-  const double used = std::min(held * wave_.squaredNorm() / 2, std::max(newest_energy_ - used_energy_, 0.0));
-  used_energy_ += used;
+  taken_ = std::min(held * wave_.squaredNorm() / 2, std::max(newest_energy_ - used_energy_, 0.0));
+  used_energy_ += taken_;
   used_integral_ += held * wave_;
-  account_ += used - interval.applied.dot(interval.dx);
+  account_ += taken_ - interval.applied.dot(interval.dx);
 
   const Vec<N> due = (config_.impedance * interval.dx - held * interval.applied) / root_;
-  const Vec<N> wave = due / held + unsent_ / seconds(config_.smoothing);
-  const double cost = held * wave.squaredNorm() / 2;
-  const double affordable = std::clamp(account_, 0.0, cost);
-  const Vec<N> step = affordable < cost ? Vec<N>(held * std::sqrt(affordable / cost) * wave) : Vec<N>(held * wave);
-  unsent_ += due - step;
-  account_ -= affordable;
-  sent_.energy += affordable;
-  sent_.integral += step;
+  unsent_ -= held * cut / root_;
+  send(due / held, held, reserve);
   return sent_;
+}
+
+/// `wave` first; what was left out earlier with what is then left beyond one and a half reserves.
+template <int N>
+void WavePort<N>::send(const Vec<N>& wave, double held, double reserve) noexcept {
+  const double cost = held * wave.squaredNorm() / 2;
+  const double most = account_ < reserve ? kPoorShare * cost : cost;
+  const double affordable = std::clamp(account_, 0.0, most);
+  double sent = affordable < cost ? std::sqrt(affordable / cost) : 1.0;
+  unsent_ += (1 - sent) * held * wave;
+  Vec<N> whole = sent * wave;
+  const Vec<N> late = unsent_ / seconds(kLate);
+  const double square = late.squaredNorm();
+  const double spare = account_ - affordable - 1.5 * reserve;
+  if (spare > 0 && square > 0) {
+    // The largest k ≤ 1 with T ‖whole + k late‖²/2 ≤ T ‖whole‖²/2 + spare.
+    const double along = whole.dot(late);
+    const double root = std::sqrt(along * along + 2 * square * spare / held);
+    const double k = std::min(1.0, (root - along) / square);
+    whole += k * late;
+    unsent_ -= k * held * late;
+  }
+  given_ = std::min(held * whole.squaredNorm() / 2, std::max(account_, 0.0));
+  account_ -= given_;
+  sent_.energy += given_;
+  sent_.integral += held * whole;
 }
 
 template class WavePort<1>;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "core/control/stability_controller.h"
 #include "core/teleoperation/playout_clock.h"
@@ -46,7 +47,7 @@ struct WaveMessage {
 ///
 ///     A += T r̂²/2 − T s²/2 − F·Δx
 ///
-/// and s is shortened where it would take A below zero; what was left out of its sum is sent as soon as A has it again.
+/// and s is shortened where it would take A below zero; what was left out of its sum is sent when A has it again.
 /// So A + A' + (what is on the way in both directions) is exactly what the two ends have put in, and none of its parts
 /// is negative, except that A is when the motion in one period was another than v promised; then nothing is sent until
 /// it has been earned back. (The limiter at the device is what bounds the leader's port in every case.)
@@ -74,10 +75,16 @@ class WavePort {
     Duration smoothing = std::chrono::milliseconds(20);  ///< W; ≥ T and ≤ 256 T, rounded to a whole number of T
     /// The most that D may be; ≥ 0. Messages that wait for more than 255 periods of the sender are played early.
     Duration max_playout = std::chrono::milliseconds(60);
+    /// √W, the longest r̂ that is used: no more than half of its square, in W, comes in. What is left out comes later.
+    double max_wave = std::numeric_limits<double>::infinity();
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
   explicit WavePort(const Config& config);
+
+  /// The first message of an other end that began before this one heard of it, or began anew: only what it sends from
+  /// now on counts.
+  void join(const WaveMessage<N>& first) noexcept;
 
   /// A message of the other end has come, in whatever order.
   void receive(const WaveMessage<N>& message) noexcept;
@@ -88,17 +95,36 @@ class WavePort {
   /// The interval that has just ended; returns what to send.
   WaveMessage<N> observe(const Interval<N>& interval) noexcept;
 
+  /// What the limiter of a port says that lets the line draw on its account (SharesAccount).
+  struct SharedAccount {
+    double payable = 0;              ///< J, after its `observe`: takes the place of A
+    double reserve = 0;              ///< J, ℓ of the force that is wanted: what the limiter needs for itself
+    Vec<N> wanted = Vec<N>::Zero();  ///< N, what the line wanted in the interval, of which `applied` was left
+  };
+  /// The same for a port with a limiter, which cuts forces for want of the energy that the line has. Below the reserve
+  /// a fifth of each wave's energy stays here, so that the limiter gets what it needs without the line falling silent;
+  /// what a cut force has left out of the sum is sent when there is more than one and a half reserves. The caller
+  /// credits `taken` to the limiter and withdraws `given`.
+  WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
+
   /// A, J.
   double energy() const noexcept { return account_; }
+  /// J ≥ 0, of the waves that came and went in the interval observed last.
+  double taken() const noexcept { return taken_; }
+  double given() const noexcept { return given_; }
 
   /// D in use, but for what the clock still has to steer.
   Duration playout() const noexcept { return clock_.playout(); }
 
  private:
   static constexpr std::size_t kMost = 256;
+  static constexpr Duration kLate = std::chrono::milliseconds(200);  ///< what was left out is sent over so long
+  static constexpr double kPoorShare = 0.8;
 
   WaveMessage<N>& heard(std::size_t k) noexcept { return heard_[(begin_ + k) % kMost]; }
   Vec<N> sum_at(Duration time) noexcept;
+  WaveMessage<N> observe(const Interval<N>& interval, const Vec<N>& cut, double reserve) noexcept;
+  void send(const Vec<N>& wave, double held, double reserve) noexcept;
 
   Config config_;
   double root_;        ///< √(2B)
@@ -118,6 +144,8 @@ class WavePort {
   double used_energy_ = 0;
   double newest_energy_ = 0;
   double account_ = 0;
+  double taken_ = 0;
+  double given_ = 0;
   WaveMessage<N> sent_;
   Vec<N> unsent_ = Vec<N>::Zero();  ///< of ∫ wave dt, left out for want of energy
 };

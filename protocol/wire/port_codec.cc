@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
+#include <optional>
 
 #include "core/base/rotation.h"
 #include "protocol/limits.h"
@@ -22,6 +23,13 @@ bool read(pb::PortPhase from, PortPhase& to) noexcept {
 
 bool within(double value, double least, double most) noexcept { return value >= least && value <= most; }
 
+bool read(bool there, const pb::PortSurface& from, std::optional<PortSurface>& to) noexcept {
+  to.reset();
+  if (!there) return true;
+  to = {.offset = from.offset_m(), .stiffness = from.stiffness_npm()};
+  return read(from.normal(), to->normal);
+}
+
 }  // namespace
 
 bool read(const pb::PortState& from, PortFrame& to) noexcept {
@@ -36,11 +44,13 @@ bool read(const pb::PortState& from, PortFrame& to) noexcept {
   to.need = from.need_j();
   to.given = from.given_j();
   to.taken = from.taken_j();
+  to.wave_energy = from.wave_energy_j();
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
          read(from.round_trip_ns(), to.round_trip) && read(from.phase(), to.phase) &&
          read(from.position_m(), to.position) && read(from.velocity_mps(), to.velocity) &&
-         read(from.force_n(), to.force) && read(from.has_contact_force_n(), from.contact_force_n(), to.contact_force) &&
-         is_sound(to);
+         read(from.force_n(), to.force) && read(from.wave_integral(), to.wave_integral) &&
+         read(from.has_surface(), from.surface(), to.surface) &&
+         read(from.has_contact_force_n(), from.contact_force_n(), to.contact_force) && is_sound(to);
 }
 
 void write(const PortFrame& from, pb::PortState& to) {
@@ -64,14 +74,22 @@ void write(const PortFrame& from, pb::PortState& to) {
   to.set_need_j(from.need);
   to.set_given_j(from.given);
   to.set_taken_j(from.taken);
+  to.clear_wave_integral();
+  if (!from.wave_integral.isZero(0)) write(from.wave_integral, *to.mutable_wave_integral());
+  to.set_wave_energy_j(from.wave_energy);
+  to.clear_surface();
+  if (from.surface) {
+    write(from.surface->normal, *to.mutable_surface()->mutable_normal());
+    to.mutable_surface()->set_offset_m(from.surface->offset);
+    to.mutable_surface()->set_stiffness_npm(from.surface->stiffness);
+  }
 }
 
 bool read(const pb::Couple& from, Couple& to) noexcept {
   if (from.role() == pb::PORT_ROLE_UNSPECIFIED || !pb::PortRole_IsValid(from.role())) return false;
   if (from.method() == pb::COUPLING_METHOD_UNSPECIFIED || !pb::CouplingMethod_IsValid(from.method())) return false;
   to.role = from.role() == pb::PORT_ROLE_LEADER ? PortRole::kLeader : PortRole::kFollower;
-  to.method = from.method() == pb::COUPLING_METHOD_POSITION_POSITION ? CouplingMethod::kPositionPosition
-                                                                     : CouplingMethod::kPositionForce;
+  to.method = static_cast<CouplingMethod>(from.method());
   to.position_scale = from.position_scale();
   to.force_scale = from.force_scale();
   to.axes = from.axes();
@@ -92,8 +110,7 @@ void write(const Couple& from, pb::Couple& to) {
   to.set_device(from.device);
   to.set_channel(from.channel);
   to.set_role(from.role == PortRole::kLeader ? pb::PORT_ROLE_LEADER : pb::PORT_ROLE_FOLLOWER);
-  to.set_method(from.method == CouplingMethod::kPositionPosition ? pb::COUPLING_METHOD_POSITION_POSITION
-                                                                 : pb::COUPLING_METHOD_POSITION_FORCE);
+  to.set_method(static_cast<pb::CouplingMethod>(from.method));
   to.set_position_scale(from.position_scale);
   to.set_force_scale(from.force_scale);
   write(from.rotation, *to.mutable_rotation());

@@ -306,17 +306,22 @@ double operational_stiffness(const LimiterConfig& limiter) {
 /// Says how stiff and how heavy the coupling is at some round trips, if the other end is like this one.
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
-  const bool springs = coupling.method == CouplingMethod::kPositionPosition;
+  const bool waves = coupling.method == CouplingMethod::kWaves;
   const auto& spring = coupling.spring;
-  text << "teleoperation: the " << (leads ? "leader" : "follower") << " of a "
-       << (springs ? "position-position" : "position-force") << " coupling"
+  text << "teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by " << to_string(coupling.method)
        << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
-  if (!springs) return;
+  if (!waves && coupling.method != CouplingMethod::kPositionPosition) return;
   text << "  the two limiters let no stiffness above " << std::llround(operational_stiffness(limiter) / 2)
        << " N/m be felt, if the other end is like this one\n"
-       << "  round trip      stiffness   in free motion like a damper of\n";
+       << "  round trip      stiffness   in free motion like a " << (waves ? "mass" : "damper") << " of\n";
   for (const int ms : {2, 10, 50, 200, 600}) {
     const double loop = ms * 1e-3;
+    if (waves) {
+      const double way = loop / 2 + seconds(Coupling::kLineWaits);
+      text << std::setw(9) << ms << " ms" << std::setw(11) << std::llround(spring.own_damping / way) << " N/m"
+           << std::setw(11) << std::setprecision(3) << spring.own_damping * way << " kg\n";
+      continue;
+    }
     const double quiet = spring.adapt_to_delay ? 2 * spring.own_damping / loop : spring.stiffness;
     const double stiffness = std::min(spring.stiffness, quiet);
     text << std::setw(9) << ms << " ms" << std::setw(11) << std::llround(stiffness) << " N/m" << std::setw(11)

@@ -16,9 +16,7 @@ constexpr double kAlike = 1e-9;
 bool alike(double a, double b) { return std::abs(a - b) <= kAlike * std::max(std::abs(a), std::abs(b)); }
 
 std::string name(PortRole role) { return role == PortRole::kLeader ? "leader" : "follower"; }
-std::string name(CouplingMethod method) {
-  return method == CouplingMethod::kPositionPosition ? "position-position" : "position-force";
-}
+std::string name(CouplingMethod method) { return std::string(to_string(method)); }
 std::string name(bool there) { return there ? "true" : "false"; }
 std::string name(double value) { return shortest(value); }
 std::string axes(std::uint32_t bits) {

@@ -88,6 +88,13 @@ void put(pb::PortState* out, const PortState& state) {
   out->set_need_j(state.need);
   out->set_given_j(state.given);
   out->set_taken_j(state.taken);
+  if (state.surface) {
+    put(out->mutable_surface()->mutable_normal(), state.surface->normal);
+    out->mutable_surface()->set_offset_m(state.surface->offset);
+    out->mutable_surface()->set_stiffness_n_per_m(state.surface->stiffness);
+  }
+  if (!state.wave_integral.isZero(0)) put(out->mutable_wave_integral(), state.wave_integral);
+  out->set_wave_energy_j(state.wave_energy);
 }
 
 PortState port_state(const pb::PortState& in) {
@@ -113,6 +120,13 @@ PortState port_state(const pb::PortState& in) {
   out.need = in.need_j();
   out.given = in.given_j();
   out.taken = in.taken_j();
+  if (in.has_surface()) {
+    out.surface = {.normal = vec3(in.surface().normal()),
+                   .offset = in.surface().offset_m(),
+                   .stiffness = in.surface().stiffness_n_per_m()};
+  }
+  out.wave_integral = vec3(in.wave_integral());
+  out.wave_energy = in.wave_energy_j();
   return out;
 }
 

@@ -362,15 +362,22 @@ class SceneResolver {
       blame("teleoperation.purse", {"teleoperation"},
             "missing, expected this table: behind a limiter of its own a follower cannot move unless the leader pays");
     }
-    if (coupling.purse && law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
-      blame("teleoperation.purse", {"limiter.kind"},
-            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no account that a purse can share");
+    const bool waves = coupling.method == CouplingMethod::kWaves;
+    const bool shares = coupling.purse || (waves && law != Law::kNone);
+    const std::string what = coupling.purse ? "teleoperation.purse" : "teleoperation.method";
+    if (shares && law != Law::kAolPlus && law != Law::kAol && law != Law::kAolBox) {
+      blame(what, {"limiter.kind"},
+            "expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no account that ports can share");
     }
-    if (coupling.purse && control.limiter.parts.latency_reserve) {
+    if (shares && control.limiter.parts.latency_reserve) {
       blame("limiter.latency_reserve", {},
-            "expected none with teleoperation.purse: the reserve is not proved for an account that ports share");
+            "expected none with " + what + ": the reserve is not proved for an account that ports share");
     }
-    control.limiter.shared_account = coupling.purse.has_value();
+    if (waves && !(coupling.spring.own_damping > 0)) {
+      blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
+            "expected a number above 0: it is the impedance of the waves");
+    }
+    control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;
   }

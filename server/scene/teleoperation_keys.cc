@@ -60,12 +60,20 @@ void declare_coupling(Table& keys, Draft& draft) {
   keys.key("stiffness_n_per_m", spring.stiffness, kAboveZero,
            "the stiffest that the spring between the handles is, as the leader feels it", kRequired);
   keys.key("damping_n_s_per_m", spring.own_damping, kZeroOrMore,
-           "rendered at each handle by itself, as the leader feels it. Above 0 with adapt_to_delay");
+           "rendered at each handle by itself, as the leader feels it; of waves the impedance. Above 0 for waves, and "
+           "with adapt_to_delay");
   keys.key("mutual_damping_n_s_per_m", spring.damping, kZeroOrMore, "between the handles, beside the spring");
   keys.key("adapt_to_delay", spring.adapt_to_delay, YesNo{},
-           "the stiffness is at most twice damping_n_s_per_m over the round trip: above that it buzzes");
+           "of position-position: the stiffness is at most twice damping_n_s_per_m over the round trip, because it "
+           "buzzes above");
   keys.key("max_force_n", draft.coupling_force, kAboveZero, "no force of the coupling is longer than this",
            Absent{.text = "force.max_force_n"});
+}
+
+Names<CouplingMethod> method_names() {
+  Names<CouplingMethod> names;
+  for (const CouplingMethod method : kCouplingMethods) names.all.emplace_back(to_string(method), method);
+  return names;
 }
 
 }  // namespace
@@ -76,11 +84,10 @@ void declare_teleoperation(Table& scene, Draft& draft) {
     Coupling::Config& coupling = draft.coupling;
     keys.key("role", coupling.role, Names<PortRole>{{{"leader", PortRole::kLeader}, {"follower", PortRole::kFollower}}},
              "the leader engages and clutches; the follower goes where the leader goes", kRequired);
-    keys.key("method", coupling.method,
-             Names<CouplingMethod>{{{"position-position", CouplingMethod::kPositionPosition},
-                                    {"position-force", CouplingMethod::kPositionForce}}},
-             "position-position: a spring between the handles. position-force: the leader feels the contact force that "
-             "the follower measures");
+    keys.key("method", coupling.method, method_names(),
+             "position-position: a spring between the handles. waves: one that stays quiet when the way is long. "
+             "position-force: the leader feels the contact force that the follower measures. surface: it feels the "
+             "surface that the follower found");
     keys.key("dial", peer.dial, NetworkAddress{}, "address of the server of the other handle",
              Absent{.text = "that server dials this one"});
     keys.key("key", peer.key, Path{}, "the key file with which this server dials, relative to this file",

@@ -218,7 +218,8 @@ void print(Line& line, const PortFrame& port) {
        << port.time << port.round_trip << port.phase << port.engagement << port.buttons << port.position
        << port.velocity << port.force;
   if (port.contact_force) line << "contact" << *port.contact_force;
-  line << port.account << port.need << port.given << port.taken;
+  line << port.account << port.need << port.given << port.taken << port.wave_integral << port.wave_energy;
+  if (port.surface) line << "surface" << port.surface->normal << port.surface->offset << port.surface->stiffness;
 }
 
 void print(Line& line, const Welcome& welcome) {

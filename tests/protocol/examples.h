@@ -308,6 +308,15 @@ inline PortFrame port_in_contact() {
   return port;
 }
 
+/// One of the other two methods: a follower that has touched a floor; its line has sent waves.
+inline PortFrame port_by_model() {
+  PortFrame port = port_in_contact();
+  port.surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
+  port.wave_integral = {0.25, 0, -1};
+  port.wave_energy = 0.5;
+  return port;
+}
+
 /// The other end makes half as large moves, and is turned by 106° about y.
 inline Couple couple() {
   return {.device = 1,
@@ -425,6 +434,7 @@ inline std::vector<Named> datagrams() {
       {"control-ack-joints", data(70, {}, joints_described(14))},
       {"port", data(71, {}, port())},
       {"port-contact", data(72, {}, port_in_contact())},
+      {"port-model", data(90, {}, port_by_model())},
       {"control-couple", data(73, {}, Control{.id = 15, .request = couple()})},
       {"control-engage", data(74, {}, Control{.id = 16, .request = Engage{.device = 1}})},
       {"control-disengage", data(75, {}, Control{.id = 17, .request = Disengage{.device = 1}})},

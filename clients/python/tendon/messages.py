@@ -294,6 +294,8 @@ class CouplingMethod(IntEnum):
 
     POSITION_POSITION = 1  # a spring and a damper at both ends
     POSITION_FORCE = 2  # the follower's spring; the leader feels the contact that the follower measures
+    WAVES = 3  # wave variables, played out
+    SURFACE = 4  # as POSITION_FORCE, but the leader feels a model of the surface that the follower found
 
 
 class PortPhase(IntEnum):
@@ -306,6 +308,15 @@ class PortPhase(IntEnum):
     CLUTCHED = 5  # the leader is free, the follower stays where it is
     LOST = 6  # it was engaged, and its peer fell silent; engaged again only by another act
     FAULT = 7  # its device gives no force
+
+
+@dataclass(frozen=True, slots=True)
+class PortSurface:
+    """A flat, springy surface that a follower's tool touches, or touched last. It only pushes."""
+
+    normal: Vec3  # out of the surface, of length 1
+    offset: float  # m: the surface is where normal · position is this
+    stiffness: float  # N/m; 0: there is none any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,6 +343,9 @@ class PortState:
     need: float = 0.0  # J, for the force that it wants; 0: it has no purse
     given: float = 0.0  # J, total paid to the receiver
     taken: float = 0.0  # J, the receiver's total that was heard of, in the receiver's joules
+    wave_integral: Vec3 = ZERO  # √W·s, of WAVES: the sum of the waves sent
+    wave_energy: float = 0.0  # J, of WAVES: the sum of their energies
+    surface: PortSurface | None = None  # of SURFACE; None: the tool has touched nothing yet
 
 
 @dataclass(frozen=True, slots=True)

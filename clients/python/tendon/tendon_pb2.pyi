@@ -20,7 +20,9 @@ CODE_UNSPECIFIED: Code
 CODE_UNSUPPORTED: Code
 COUPLING_METHOD_POSITION_FORCE: CouplingMethod
 COUPLING_METHOD_POSITION_POSITION: CouplingMethod
+COUPLING_METHOD_SURFACE: CouplingMethod
 COUPLING_METHOD_UNSPECIFIED: CouplingMethod
+COUPLING_METHOD_WAVES: CouplingMethod
 DESCRIPTOR: _descriptor.FileDescriptor
 HAND_ANY: Hand
 HAND_LEFT: Hand
@@ -574,7 +576,7 @@ class PeerReport(_message.Message):
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
 
 class PortState(_message.Message):
-    __slots__ = ["account_j", "answers", "answers_epoch", "buttons", "channel", "contact_force_n", "device", "engagement", "epoch", "force_n", "given_j", "need_j", "phase", "position_m", "round_trip_ns", "sequence", "taken_j", "time_ns", "velocity_mps"]
+    __slots__ = ["account_j", "answers", "answers_epoch", "buttons", "channel", "contact_force_n", "device", "engagement", "epoch", "force_n", "given_j", "need_j", "phase", "position_m", "round_trip_ns", "sequence", "surface", "taken_j", "time_ns", "velocity_mps", "wave_energy_j", "wave_integral"]
     ACCOUNT_J_FIELD_NUMBER: _ClassVar[int]
     ANSWERS_EPOCH_FIELD_NUMBER: _ClassVar[int]
     ANSWERS_FIELD_NUMBER: _ClassVar[int]
@@ -591,9 +593,12 @@ class PortState(_message.Message):
     POSITION_M_FIELD_NUMBER: _ClassVar[int]
     ROUND_TRIP_NS_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    SURFACE_FIELD_NUMBER: _ClassVar[int]
     TAKEN_J_FIELD_NUMBER: _ClassVar[int]
     TIME_NS_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    WAVE_ENERGY_J_FIELD_NUMBER: _ClassVar[int]
+    WAVE_INTEGRAL_FIELD_NUMBER: _ClassVar[int]
     account_j: float
     answers: int
     answers_epoch: int
@@ -610,10 +615,23 @@ class PortState(_message.Message):
     position_m: Vec3
     round_trip_ns: int
     sequence: int
+    surface: PortSurface
     taken_j: float
     time_ns: int
     velocity_mps: Vec3
-    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., answers_epoch: _Optional[int] = ..., answers: _Optional[int] = ..., time_ns: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., phase: _Optional[_Union[PortPhase, str]] = ..., engagement: _Optional[int] = ..., buttons: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., contact_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., account_j: _Optional[float] = ..., need_j: _Optional[float] = ..., given_j: _Optional[float] = ..., taken_j: _Optional[float] = ...) -> None: ...
+    wave_energy_j: float
+    wave_integral: Vec3
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., answers_epoch: _Optional[int] = ..., answers: _Optional[int] = ..., time_ns: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., phase: _Optional[_Union[PortPhase, str]] = ..., engagement: _Optional[int] = ..., buttons: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., contact_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., account_j: _Optional[float] = ..., need_j: _Optional[float] = ..., given_j: _Optional[float] = ..., taken_j: _Optional[float] = ..., wave_integral: _Optional[_Union[Vec3, _Mapping]] = ..., wave_energy_j: _Optional[float] = ..., surface: _Optional[_Union[PortSurface, _Mapping]] = ...) -> None: ...
+
+class PortSurface(_message.Message):
+    __slots__ = ["normal", "offset_m", "stiffness_npm"]
+    NORMAL_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_M_FIELD_NUMBER: _ClassVar[int]
+    STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    normal: Vec3
+    offset_m: float
+    stiffness_npm: float
+    def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., offset_m: _Optional[float] = ..., stiffness_npm: _Optional[float] = ...) -> None: ...
 
 class Quat(_message.Message):
     __slots__ = ["w", "x", "y", "z"]

@@ -5,9 +5,16 @@ import { isChannel, isDevice, isMagnitude, isRotation, isTime, isVec3 } from "./
 import { isEnum, readQuat, readVec3, writeQuat, writeVec3 } from "./fields.js";
 import * as pb from "./gen/tendon_pb.js";
 import * as limits from "./limits.js";
-import type { Couple, PortState } from "./messages.js";
+import type { Couple, PortState, PortSurface } from "./messages.js";
 
 const isWithin = (value: number, least: number, most: number): boolean => value >= least && value <= most; // false for NaN
+
+const readSurface = ({ normal, offsetM, stiffnessNpm }: pb.PortSurface): PortSurface =>
+  ({ normal: readVec3(normal), offset: offsetM, stiffness: stiffnessNpm });
+
+const isSurface = ({ normal, offset, stiffness }: PortSurface): boolean =>
+  Math.abs(Math.hypot(normal.x, normal.y, normal.z) - 1) <= limits.kUnitTolerance &&
+  isWithin(offset, -limits.kMaxValue, limits.kMaxValue) && isMagnitude(stiffness);
 
 export function readPort(from: pb.PortState): PortState | undefined {
   const { device, channel, epoch, sequence, answersEpoch, answers, timeNs, roundTripNs, phase, engagement, buttons } = from;
@@ -21,17 +28,22 @@ export function readPort(from: pb.PortState): PortState | undefined {
     need: from.needJ,
     given: from.givenJ,
     taken: from.takenJ,
+    ...(from.waveIntegral && { waveIntegral: readVec3(from.waveIntegral) }),
+    ...(from.waveEnergyJ !== 0 && { waveEnergy: from.waveEnergyJ }),
+    ...(from.surface && { surface: readSurface(from.surface) }),
   };
   const good = isDevice(device) && isChannel(channel) && epoch > 0n && sequence > 0n && isTime(timeNs) &&
     roundTripNs <= limits.kMaxRoundTripNs && isEnum(phase, pb.PortPhaseSchema) && isVec3(port.position) &&
     isVec3(port.velocity) && isVec3(port.force) && (!port.contactForce || isVec3(port.contactForce)) &&
     isWithin(port.account, -limits.kMaxAccount, limits.kMaxAccount) && isWithin(port.need, 0, limits.kMaxAccount) &&
-    isWithin(port.given, 0, limits.kMaxTotal) && isWithin(port.taken, 0, limits.kMaxTotal);
+    isWithin(port.given, 0, limits.kMaxTotal) && isWithin(port.taken, 0, limits.kMaxTotal) &&
+    (!port.waveIntegral || isVec3(port.waveIntegral)) && isWithin(port.waveEnergy ?? 0, 0, limits.kMaxTotal) &&
+    (!port.surface || isSurface(port.surface));
   return good ? port : undefined;
 }
 
 export function writePort(port: PortState): pb.PortState {
-  const { position, velocity, force, contactForce, account, need, given, taken, ...rest } = port;
+  const { position, velocity, force, contactForce, account, need, given, taken, waveIntegral, waveEnergy, surface, ...rest } = port;
   return create(pb.PortStateSchema, {
     ...rest,
     positionM: writeVec3(position),
@@ -42,6 +54,11 @@ export function writePort(port: PortState): pb.PortState {
     needJ: need,
     givenJ: given,
     takenJ: taken,
+    ...(waveIntegral && { waveIntegral: writeVec3(waveIntegral) }),
+    waveEnergyJ: waveEnergy ?? 0,
+    ...(surface && {
+      surface: { normal: writeVec3(surface.normal), offsetM: surface.offset, stiffnessNpm: surface.stiffness },
+    }),
   });
 }
 

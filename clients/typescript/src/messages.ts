@@ -239,6 +239,21 @@ export interface PortState {
   /** J, total paid to the receiver, and the receiver's total that was heard of, in the receiver's joules. */
   readonly given: number;
   readonly taken: number;
+  /** √W·s and J, of CouplingMethod.WAVES: the sums of the waves sent and of their energies; absent: none sent yet. */
+  readonly waveIntegral?: Vec3 | undefined;
+  readonly waveEnergy?: number | undefined;
+  /** Of CouplingMethod.SURFACE; absent: the tool has touched nothing yet. */
+  readonly surface?: PortSurface | undefined;
+}
+
+/** A flat, springy surface that a follower's tool touches, or touched last. It only pushes. */
+export interface PortSurface {
+  /** Out of the surface, of length 1. */
+  readonly normal: Vec3;
+  /** m: the surface is where normal · position is this. */
+  readonly offset: number;
+  /** N/m; 0: there is none any more. */
+  readonly stiffness: number;
 }
 
 /** What the sender's end of a coupling is like. Only to a server that has agreed to kFeatureTeleoperation. */

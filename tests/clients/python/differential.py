@@ -37,6 +37,7 @@ from tendon.messages import (
     Mat3,
     PeerReport,
     PortState,
+    PortSurface,
     Rearm,
     Refused,
     SetOutput,
@@ -194,9 +195,17 @@ def _frame(frame: Frame) -> list[object]:
             *(*_vector(frame.position), *_vector(frame.velocity), *_vector(frame.force)),
             *([] if frame.contact_force is None else ["contact", *_vector(frame.contact_force)]),
             *map(_double, (frame.account, frame.need, frame.given, frame.taken)),
+            *(*_vector(frame.wave_integral), _double(frame.wave_energy)),
+            *_surface(frame.surface),
         ]
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]
+
+
+def _surface(surface: PortSurface | None) -> list[object]:
+    if surface is None:
+        return []
+    return ["surface", *_vector(surface.normal), _double(surface.offset), _double(surface.stiffness)]
 
 
 def _data(body: bytes) -> list[object]:

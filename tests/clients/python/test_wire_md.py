@@ -39,6 +39,7 @@ from tendon.messages import (
     PortPhase,
     PortRole,
     PortState,
+    PortSurface,
     Refused,
     Role,
     RotationModel,
@@ -183,6 +184,12 @@ PORT = PortState(
     taken=0.5,
 )
 PORT_CONTACT = replace(PORT, contact_force=(-2.0, 0.0, 0.5), account=-0.25, need=0.0, given=0.0, taken=0.0)
+PORT_MODEL = replace(
+    PORT_CONTACT,
+    wave_integral=(0.25, 0.0, -1.0),
+    wave_energy=0.5,
+    surface=PortSurface(normal=(0.0, 0.6, 0.8), offset=-0.125, stiffness=500.0),
+)
 COUPLE = Couple(
     device=1,
     channel=1,
@@ -202,6 +209,7 @@ COUPLE = Couple(
 FRAMES = {
     "port": (71, None, [PORT]),
     "port-contact": (72, None, [PORT_CONTACT]),
+    "port-model": (90, None, [PORT_MODEL]),
     "control-couple": (73, None, [Control(15, COUPLE)]),
     "control-engage": (74, None, [Control(16, Engage(1))]),
     "control-disengage": (75, None, [Control(17, Disengage(1))]),

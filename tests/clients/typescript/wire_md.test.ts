@@ -250,10 +250,15 @@ describe("WIRE.md", () => {
     purse: true, periodUs: 1000,
   };
 
-  it("port and port-contact say what the page says", () => {
+  it("port, port-contact and port-model say what the page says", () => {
     assert.deepEqual(contentOf("port").frames, [{ kind: "port", value: kPort }]);
     const value = { ...kPort, contactForce: { x: -2, y: 0, z: 0.5 }, account: -0.25, need: 0, given: 0, taken: 0 };
     assert.deepEqual(contentOf("port-contact").frames, [{ kind: "port", value }]);
+    const model = {
+      ...value, waveIntegral: { x: 0.25, y: 0, z: -1 }, waveEnergy: 0.5,
+      surface: { normal: { x: 0, y: 0.6, z: 0.8 }, offset: -0.125, stiffness: 500 },
+    };
+    assert.deepEqual(contentOf("port-model").frames, [{ kind: "port", value: model }]);
   });
 
   it("couple, engage and disengage say what the page says", () => {
@@ -281,10 +286,14 @@ describe("WIRE.md", () => {
       { phase: 0 as PortPhase }, { phase: 8 as PortPhase }, { position: { x: NaN, y: 0, z: 0 } }, { velocity: { x: 0, y: Infinity, z: 0 } },
       { force: { x: 0, y: 0, z: 1.1e12 } }, { contactForce: { x: NaN, y: 0, z: 0 } }, { account: 1000.1 }, { account: -1000.1 },
       { account: NaN }, { need: -0.1 }, { need: 1000.1 }, { given: -0.1 }, { given: 1e6 + 1 }, { taken: -0.1 }, { taken: Infinity },
+      { waveIntegral: { x: NaN, y: 0, z: 0 } }, { waveEnergy: -0.1 }, { waveEnergy: 1e6 + 1 },
+      { surface: { normal: { x: 0, y: 0.6, z: 0.802 }, offset: 0, stiffness: 1 } },
+      { surface: { normal: { x: 0, y: 0.6, z: 0.8 }, offset: 1.1e12, stiffness: 1 } },
+      { surface: { normal: { x: 0, y: 0.6, z: 0.8 }, offset: 0, stiffness: -1 } },
     ];
     const couples: Partial<Couple>[] = [
       { device: 16 }, { channel: 8 }, { role: 0 as PortRole }, { role: 3 as PortRole }, { method: 0 as CouplingMethod },
-      { method: 3 as CouplingMethod }, { positionScale: 0.0099 }, { positionScale: NaN }, { forceScale: 100.1 },
+      { method: 5 as CouplingMethod }, { positionScale: 0.0099 }, { positionScale: NaN }, { forceScale: 100.1 },
       { rotation: { w: 0.602, x: 0, y: 0.8, z: 0 } }, { axes: 0 }, { axes: 8 }, { stiffness: -1 }, { mutualDamping: Infinity },
       { damping: NaN }, { periodUs: 0 }, { periodUs: 10_000_001 },
     ];

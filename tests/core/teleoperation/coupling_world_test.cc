@@ -95,7 +95,11 @@ class CouplingWorld {
     led.spring.adapt_to_delay = dice_.chance(0.7);
     led.spring.max_force = dice_.decades(0, 1.3);
     led.ramp = dice_.milliseconds(100, 500);
-    led.method = dice_.chance(0.85) ? CouplingMethod::kPositionPosition : CouplingMethod::kPositionForce;
+    const double method = dice_.uniform();
+    led.method = method < 0.55   ? CouplingMethod::kPositionPosition
+                 : method < 0.65 ? CouplingMethod::kPositionForce
+                 : method < 0.85 ? CouplingMethod::kWaves
+                                 : CouplingMethod::kSurface;
     if (dice_.chance(0.5)) {
       led.map.position_scale = dice_.decades(-1, 1);
       led.map.force_scale = dice_.decades(-1, 1);

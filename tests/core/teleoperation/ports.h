@@ -95,6 +95,7 @@ class Port {
       const Vec3 dx = measured() - before;
       speed_ = dx / length;
       limiter->observe({applied, dx, held});
+      if (seen) coupling->observe({applied, dx, held}, limiter->payable());
       truth.observe(applied, Vec3(x() - true_before), held);
     }
     began_ = true;

@@ -131,7 +131,7 @@ TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
   EXPECT_NEAR(port.energy(), 0, 1e-15);
   EXPECT_NEAR(paid_back.energy, 1e-3, 1e-15);
   // Due were (B Δx − T F)/√(2B), 0.5 mm √(N·s/m) and 2 of them. A wave that the device did not use pays for the rest.
-  for (std::uint64_t i = 1; i <= 400; ++i) {
+  for (std::uint64_t i = 1; i <= 4000; ++i) {
     const auto n = static_cast<double>(i);
     port.receive({i, i * 1ms, Vec<1>(1e-3 * n), 0.5e-3 * n});
     port.command(Vec<1>(0));

@@ -242,9 +242,17 @@ TEST(Codec, APortOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"NaN given", [](PortFrame& p) { p.given = kNan; }},
       {"taken less than nothing", [](PortFrame& p) { p.taken = -1e-9; }},
       {"infinite taken", [](PortFrame& p) { p.taken = kInf; }},
+      {"NaN wave", [](PortFrame& p) { p.wave_integral.x() = kNan; }},
+      {"waves with less than no energy", [](PortFrame& p) { p.wave_energy = -1e-9; }},
+      {"waves of a million joules and one", [](PortFrame& p) { p.wave_energy = 1'000'001; }},
+      {"a normal that is too long", [](PortFrame& p) { p.surface->normal *= 1.0011; }},
+      {"NaN normal", [](PortFrame& p) { p.surface->normal.y() = kNan; }},
+      {"a surface beyond all places", [](PortFrame& p) { p.surface->offset = -1.001e12; }},
+      {"a surface that pulls", [](PortFrame& p) { p.surface->stiffness = -1e-9; }},
+      {"a rigid surface", [](PortFrame& p) { p.surface->stiffness = kInf; }},
   };
   for (const BadPort& bad : cases) {
-    PortFrame port = examples::port_in_contact();
+    PortFrame port = examples::port_by_model();
     bad.spoil(port);
     expect_left_out(port, bad.what);
   }

@@ -334,6 +334,11 @@ RC_GTEST_PROP(Codec, APortComesOutAsItWentIn, ()) {
   in.need = between(0, 1e3);
   in.given = between(0, 1e6);
   in.taken = between(0, 1e6);
+  if (*rc::gen::arbitrary<bool>()) in.wave_integral = any_vector();
+  in.wave_energy = between(0, 1e6);
+  if (*rc::gen::arbitrary<bool>()) {
+    in.surface = {.normal = {0, 0.6, -0.8}, .offset = between(-1e12, 1e12), .stiffness = between(0, 1e12)};
+  }
 
   const PortFrame out = there(in);
   RC_ASSERT(out.device == in.device);
@@ -352,6 +357,14 @@ RC_GTEST_PROP(Codec, APortComesOutAsItWentIn, ()) {
   RC_ASSERT(out.need == in.need);
   RC_ASSERT(out.given == in.given);
   RC_ASSERT(out.taken == in.taken);
+  RC_ASSERT(out.wave_integral == in.wave_integral);
+  RC_ASSERT(out.wave_energy == in.wave_energy);
+  RC_ASSERT(out.surface.has_value() == in.surface.has_value());
+  if (in.surface) {
+    RC_ASSERT(out.surface->normal == in.surface->normal);
+    RC_ASSERT(out.surface->offset == in.surface->offset);
+    RC_ASSERT(out.surface->stiffness == in.surface->stiffness);
+  }
 }
 
 RC_GTEST_PROP(Codec, ACoupleComesOutAsItWentIn, ()) {
@@ -404,6 +417,9 @@ TEST(Codec, APortTakes238BytesAndAtMost311AndFitsBesideAState) {
   most.epoch = most.sequence = most.answers_epoch = most.answers = most.engagement = ~std::uint64_t{0};
   most.round_trip = PortState::kMostRoundTrip;
   most.contact_force = Vec3(0.1, -0.2, 0.3);
+  most.wave_integral = {0.1, -0.2, 0.3};
+  most.wave_energy = 0.1;
+  most.surface = {.normal = {0.36, 0.48, 0.8}, .offset = 0.1, .stiffness = 0.1};
   EXPECT_EQ(sealed(most), 311U);
   EXPECT_LE(sealed(examples::state_with_handle(), most), kMaxDatagram);
 }

@@ -170,6 +170,7 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"torque and grip force", true, 272, 0, at(272, examples::force_with_torque())},
       {"one end of a coupling", true, 273, 0, at(273, examples::port())},
       {"its other end beside a state", false, 274, 0, at(274, examples::state(), examples::port_in_contact())},
+      {"one by waves or by a surface", true, 290, 0, at(290, examples::port_by_model())},
       {"couple a device", true, 275, 0, request(275, 15, examples::couple())},
       {"engage", true, 276, 0, request(276, 16, Engage{.device = 1})},
       {"disengage", true, 277, 0, request(277, 17, Disengage{.device = 1})},

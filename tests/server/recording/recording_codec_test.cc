@@ -120,6 +120,9 @@ PortRecord a_port() {
   port.sent.taken = 0.75;
   port.peer = port.sent;
   port.peer->contact_force = Vec3(0.5, 0, -0.5);
+  port.peer->surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
+  port.peer->wave_integral = {0.25, 0, -1};
+  port.peer->wave_energy = 0.5;
   return port;
 }
 
@@ -137,6 +140,13 @@ TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
   EXPECT_FALSE(read.sent.contact_force);
   ASSERT_TRUE(read.peer);
   EXPECT_EQ(read.peer->contact_force, port.peer->contact_force);
+  ASSERT_TRUE(read.peer->surface);
+  EXPECT_EQ(read.peer->surface->normal, port.peer->surface->normal);
+  EXPECT_EQ(read.peer->surface->offset, -0.125);
+  EXPECT_EQ(read.peer->surface->stiffness, 500);
+  EXPECT_EQ(read.peer->wave_integral, port.peer->wave_integral);
+  EXPECT_EQ(read.peer->wave_energy, 0.5);
+  EXPECT_FALSE(read.sent.surface);
   PortRecord alone = port;
   alone.peer.reset();
   EXPECT_FALSE(recording::decode_port(recording::encode(alone), port.at).peer);

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import cast
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import Couple, CouplingMethod, PortPhase, PortRole, PortState, Vec3
+from ..messages import Couple, CouplingMethod, PortPhase, PortRole, PortState, PortSurface, Vec3
 from . import fields
 
 _PHASES: dict[int, PortPhase] = {int(phase): phase for phase in PortPhase}
@@ -23,6 +24,19 @@ def _within(value: float, least: float, most: float) -> float:
 
 def _write_vector(vector: Vec3) -> pb.Vec3:
     return pb.Vec3(x=vector[0], y=vector[1], z=vector[2])
+
+
+def _read_surface(message: pb.PortSurface) -> PortSurface:
+    normal = fields.vector(message.normal)
+    if not abs(hypot(*normal) - 1) <= limits.UNIT_TOLERANCE:
+        raise fields.OutOfBounds
+    offset = _within(message.offset_m, -limits.MAX_VALUE, limits.MAX_VALUE)
+    return PortSurface(normal, offset, fields.magnitude(message.stiffness_npm))
+
+
+def _write_surface(surface: PortSurface) -> pb.PortSurface:
+    normal = _write_vector(surface.normal)
+    return pb.PortSurface(normal=normal, offset_m=surface.offset, stiffness_npm=surface.stiffness)
 
 
 def read_port(message: pb.PortState) -> PortState:
@@ -47,6 +61,9 @@ def read_port(message: pb.PortState) -> PortState:
         need=_within(message.need_j, 0, limits.MAX_ACCOUNT),
         given=_within(message.given_j, 0, limits.MAX_TOTAL),
         taken=_within(message.taken_j, 0, limits.MAX_TOTAL),
+        wave_integral=fields.vector(message.wave_integral),
+        wave_energy=_within(message.wave_energy_j, 0, limits.MAX_TOTAL),
+        surface=_read_surface(message.surface) if message.HasField("surface") else None,
     )
 
 
@@ -71,6 +88,9 @@ def write_port(port: PortState) -> pb.PortState:
         need_j=port.need,
         given_j=port.given,
         taken_j=port.taken,
+        wave_integral=_write_vector(port.wave_integral) if any(port.wave_integral) else None,
+        wave_energy_j=port.wave_energy,
+        surface=None if port.surface is None else _write_surface(port.surface),
     )
 
 
