@@ -53,3 +53,8 @@ coupling_mutant(no-fade "fade_ = turned ? 1 :" "fade_ = turned ? 0 :" "step")
 # A joule of the leader is taken for one of the follower.
 coupling_mutant(joule-of-the-wrong-end "? map.leader_joule() : map.follower_joule()"
   "? map.follower_joule() : map.leader_joule()" "pair")
+# A line sends what its account has not paid.
+coupling_mutant(line-pays-nothing ".withdraw = std::exchange(given_, 0)" ".withdraw = 0 * std::exchange(given_, 0)" pair)
+# What comes by waves is worth more than it was.
+coupling_mutant(waves-of-the-wrong-worth "peer.wave_energy * (leader ? map_.leader_joule() : map_.follower_joule())"
+  "peer.wave_energy * (leader ? map_.follower_joule() : map_.leader_joule())" "account|pair")
