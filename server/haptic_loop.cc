@@ -113,8 +113,8 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   }
   if (Coupling* const coupling = controller_.coupling()) {
     peer_.reset();
-    if (const PortState* const peer = mail_.port_in.take()) {
-      coupling->receive(*peer, now);
+    if (const ArrivedPort* const peer = mail_.port_in.take()) {
+      coupling->receive(peer->state, now);
       peer_ = *peer;
     }
   }
@@ -261,13 +261,18 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
 /// The contact that a follower feels is what its force sensor measures of whatever moves its handle.
 void HapticLoop::publish_port(const StepRecord& record) noexcept {
   Coupling& coupling = *controller_.coupling();
-  const PortRecord port{.tick = record.tick,
-                        .at = record.hand.at,
-                        .settled = controller_.settled(),
-                        .stiffness = coupling.stiffness(),
-                        .round_trip = coupling.round_trip(),
-                        .sent = coupling.message(record.applied, record.hand_force),
-                        .peer = peer_};
+  PortRecord port{
+      .tick = record.tick,
+      .at = record.hand.at,
+      .settled = controller_.settled(),
+      .stiffness = coupling.stiffness(),
+      .round_trip = coupling.round_trip(),
+      .sent = coupling.message(record.applied, record.hand_force),
+  };
+  if (peer_) {
+    port.peer = peer_->state;
+    port.peer_arrived = peer_->at;
+  }
   mail_.port_out.put(port.sent);
   if (!mail_.ports.try_push(port)) mail_.ports_lost.fetch_add(1, std::memory_order_relaxed);
 }

@@ -83,7 +83,7 @@ class HapticLoop {
   bool has_more_motors_;           ///< than those of its position
   bool has_outputs_;
   std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< numbers of the settings that the device has
-  std::optional<PortState> peer_;                          ///< of a coupling: what came since the step before
+  std::optional<ArrivedPort> peer_;                        ///< of a coupling: what came since the step before
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};

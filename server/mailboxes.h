@@ -33,6 +33,12 @@ struct HapticOrder {
   std::uint32_t source = 0;
 };
 
+/// What the other end of a coupling has told.
+struct ArrivedPort {
+  PortState state;
+  LocalTime at{};  ///< by which it had come
+};
+
 /// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else
 /// they share, and no lock.
 ///
@@ -70,7 +76,7 @@ struct Mailboxes {
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;
-  Latest<PortState> port_in;
+  Latest<ArrivedPort> port_in;
   Latest<PortState> port_out;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};

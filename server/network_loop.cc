@@ -477,7 +477,7 @@ void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) 
     return;
   }
   leases_.renew(now, port.device, port.channel);
-  devices_[port.device].mail->port_in.put(port);
+  devices_[port.device].mail->port_in.put({port, now});
 }
 
 /// Our end of a coupling goes to whoever has the other one.
@@ -502,7 +502,7 @@ bool NetworkLoop::receive_of_peer(LocalTime now, const Address& from, std::span<
   for (Dialled& dialled : dialled_) {
     if (!dialled.peer->is_from_server(from, datagram)) continue;
     dialled.peer->receive(now, from, datagram);
-    if (const auto port = dialled.peer->take()) devices_[dialled.device].mail->port_in.put(*port);
+    if (const auto port = dialled.peer->take()) devices_[dialled.device].mail->port_in.put({*port, now});
     return true;
   }
   return false;

@@ -105,10 +105,8 @@ SimulatedDevice::SimulatedDevice(Config config) : config_(std::move(config)) {
   if (config_.amplifier_bandwidth) amplifier_force_ = Vec3::Zero();
   const Rub rub = joints_ ? Rub::kJoints : config_.coulomb_friction ? Rub::kHandle : Rub::kNone;
   const Far far = config_.structural_mode ? Far::kMode : environment_ ? Far::kEnvironment : Far::kNone;
-  take_substeps_ = substeps_with({.rub = rub,
-                                  .hand = hand_.has_value(),
-                                  .lag = config_.amplifier_bandwidth.has_value(),
-                                  .far = far});
+  take_substeps_ = substeps_with(
+      {.rub = rub, .hand = hand_.has_value(), .lag = config_.amplifier_bandwidth.has_value(), .far = far});
 
   info_ = {.name = config_.name,
            .max_force = config_.max_force.value_or(std::numeric_limits<double>::infinity()),

@@ -155,11 +155,11 @@ class SimulatedDevice final : public Device {
     Vec3 device_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
     Vec3 hand_force = Vec3::Zero();    ///< N, mean over the last substep, on the handle
     Vec3 environment_force = Vec3::Zero();  ///< N, mean over the last substep, on the handle
-    double hand_work = 0;              ///< J, ∫ F_hand·dx since the start
-    double environment_work = 0;       ///< J, the same of the surroundings
-    double kinetic_energy = 0;         ///< J, of the device alone (the hand's mass is the hand's)
-    double spring_energy = 0;          ///< J, of the structural mode
-    bool watchdog_fired = false;       ///< it took the force away during the last interval
+    double hand_work = 0;                   ///< J, ∫ F_hand·dx since the start
+    double environment_work = 0;            ///< J, the same of the surroundings
+    double kinetic_energy = 0;              ///< J, of the device alone (the hand's mass is the hand's)
+    double spring_energy = 0;               ///< J, of the structural mode
+    bool watchdog_fired = false;            ///< it took the force away during the last interval
   };
 
   /// 10 s is far beyond any pause that a loop survives, and bounds what one `read` may cost (200 000

@@ -239,7 +239,17 @@ std::string encode(const PortRecord& port) {
   out.set_stiffness_n_per_m(port.stiffness);
   out.set_round_trip_ns(port.round_trip.count());
   put(out.mutable_sent(), port.sent);
-  if (port.peer) put(out.mutable_peer(), *port.peer);
+  if (port.peer) {
+    put(out.mutable_peer(), *port.peer);
+    out.set_peer_arrived_ns((port.peer_arrived - port.at).count());
+  }
+  return out.SerializeAsString();
+}
+
+std::string encode(const ClockRecord& clock) {
+  pb::Clock out;
+  out.set_offset_ns(clock.offset.count());
+  out.set_error_ns(clock.error.count());
   return out.SerializeAsString();
 }
 
@@ -331,6 +341,7 @@ PortRecord decode_port(std::string_view message, LocalTime at) {
   out.round_trip = Duration(in.round_trip_ns());
   out.sent = port_state(in.sent());
   if (in.has_peer()) out.peer = port_state(in.peer());
+  out.peer_arrived = at + Duration(in.peer_arrived_ns());
   return out;
 }
 

@@ -54,6 +54,7 @@ inline constexpr Channel kScene = {"/scene", "tendon.recording.v1.Scene"};
 inline constexpr Channel kStep = {"/haptic/step", "tendon.recording.v1.Step"};
 inline constexpr Channel kPort = {"/haptic/port", "tendon.recording.v1.Port"};
 inline constexpr Channel kDatagram = {"/net/datagram", "tendon.recording.v1.Datagram"};
+inline constexpr Channel kClock = {"/merge/clock", "tendon.recording.v1.Clock"};
 inline constexpr Channel kLoss = {"/recording/lost", "tendon.recording.v1.Lost"};
 
 /// The MCAP name of both our schemas' and our messages' encoding.
@@ -66,6 +67,7 @@ std::string schema_data();
 std::string encode(const SceneRecord& scene);
 std::string encode(const StepRecord& step);
 std::string encode(const PortRecord& port);
+std::string encode(const ClockRecord& clock);
 std::string encode(const DatagramRecord& datagram);
 std::string encode(const LossRecord& loss);
 

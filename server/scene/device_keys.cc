@@ -234,17 +234,17 @@ template <class Table>
 void declare_environment(Table& keys, SimulatedEnvironment::Config& environment) {
   keys.key("damping_n_s_per_m", environment.damping, kZeroOrMore, "of the medium that the handle moves in");
   keys.key("friction_n", environment.friction, kZeroOrMore, "Coulomb friction of the medium");
-  keys.tables(
-      "wall", environment.walls, SimulatedEnvironment::kMostWalls, [](Table& walls, SimulatedEnvironment::Wall& wall) {
-        walls.key("point_mm", wall.point, Vector{}, "any point of its surface");
-        walls.key("normal", wall.normal, Vector{}, "out of the wall; its length does not count", kRequired);
-        walls.key("stiffness_n_per_m", wall.stiffness, kAboveZero, "force for each depth", kRequired);
-        walls.key("damping_n_s_per_m", wall.damping, kZeroOrMore, "while the handle goes in");
-        walls.key("friction", wall.friction, kZeroOrMore, "Coulomb's coefficient along the surface");
-        walls.key("speed_m_per_s", wall.speed, kAnyNumber, "along the normal: above 0 it comes nearer");
-        walls.key("from_ms", wall.from, kZeroOrMore, "it is there, and begins to move, after this time");
-        walls.key("until_ms", wall.until, kAboveZero, "it is gone after this time", Absent{.text = "never"});
-      });
+  keys.tables("wall", environment.walls, SimulatedEnvironment::kMostWalls,
+              [](Table& walls, SimulatedEnvironment::Wall& wall) {
+                walls.key("point_mm", wall.point, Vector{}, "any point of its surface");
+                walls.key("normal", wall.normal, Vector{}, "out of the wall; its length does not count", kRequired);
+                walls.key("stiffness_n_per_m", wall.stiffness, kAboveZero, "force for each depth", kRequired);
+                walls.key("damping_n_s_per_m", wall.damping, kZeroOrMore, "while the handle goes in");
+                walls.key("friction", wall.friction, kZeroOrMore, "Coulomb's coefficient along the surface");
+                walls.key("speed_m_per_s", wall.speed, kAnyNumber, "along the normal: above 0 it comes nearer");
+                walls.key("from_ms", wall.from, kZeroOrMore, "it is there, and begins to move, after this time");
+                walls.key("until_ms", wall.until, kAboveZero, "it is gone after this time", Absent{.text = "never"});
+              });
 }
 
 template <class Point = Vector, class Table>

@@ -55,6 +55,5 @@ coupling_mutant(joule-of-the-wrong-end "? map.leader_joule() : map.follower_joul
   "? map.follower_joule() : map.leader_joule()" "pair")
 # A line sends what its account has not paid.
 coupling_mutant(line-pays-nothing ".withdraw = std::exchange(given_, 0)" ".withdraw = 0 * std::exchange(given_, 0)" pair)
-# What comes by waves is worth more than it was.
-coupling_mutant(waves-of-the-wrong-worth "peer.wave_energy * (leader ? map_.leader_joule() : map_.follower_joule())"
-  "peer.wave_energy * (leader ? map_.follower_joule() : map_.leader_joule())" "account|pair")
+# What comes by waves is paid in twice.
+coupling_mutant(waves-credited-twice ".credit = std::exchange(taken_, 0)" ".credit = 2 * std::exchange(taken_, 0)" pair)

@@ -119,6 +119,7 @@ PortRecord a_port() {
   port.sent.given = 0.5;
   port.sent.taken = 0.75;
   port.peer = port.sent;
+  port.peer_arrived = testing::ms(76);
   port.peer->contact_force = Vec3(0.5, 0, -0.5);
   port.peer->surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
   port.peer->wave_integral = {0.25, 0, -1};
@@ -131,6 +132,7 @@ TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
   const PortRecord read = recording::decode_port(recording::encode(port), port.at);
   EXPECT_EQ(recording::encode(read), recording::encode(port));
   EXPECT_EQ(read.at, port.at);
+  EXPECT_EQ(read.peer_arrived, port.peer_arrived);
   EXPECT_EQ(read.settled.credit, port.settled.credit);
   EXPECT_EQ(read.settled.withdraw, port.settled.withdraw);
   EXPECT_EQ(read.sent.phase, PortPhase::kClutched);

@@ -309,5 +309,41 @@ TEST(Scene, AWoodenHapticsSaysWhichModelsCanBeDrivenAndWhyTwoCannot) {
             "s.toml:8: safety.dead_man.button: expected 0, the switch at its tip, found 1");
 }
 
+TEST(SceneDevice, HasTheWallsAndTheMediumThatItsTableLists) {
+  EXPECT_FALSE(minimal_and("").simulated().environment);
+  const auto environment = *minimal_and(R"([device.environment]
+damping_n_s_per_m = 2
+friction_n = 0.5
+[[device.environment.wall]]
+point_mm = [8, 0, 1]
+normal = [-1, 0, 0]
+stiffness_n_per_m = 2000
+damping_n_s_per_m = 3
+friction = 0.4
+speed_m_per_s = -0.02
+from_ms = 100
+until_ms = 5000
+[[device.environment.wall]]
+normal = [0, 0, 2]
+stiffness_n_per_m = 500
+)")
+                                .simulated()
+                                .environment;
+  EXPECT_EQ(environment.damping, 2);
+  EXPECT_EQ(environment.friction, 0.5);
+  ASSERT_EQ(environment.walls.size(), 2U);
+  const auto& wall = environment.walls[0];
+  EXPECT_EQ(wall.point, Vec3(0.008, 0, 0.001));
+  EXPECT_EQ(wall.normal, Vec3(-1, 0, 0));
+  EXPECT_EQ(wall.stiffness, 2000);
+  EXPECT_EQ(wall.damping, 3);
+  EXPECT_EQ(wall.friction, 0.4);
+  EXPECT_EQ(wall.speed, -0.02);
+  EXPECT_EQ(wall.from, 100ms);
+  EXPECT_EQ(wall.until, 5s);
+  EXPECT_FALSE(environment.walls[1].until);
+  EXPECT_EQ(error_of_minimal_and("[[device.environment.wall]]\nnormal = [0, 0, 0]\nstiffness_n_per_m = 500\n"), "");
+}
+
 }  // namespace
 }  // namespace tendon

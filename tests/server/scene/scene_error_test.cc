@@ -97,7 +97,7 @@ TEST(SceneError, NamesTheClosestKeyOrAllOfThem) {
        "s.toml:4: device.gravity: unknown table; known here: kind, name, axes, group, held_by, profile, "
        "start_position_mm, effects, "
        "hand, "
-       "rotation, gripper"},
+       "environment, rotation, gripper"},
       {"[loop]\n" + std::string(10'000, 'x') + " = 1\n", "s.toml:5: loop." + std::string(10'000, 'x') +
                                                              ": unknown key; known here: period_us, longest_hold_us, "
                                                              "hold_memory_ms, hold_margin, hold_most, "

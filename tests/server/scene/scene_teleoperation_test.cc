@@ -103,6 +103,27 @@ button = 0
   EXPECT_EQ(coupling.engage_by, 0U);
 }
 
+TEST(SceneTeleoperation, NamesEachMethodAndWavesShareTheirAccountWithoutAPurse) {
+  const auto by = [](const std::string& method, const std::string& more = "") {
+    return "[teleoperation]\nrole = \"leader\"\nmethod = \"" + method +
+           "\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + more;
+  };
+  for (const CouplingMethod method : kCouplingMethods) {
+    const Scene scene = minimal_and(by(std::string(to_string(method)), "[teleoperation.purse]\n"));
+    EXPECT_EQ(scene.loop.control.coupling->method, method) << to_string(method);
+  }
+  EXPECT_TRUE(minimal_and(by("waves")).loop.control.limiter.shared_account);
+  EXPECT_FALSE(minimal_and(by("surface")).loop.control.limiter.shared_account);
+  EXPECT_FALSE(minimal_and("[limiter]\nkind = \"none\"\n" + by("waves")).loop.control.limiter.shared_account);
+  EXPECT_EQ(error_of_minimal_and("[limiter]\nkind = \"tdpa\"\n" + by("waves")),
+            "s.toml:8: teleoperation.method: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
+            "account that ports can share");
+  EXPECT_EQ(error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
+                                 "stiffness_n_per_m = 400\nadapt_to_delay = false\n"),
+            "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: it is the impedance of the "
+            "waves");
+}
+
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
   EXPECT_EQ(
@@ -112,7 +133,7 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
       "move unless the leader pays");
   EXPECT_EQ(refusal("[limiter]\nkind = \"tdpa\"\n" + kLeader),
             "s.toml:5: teleoperation.purse: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
-            "account that a purse can share");
+            "account that ports can share");
   EXPECT_EQ(
       refusal("[limiter]\nkind = \"aol+\"\n[limiter.latency_reserve]\nholds = 2\n" + kLeader),
       "s.toml:6: limiter.latency_reserve: expected none with teleoperation.purse: the reserve is not proved for an "

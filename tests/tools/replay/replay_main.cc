@@ -9,6 +9,7 @@
 #include "core/control/limiter.h"
 #include "server/build_info.h"
 #include "tests/support/run_tool.h"
+#include "tests/tools/replay/merge.h"
 #include "tests/tools/replay/replay.h"
 
 int main(int argc, char** argv) {
@@ -22,6 +23,8 @@ int main(int argc, char** argv) {
   std::string files;
   std::string csv;
   std::string picture;
+  std::string follower;
+  std::string into;
   CLI::App app(
       "A recording through the control law again: bit for bit as it was recorded, or with another law or other "
       "settings.",
@@ -43,15 +46,29 @@ int main(int argc, char** argv) {
   app.add_option("--files", files, "folder of the files that the scene names")->type_name("DIR")->default_val(".");
   app.add_option("--csv", csv, "write a row for each step there")->type_name("FILE.csv");
   app.add_option("--out", picture, "draw both runs side by side (needs gnuplot)")->type_name("FILE.svg|FILE.png");
+  auto* const merged = app.add_option("--merge", follower,
+                                      "RECORDING is a leader's, and this its follower's: write both into one, in the "
+                                      "leader's time, with a proved bound of the clocks")
+                           ->type_name("FILE.mcap")
+                           ->check(CLI::ExistingFile.description(""));
+  auto* const one = app.add_option("--into", into, "the file that --merge writes")->type_name("FILE.mcap");
+  merged->needs(one);
+  one->needs(merged);
+  for (const char* const other : {"PART", "--law", "--set", "--csv", "--out"}) merged->excludes(app.get_option(other));
   app.add_flag("--json", options.json, "JSON objects on stdout, a line each, instead of the table");
   app.footer(
       "\nExamples\n"
       "  tendon-replay run.mcap                          is what was recorded what the law decides?\n"
       "  tendon-replay run.mcap run-2.mcap               … of a long run, which has parts\n"
       "  tendon-replay run.mcap --law aol --out both.png  what would the law of 2009 have permitted?\n"
+      "  tendon-replay leader.mcap --merge follower.mcap --into pair.mcap    both ends of a coupling in one clock\n"
       "\nExit: 0 done; 1 a step differs (it is named), or a file cannot be read or written; 2 wrong usage.");
 
   return tendon::run_tool(app, argc, argv, [&] {
+    if (!follower.empty()) {
+      tendon::replay::merge({.leader = recording, .follower = follower, .out = into, .json = options.json}, std::cout);
+      return 0;
+    }
     options.recording = recording;
     options.more_parts.assign(parts.begin(), parts.end());
     options.files = files;

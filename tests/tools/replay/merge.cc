@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/replay/merge.h"
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/build_info.h"
+#include "server/machine/regular_file.h"
+#include "server/recording/byte_sink.h"
+#include "server/recording/mcap_reader.h"
+#include "server/recording/mcap_writer.h"
+#include "server/recording/recording_codec.h"
+#include "tests/support/json_line.h"
+#include "tests/tools/replay/clock_bound.h"
+
+namespace tendon::replay {
+namespace {
+
+McapReader open(const std::filesystem::path& path) {
+  return {std::make_unique<std::ifstream>(open_regular_file(path, "recording")), path.string()};
+}
+
+/// What one end recorded of the coupling; times are those of the recording.
+struct End {
+  std::map<std::pair<std::uint64_t, std::uint64_t>, LocalTime> sent;  ///< (epoch, sequence) → when
+  struct Came {
+    std::pair<std::uint64_t, std::uint64_t> which;
+    LocalTime by;
+  };
+  std::vector<Came> came;
+};
+
+End read_end(const std::filesystem::path& path) {
+  End end;
+  McapReader reader = open(path);
+  while (const auto message = reader.next()) {
+    if (message->channel.topic != recording::kPort.topic) continue;
+    try {
+      const LocalTime at{Duration(static_cast<Duration::rep>(message->log_time))};
+      const PortRecord port = recording::decode_port(message->data, at);
+      end.sent[{port.sent.epoch, port.sent.sequence}] = at;
+      if (port.peer) end.came.push_back({{port.peer->epoch, port.peer->sequence}, port.peer_arrived});
+    } catch (const std::invalid_argument& error) {
+      reader.corrupt(message->offset, error.what());
+    }
+  }
+  return end;
+}
+
+std::vector<ClockBound> bounds_between(const End& leader, const End& follower, const MergeOptions& options) {
+  std::vector<Crossing> there;
+  std::vector<Crossing> back;
+  for (const End::Came& came : follower.came) {
+    const auto sent = leader.sent.find(came.which);
+    if (sent != leader.sent.end()) there.push_back({.at = sent->second, .bound = came.by - sent->second});
+  }
+  for (const End::Came& came : leader.came) {
+    const auto sent = follower.sent.find(came.which);
+    if (sent != follower.sent.end()) back.push_back({.at = came.by, .bound = sent->second - came.by});
+  }
+  for (auto* const crossings : {&there, &back}) std::ranges::sort(*crossings, {}, &Crossing::at);
+  auto bounds = clock_bounds(there, back, std::chrono::seconds(1));
+  if (bounds.empty()) {
+    throw std::runtime_error(options.leader.string() + " and " + options.follower.string() +
+                             " are not the two ends of one coupling: " + (there.empty() ? "the second" : "the first") +
+                             " has no state that the other one recorded");
+  }
+  for (const ClockBound& bound : bounds) {
+    if (bound.error >= Duration::zero()) continue;
+    throw std::runtime_error("a clock stepped: no offset that drifts by less than 200 ppm explains the states around " +
+                             std::to_string(seconds(bound.at - bounds.front().at)) + " s of the coupling");
+  }
+  return bounds;
+}
+
+/// Copies the messages of one recording, in its order.
+class Copy {
+ public:
+  Copy(const std::filesystem::path& path, std::string prefix) : reader_(open(path)), prefix_(std::move(prefix)) {
+    next();
+  }
+
+  bool done() const { return !message_; }
+  LocalTime at() const { return LocalTime(Duration(static_cast<Duration::rep>(message_->log_time))); }
+  void write(McapWriter& writer, LocalTime at) {
+    const McapReader::Channel& from = message_->channel;
+    auto [channel, anew] = channels_.try_emplace(from.topic, std::uint16_t{0});
+    if (anew) {
+      const auto schema = writer.add_schema(from.schema_name, recording::kEncoding, recording::schema_data());
+      channel->second = writer.add_channel(schema, prefix_ + from.topic, from.message_encoding);
+    }
+    writer.write(channel->second, static_cast<std::uint64_t>(at.time_since_epoch().count()), message_->data);
+    next();
+  }
+
+ private:
+  void next() {
+    message_.reset();
+    if (const auto message = reader_.next()) message_.emplace(*message);
+  }
+
+  McapReader reader_;
+  std::string prefix_;
+  std::map<std::string, std::uint16_t> channels_;
+  std::optional<McapReader::Message> message_;
+};
+
+void check(bool written, const FileSink& sink) {
+  if (!written) throw std::runtime_error(sink.path().string() + ": " + sink.error());
+}
+
+void write(const MergeOptions& options, const std::vector<ClockBound>& bounds) {
+  FileSink sink(options.out);
+  McapWriter writer("tendon " + std::string(version_text()), sink);
+  const auto schema = writer.add_schema(recording::kClock.schema, recording::kEncoding, recording::schema_data());
+  const auto clock = writer.add_channel(schema, recording::kClock.topic, recording::kEncoding);
+  for (const ClockBound& bound : bounds) {
+    const auto at = static_cast<std::uint64_t>(bound.at.time_since_epoch().count());
+    writer.write(clock, at, recording::encode(ClockRecord{.offset = bound.offset, .error = bound.error}));
+  }
+  Copy leader(options.leader, "/leader");
+  Copy follower(options.follower, "/follower");
+  const auto in_leaders_time = [&](LocalTime at) { return at - offset_at(bounds, at - bounds.front().offset); };
+  while (!leader.done() || !follower.done()) {
+    const LocalTime next = follower.done() ? LocalTime::max() : in_leaders_time(follower.at());
+    if (!leader.done() && leader.at() <= next) {
+      leader.write(writer, leader.at());
+    } else {
+      follower.write(writer, next);
+    }
+    if (writer.chunk_size() > std::size_t{256} * 1024) check(writer.flush_chunk(), sink);
+  }
+  check(writer.close(), sink);
+}
+
+}  // namespace
+
+void merge(const MergeOptions& options, std::ostream& out) {
+  if (std::filesystem::exists(options.out)) {
+    throw std::runtime_error(options.out.string() + ": there is such a file; a merge overwrites none");
+  }
+  const auto bounds = bounds_between(read_end(options.leader), read_end(options.follower), options);
+  write(options, bounds);
+  std::vector<Duration> errors;
+  for (const ClockBound& bound : bounds) errors.push_back(bound.error);
+  std::ranges::sort(errors);
+  const double offset = seconds(bounds[bounds.size() / 2].offset);
+  const double middle = seconds(errors[errors.size() / 2]);
+  const double p99 = seconds(errors[errors.size() * 99 / 100]);
+  if (options.json) {
+    out << JsonLine()
+               .add("into", options.out.string())
+               .add("seconds", bounds.size())
+               .add("offset_s", offset)
+               .add("error_p50_s", middle)
+               .add("error_p99_s", p99)
+               .str()
+        << '\n';
+  } else {
+    out << options.out.string() << ": the follower's clock is " << offset * 1e3
+        << " ms ahead of the leader's, proved to ± " << middle * 1e3 << " ms (p50), " << p99 * 1e3 << " ms (p99), over "
+        << bounds.size() << " s\n";
+  }
+}
+
+}  // namespace tendon::replay

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <ostream>
+
+namespace tendon::replay {
+
+/// `tendon-replay --merge`: the recordings of both ends of a coupling as one, in the leader's time.
+struct MergeOptions {
+  std::filesystem::path leader;
+  std::filesystem::path follower;
+  std::filesystem::path out;  ///< must not exist
+  bool json = false;
+};
+
+/// Writes an MCAP file with every message of both, the leader's channels under /leader and the follower's under
+/// /follower (/leader/haptic/step), their bytes as they were recorded and the follower's times moved by the offset of
+/// the clocks; and /merge/clock, a ClockBound (recording.proto) each second. The bound comes from the PortStates that
+/// both recorded (clock_bound.h). Of a server with several devices its first device is the coupled one.
+///
+/// Tells `out` the offset and the bound. Throws std::runtime_error when a file cannot be read or written, when `out`
+/// exists, when the two are not the two ends of one coupling, or when one of the clocks stepped.
+void merge(const MergeOptions& options, std::ostream& out);
+
+}  // namespace tendon::replay
