@@ -365,6 +365,7 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
     }
 
     Vec3 mean = handle.mass * v0 + h / 2 * push;
+    if constexpr (kEnvironment) contact += environment_->rub(mean, h);
     if constexpr (kMode) {
       const Vec3 motor_push = truth_.device_force - config_.structural_mode->stiffness * truth_.deflection;
       Vec3 motor_mean = motor.mass * motor_velocity_ + h / 2 * motor_push + coupling / handle.resistance * mean;
@@ -377,7 +378,8 @@ void SimulatedDevice::take_substeps(Duration::rep count, double h) noexcept {
       slide<kEffects.rub>(mean, truth_.velocity, handle, push, truth_.position, h);
     }
     if constexpr (kEnvironment) {
-      contact += environment_->rub(mean, truth_.velocity, handle.resistance, h) - environment_->damping() * mean;
+      environment_->stop(truth_.velocity);
+      contact -= environment_->damping() * mean;
       truth_.environment_force = contact;
       truth_.environment_work += h * contact.dot(mean);
     }

@@ -11,27 +11,19 @@
 namespace tendon {
 namespace {
 
-/// Takes up to `most` out of the part of `mean` that does not lie along `normal` (all of it, without one). What was at
-/// rest already stays at rest.
-void brake(Vec3& mean, Vec3& end, double most, const Vec3* normal) {
-  const auto sliding = [normal](const Vec3& v) { return normal ? Vec3(v - normal->dot(v) * *normal) : v; };
-  const Vec3 moving = sliding(mean);
-  const double speed = moving.norm();
-  if (speed <= most) {
-    mean -= moving;
-    end -= sliding(end);
-  } else {
-    const Vec3 lost = (most / speed) * moving;
-    mean -= lost;
-    // The device's own friction may have stopped it already: then it is not pushed back.
-    if (sliding(end).squaredNorm() > 0) end -= 2 * lost;
-  }
+/// The part of `v` that does not lie along `normal`.
+Vec3 along_surface(const Vec3& v, const Vec3& normal) { return v - normal.dot(v) * normal; }
+
+/// Takes up to `most` out of `momentum`, of which `moving` is a part. True when that stops it.
+bool brake(Vec3& momentum, const Vec3& moving, double most) {
+  const double size = moving.norm();
+  momentum -= size <= most ? moving : Vec3((most / size) * moving);
+  return size <= most;
 }
 
 }  // namespace
 
-SimulatedEnvironment::SimulatedEnvironment(Config config)
-    : config_(std::move(config)), pressed_(config_.walls.size(), 0.0) {
+SimulatedEnvironment::SimulatedEnvironment(Config config) : config_(std::move(config)), touched_(config_.walls.size()) {
   expect_not_negative(config_.damping, "environment.damping");
   expect_not_negative(config_.friction, "environment.friction");
   expect(config_.walls.size() <= kMostWalls, "environment.walls", static_cast<double>(config_.walls.size()),
@@ -57,26 +49,32 @@ Vec3 SimulatedEnvironment::push(double t, const Vec3& x, const Vec3& v) noexcept
   Vec3 push = Vec3::Zero();
   for (std::size_t i = 0; i < config_.walls.size(); ++i) {
     const Wall& wall = config_.walls[i];
-    pressed_[i] = 0;
+    touched_[i].pressed = 0;
     const double age = t - seconds(wall.from);
     if (age < 0 || (wall.until && t >= seconds(*wall.until))) continue;
     const double depth = wall.normal.dot(wall.point - x) + wall.speed * age;
     if (!(depth > 0)) continue;
-    pressed_[i] = std::max(0.0, wall.stiffness * depth - wall.damping * (wall.normal.dot(v) - wall.speed));
-    push += pressed_[i] * wall.normal;
+    touched_[i].pressed = std::max(0.0, wall.stiffness * depth - wall.damping * (wall.normal.dot(v) - wall.speed));
+    push += touched_[i].pressed * wall.normal;
   }
   return push;
 }
 
-Vec3 SimulatedEnvironment::rub(Vec3& mean, Vec3& end, double resistance, double h) const noexcept {
-  const Vec3 before = mean;
-  const double loss = h / 2 / resistance;  // of velocity, for each N
+Vec3 SimulatedEnvironment::rub(Vec3& momentum, double h) noexcept {
+  const Vec3 before = momentum;
   for (std::size_t i = 0; i < config_.walls.size(); ++i) {
-    const double most = loss * config_.walls[i].friction * pressed_[i];
-    if (most > 0) brake(mean, end, most, &config_.walls[i].normal);
+    const double most = h / 2 * config_.walls[i].friction * touched_[i].pressed;
+    touched_[i].sticks = most > 0 && brake(momentum, along_surface(momentum, config_.walls[i].normal), most);
   }
-  if (config_.friction > 0) brake(mean, end, loss * config_.friction, nullptr);
-  return (mean - before) / loss;
+  sticks_ = config_.friction > 0 && brake(momentum, momentum, h / 2 * config_.friction);
+  return (momentum - before) * (2 / h);
+}
+
+void SimulatedEnvironment::stop(Vec3& velocity) const noexcept {
+  for (std::size_t i = 0; i < config_.walls.size(); ++i) {
+    if (touched_[i].sticks) velocity -= along_surface(velocity, config_.walls[i].normal);
+  }
+  if (sticks_) velocity.setZero();
 }
 
 }  // namespace tendon

@@ -21,7 +21,7 @@ namespace tendon {
 ///
 /// **Integration.** SimulatedDevice calls, in each substep of length h, `push` at the middle in time and at the place
 /// x₀ + (h/2) v₀, which makes the springs of the walls a position Verlet step: no energy comes or goes for ever. Then
-/// `rub` takes the friction out of the mean velocity, which does work −μ F_n |v_t|, never more than there is motion for.
+/// `rub` takes the friction out of the half-step momentum, before that of the device, and `stop` ends what sticks.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class SimulatedEnvironment {
@@ -29,20 +29,20 @@ class SimulatedEnvironment {
   static constexpr std::size_t kMostWalls = 16;
 
   struct Wall {
-    Vec3 point = Vec3::Zero();      ///< m, p: any point of the surface
-    Vec3 normal = Vec3::Zero();     ///< n, out of the wall; its length does not count, > 0
-    double stiffness = 0;           ///< k, N/m, > 0
-    double damping = 0;             ///< c, N·s/m, ≥ 0
-    double friction = 0;            ///< μ, ≥ 0
-    double speed = 0;               ///< s, m/s
-    Duration from{};                ///< it is there from this time on, since the first `read`; ≥ 0
-    std::optional<Duration> until;  ///< … and gone from this one on, > `from`
+    Vec3 point = Vec3::Zero();        ///< m, p: any point of the surface
+    Vec3 normal = Vec3::Zero();       ///< n, out of the wall; its length does not count, > 0
+    double stiffness = 0;             ///< k, N/m, > 0
+    double damping = 0;               ///< c, N·s/m, ≥ 0
+    double friction = 0;              ///< μ, ≥ 0
+    double speed = 0;                 ///< s, m/s
+    Duration from{};                  ///< it is there from this time on, since the first `read`; ≥ 0
+    std::optional<Duration> until{};  ///< … and gone from this one on, > `from`
   };
 
   struct Config {
     double damping = 0;   ///< b, N·s/m, ≥ 0
     double friction = 0;  ///< f, N, ≥ 0
-    std::vector<Wall> walls;
+    std::vector<Wall> walls{};
   };
 
   /// Throws std::invalid_argument naming the field ("environment.…"), its value and what was expected.
@@ -54,14 +54,21 @@ class SimulatedEnvironment {
   /// Σ F_n n at the time `t` (s since the first read), the place `x` and the velocity `v`.
   Vec3 push(double t, const Vec3& x, const Vec3& v) noexcept;
 
-  /// Friction of the substep whose `push` came before. `mean` is the mean velocity and `end` that at the end, both
-  /// without this friction, and `resistance` (kg) is what an impulse on the handle is divided by. Returns the mean
-  /// force of friction, N.
-  Vec3 rub(Vec3& mean, Vec3& end, double resistance, double h) const noexcept;
+  /// Friction of the substep of length h whose `push` came before: taken out of the half-step momentum p (N·s), from
+  /// which the mean velocity follows. Returns its mean force, N.
+  Vec3 rub(Vec3& momentum, double h) noexcept;
+
+  /// What sticks is at rest at the end of that substep.
+  void stop(Vec3& velocity) const noexcept;
 
  private:
   Config config_;
-  std::vector<double> pressed_;  ///< N, F_n of each wall in this substep
+  struct Touched {
+    double pressed = 0;  ///< N, F_n
+    bool sticks = false;
+  };
+  std::vector<Touched> touched_;  ///< in this substep, by wall
+  bool sticks_ = false;           ///< in the medium
 };
 
 }  // namespace tendon

@@ -2,7 +2,11 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <thread>
 
@@ -59,6 +63,52 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
   };
   EXPECT_GT(spread(hand), 0.01);
   EXPECT_GT(spread(tool), 0.5 * spread(hand)) << "it follows";
+}
+
+/// A copy in `folder` of the shipped scene of that role, with that method.
+std::filesystem::path scene_by(const std::string& method, const std::string& role,
+                               const std::filesystem::path& folder) {
+  std::ifstream shipped(scene(role + ".toml"));
+  std::string text{std::istreambuf_iterator<char>(shipped), {}};
+  const std::string line = "role = \"" + role + "\"\n";
+  text.insert(text.find(line) + line.size(), "method = \"" + method + "\"\n");
+  std::ofstream(folder / (role + ".toml")) << text;
+  return folder / (role + ".toml");
+}
+
+/// By waves and by the surface that the follower finds, in one clock afterwards.
+TEST(Teleoperation, OtherMethodsLeadToo) {
+  for (const std::string method : {"waves", "surface"}) {
+    const testing::ScratchFolder folder;
+    const auto followed = folder.path() / "follower.mcap";
+    const auto led = folder.path() / "leader.mcap";
+    Server follower(folder.path(), scene_by(method, "follower", folder.path()), {"--record", followed.string()});
+    Server leader(folder.path(), scene_by(method, "leader", folder.path()),
+                  {"--record", led.string(), "--dial", follower.address()});
+    leader.process().wait_for_line("teleoperation: engaged");
+    std::this_thread::sleep_for(std::chrono::seconds(4));
+    leader.stop();
+    follower.stop();
+    expect_sound(led, folder.path());
+    expect_sound(followed, folder.path());
+    double farthest = 0;
+    double pressed = 0;
+    for (const StepRecord& step : read_recording(followed).steps) {
+      farthest = std::max(farthest, step.hand.position.x());
+      if (step.hand_force) pressed = std::max(pressed, -step.hand_force->x());
+    }
+    EXPECT_GT(farthest, 0.007) << method << ": it follows to the wall";
+    EXPECT_GT(pressed, 0.3) << method;
+
+    const auto both = folder.path() / "both.mcap";
+    Process merged(program("tendon-replay"),
+                   {led.string(), "--merge", followed.string(), "--into", both.string(), "--json"}, folder.path());
+    ASSERT_EQ(merged.wait(), 0) << merged.err();
+    // On one machine the two clocks are one.
+    EXPECT_LT(number_in(merged.out(), "error_p99_s"), 0.5e-3) << merged.out();
+    EXPECT_LE(std::abs(number_in(merged.out(), "offset_s")), number_in(merged.out(), "error_p99_s") + 50e-6)
+        << merged.out();
+  }
 }
 
 /// What the two must not do with limiters: it shows that the demonstration demonstrates something.

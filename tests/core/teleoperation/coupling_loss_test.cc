@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
 
 namespace tendon {

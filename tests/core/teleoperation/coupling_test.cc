@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/core/control/adversary.h"
+#include "tests/core/teleoperation/expect_ports.h"
 #include "tests/core/teleoperation/ports.h"
 
 namespace tendon {

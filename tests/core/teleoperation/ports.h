@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -207,22 +205,6 @@ inline Ports far_apart(int one_way) {
 }
 
 inline PortPhase phase(const Port& port) { return port.coupling->phase(); }
-
-inline void expect_coupled(const Ports& ports, const std::string& when) {
-  EXPECT_EQ(phase(ports.leader), PortPhase::kCoupled) << when;
-  EXPECT_EQ(phase(ports.follower), PortPhase::kCoupled) << when;
-}
-
-/// Runs, and expects that no end is engaged in any period.
-inline void expect_no_engagement(Ports& ports, int ticks, const std::string& when) {
-  bool engaged = false;
-  ports.run(ticks, [&](int) {
-    for (const Port* port : {&ports.leader, &ports.follower}) {
-      engaged = engaged || phase(*port) == PortPhase::kEngaged || phase(*port) == PortPhase::kClutched;
-    }
-  });
-  EXPECT_FALSE(engaged) << when;
-}
 
 /// One port whose peer is played by the test.
 class Played {

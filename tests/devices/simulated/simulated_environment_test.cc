@@ -93,7 +93,7 @@ TEST(SimulatedEnvironment, AMovingWallCarriesTheHandleAlongUntilItIsGone) {
   EXPECT_EQ(bench.truth().position.x(), 0);
   bench.wait(999ms);
   EXPECT_NEAR(bench.truth().velocity.x(), 0.02, 1e-4);
-  EXPECT_NEAR(bench.truth().position.x(), 0.02 * 0.999 - 10 * 0.02 / 500 - 0.1 * 0.02 / 10, 1e-4);
+  EXPECT_NEAR(bench.truth().position.x(), 0.02 * 0.999 - 10 * 0.02 / 500, 1e-5);
   bench.wait(2ms);
   const double left = bench.truth().velocity.x();
   bench.wait(100ms);
@@ -109,7 +109,7 @@ TEST(SimulatedEnvironment, AMediumBrakesAndItsFrictionSticks) {
   EXPECT_EQ(bench.truth().position.x(), 0);
   for (int i = 0; i < 1000; ++i) bench.push({1.3, 0, 0}, 1ms);
   EXPECT_NEAR(bench.truth().velocity.x(), (1.3 - 0.5) / 4, 1e-9);
-  for (int i = 0; i < 1000; ++i) bench.push({}, 1ms);
+  for (int i = 0; i < 1000; ++i) bench.push(Vec3::Zero(), 1ms);
   EXPECT_EQ(bench.truth().velocity.x(), 0);
 }
 
@@ -144,7 +144,7 @@ TEST(SimulatedEnvironment, WhatIsWrongWithItIsNamed) {
   EXPECT_EQ(says([](Config& c) { c.environment->damping = -1; }), "environment.damping");
   EXPECT_EQ(says([](Config& c) { c.environment->friction = NAN; }), "environment.friction");
   EXPECT_EQ(says([](Config& c) { c.environment->walls.resize(17, kFloor); }), "environment.walls");
-  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].point.y() = NAN; }), "environment.wall.point");
+  EXPECT_EQ(says([](Config& c) { c.environment->walls[0].point.y() = NAN; }), "environment.wall.point.y");
   EXPECT_EQ(says([](Config& c) { c.environment->walls[0].normal.setZero(); }), "environment.wall.normal");
   EXPECT_EQ(says([](Config& c) { c.environment->walls[0].stiffness = 0; }), "environment.wall.stiffness");
   EXPECT_EQ(says([](Config& c) { c.environment->walls[0].damping = -1; }), "environment.wall.damping");

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/tools/lab/experiments/teleop.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "tests/core/teleoperation/pressing.h"
+#include "tests/support/dice.h"
+#include "tests/support/json_line.h"
+#include "tests/tools/lab/pictures/gnuplot.h"
+#include "tests/tools/lab/pictures/panels.h"
+
+namespace tendon::lab {
+namespace {
+
+constexpr int kRoundTrips[] = {0, 10, 20, 50, 100, 200, 400, 600};
+
+Pressing by(CouplingMethod method) {
+  Pressing with{.method = method};
+  switch (method) {
+    case CouplingMethod::kPositionPosition:
+      break;
+    case CouplingMethod::kWaves:
+      with.impedance = 10;
+      with.purse = false;
+      break;
+    case CouplingMethod::kPositionForce:
+    case CouplingMethod::kSurface:
+      with.stiffness = 1000;
+      break;
+  }
+  return with;
+}
+
+const char* colour_of(CouplingMethod method) {
+  switch (method) {
+    case CouplingMethod::kPositionPosition:
+      return kBlue;
+    case CouplingMethod::kPositionForce:
+      return kOrange;
+    case CouplingMethod::kWaves:
+      return kGreen;
+    case CouplingMethod::kSurface:
+      return kVermilion;
+  }
+  return kInk;
+}
+
+double median(std::vector<double>& of) {
+  const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
+  std::nth_element(of.begin(), middle, of.end());
+  return *middle;
+}
+
+TeleopRow measure(CouplingMethod method, int round_trip_ms, int hands, std::uint64_t seed) {
+  TeleopRow row{.method = method, .round_trip_ms = round_trip_ms};
+  std::vector<double> first;
+  std::vector<double> second;
+  Pressing with = by(method);
+  with.one_way = round_trip_ms / 2;
+  for (int hand = 0; hand < hands; ++hand) {
+    with.seed = seed + static_cast<std::uint64_t>(hand);
+    with.hand = Dice(with.seed).within(150, 600);
+    const Felt felt = feel(with);
+    if (!felt.live) throw std::runtime_error(std::string(to_string(method)) + " did not stay engaged");
+    first.push_back(felt.first / rigid(with));
+    second.push_back(felt.second / rigid(with));
+    row.buzz = std::max(row.buzz, felt.buzz);
+    row.pair = std::min(row.pair, felt.sum);
+  }
+  row.first = median(first);
+  row.second = median(second);
+  return row;
+}
+
+std::string table_of(const std::vector<TeleopRow>& rows) {
+  std::ostringstream text;
+  text << "method              round trip ms  felt 1st  felt 2nd  buzz mm/s  pair J\n" << std::fixed;
+  CouplingMethod before = rows.front().method;
+  for (const TeleopRow& row : rows) {
+    if (row.method != before) text << '\n';
+    before = row.method;
+    text << std::left << std::setw(20) << to_string(row.method) << std::right << std::setw(13) << row.round_trip_ms
+         << std::setprecision(2) << std::setw(10) << row.first << std::setw(10) << row.second << std::setw(11)
+         << row.buzz * 1e3 << std::setw(8) << std::setprecision(3) << row.pair << '\n';
+  }
+  return text.str();
+}
+
+void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std::ostream& out) {
+  Panel press[2] = {{.title = "First press: share of a rigid link's force", .x_label = "round trip, ms"},
+                    {.title = "Second press", .x_label = "round trip, ms"}};
+  for (Panel& panel : press) panel.y_range = {0, 1.05};
+  for (const CouplingMethod method : kCouplingMethods) {
+    Curve curve[2] = {
+        {.name = std::string(to_string(method)), .colour = colour_of(method), .style = Curve::Style::kBold},
+        {.name = std::string(to_string(method)), .colour = colour_of(method), .style = Curve::Style::kBold}};
+    for (const TeleopRow& row : rows) {
+      if (row.method != method) continue;
+      curve[0].points.emplace_back(row.round_trip_ms, row.first);
+      curve[1].points.emplace_back(row.round_trip_ms, row.second);
+    }
+    press[0].curves.push_back(curve[0]);
+    press[1].curves.push_back(curve[1]);
+  }
+  const std::string figures = "median of n = " + std::to_string(options.hands) + " hands from seed " +
+                              std::to_string(options.seed) + "; each way varies by 20 %, 10 % lost; every pair passive";
+  for (const auto& file : draw_panels(*options.out / "teleop", "What a hand feels of a wall behind a network", figures,
+                                      {press[0], press[1]})) {
+    out << "drew " << file.string() << '\n';
+  }
+}
+
+}  // namespace
+
+std::vector<TeleopRow> teleop_rows(int hands, std::uint64_t seed, std::span<const int> round_trips_ms) {
+  if (hands < 1 || hands > 1000) throw std::invalid_argument("hands: expected 1 to 1000");
+  std::vector<TeleopRow> rows;
+  for (const CouplingMethod method : kCouplingMethods) {
+    for (const int round_trip : round_trips_ms) rows.push_back(measure(method, round_trip, hands, seed));
+  }
+  return rows;
+}
+
+void teleop(const TeleopOptions& options, std::ostream& out) {
+  const auto rows = teleop_rows(options.hands, options.seed, kRoundTrips);
+  if (options.json) {
+    for (const TeleopRow& row : rows) {
+      out << JsonLine()
+                 .add("method", to_string(row.method))
+                 .add("round_trip_ms", row.round_trip_ms)
+                 .add("felt_first", row.first)
+                 .add("felt_second", row.second)
+                 .add("buzz_mps", row.buzz)
+                 .add("pair_j", row.pair)
+                 .add("hands", options.hands)
+                 .add("seed", options.seed)
+                 .str()
+          << '\n';
+    }
+  } else {
+    out << table_of(rows);
+  }
+  if (options.out) draw(rows, options, out);
+}
+
+}  // namespace tendon::lab
