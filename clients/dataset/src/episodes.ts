@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// A coupling as demonstrations: one episode for each time that the operator engaged.
+import type { Coupling, PoseMap, Port, Step, Vec3 } from "./recording.js";
+
+export interface Frame {
+  /** m, m/s: the follower's tool, in its base frame. */
+  readonly state: readonly number[];
+  /** N, of what it runs into; undefined: not measured. */
+  readonly contact?: Vec3 | undefined;
+  /** m: where the operator wanted the tool to be, in the follower's base frame. */
+  readonly action: Vec3;
+}
+
+export interface Episode {
+  readonly frames: readonly Frame[];
+}
+
+const add = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const less = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+
+function mapped({ scale, rotation }: PoseMap, u: Vec3): Vec3 {
+  const row = (r: Vec3): number => scale * (r[0] * u[0] + r[1] * u[1] + r[2] * u[2]);
+  return [row(rotation[0]), row(rotation[1]), row(rotation[2])];
+}
+
+/** The last of `rows` that is not later than t; they rise. Looks on from where it looked last. */
+class Latest<T extends { readonly t: number }> {
+  readonly #rows: readonly T[];
+  #next = 0;
+
+  constructor(rows: readonly T[]) {
+    this.#rows = rows;
+  }
+
+  at(t: number): T | undefined {
+    while (this.#next < this.#rows.length && this.#rows[this.#next]!.t <= t) ++this.#next;
+    return this.#rows[this.#next - 1];
+  }
+}
+
+const kEngaged = 4;
+
+/** The stretches in which the follower was engaged by one act. */
+function acts(ports: readonly Port[]): { readonly from: number; readonly to: number }[] {
+  const found: { from: number; to: number }[] = [];
+  let before: Port | undefined;
+  for (const port of ports) {
+    if (port.phase === kEngaged) {
+      const same = before?.phase === kEngaged && before.engagement === port.engagement;
+      if (same) found.at(-1)!.to = port.t;
+      else found.push({ from: port.t, to: port.t });
+    }
+    before = port;
+  }
+  return found;
+}
+
+/** Frames at `fps`, from the moment of each act on; an act of less than two frames is none. */
+export function episodesOf({ leader, follower, map }: Coupling, fps: number): Episode[] {
+  const tool = new Latest<Step>(follower.steps);
+  const told = new Latest<Port>(follower.ports);
+  const hand = new Latest<Port>(leader.ports);
+  const episodes: Episode[] = [];
+  for (const { from, to } of acts(follower.ports)) {
+    const frames: Frame[] = [];
+    for (let k = 0; from + k / fps <= to; ++k) {
+      const t = from + k / fps;
+      const [step, port, wish] = [tool.at(t), told.at(t), hand.at(t)];
+      if (!step || !port || !wish) continue;
+      const offset = less(step.position, port.displacement);
+      frames.push({
+        state: [...step.position, ...step.velocity], contact: step.contact, action: add(offset, mapped(map, wish.displacement)),
+      });
+    }
+    if (frames.length > 1) episodes.push({ frames });
+  }
+  return episodes;
+}

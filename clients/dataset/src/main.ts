@@ -1,0 +1,67 @@
+#!/usr/bin/env node
+// SPDX-License-Identifier: Apache-2.0
+import { parseArgs } from "node:util";
+import { episodesOf, type Episode } from "./episodes.js";
+import { writeDataset } from "./lerobot.js";
+import { readCoupling } from "./recording.js";
+
+const kHelp = `tendon-dataset: makes a robot-learning dataset of recordings of a coupling. LeRobot v2.1, without videos.
+
+Usage: tendon-dataset PAIR.mcap... --out DIR [OPTIONS]
+
+  PAIR.mcap               What tendon-replay --merge has written: a leader and its follower
+  -h, --help              Print this and leave
+  --out DIR               The dataset: a folder that is empty or does not exist
+  --fps NUMBER            Frames per second, 1 to 1000 [30]
+  --task TEXT             What the operator did [teleoperation]
+  --robot NAME            What the follower is [tendon]
+  --json                  One JSON object on stdout instead of a sentence
+
+Each time that the operator engages begins an episode. Exit: 0 done; 1 a file cannot be used; 2 wrong usage.
+
+Example: tendon-replay leader.mcap --merge follower.mcap --into pair.mcap
+         tendon-dataset pair.mcap --out press --task "press the wall"
+`;
+
+function options() {
+  const { values, positionals } = parseArgs({
+    allowPositionals: true,
+    options: {
+      help: { type: "boolean", short: "h", default: false },
+      out: { type: "string" },
+      fps: { type: "string", default: "30" },
+      task: { type: "string", default: "teleoperation" },
+      robot: { type: "string", default: "tendon" },
+      json: { type: "boolean", default: false },
+    },
+  });
+  if (values.help) {
+    process.stdout.write(kHelp);
+    process.exit(0);
+  }
+  const fps = Number(values.fps);
+  if (!(Number.isInteger(fps) && fps >= 1 && fps <= 1000)) {
+    throw new RangeError(`--fps: expected a whole number from 1 to 1000, got "${values.fps}"`);
+  }
+  if (values.out === undefined) throw new RangeError("--out: missing, expected a folder for the dataset");
+  if (positionals.length === 0) throw new RangeError("PAIR.mcap: missing, expected a merged recording");
+  return { ...values, out: values.out, fps, recordings: positionals };
+}
+
+async function main(): Promise<void> {
+  const { recordings, json, ...config } = options();
+  const episodes: Episode[] = [];
+  for (const recording of recordings) {
+    episodes.push(...episodesOf(await readCoupling(recording), config.fps));
+    if (process.stderr.isTTY) process.stderr.write(`read ${recording}: ${episodes.length} episodes so far\n`);
+  }
+  const frames = writeDataset(episodes, config);
+  const done = { out: config.out, episodes: episodes.length, frames, fps: config.fps };
+  process.stdout.write(json ? `${JSON.stringify(done)}\n` : `${done.out}: ${done.episodes} episodes, ${frames} frames at ${done.fps} Hz\n`);
+}
+
+main().catch((error: unknown) => {
+  process.stderr.write(`tendon-dataset: ${error instanceof Error ? error.message : String(error)}\n`);
+  const usage = error instanceof RangeError || (error as { code?: string }).code?.startsWith("ERR_PARSE_ARGS");
+  process.exitCode = usage ? 2 : 1;
+});

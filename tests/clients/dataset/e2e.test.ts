@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Real processes: a hand leads the device of another server, both record, and the two recordings become a dataset.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { setTimeout as sleep } from "node:timers/promises";
+import { it } from "node:test";
+import { kRoot } from "../typescript/support/paths.js";
+import { findTendond, Program, scene } from "../typescript/support/program.js";
+import { readJson, readParquetFile } from "./read_back.js";
+
+const address = async (server: Program): Promise<string> =>
+  /"address":"([^"]*)"/.exec(await server.line((line) => line.includes('"address"')))![1]!;
+
+it("what an operator did becomes a dataset", async (test) => {
+  const tendond = findTendond(test);
+  if (!tendond) return;
+  const folder = mkdtempSync(join(tmpdir(), "tendon-dataset-"));
+  test.after(() => rmSync(folder, { recursive: true }));
+  const file = (name: string): string => join(folder, `${name}.mcap`);
+  const follower = new Program(test, tendond, [scene("follower"), "--listen", "127.0.0.1:0", "--json", "--record", file("follower")]);
+  const leader = new Program(test, tendond, [
+    scene("leader"), "--listen", "127.0.0.1:0", "--json", "--record", file("leader"), "--dial", await address(follower),
+  ]);
+  await leader.line((line) => line.includes("teleoperation: engaged"));
+  await sleep(3000);
+  for (const server of [leader, follower]) assert.equal(await server.end("SIGTERM"), 0);
+
+  const replay = join(process.env["TENDON_PROGRAMS"]!, "tendon-replay");
+  execFileSync(replay, [file("leader"), "--merge", file("follower"), "--into", file("pair")]);
+  const tool = join(kRoot, "clients/dataset/dist/main.js");
+  const out = join(folder, "press");
+  const said = execFileSync("node", [tool, file("pair"), "--out", out, "--fps", "50", "--task", "press", "--json"], { encoding: "utf8" });
+  const { episodes, frames } = JSON.parse(said) as { episodes: number; frames: number };
+  assert.equal(episodes, 1);
+  assert.ok(frames > 100, said);
+  const columns = readParquetFile(join(out, "data/chunk-000/episode_000000.parquet"));
+  assert.equal(columns.get("frame_index")!.values.length, frames);
+  assert.equal(readJson(join(out, "meta/info.json")).total_frames, frames);
+  const x = (name: string): number[] => columns.get(name)!.values.map((row) => (row as number[])[0]!);
+  const spread = (values: number[]): number => Math.max(...values) - Math.min(...values);
+  assert.ok(spread(x("action")) > 0.02, "the hand moved");
+  assert.ok(spread(x("observation.state")) > 0.01, "the tool followed");
+  assert.ok(Math.min(...x("observation.contact_force")) < -0.3, "it touched the wall");
+  assert.throws(() => execFileSync("node", [tool, file("leader"), "--out", join(folder, "no")], { stdio: "pipe" }), /both ends of a coupling/);
+});
