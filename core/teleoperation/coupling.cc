@@ -289,6 +289,7 @@ bool Coupling::engage() noexcept {
   acted_at_ = now_;
   u_.setZero();
   if (renderer_) renderer_.emplace();
+  if (wave_) wave_->forgive();
   return true;
 }
 
@@ -366,6 +367,7 @@ void Coupling::begin_act() noexcept {
   u_ = mapped(newest_.position);
   if (estimator_) estimator_.emplace(config_.surface);
   surface_.reset();
+  if (wave_) wave_->forgive();
 }
 
 /// p₀ follows the handle while u stands still, and the other way round.

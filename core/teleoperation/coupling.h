@@ -78,11 +78,11 @@ namespace tendon {
 /// surface is forgotten with each act. waves: a WavePort of impedance B at both ends, B_f = B/(s_f s_x); K and D are
 /// not used, but for the place of a robot. All forces of the coupling are bounded by max_force.
 ///
-/// **Waves and phases.** The line books the force that the law wants, whole, and not what ramp, limiter and motors make
-/// of it: nothing that cuts a force shifts the two places against each other. What it sends is paid from the limiter's
-/// account, and what comes is paid into it, so that the pair is passive whatever was cut. A clutched leader holds its
-/// end of the line where it is: the follower stays there on the line's own spring. An end that is not engaged takes up
-/// what comes and sends nothing.
+/// **Waves and phases.** What the line sends is paid from the limiter's account, and what comes is paid into it, so that
+/// the pair is passive whatever was cut. What limiter and motors leave of the force is what the line books; what they
+/// cut is sent later (WavePort::SharedAccount), and what the ramp takes is not cut, so that nothing shifts the two places
+/// against each other for good. A clutched leader holds its end of the line where it is: the follower stays there on the
+/// line's own spring. An end that is not engaged takes up what comes and sends nothing.
 ///
 /// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while it is live and its
 /// peer is engaged (not clutched) and not silent. Its `joule` is the map's. Method position-position needs it for the
@@ -141,8 +141,8 @@ class Coupling {
   /// Either end.
   void disengage() noexcept;
 
-  /// The interval that has just ended: where the handle went, m, and the account after it was booked, J
-  /// (SharesAccount::payable; +∞ for a port without a limiter). Not when the interval was not seen.
+  /// The interval that has just ended, and the account after it was booked, J (SharesAccount::payable; +∞ for a port
+  /// without a limiter). Not when the interval was not seen.
   void observe(const Interval<3>& interval, double payable) noexcept;
 
   /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes.

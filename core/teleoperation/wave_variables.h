@@ -47,7 +47,8 @@ struct WaveMessage {
 ///
 ///     A += T r̂²/2 − T s²/2 − F·Δx
 ///
-/// and s is shortened where it would take A below zero; what was left out of its sum is sent when A has it again.
+/// and s is shortened where it would take A below zero; what was left out of its sum is sent within 200 ms when A has it
+/// again.
 /// So A + A' + (what is on the way in both directions) is exactly what the two ends have put in, and none of its parts
 /// is negative, except that A is when the motion in one period was another than v promised; then nothing is sent until
 /// it has been earned back. (The limiter at the device is what bounds the leader's port in every case.)
@@ -106,6 +107,9 @@ class WavePort {
   /// what a cut force has left out of the sum is sent when there is more than one and a half reserves. The caller
   /// credits `taken` to the limiter and withdraws `given`.
   WaveMessage<N> observe(const Interval<N>& interval, const SharedAccount& account) noexcept;
+
+  /// Does not send any more what was left out.
+  void forgive() noexcept { unsent_.setZero(); }
 
   /// A, J.
   double energy() const noexcept { return account_; }

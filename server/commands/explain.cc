@@ -97,8 +97,12 @@ std::vector<Listable> make_listables() {
   guard("turn_trip", "a handle that spins gets no force", &Safety::turn_trip);
   guard("grip_limit", "no grip is larger", &Safety::grip_limit);
   guard("grip_growth_limit", "no grip grows faster", &Safety::grip_growth_limit);
-  add("limiter", "keeps the device from giving out energy",
-      [](Scene& scene) { return std::exchange(scene.loop.control.limiter.law, Law::kNone) != Law::kNone; });
+  add("limiter", "keeps the device from giving out energy", [](Scene& scene) {
+    LimiterConfig& limiter = scene.loop.control.limiter;
+    limiter.shared_account = false;  // ports without a limiter have none
+    if (scene.loop.control.coupling) scene.loop.control.coupling->purse.reset();
+    return std::exchange(limiter.law, Law::kNone) != Law::kNone;
+  });
   for_each_aol_part([&add](const auto& part) {
     add("limiter." + std::string(part.name), part.what, [config = part.config](Scene& scene) {
       HapticController::Config& loop = scene.loop.control;

@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace tendon {
 namespace {
@@ -25,8 +29,9 @@ std::function<Duration()> ticking() {
 
 /// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
 std::set<std::string> optional_parts() {
-  std::set<std::string> keys = {"device.hand", "device.rotation", "device.gripper", "loop.max_speed_m_per_s",
-                                "safety",      "limiter",         "admittance",     "teleoperation"};
+  std::set<std::string> keys = {
+      "device.hand", "device.environment", "device.rotation", "device.gripper", "loop.max_speed_m_per_s", "safety",
+      "limiter",     "admittance",         "teleoperation"};
   std::istringstream reference(scene_reference());
   std::string table;
   for (std::string line; std::getline(reference, line);) {
@@ -57,6 +62,25 @@ TEST(Explain, OnlyWhatIsListedHasACost) {
   EXPECT_EQ(listed, (std::set<std::string>{"admittance", "device.effects.coulomb_friction_n",
                                            "device.effects.force_sensor", "device.effects.max_force_n",
                                            "device.effects.viscous_friction_n_s_per_m", "device.hand", "limiter"}));
+}
+
+TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
+  std::ifstream shipped_scene(std::filesystem::path(TENDON_SCENES) / "leader.toml");
+  const std::string text{std::istreambuf_iterator<char>(shipped_scene), {}};
+  for (const CouplingMethod method : kCouplingMethods) {
+    const std::string name(to_string(method));
+    const std::vector<std::string> settings = {"teleoperation.method=" + name};
+    const Scene scene = parse_scene(text, "leader.toml", ".", settings);
+    const Explanation explanation = explain(scene, ticking(), kRounds);
+    EXPECT_TRUE(std::ranges::any_of(explanation.parts, [](const auto& part) {
+      return part.key == "teleoperation" && part.cost_ns;
+    })) << name;
+    const std::string words = in_words(scene, explanation);
+    EXPECT_NE(words.find("the leader of a coupling by " + name), std::string::npos) << words;
+    EXPECT_EQ(words.find("round trip") != std::string::npos,
+              method == CouplingMethod::kWaves || method == CouplingMethod::kPositionPosition)
+        << words;
+  }
 }
 
 TEST(Explain, ACostIsTheDifferenceToTheSceneWithoutThePart) {
