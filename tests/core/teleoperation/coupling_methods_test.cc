@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <numbers>
@@ -15,6 +17,7 @@
 
 #include "tests/core/teleoperation/ports.h"
 #include "tests/core/teleoperation/pressing.h"
+#include "tests/core/teleoperation/recorded_rig.h"
 
 namespace tendon {
 namespace {
@@ -114,6 +117,38 @@ TEST(CouplingMethods, SevenSecondsOfRoundTripAreStableByEachMethod) {
     EXPECT_GE(ports.least_account(), kRounding) << to_string(method);
     EXPECT_LT(fastest, 0.5) << to_string(method);
     EXPECT_TRUE(ports.leader.coupling->live()) << to_string(method);
+  }
+}
+
+TEST(CouplingMethods, RecordedMotionOfBothPortsOfARigGetsNoEnergyOut) {
+  const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
+  if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no recorded rig";
+  for (const char* const name : {"m2_question1d_foam.csv", "m2_question1d_rigid.csv"}) {
+    const auto file = std::filesystem::path(data) / "tue-1dof-teleop" / name;
+    for (const CouplingMethod method : kCouplingMethods) {
+      for (const int one_way : {0, 25, 100, 350}) {
+        Ports made = press({.method = method, .one_way = one_way, .seed = 17});
+        PortSetup leader = made.leader.setup;
+        PortSetup follower = made.follower.setup;
+        const auto along = [&](PortSetup& setup, const char* column) {
+          setup.path = [x = recorded(file, column)](double t) { return Vec3(x(std::max(0.0, t - 1.5)), 0, 0); };
+        };
+        along(leader, "master_pos_rad");
+        along(follower, "slave_pos_rad");
+        Ports ports(leader, follower, bad_way(one_way, 17), bad_way(one_way, 18));
+        ports.run(800);
+        ASSERT_TRUE(ports.engage());
+        double largest = 0;
+        ports.run(5000, [&](int) { largest = std::max(largest, ports.leader.applied.norm()); });
+        const std::string which =
+            std::string(name) + " " + std::string(to_string(method)) + " " + std::to_string(one_way);
+        EXPECT_GE(ports.least_account(), kRounding) << which;
+        EXPECT_GE(ports.least_sum, kRounding) << which;
+        if (method == CouplingMethod::kPositionPosition || method == CouplingMethod::kWaves) {
+          EXPECT_GT(largest, 0.05) << which << ": nothing was rendered";
+        }
+      }
+    }
   }
 }
 

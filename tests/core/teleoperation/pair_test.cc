@@ -3,6 +3,7 @@
 // Two devices tied by position–position springs, limiters and purses, over bad networks: what is felt, how it feels in
 // free motion, how quiet it is, and that the pair gives out nothing.
 #include "tests/core/teleoperation/pair.h"
+#include "tests/core/teleoperation/recorded_rig.h"
 
 #include <gtest/gtest.h>
 
@@ -13,8 +14,6 @@
 #include <fstream>
 #include <iostream>
 #include <numbers>
-
-#include "devices/simulated/recorded_motion.h"
 
 namespace tendon {
 namespace {
@@ -288,13 +287,6 @@ TEST(Pair, WithoutLimitersTheSamePairGivesOutEnergy) {
   Pair safe(config);
   safe.run(3);
   EXPECT_GE(safe.least_sum, -kNanojoule);
-}
-
-/// A column of a recording as a path of the handle, m.
-std::function<double(double)> recorded(const std::filesystem::path& file, const char* column) {
-  std::ifstream csv(file);
-  const ScriptedMotion motion(load_recorded_motion(csv, {.path = file, .position = column, .scale = 0.075}));
-  return [motion](double t) { return motion.at(t).position.x(); };
 }
 
 TEST(Pair, RecordedMotionOfBothPortsOfARigGetsNoEnergyOut) {

@@ -140,6 +140,65 @@ TEST(WaveVariables, SendsNothingWhileItsAccountIsShort) {
   EXPECT_NEAR(port.observe({Vec<1>(0), Vec<1>(0), kPeriod}).integral[0], 2.5e-3, 1e-9);
 }
 
+TEST(WaveVariables, OfAnEndThatHasSentForLongOnlyWhatComesNowCounts) {
+  WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
+  port.join({500, 500s, Vec<1>(7), 3});
+  EXPECT_EQ(port.command(Vec<1>(0)).force[0], 0);
+  port.observe({Vec<1>(0), Vec<1>(0), kPeriod});
+  double most = 0;
+  for (std::uint64_t i = 1; i <= 300; ++i) {
+    const auto n = static_cast<double>(i);
+    port.receive({500 + i, 500s + i * 1ms, Vec<1>(7 + 1e-3 * n), 3 + 0.5e-3 * n});
+    most = std::max(most, port.command(Vec<1>(0)).force[0]);
+    port.observe({Vec<1>(0), Vec<1>(0), kPeriod});
+  }
+  EXPECT_NEAR(most, 2, 1e-9) << "√(2B) times a wave of 1 √W";
+  EXPECT_LE(port.energy(), 0.5e-3 * 300);
+}
+
+TEST(WaveVariables, UseNoWaveThatIsLongerThanItMayBe) {
+  WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod, .max_wave = 0.25});
+  for (std::uint64_t i = 1; i <= 300; ++i) {
+    const auto n = static_cast<double>(i);
+    port.receive({i, i * 1ms, Vec<1>(1e-3 * n), 0.5e-3 * n});
+    EXPECT_LE(port.command(Vec<1>(0)).force[0], 2 * 0.25 * (1 + 1e-12));
+    port.observe({Vec<1>(0), Vec<1>(0), kPeriod});
+    EXPECT_LE(port.taken(), kT * 0.25 * 0.25 / 2 * (1 + 1e-12));
+  }
+}
+
+TEST(WaveVariables, BelowTheReserveOfALimiterAFifthOfAWaveStays) {
+  const auto sent = [](double payable, double reserve) {
+    WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
+    port.command(Vec<1>(0));
+    // Due is a wave of (2 N·s/m · 1 m/s + 2 N)/2 = 2 √W, of 2 mJ in the period.
+    const auto message =
+        port.observe({Vec<1>(-2), Vec<1>(kT), kPeriod}, {.payable = payable, .reserve = reserve, .wanted = Vec<1>(-2)});
+    EXPECT_NEAR(message.energy, port.given(), 1e-15);
+    return port.given();
+  };
+  EXPECT_NEAR(sent(1, 0), 2e-3, 1e-12);
+  EXPECT_NEAR(sent(1, 2), 1.6e-3, 1e-12);
+  EXPECT_NEAR(sent(0.5e-3, 2), 0.5e-3, 1e-12) << "never more than there is";
+  EXPECT_EQ(sent(-1, 0), 0);
+}
+
+TEST(WaveVariables, WhatALimiterCutIsSentWhenItHasMoreThanItNeeds) {
+  WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
+  port.command(Vec<1>(0));
+  const auto observe = [&](double applied, double payable) {
+    return port.observe({Vec<1>(applied), Vec<1>(0), kPeriod},
+                        {.payable = payable, .reserve = 1, .wanted = Vec<1>(-2)});
+  };
+  const double cut = observe(0, 1.2).integral[0];
+  EXPECT_EQ(cut, 0) << "the wave that was wanted, 1 √W for 1 ms, is left out";
+  EXPECT_NEAR(observe(-2, 1.2).integral[0], kT, 1e-15)
+      << "that of this period only: it has less than one and a half reserves";
+  double sum = 0;
+  for (int i = 0; i < 3000; ++i) sum = observe(-2, 9).integral[0] - (2 + i) * kT;
+  EXPECT_NEAR(sum, kT, 1e-9);
+}
+
 TEST(WaveVariables, PassOverWhatIsNotFiniteOrOutOfPlace) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});

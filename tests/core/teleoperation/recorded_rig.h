@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "devices/simulated/recorded_motion.h"
+#include "devices/simulated/scripted_motion.h"
+
+namespace tendon {
+
+/// A column of a recording of the TU/e rig as a path of the handle, m.
+inline std::function<double(double)> recorded(const std::filesystem::path& file, const char* column) {
+  std::ifstream csv(file);
+  const ScriptedMotion motion(load_recorded_motion(csv, {.path = file, .position = column, .scale = 0.075}));
+  return [motion](double t) { return motion.at(t).position.x(); };
+}
+
+}  // namespace tendon
