@@ -246,7 +246,7 @@ void Coupling::observe(const Interval<3>& interval, double payable) noexcept {
   Interval<3> end{.applied = wave_force_, .dx = Vec3::Zero(), .held = interval.held};
   if (wave_moves_) {
     end.dx = coupled(interval.dx);
-    // What limiter and motors cut is a softer end of the line; what the ramp took is not.
+    // A cut by limiter or motors makes the end of the line softer; the ramp does not.
     end.applied = coupled(interval.applied) + wave_force_ - coupled(last_);
   }
   sent_wave_ = wave_->observe(end, {.payable = payable, .reserve = loss_, .wanted = wave_force_});

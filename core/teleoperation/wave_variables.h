@@ -76,7 +76,7 @@ class WavePort {
     Duration smoothing = std::chrono::milliseconds(20);  ///< W; ≥ T and ≤ 256 T, rounded to a whole number of T
     /// The most that D may be; ≥ 0. Messages that wait for more than 255 periods of the sender are played early.
     Duration max_playout = std::chrono::milliseconds(60);
-    /// √W, the longest r̂ that is used: no more than half of its square, in W, comes in. What is left out comes later.
+    /// √W, the longest r̂ that is used: no more than half of its square, in W, comes in. The rest comes later.
     double max_wave = std::numeric_limits<double>::infinity();
   };
 

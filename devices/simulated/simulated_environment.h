@@ -58,7 +58,7 @@ class SimulatedEnvironment {
   /// which the mean velocity follows. Returns its mean force, N.
   Vec3 rub(Vec3& momentum, double h) noexcept;
 
-  /// What sticks is at rest at the end of that substep.
+  /// Ends, with that substep, the motion that friction holds.
   void stop(Vec3& velocity) const noexcept;
 
  private:

@@ -96,7 +96,7 @@ struct World {
   }
 };
 
-TEST(SimulatedDeviceEnergy, WorkOfHandAndWallsIsNeverLessThanEquation5Demands) {
+TEST(SimulatedDeviceEnergy, HandAndWallsNeverDoLessWorkThanEquation5Demands) {
   // 2000 worlds with random devices, hands, forces and intervals; exact position sensing.
   double least = 1e300;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

@@ -335,7 +335,8 @@ TEST(Codec, ACoupleWithoutARoleAMethodOrARotationIsRefused) {
   EXPECT_EQ(couple(0, 1, true), 0U);
   EXPECT_EQ(couple(3, 1, true), 0U);
   EXPECT_EQ(couple(1, 0, true), 0U);
-  EXPECT_EQ(couple(1, 3, true), 0U);
+  EXPECT_EQ(couple(1, 4, true), 1U);
+  EXPECT_EQ(couple(1, 5, true), 0U);
   EXPECT_EQ(couple(1, 1, false), 0U);
 }
 

@@ -403,7 +403,7 @@ TEST(Codec, ASettingComesOutAsItWentIn) {
 }
 
 /// With the tag of suite 1, and an echo, as it is on its way.
-TEST(Codec, APortTakes238BytesAndAtMost311AndFitsBesideAState) {
+TEST(Codec, APortTakes238BytesAndAtMost401AndFitsBesideAState) {
   const auto sealed = [](const auto&... frames) {
     return data(1'000'000, examples::echo(), frames...).size() + crypto::kTagSize;
   };
@@ -420,7 +420,7 @@ TEST(Codec, APortTakes238BytesAndAtMost311AndFitsBesideAState) {
   most.wave_integral = {0.1, -0.2, 0.3};
   most.wave_energy = 0.1;
   most.surface = {.normal = {0.36, 0.48, 0.8}, .offset = 0.1, .stiffness = 0.1};
-  EXPECT_EQ(sealed(most), 311U);
+  EXPECT_EQ(sealed(most), 401U);
   EXPECT_LE(sealed(examples::state_with_handle(), most), kMaxDatagram);
 }
 

@@ -342,7 +342,8 @@ stiffness_n_per_m = 500
   EXPECT_EQ(wall.from, 100ms);
   EXPECT_EQ(wall.until, 5s);
   EXPECT_FALSE(environment.walls[1].until);
-  EXPECT_EQ(error_of_minimal_and("[[device.environment.wall]]\nnormal = [0, 0, 0]\nstiffness_n_per_m = 500\n"), "");
+  EXPECT_EQ(error_of_minimal_and("[[device.environment.wall]]\nnormal = [0, 0, 0]\nstiffness_n_per_m = 500\n"),
+            "s.toml:1: device: environment.wall.normal = 0: expected a length above 0");
 }
 
 }  // namespace

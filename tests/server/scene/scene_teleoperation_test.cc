@@ -103,7 +103,7 @@ button = 0
   EXPECT_EQ(coupling.engage_by, 0U);
 }
 
-TEST(SceneTeleoperation, NamesEachMethodAndWavesShareTheirAccountWithoutAPurse) {
+TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
   const auto by = [](const std::string& method, const std::string& more = "") {
     return "[teleoperation]\nrole = \"leader\"\nmethod = \"" + method +
            "\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + more;
@@ -116,7 +116,7 @@ TEST(SceneTeleoperation, NamesEachMethodAndWavesShareTheirAccountWithoutAPurse) 
   EXPECT_FALSE(minimal_and(by("surface")).loop.control.limiter.shared_account);
   EXPECT_FALSE(minimal_and("[limiter]\nkind = \"none\"\n" + by("waves")).loop.control.limiter.shared_account);
   EXPECT_EQ(error_of_minimal_and("[limiter]\nkind = \"tdpa\"\n" + by("waves")),
-            "s.toml:8: teleoperation.method: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
+            "s.toml:5: teleoperation.method: expected the limiter \"aol+\", \"aol\" or \"aol-box\": the others have no "
             "account that ports can share");
   EXPECT_EQ(error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
                                  "stiffness_n_per_m = 400\nadapt_to_delay = false\n"),

@@ -61,7 +61,8 @@ TEST(ClockBound, TheTrueOffsetLiesWithinItWhateverTheNetworkDoes) {
       const double t = seconds(bound.at - Clocks::at(0));
       const double wrong = std::abs(seconds(bound.offset) - clocks.theta(t));
       ASSERT_LE(wrong, seconds(bound.error) + 1e-9) << "seed " << seed << " at " << t;
-      ASSERT_GE(seconds(bound.error), round_trip / 2 * (1 - kMostDrift) - 1e-8) << "seed " << seed << ": nobody can know that";
+      ASSERT_GE(seconds(bound.error), round_trip / 2 * (1 - kMostDrift) - 1e-8)
+          << "seed " << seed << ": nobody can know that";
     }
   }
 }
