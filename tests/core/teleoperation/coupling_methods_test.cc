@@ -215,7 +215,7 @@ TEST(CouplingMethods, AClutchedLeaderHoldsTheFollowerOnTheLine) {
   EXPECT_GE(ports.least_sum, kRounding);
 }
 
-TEST(CouplingMethods, AWallThatIsGoneIsGoneForTheLeaderWhenTheToolHasPassedIt) {
+TEST(CouplingMethods, AWallThatIsGoneIsGoneForTheLeaderOnceTheToolPassed) {
   constexpr int kOneWay = 300;
   Ports ports = press(
       {.method = CouplingMethod::kSurface, .impedance = 2, .stiffness = 1000, .wall_until = 9, .one_way = kOneWay});
