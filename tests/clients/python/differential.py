@@ -143,7 +143,7 @@ def _frame(frame: Frame) -> list[object]:
         if isinstance(frame.request, Couple):
             c = frame.request
             return [
-                *("control", frame.id, "couple", c.device, c.channel, int(c.role) - 1, int(c.method) - 1),
+                *("control", frame.id, "couple", c.device, c.channel, int(c.role) - 1, int(c.method)),
                 *map(_double, (c.position_scale, c.force_scale, *c.rotation)),
                 *(c.axes, *map(_double, (c.stiffness, c.mutual_damping, c.damping))),
                 *(int(c.adapt_to_delay), int(c.purse), c.period_us * 1000),

@@ -387,7 +387,7 @@ def out_of_bounds():
     yield "given", replace(PORT, given=1e6 + 1)
     yield "taken", replace(PORT, taken=-0.1)
     yield "role 0", Control(1, replace(COUPLE, role=0))
-    yield "method 3", Control(1, replace(COUPLE, method=3))
+    yield "method 5", Control(1, replace(COUPLE, method=5))
     yield "a scale below a hundredth", Control(1, replace(COUPLE, position_scale=0.0099))
     yield "a scale above a hundred", Control(1, replace(COUPLE, force_scale=100.1))
     yield "a rotation that is none", Control(1, replace(COUPLE, rotation=(0.602, 0.0, 0.8, 0.0)))

@@ -123,7 +123,7 @@ static COUPLE: Schema = message(&[
     Field(1, Unsigned32, One, DEVICE),
     Field(2, Unsigned32, One, CHANNEL),
     Field(3, Enum, One, Whole(1, 2)),
-    Field(4, Enum, One, Whole(1, 2)),
+    Field(4, Enum, One, Whole(1, 4)),
     Field(5, Real, One, Between(0.01, 100.0)),
     Field(6, Real, One, Between(0.01, 100.0)),
     Field(7, Sub(&QUATERNION), Required, Any),
@@ -285,6 +285,12 @@ pub static PEER_REPORT: Schema = message(&[
     Field(6, Sub(&LINK_REPORT), Required, Any),
 ]);
 
+static PORT_SURFACE: Schema = Schema {
+    fields: &[Field(1, Sub(&VECTOR), Required, Any), Field(2, Real, One, SIGNED), Field(3, Real, One, POSITIVE)],
+    oneof: &[],
+    rule: |node| node.sub(1).map_or(false, |normal| near_one(&normal.reals::<3>())),
+};
+
 pub static PORT_STATE: Schema = message(&[
     Field(1, Unsigned32, One, DEVICE),
     Field(2, Unsigned32, One, CHANNEL),
@@ -305,6 +311,9 @@ pub static PORT_STATE: Schema = message(&[
     Field(17, Real, One, Between(0.0, 1e3)),
     Field(18, Real, One, Between(0.0, 1e6)),
     Field(19, Real, One, Between(0.0, 1e6)),
+    Field(20, Sub(&VECTOR), Optional, Any),
+    Field(21, Real, One, Between(0.0, 1e6)),
+    Field(22, Sub(&PORT_SURFACE), Optional, Any),
 ]);
 
 pub static FRAME: Schema = Schema {
