@@ -30,6 +30,8 @@ struct PortSetup {
   std::function<Vec3(double)> path{};    ///< t, s → m: the handle is led there and ignores forces
   double encoder_step = 0;               ///< m; 0: exact
   bool measures_contact = false;
+  double motor = std::numeric_limits<double>::infinity();  ///< N, the most that it gives
+  bool limited = true;                                     ///< false: what the coupling wants is applied
 };
 
 /// The springs, purse and period that both ends of these tests have.
@@ -110,7 +112,8 @@ class Port {
     limiter->withdraw(settled.withdraw);
     paid = settled.withdraw;
     const LimitedForce<3> limited = limiter->limit(demand);
-    applied = ready && seen ? limited.force : Vec3(Vec3::Zero());
+    applied = ready && seen ? (setup.limited ? limited.force : demand.force) : Vec3(Vec3::Zero());
+    if (applied.norm() > setup.motor) applied *= setup.motor / applied.norm();
     cut = !limited.reasons.empty();
     least_account = std::min(least_account, limiter->payable());
     return coupling->message(applied, setup.measures_contact ? std::optional<Vec3>(outside()) : std::nullopt);
