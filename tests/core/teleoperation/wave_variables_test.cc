@@ -199,6 +199,14 @@ TEST(WaveVariables, WhatALimiterCutIsSentWhenItHasMoreThanItNeeds) {
   EXPECT_NEAR(sum, kT, 1e-9);
 }
 
+TEST(WaveVariables, WhatWasForgivenIsNotSent) {
+  WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});
+  port.command(Vec<1>(0));
+  port.observe({Vec<1>(0), Vec<1>(0), kPeriod}, {.payable = 0, .reserve = 1, .wanted = Vec<1>(-2)});
+  port.forgive();
+  EXPECT_EQ(port.observe({Vec<1>(0), Vec<1>(0), kPeriod}, {.payable = 9, .reserve = 1}).integral[0], 0);
+}
+
 TEST(WaveVariables, PassOverWhatIsNotFiniteOrOutOfPlace) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   WavePort<1> port({.impedance = 2, .period = kPeriod, .smoothing = kPeriod});

@@ -83,6 +83,8 @@ TEST(SimulatedEnvironment, FrictionHoldsAlongAWallUpToItsCone) {
   for (int i = 0; i < 1000; ++i) bench.push({3, 0, -4}, 1ms);
   EXPECT_NEAR(bench.truth().velocity.x(), (3 - 0.5 * 4) / 0.1, 1e-3);
   EXPECT_NEAR(bench.truth().environment_force.x(), -2, 1e-6);
+  for (int i = 0; i < 3000; ++i) bench.push({0, 0, -4}, 1ms);
+  EXPECT_EQ(bench.truth().velocity.x(), 0) << "it has come to rest, and does not tremble";
 }
 
 TEST(SimulatedEnvironment, AMovingWallCarriesTheHandleAlongUntilItIsGone) {

@@ -71,8 +71,7 @@ std::vector<ClockBound> clock_bounds(const std::vector<Crossing>& there, const s
 }
 
 Duration offset_at(const std::vector<ClockBound>& bounds, LocalTime at) {
-  const auto after =
-      std::find_if(bounds.begin(), bounds.end(), [at](const ClockBound& bound) { return bound.at > at; });
+  const auto after = std::ranges::upper_bound(bounds, at, {}, &ClockBound::at);
   if (after == bounds.begin()) return after->offset;
   const ClockBound& before = *(after - 1);
   if (after == bounds.end()) return before.offset;
