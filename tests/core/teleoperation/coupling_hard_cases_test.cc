@@ -17,6 +17,8 @@ struct HardCase {
   const char* name;
   void (*make)(PortSetup& leader, PortSetup& follower);
   bool breaks_springs = true;  ///< springs without limiters give out energy
+  /// m/s, of a follower of position-force: it goes on bouncing on the wall, because its contact force comes back late.
+  double bounces = 0;
 };
 
 /// The hand goes to and fro beyond both ends.
@@ -30,7 +32,7 @@ constexpr HardCase kCases[] = {
     {"the follower's motor gives 0.8 N", [](PortSetup&, PortSetup& follower) { follower.motor = 0.8; }},
     {"the leader's motor gives 0.5 N", [](PortSetup& leader, PortSetup&) { leader.motor = 0.5; }},
     {"the follower's workspace ends", between_stops},
-    {"a follower ten times heavier", [](PortSetup&, PortSetup& follower) { follower.mass *= 10; }, false},
+    {"a follower ten times heavier", [](PortSetup&, PortSetup& follower) { follower.mass *= 10; }, false, 0.1},
     {"a follower at 500 Hz",
      [](PortSetup& leader, PortSetup& follower) {
        follower.every = 2;
@@ -39,6 +41,12 @@ constexpr HardCase kCases[] = {
     {"the hand lets go while it presses", [](PortSetup& leader, PortSetup&) { leader.around[0].until = 6; }},
     {"a wall that is cut while it is pressed", [](PortSetup&, PortSetup& follower) { follower.around[0].until = 6; }},
     {"a robot that holds its place", [](PortSetup&, PortSetup& follower) { follower.coupling.holds_place = true; }},
+    {"a wall that is stiff at every second press",
+     [](PortSetup&, PortSetup& follower) {
+       follower.around[0].stiffer = [](double t) {
+         return std::fmod(t - 2, 4e-3 * kPressMs) > 2e-3 * kPressMs ? 20. : 1.;
+       };
+     }},
     {"a leader with next to no friction", [](PortSetup& leader, PortSetup&) { leader.friction.viscous = 0.02; }},
 };
 
@@ -69,7 +77,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   Outcome outcome;
   Vec3 leader_was = ports.leader.x();
   Vec3 follower_was = ports.follower.x();
-  const int end = 3000 + 3 * kPressMs;
+  const int end = 3000 + 5 * kPressMs;  // held since half a press: the third one
   ports.run(end - ports.now, [&](int now) {
     outcome.most = std::max(outcome.most, ports.leader.applied.norm());
     if (now > end - 1000) {
@@ -84,7 +92,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   return outcome;
 }
 
-TEST(CouplingHardCases, WithLimitersNoPairGivesOutEnergyAndEachComesToRest) {
+TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButOneComeToRest) {
   for (const HardCase& hard : kCases) {
     for (const CouplingMethod method : kCouplingMethods) {
       const Outcome outcome = run(hard, method, 25, true);
@@ -93,7 +101,8 @@ TEST(CouplingHardCases, WithLimitersNoPairGivesOutEnergyAndEachComesToRest) {
       EXPECT_GE(outcome.sum, kRounding) << which;
       EXPECT_GE(outcome.account, kRounding) << which;
       EXPECT_LE(outcome.most, 8 * (1 + 1e-9)) << which;
-      EXPECT_LT(outcome.unrest, 0.12) << which;
+      const double bounces = method == CouplingMethod::kPositionForce ? hard.bounces : 0;
+      EXPECT_LT(outcome.unrest, std::max(bounces, 0.02)) << which;
     }
   }
 }
@@ -124,6 +133,45 @@ TEST(CouplingHardCases, AMotorThatCannotHoldTheForceOfWavesLosesNoPlace) {
     std::cout << motor << " N: " << apart * 1e3 << " mm apart, friction holds " << friction * 1e3 << " mm\n";
     EXPECT_LE(apart, friction + 2 * 20e-6);
   }
+}
+
+TEST(CouplingHardCases, ANewActForgetsTheWavesThatTheLastOneLeftUnsent) {
+  const Ports made = press({.impedance = 10, .one_way = 10});
+  PortSetup leader = made.leader.setup;
+  leader.motor = 0.3;
+  Ports ports(leader, made.follower.setup, bad_way(10, 5), bad_way(10, 6));
+  ports.run(1200);
+  ASSERT_TRUE(ports.engage());
+  ports.run(5000 - ports.now);
+  ports.leader.coupling->disengage();
+  ports.run(9500 - ports.now);  // the hand is back, and rests
+  const Vec3 before = ports.follower.x();
+  ASSERT_TRUE(ports.engage());
+  double most = 0;
+  ports.run(1000, [&](int) { most = std::max(most, (ports.follower.x() - before).norm()); });
+  EXPECT_GE(ports.least_sum, kRounding);
+  EXPECT_LT(most, 40e-6);
+}
+
+TEST(CouplingHardCases, AFollowerForgetsThemToo) {
+  auto config = coupling_of(PortRole::kFollower);
+  config.method = CouplingMethod::kWaves;
+  config.spring.max_force = 5;
+  config.purse.reset();
+  Played played(config);
+  const auto period = [&](PortPhase leader, std::uint64_t act, const Vec3& dx, double payable) {
+    played.hear(played.state(leader, act));
+    played.port.observe({Vec3::Zero(), dx, std::chrono::milliseconds(1)}, payable);
+    played.step();
+  };
+  for (int i = 0; i < 3; ++i) period(PortPhase::kCoupled, 0, Vec3::Zero(), 0);
+  for (int i = 0; i < 10; ++i) period(PortPhase::kEngaged, 1, Vec3(1e-3, 0, 0), 0);  // nothing to pay for the line
+  EXPECT_TRUE(played.port.live());
+  EXPECT_TRUE(played.told.wave_integral.isZero(0));
+  for (int i = 0; i < 3; ++i) period(PortPhase::kCoupled, 1, Vec3::Zero(), 0);
+  for (int i = 0; i < 100; ++i) period(PortPhase::kEngaged, 2, Vec3::Zero(), i == 0 ? 0 : 1);
+  EXPECT_TRUE(played.port.live());
+  EXPECT_TRUE(played.told.wave_integral.isZero(0)) << played.told.wave_integral;
 }
 
 }  // namespace

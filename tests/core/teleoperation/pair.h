@@ -24,6 +24,7 @@ struct Surroundings {
   bool wall = false;                          ///< only while x is beyond `reference`
   /// s: from then on there is nothing; the hand has let go, or the wall was removed.
   double until = std::numeric_limits<double>::infinity();
+  std::function<double(double)> stiffer{};  ///< t, s → by which `stiffness` is multiplied; empty: 1
 };
 
 /// A device with one degree of freedom: m dv/dt = F + F_surroundings − b v − f_c sgn(v), by the implicit midpoint rule
@@ -51,7 +52,7 @@ class Body {
                                   ? (around_.reference(middle + h) - around_.reference(middle - h)) / (2 * h)
                                   : 0;
     const bool touches = middle < around_.until && (!around_.wall || x > rest);
-    const double k = touches ? around_.stiffness : 0;
+    const double k = touches ? around_.stiffness * (around_.stiffer ? around_.stiffer(middle) : 1) : 0;
     const double c = touches ? around_.damping : 0;
     const double push = force + k * (rest - x) + c * rest_speed;
     const double p = mass_ * v + h / 2 * push;
