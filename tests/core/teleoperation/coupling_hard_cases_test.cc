@@ -3,6 +3,8 @@
 // The hard cases of teleoperation with the coupling that the server runs, by each method, with its limiters and without.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iostream>
 #include <string>
@@ -17,13 +19,11 @@ struct HardCase {
   const char* name;
   void (*make)(PortSetup& leader, PortSetup& follower);
   bool breaks_springs = true;  ///< springs without limiters give out energy
-  /// m/s, of a follower of position-force: it goes on bouncing on the wall, because its contact force comes back late.
-  double bounces = 0;
+  double bounces = 0;          ///< m/s, by position-force: the follower goes on bouncing on its wall
 };
 
-/// The hand goes to and fro beyond both ends.
-void between_stops(PortSetup& /*leader*/, PortSetup& follower) {
-  // The follower's workspace ends 5 mm to one side.
+/// 5 mm to one side; the hand goes farther.
+void workspace_ends(PortSetup& /*leader*/, PortSetup& follower) {
   follower.around[0] = {.stiffness = 20000, .damping = 5, .reference = [](double) { return 0.005; }, .wall = true};
 }
 
@@ -31,7 +31,7 @@ constexpr HardCase kCases[] = {
     {"a wall of 500 N/m", [](PortSetup&, PortSetup&) {}},
     {"the follower's motor gives 0.8 N", [](PortSetup&, PortSetup& follower) { follower.motor = 0.8; }},
     {"the leader's motor gives 0.5 N", [](PortSetup& leader, PortSetup&) { leader.motor = 0.5; }},
-    {"the follower's workspace ends", between_stops},
+    {"the follower's workspace ends", workspace_ends},
     {"a follower ten times heavier", [](PortSetup&, PortSetup& follower) { follower.mass *= 10; }, false, 0.1},
     {"a follower at 500 Hz",
      [](PortSetup& leader, PortSetup& follower) {
@@ -77,7 +77,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   Outcome outcome;
   Vec3 leader_was = ports.leader.x();
   Vec3 follower_was = ports.follower.x();
-  const int end = 3000 + 5 * kPressMs;  // held since half a press: the third one
+  const int end = 3000 + 5 * kPressMs;  // in the third press, held for 3.5 s
   ports.run(end - ports.now, [&](int now) {
     outcome.most = std::max(outcome.most, ports.leader.applied.norm());
     if (now > end - 1000) {
