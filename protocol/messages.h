@@ -170,6 +170,15 @@ constexpr std::size_t lateness_bucket(Duration late) noexcept {
   return std::min(bucket, limits::kLatenessBuckets - 1);
 }
 
+/// Either way, unreliable: one end of a coupling of two devices, told to the other; and both ends to an observer. For each
+/// device, channel and end the highest sequence of the highest epoch wins. Only between peers that both named
+/// kFeatureTeleoperation.
+struct PortFrame : PortState {
+  std::uint32_t device = 0;  ///< of the server of the session, whichever way this goes
+  std::uint32_t channel = 0;
+  bool of_peer = false;  ///< to an observer: of the other end of the device's coupling
+};
+
 /// Server → client, unreliable, newest wins for each device: how its loop does. Once a second, to an observer of it
 /// that named kFeatureDiagnostics. Numbers of things are of the time that it tells of.
 struct DeviceReport {
@@ -197,13 +206,6 @@ struct PeerReport {
   std::uint32_t state_one_in = 1;  ///< of the states that it wants, it is sent one in so many: its way is full
   bool forces_refused = false;     ///< its forces are not taken: its way loses too much
   LinkReport link{};               ///< `number`: 1, 2, 3 … of the channel; the forces are the channel's
-};
-
-/// Either way, unreliable: one end of a coupling of two devices, told to the other. For each device and channel the
-/// highest sequence of the highest epoch wins. Only between peers that both named kFeatureTeleoperation.
-struct PortFrame : PortState {
-  std::uint32_t device = 0;  ///< of the server of the session, whichever way this goes
-  std::uint32_t channel = 0;
 };
 
 /// Client → server, reliable: how many states of a device per second this client wants. The server sends
@@ -283,8 +285,31 @@ struct Couple {
   bool adapt_to_delay = false;
   bool purse = false;
   Duration period{};  ///< between two PortStates; travels in whole µs; > 0, at most 10 s
+  bool absolute = false;      ///< offsets are zero, and the two align first
+  double turn_stiffness = 0;  ///< N·m/rad; 0: the orientations are not coupled
+  double turn_damping = 0;    ///< N·m·s/rad
+  double grip_stiffness = 0;  ///< N/m at the fingers; 0: the grippers are not coupled
+  double grip_damping = 0;    ///< N·s/m
+  double drift_rate = 0;      ///< 1/s, of passivity
+  std::optional<RateControl> rate{};
 
   bool operator==(const Couple&) const = default;
+};
+
+/// Client → server, reliable: the scales of a coupling from now on, while the leader is not engaged or holds its clutch.
+/// Only from a controller of the leader's device.
+struct SetScale {
+  std::uint32_t device = 0;
+  double position_scale = 1;  ///< follower over leader; 0.01 … 100
+  double force_scale = 1;     ///< leader over follower; 0.01 … 100
+};
+
+/// Client → server, reliable: how much the leader of that channel counts among several. Only from a controller of the
+/// follower's device.
+struct SetShare {
+  std::uint32_t device = 0;
+  std::uint32_t channel = 0;
+  double share = 0;  ///< 0 … 1
 };
 
 /// Client → server, reliable: the operator's act, which couples the handles. Only from a controller of the device.
@@ -298,7 +323,7 @@ struct Disengage {
 };
 
 using Request = std::variant<SetStateRate, Rearm, Disarm, Describe, TakeLease, GiveLease, LeaseLost, SetStateDeadband,
-                             Couple, Engage, Disengage, SetOutput>;
+                             Couple, Engage, Disengage, SetOutput, SetScale, SetShare>;
 
 struct ChannelDescription {
   std::string name;  ///< at most 24 bytes
@@ -366,7 +391,8 @@ inline constexpr std::string_view kFeatureJoints = "joints";
 /// A feature: the client is told the outputs of the device (lamps, vibration), and may set them.
 inline constexpr std::string_view kFeatureOutputs = "outputs";
 
-/// A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways.
+/// A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. An observer is
+/// sent those of both ends.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,

@@ -61,6 +61,9 @@ class Newest {
 
   static bool same(const DeviceState& a, const DeviceState& b) noexcept { return a.device == b.device; }
   static bool same(const DeviceReport& a, const DeviceReport& b) noexcept { return a.device == b.device; }
+  static bool same(const PortFrame& a, const PortFrame& b) noexcept {
+    return a.device == b.device && a.channel == b.channel && a.of_peer == b.of_peer;
+  }
   static bool same(const auto& a, const auto& b) noexcept { return a.device == b.device && a.channel == b.channel; }
   typename std::vector<Stream>::const_iterator next_waiting() const noexcept {
     return std::find_if(streams_.begin(), streams_.end(), [](const Stream& s) { return s.waiting; });

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/expect.h"
+#include "core/base/rotation.h"
 
 namespace tendon {
 
@@ -65,6 +66,8 @@ SurfaceModel<3> at_leader(const PortSurface& from, const PoseMap& map, std::uint
 bool fits(double value, double low, double high) noexcept { return value >= low && value <= high; }
 bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
 
+bool is_scale(double scale) noexcept { return scale == 0 || fits(scale, 0.01, 100); }
+
 bool has(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
 }  // namespace
@@ -79,6 +82,12 @@ std::string_view to_string(CouplingMethod method) noexcept {
       return "waves";
     case CouplingMethod::kSurface:
       return "surface";
+    case CouplingMethod::kPassivity:
+      return "passivity";
+    case CouplingMethod::kSetPosition:
+      return "set-position";
+    case CouplingMethod::kRate:
+      return "rate";
   }
   return "unknown";
 }
@@ -108,6 +117,18 @@ bool is_sound(const PortSurface& surface) noexcept {
          fits(surface.stiffness, 0, 1e12);
 }
 
+bool is_sound(const PortTurn& turn) noexcept {
+  return is_rotation(turn.turn) && fits(turn.angular_velocity) && fits(turn.torque);
+}
+
+bool is_sound(const PortGrip& grip) noexcept {
+  constexpr double kAccount = PurseMessage::kMostAccount;
+  constexpr double kTotal = PurseMessage::kMostTotal;
+  return fits(grip.opening, -1e12, 1e12) && fits(grip.velocity, -1e12, 1e12) && fits(grip.force, -1e12, 1e12) &&
+         fits(grip.account, -kAccount, kAccount) && fits(grip.need, 0, kAccount) && fits(grip.given, 0, kTotal) &&
+         fits(grip.taken, 0, kTotal);
+}
+
 bool is_sound(const PortState& state) noexcept {
   constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
   constexpr double kAccount = PurseMessage::kMostAccount;
@@ -118,7 +139,9 @@ bool is_sound(const PortState& state) noexcept {
          fits(state.velocity) && fits(state.force) && (!state.contact_force || fits(*state.contact_force)) &&
          fits(state.account, -kAccount, kAccount) && fits(state.need, 0, kAccount) && fits(state.given, 0, kTotal) &&
          fits(state.taken, 0, kTotal) && fits(state.wave_integral) && fits(state.wave_energy, 0, kTotal) &&
-         (!state.surface || is_sound(*state.surface));
+         (!state.surface || is_sound(*state.surface)) && (!state.turn || is_sound(*state.turn)) &&
+         (!state.grip || is_sound(*state.grip)) && fits(state.energy_in, 0, kTotal) &&
+         (!state.share || fits(*state.share, 0, 1)) && is_scale(state.position_scale) && is_scale(state.force_scale);
 }
 
 Coupling::Coupling(const Config& config)

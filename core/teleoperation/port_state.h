@@ -16,7 +16,7 @@ namespace tendon {
 enum class PortPhase : std::uint8_t {
   kAlone = 1,  ///< has no peer
   kCoupled,    ///< hears its peer; no force; waits for the operator's act
-  kAligning,   ///< (absolute maps, which there are none of yet)
+  kAligning,   ///< absolute maps: the leader is led to where the follower is
   kEngaged,    ///< the law
   kClutched,   ///< the leader is free; the follower stays where it is
   kLost,       ///< was engaged, and its peer fell silent; never engaged again without an act
@@ -33,18 +33,50 @@ enum class CouplingMethod : std::uint8_t {
   kPositionForce,         ///< the follower's spring; the leader feels the contact that the follower measures
   kWaves,                 ///< wave variables, played out (WavePort)
   kSurface,               ///< position-force, but the leader touches a model of the surface that the follower found
+  kPassivity,             ///< velocity there, force back, each paid from what the other took in (PassivityLeader)
+  kSetPosition,           ///< springs to late positions, stretched only as far as the account pays
+  kRate,                  ///< the leader's place says how fast the follower moves
 };
-inline constexpr std::array kCouplingMethods = {CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce,
-                                                CouplingMethod::kWaves, CouplingMethod::kSurface};
+inline constexpr std::array kCouplingMethods = {
+    CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves,
+    CouplingMethod::kSurface,          CouplingMethod::kPassivity,     CouplingMethod::kSetPosition,
+    CouplingMethod::kRate};
 
 /// As scenes and refusals call it: "position-position".
 std::string_view to_string(CouplingMethod method) noexcept;
+
+/// Method rate: the leader's handle, pulled back to its centre, says how fast the follower moves. In the leader's scale.
+struct RateControl {
+  double dead_zone = 0;  ///< m, ≥ 0: nearer to its centre the follower stands
+  double gain = 0;       ///< 1/s, > 0: speed for each metre beyond that
+  double max_speed = 0;  ///< m/s, > 0
+
+  bool operator==(const RateControl&) const = default;
+};
 
 /// A flat, springy surface as the sender's tool has found it: SurfaceModel in the sender's displacements u.
 struct PortSurface {
   Vec3 normal = Vec3::UnitX();  ///< of length 1 ± 0.001, out of the surface
   double offset = 0;            ///< m: the surface is at normal·u = offset
   double stiffness = 0;         ///< N/m, ≥ 0; 0: there is none
+};
+
+/// How a handle has turned since its offset was taken.
+struct PortTurn {
+  Quat turn{};                            ///< in the axes of the sender's base frame; of length 1 ± 0.001
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, zero while `turn` is frozen
+  Vec3 torque = Vec3::Zero();            ///< N·m, on whoever holds the handle, really applied
+};
+
+/// A gripper, measured at its fingers. It is a port of its own, with an account of its own.
+struct PortGrip {
+  double opening = 0;   ///< m
+  double velocity = 0;  ///< m/s
+  double force = 0;     ///< N, on the fingers, > 0 opens them; really applied
+  double account = 0;   ///< J, these four as in PortState
+  double need = 0;
+  double given = 0;
+  double taken = 0;
 };
 
 /// What one port of a coupling tells the other, once a period. It may be sent as seldom as one likes, late, twice, in
@@ -73,10 +105,18 @@ struct PortState {
   std::optional<PortSurface> surface{};  ///< what its tool touches, or touched last; empty: nothing yet
   Vec3 wave_integral = Vec3::Zero();     ///< √W·s, WaveMessage::integral
   double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of PurseMessage
+  std::optional<PortTurn> turn{};        ///< empty: the orientations are not coupled
+  std::optional<PortGrip> grip{};        ///< empty: the grippers are not coupled
+  double energy_in = 0;          ///< J, of passivity: total that its port took in, in this epoch; as wave_energy
+  std::optional<double> share{};  ///< 0 … 1, of a follower: how much this leader counts; empty: it is the only one
+  double position_scale = 0;     ///< of a leader, in use from this state on: 0.01 … 100; 0: as both scenes say
+  double force_scale = 0;
 };
 
 /// Whether each value is finite and within the bounds that it has above and on the wire (tendon.proto).
 bool is_sound(const PortState& state) noexcept;
 bool is_sound(const PortSurface& surface) noexcept;
+bool is_sound(const PortTurn& turn) noexcept;
+bool is_sound(const PortGrip& grip) noexcept;
 
 }  // namespace tendon

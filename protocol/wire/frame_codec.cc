@@ -231,6 +231,17 @@ bool read(const pb::Describe& from, Describe& to) noexcept {
   to.handle = from.handle();
   return read_device(from.device(), to.device);
 }
+bool read(const pb::SetScale& from, SetScale& to) noexcept {
+  to.position_scale = from.position_scale();
+  to.force_scale = from.force_scale();
+  const auto possible = [](double scale) { return scale >= 0.01 && scale <= 100; };
+  return read_device(from.device(), to.device) && possible(to.position_scale) && possible(to.force_scale);
+}
+bool read(const pb::SetShare& from, SetShare& to) noexcept {
+  to.share = from.share();
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) && to.share >= 0 &&
+         to.share <= 1;
+}
 /// A setting of neither kind is refused.
 bool read(const pb::SetOutput& from, SetOutput& to) noexcept {
   to.output = from.output();
@@ -284,6 +295,16 @@ void write_request(const LeaseLost& from, pb::Control& to) {
 void write_request(const Couple& from, pb::Control& to) { write(from, *to.mutable_couple()); }
 void write_request(const Engage& from, pb::Control& to) { to.mutable_engage()->set_device(from.device); }
 void write_request(const Disengage& from, pb::Control& to) { to.mutable_disengage()->set_device(from.device); }
+void write_request(const SetScale& from, pb::Control& to) {
+  to.mutable_set_scale()->set_device(from.device);
+  to.mutable_set_scale()->set_position_scale(from.position_scale);
+  to.mutable_set_scale()->set_force_scale(from.force_scale);
+}
+void write_request(const SetShare& from, pb::Control& to) {
+  to.mutable_set_share()->set_device(from.device);
+  to.mutable_set_share()->set_channel(from.channel);
+  to.mutable_set_share()->set_share(from.share);
+}
 void write_request(const SetOutput& from, pb::Control& to) {
   pb::SetOutput& out = *to.mutable_set_output();
   out.set_device(from.device);
@@ -343,6 +364,10 @@ bool read(const pb::Control& from, Control& to) {
       return read_request<Engage>(from.engage(), to);
     case pb::Control::kDisengage:
       return read_request<Disengage>(from.disengage(), to);
+    case pb::Control::kSetScale:
+      return read_request<SetScale>(from.set_scale(), to);
+    case pb::Control::kSetShare:
+      return read_request<SetShare>(from.set_share(), to);
     case pb::Control::OP_NOT_SET:
       break;
   }

@@ -30,6 +30,50 @@ bool read(bool there, const pb::PortSurface& from, std::optional<PortSurface>& t
   return read(from.normal(), to->normal);
 }
 
+bool read(bool there, const pb::PortTurn& from, std::optional<PortTurn>& to) noexcept {
+  to.reset();
+  if (!there) return true;
+  to.emplace();
+  return read(from.turn(), to->turn) && read(from.angular_velocity_radps(), to->angular_velocity) &&
+         read(from.torque_nm(), to->torque);
+}
+
+void read(bool there, const pb::PortGrip& from, std::optional<PortGrip>& to) noexcept {
+  to.reset();
+  if (!there) return;
+  to = {.opening = from.opening_m(),
+        .velocity = from.velocity_mps(),
+        .force = from.force_n(),
+        .account = from.account_j(),
+        .need = from.need_j(),
+        .given = from.given_j(),
+        .taken = from.taken_j()};
+}
+
+void write(const PortTurn& from, pb::PortTurn& to) {
+  write(from.turn, *to.mutable_turn());
+  write(from.angular_velocity, *to.mutable_angular_velocity_radps());
+  write(from.torque, *to.mutable_torque_nm());
+}
+
+void write(const PortGrip& from, pb::PortGrip& to) {
+  to.set_opening_m(from.opening);
+  to.set_velocity_mps(from.velocity);
+  to.set_force_n(from.force);
+  to.set_account_j(from.account);
+  to.set_need_j(from.need);
+  to.set_given_j(from.given);
+  to.set_taken_j(from.taken);
+}
+
+bool read(bool there, const pb::RateControl& from, std::optional<RateControl>& to) noexcept {
+  to.reset();
+  if (!there) return true;
+  to = {.dead_zone = from.dead_zone_m(), .gain = from.gain_per_s(), .max_speed = from.max_speed_mps()};
+  return within(to->dead_zone, 0, limits::kMaxValue) && to->gain > 0 && within(to->gain, 0, limits::kMaxValue) &&
+         to->max_speed > 0 && within(to->max_speed, 0, limits::kMaxValue);
+}
+
 }  // namespace
 
 bool read(const pb::PortState& from, PortFrame& to) noexcept {
@@ -45,11 +89,17 @@ bool read(const pb::PortState& from, PortFrame& to) noexcept {
   to.given = from.given_j();
   to.taken = from.taken_j();
   to.wave_energy = from.wave_energy_j();
+  to.energy_in = from.energy_in_j();
+  to.of_peer = from.of_peer();
+  to.share = from.has_share() ? std::optional(from.share()) : std::nullopt;
+  to.position_scale = from.position_scale();
+  to.force_scale = from.force_scale();
+  read(from.has_grip(), from.grip(), to.grip);
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
          read(from.round_trip_ns(), to.round_trip) && read(from.phase(), to.phase) &&
          read(from.position_m(), to.position) && read(from.velocity_mps(), to.velocity) &&
          read(from.force_n(), to.force) && read(from.wave_integral(), to.wave_integral) &&
-         read(from.has_surface(), from.surface(), to.surface) &&
+         read(from.has_surface(), from.surface(), to.surface) && read(from.has_turn(), from.turn(), to.turn) &&
          read(from.has_contact_force_n(), from.contact_force_n(), to.contact_force) && is_sound(to);
 }
 
@@ -83,6 +133,16 @@ void write(const PortFrame& from, pb::PortState& to) {
     to.mutable_surface()->set_offset_m(from.surface->offset);
     to.mutable_surface()->set_stiffness_npm(from.surface->stiffness);
   }
+  to.clear_turn();
+  if (from.turn) write(*from.turn, *to.mutable_turn());
+  to.clear_grip();
+  if (from.grip) write(*from.grip, *to.mutable_grip());
+  to.set_energy_in_j(from.energy_in);
+  to.clear_share();
+  if (from.share) to.set_share(*from.share);
+  to.set_position_scale(from.position_scale);
+  to.set_force_scale(from.force_scale);
+  to.set_of_peer(from.of_peer);
 }
 
 bool read(const pb::Couple& from, Couple& to) noexcept {
@@ -99,11 +159,20 @@ bool read(const pb::Couple& from, Couple& to) noexcept {
   to.adapt_to_delay = from.adapt_to_delay();
   to.purse = from.purse();
   to.period = std::chrono::microseconds(from.period_us());
+  to.absolute = from.absolute();
+  to.turn_stiffness = from.turn_stiffness_nmprad();
+  to.turn_damping = from.turn_damping_nmsprad();
+  to.grip_stiffness = from.grip_stiffness_npm();
+  to.grip_damping = from.grip_damping_nspm();
+  to.drift_rate = from.drift_rate_per_s();
+  const auto sound = [](double value) { return within(value, 0, limits::kMaxValue); };
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
          within(to.position_scale, 0.01, 100) && within(to.force_scale, 0.01, 100) &&
          read(from.rotation(), to.rotation) && to.axes >= 1 && to.axes <= 7 &&
-         within(to.stiffness, 0, limits::kMaxValue) && within(to.mutual_damping, 0, limits::kMaxValue) &&
-         within(to.damping, 0, limits::kMaxValue) && to.period > Duration::zero() && to.period <= limits::kMaxValidFor;
+         sound(to.stiffness) && sound(to.mutual_damping) && sound(to.damping) && to.period > Duration::zero() &&
+         to.period <= limits::kMaxValidFor && sound(to.turn_stiffness) && sound(to.turn_damping) &&
+         sound(to.grip_stiffness) && sound(to.grip_damping) && sound(to.drift_rate) &&
+         read(from.has_rate(), from.rate(), to.rate);
 }
 
 void write(const Couple& from, pb::Couple& to) {
@@ -124,6 +193,18 @@ void write(const Couple& from, pb::Couple& to) {
   const bool possible = from.period > Duration::zero() && from.period <= limits::kMaxValidFor;
   const auto us = std::chrono::ceil<std::chrono::microseconds>(possible ? from.period : Duration::zero());
   to.set_period_us(static_cast<std::uint32_t>(us.count()));
+  to.set_absolute(from.absolute);
+  to.set_turn_stiffness_nmprad(from.turn_stiffness);
+  to.set_turn_damping_nmsprad(from.turn_damping);
+  to.set_grip_stiffness_npm(from.grip_stiffness);
+  to.set_grip_damping_nspm(from.grip_damping);
+  to.set_drift_rate_per_s(from.drift_rate);
+  to.clear_rate();
+  if (from.rate) {
+    to.mutable_rate()->set_dead_zone_m(from.rate->dead_zone);
+    to.mutable_rate()->set_gain_per_s(from.rate->gain);
+    to.mutable_rate()->set_max_speed_mps(from.rate->max_speed);
+  }
 }
 
 }  // namespace tendon::wire

@@ -124,6 +124,14 @@ Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted
   return order(asker, wanted.device, HapticOrder::Kind::kDisengage, "told to disengage");
 }
 
+Outcome set_scale(LocalTime /*now*/, const Asker& /*asker*/, const SetScale& /*wanted*/) {
+  return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+}
+
+Outcome set_share(LocalTime /*now*/, const Asker& /*asker*/, const SetShare& /*wanted*/) {
+  return {.code = Code::kUnsupported, .detail = "this device has no leaders to choose from"};
+}
+
 /// Nobody sets the lamps of a device whose forces are another's.
 Outcome set_output(LocalTime /*now*/, const Asker& asker, const SetOutput& wanted) {
   if (!asker.guest.sees_outputs) {
@@ -209,6 +217,8 @@ constexpr std::array kRequests = {
     row<Engage, From::kControllers, engage>("engage a coupling"),
     row<Disengage, From::kControllers, disengage>("disengage a coupling"),
     row<SetOutput, From::kControllers, set_output>("set an output"),
+    row<SetScale, From::kControllers, set_scale>("set the scales of a coupling"),
+    row<SetShare, From::kControllers, set_share>("set the share of a leader"),
 };
 static_assert(kRequests.size() == std::variant_size_v<Request>);
 constexpr bool in_order() {

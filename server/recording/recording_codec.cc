@@ -25,12 +25,17 @@ void put(pb::Vec3* out, const Vec3& v) {
 
 Vec3 vec3(const pb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
+void put(pb::Quat* out, const Quat& q) {
+  out->set_w(q.w);
+  out->set_x(q.x);
+  out->set_y(q.y);
+  out->set_z(q.z);
+}
+
+Quat quat(const pb::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+
 void put(pb::Turn* out, const TurnStep& turn) {
-  const Quat& q = turn.hand.orientation;
-  out->mutable_orientation()->set_w(q.w);
-  out->mutable_orientation()->set_x(q.x);
-  out->mutable_orientation()->set_y(q.y);
-  out->mutable_orientation()->set_z(q.z);
+  put(out->mutable_orientation(), turn.hand.orientation);
   put(out->mutable_angular_velocity_radps(), turn.hand.angular_velocity);
   put(out->mutable_torque_held_nm(), turn.was_applied);
   put(out->mutable_torque_wanted_nm(), turn.wanted);
@@ -41,8 +46,7 @@ void put(pb::Turn* out, const TurnStep& turn) {
 }
 
 TurnStep turn_step(const pb::Turn& in) {
-  const pb::Quat& q = in.orientation();
-  return {.hand = {.orientation = {q.w(), q.x(), q.y(), q.z()}, .angular_velocity = vec3(in.angular_velocity_radps())},
+  return {.hand = {.orientation = quat(in.orientation()), .angular_velocity = vec3(in.angular_velocity_radps())},
           .was_applied = vec3(in.torque_held_nm()),
           .wanted = vec3(in.torque_wanted_nm()),
           .torque = vec3(in.torque_commanded_nm()),
@@ -95,6 +99,24 @@ void put(pb::PortState* out, const PortState& state) {
   }
   if (!state.wave_integral.isZero(0)) put(out->mutable_wave_integral(), state.wave_integral);
   out->set_wave_energy_j(state.wave_energy);
+  if (state.turn) {
+    put(out->mutable_turn()->mutable_turn(), state.turn->turn);
+    put(out->mutable_turn()->mutable_angular_velocity_radps(), state.turn->angular_velocity);
+    put(out->mutable_turn()->mutable_torque_nm(), state.turn->torque);
+  }
+  if (state.grip) {
+    out->mutable_grip()->set_opening_m(state.grip->opening);
+    out->mutable_grip()->set_velocity_mps(state.grip->velocity);
+    out->mutable_grip()->set_force_n(state.grip->force);
+    out->mutable_grip()->set_account_j(state.grip->account);
+    out->mutable_grip()->set_need_j(state.grip->need);
+    out->mutable_grip()->set_given_j(state.grip->given);
+    out->mutable_grip()->set_taken_j(state.grip->taken);
+  }
+  out->set_energy_in_j(state.energy_in);
+  if (state.share) out->set_share(*state.share);
+  out->set_position_scale(state.position_scale);
+  out->set_force_scale(state.force_scale);
 }
 
 PortState port_state(const pb::PortState& in) {
@@ -127,6 +149,24 @@ PortState port_state(const pb::PortState& in) {
   }
   out.wave_integral = vec3(in.wave_integral());
   out.wave_energy = in.wave_energy_j();
+  if (in.has_turn()) {
+    out.turn = {.turn = quat(in.turn().turn()),
+                .angular_velocity = vec3(in.turn().angular_velocity_radps()),
+                .torque = vec3(in.turn().torque_nm())};
+  }
+  if (in.has_grip()) {
+    out.grip = {.opening = in.grip().opening_m(),
+                .velocity = in.grip().velocity_mps(),
+                .force = in.grip().force_n(),
+                .account = in.grip().account_j(),
+                .need = in.grip().need_j(),
+                .given = in.grip().given_j(),
+                .taken = in.grip().taken_j()};
+  }
+  out.energy_in = in.energy_in_j();
+  if (in.has_share()) out.share = in.share();
+  out.position_scale = in.position_scale();
+  out.force_scale = in.force_scale();
   return out;
 }
 
