@@ -105,6 +105,9 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
       case HapticOrder::Kind::kDisengage:
         if (Coupling* const coupling = controller_.coupling()) coupling->disengage();
         break;
+      case HapticOrder::Kind::kSetScale:
+        if (Coupling* const coupling = controller_.coupling()) coupling->set_scale(order->scales[0], order->scales[1]);
+        break;
     }
     mail_.orders.pop();
   }

@@ -27,10 +27,12 @@ struct HapticOrder {
     kDisarm,     ///< no force until kRearm
     kEngage,     ///< the operator's act of a coupling
     kDisengage,  ///< … and its end
+    kSetScale,   ///< of a coupling: `scales`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
   std::uint32_t source = 0;
+  std::array<double, 2> scales{};  ///< of positions and of forces
 };
 
 /// What the other end of a coupling has told.

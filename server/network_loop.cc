@@ -484,6 +484,7 @@ void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) 
 void NetworkLoop::publish_port(LocalTime now, std::uint32_t device) {
   const PortState* const port = devices_[device].mail->port_out.take();
   if (port == nullptr) return;
+  devices_[device].phase = port->phase;
   for (const Dialled& dialled : dialled_) {
     if (dialled.device == device) dialled.peer->send(now, *port);
   }

@@ -157,6 +157,14 @@ Coupling::Coupling(const Config& config)
       estimator_.emplace(config.surface);
     }
   }
+  if (config.absolute) {
+    const bool springs = config.method == CouplingMethod::kPositionPosition ||
+                         config.method == CouplingMethod::kPositionForce || config.method == CouplingMethod::kSurface;
+    expect(springs, "absolute", 1, "none: this method has no absolute places");
+    expect(!config.clutch, "clutch", 1, "none: an absolute map has no offset that it could change");
+    expect_above_zero(config.absolute->within, "absolute.within");
+    expect_not_negative(config.absolute->energy, "absolute.energy");
+  }
   const auto refuse_of = [&](bool there, const char* field, PortRole only) {
     expect(!there || config.role == only, field, 1,
            only == PortRole::kLeader ? "none: only a leader has one" : "none: only a follower has one");
@@ -222,6 +230,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
       return;
     }
   }
+  take_scales(peer);
   // It refuses none of those that are left: either all of a state is taken or nothing.
   spring_.receive({.epoch = peer.epoch,
                    .sequence = peer.sequence,
@@ -304,20 +313,78 @@ void Coupling::leave(PortPhase to) noexcept {
 
 bool Coupling::engage() noexcept {
   if (!leads()) return false;
-  if (in_act()) return true;
+  if (in_act() || phase_ == PortPhase::kAligning) return true;
   if (phase_ != PortPhase::kCoupled || !fresh_ || !ready_ || !peer_is_ready()) return false;
+  if (!config_.absolute) {
+    act();
+    return true;
+  }
+  leave(PortPhase::kAligning);
+  aligning_since_ = apart_at_ = now_;
+  guide_.reset();
+  taken_ += config_.absolute->energy;
+  return true;
+}
+
+void Coupling::act() noexcept {
   leave(PortPhase::kEngaged);
   ++engagement_;
   act_sequence_ = sequence_ + 1;
   acted_at_ = now_;
-  u_.setZero();
+  if (!config_.absolute) u_.setZero();
   if (renderer_) renderer_.emplace();
   if (wave_) wave_->forgive();
-  return true;
 }
 
 void Coupling::disengage() noexcept {
-  if (in_act()) leave(PortPhase::kCoupled);
+  if (in_act() || phase_ == PortPhase::kAligning) leave(PortPhase::kCoupled);
+}
+
+bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
+  const bool bound = phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || wave_;
+  if (!leads() || bound || !fits(position_scale, 0.01, 100) || !fits(force_scale, 0.01, 100)) return false;
+  if (!config_.absolute) u_ *= map_.position_scale() / position_scale;
+  rescale(position_scale, force_scale);
+  scaled_ = true;
+  return true;
+}
+
+void Coupling::rescale(double position_scale, double force_scale) noexcept {
+  const double joule = map_.leader_joule();
+  map_ = map_.scaled(position_scale, force_scale);
+  rescaled_ = true;
+  if (renderer_) renderer_.emplace();
+  if (!leads()) {
+    const auto at_follower = [this](double at_leader) { return map_.stiffness_at_follower(at_leader); };
+    spring_.become(at_follower(config_.spring.stiffness), at_follower(config_.spring.damping),
+                   at_follower(config_.spring.own_damping));
+    // The account is worth no more to the leader than it was.
+    if (map_.leader_joule() > joule) kept_ *= joule / map_.leader_joule();
+  }
+  if (!purse_) return;
+  const double start = config_.purse->start * (leads() ? 1 : map_.follower_joule());
+  purse_->revalue(0, leads() ? map_.leader_joule() : map_.follower_joule(), start);
+}
+
+/// Whether it was made with the scales that are in use here. 0 stands for those of the scene.
+bool Coupling::tells_our_scales(const PortState& peer) const noexcept {
+  const auto told = [](double scale, double of_scene) { return scale > 0 ? scale : of_scene; };
+  return told(peer.position_scale, config_.map.position_scale) == map_.position_scale() &&
+         told(peer.force_scale, config_.map.force_scale) == map_.force_scale();
+}
+
+/// A follower takes the leader's. Energy counts only between two states that both tell the scales in use: between others
+/// nobody knows at which worth it was given.
+void Coupling::take_scales(const PortState& peer) noexcept {
+  if (wave_) return;
+  const bool before = !heard() || tells_our_scales(newest_);
+  if (!leads() && !tells_our_scales(peer)) {
+    const bool told = peer.position_scale > 0 && peer.force_scale > 0;
+    rescale(told ? peer.position_scale : config_.map.position_scale, told ? peer.force_scale : config_.map.force_scale);
+    scaled_ = told;
+  } else if (purse_ && (!before || !tells_our_scales(peer))) {
+    purse_->forgo(0);
+  }
 }
 
 /// The table of phases; see the header.
@@ -333,7 +400,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   if (std::exchange(peer_anew_, false)) {
     seen_ = 0;
     if (!leads()) engagement_ = 0;
-    if (in_act()) leave(PortPhase::kCoupled);
+    disengage();
   }
   if (!ready) {
     leave(PortPhase::kFault);
@@ -347,6 +414,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   }
   // A fault after the loss does not make the peer know of it.
   const bool told = lost_sequence_ == 0 || heard_since(lost_sequence_);
+  if (phase_ == PortPhase::kAligning && gone) phase_ = PortPhase::kAlone;
   if ((phase_ == PortPhase::kAlone || phase_ == PortPhase::kLost) && fresh_ && told) {
     phase_ = PortPhase::kCoupled;
     lost_sequence_ = 0;
@@ -365,10 +433,22 @@ void Coupling::advance_leader(std::uint32_t buttons) noexcept {
     }
   }
   if (config_.engage_by && pressed(*config_.engage_by)) engage();
+  if (phase_ == PortPhase::kAligning) advance_aligning();
   if (!config_.clutch || !in_act()) return;
   if (pressed(config_.clutch->bit)) toggled_ = !toggled_;
   const bool clutched = config_.clutch->toggles ? toggled_ : has(buttons, config_.clutch->bit);
   phase_ = clutched ? PortPhase::kClutched : PortPhase::kEngaged;
+}
+
+/// The handle's newest place is that of the period before.
+void Coupling::advance_aligning() noexcept {
+  const Vec3 apart = coupled(u_) - mapped(newest_.position);
+  if (!(apart.norm() <= config_.absolute->within)) apart_at_ = now_;
+  if (!peer_is_ready() || now_ - aligning_since_ > kAlignWithin) {
+    leave(PortPhase::kCoupled);
+  } else if (now_ - apart_at_ >= kAligned) {
+    act();
+  }
 }
 
 void Coupling::advance_follower() noexcept {
@@ -387,7 +467,7 @@ void Coupling::advance_follower() noexcept {
 bool Coupling::driven() const noexcept { return live() && (!silent_ || (config_.holds_place && !wave_)); }
 
 void Coupling::begin_act() noexcept {
-  u_ = mapped(newest_.position);
+  if (!config_.absolute) u_ = mapped(newest_.position);
   if (estimator_) estimator_.emplace(config_.surface);
   surface_.reset();
   if (wave_) wave_->forgive();
@@ -396,7 +476,9 @@ void Coupling::begin_act() noexcept {
 /// p₀ follows the handle while u stands still, and the other way round.
 void Coupling::place(const Vec3& position) noexcept {
   if (new_act_) begin_act();
-  if (live() && was_live_ && !new_act_) {
+  if (config_.absolute) {
+    u_ = position;
+  } else if (live() && was_live_ && !new_act_) {
     u_ = position - offset_;
   } else {
     offset_ = position - u_;
@@ -435,10 +517,25 @@ Demand<3> Coupling::felt() noexcept {
   return renderer_->command(u_, std::max(payable_ - renderer_->energy(u_), 0.0)).demand;
 }
 
+/// Towards where the follower is: the far end of a spring leaves the handle at kAlignSpeed.
+Demand<3> Coupling::aligning(const Motion& hand) noexcept {
+  const Vec3 there = mapped(newest_.position);
+  if (!guide_) guide_ = coupled(hand.position);
+  const Vec3 left = there - *guide_;
+  const double way = kAlignSpeed * seconds(elapsed_);
+  *guide_ = left.norm() > way ? Vec3(*guide_ + left * (way / left.norm())) : there;
+  Vec3 force = config_.spring.stiffness * (*guide_ - coupled(hand.position)) -
+               config_.spring.own_damping * coupled(hand.velocity);
+  const double most = std::min(kAlignForce, config_.spring.max_force);
+  if (force.stableNorm() > most) force *= most / force.stableNorm();
+  return {force};
+}
+
 /// The law as far as its ramp has come, and the place of a robot as far as it has not. No network is between a robot
 /// and its place, so that spring has its whole stiffness.
 Demand<3> Coupling::blended(const Motion& hand) noexcept {
   Demand<3> demand = law(hand.velocity);
+  if (phase_ == PortPhase::kAligning) return aligning(hand);
   demand.force *= gain_;
   demand.stiffness *= gain_;
   if (!place_) return demand;
@@ -458,6 +555,7 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   place(hand.position);
   u_velocity_ = live() ? hand.velocity : Vec3(Vec3::Zero());
 
+  const bool aligns = phase_ == PortPhase::kAligning;
   const bool turned = driven() != was_driven_ || new_act_;
   const bool ended = !driven() || (was_driven_ && new_act_);
   was_driven_ = driven();
@@ -471,9 +569,11 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   }
 
   Demand<3> demand = blended(hand);
-  fade_ = turned ? 1 : std::max(0.0, fade_ - seconds(elapsed_) / seconds(kFade));
+  const bool stepped = turned || std::exchange(rescaled_, false) || aligns != was_aligning_;
+  was_aligning_ = aligns;
+  fade_ = stepped ? 1 : std::max(0.0, fade_ - seconds(elapsed_) / seconds(kFade));
   if (phase_ == PortPhase::kFault) fade_ = 0;
-  if (turned) left_ = last_ - demand.force;
+  if (stepped) left_ = last_ - demand.force;
   if (fade_ > 0) demand.force = bounded(demand.force + fade_ * left_);
   last_ = demand.force;
   return demand;
@@ -505,6 +605,7 @@ void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
 Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
   loss_ = loss;
   Purse::Settlement settlement{.credit = std::exchange(taken_, 0), .withdraw = std::exchange(given_, 0)};
+  settlement.withdraw += (1 - std::exchange(kept_, 1)) * std::max(payable, 0.0);
   if (!purse_) return settlement;
   const bool giving = live() && !silent_ && newest_.phase == PortPhase::kEngaged;
   const double left = payable + settlement.credit - settlement.withdraw;
@@ -535,6 +636,10 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
     surface_ = {.normal = found.normal, .offset = found.offset, .stiffness = found.stiffness};
   }
   state.surface = surface_;
+  if (scaled_) {
+    state.position_scale = map_.position_scale();
+    state.force_scale = map_.force_scale();
+  }
   if (wave_) {
     state.wave_integral = sent_wave_.integral;
     state.wave_energy = sent_wave_.energy;

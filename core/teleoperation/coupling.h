@@ -38,6 +38,9 @@ namespace tendon {
 /// **Phases** (PortPhase), `ready` = the device is seen, armed and without fault:
 ///
 ///     alone    → coupled   the peer is fresh;  coupled → alone   it is silent for as long as the last rung says
+///     coupled  → aligning  leader, of an absolute map: the act, while ready and so on, as below
+///     aligning → engaged   leader: the handle was within `within` of the follower's place for kAligned
+///     aligning → coupled   disengage(), the peer is not ready or starts anew, or after kAlignWithin
 ///     coupled  → engaged   leader: the act (engage(), or its button pressed), while ready and the peer is coupled,
 ///                          engaged or clutched, and fresh. follower: ready, the peer fresh, and engaged or clutched by
 ///                          an act that is newer than any that the follower has heard of, in any phase, and that was
@@ -56,6 +59,17 @@ namespace tendon {
 /// The force of a port that becomes live is multiplied by a ramp 0 → 1 within `ramp`. Whenever what makes the force
 /// changes, what the force was before is faded out within kFade: no act, clutch, loss or takeover makes a step. A fault
 /// ends the force at once. (So does the limiter, when it has to.) Periods without a position lower the ramp as fast.
+///
+/// **Absolute maps** (Config::absolute): u = p at both ends, p_f = s_x R p_l, and no clutch. The act is aligning first:
+/// the leader is drawn to where the follower is, by its spring whose far end moves at kAlignSpeed, with at most kAlignForce,
+/// while the follower stands still. A limiter lets it draw with what the hand has put in; `energy` (J) is paid into the
+/// account at each act beside that, so that the port's promise is L ≥ −energy · acts. 0: the hand brings the handle there.
+/// What is left of the distance when it engages is drawn together as the ramp rises.
+///
+/// **Scales that change** (set_scale): the leader's u is stretched by the old s_x over the new, so that its mapped place
+/// stays where it is, and its states tell the new scales. The follower takes them from the first state that tells them.
+/// The force that this changes fades from the old to the new within kFade. Purse says what becomes of energy: in the
+/// leader's joules of each moment, the pair gives out nothing. Method waves keeps its scales.
 ///
 /// **Ladder.** Age: how long ago the newest state came. v = max(3 periods of the peer, 20 ms, twice the longest gap
 /// of at most kMostGap between two newer states lately):
@@ -111,6 +125,17 @@ class Coupling {
     bool toggles = false;   ///< else: as long as it is held
   };
 
+  static constexpr Duration kAligned = std::chrono::milliseconds(200);
+  static constexpr Duration kAlignWithin = std::chrono::seconds(5);
+  static constexpr double kAlignSpeed = 0.05;  ///< m/s
+  static constexpr double kAlignForce = 1;     ///< N
+
+  /// A place of the leader is a place of the follower.
+  struct Absolute {
+    double within = 0.02;  ///< m, at the leader: near enough to engage; > 0
+    double energy = 0;     ///< J, of the leader: paid into the account at each act; ≥ 0
+  };
+
   struct Config {
     PortRole role = PortRole::kLeader;
     CouplingMethod method = CouplingMethod::kPositionPosition;
@@ -123,6 +148,8 @@ class Coupling {
     /// Of method surface; in the follower's scale, and used there only.
     SurfaceEstimator<3>::Config surface{
         .contact_force = 0.1, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 300};
+    /// Of position-position, position-force and surface; not with a clutch. Empty: places count from where each end was.
+    std::optional<Absolute> absolute{};
     std::optional<Button> clutch{};            ///< leader only
     std::optional<std::uint32_t> engage_by{};  ///< leader: bit of the button whose press is the act; empty: engage()
     Duration ramp = std::chrono::milliseconds(300);       ///< > 0
@@ -140,6 +167,10 @@ class Coupling {
   bool engage() noexcept;
   /// Either end.
   void disengage() noexcept;
+
+  /// The scales from now on, leader only, 0.01 … 100. False, and nothing happens, while it is engaged or aligning, with
+  /// waves, at a follower, and for a scale out of its bounds.
+  bool set_scale(double position_scale, double force_scale) noexcept;
 
   /// The interval that has just ended, and the account after it was booked, J (SharesAccount::payable; +∞ for a port
   /// without a limiter). Not when the interval was not seen.
@@ -160,7 +191,9 @@ class Coupling {
   bool live() const noexcept;
   double stiffness() const noexcept;  ///< in use at this end, N/m: K, of waves B/d, of surface that of the model
   Duration round_trip() const noexcept { return spring_.round_trip(); }
-  double account() const noexcept;         ///< J; 0 without a purse
+  double account() const noexcept;                                          ///< J; 0 without a purse
+  double position_scale() const noexcept { return map_.position_scale(); }  ///< in use
+  double force_scale() const noexcept { return map_.force_scale(); }
   bool contact_measured() const noexcept;  ///< the peer's newest state has a contact force
   std::uint64_t refused() const noexcept;  ///< states
 
@@ -176,6 +209,12 @@ class Coupling {
   void advance(LocalTime now, std::uint32_t buttons, bool ready) noexcept;
   void advance_leader(std::uint32_t buttons) noexcept;
   void advance_follower() noexcept;
+  void advance_aligning() noexcept;
+  void act() noexcept;
+  void rescale(double position_scale, double force_scale) noexcept;
+  void take_scales(const PortState& peer) noexcept;
+  bool tells_our_scales(const PortState& peer) const noexcept;
+  Demand<3> aligning(const Motion& hand) noexcept;
   void leave(PortPhase to) noexcept;
   void place(const Vec3& position) noexcept;
   void skip() noexcept;
@@ -216,6 +255,12 @@ class Coupling {
   std::uint64_t act_sequence_ = 0;   ///< the first period that tells of our act
   std::uint64_t lost_sequence_ = 0;  ///< the first period that tells of our loss; 0: none, or the peer knows
   LocalTime acted_at_{};
+  LocalTime aligning_since_{};
+  LocalTime apart_at_{};                       ///< when the two were last farther apart than Absolute::within
+  std::optional<Vec3> guide_{};                ///< m: the far end of the spring that aligns
+  bool scaled_ = false;                        ///< set_scale was used: the scales are not those of the scenes
+  bool rescaled_ = false;                      ///< in this period
+  double kept_ = 1;                            ///< of the account, because the scales changed
   std::uint32_t buttons_ = ~std::uint32_t{0};  ///< at first all: a button that was held all along is not pressed
   LocalTime now_{};                            ///< of the newest period
   Duration elapsed_{};                         ///< since the one before
@@ -237,6 +282,7 @@ class Coupling {
   bool new_act_ = false;         ///< follower: this period is the first by its act
   std::optional<Vec3> place_{};  ///< m: where a robot stays
   bool was_driven_ = false;
+  bool was_aligning_ = false;
   double gain_ = 0;           ///< of the law
   double fade_ = 0;           ///< of `left_`
   Vec3 left_ = Vec3::Zero();  ///< N, by which the force was above the present one when what drives it changed

@@ -23,6 +23,13 @@ PoseMap::PoseMap(const Config& config)
   expect(!axes_.isZero(0), "axes", 0, "one axis at least");
 }
 
+PoseMap PoseMap::scaled(double position_scale, double force_scale) const noexcept {
+  PoseMap map = *this;
+  map.position_scale_ = position_scale;
+  map.force_scale_ = force_scale;
+  return map;
+}
+
 Vec3 PoseMap::to_follower(const Vec3& displacement) const noexcept {
   return position_scale_ * (rotation_ * coupled_at_leader(displacement));
 }

@@ -29,6 +29,12 @@ class PoseMap {
   /// Throws std::invalid_argument naming the field, its value and what was expected.
   explicit PoseMap(const Config& config);
 
+  /// The same with other scales, each within its bounds.
+  PoseMap scaled(double position_scale, double force_scale) const noexcept;
+
+  double position_scale() const noexcept { return position_scale_; }
+  double force_scale() const noexcept { return force_scale_; }
+
   Vec3 to_follower(const Vec3& displacement) const noexcept;  ///< m, m/s: s_x R (the coupled part of u_l)
   Vec3 to_leader(const Vec3& displacement) const noexcept;    ///< m, m/s: the coupled part of Rᵀ u_f/s_x
   Vec3 force_to_leader(const Vec3& force) const noexcept;     ///< N: s_f (the coupled part of Rᵀ F_f)

@@ -36,6 +36,13 @@ PositionPosition<N>::PositionPosition(const Config& config) : config_(config), s
 }
 
 template <int N>
+void PositionPosition<N>::become(double stiffness, double damping, double own_damping) noexcept {
+  config_.stiffness = stiffness;
+  config_.damping = damping;
+  config_.own_damping = own_damping;
+}
+
+template <int N>
 void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
   const bool answered = message.answers_epoch == config_.epoch;
   if (!message.position.allFinite() || !message.velocity.allFinite() || message.epoch == 0 || message.sequence == 0 ||

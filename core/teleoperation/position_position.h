@@ -94,6 +94,9 @@ class PositionPosition {
   /// What to send in this period, after `command`.
   PortMotion<N> message() const noexcept;
 
+  /// K, D and B from now on, each in its bounds of Config. K goes there within kSettling.
+  void become(double stiffness, double damping, double own_damping) noexcept;
+
   double stiffness() const noexcept { return stiffness_; }  ///< K in use, N/m
   /// T_loop in use; zero until the other end has answered.
   Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }

@@ -57,6 +57,17 @@ void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
   from.arrived = message.taken;
 }
 
+void Purse::revalue(std::size_t peer, double joule, double start) noexcept {
+  if (peer >= config_.peers) return;
+  config_.joule[peer] = joule;
+  config_.start = start;
+  forgo(peer);
+}
+
+void Purse::forgo(std::size_t peer) noexcept {
+  if (peer < config_.peers) peers_[peer].credited = peers_[peer].heard;
+}
+
 double Purse::take() noexcept {
   double sum = 0;
   for (std::size_t j = 0; j < config_.peers; ++j) {

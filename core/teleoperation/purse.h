@@ -61,6 +61,11 @@ struct PurseMessage {
 /// leader's `joule` is s_f/s_x and the follower's s_x/s_f, each the worth of one of the **peer's** joules here. Then
 /// W_l + (s_f/s_x) W_f stays ≥ 0.
 ///
+/// **Scales that change.** A joule that was given at one worth must not be credited at a higher one, and an account must
+/// not be worth more to a peer than when it was filled. So whoever changes `joule` (revalue) forgoes what is under way
+/// until the peer tells that it knows, and the follower gives up the part of its account by which (s_f/s_x) A has grown:
+/// in the leader's joules no change of scale raises the sum of the accounts.
+///
 /// **Epochs.** A port that starts anew has forgotten what it gave and took; its new purse has an epoch above all that
 /// it had before (a counter that survives, or the time of day at the start: no two machines' are compared). Totals
 /// belong to a pair of epochs. A peer's higher epoch voids both totals of the pair; messages of a lower one, and totals
@@ -100,6 +105,12 @@ class Purse {
 
   /// At any time before settle(); peer < Config::peers, else nothing happens.
   void receive(std::size_t peer, const PurseMessage& message) noexcept;
+
+  /// One joule of the peer is worth `joule` here from now on, and ε is `start`. What it has given and is not credited
+  /// yet is lost, because nobody knows at which worth it was given.
+  void revalue(std::size_t peer, double joule, double start) noexcept;
+  /// The same, of what a message told that the peer made before it knew of that.
+  void forgo(std::size_t peer) noexcept;
 
   /// Once in each period, after the interval was booked and before the force is limited.
   struct Period {

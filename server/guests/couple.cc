@@ -47,6 +47,7 @@ Couple couple_of(const Coupling::Config& config) {
   couple.damping = config.spring.own_damping;
   couple.adapt_to_delay = config.spring.adapt_to_delay;
   couple.purse = config.purse.has_value();
+  couple.absolute = config.absolute.has_value();
   couple.period = config.spring.period;
   return couple;
 }
@@ -77,6 +78,9 @@ std::string first_difference(const Couple& theirs, const Couple& mine) {
   if (theirs.axes != mine.axes) return differ("map.axes", axes(theirs.axes), axes(mine.axes));
   if (theirs.adapt_to_delay != mine.adapt_to_delay) {
     return differ("coupling.adapt_to_delay", name(theirs.adapt_to_delay), name(mine.adapt_to_delay));
+  }
+  if (theirs.absolute != mine.absolute) {
+    return differ("map.absolute", name(theirs.absolute), name(mine.absolute));
   }
   if (theirs.purse != mine.purse) return differ("purse", name(theirs.purse), name(mine.purse));
   return {};

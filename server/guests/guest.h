@@ -103,7 +103,8 @@ struct ServedDevice {
   Mailboxes* mail;
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
-  std::optional<Couple> coupling{};  ///< what our end is like; empty: it is not to be coupled
+  std::optional<Couple> coupling{};     ///< what our end is like; empty: it is not to be coupled
+  PortPhase phase = PortPhase::kAlone;  ///< of our end, as its loop told it last
   Outputs outputs{};
   std::optional<Health> told{};  ///< to observers, last; empty before there was any
   std::uint64_t reports = 0;     ///< told so far

@@ -35,8 +35,8 @@ Outcome set_state_deadband(LocalTime /*now*/, const Asker& asker, const SetState
   return {};
 }
 
-Outcome order(const Asker& asker, std::uint32_t device, HapticOrder::Kind kind, const char* done) {
-  if (!asker.devices[device].mail->orders.try_push({.kind = kind})) return {.code = Code::kBusy};
+Outcome order(const Asker& asker, std::uint32_t device, const HapticOrder& wanted, const char* done) {
+  if (!asker.devices[device].mail->orders.try_push(wanted)) return {.code = Code::kBusy};
   return {.warning = std::string(done) + " by \"" + asker.guest.name + "\""};
 }
 
@@ -44,13 +44,13 @@ Outcome rearm(LocalTime /*now*/, const Asker& asker, const Rearm& wanted) {
   if (asker.guest.coupled && asker.guest.coupled->device == wanted.device) {
     return {.code = Code::kDenied, .detail = "each end of a coupling is armed at its own place"};
   }
-  return order(asker, wanted.device, HapticOrder::Kind::kRearm, "rearmed");
+  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kRearm}, "rearmed");
 }
 
 Outcome disarm(LocalTime /*now*/, const Asker& asker, const Disarm& wanted) {
   ServedDevice& device = asker.devices[wanted.device];
   if (device.outputs.turn_off_all()) device.mail->outputs.put(device.outputs.settings());
-  return order(asker, wanted.device, HapticOrder::Kind::kDisarm, "disarmed");
+  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kDisarm}, "disarmed");
 }
 
 Outcome describe(LocalTime /*now*/, const Asker& asker, const Describe& wanted) {
@@ -108,24 +108,40 @@ Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   return {.warning = "coupled with \"" + asker.guest.name + "\""};
 }
 
+/// Why the device is not the leader of a coupling, which `does` what was asked for; empty when it is.
+std::string no_leader(const ServedDevice& device, const char* does) {
+  if (!device.coupling) return "this device has no [teleoperation]";
+  if (device.coupling->role == PortRole::kLeader) return {};
+  return std::string("this device is the follower: the leader ") + does;
+}
+
 Outcome engage(LocalTime /*now*/, const Asker& asker, const Engage& wanted) {
-  const auto& coupling = asker.devices[wanted.device].coupling;
-  if (!coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
-  if (coupling->role != PortRole::kLeader) {
-    return {.code = Code::kUnsupported, .detail = "this device is the follower: the leader engages"};
-  }
-  return order(asker, wanted.device, HapticOrder::Kind::kEngage, "told to engage");
+  std::string objection = no_leader(asker.devices[wanted.device], "engages");
+  if (!objection.empty()) return {.code = Code::kUnsupported, .detail = std::move(objection)};
+  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kEngage}, "told to engage");
 }
 
 Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted) {
   if (!asker.devices[wanted.device].coupling) {
     return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
   }
-  return order(asker, wanted.device, HapticOrder::Kind::kDisengage, "told to disengage");
+  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kDisengage}, "told to disengage");
 }
 
-Outcome set_scale(LocalTime /*now*/, const Asker& /*asker*/, const SetScale& /*wanted*/) {
-  return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+/// A change of scale would move what is engaged.
+Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted) {
+  const ServedDevice& device = asker.devices[wanted.device];
+  std::string objection = no_leader(device, "sets the scales");
+  if (!objection.empty()) return {.code = Code::kUnsupported, .detail = std::move(objection)};
+  if (device.coupling->method == CouplingMethod::kWaves) {
+    return {.code = Code::kUnsupported, .detail = "a coupling by waves keeps the scales of its scene"};
+  }
+  if (device.phase == PortPhase::kEngaged || device.phase == PortPhase::kAligning) {
+    return {.code = Code::kBusy, .detail = "it is engaged: hold the clutch, or disengage it"};
+  }
+  return order(asker, wanted.device,
+               {.kind = HapticOrder::Kind::kSetScale, .scales = {wanted.position_scale, wanted.force_scale}},
+               "told to change its scales");
 }
 
 Outcome set_share(LocalTime /*now*/, const Asker& /*asker*/, const SetShare& /*wanted*/) {

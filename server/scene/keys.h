@@ -69,6 +69,9 @@ struct Draft {
   Coupling::Config coupling;             ///< of [teleoperation], when there is one
   Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
   std::optional<double> coupling_force;  ///< N
+  bool absolute_map = false;
+  std::optional<double> align_within;  ///< m
+  double align_energy = 0;             ///< J
   bool engages_by_button = false;
   std::optional<std::uint32_t> engage_button;
   std::vector<Vec3> places;

@@ -354,6 +354,7 @@ class SceneResolver {
                   : "expected \"request\": the leader engages");
     }
     coupling.engage_by = draft_.engage_button;
+    resolve_absolute(coupling, leads);
     coupling.map.rotation = rotation_by(draft_.map_rotation);
     coupling.spring.period = draft_.scene.loop.period;
     coupling.spring.max_force = draft_.coupling_force.value_or(control.max_force);
@@ -380,6 +381,33 @@ class SceneResolver {
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;
+  }
+
+  void resolve_absolute(Coupling::Config& coupling, bool leads) const {
+    if (draft_.absolute_map) {
+      coupling.absolute = Coupling::Absolute{.energy = draft_.align_energy};
+      if (draft_.align_within) coupling.absolute->within = *draft_.align_within;
+    }
+    const bool aligns = leads && draft_.absolute_map;
+    if (draft_.align_within && !aligns) {
+      blame("teleoperation.engage.within_mm", {},
+            "expected none but of a leader with map.absolute: only that one aligns");
+    }
+    if (draft_.align_energy > 0 && !(aligns && coupling.purse)) {
+      blame("teleoperation.engage.align_energy_mj", {},
+            "expected 0 but of a leader with map.absolute and a purse, whose account it is paid into");
+    }
+    if (draft_.absolute_map && coupling.clutch) {
+      blame("teleoperation.clutch", {"teleoperation.map.absolute"},
+            "expected none with map.absolute: a clutch changes an offset, and there is none");
+    }
+    const bool springs = coupling.method == CouplingMethod::kPositionPosition ||
+                         coupling.method == CouplingMethod::kPositionForce ||
+                         coupling.method == CouplingMethod::kSurface;
+    if (draft_.absolute_map && !springs) {
+      blame("teleoperation.map.absolute", {"teleoperation.method"},
+            "expected the method position-position, position-force or surface: the others have no absolute places");
+    }
   }
 
   /// Motors that turn the handle, and the motor of its gripper, have bounds of their own. A scene has to have them when

@@ -52,6 +52,10 @@ void declare_map(Table& keys, Draft& draft) {
            "rotation vector that turns the leader's base frame into the follower's: about this axis by its length");
   keys.key("axes", map.axes, CoupledAxes{},
            "the axes of the leader's base frame that are coupled; the others are free");
+  keys.key(
+      "absolute", draft.absolute_map, YesNo{},
+      "a place of the leader is a place of the follower, position_scale times as far from the origins of their base "
+      "frames: the act aligns the two first. Otherwise places count from where each was at the act");
 }
 
 template <class Table>
@@ -118,6 +122,13 @@ void declare_teleoperation(Table& scene, Draft& draft) {
       engage.key("button", draft.engage_button, Count{31}, "for \"button\": its number",
                  Absent{.text = "required with \"button\""});
       engage.key("ramp_ms", coupling.ramp, kAboveZero, "the force rises from zero for this long");
+      engage.key("within_mm", draft.align_within, kAboveZero,
+                 "of a leader with map.absolute: so near to the follower's place it engages, once it was for 0.2 s",
+                 Absent{.text = "20"});
+      engage.key(
+          "align_energy_mj", draft.align_energy, Number{.least = 0, .most = 1e6},
+          "of a leader with map.absolute: what its motor may put in by itself at each act, to draw the handle there; "
+          "the port gives out so much at most. 0: the hand brings it there");
     });
   });
 }

@@ -49,7 +49,7 @@ coupling_mutant(clutch-loses-its-offset "if (live() && was_live_ && !new_act_)" 
 # The force is whole at once.
 coupling_mutant(no-ramp "if (turned || !driven()) gain_ = 0" "if (turned || !driven()) gain_ = driven() ? 1 : 0" "ramp")
 # The force ends with a step.
-coupling_mutant(no-fade "fade_ = turned ? 1 :" "fade_ = turned ? 0 :" "step")
+coupling_mutant(no-fade "fade_ = stepped ? 1 :" "fade_ = stepped ? 0 :" "step")
 # A joule of the leader is taken for one of the follower.
 coupling_mutant(joule-of-the-wrong-end "? map.leader_joule() : map.follower_joule()"
   "? map.follower_joule() : map.leader_joule()" "pair")

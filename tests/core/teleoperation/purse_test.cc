@@ -112,6 +112,20 @@ TEST(Purse, AJouleOfThePeerIsWorthWhatTheScalesSay) {
   EXPECT_EQ(leader.message(0).taken, 0.004) << "totals are told as they were heard";
 }
 
+/// A joule that was given at one worth would else be credited at another.
+TEST(Purse, AChangeOfWorthForgoesWhatIsUnderWay) {
+  Purse purse({.max_power = 100, .max_account = 100});
+  purse.receive(0, from_peer(1, 1, 1, 2));
+  purse.revalue(0, 10, 1e-3);
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0) << "given when it was worth 1 J";
+  EXPECT_EQ(purse.need(), 1e-3);
+  purse.receive(0, from_peer(2, 1, 1, 2.5));
+  purse.forgo(0);
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0) << "the peer did not know yet";
+  purse.receive(0, from_peer(3, 1, 1, 3));
+  EXPECT_DOUBLE_EQ(purse.settle(period_of(0, 0)).credit, 5) << "half a joule of it";
+}
+
 TEST(Purse, ATotalIsCountedOnceHoweverOftenItComes) {
   Purse purse({});
   purse.receive(0, from_peer(2, 0, 0, 0.02));

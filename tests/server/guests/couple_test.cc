@@ -97,7 +97,10 @@ class Coupled : public testing::Test {
  protected:
   void place(const std::vector<std::string>& leader = {}, const std::vector<std::string>& follower = {}) {
     follower_ = std::make_unique<Place>(wire_, scene_of("follower.toml", follower), ++epoch_, now_);
-    leader_ = std::make_unique<Place>(wire_, scene_of("leader.toml", leader), ++epoch_, now_);
+    std::string text = text_of("leader.toml");
+    if (without_clutch_)
+      text.erase(text.find("[teleoperation.clutch]"), std::string("[teleoperation.clutch]\nbutton = 1\n").size());
+    leader_ = std::make_unique<Place>(wire_, parse_scene(text, "leader.toml", ".", leader), ++epoch_, now_);
   }
 
   struct Under {
@@ -139,6 +142,7 @@ class Coupled : public testing::Test {
   double jitter_ms_ = 0;
   double loss_ = 0;
   bool cut_ = false;
+  bool without_clutch_ = false;  ///< of the leader
   Dice dice_{7};
   std::uint64_t epoch_ = 0;
   std::unique_ptr<Place> leader_;
@@ -198,6 +202,47 @@ TEST_F(Coupled, ACutNetworkIsLostAndOnlyAnActCouplesAgain) {
   EXPECT_GE(follower_->least_energy, -1e-9);
 }
 
+TEST_F(Coupled, BothEndsTakeNewScalesWhileTheClutchIsHeld) {
+  place();
+  run(seconds(2));
+  ASSERT_EQ(follower_->phase(), PortPhase::kEngaged);
+  const HapticOrder order{.kind = HapticOrder::Kind::kSetScale, .scales = {0.25, 2}};
+  leader_->mail->orders.try_push(order);
+  run(milliseconds(50));
+  EXPECT_EQ(follower_->newest.sent.position_scale, 0) << "it is engaged: nothing changes";
+  run(milliseconds(4200));  // its hand holds the clutch from 6 s on
+  ASSERT_EQ(leader_->phase(), PortPhase::kClutched);
+  leader_->mail->orders.try_push(order);
+  run(milliseconds(10));
+  EXPECT_EQ(follower_->newest.sent.position_scale, 0.25);
+  EXPECT_EQ(follower_->newest.sent.force_scale, 2);
+  run(milliseconds(900));
+  ASSERT_EQ(leader_->phase(), PortPhase::kEngaged);
+  const Vec3 from = leader_->position;
+  const Vec3 before = follower_->position;
+  run(milliseconds(500));
+  const Vec3 moved = 0.25 * (leader_->position - from);
+  EXPECT_GT(moved.norm(), 1e-3);
+  EXPECT_LT((follower_->position - before - moved).norm(), 0.3 * moved.norm());
+  EXPECT_GE(leader_->least_energy, -1e-9);
+  EXPECT_GE(follower_->least_energy, -1e-9);
+}
+
+/// The leader's hand moves about a place 15 mm from the follower's, which its swing passes.
+TEST_F(Coupled, AnAbsoluteMapEngagesWhereTheTwoMeet) {
+  const std::vector<std::string> absolute = {"teleoperation.map.absolute=true"};
+  std::vector<std::string> of_leader = absolute;
+  of_leader.push_back("teleoperation.engage.within_mm=8");
+  without_clutch_ = true;
+  place(of_leader, absolute);
+  bool aligned = false;
+  run(seconds(4), [&] { aligned = aligned || leader_->phase() == PortPhase::kAligning; });
+  EXPECT_TRUE(aligned);
+  EXPECT_EQ(leader_->phase(), PortPhase::kEngaged);
+  EXPECT_EQ(follower_->phase(), PortPhase::kEngaged);
+  EXPECT_LT((leader_->position - follower_->position).norm(), 6e-3) << "the places are each other's";
+}
+
 TEST_F(Coupled, AServerThatWasKilledIsFoundAgainAndWaitsForAnAct) {
   place();
   run(seconds(2));
@@ -240,6 +285,7 @@ TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
        [](Couple& c) { c.rotation = {.w = 0, .x = 0, .y = 0, .z = 1}; }},
       {"map.axes: yours xz, mine xyz", [](Couple& c) { c.axes = 5; }},
       {"coupling.adapt_to_delay: yours false, mine true", [](Couple& c) { c.adapt_to_delay = false; }},
+      {"map.absolute: yours true, mine false", [](Couple& c) { c.absolute = true; }},
       {"purse: yours false, mine true", [](Couple& c) { c.purse = false; }}};
   for (const auto& [words, change] : cases) {
     Couple other = theirs;

@@ -124,6 +124,31 @@ TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
             "waves");
 }
 
+TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
+  const Scene scene = minimal_and(kLeader +
+                                  "[teleoperation.map]\nabsolute = true\n[teleoperation.engage]\n"
+                                  "within_mm = 8\nalign_energy_mj = 15\n");
+  EXPECT_EQ(scene.loop.control.coupling->absolute->within, 0.008);
+  EXPECT_EQ(scene.loop.control.coupling->absolute->energy, 0.015);
+  EXPECT_FALSE(minimal_and(kLeader).loop.control.coupling->absolute);
+  EXPECT_EQ(error_of_minimal_and(kLeader + "[teleoperation.engage]\nwithin_mm = 8\n"),
+            "s.toml:11: teleoperation.engage.within_mm: expected none but of a leader with map.absolute: only that one "
+            "aligns");
+  EXPECT_EQ(
+      error_of_minimal_and(kLeader + "[teleoperation.engage]\nalign_energy_mj = 8\n"),
+      "s.toml:11: teleoperation.engage.align_energy_mj: expected 0 but of a leader with map.absolute and a purse, "
+      "whose account it is paid into");
+  EXPECT_EQ(
+      error_of_minimal_and(kLeader + "[teleoperation.map]\nabsolute = true\n[teleoperation.clutch]\nbutton = 1\n"),
+      "s.toml:12: teleoperation.clutch: expected none with map.absolute: a clutch changes an offset, and there is "
+      "none");
+  EXPECT_EQ(
+      error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
+                           "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.map]\nabsolute = true\n"),
+      "s.toml:9: teleoperation.map.absolute: expected the method position-position, position-force or surface: "
+      "the others have no absolute places");
+}
+
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
   EXPECT_EQ(

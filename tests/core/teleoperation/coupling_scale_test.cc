@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Scales that change between clutches: who may change them, what moves, and what that does to the energy of the pair.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <string>
+
+#include "tests/core/teleoperation/ports.h"
+#include "tests/support/dice.h"
+
+namespace tendon {
+namespace {
+
+constexpr double kTurn = 6.283185307179586;
+
+/// A hand that holds the handle and leads it along x.
+PortSetup led(std::function<double(double)> along_x) {
+  PortSetup leader = port_of(PortRole::kLeader);
+  leader.coupling.clutch = Coupling::Button{.bit = 0};
+  for (Surroundings& axis : leader.around) axis = {.stiffness = 300, .damping = 3};
+  leader.around[0].reference = std::move(along_x);
+  return leader;
+}
+
+TEST(CouplingScale, IsSetByALeaderThatIsNotEngagedAndByNobodyElse) {
+  Ports ports(led([](double) { return 0.0; }), port_of(PortRole::kFollower));
+  EXPECT_FALSE(ports.follower.coupling->set_scale(2, 1)) << "the follower takes the leader's";
+  EXPECT_TRUE(ports.leader.coupling->set_scale(2, 1)) << "alone";
+  EXPECT_FALSE(ports.leader.coupling->set_scale(0.0099, 1));
+  EXPECT_FALSE(ports.leader.coupling->set_scale(1, 100.1));
+  EXPECT_FALSE(ports.leader.coupling->set_scale(1, std::nan("")));
+  ASSERT_TRUE(ports.engage());
+  EXPECT_EQ(ports.follower.coupling->position_scale(), 2);
+  EXPECT_FALSE(ports.leader.coupling->set_scale(1, 1)) << "engaged";
+  ports.leader.buttons = 1;
+  ports.run(1);
+  EXPECT_TRUE(ports.leader.coupling->set_scale(0.5, 4)) << "clutched";
+  ports.run(2);
+  EXPECT_EQ(ports.follower.coupling->position_scale(), 0.5);
+  EXPECT_EQ(ports.follower.coupling->force_scale(), 4);
+
+  PortSetup waves = led([](double) { return 0.0; });
+  waves.coupling.method = CouplingMethod::kWaves;
+  EXPECT_FALSE(Coupling(waves.coupling).set_scale(2, 1)) << "sums of waves have one scale";
+}
+
+/// 0.1 → 10 while the clutch is held in the open: nothing moves, and then the follower goes ten times as far.
+TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
+  PortSetup leader = led([](double t) { return t < 2 ? 5e-3 * t : 0.01 + 1e-3 * std::min(t - 2, 2.0); });
+  PortSetup follower = port_of(PortRole::kFollower);
+  leader.coupling.map.position_scale = follower.coupling.map.position_scale = 0.1;
+  Ports ports(leader, follower, {.delay = 10, .seed = 1}, {.delay = 10, .seed = 2});
+  ASSERT_TRUE(ports.engage());
+  ports.run(2000 - ports.now + 900);
+  const double tenth = ports.follower.x().x();
+  EXPECT_NEAR(tenth, 1e-3, 2e-4) << "a tenth of what the hand went";
+  ports.leader.buttons = 1;
+  ports.run(30);
+  Vec3 at = ports.follower.x();
+  Vec3 force = ports.follower.applied;
+  double moved = 0;
+  double step = 0;
+  ASSERT_TRUE(ports.leader.coupling->set_scale(10, 1));
+  const auto look = [&](int) {
+    moved = std::max(moved, (ports.follower.x() - at).norm());
+    step = std::max(step, (ports.follower.applied - force).norm());
+    force = ports.follower.applied;
+  };
+  ports.run(200, look);
+  EXPECT_LT(moved, 40e-6) << "two counts of 20 µm";
+  EXPECT_LT(step, 0.02) << "f_c";
+  const double hand = ports.leader.x().x();
+  const double tool = ports.follower.x().x();
+  ports.leader.buttons = 0;
+  ports.run(2000);
+  const double led_by = ports.leader.x().x() - hand;
+  EXPECT_GT(led_by, 3e-4);
+  EXPECT_NEAR(ports.follower.x().x() - tool, 10 * led_by, 2e-3 + 0.1 * 10 * led_by);
+  EXPECT_GE(ports.least_account(), kRounding);
+}
+
+/// A robot that presses while its leader is clutched has another spring afterwards: its force goes there, it does not jump.
+TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
+  PortSetup leader = led([](double t) { return t < 0.5 ? 0 : 0.02; });
+  PortSetup follower = port_of(PortRole::kFollower);
+  follower.around[0] = {.stiffness = 2000, .reference = [](double) { return 0.005; }, .wall = true};
+  Ports ports(leader, follower, {.delay = 5, .seed = 1}, {.delay = 5, .seed = 2});
+  ASSERT_TRUE(ports.engage());
+  ports.run(1500);
+  ports.leader.buttons = 1;
+  ports.run(200);
+  const double pressed = ports.follower.demand.force.norm();
+  ASSERT_GT(pressed, 0.5);
+  ASSERT_TRUE(ports.leader.coupling->set_scale(1, 4));
+  Vec3 force = ports.follower.demand.force;
+  double step = 0;
+  ports.run(1500, [&](int) {
+    step = std::max(step, (ports.follower.demand.force - force).norm());
+    force = ports.follower.demand.force;
+  });
+  EXPECT_LT(step, 0.04 * pressed) << "within 50 ms: at most 2 % of it in each";
+  EXPECT_LT(force.norm(), 0.7 * pressed) << "a quarter of the stiffness";
+  EXPECT_GE(ports.least_account(), kRounding);
+}
+
+/// So does that of a robot that holds its place while nothing is engaged: it has no law that settles by itself.
+TEST(CouplingScale, ARobotThatHoldsItsPlaceIsNotJolted) {
+  PortSetup follower = port_of(PortRole::kFollower);
+  follower.coupling.holds_place = true;
+  Ports ports(led([](double) { return 0.0; }), follower);
+  ports.run(100);
+  ports.follower.setup.path = [](double) { return Vec3(2e-3, 0, 0); };  // something holds it beside its place
+  ports.run(200);
+  Vec3 force = ports.follower.demand.force;
+  const double held = force.norm();
+  ASSERT_GT(held, 0.5);
+  ASSERT_TRUE(ports.leader.coupling->set_scale(1, 4));
+  double step = 0;
+  ports.run(200, [&](int) {
+    step = std::max(step, (ports.follower.demand.force - force).norm());
+    force = ports.follower.demand.force;
+  });
+  EXPECT_LT(step, 0.04 * held);
+  EXPECT_NEAR(force.norm(), held / 4, 0.05 * held);
+}
+
+/// The energy of the pair in the leader's joules, each of the follower's at its worth of that moment.
+double least_sum(std::uint64_t seed, double& given) {
+  Dice dice(seed);
+  PortSetup leader = port_of(PortRole::kLeader);
+  PortSetup follower = port_of(PortRole::kFollower);
+  leader.coupling.clutch = Coupling::Button{.bit = 0};
+  for (PortSetup* const setup : {&leader, &follower}) {
+    const double size = dice.decades(-3, -1.5);
+    const double often = dice.decades(0.5, 1.5);
+    const double late = dice.within(0, 6);
+    setup->path = [=](double t) { return Vec3(size * std::sin(often * t + late), 0, 0); };
+  }
+  const auto network = [&] {
+    return Network{.delay = static_cast<int>(dice.decades(0, 1.7)),
+                   .jitter = static_cast<int>(dice.decades(0, 1.3)),
+                   .loss = dice.within(0, 0.5),
+                   .seed = dice.bits()};
+  };
+  const Network there = network();
+  Ports ports(leader, follower, there, network());
+  for (int attempt = 0; attempt < 10 && !ports.engage(); ++attempt) continue;
+  EXPECT_TRUE(ports.leader.coupling->live()) << "seed " << seed;
+  double led = ports.leader.truth.energy();
+  double followed = ports.follower.truth.energy();
+  double sum = led + followed;
+  double least = 0;
+  double worth = 1;
+  ports.run(4000, [&](int) {
+    if (dice.chance(0.01)) ports.leader.buttons ^= 1U;
+    if (dice.chance(0.02)) ports.leader.coupling->set_scale(dice.decades(-1, 1), dice.decades(-1, 1));
+    sum += ports.leader.truth.energy() - led + worth * (ports.follower.truth.energy() - followed);
+    led = ports.leader.truth.energy();
+    followed = ports.follower.truth.energy();
+    least = std::min(least, sum);
+    // From the interval that begins now.
+    worth = ports.follower.coupling->force_scale() / ports.follower.coupling->position_scale();
+    given += ports.leader.paid + ports.follower.paid;
+  });
+  EXPECT_GE(ports.least_account(), kRounding) << "seed " << seed;
+  return least;
+}
+
+TEST(CouplingScale, NoChangeOfScaleMakesEnergyInAHundredDrawnPairs) {
+  double least = 0;
+  double given = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const double sum = least_sum(seed, given);
+    EXPECT_GE(sum, kRounding) << "seed " << seed;
+    least = std::min(least, sum);
+  }
+  EXPECT_GT(given, 1) << "nothing was paid: nothing was tested";
+  std::cout << "least " << least << " J, paid " << given << " J\n";
+}
+
+}  // namespace
+}  // namespace tendon
