@@ -398,14 +398,14 @@ class SceneResolver {
             "expected 0 but of a leader with map.absolute and a purse, whose account it is paid into");
     }
     if (draft_.absolute_map && coupling.clutch) {
-      blame("teleoperation.clutch", {"teleoperation.map.absolute"},
+      blame("teleoperation.clutch", {},
             "expected none with map.absolute: a clutch changes an offset, and there is none");
     }
     const bool springs = coupling.method == CouplingMethod::kPositionPosition ||
                          coupling.method == CouplingMethod::kPositionForce ||
                          coupling.method == CouplingMethod::kSurface;
     if (draft_.absolute_map && !springs) {
-      blame("teleoperation.map.absolute", {"teleoperation.method"},
+      blame("teleoperation.map.absolute", {},
             "expected the method position-position, position-force or surface: the others have no absolute places");
     }
   }
