@@ -145,7 +145,7 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
   EXPECT_EQ(
       error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
                            "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.map]\nabsolute = true\n"),
-      "s.toml:9: teleoperation.map.absolute: expected the method position-position, position-force or surface: "
+      "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force or surface: "
       "the others have no absolute places");
 }
 
