@@ -62,8 +62,9 @@ TEST(Teleoperation, AHandLeadsTheDeviceOfAnotherServerThroughABadNetwork) {
     return high - low;
   };
   EXPECT_GT(spread(hand), 0.01);
-  // The wall behind it is 8 mm away. How far it gets to the other side depends on where the hand was at the act.
-  EXPECT_GT(spread(tool), 0.007) << "it follows";
+  // The wall behind it is 8 mm away. How far it gets to the other side depends on where the hand was at the act, and
+  // on how soft a machine that pauses has made the spring.
+  EXPECT_GT(spread(tool), 0.004) << "it follows";
 }
 
 /// A copy in `folder` of the shipped scene of that role, with that method.
