@@ -148,7 +148,7 @@ void print(Line& line, const Control& control) {
          << couple->damping << std::uint32_t{couple->adapt_to_delay} << std::uint32_t{couple->purse} << couple->period
          << std::uint32_t{couple->absolute} << couple->turn_stiffness << couple->turn_damping << couple->grip_stiffness
          << couple->grip_damping << couple->drift_rate;
-    if (const auto& rate = couple->rate) line << "rate" << rate->dead_zone << rate->gain << rate->max_speed;
+    if (const auto& by = couple->rate) line << "rate" << by->dead_zone << by->gain << by->max_speed;
   } else if (const auto* engage = std::get_if<Engage>(&*control.request)) {
     line << "engage" << engage->device;
   } else if (const auto* disengage = std::get_if<Disengage>(&*control.request)) {

@@ -64,11 +64,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         fuzz::require(!couple->rate || (couple->rate->gain > 0 && couple->rate->max_speed > 0));
       }
       if (const auto* scale = std::get_if<SetScale>(&request->request)) {
-        fuzz::require(scale->position_scale >= 0.01 && scale->position_scale <= 100);
-        fuzz::require(scale->force_scale >= 0.01 && scale->force_scale <= 100);
+        fuzz::require(in_bounds(*scale) && scale->device < limits::kMaxDevices);
       }
       if (const auto* share = std::get_if<SetShare>(&request->request)) {
-        fuzz::require(share->share >= 0 && share->share <= 1 && share->channel < limits::kMaxChannels);
+        fuzz::require(in_bounds(*share) && share->channel < limits::kMaxChannels);
       }
       if (const auto* wanted = std::get_if<SetOutput>(&request->request)) {
         fuzz::require(in_bounds(*wanted) && wanted->device < limits::kMaxDevices);

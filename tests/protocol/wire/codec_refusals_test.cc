@@ -346,6 +346,8 @@ TEST(Codec, AScaleOrAShareOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"NaN share", SetShare{.share = kNan}},
   };
   for (const Bad& bad : cases) expect_left_out(Control{.id = 1, .request = bad.request}, bad.what);
+  EXPECT_TRUE(in_bounds(SetScale{.position_scale = 0.01, .force_scale = 100}));
+  EXPECT_TRUE(in_bounds(SetShare{.share = 0}) && in_bounds(SetShare{.share = 1}));
 }
 
 TEST(Codec, ASettingOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
