@@ -170,8 +170,8 @@ constexpr std::size_t lateness_bucket(Duration late) noexcept {
   return std::min(bucket, limits::kLatenessBuckets - 1);
 }
 
-/// Either way, unreliable: one end of a coupling of two devices, told to the other; and both ends to an observer. For each
-/// device, channel and end the highest sequence of the highest epoch wins. Only between peers that both named
+/// Either way, unreliable: one end of a coupling of two devices, told to the other; and both ends to an observer. For
+/// each device, channel and end the highest sequence of the highest epoch wins. Only between peers that both named
 /// kFeatureTeleoperation.
 struct PortFrame : PortState {
   std::uint32_t device = 0;  ///< of the server of the session, whichever way this goes
@@ -268,8 +268,8 @@ struct LeaseLost {
   std::string to;  ///< name of the one that is; at most 64 bytes
 };
 
-/// Client → server, reliable: my device is the other end of this one, and my end is like this. Only from one that claimed
-/// the channel.
+/// Client → server, reliable: my device is the other end of this one, and my end is like this. Only from one that
+/// claimed the channel.
 struct Couple {
   std::uint32_t device = 0;
   std::uint32_t channel = 0;
@@ -284,7 +284,7 @@ struct Couple {
   double damping = 0;         ///< N·s/m
   bool adapt_to_delay = false;
   bool purse = false;
-  Duration period{};  ///< between two PortStates; travels in whole µs; > 0, at most 10 s
+  Duration period{};          ///< between two PortStates; travels in whole µs; > 0, at most 10 s
   bool absolute = false;      ///< offsets are zero, and the two align first
   double turn_stiffness = 0;  ///< N·m/rad; 0: the orientations are not coupled
   double turn_damping = 0;    ///< N·m·s/rad
@@ -296,8 +296,8 @@ struct Couple {
   bool operator==(const Couple&) const = default;
 };
 
-/// Client → server, reliable: the scales of a coupling from now on, while the leader is not engaged or holds its clutch.
-/// Only from a controller of the leader's device.
+/// Client → server, reliable: the scales of a coupling from now on, while the leader is not engaged or holds its
+/// clutch. Only from a controller of the leader's device.
 struct SetScale {
   std::uint32_t device = 0;
   double position_scale = 1;  ///< follower over leader; 0.01 … 100
@@ -391,8 +391,8 @@ inline constexpr std::string_view kFeatureJoints = "joints";
 /// A feature: the client is told the outputs of the device (lamps, vibration), and may set them.
 inline constexpr std::string_view kFeatureOutputs = "outputs";
 
-/// A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. An observer is
-/// sent those of both ends.
+/// A feature: the client may be the other end of a coupling: it says Couple, and PortStates go both ways. An observer
+/// is sent those of both ends.
 inline constexpr std::string_view kFeatureTeleoperation = "teleoperation";
 
 /// A feature: an observer is told what the engines ask for, and how the loops and the engines do (DeviceReport,

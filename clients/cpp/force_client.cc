@@ -114,6 +114,16 @@ bool ForceClient::engage() { return give_order(Engage{.device = place_.device});
 
 bool ForceClient::disengage() { return give_order(Disengage{.device = place_.device}); }
 
+bool ForceClient::set_scale(double position_scale, double force_scale) {
+  const SetScale wanted{.device = place_.device, .position_scale = position_scale, .force_scale = force_scale};
+  return in_bounds(wanted) && give_order(wanted);
+}
+
+bool ForceClient::set_share(std::uint32_t channel, double share) {
+  const SetShare wanted{.device = place_.device, .channel = channel, .share = share};
+  return channel < limits::kMaxChannels && in_bounds(wanted) && give_order(wanted);
+}
+
 bool ForceClient::set_output(std::uint32_t output, const OutputSetting& setting) {
   const SetOutput wanted{.device = place_.device, .output = output, .setting = setting};
   return welcome_ && agreed_to(kFeatureOutputs) && in_bounds(wanted) && give_order(wanted);

@@ -192,11 +192,17 @@ class ForceClient {
   /// rearm().
   bool engage();
   bool disengage();
+  /// The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held.
+  /// False as for rearm(), and beyond 0.01 … 100.
+  bool set_scale(double position_scale, double force_scale);
+  /// How much the leader of that channel of our device counts among several, at the follower's server: 0 … 1. False as
+  /// for rearm(), and out of bounds.
+  bool set_share(std::uint32_t channel, double share);
   /// Sets a lamp of the device, or starts a pulse of vibration (`handle()->outputs`). For whoever `holds()`. False as
   /// for rearm(), without Config::outputs, when the server does not know kFeatureOutputs, and out of bounds.
   bool set_output(std::uint32_t output, const OutputSetting& setting);
 
-  /// What the server has said to the newest of these five of the present session; empty until then.
+  /// What the server has said to the newest of these seven of the present session; empty until then.
   const std::optional<Session::RequestAnswered>& order_answer() const noexcept { return order_answer_; }
 
   /// Whether the channel takes our forces; while it does not, the callback is not called.

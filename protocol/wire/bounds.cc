@@ -64,6 +64,13 @@ bool in_bounds(const SetOutput& wanted) noexcept {
          (own || (pulse.frequency >= limits::kMinVibrationHz && pulse.frequency <= limits::kMaxVibrationHz));
 }
 
+bool in_bounds(const SetScale& wanted) noexcept {
+  const auto possible = [](double scale) { return scale >= 0.01 && scale <= 100; };
+  return possible(wanted.position_scale) && possible(wanted.force_scale);
+}
+
+bool in_bounds(const SetShare& wanted) noexcept { return wanted.share >= 0 && wanted.share <= 1; }
+
 bool is_finite(const ForceCommand& command) noexcept {
   const auto contact_is_finite = [](const Contact& contact) {
     if (!contact.normal.allFinite() || !std::isfinite(contact.gap)) return false;

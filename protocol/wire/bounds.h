@@ -23,6 +23,10 @@ bool in_bounds(const ForceCommand& command) noexcept;
 /// Whether a receiver accepts that setting; the number of the device is another matter.
 bool in_bounds(const SetOutput& wanted) noexcept;
 
+/// Whether a receiver accepts those scales, and that share; the numbers of device and channel are another matter.
+bool in_bounds(const SetScale& wanted) noexcept;
+bool in_bounds(const SetShare& wanted) noexcept;
+
 /// Whether `command` holds no NaN, and no infinity except as a model's `valid_radius`.
 bool is_finite(const ForceCommand& command) noexcept;
 

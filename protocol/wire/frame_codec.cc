@@ -234,13 +234,11 @@ bool read(const pb::Describe& from, Describe& to) noexcept {
 bool read(const pb::SetScale& from, SetScale& to) noexcept {
   to.position_scale = from.position_scale();
   to.force_scale = from.force_scale();
-  const auto possible = [](double scale) { return scale >= 0.01 && scale <= 100; };
-  return read_device(from.device(), to.device) && possible(to.position_scale) && possible(to.force_scale);
+  return read_device(from.device(), to.device) && in_bounds(to);
 }
 bool read(const pb::SetShare& from, SetShare& to) noexcept {
   to.share = from.share();
-  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) && to.share >= 0 &&
-         to.share <= 1;
+  return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) && in_bounds(to);
 }
 /// A setting of neither kind is refused.
 bool read(const pb::SetOutput& from, SetOutput& to) noexcept {

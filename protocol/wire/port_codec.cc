@@ -168,8 +168,8 @@ bool read(const pb::Couple& from, Couple& to) noexcept {
   const auto sound = [](double value) { return within(value, 0, limits::kMaxValue); };
   return read_device(from.device(), to.device) && read_channel(from.channel(), to.channel) &&
          within(to.position_scale, 0.01, 100) && within(to.force_scale, 0.01, 100) &&
-         read(from.rotation(), to.rotation) && to.axes >= 1 && to.axes <= 7 &&
-         sound(to.stiffness) && sound(to.mutual_damping) && sound(to.damping) && to.period > Duration::zero() &&
+         read(from.rotation(), to.rotation) && to.axes >= 1 && to.axes <= 7 && sound(to.stiffness) &&
+         sound(to.mutual_damping) && sound(to.damping) && to.period > Duration::zero() &&
          to.period <= limits::kMaxValidFor && sound(to.turn_stiffness) && sound(to.turn_damping) &&
          sound(to.grip_stiffness) && sound(to.grip_damping) && sound(to.drift_rate) &&
          read(from.has_rate(), from.rate(), to.rate);

@@ -145,11 +145,18 @@ void print(Line& line, const Control& control) {
   } else if (const auto* couple = std::get_if<Couple>(&*control.request)) {
     line << "couple" << couple->device << couple->channel << couple->role << couple->method << couple->position_scale
          << couple->force_scale << couple->rotation << couple->axes << couple->stiffness << couple->mutual_damping
-         << couple->damping << std::uint32_t{couple->adapt_to_delay} << std::uint32_t{couple->purse} << couple->period;
+         << couple->damping << std::uint32_t{couple->adapt_to_delay} << std::uint32_t{couple->purse} << couple->period
+         << std::uint32_t{couple->absolute} << couple->turn_stiffness << couple->turn_damping << couple->grip_stiffness
+         << couple->grip_damping << couple->drift_rate;
+    if (const auto& by = couple->rate) line << "rate" << by->dead_zone << by->gain << by->max_speed;
   } else if (const auto* engage = std::get_if<Engage>(&*control.request)) {
     line << "engage" << engage->device;
   } else if (const auto* disengage = std::get_if<Disengage>(&*control.request)) {
     line << "disengage" << disengage->device;
+  } else if (const auto* scale = std::get_if<SetScale>(&*control.request)) {
+    line << "scale" << scale->device << scale->position_scale << scale->force_scale;
+  } else if (const auto* share = std::get_if<SetShare>(&*control.request)) {
+    line << "share" << share->device << share->channel << share->share;
   } else if (const auto* wanted = std::get_if<SetOutput>(&*control.request)) {
     line << "output" << wanted->device << wanted->output;
     if (const auto* lamp = std::get_if<LampColour>(&wanted->setting)) line << "rgb" << lamp->rgb;
@@ -220,6 +227,14 @@ void print(Line& line, const PortFrame& port) {
   if (port.contact_force) line << "contact" << *port.contact_force;
   line << port.account << port.need << port.given << port.taken << port.wave_integral << port.wave_energy;
   if (port.surface) line << "surface" << port.surface->normal << port.surface->offset << port.surface->stiffness;
+  if (const auto& turn = port.turn) line << "turn" << turn->turn << turn->angular_velocity << turn->torque;
+  if (const auto& grip = port.grip) {
+    line << "grip" << grip->opening << grip->velocity << grip->force << grip->account << grip->need << grip->given
+         << grip->taken;
+  }
+  line << port.energy_in;
+  if (port.share) line << "share" << *port.share;
+  line << port.position_scale << port.force_scale << std::uint32_t{port.of_peer};
 }
 
 void print(Line& line, const Welcome& welcome) {

@@ -58,6 +58,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (const auto* couple = std::get_if<Couple>(&request->request)) {
         fuzz::require(couple->position_scale >= 0.01 && couple->force_scale >= 0.01 && couple->stiffness >= 0);
         fuzz::require(couple->axes >= 1 && couple->axes <= 7 && couple->period > Duration::zero());
+        fuzz::require(couple->method >= CouplingMethod::kPositionPosition && couple->method <= CouplingMethod::kRate);
+        fuzz::require(couple->turn_stiffness >= 0 && couple->turn_damping >= 0 && couple->grip_stiffness >= 0);
+        fuzz::require(couple->grip_damping >= 0 && couple->drift_rate >= 0);
+        fuzz::require(!couple->rate || (couple->rate->gain > 0 && couple->rate->max_speed > 0));
+      }
+      if (const auto* scale = std::get_if<SetScale>(&request->request)) {
+        fuzz::require(in_bounds(*scale) && scale->device < limits::kMaxDevices);
+      }
+      if (const auto* share = std::get_if<SetShare>(&request->request)) {
+        fuzz::require(in_bounds(*share) && share->channel < limits::kMaxChannels);
       }
       if (const auto* wanted = std::get_if<SetOutput>(&request->request)) {
         fuzz::require(in_bounds(*wanted) && wanted->device < limits::kMaxDevices);

@@ -335,6 +335,39 @@ inline Couple couple() {
           .period = std::chrono::milliseconds(1)};
 }
 
+/// To an observer: what no one end says together, of a whole handle that the leader is led to.
+inline PortFrame port_with_all() {
+  PortFrame port = port_by_model();
+  port.phase = PortPhase::kAligning;
+  port.turn = {.turn = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}, .angular_velocity = {0, 0.25, 0}, .torque = {0, -0.5, 0}};
+  port.grip = {
+      .opening = 0.0625, .velocity = -0.125, .force = 2, .account = -0.25, .need = 0.5, .given = 0.75, .taken = 1.25};
+  port.energy_in = 3.5;
+  port.share = 0.25;
+  port.position_scale = 0.5;
+  port.force_scale = 2;
+  port.of_peer = true;
+  return port;
+}
+
+/// Both handles whole, and places of one are places of the other; the follower moves as fast as the leader is far out.
+inline Couple couple_with_all() {
+  Couple couple = examples::couple();
+  couple.method = CouplingMethod::kRate;
+  couple.absolute = true;
+  couple.turn_stiffness = 0.5;
+  couple.turn_damping = 0.0625;
+  couple.grip_stiffness = 200;
+  couple.grip_damping = 1.5;
+  couple.drift_rate = 0.25;
+  couple.rate = {.dead_zone = 0.125, .gain = 2.5, .max_speed = 0.75};
+  return couple;
+}
+
+inline SetScale set_scale() { return {.device = 1, .position_scale = 0.25, .force_scale = 4}; }
+
+inline SetShare set_share() { return {.device = 1, .channel = 1, .share = 0.75}; }
+
 inline ControlAck handle_described(std::uint32_t id) {
   ControlAck ack{.id = id, .code = Code::kOk, .detail = {}};
   ack.handle = handle_description();
@@ -441,6 +474,10 @@ inline std::vector<Named> datagrams() {
       {"control-set-output-lamp", data(76, {}, Control{.id = 18, .request = lamp()})},
       {"control-set-output-vibration", data(77, {}, Control{.id = 19, .request = vibration()})},
       {"control-ack-outputs", data(78, {}, outputs_described(14))},
+      {"port-all", data(91, {}, port_with_all())},
+      {"control-couple-all", data(92, {}, Control{.id = 20, .request = couple_with_all()})},
+      {"control-set-scale", data(93, {}, Control{.id = 21, .request = set_scale()})},
+      {"control-set-share", data(94, {}, Control{.id = 22, .request = set_share()})},
   };
 }
 

@@ -260,6 +260,25 @@ TEST_F(TwoEnds, OfPortsTheHighestSequenceOfTheHighestEpochWins) {
   EXPECT_EQ(std::get<Session::PortArrived>(anew[0]).port.epoch, 6U);
 }
 
+TEST_F(TwoEnds, TheTwoEndsOfACouplingAreStreamsOfTheirOwn) {
+  const auto port = [](bool of_peer, std::uint64_t epoch) {
+    PortFrame made = examples::port();
+    made.of_peer = of_peer;
+    made.epoch = epoch;
+    return made;
+  };
+  z_.send(port(true, 9));
+  z_.send(port(false, 5));  // neither replaces the other before they have left …
+  deliver(a_, now_, pull(z_, now_));
+  const auto at_a = events(a_);
+  ASSERT_EQ(at_a.size(), 2U);
+  EXPECT_TRUE(std::get<Session::PortArrived>(at_a[0]).port.of_peer);
+  EXPECT_EQ(std::get<Session::PortArrived>(at_a[0]).port.epoch, 9U);
+  EXPECT_FALSE(std::get<Session::PortArrived>(at_a[1]).port.of_peer);
+  EXPECT_EQ(std::get<Session::PortArrived>(at_a[1]).port.epoch, 5U);
+  EXPECT_EQ(a_.stats().stale, 0U) << "… nor makes it old where it comes in";
+}
+
 TEST_F(TwoEnds, PortsGoEitherWayAndOfThoseNotTakenOutTheNewestIsLeft) {
   PortFrame port = examples::port();
   a_.send(port);
@@ -276,13 +295,17 @@ TEST_F(TwoEnds, CouplingsAreAskedForAndAnsweredInOrder) {
   ASSERT_TRUE(a_.request(examples::couple()));
   ASSERT_TRUE(a_.request(Engage{.device = 1}));
   ASSERT_TRUE(a_.request(Disengage{.device = 1}));
+  ASSERT_TRUE(a_.request(examples::set_scale()));
+  ASSERT_TRUE(a_.request(examples::set_share()));
   deliver(z_, now_, pull(a_, now_));
   const auto at_z = events(z_);
-  ASSERT_EQ(at_z.size(), 3U);
+  ASSERT_EQ(at_z.size(), 5U);
   const auto asked = [&](std::size_t i) { return std::get<Session::RequestArrived>(at_z[i]).request; };
   EXPECT_EQ(std::get<Couple>(asked(0)), examples::couple());
   EXPECT_EQ(std::get<Engage>(asked(1)).device, 1U);
   EXPECT_EQ(std::get<Disengage>(asked(2)).device, 1U);
+  EXPECT_EQ(std::get<SetScale>(asked(3)).force_scale, 4);
+  EXPECT_EQ(std::get<SetShare>(asked(4)).share, 0.75);
 }
 
 TEST_F(TwoEnds, ReportsOfAllDevicesAndChannelsLeaveInAsManyDatagramsAsTheyNeed) {

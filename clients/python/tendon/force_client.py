@@ -13,6 +13,7 @@ from enum import Enum
 from . import limits
 from .answer import Answer, read_touch
 from .codec.fields import is_setting
+from .codec.ports import is_scale, is_share
 from .deadband import Deadband, ForceDeadband, check_state_deadband, foretell
 from .expect import expect
 from .handshake import ClientHandshake
@@ -50,6 +51,8 @@ from .messages import (
     Refused,
     Role,
     SetOutput,
+    SetScale,
+    SetShare,
     SetStateDeadband,
     SetStateRate,
     TakeLease,
@@ -333,6 +336,22 @@ class ForceClient:
     def disengage(self) -> bool:
         """The end of that, at either end's server. False as for rearm()."""
         return self._session is not None and self._session.request(Disengage(self._place.device)) is not None
+
+    def set_scale(self, position_scale: float, force_scale: float) -> bool:
+        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held.
+        False as for rearm(); ValueError beyond 0.01 … 100."""
+        wanted = SetScale(self._place.device, position_scale, force_scale)
+        if not is_scale(wanted):
+            raise ValueError(f"set_scale({position_scale}, {force_scale}): expected two scales, each 0.01 … 100")
+        return self._session is not None and self._session.request(wanted) is not None
+
+    def set_share(self, channel: int, share: float) -> bool:
+        """How much the leader of that channel of our device counts among several, at the follower's server.
+        False as for rearm(); ValueError when it is out of its bounds."""
+        wanted = SetShare(self._place.device, channel, share)
+        if not is_share(wanted):
+            raise ValueError(f"set_share({channel}, {share}): expected a channel 0 … 7 and a share 0 … 1")
+        return self._session is not None and self._session.request(wanted) is not None
 
     def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
         """Sets a lamp of the device, or starts a pulse of vibration (`handle.outputs`). For whoever `holds`. False as

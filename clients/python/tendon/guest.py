@@ -226,6 +226,16 @@ class AnyClient:
         """The end of that, at either end's server. False when there is no session."""
         return self._ask(self._guest.core.disengage)
 
+    def set_scale(self, position_scale: float, force_scale: float) -> bool:
+        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held.
+        False when there is no session."""
+        return self._ask(lambda: self._guest.core.set_scale(position_scale, force_scale))
+
+    def set_share(self, channel: int, share: float) -> bool:
+        """How much the leader of that channel of the device counts among several, at the follower's server: 0 … 1.
+        False when there is no session."""
+        return self._ask(lambda: self._guest.core.set_share(channel, share))
+
     def set_output(self, output: int, setting: LampColour | Vibration) -> bool:
         """Sets a lamp of the device, or starts a pulse of vibration (`handle.outputs`, asked for with
         `Config.outputs`). False when there is no session to ask in, or it does not know outputs."""

@@ -296,6 +296,9 @@ class CouplingMethod(IntEnum):
     POSITION_FORCE = 2  # the follower's spring; the leader feels the contact that the follower measures
     WAVES = 3  # wave variables, played out
     SURFACE = 4  # as POSITION_FORCE, but the leader feels a model of the surface that the follower found
+    PASSIVITY = 5  # velocity there, force back, each paid from what the other took in
+    SET_POSITION = 6  # springs to late positions, stretched only as far as the account pays
+    RATE = 7  # the leader's place says how fast the follower moves
 
 
 class PortPhase(IntEnum):
@@ -303,7 +306,7 @@ class PortPhase(IntEnum):
 
     ALONE = 1  # it has no peer
     COUPLED = 2  # it hears its peer, and waits for the operator's act; no force
-    ALIGNING = 3
+    ALIGNING = 3  # absolute maps: the leader is led to where the follower is
     ENGAGED = 4  # the law
     CLUTCHED = 5  # the leader is free, the follower stays where it is
     LOST = 6  # it was engaged, and its peer fell silent; engaged again only by another act
@@ -320,9 +323,32 @@ class PortSurface:
 
 
 @dataclass(frozen=True, slots=True)
+class PortTurn:
+    """How a handle has turned since its offset was taken."""
+
+    turn: Quat  # in the axes of the sender's base frame, of length 1
+    angular_velocity: Vec3 = ZERO  # rad/s, zero while `turn` is frozen
+    torque: Vec3 = ZERO  # N·m, on whoever holds the sender's handle, really applied
+
+
+@dataclass(frozen=True, slots=True)
+class PortGrip:
+    """A gripper, measured at its fingers. It is a port of its own, with an account of its own."""
+
+    opening: float = 0.0  # m
+    velocity: float = 0.0  # m/s
+    force: float = 0.0  # N, on the fingers, > 0 opens them; really applied
+    account: float = 0.0  # J, these four as in PortState
+    need: float = 0.0
+    given: float = 0.0
+    taken: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class PortState:
-    """Either way, newest wins (the highest sequence of the highest epoch of a device and channel): one end of a coupling,
-    told to the other. Vectors are in the base frame and the scale of the sender's device (FEATURE_TELEOPERATION)."""
+    """Either way, newest wins (the highest sequence of the highest epoch of a device, channel and end): one end of a
+    coupling, told to the other; both ends, told to an observer. Vectors are in the base frame and the scale of the sender's
+    device (FEATURE_TELEOPERATION)."""
 
     device: int  # of the server of the session, whichever way this goes
     channel: int
@@ -346,6 +372,22 @@ class PortState:
     wave_integral: Vec3 = ZERO  # √W·s, of WAVES: the sum of the waves sent
     wave_energy: float = 0.0  # J, of WAVES: the sum of their energies
     surface: PortSurface | None = None  # of SURFACE; None: the tool has touched nothing yet
+    turn: PortTurn | None = None  # None: the orientations are not coupled
+    grip: PortGrip | None = None  # None: the grippers are not coupled
+    energy_in: float = 0.0  # J, of PASSIVITY: total that its port took in, in this epoch
+    share: float | None = None  # 0 … 1, of a follower: how much this leader counts; None: it is the only one
+    position_scale: float = 0.0  # of a leader, in use from this state on: 0.01 … 100; 0: as in Couple
+    force_scale: float = 0.0
+    of_peer: bool = False  # to an observer: of the other end of the device's coupling
+
+
+@dataclass(frozen=True, slots=True)
+class RateControl:
+    """RATE: the leader's handle, pulled back to its centre, says how fast the follower moves. In the leader's scale."""
+
+    dead_zone: float  # m: nearer to its centre the follower stands
+    gain: float  # 1/s, > 0: speed for each metre beyond that
+    max_speed: float  # m/s, > 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,6 +409,13 @@ class Couple:
     adapt_to_delay: bool
     purse: bool  # it pays and is paid
     period_us: int  # between two PortStates
+    absolute: bool = False  # a place of the leader is a place of the follower: the two align first
+    turn_stiffness: float = 0.0  # N·m/rad, as the leader feels it; 0: the orientations are not coupled
+    turn_damping: float = 0.0  # N·m·s/rad
+    grip_stiffness: float = 0.0  # N/m, at the leader's fingers; 0: the grippers are not coupled
+    grip_damping: float = 0.0  # N·s/m
+    drift_rate: float = 0.0  # 1/s, of PASSIVITY
+    rate: RateControl | None = None  # of RATE
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,6 +430,26 @@ class Disengage:
     """Client → server, reliable: the end of that. Only from a controller of the device."""
 
     device: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SetScale:
+    """Client → server, reliable: the scales of a coupling from now on. Only from a controller of the leader's device, while
+    it is not engaged or its clutch is held."""
+
+    device: int
+    position_scale: float  # follower over leader: 0.01 … 100
+    force_scale: float  # leader over follower: 0.01 … 100
+
+
+@dataclass(frozen=True, slots=True)
+class SetShare:
+    """Client → server, reliable: how much the leader of that channel counts among several. Only from a controller of the
+    follower's device."""
+
+    device: int
+    channel: int
+    share: float  # 0 … 1
 
 
 class OutputKind(IntEnum):
@@ -437,6 +506,8 @@ Request = Union[
     Engage,
     Disengage,
     SetOutput,
+    SetScale,
+    SetShare,
 ]
 
 

@@ -57,13 +57,17 @@ def _stream(report: DeviceReport | PeerReport) -> tuple[int, int]:
     return (report.device, report.channel if isinstance(report, PeerReport) else -1)
 
 
+def _end(port: PortState) -> tuple[int, int, bool]:
+    return (port.device, port.channel, port.of_peer)
+
+
 class Session:
     """Sans I/O, pull: no socket, clock, thread or randomness of its own.
 
     Use: `receive` what arrives and `tick` when `next_turn()` is due; then pull `next_event` and
     `next_datagram` until they are empty. `now` never goes back.
 
-    Nothing queues without a bound: there is room for one state, one force, one report and one port (of each device and channel)
+    Nothing queues without a bound: there is room for one state, one force, one report and one port (of each device, channel and end)
     and limits.REQUEST_WINDOW requests each way; a newer one replaces one of its kind that was not taken out.
     """
 
@@ -84,7 +88,7 @@ class Session:
         self._force_to_send: ForceCommand | None = None
         self._report_to_send: LinkReport | None = None
         self._diagnoses_to_send: dict[tuple[int, int], DeviceReport | PeerReport] = {}
-        self._ports_to_send: dict[tuple[int, int], PortState] = {}  # by device and channel
+        self._ports_to_send: dict[tuple[int, int, bool], PortState] = {}  # by device, channel and end
         self._asked = OutgoingRequests()
         self._bye: Bye | None = None
         self._byes_left = 0
@@ -98,7 +102,7 @@ class Session:
         self._newest_sequence: dict[tuple[int, int], int] = {}  # by device and channel
         self._newest_report = 0
         self._newest_diagnosis: dict[tuple[int, int], int] = {}  # by _stream
-        self._newest_port: dict[tuple[int, int], tuple[int, int]] = {}  # epoch and sequence, by device and channel
+        self._newest_port: dict[tuple[int, int, bool], tuple[int, int]] = {}  # epoch and sequence, by the same
         self._newest_echoed = -1  # newest packet of ours that the peer has echoed
         self._answering = IncomingRequests()
         self._round_trip = RoundTrip()
@@ -107,7 +111,7 @@ class Session:
         self._force_arrived: ForceCommand | None = None
         self._report_arrived: LinkReport | None = None
         self._diagnoses_arrived: dict[tuple[int, int], DeviceReport | PeerReport] = {}
-        self._ports_arrived: dict[tuple[int, int], PortState] = {}
+        self._ports_arrived: dict[tuple[int, int, bool], PortState] = {}
         self._closed: Closed | None = None
 
     # ---- In ----
@@ -159,7 +163,7 @@ class Session:
         elif isinstance(frame, (DeviceReport, PeerReport)):
             self._diagnoses_to_send[_stream(frame)] = frame
         elif isinstance(frame, PortState):
-            self._ports_to_send[(frame.device, frame.channel)] = frame
+            self._ports_to_send[_end(frame)] = frame
         else:
             self._state_to_send = frame
 
@@ -286,12 +290,12 @@ class Session:
             self._newest_diagnosis[stream] = number
             self._diagnoses_arrived[stream] = frame
         elif isinstance(frame, PortState):
-            place, age = (frame.device, frame.channel), (frame.epoch, frame.sequence)
-            if age <= self._newest_port.get(place, (0, 0)):
+            end, age = _end(frame), (frame.epoch, frame.sequence)
+            if age <= self._newest_port.get(end, (0, 0)):
                 self.stats.stale += 1
                 return
-            self._newest_port[place] = age
-            self._ports_arrived[place] = frame
+            self._newest_port[end] = age
+            self._ports_arrived[end] = frame
         elif isinstance(frame, Control):
             self.stats.invalid += not self._answering.take(frame)
         elif isinstance(frame, ControlAck):

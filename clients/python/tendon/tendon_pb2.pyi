@@ -18,8 +18,11 @@ CODE_SHUTDOWN: Code
 CODE_TIMED_OUT: Code
 CODE_UNSPECIFIED: Code
 CODE_UNSUPPORTED: Code
+COUPLING_METHOD_PASSIVITY: CouplingMethod
 COUPLING_METHOD_POSITION_FORCE: CouplingMethod
 COUPLING_METHOD_POSITION_POSITION: CouplingMethod
+COUPLING_METHOD_RATE: CouplingMethod
+COUPLING_METHOD_SET_POSITION: CouplingMethod
 COUPLING_METHOD_SURFACE: CouplingMethod
 COUPLING_METHOD_UNSPECIFIED: CouplingMethod
 COUPLING_METHOD_WAVES: CouplingMethod
@@ -110,7 +113,7 @@ class Contact(_message.Message):
     def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., gap_m: _Optional[float] = ..., table: _Optional[_Union[ForceTable, _Mapping]] = ...) -> None: ...
 
 class Control(_message.Message):
-    __slots__ = ["couple", "describe", "disarm", "disengage", "engage", "give_lease", "id", "lease_lost", "rearm", "set_output", "set_state_deadband", "set_state_rate", "take_lease"]
+    __slots__ = ["couple", "describe", "disarm", "disengage", "engage", "give_lease", "id", "lease_lost", "rearm", "set_output", "set_scale", "set_share", "set_state_deadband", "set_state_rate", "take_lease"]
     COUPLE_FIELD_NUMBER: _ClassVar[int]
     DESCRIBE_FIELD_NUMBER: _ClassVar[int]
     DISARM_FIELD_NUMBER: _ClassVar[int]
@@ -121,6 +124,8 @@ class Control(_message.Message):
     LEASE_LOST_FIELD_NUMBER: _ClassVar[int]
     REARM_FIELD_NUMBER: _ClassVar[int]
     SET_OUTPUT_FIELD_NUMBER: _ClassVar[int]
+    SET_SCALE_FIELD_NUMBER: _ClassVar[int]
+    SET_SHARE_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_DEADBAND_FIELD_NUMBER: _ClassVar[int]
     SET_STATE_RATE_FIELD_NUMBER: _ClassVar[int]
     TAKE_LEASE_FIELD_NUMBER: _ClassVar[int]
@@ -134,10 +139,12 @@ class Control(_message.Message):
     lease_lost: LeaseLost
     rearm: Rearm
     set_output: SetOutput
+    set_scale: SetScale
+    set_share: SetShare
     set_state_deadband: SetStateDeadband
     set_state_rate: SetStateRate
     take_lease: TakeLease
-    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., set_output: _Optional[_Union[SetOutput, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
+    def __init__(self, id: _Optional[int] = ..., set_state_rate: _Optional[_Union[SetStateRate, _Mapping]] = ..., rearm: _Optional[_Union[Rearm, _Mapping]] = ..., describe: _Optional[_Union[Describe, _Mapping]] = ..., take_lease: _Optional[_Union[TakeLease, _Mapping]] = ..., give_lease: _Optional[_Union[GiveLease, _Mapping]] = ..., set_state_deadband: _Optional[_Union[SetStateDeadband, _Mapping]] = ..., disarm: _Optional[_Union[Disarm, _Mapping]] = ..., set_output: _Optional[_Union[SetOutput, _Mapping]] = ..., couple: _Optional[_Union[Couple, _Mapping]] = ..., engage: _Optional[_Union[Engage, _Mapping]] = ..., disengage: _Optional[_Union[Disengage, _Mapping]] = ..., set_scale: _Optional[_Union[SetScale, _Mapping]] = ..., set_share: _Optional[_Union[SetShare, _Mapping]] = ..., lease_lost: _Optional[_Union[LeaseLost, _Mapping]] = ...) -> None: ...
 
 class ControlAck(_message.Message):
     __slots__ = ["code", "detail", "device", "handle", "id", "wait_ms"]
@@ -156,36 +163,50 @@ class ControlAck(_message.Message):
     def __init__(self, id: _Optional[int] = ..., code: _Optional[_Union[Code, str]] = ..., detail: _Optional[str] = ..., wait_ms: _Optional[int] = ..., device: _Optional[_Union[DeviceDescription, _Mapping]] = ..., handle: _Optional[_Union[HandleDescription, _Mapping]] = ...) -> None: ...
 
 class Couple(_message.Message):
-    __slots__ = ["adapt_to_delay", "axes", "channel", "damping_nspm", "device", "force_scale", "method", "mutual_damping_nspm", "period_us", "position_scale", "purse", "role", "rotation", "stiffness_npm"]
+    __slots__ = ["absolute", "adapt_to_delay", "axes", "channel", "damping_nspm", "device", "drift_rate_per_s", "force_scale", "grip_damping_nspm", "grip_stiffness_npm", "method", "mutual_damping_nspm", "period_us", "position_scale", "purse", "rate", "role", "rotation", "stiffness_npm", "turn_damping_nmsprad", "turn_stiffness_nmprad"]
+    ABSOLUTE_FIELD_NUMBER: _ClassVar[int]
     ADAPT_TO_DELAY_FIELD_NUMBER: _ClassVar[int]
     AXES_FIELD_NUMBER: _ClassVar[int]
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     DAMPING_NSPM_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    DRIFT_RATE_PER_S_FIELD_NUMBER: _ClassVar[int]
     FORCE_SCALE_FIELD_NUMBER: _ClassVar[int]
+    GRIP_DAMPING_NSPM_FIELD_NUMBER: _ClassVar[int]
+    GRIP_STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
     METHOD_FIELD_NUMBER: _ClassVar[int]
     MUTUAL_DAMPING_NSPM_FIELD_NUMBER: _ClassVar[int]
     PERIOD_US_FIELD_NUMBER: _ClassVar[int]
     POSITION_SCALE_FIELD_NUMBER: _ClassVar[int]
     PURSE_FIELD_NUMBER: _ClassVar[int]
+    RATE_FIELD_NUMBER: _ClassVar[int]
     ROLE_FIELD_NUMBER: _ClassVar[int]
     ROTATION_FIELD_NUMBER: _ClassVar[int]
     STIFFNESS_NPM_FIELD_NUMBER: _ClassVar[int]
+    TURN_DAMPING_NMSPRAD_FIELD_NUMBER: _ClassVar[int]
+    TURN_STIFFNESS_NMPRAD_FIELD_NUMBER: _ClassVar[int]
+    absolute: bool
     adapt_to_delay: bool
     axes: int
     channel: int
     damping_nspm: float
     device: int
+    drift_rate_per_s: float
     force_scale: float
+    grip_damping_nspm: float
+    grip_stiffness_npm: float
     method: CouplingMethod
     mutual_damping_nspm: float
     period_us: int
     position_scale: float
     purse: bool
+    rate: RateControl
     role: PortRole
     rotation: Quat
     stiffness_npm: float
-    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[PortRole, str]] = ..., method: _Optional[_Union[CouplingMethod, str]] = ..., position_scale: _Optional[float] = ..., force_scale: _Optional[float] = ..., rotation: _Optional[_Union[Quat, _Mapping]] = ..., axes: _Optional[int] = ..., stiffness_npm: _Optional[float] = ..., mutual_damping_nspm: _Optional[float] = ..., damping_nspm: _Optional[float] = ..., adapt_to_delay: bool = ..., purse: bool = ..., period_us: _Optional[int] = ...) -> None: ...
+    turn_damping_nmsprad: float
+    turn_stiffness_nmprad: float
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., role: _Optional[_Union[PortRole, str]] = ..., method: _Optional[_Union[CouplingMethod, str]] = ..., position_scale: _Optional[float] = ..., force_scale: _Optional[float] = ..., rotation: _Optional[_Union[Quat, _Mapping]] = ..., axes: _Optional[int] = ..., stiffness_npm: _Optional[float] = ..., mutual_damping_nspm: _Optional[float] = ..., damping_nspm: _Optional[float] = ..., adapt_to_delay: bool = ..., purse: bool = ..., period_us: _Optional[int] = ..., absolute: bool = ..., turn_stiffness_nmprad: _Optional[float] = ..., turn_damping_nmsprad: _Optional[float] = ..., grip_stiffness_npm: _Optional[float] = ..., grip_damping_nspm: _Optional[float] = ..., drift_rate_per_s: _Optional[float] = ..., rate: _Optional[_Union[RateControl, _Mapping]] = ...) -> None: ...
 
 class Datagram(_message.Message):
     __slots__ = ["echo", "frames", "tx_time_ns"]
@@ -575,8 +596,26 @@ class PeerReport(_message.Message):
     state_one_in: int
     def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., name: _Optional[str] = ..., state_one_in: _Optional[int] = ..., forces_refused: bool = ..., link: _Optional[_Union[LinkReport, _Mapping]] = ...) -> None: ...
 
+class PortGrip(_message.Message):
+    __slots__ = ["account_j", "force_n", "given_j", "need_j", "opening_m", "taken_j", "velocity_mps"]
+    ACCOUNT_J_FIELD_NUMBER: _ClassVar[int]
+    FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    GIVEN_J_FIELD_NUMBER: _ClassVar[int]
+    NEED_J_FIELD_NUMBER: _ClassVar[int]
+    OPENING_M_FIELD_NUMBER: _ClassVar[int]
+    TAKEN_J_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    account_j: float
+    force_n: float
+    given_j: float
+    need_j: float
+    opening_m: float
+    taken_j: float
+    velocity_mps: float
+    def __init__(self, opening_m: _Optional[float] = ..., velocity_mps: _Optional[float] = ..., force_n: _Optional[float] = ..., account_j: _Optional[float] = ..., need_j: _Optional[float] = ..., given_j: _Optional[float] = ..., taken_j: _Optional[float] = ...) -> None: ...
+
 class PortState(_message.Message):
-    __slots__ = ["account_j", "answers", "answers_epoch", "buttons", "channel", "contact_force_n", "device", "engagement", "epoch", "force_n", "given_j", "need_j", "phase", "position_m", "round_trip_ns", "sequence", "surface", "taken_j", "time_ns", "velocity_mps", "wave_energy_j", "wave_integral"]
+    __slots__ = ["account_j", "answers", "answers_epoch", "buttons", "channel", "contact_force_n", "device", "energy_in_j", "engagement", "epoch", "force_n", "force_scale", "given_j", "grip", "need_j", "of_peer", "phase", "position_m", "position_scale", "round_trip_ns", "sequence", "share", "surface", "taken_j", "time_ns", "turn", "velocity_mps", "wave_energy_j", "wave_integral"]
     ACCOUNT_J_FIELD_NUMBER: _ClassVar[int]
     ANSWERS_EPOCH_FIELD_NUMBER: _ClassVar[int]
     ANSWERS_FIELD_NUMBER: _ClassVar[int]
@@ -584,18 +623,25 @@ class PortState(_message.Message):
     CHANNEL_FIELD_NUMBER: _ClassVar[int]
     CONTACT_FORCE_N_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ENERGY_IN_J_FIELD_NUMBER: _ClassVar[int]
     ENGAGEMENT_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    FORCE_SCALE_FIELD_NUMBER: _ClassVar[int]
     GIVEN_J_FIELD_NUMBER: _ClassVar[int]
+    GRIP_FIELD_NUMBER: _ClassVar[int]
     NEED_J_FIELD_NUMBER: _ClassVar[int]
+    OF_PEER_FIELD_NUMBER: _ClassVar[int]
     PHASE_FIELD_NUMBER: _ClassVar[int]
     POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    POSITION_SCALE_FIELD_NUMBER: _ClassVar[int]
     ROUND_TRIP_NS_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    SHARE_FIELD_NUMBER: _ClassVar[int]
     SURFACE_FIELD_NUMBER: _ClassVar[int]
     TAKEN_J_FIELD_NUMBER: _ClassVar[int]
     TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    TURN_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
     WAVE_ENERGY_J_FIELD_NUMBER: _ClassVar[int]
     WAVE_INTEGRAL_FIELD_NUMBER: _ClassVar[int]
@@ -606,22 +652,29 @@ class PortState(_message.Message):
     channel: int
     contact_force_n: Vec3
     device: int
+    energy_in_j: float
     engagement: int
     epoch: int
     force_n: Vec3
+    force_scale: float
     given_j: float
+    grip: PortGrip
     need_j: float
+    of_peer: bool
     phase: PortPhase
     position_m: Vec3
+    position_scale: float
     round_trip_ns: int
     sequence: int
+    share: float
     surface: PortSurface
     taken_j: float
     time_ns: int
+    turn: PortTurn
     velocity_mps: Vec3
     wave_energy_j: float
     wave_integral: Vec3
-    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., answers_epoch: _Optional[int] = ..., answers: _Optional[int] = ..., time_ns: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., phase: _Optional[_Union[PortPhase, str]] = ..., engagement: _Optional[int] = ..., buttons: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., contact_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., account_j: _Optional[float] = ..., need_j: _Optional[float] = ..., given_j: _Optional[float] = ..., taken_j: _Optional[float] = ..., wave_integral: _Optional[_Union[Vec3, _Mapping]] = ..., wave_energy_j: _Optional[float] = ..., surface: _Optional[_Union[PortSurface, _Mapping]] = ...) -> None: ...
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., answers_epoch: _Optional[int] = ..., answers: _Optional[int] = ..., time_ns: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., phase: _Optional[_Union[PortPhase, str]] = ..., engagement: _Optional[int] = ..., buttons: _Optional[int] = ..., position_m: _Optional[_Union[Vec3, _Mapping]] = ..., velocity_mps: _Optional[_Union[Vec3, _Mapping]] = ..., force_n: _Optional[_Union[Vec3, _Mapping]] = ..., contact_force_n: _Optional[_Union[Vec3, _Mapping]] = ..., account_j: _Optional[float] = ..., need_j: _Optional[float] = ..., given_j: _Optional[float] = ..., taken_j: _Optional[float] = ..., wave_integral: _Optional[_Union[Vec3, _Mapping]] = ..., wave_energy_j: _Optional[float] = ..., surface: _Optional[_Union[PortSurface, _Mapping]] = ..., turn: _Optional[_Union[PortTurn, _Mapping]] = ..., grip: _Optional[_Union[PortGrip, _Mapping]] = ..., energy_in_j: _Optional[float] = ..., share: _Optional[float] = ..., position_scale: _Optional[float] = ..., force_scale: _Optional[float] = ..., of_peer: bool = ...) -> None: ...
 
 class PortSurface(_message.Message):
     __slots__ = ["normal", "offset_m", "stiffness_npm"]
@@ -632,6 +685,16 @@ class PortSurface(_message.Message):
     offset_m: float
     stiffness_npm: float
     def __init__(self, normal: _Optional[_Union[Vec3, _Mapping]] = ..., offset_m: _Optional[float] = ..., stiffness_npm: _Optional[float] = ...) -> None: ...
+
+class PortTurn(_message.Message):
+    __slots__ = ["angular_velocity_radps", "torque_nm", "turn"]
+    ANGULAR_VELOCITY_RADPS_FIELD_NUMBER: _ClassVar[int]
+    TORQUE_NM_FIELD_NUMBER: _ClassVar[int]
+    TURN_FIELD_NUMBER: _ClassVar[int]
+    angular_velocity_radps: Vec3
+    torque_nm: Vec3
+    turn: Quat
+    def __init__(self, turn: _Optional[_Union[Quat, _Mapping]] = ..., angular_velocity_radps: _Optional[_Union[Vec3, _Mapping]] = ..., torque_nm: _Optional[_Union[Vec3, _Mapping]] = ...) -> None: ...
 
 class Quat(_message.Message):
     __slots__ = ["w", "x", "y", "z"]
@@ -644,6 +707,16 @@ class Quat(_message.Message):
     y: float
     z: float
     def __init__(self, w: _Optional[float] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
+
+class RateControl(_message.Message):
+    __slots__ = ["dead_zone_m", "gain_per_s", "max_speed_mps"]
+    DEAD_ZONE_M_FIELD_NUMBER: _ClassVar[int]
+    GAIN_PER_S_FIELD_NUMBER: _ClassVar[int]
+    MAX_SPEED_MPS_FIELD_NUMBER: _ClassVar[int]
+    dead_zone_m: float
+    gain_per_s: float
+    max_speed_mps: float
+    def __init__(self, dead_zone_m: _Optional[float] = ..., gain_per_s: _Optional[float] = ..., max_speed_mps: _Optional[float] = ...) -> None: ...
 
 class Rearm(_message.Message):
     __slots__ = ["device"]
@@ -682,6 +755,26 @@ class SetOutput(_message.Message):
     rgb: int
     vibration: Vibration
     def __init__(self, device: _Optional[int] = ..., output: _Optional[int] = ..., rgb: _Optional[int] = ..., vibration: _Optional[_Union[Vibration, _Mapping]] = ...) -> None: ...
+
+class SetScale(_message.Message):
+    __slots__ = ["device", "force_scale", "position_scale"]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    FORCE_SCALE_FIELD_NUMBER: _ClassVar[int]
+    POSITION_SCALE_FIELD_NUMBER: _ClassVar[int]
+    device: int
+    force_scale: float
+    position_scale: float
+    def __init__(self, device: _Optional[int] = ..., position_scale: _Optional[float] = ..., force_scale: _Optional[float] = ...) -> None: ...
+
+class SetShare(_message.Message):
+    __slots__ = ["channel", "device", "share"]
+    CHANNEL_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    SHARE_FIELD_NUMBER: _ClassVar[int]
+    channel: int
+    device: int
+    share: float
+    def __init__(self, device: _Optional[int] = ..., channel: _Optional[int] = ..., share: _Optional[float] = ...) -> None: ...
 
 class SetStateDeadband(_message.Message):
     __slots__ = ["floor_mps", "max_silence_us", "share"]

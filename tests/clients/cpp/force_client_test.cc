@@ -354,9 +354,15 @@ TEST(ForceClient, AnOperatorSendsNoForceAndHearsTheAnswerToItsOrder) {
   EXPECT_FALSE(world.a->order_answer()) << "that was the one before";
   world.run(kSecond);
   EXPECT_TRUE(world.a->order_answer());
-  ASSERT_TRUE(world.a->engage() && world.a->disengage());
+  ASSERT_TRUE(world.a->engage() && world.a->disengage() && world.a->set_scale(0.5, 2) && world.a->set_share(3, 0.25));
+  EXPECT_FALSE(world.a->set_scale(0.0099, 1) || world.a->set_scale(1, 100.1) || world.a->set_share(8, 0.25) ||
+               world.a->set_share(3, 1.001));
   world.run(kSecond);
-  ASSERT_EQ(world.z->requests.size(), 4U);
+  ASSERT_EQ(world.z->requests.size(), 6U);
+  EXPECT_EQ(std::get<SetScale>(world.z->requests[4]).position_scale, 0.5);
+  EXPECT_EQ(std::get<SetScale>(world.z->requests[4]).force_scale, 2);
+  EXPECT_EQ(std::get<SetShare>(world.z->requests[5]).channel, 3U);
+  EXPECT_EQ(std::get<SetShare>(world.z->requests[5]).share, 0.25);
   EXPECT_TRUE(std::holds_alternative<Engage>(world.z->requests[2]));
   EXPECT_TRUE(std::holds_alternative<Disengage>(world.z->requests[3]));
   EXPECT_TRUE(std::holds_alternative<Disarm>(world.z->requests[0]));

@@ -36,11 +36,15 @@ from tendon.messages import (
     LinkReport,
     Mat3,
     PeerReport,
+    PortGrip,
     PortState,
     PortSurface,
+    PortTurn,
     Rearm,
     Refused,
     SetOutput,
+    SetScale,
+    SetShare,
     SetStateDeadband,
     SetStateRate,
     Vec3,
@@ -146,8 +150,17 @@ def _frame(frame: Frame) -> list[object]:
                 *("control", frame.id, "couple", c.device, c.channel, int(c.role) - 1, int(c.method)),
                 *map(_double, (c.position_scale, c.force_scale, *c.rotation)),
                 *(c.axes, *map(_double, (c.stiffness, c.mutual_damping, c.damping))),
-                *(int(c.adapt_to_delay), int(c.purse), c.period_us * 1000),
+                *(int(c.adapt_to_delay), int(c.purse), c.period_us * 1000, int(c.absolute)),
+                *map(_double, (c.turn_stiffness, c.turn_damping, c.grip_stiffness, c.grip_damping, c.drift_rate)),
+                *([] if c.rate is None else ["rate", *map(_double, (c.rate.dead_zone, c.rate.gain, c.rate.max_speed))]),
             ]
+        if isinstance(frame.request, SetScale):
+            scales = frame.request
+            doubles = map(_double, (scales.position_scale, scales.force_scale))
+            return ["control", frame.id, "scale", scales.device, *doubles]
+        if isinstance(frame.request, SetShare):
+            of = frame.request
+            return ["control", frame.id, "share", of.device, of.channel, _double(of.share)]
         if isinstance(frame.request, (Engage, Disengage)):
             return ["control", frame.id, type(frame.request).__name__.lower(), frame.request.device]
         if isinstance(frame.request, SetOutput):
@@ -197,6 +210,11 @@ def _frame(frame: Frame) -> list[object]:
             *map(_double, (frame.account, frame.need, frame.given, frame.taken)),
             *(*_vector(frame.wave_integral), _double(frame.wave_energy)),
             *_surface(frame.surface),
+            *_turn(frame.turn),
+            *_grip(frame.grip),
+            _double(frame.energy_in),
+            *([] if frame.share is None else ["share", _double(frame.share)]),
+            *(_double(frame.position_scale), _double(frame.force_scale), int(frame.of_peer)),
         ]
     assert isinstance(frame, Bye)
     return ["bye", int(frame.code), _text(frame.reason)]
@@ -206,6 +224,19 @@ def _surface(surface: PortSurface | None) -> list[object]:
     if surface is None:
         return []
     return ["surface", *_vector(surface.normal), _double(surface.offset), _double(surface.stiffness)]
+
+
+def _turn(turn: PortTurn | None) -> list[object]:
+    if turn is None:
+        return []
+    return ["turn", *map(_double, turn.turn), *_vector(turn.angular_velocity), *_vector(turn.torque)]
+
+
+def _grip(grip: PortGrip | None) -> list[object]:
+    if grip is None:
+        return []
+    values = (grip.opening, grip.velocity, grip.force, grip.account, grip.need, grip.given, grip.taken)
+    return ["grip", *map(_double, values)]
 
 
 def _data(body: bytes) -> list[object]:

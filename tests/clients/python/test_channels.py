@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 
 import pytest
 from stage import DESCRIPTION, HANDLE, KEPT, Stage
@@ -21,6 +21,8 @@ from tendon.messages import (
     LeaseLost,
     Rearm,
     SetOutput,
+    SetScale,
+    SetShare,
     SetStateRate,
     TakeLease,
 )
@@ -81,6 +83,23 @@ def test_outputs_are_set_by_those_who_asked_for_them():
     plain = named()
     plain.run(100 * MS)
     assert not plain.client.set_output(0, LampColour(1)), "it did not ask for outputs"
+
+
+def test_scales_and_shares_are_asked_for_within_their_bounds():
+    stage = named()
+    client = stage.client
+    assert not client.set_scale(1, 1) and not client.set_share(0, 0), "there is no session to ask in"
+    stage.run(100 * MS)
+    assert client.set_scale(0.01, 100.0) and client.set_share(7, 0.0) and client.set_share(0, 1.0)
+    stage.run(100 * MS)
+    sent = [control.request for control in stage.requests if isinstance(control.request, (SetScale, SetShare))]
+    assert sent == [SetScale(1, 0.01, 100.0), SetShare(1, 7, 0.0), SetShare(1, 0, 1.0)]
+    for scales in [(0.0099, 1.0), (1.0, 100.1), (nan, 1.0)]:
+        with pytest.raises(ValueError, match="set_scale"):
+            client.set_scale(*scales)
+    for share in [(8, 0.5), (-1, 0.5), (0, -0.001), (0, 1.001), (0, nan)]:
+        with pytest.raises(ValueError, match="set_share"):
+            client.set_share(*share)
 
 
 def test_forces_orders_leases_and_rates_name_the_granted_place():

@@ -86,15 +86,22 @@ def test_a_datagram_found_late_in_a_turn_is_not_taken_for_older(monkeypatch):
 
 
 @pytest.mark.parametrize("kind", [Client, aio.Client])
-@pytest.mark.parametrize("order", ["rearm", "disarm", "engage", "disengage", "take_lease", "give_lease"])
-def test_what_a_client_asks_for_leaves_at_once(kind, order, monkeypatch):
+@pytest.mark.parametrize(
+    "order, values",
+    [
+        *((order, ()) for order in ("rearm", "disarm", "engage", "disengage", "take_lease", "give_lease")),
+        ("set_scale", (0.5, 2.0)),
+        ("set_share", (1, 0.25)),
+    ],
+)
+def test_what_a_client_asks_for_leaves_at_once(kind, order, values, monkeypatch):
     client = kind("127.0.0.1:9")
     client._guest.socket.close()
     done = []
-    monkeypatch.setattr(client._guest.core, order, lambda: done.append(order) or True)
+    monkeypatch.setattr(client._guest.core, order, lambda *said: done.append((order, said)) or True)
     monkeypatch.setattr(client._guest, "flush", lambda now: done.append("flush"))
-    assert getattr(client, order)()
-    assert done == [order, "flush"]
+    assert getattr(client, order)(*values)
+    assert done == [(order, values), "flush"]
 
 
 @pytest.mark.parametrize("kind", [Client, aio.Client])

@@ -10,7 +10,19 @@ from world import MS, PERFECT, SECOND, Weather, World
 
 from tendon import codec, limits
 from tendon.cipher import Plain, Sealed
-from tendon.messages import NEVER, Code, Control, ControlAck, DeviceState, ForceCommand, Mode, Rearm, SetStateRate
+from tendon.messages import (
+    NEVER,
+    Code,
+    Control,
+    ControlAck,
+    DeviceState,
+    ForceCommand,
+    Mode,
+    PortPhase,
+    PortState,
+    Rearm,
+    SetStateRate,
+)
 from tendon.replay_window import ReplayWindow
 from tendon.requests import IncomingRequests, OutgoingRequests
 from tendon.round_trip import RoundTrip
@@ -314,6 +326,24 @@ def test_what_does_not_fit_into_one_datagram_goes_into_the_next():
     assert len(sizes) == 2 and max(sizes) <= 1200
     assert [event.id for event in drain(ours)] == list(range(1, 17))
     assert ours.request(Rearm()) == 17
+
+
+def test_the_two_ends_of_a_coupling_are_streams_of_their_own():
+    ours, theirs = Session(7, 0), Session(7, 0)
+
+    def arrived(*ports: PortState) -> list:
+        for port in ports:
+            theirs.send(port)
+        while (datagram := theirs.next_datagram(0)) is not None:
+            ours.receive(0, datagram)
+        return drain(ours)
+
+    def port(epoch: int, of_peer: bool) -> PortState:
+        return PortState(1, 1, epoch, 1, 0, 0, 0, 0, PortPhase.ENGAGED, of_peer=of_peer)
+
+    assert arrived(port(9, True), port(5, False)) == [port(5, False), port(9, True)]
+    assert ours.stats.stale == 0
+    assert arrived(port(4, False)) == [] and ours.stats.stale == 1
 
 
 def test_a_request_is_repeated_at_doubling_intervals_up_to_1_s():

@@ -36,15 +36,20 @@ from tendon.messages import (
     OutputDescription,
     OutputKind,
     PeerReport,
+    PortGrip,
     PortPhase,
     PortRole,
     PortState,
     PortSurface,
+    PortTurn,
+    RateControl,
     Refused,
     Role,
     RotationModel,
     Safety,
     SetOutput,
+    SetScale,
+    SetShare,
     SetStateDeadband,
     SetStateRate,
     Torque,
@@ -190,6 +195,17 @@ PORT_MODEL = replace(
     wave_energy=0.5,
     surface=PortSurface(normal=(0.0, 0.6, 0.8), offset=-0.125, stiffness=500.0),
 )
+PORT_ALL = replace(
+    PORT_MODEL,
+    phase=PortPhase.ALIGNING,
+    turn=PortTurn(turn=(0.6, 0.0, 0.8, 0.0), angular_velocity=(0.0, 0.25, 0.0), torque=(0.0, -0.5, 0.0)),
+    grip=PortGrip(opening=0.0625, velocity=-0.125, force=2.0, account=-0.25, need=0.5, given=0.75, taken=1.25),
+    energy_in=3.5,
+    share=0.25,
+    position_scale=0.5,
+    force_scale=2.0,
+    of_peer=True,
+)
 COUPLE = Couple(
     device=1,
     channel=1,
@@ -206,10 +222,25 @@ COUPLE = Couple(
     purse=True,
     period_us=1000,
 )
+COUPLE_ALL = replace(
+    COUPLE,
+    method=CouplingMethod.RATE,
+    absolute=True,
+    turn_stiffness=0.5,
+    turn_damping=0.0625,
+    grip_stiffness=200.0,
+    grip_damping=1.5,
+    drift_rate=0.25,
+    rate=RateControl(dead_zone=0.125, gain=2.5, max_speed=0.75),
+)
 FRAMES = {
     "port": (71, None, [PORT]),
     "port-contact": (72, None, [PORT_CONTACT]),
     "port-model": (90, None, [PORT_MODEL]),
+    "port-all": (91, None, [PORT_ALL]),
+    "control-couple-all": (92, None, [Control(20, COUPLE_ALL)]),
+    "control-set-scale": (93, None, [Control(21, SetScale(1, 0.25, 4.0))]),
+    "control-set-share": (94, None, [Control(22, SetShare(1, 1, 0.75))]),
     "control-couple": (73, None, [Control(15, COUPLE)]),
     "control-engage": (74, None, [Control(16, Engage(1))]),
     "control-disengage": (75, None, [Control(17, Disengage(1))]),
@@ -387,7 +418,37 @@ def out_of_bounds():
     yield "given", replace(PORT, given=1e6 + 1)
     yield "taken", replace(PORT, taken=-0.1)
     yield "role 0", Control(1, replace(COUPLE, role=0))
-    yield "method 5", Control(1, replace(COUPLE, method=5))
+    yield "a turn that is no rotation", replace(PORT, turn=PortTurn((0.602, 0.0, 0.8, 0.0)))
+    yield "angular velocity NaN", replace(PORT, turn=PortTurn((0.6, 0.0, 0.8, 0.0), (nan, 0.0, 0.0)))
+    yield "torque infinite", replace(PORT, turn=PortTurn((0.6, 0.0, 0.8, 0.0), torque=(0.0, inf, 0.0)))
+    yield "opening NaN", replace(PORT, grip=PortGrip(opening=nan))
+    yield "velocity of the grip infinite", replace(PORT, grip=PortGrip(velocity=inf))
+    yield "grip force", replace(PORT, grip=PortGrip(force=1.1e12))
+    yield "account of the grip", replace(PORT, grip=PortGrip(account=1000.1))
+    yield "need of the grip", replace(PORT, grip=PortGrip(need=-0.1))
+    yield "given by the grip", replace(PORT, grip=PortGrip(given=1e6 + 1))
+    yield "taken by the grip", replace(PORT, grip=PortGrip(taken=-0.1))
+    yield "energy in", replace(PORT, energy_in=-0.1)
+    yield "share below zero", replace(PORT, share=-0.001)
+    yield "share above one", replace(PORT, share=1.001)
+    yield "a port's scale below a hundredth", replace(PORT, position_scale=0.0099)
+    yield "a port's scale above a hundred", replace(PORT, force_scale=100.1)
+    yield "a port's scale NaN", replace(PORT, force_scale=nan)
+    yield "method 8", Control(1, replace(COUPLE, method=8))
+    yield "turn stiffness", Control(1, replace(COUPLE, turn_stiffness=-0.1))
+    yield "turn damping", Control(1, replace(COUPLE, turn_damping=inf))
+    yield "grip stiffness", Control(1, replace(COUPLE, grip_stiffness=nan))
+    yield "grip damping", Control(1, replace(COUPLE, grip_damping=-0.1))
+    yield "drift rate", Control(1, replace(COUPLE, drift_rate=1.1e12))
+    yield "dead zone", Control(1, replace(COUPLE_ALL, rate=RateControl(-0.1, 1.0, 1.0)))
+    yield "no gain", Control(1, replace(COUPLE_ALL, rate=RateControl(0.0, 0.0, 1.0)))
+    yield "no speed", Control(1, replace(COUPLE_ALL, rate=RateControl(0.0, 1.0, 0.0)))
+    yield "scales of device 16", Control(1, SetScale(16, 1.0, 1.0))
+    yield "scale of the moves", Control(1, SetScale(1, 0.0099, 1.0))
+    yield "scale of the forces", Control(1, SetScale(1, 1.0, nan))
+    yield "share on device 16", Control(1, SetShare(16, 1, 0.5))
+    yield "share on channel 8", Control(1, SetShare(1, 8, 0.5))
+    yield "share of more than the whole", Control(1, SetShare(1, 1, 1.001))
     yield "a scale below a hundredth", Control(1, replace(COUPLE, position_scale=0.0099))
     yield "a scale above a hundred", Control(1, replace(COUPLE, force_scale=100.1))
     yield "a rotation that is none", Control(1, replace(COUPLE, rotation=(0.602, 0.0, 0.8, 0.0)))

@@ -33,6 +33,7 @@ struct Range {
   std::string most;       ///< empty: none
   bool beyond = false;    ///< `least` itself is out of bounds
   bool infinity = false;  ///< +infinity is within bounds
+  bool zero = false;      ///< 0 is within bounds
 };
 
 struct Bound {
@@ -63,8 +64,12 @@ void take_entries(const std::string& text, Bound& to) {
   to.too_few_or_many.erase(-1);
 }
 
-Range range(const std::string& open, const std::string& least, const std::string& most, bool infinity) {
-  return {.least = least, .most = most == "…" ? "" : most, .beyond = open == "(", .infinity = infinity};
+Range range(const std::string& open, const std::string& least, const std::string& most, std::string_view beside) {
+  return {.least = least,
+          .most = most == "…" ? "" : most,
+          .beyond = open == "(",
+          .infinity = beside == " or +infinity",
+          .zero = beside == " or 0"};
 }
 
 /// The bound at the front of a comment; empty when there is none.
@@ -72,18 +77,18 @@ std::optional<Bound> bound_of(const std::string& comment) {
   if (comment.empty() || std::string("[({").find(comment.front()) == std::string::npos) return {};
   static const std::string kRange = R"(([\[(])([^,\]]+), ([^\]]+)\])";
   static const std::string kEntries = R"((\[\d+, \d+\]|\{\d+(?:, \d+)*\}) entries)";
-  static const std::regex kForms("(?:" + kRange + "( bytes| or \\+infinity)?(?:, " + kEntries + ")?|" + kEntries +
+  static const std::regex kForms("(?:" + kRange + "( bytes| or \\+infinity| or 0)?(?:, " + kEntries + ")?|" + kEntries +
                                  "(?: of " + kRange + " bytes)?)(?::.*)?");
   std::smatch found;
   if (!std::regex_match(comment, found, kForms)) throw std::invalid_argument("no bound: " + comment);
   Bound out;
   if (found[1].matched && !(found[4] == "" && found[6].matched)) {
-    const Range read = range(found[1], found[2], found[3], found[4] == " or +infinity");
+    const Range read = range(found[1], found[2], found[3], found[4].str());
     (found[4] == " bytes" ? out.bytes : out.value) = read;
   }
   if (found[5].matched) take_entries(found[5], out);
   if (found[6].matched) take_entries(found[6], out);
-  if (found[7].matched) out.bytes = range(found[7], found[8], found[9], false);
+  if (found[7].matched) out.bytes = range(found[7], found[8], found[9], {});
   return out;
 }
 
@@ -118,8 +123,8 @@ std::int64_t whole(const std::string& text) {
 
 /// What depends on another field too: what is right beyond the bound is refused all the same.
 bool is_bound_to_others(const std::string& path) {
-  static const std::regex kOthers(
-      R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|at_orientation|rotation)\..*)");
+  static const std::regex kOthers(R"(.*\.(normal|workspace_min_m|workspace_max_m|operator_from_device|orientation|)"
+                                  R"(at_orientation|rotation|turn\.turn)\..*)");
   return std::regex_match(path, kOthers);
 }
 
@@ -230,6 +235,10 @@ class Maker {
       set(std::nextafter(least, bound.value->beyond ? kInfinity : -kInfinity), bound.value->beyond);
       set(most, true);
       set(std::nextafter(most, kInfinity), false);
+      if (bound.value->zero) {
+        set(0, true);
+        set(std::nextafter(0, kInfinity), false);
+      }
       set(kInfinity, bound.value->infinity);
       set(-kInfinity, false);
       set(std::numeric_limits<double>::quiet_NaN(), false);

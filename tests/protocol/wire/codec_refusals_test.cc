@@ -250,9 +250,35 @@ TEST(Codec, APortOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"a surface beyond all places", [](PortFrame& p) { p.surface->offset = -1.001e12; }},
       {"a surface that pulls", [](PortFrame& p) { p.surface->stiffness = -1e-9; }},
       {"a rigid surface", [](PortFrame& p) { p.surface->stiffness = kInf; }},
+      {"a turn that is no rotation", [](PortFrame& p) { p.turn->turn.w = 0.602; }},
+      {"NaN turn", [](PortFrame& p) { p.turn->turn.x = kNan; }},
+      {"infinite angular velocity", [](PortFrame& p) { p.turn->angular_velocity.x() = kInf; }},
+      {"huge torque", [](PortFrame& p) { p.turn->torque.z() = -1.001e12; }},
+      {"NaN opening", [](PortFrame& p) { p.grip->opening = kNan; }},
+      {"infinite velocity of the grip", [](PortFrame& p) { p.grip->velocity = kInf; }},
+      {"huge grip force", [](PortFrame& p) { p.grip->force = -1.001e12; }},
+      {"a huge account of the grip", [](PortFrame& p) { p.grip->account = 1001; }},
+      {"a huge debt of the grip", [](PortFrame& p) { p.grip->account = -1001; }},
+      {"a grip that needs less than nothing", [](PortFrame& p) { p.grip->need = -1e-9; }},
+      {"a huge need of the grip", [](PortFrame& p) { p.grip->need = 1001; }},
+      {"a grip that gave less than nothing", [](PortFrame& p) { p.grip->given = -1e-9; }},
+      {"a grip that gave too much", [](PortFrame& p) { p.grip->given = 1'000'001; }},
+      {"a grip that took less than nothing", [](PortFrame& p) { p.grip->taken = -1e-9; }},
+      {"a grip that took too much", [](PortFrame& p) { p.grip->taken = 1'000'001; }},
+      {"less than no energy in", [](PortFrame& p) { p.energy_in = -1e-9; }},
+      {"a million joules and one in", [](PortFrame& p) { p.energy_in = 1'000'001; }},
+      {"NaN energy in", [](PortFrame& p) { p.energy_in = kNan; }},
+      {"a share below zero", [](PortFrame& p) { p.share = -1e-9; }},
+      {"more than the whole", [](PortFrame& p) { p.share = 1.001; }},
+      {"NaN share", [](PortFrame& p) { p.share = kNan; }},
+      {"a hundredth is the least scale but 0", [](PortFrame& p) { p.position_scale = 0.0099; }},
+      {"a scale below zero", [](PortFrame& p) { p.position_scale = -1; }},
+      {"a hundred is the largest scale", [](PortFrame& p) { p.position_scale = 100.1; }},
+      {"the same of the forces", [](PortFrame& p) { p.force_scale = 0.0099; }},
+      {"NaN scale", [](PortFrame& p) { p.force_scale = kNan; }},
   };
   for (const BadPort& bad : cases) {
-    PortFrame port = examples::port_by_model();
+    PortFrame port = examples::port_with_all();
     bad.spoil(port);
     expect_left_out(port, bad.what);
   }
@@ -281,12 +307,47 @@ TEST(Codec, ACoupleOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
       {"mutual damping below zero", [](Couple& c) { c.mutual_damping = -1; }},
       {"no period", [](Couple& c) { c.period = Duration{}; }},
       {"a period of more than 10 s", [](Couple& c) { c.period = std::chrono::seconds(10) + Duration{1}; }},
+      {"method 8", [](Couple& c) { c.method = CouplingMethod{8}; }},
+      {"a turn's stiffness below zero", [](Couple& c) { c.turn_stiffness = -1e-9; }},
+      {"infinite damping of a turn", [](Couple& c) { c.turn_damping = kInf; }},
+      {"NaN stiffness of the grip", [](Couple& c) { c.grip_stiffness = kNan; }},
+      {"damping of the grip below zero", [](Couple& c) { c.grip_damping = -1e-9; }},
+      {"a huge drift rate", [](Couple& c) { c.drift_rate = 1.001e12; }},
+      {"a dead zone below zero", [](Couple& c) { c.rate->dead_zone = -1e-9; }},
+      {"NaN dead zone", [](Couple& c) { c.rate->dead_zone = kNan; }},
+      {"no gain", [](Couple& c) { c.rate->gain = 0; }},
+      {"infinite gain", [](Couple& c) { c.rate->gain = kInf; }},
+      {"no speed", [](Couple& c) { c.rate->max_speed = 0; }},
+      {"a huge speed", [](Couple& c) { c.rate->max_speed = 1.001e12; }},
   };
   for (const BadCouple& bad : cases) {
-    Couple couple = examples::couple();
+    Couple couple = examples::couple_with_all();
     bad.spoil(couple);
     expect_left_out(Control{.id = 1, .request = couple}, bad.what);
   }
+}
+
+TEST(Codec, AScaleOrAShareOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
+  struct Bad {
+    const char* what;
+    Request request;
+  };
+  const Bad cases[] = {
+      {"scales of device 16", SetScale{.device = limits::kMaxDevices}},
+      {"a hundredth is the least scale", SetScale{.position_scale = 0.0099}},
+      {"a hundred is the largest", SetScale{.position_scale = 100.1}},
+      {"NaN scale", SetScale{.position_scale = kNan}},
+      {"no force", SetScale{.force_scale = 0}},
+      {"a huge force", SetScale{.force_scale = kInf}},
+      {"a share on device 16", SetShare{.device = limits::kMaxDevices}},
+      {"a share on channel 8", SetShare{.channel = limits::kMaxChannels}},
+      {"a share below zero", SetShare{.share = -1e-9}},
+      {"more than the whole", SetShare{.share = 1.001}},
+      {"NaN share", SetShare{.share = kNan}},
+  };
+  for (const Bad& bad : cases) expect_left_out(Control{.id = 1, .request = bad.request}, bad.what);
+  EXPECT_TRUE(in_bounds(SetScale{.position_scale = 0.01, .force_scale = 100}));
+  EXPECT_TRUE(in_bounds(SetShare{.share = 0}) && in_bounds(SetShare{.share = 1}));
 }
 
 TEST(Codec, ASettingOutOfBoundsIsLeftOutAndCountedAndTheRestIsRead) {
@@ -336,7 +397,8 @@ TEST(Codec, ACoupleWithoutARoleAMethodOrARotationIsRefused) {
   EXPECT_EQ(couple(3, 1, true), 0U);
   EXPECT_EQ(couple(1, 0, true), 0U);
   EXPECT_EQ(couple(1, 4, true), 1U);
-  EXPECT_EQ(couple(1, 5, true), 0U);
+  EXPECT_EQ(couple(1, 7, true), 1U);
+  EXPECT_EQ(couple(1, 8, true), 0U);
   EXPECT_EQ(couple(1, 1, false), 0U);
 }
 

@@ -339,6 +339,23 @@ RC_GTEST_PROP(Codec, APortComesOutAsItWentIn, ()) {
   if (*rc::gen::arbitrary<bool>()) {
     in.surface = {.normal = {0, 0.6, -0.8}, .offset = between(-1e12, 1e12), .stiffness = between(0, 1e12)};
   }
+  if (*rc::gen::arbitrary<bool>()) {
+    in.turn = {.turn = any_rotation(), .angular_velocity = any_vector(), .torque = any_vector()};
+  }
+  if (*rc::gen::arbitrary<bool>()) {
+    in.grip = {.opening = any_value(),
+               .velocity = any_value(),
+               .force = any_value(),
+               .account = between(-1e3, 1e3),
+               .need = between(0, 1e3),
+               .given = between(0, 1e6),
+               .taken = between(0, 1e6)};
+  }
+  in.energy_in = between(0, 1e6);
+  if (*rc::gen::arbitrary<bool>()) in.share = between(0, 1);
+  if (*rc::gen::arbitrary<bool>()) in.position_scale = between(0.01, 100);
+  if (*rc::gen::arbitrary<bool>()) in.force_scale = between(0.01, 100);
+  in.of_peer = *rc::gen::arbitrary<bool>();
 
   const PortFrame out = there(in);
   RC_ASSERT(out.device == in.device);
@@ -365,6 +382,27 @@ RC_GTEST_PROP(Codec, APortComesOutAsItWentIn, ()) {
     RC_ASSERT(out.surface->offset == in.surface->offset);
     RC_ASSERT(out.surface->stiffness == in.surface->stiffness);
   }
+  RC_ASSERT(out.turn.has_value() == in.turn.has_value());
+  if (in.turn) {
+    RC_ASSERT((out.turn->turn == in.turn->turn));
+    RC_ASSERT(out.turn->angular_velocity == in.turn->angular_velocity);
+    RC_ASSERT(out.turn->torque == in.turn->torque);
+  }
+  RC_ASSERT(out.grip.has_value() == in.grip.has_value());
+  if (in.grip) {
+    RC_ASSERT(out.grip->opening == in.grip->opening);
+    RC_ASSERT(out.grip->velocity == in.grip->velocity);
+    RC_ASSERT(out.grip->force == in.grip->force);
+    RC_ASSERT(out.grip->account == in.grip->account);
+    RC_ASSERT(out.grip->need == in.grip->need);
+    RC_ASSERT(out.grip->given == in.grip->given);
+    RC_ASSERT(out.grip->taken == in.grip->taken);
+  }
+  RC_ASSERT(out.energy_in == in.energy_in);
+  RC_ASSERT(out.share == in.share);
+  RC_ASSERT(out.position_scale == in.position_scale);
+  RC_ASSERT(out.force_scale == in.force_scale);
+  RC_ASSERT(out.of_peer == in.of_peer);
 }
 
 RC_GTEST_PROP(Codec, ACoupleComesOutAsItWentIn, ()) {
@@ -373,7 +411,7 @@ RC_GTEST_PROP(Codec, ACoupleComesOutAsItWentIn, ()) {
   in.device = *rc::gen::inRange(0U, limits::kMaxDevices);
   in.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
   in.role = *rc::gen::arbitrary<bool>() ? PortRole::kLeader : PortRole::kFollower;
-  in.method = *rc::gen::arbitrary<bool>() ? CouplingMethod::kPositionPosition : CouplingMethod::kPositionForce;
+  in.method = *rc::gen::elementOf(std::vector(kCouplingMethods.begin(), kCouplingMethods.end()));
   in.position_scale = scale();
   in.force_scale = scale();
   in.rotation = any_rotation();
@@ -384,6 +422,16 @@ RC_GTEST_PROP(Codec, ACoupleComesOutAsItWentIn, ()) {
   in.adapt_to_delay = *rc::gen::arbitrary<bool>();
   in.purse = *rc::gen::arbitrary<bool>();
   in.period = std::chrono::microseconds(*rc::gen::inRange(1, 10'000'001));
+  in.absolute = *rc::gen::arbitrary<bool>();
+  in.turn_stiffness = std::abs(any_value());
+  in.turn_damping = std::abs(any_value());
+  in.grip_stiffness = std::abs(any_value());
+  in.grip_damping = std::abs(any_value());
+  in.drift_rate = std::abs(any_value());
+  if (*rc::gen::arbitrary<bool>()) {
+    const auto above_zero = [] { return std::min(std::abs(any_value()) + 1e-9, limits::kMaxValue); };
+    in.rate = {.dead_zone = std::abs(any_value()), .gain = above_zero(), .max_speed = above_zero()};
+  }
   const auto out = there(Control{.id = 1, .request = in});
   RC_ASSERT(std::get<Couple>(*out.request) == in);
 }
@@ -391,6 +439,32 @@ RC_GTEST_PROP(Codec, ACoupleComesOutAsItWentIn, ()) {
 TEST(Codec, EngageAndDisengageComeOutAsTheyWentIn) {
   EXPECT_EQ(std::get<Engage>(*there(Control{.id = 1, .request = Engage{.device = 15}}).request).device, 15U);
   EXPECT_EQ(std::get<Disengage>(*there(Control{.id = 1, .request = Disengage{.device = 15}}).request).device, 15U);
+}
+
+RC_GTEST_PROP(Codec, ScalesAndSharesComeOutAsTheyWentIn, ()) {
+  SetScale scale;
+  scale.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  scale.position_scale = *rc::gen::inRange(1, 10'001) / 100.0;
+  scale.force_scale = *rc::gen::inRange(1, 10'001) / 100.0;
+  const auto scaled = std::get<SetScale>(*there(Control{.id = 1, .request = scale}).request);
+  RC_ASSERT(scaled.device == scale.device);
+  RC_ASSERT(scaled.position_scale == scale.position_scale);
+  RC_ASSERT(scaled.force_scale == scale.force_scale);
+  SetShare share;
+  share.device = *rc::gen::inRange(0U, limits::kMaxDevices);
+  share.channel = *rc::gen::inRange(0U, limits::kMaxChannels);
+  share.share = *rc::gen::inRange(0, 1001) / 1000.0;
+  const auto shared = std::get<SetShare>(*there(Control{.id = 1, .request = share}).request);
+  RC_ASSERT(shared.device == share.device);
+  RC_ASSERT(shared.channel == share.channel);
+  RC_ASSERT(shared.share == share.share);
+}
+
+TEST(Codec, AShareOfNothingIsNotTheSameAsNone) {
+  PortFrame port = examples::port();
+  EXPECT_FALSE(there(port).share);
+  port.share = 0;
+  EXPECT_EQ(there(port).share, 0.0);
 }
 
 TEST(Codec, ASettingComesOutAsItWentIn) {
@@ -420,6 +494,13 @@ TEST(Codec, APortTakes238BytesAndAtMost401AndFitsBesideAState) {
   most.wave_integral = {0.1, -0.2, 0.3};
   most.wave_energy = 0.1;
   most.surface = {.normal = {0.36, 0.48, 0.8}, .offset = 0.1, .stiffness = 0.1};
+  most.turn = {.turn = {.w = 0.4, .x = 0.4, .y = 0.2, .z = -0.8},
+               .angular_velocity = {0.1, -0.2, 0.3},
+               .torque = {0.1, -0.2, 0.3}};
+  most.grip = {.opening = 0.1, .velocity = 0.1, .force = 0.1, .account = 0.1, .need = 0.1, .given = 0.1, .taken = 0.1};
+  most.energy_in = most.position_scale = most.force_scale = 0.1;
+  most.share = 0;
+  most.of_peer = true;
   EXPECT_EQ(sealed(most), 401U);
   EXPECT_LE(sealed(examples::state_with_handle(), most), kMaxDatagram);
 }
@@ -472,6 +553,31 @@ TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastHandle) {
   ControlAck ack = examples::handle_described(1);
   ack.handle = little;
   EXPECT_EQ(write(examples::state(), examples::force(), ack), data(0, {}, examples::state(), examples::force(), ack));
+}
+
+TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastCoupling) {
+  DataWriter writer;
+  std::array<std::byte, kMaxDatagram> buffer;
+  const auto write = [&](const auto&... frames) {
+    writer.begin(buffer, {.connection_id = examples::kConnection}, LocalTime{Duration{1'000'100'000}}, {});
+    (writer.add(frames), ...);
+    return examples::Bytes(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(writer.size()));
+  };
+  write(examples::port_with_all(), Control{.id = 1, .request = examples::couple_with_all()});
+  const Control couple{.id = 1, .request = examples::couple()};
+  EXPECT_EQ(write(examples::port(), couple), data(0, {}, examples::port(), couple));
+}
+
+TEST(Codec, AReaderUsedAgainRemembersNothingOfTheLastCoupling) {
+  DataReader reader;
+  read(reader, data(1, {}, examples::port_with_all(), Control{.id = 1, .request = examples::couple_with_all()}));
+  const auto* content = read(reader, data(2, {}, examples::port(), Control{.id = 1, .request = examples::couple()}));
+  ASSERT_NE(content, nullptr);
+  ASSERT_EQ(content->frames.size(), 2U);
+  const auto& port = std::get<PortFrame>(content->frames[0]);
+  EXPECT_FALSE(port.turn || port.grip || port.share || port.of_peer);
+  EXPECT_EQ(port.energy_in + port.position_scale + port.force_scale, 0);
+  EXPECT_EQ(std::get<Couple>(*std::get<Control>(content->frames[1]).request), examples::couple());
 }
 
 TEST(Codec, AWriterUsedAgainRemembersNothingOfTheLastReports) {

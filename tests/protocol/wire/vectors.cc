@@ -177,6 +177,10 @@ std::vector<Shown> shown(std::uint64_t far) {
       {"set a lamp", true, 278, 0, request(278, 18, examples::lamp())},
       {"start a pulse", true, 279, 0, request(279, 19, examples::vibration())},
       {"outputs of a device", false, 280, 0, at(280, examples::outputs_described(15))},
+      {"both ends of a coupling to an observer", false, 281, 0, at(281, examples::port(), examples::port_with_all())},
+      {"couple a device with all there is", true, 291, 0, request(291, 20, examples::couple_with_all())},
+      {"set the scales of a coupling", true, 292, 0, request(292, 21, examples::set_scale())},
+      {"set the share of a leader", true, 293, 0, request(293, 22, examples::set_share())},
       {"force far away", true, far, 0, at(far, examples::force())},
       {"bye", false, 259, 0, at(259, bye)},
   };

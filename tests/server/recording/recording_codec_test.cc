@@ -124,6 +124,13 @@ PortRecord a_port() {
   port.peer->surface = {.normal = {0, 0.6, 0.8}, .offset = -0.125, .stiffness = 500};
   port.peer->wave_integral = {0.25, 0, -1};
   port.peer->wave_energy = 0.5;
+  port.peer->turn = {.turn = {.w = 0.6, .x = 0, .y = 0.8, .z = 0}, .angular_velocity = {1, 2, 3}, .torque = {4, -5, 6}};
+  port.peer->grip = {
+      .opening = 0.0625, .velocity = -0.125, .force = 2, .account = -0.25, .need = 0.5, .given = 0.75, .taken = 1.25};
+  port.peer->energy_in = 3.5;
+  port.peer->share = 0;
+  port.peer->position_scale = 0.5;
+  port.peer->force_scale = 4;
   return port;
 }
 
@@ -148,7 +155,23 @@ TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
   EXPECT_EQ(read.peer->surface->stiffness, 500);
   EXPECT_EQ(read.peer->wave_integral, port.peer->wave_integral);
   EXPECT_EQ(read.peer->wave_energy, 0.5);
-  EXPECT_FALSE(read.sent.surface);
+  ASSERT_TRUE(read.peer->turn);
+  EXPECT_EQ(read.peer->turn->turn, port.peer->turn->turn);
+  EXPECT_EQ(read.peer->turn->angular_velocity, port.peer->turn->angular_velocity);
+  EXPECT_EQ(read.peer->turn->torque, port.peer->turn->torque);
+  ASSERT_TRUE(read.peer->grip);
+  EXPECT_EQ(read.peer->grip->opening, 0.0625);
+  EXPECT_EQ(read.peer->grip->velocity, -0.125);
+  EXPECT_EQ(read.peer->grip->force, 2);
+  EXPECT_EQ(read.peer->grip->account, -0.25);
+  EXPECT_EQ(read.peer->grip->need, 0.5);
+  EXPECT_EQ(read.peer->grip->given, 0.75);
+  EXPECT_EQ(read.peer->grip->taken, 1.25);
+  EXPECT_EQ(read.peer->energy_in, 3.5);
+  EXPECT_EQ(read.peer->share, 0.0);
+  EXPECT_EQ(read.peer->position_scale, 0.5);
+  EXPECT_EQ(read.peer->force_scale, 4);
+  EXPECT_FALSE(read.sent.surface || read.sent.turn || read.sent.grip || read.sent.share);
   PortRecord alone = port;
   alone.peer.reset();
   EXPECT_FALSE(recording::decode_port(recording::encode(alone), port.at).peer);

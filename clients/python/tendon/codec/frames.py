@@ -42,6 +42,8 @@ from ..messages import (
     Request,
     RotationModel,
     SetOutput,
+    SetScale,
+    SetShare,
     SetStateDeadband,
     SetStateRate,
     TakeLease,
@@ -217,6 +219,10 @@ def _read_control(message: pb.Control) -> Control:
         request = Disengage(fields.device(message.disengage.device))
     elif op == "set_output":
         request = _read_set_output(message.set_output)
+    elif op == "set_scale":
+        request = ports.read_set_scale(message.set_scale)
+    elif op == "set_share":
+        request = ports.read_set_share(message.set_share)
     return Control(id=fields.whole(message.id, 1, 2**32), request=request)
 
 
@@ -521,6 +527,11 @@ def _write_control(frame: Control) -> pb.Control:
         control.disengage.CopyFrom(pb.Disengage(device=request.device))
     elif isinstance(request, SetOutput):
         control.set_output.CopyFrom(_write_set_output(request))
+    elif isinstance(request, SetScale):
+        position, force = request.position_scale, request.force_scale
+        control.set_scale.CopyFrom(pb.SetScale(device=request.device, position_scale=position, force_scale=force))
+    elif isinstance(request, SetShare):
+        control.set_share.CopyFrom(pb.SetShare(device=request.device, channel=request.channel, share=request.share))
     return control
 
 

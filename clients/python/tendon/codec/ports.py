@@ -8,7 +8,20 @@ from typing import cast
 
 from .. import limits
 from .. import tendon_pb2 as pb
-from ..messages import Couple, CouplingMethod, PortPhase, PortRole, PortState, PortSurface, Vec3
+from ..messages import (
+    Couple,
+    CouplingMethod,
+    PortGrip,
+    PortPhase,
+    PortRole,
+    PortState,
+    PortSurface,
+    PortTurn,
+    RateControl,
+    SetScale,
+    SetShare,
+    Vec3,
+)
 from . import fields
 
 _PHASES: dict[int, PortPhase] = {int(phase): phase for phase in PortPhase}
@@ -39,6 +52,49 @@ def _write_surface(surface: PortSurface) -> pb.PortSurface:
     return pb.PortSurface(normal=normal, offset_m=surface.offset, stiffness_npm=surface.stiffness)
 
 
+def _read_turn(message: pb.PortTurn) -> PortTurn:
+    angular_velocity = fields.vector(message.angular_velocity_radps)
+    return PortTurn(fields.quaternion(message.turn), angular_velocity, fields.vector(message.torque_nm))
+
+
+def _write_turn(turn: PortTurn) -> pb.PortTurn:
+    w, x, y, z = turn.turn
+    return pb.PortTurn(
+        turn=pb.Quat(w=w, x=x, y=y, z=z),
+        angular_velocity_radps=_write_vector(turn.angular_velocity),
+        torque_nm=_write_vector(turn.torque),
+    )
+
+
+def _read_grip(message: pb.PortGrip) -> PortGrip:
+    return PortGrip(
+        opening=fields.number(message.opening_m),
+        velocity=fields.number(message.velocity_mps),
+        force=fields.number(message.force_n),
+        account=_within(message.account_j, -limits.MAX_ACCOUNT, limits.MAX_ACCOUNT),
+        need=_within(message.need_j, 0, limits.MAX_ACCOUNT),
+        given=_within(message.given_j, 0, limits.MAX_TOTAL),
+        taken=_within(message.taken_j, 0, limits.MAX_TOTAL),
+    )
+
+
+def _write_grip(grip: PortGrip) -> pb.PortGrip:
+    return pb.PortGrip(
+        opening_m=grip.opening,
+        velocity_mps=grip.velocity,
+        force_n=grip.force,
+        account_j=grip.account,
+        need_j=grip.need,
+        given_j=grip.given,
+        taken_j=grip.taken,
+    )
+
+
+def _read_scale(scale: float) -> float:
+    """0: as in Couple."""
+    return scale if scale == 0 else _within(scale, limits.MIN_SCALE, limits.MAX_SCALE)
+
+
 def read_port(message: pb.PortState) -> PortState:
     contact = message.contact_force_n
     return PortState(
@@ -64,6 +120,13 @@ def read_port(message: pb.PortState) -> PortState:
         wave_integral=fields.vector(message.wave_integral),
         wave_energy=_within(message.wave_energy_j, 0, limits.MAX_TOTAL),
         surface=_read_surface(message.surface) if message.HasField("surface") else None,
+        turn=_read_turn(message.turn) if message.HasField("turn") else None,
+        grip=_read_grip(message.grip) if message.HasField("grip") else None,
+        energy_in=_within(message.energy_in_j, 0, limits.MAX_TOTAL),
+        share=_within(message.share, 0, 1) if message.HasField("share") else None,
+        position_scale=_read_scale(message.position_scale),
+        force_scale=_read_scale(message.force_scale),
+        of_peer=message.of_peer,
     )
 
 
@@ -91,7 +154,25 @@ def write_port(port: PortState) -> pb.PortState:
         wave_integral=_write_vector(port.wave_integral) if any(port.wave_integral) else None,
         wave_energy_j=port.wave_energy,
         surface=None if port.surface is None else _write_surface(port.surface),
+        turn=None if port.turn is None else _write_turn(port.turn),
+        grip=None if port.grip is None else _write_grip(port.grip),
+        energy_in_j=port.energy_in,
+        share=port.share,
+        position_scale=port.position_scale,
+        force_scale=port.force_scale,
+        of_peer=port.of_peer,
     )
+
+
+def _read_rate(message: pb.RateControl) -> RateControl:
+    gain, max_speed = fields.magnitude(message.gain_per_s), fields.magnitude(message.max_speed_mps)
+    if gain == 0 or max_speed == 0:
+        raise fields.OutOfBounds
+    return RateControl(fields.magnitude(message.dead_zone_m), gain, max_speed)
+
+
+def _write_rate(rate: RateControl) -> pb.RateControl:
+    return pb.RateControl(dead_zone_m=rate.dead_zone, gain_per_s=rate.gain, max_speed_mps=rate.max_speed)
 
 
 def read_couple(message: pb.Couple) -> Couple:
@@ -110,6 +191,13 @@ def read_couple(message: pb.Couple) -> Couple:
         adapt_to_delay=message.adapt_to_delay,
         purse=message.purse,
         period_us=fields.whole(message.period_us, 1, limits.MAX_VALID_FOR_US),
+        absolute=message.absolute,
+        turn_stiffness=fields.magnitude(message.turn_stiffness_nmprad),
+        turn_damping=fields.magnitude(message.turn_damping_nmsprad),
+        grip_stiffness=fields.magnitude(message.grip_stiffness_npm),
+        grip_damping=fields.magnitude(message.grip_damping_nspm),
+        drift_rate=fields.magnitude(message.drift_rate_per_s),
+        rate=_read_rate(message.rate) if message.HasField("rate") else None,
     )
 
 
@@ -130,4 +218,36 @@ def write_couple(couple: Couple) -> pb.Couple:
         adapt_to_delay=couple.adapt_to_delay,
         purse=couple.purse,
         period_us=couple.period_us,
+        absolute=couple.absolute,
+        turn_stiffness_nmprad=couple.turn_stiffness,
+        turn_damping_nmsprad=couple.turn_damping,
+        grip_stiffness_npm=couple.grip_stiffness,
+        grip_damping_nspm=couple.grip_damping,
+        drift_rate_per_s=couple.drift_rate,
+        rate=None if couple.rate is None else _write_rate(couple.rate),
     )
+
+
+def is_scale(wanted: SetScale) -> bool:
+    """Whether a receiver accepts it."""
+    scales = (wanted.position_scale, wanted.force_scale)
+    return all(limits.MIN_SCALE <= scale <= limits.MAX_SCALE for scale in scales)
+
+
+def is_share(wanted: SetShare) -> bool:
+    """Whether a receiver accepts it."""
+    return 0 <= wanted.channel < limits.MAX_CHANNELS and 0 <= wanted.share <= 1
+
+
+def read_set_scale(message: pb.SetScale) -> SetScale:
+    wanted = SetScale(fields.device(message.device), message.position_scale, message.force_scale)
+    if not is_scale(wanted):
+        raise fields.OutOfBounds
+    return wanted
+
+
+def read_set_share(message: pb.SetShare) -> SetShare:
+    wanted = SetShare(fields.device(message.device), message.channel, message.share)
+    if not is_share(wanted):
+        raise fields.OutOfBounds
+    return wanted

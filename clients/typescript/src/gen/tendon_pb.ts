@@ -12,7 +12,7 @@ import type { Message } from "@bufbuild/protobuf";
  * Describes the file tendon.proto.
  */
 export const file_tendon: GenFile = /*@__PURE__*/
-  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByKLAwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIAEIGCgRib2R5IicKBFZlYzMSCQoBeBgBIAEoARIJCgF5GAIgASgBEgkKAXoYAyABKAEiMgoEUXVhdBIJCgF3GAEgASgBEgkKAXgYAiABKAESCQoBeRgDIAEoARIJCgF6GAQgASgBIrwGCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKC29yaWVudGF0aW9uGA8gASgLMg8udGVuZG9uLnYxLlF1YXQSLwoWYW5ndWxhcl92ZWxvY2l0eV9yYWRwcxgQIAEoCzIPLnRlbmRvbi52MS5WZWMzEg8KB2J1dHRvbnMYESABKAcSKgoRdG9ycXVlX2FwcGxpZWRfbm0YEiABKAsyDy50ZW5kb24udjEuVmVjMxIYCgtncmlwcGVyX3JhZBgTIAEoAUgAiAEBEiMKFmdyaXBwZXJfdmVsb2NpdHlfcmFkcHMYFCABKAFIAYgBARIkChdncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbhgVIAEoAUgCiAEBEiUKDGhhbmRfZm9yY2VfbhgWIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKCWpvaW50X3JhZBgXIAMoAUICEAESIAoUam9pbnRfdmVsb2NpdHlfcmFkcHMYGCADKAFCAhABEiAKFHN0aWZmbmVzc193YW50ZWRfbnBtGBkgAygBQgIQAUIOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEinwQKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpzZXRfb3V0cHV0GAogASgLMhQudGVuZG9uLnYxLlNldE91dHB1dEgAEiMKBmNvdXBsZRgLIAEoCzIRLnRlbmRvbi52MS5Db3VwbGVIABIjCgZlbmdhZ2UYDCABKAsyES50ZW5kb24udjEuRW5nYWdlSAASKQoJZGlzZW5nYWdlGA0gASgLMhQudGVuZG9uLnYxLkRpc2VuZ2FnZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSLZAgoGQ291cGxlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEiEKBHJvbGUYAyABKA4yEy50ZW5kb24udjEuUG9ydFJvbGUSKQoGbWV0aG9kGAQgASgOMhkudGVuZG9uLnYxLkNvdXBsaW5nTWV0aG9kEhYKDnBvc2l0aW9uX3NjYWxlGAUgASgBEhMKC2ZvcmNlX3NjYWxlGAYgASgBEiEKCHJvdGF0aW9uGAcgASgLMg8udGVuZG9uLnYxLlF1YXQSDAoEYXhlcxgIIAEoDRIVCg1zdGlmZm5lc3NfbnBtGAkgASgBEhsKE211dHVhbF9kYW1waW5nX25zcG0YCiABKAESFAoMZGFtcGluZ19uc3BtGAsgASgBEhYKDmFkYXB0X3RvX2RlbGF5GAwgASgIEg0KBXB1cnNlGA0gASgIEhEKCXBlcmlvZF91cxgOIAEoDSIYCgZFbmdhZ2USDgoGZGV2aWNlGAEgASgNIhsKCURpc2VuZ2FnZRIOCgZkZXZpY2UYASABKA0icAoJU2V0T3V0cHV0Eg4KBmRldmljZRgBIAEoDRIOCgZvdXRwdXQYAiABKA0SDQoDcmdiGAMgASgHSAASKQoJdmlicmF0aW9uGAQgASgLMhQudGVuZG9uLnYxLlZpYnJhdGlvbkgAQgkKB3NldHRpbmciSQoJVmlicmF0aW9uEhEKCWFtcGxpdHVkZRgBIAEoARIUCgxmcmVxdWVuY3lfaHoYAiABKAESEwoLZHVyYXRpb25fbXMYAyABKA0iKgoIRGVzY3JpYmUSDgoGZGV2aWNlGAEgASgNEg4KBmhhbmRsZRgCIAEoCCIsCglUYWtlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iLAoJR2l2ZUxlYXNlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNIjgKCUxlYXNlTG9zdBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIKCgJ0bxgDIAEoCSK0AQoKQ29udHJvbEFjaxIKCgJpZBgBIAEoDRIdCgRjb2RlGAIgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGZGV0YWlsGAMgASgJEg8KB3dhaXRfbXMYBCABKA0SLAoGZGV2aWNlGAUgASgLMhwudGVuZG9uLnYxLkRldmljZURlc2NyaXB0aW9uEiwKBmhhbmRsZRgGIAEoCzIcLnRlbmRvbi52MS5IYW5kbGVEZXNjcmlwdGlvbiLqAgoRRGV2aWNlRGVzY3JpcHRpb24SDgoGZGV2aWNlGAEgASgNEgwKBG5hbWUYAiABKAkSDQoFbW9kZWwYAyABKAkSFAoMcG9zaXRpb25fZG9mGAQgASgNEhEKCWZvcmNlX2RvZhgFIAEoDRIoCg93b3Jrc3BhY2VfbWluX20YBiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg93b3Jrc3BhY2VfbWF4X20YByABKAsyDy50ZW5kb24udjEuVmVjMxITCgttYXhfZm9yY2VfbhgIIAEoARIaChJjb250aW51b3VzX2ZvcmNlX24YCSABKAESGQoRbWF4X3N0aWZmbmVzc19ucG0YCiABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAsgASgBEg8KB2xvb3BfaHoYDCABKA0SLwoIY2hhbm5lbHMYDSADKAsyHS50ZW5kb24udjEuQ2hhbm5lbERlc2NyaXB0aW9uItYCChFIYW5kbGVEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SLQoUb3BlcmF0b3JfZnJvbV9kZXZpY2UYAiABKAsyDy50ZW5kb24udjEuUXVhdBIPCgdidXR0b25zGAMgAygJEhwKFG9yaWVudGF0aW9uX21lYXN1cmVkGAQgASgIEhUKDW1heF90b3JxdWVfbm0YBSABKAESHQoQZ3JpcHBlcl9vcGVuX3JhZBgGIAEoAUgAiAEBEhsKE21heF9ncmlwcGVyX2ZvcmNlX24YByABKAESDQoFZ3JvdXAYCCABKAkSHQoEaGFuZBgJIAEoDjIPLnRlbmRvbi52MS5IYW5kEg4KBmpvaW50cxgKIAMoCRItCgdvdXRwdXRzGAsgAygLMhwudGVuZG9uLnYxLk91dHB1dERlc2NyaXB0aW9uQhMKEV9ncmlwcGVyX29wZW5fcmFkIkYKEU91dHB1dERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSIwoEa2luZBgCIAEoDjIVLnRlbmRvbi52MS5PdXRwdXRLaW5kImoKEkNoYW5uZWxEZXNjcmlwdGlvbhIMCgRuYW1lGAEgASgJEiQKBHJ1bGUYAiABKA4yFi50ZW5kb24udjEuQ2hhbm5lbFJ1bGUSEAoIbGVhc2VfbXMYAyABKA0SDgoGaG9sZGVyGAQgASgJIjQKA0J5ZRIdCgRjb2RlGAEgASgOMg8udGVuZG9uLnYxLkNvZGUSDgoGcmVhc29uGAIgASgJIt4ECgpMaW5rUmVwb3J0Eg4KBm51bWJlchgBIAEoBBIQCgh1bnRpbF9ucxgCIAEoEBIPCgdzcGFuX25zGAMgASgEEg4KBmZvcmNlcxgEIAEoBBITCgtsYXRlX3NlcnZlchgFIAEoBBIUCgxsYXRlX25ldHdvcmsYBiABKAQSEwoLbGF0ZV9lbmdpbmUYByABKAQSFQoNd29yc3RfbGF0ZV9ucxgIIAEoBBIWCg5sb25nZXN0X2dhcF9ucxgJIAEoBBIlCgpyb3VuZF90cmlwGAogASgLMhEudGVuZG9uLnYxLkRlbGF5cxIkCgl0b19zZXJ2ZXIYCyABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX2NsaWVudBgMIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSFwoPY2xvY2tfb2Zmc2V0X25zGA0gASgSEhcKD2Nsb2NrX2RyaWZ0X3BwbRgOIAEoARIWCg5jbG9ja19lcnJvcl9ucxgPIAEoBBIQCghyZWNlaXZlZBgQIAEoBBIMCgRsb3N0GBEgASgEEhEKCXJlb3JkZXJlZBgSIAEoBBISCgpkdXBsaWNhdGVkGBMgASgEEg0KBXdvcmRzGBQgASgJEhQKDGxhdGVfdW5rbm93bhgVIAEoBBIaChJyZWZ1c2VkX25vdF9maW5pdGUYFiABKAQSHQoVcmVmdXNlZF9vdXRfb2ZfYm91bmRzGBcgASgEEhwKFHJlZnVzZWRfdW5rbm93bl90aWNrGBggASgEEhwKFHJlZnVzZWRfb2xkX3NlcXVlbmNlGBkgASgEIisKBkRlbGF5cxIRCgltZWRpYW5fbnMYASABKBISDgoGcDk5X25zGAIgASgSIqwECglQb3J0U3RhdGUSDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0SDQoFZXBvY2gYAyABKAQSEAoIc2VxdWVuY2UYBCABKAQSFQoNYW5zd2Vyc19lcG9jaBgFIAEoBBIPCgdhbnN3ZXJzGAYgASgEEg8KB3RpbWVfbnMYByABKBASFQoNcm91bmRfdHJpcF9ucxgIIAEoBBIjCgVwaGFzZRgJIAEoDjIULnRlbmRvbi52MS5Qb3J0UGhhc2USEgoKZW5nYWdlbWVudBgKIAEoBBIPCgdidXR0b25zGAsgASgHEiMKCnBvc2l0aW9uX20YDCABKAsyDy50ZW5kb24udjEuVmVjMxIlCgx2ZWxvY2l0eV9tcHMYDSABKAsyDy50ZW5kb24udjEuVmVjMxIgCgdmb3JjZV9uGA4gASgLMg8udGVuZG9uLnYxLlZlYzMSKAoPY29udGFjdF9mb3JjZV9uGA8gASgLMg8udGVuZG9uLnYxLlZlYzMSEQoJYWNjb3VudF9qGBAgASgBEg4KBm5lZWRfahgRIAEoARIPCgdnaXZlbl9qGBIgASgBEg8KB3Rha2VuX2oYEyABKAESJgoNd2F2ZV9pbnRlZ3JhbBgUIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKDXdhdmVfZW5lcmd5X2oYFSABKAESJwoHc3VyZmFjZRgWIAEoCzIWLnRlbmRvbi52MS5Qb3J0U3VyZmFjZSJXCgtQb3J0U3VyZmFjZRIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxIQCghvZmZzZXRfbRgCIAEoARIVCg1zdGlmZm5lc3NfbnBtGAMgASgBIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlMKCFBvcnRSb2xlEhkKFVBPUlRfUk9MRV9VTlNQRUNJRklFRBAAEhQKEFBPUlRfUk9MRV9MRUFERVIQARIWChJQT1JUX1JPTEVfRk9MTE9XRVIQAiq0AQoOQ291cGxpbmdNZXRob2QSHwobQ09VUExJTkdfTUVUSE9EX1VOU1BFQ0lGSUVEEAASJQohQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX1BPU0lUSU9OEAESIgoeQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX0ZPUkNFEAISGQoVQ09VUExJTkdfTUVUSE9EX1dBVkVTEAMSGwoXQ09VUExJTkdfTUVUSE9EX1NVUkZBQ0UQBCpLCgpPdXRwdXRLaW5kEhYKEk9VVFBVVF9VTlNQRUNJRklFRBAAEg8KC09VVFBVVF9MQU1QEAESFAoQT1VUUFVUX1ZJQlJBVElPThACKjMKBEhhbmQSDAoISEFORF9BTlkQABINCglIQU5EX0xFRlQQARIOCgpIQU5EX1JJR0hUEAIqXAoLQ2hhbm5lbFJ1bGUSHAoYQ0hBTk5FTF9SVUxFX1VOU1BFQ0lGSUVEEAASFAoQQ0hBTk5FTF9SVUxFX1NVTRABEhkKFUNIQU5ORUxfUlVMRV9QUklPUklUWRACKsoBCglQb3J0UGhhc2USGgoWUE9SVF9QSEFTRV9VTlNQRUNJRklFRBAAEhQKEFBPUlRfUEhBU0VfQUxPTkUQARIWChJQT1JUX1BIQVNFX0NPVVBMRUQQAhIXChNQT1JUX1BIQVNFX0FMSUdOSU5HEAMSFgoSUE9SVF9QSEFTRV9FTkdBR0VEEAQSFwoTUE9SVF9QSEFTRV9DTFVUQ0hFRBAFEhMKD1BPUlRfUEhBU0VfTE9TVBAGEhQKEFBPUlRfUEhBU0VfRkFVTFQQByq8AQoGU2FmZXR5EhYKElNBRkVUWV9VTlNQRUNJRklFRBAAEhEKDVNBRkVUWV9BQlNFTlQQARISCg5TQUZFVFlfT1BFTklORxACEhMKD1NBRkVUWV9GSVJNV0FSRRADEhIKDlNBRkVUWV9VTkhPTUVEEAQSEAoMU0FGRVRZX0hPTUVEEAUSEAoMU0FGRVRZX0FSTUVEEAYSEAoMU0FGRVRZX0ZBVUxUEAcSFAoQU0FGRVRZX1VOR1VBUkRFRBAIKr0BCgRDb2RlEhQKEENPREVfVU5TUEVDSUZJRUQQABILCgdDT0RFX09LEAESEAoMQ09ERV9JTlZBTElEEAISFAoQQ09ERV9VTlNVUFBPUlRFRBADEg0KCUNPREVfQlVTWRAEEg8KC0NPREVfREVOSUVEEAUSEQoNQ09ERV9TSFVURE9XThAGEhIKDkNPREVfVElNRURfT1VUEAcSEAoMQ09ERV9FWFBJUkVEEAgSEQoNQ09ERV9SRVBMQUNFRBAJKkQKBFJvbGUSFAoQUk9MRV9VTlNQRUNJRklFRBAAEhEKDVJPTEVfT0JTRVJWRVIQARITCg9ST0xFX0NPTlRST0xMRVIQAmIGcHJvdG8z");
+  fileDesc("Cgx0ZW5kb24ucHJvdG8SCXRlbmRvbi52MSJfCghEYXRhZ3JhbRISCgp0eF90aW1lX25zGAEgASgQEh0KBGVjaG8YAiABKAsyDy50ZW5kb24udjEuRWNobxIgCgZmcmFtZXMYAyADKAsyEC50ZW5kb24udjEuRnJhbWUiZgoERWNobxIXCg9wZWVyX3R4X3RpbWVfbnMYASABKBASEgoKcnhfdGltZV9ucxgCIAEoEBIaChJwZWVyX3BhY2tldF9udW1iZXIYAyABKAQSFQoNcmVjZWl2ZWRfbWFzaxgEIAEoByKLAwoFRnJhbWUSJwoFc3RhdGUYASABKAsyFi50ZW5kb24udjEuRGV2aWNlU3RhdGVIABIoCgVmb3JjZRgCIAEoCzIXLnRlbmRvbi52MS5Gb3JjZUNvbW1hbmRIABIlCgdjb250cm9sGAMgASgLMhIudGVuZG9uLnYxLkNvbnRyb2xIABIsCgtjb250cm9sX2FjaxgEIAEoCzIVLnRlbmRvbi52MS5Db250cm9sQWNrSAASHQoDYnllGAUgASgLMg4udGVuZG9uLnYxLkJ5ZUgAEicKBnJlcG9ydBgGIAEoCzIVLnRlbmRvbi52MS5MaW5rUmVwb3J0SAASMAoNZGV2aWNlX3JlcG9ydBgHIAEoCzIXLnRlbmRvbi52MS5EZXZpY2VSZXBvcnRIABIsCgtwZWVyX3JlcG9ydBgIIAEoCzIVLnRlbmRvbi52MS5QZWVyUmVwb3J0SAASKgoKcG9ydF9zdGF0ZRgJIAEoCzIULnRlbmRvbi52MS5Qb3J0U3RhdGVIAEIGCgRib2R5IicKBFZlYzMSCQoBeBgBIAEoARIJCgF5GAIgASgBEgkKAXoYAyABKAEiMgoEUXVhdBIJCgF3GAEgASgBEgkKAXgYAiABKAESCQoBeRgDIAEoARIJCgF6GAQgASgBIrwGCgtEZXZpY2VTdGF0ZRIMCgR0aWNrGAEgASgEEhIKCnNhbXBsZWRfbnMYAiABKBASIwoKcG9zaXRpb25fbRgDIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgEIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD2ZvcmNlX2FwcGxpZWRfbhgFIAEoCzIPLnRlbmRvbi52MS5WZWMzEhAKCGVuZXJneV9qGAYgASgBEhkKEXBlcm1pdHRlZF9mb3JjZV9uGAcgASgBEg8KB3JlYXNvbnMYCCABKAcSFgoOZm9yY2Vfc2VxdWVuY2UYCSABKAQSFAoMZm9yY2VfYWdlX25zGAogASgEEh0KBG1vZGUYCyABKA4yDy50ZW5kb24udjEuTW9kZRIOCgZkZXZpY2UYDCABKA0SDwoHY2hhbm5lbBgNIAEoDRInCg5mb3JjZV93YW50ZWRfbhgOIAEoCzIPLnRlbmRvbi52MS5WZWMzEiQKC29yaWVudGF0aW9uGA8gASgLMg8udGVuZG9uLnYxLlF1YXQSLwoWYW5ndWxhcl92ZWxvY2l0eV9yYWRwcxgQIAEoCzIPLnRlbmRvbi52MS5WZWMzEg8KB2J1dHRvbnMYESABKAcSKgoRdG9ycXVlX2FwcGxpZWRfbm0YEiABKAsyDy50ZW5kb24udjEuVmVjMxIYCgtncmlwcGVyX3JhZBgTIAEoAUgAiAEBEiMKFmdyaXBwZXJfdmVsb2NpdHlfcmFkcHMYFCABKAFIAYgBARIkChdncmlwcGVyX2ZvcmNlX2FwcGxpZWRfbhgVIAEoAUgCiAEBEiUKDGhhbmRfZm9yY2VfbhgWIAEoCzIPLnRlbmRvbi52MS5WZWMzEhUKCWpvaW50X3JhZBgXIAMoAUICEAESIAoUam9pbnRfdmVsb2NpdHlfcmFkcHMYGCADKAFCAhABEiAKFHN0aWZmbmVzc193YW50ZWRfbnBtGBkgAygBQgIQAUIOCgxfZ3JpcHBlcl9yYWRCGQoXX2dyaXBwZXJfdmVsb2NpdHlfcmFkcHNCGgoYX2dyaXBwZXJfZm9yY2VfYXBwbGllZF9uIvoCCgxGb3JjZUNvbW1hbmQSEAoIc2VxdWVuY2UYASABKAQSFQoNYmFzZWRfb25fdGljaxgCIAEoBBIgCgdmb3JjZV9uGAMgASgLMg8udGVuZG9uLnYxLlZlYzMSJAoFbW9kZWwYBCABKAsyFS50ZW5kb24udjEuTG9jYWxNb2RlbBIUCgx2YWxpZF9mb3JfdXMYBSABKA0SDgoGZGV2aWNlGAYgASgNEg8KB2NoYW5uZWwYByABKA0SGAoQdG9wb2xvZ3lfY2hhbmdlZBgIIAEoCBIUCgdlcnJvcl9uGAkgASgBSACIAQESIgoJdG9ycXVlX25tGAogASgLMg8udGVuZG9uLnYxLlZlYzMSHAoPZ3JpcHBlcl9mb3JjZV9uGAsgASgBSAGIAQESMAoOcm90YXRpb25fbW9kZWwYDiABKAsyGC50ZW5kb24udjEuUm90YXRpb25Nb2RlbEIKCghfZXJyb3JfbkISChBfZ3JpcHBlcl9mb3JjZV9uIl4KDVJvdGF0aW9uTW9kZWwSJwoOYXRfb3JpZW50YXRpb24YASABKAsyDy50ZW5kb24udjEuUXVhdBIkChhhbmd1bGFyX3N0aWZmbmVzc19ubXByYWQYAiADKAFCAhABIpsBCgpMb2NhbE1vZGVsEh0KBGF0X20YASABKAsyDy50ZW5kb24udjEuVmVjMxIZCg1zdGlmZm5lc3NfbnBtGAIgAygBQgIQARIbCg52YWxpZF9yYWRpdXNfbRgDIAEoAUgAiAEBEiMKB2NvbnRhY3QYBCABKAsyEi50ZW5kb24udjEuQ29udGFjdEIRCg9fdmFsaWRfcmFkaXVzX20iXwoHQ29udGFjdBIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxINCgVnYXBfbRgCIAEoARIkCgV0YWJsZRgDIAEoCzIVLnRlbmRvbi52MS5Gb3JjZVRhYmxlIkgKCkZvcmNlVGFibGUSFQoNZmlyc3RfZGVwdGhfbRgBIAEoARIOCgZzdGVwX20YAiABKAESEwoHZm9yY2VfbhgDIAMoAUICEAEi8wQKB0NvbnRyb2wSCgoCaWQYASABKA0SMQoOc2V0X3N0YXRlX3JhdGUYAiABKAsyFy50ZW5kb24udjEuU2V0U3RhdGVSYXRlSAASIQoFcmVhcm0YAyABKAsyEC50ZW5kb24udjEuUmVhcm1IABInCghkZXNjcmliZRgEIAEoCzITLnRlbmRvbi52MS5EZXNjcmliZUgAEioKCnRha2VfbGVhc2UYBSABKAsyFC50ZW5kb24udjEuVGFrZUxlYXNlSAASKgoKZ2l2ZV9sZWFzZRgGIAEoCzIULnRlbmRvbi52MS5HaXZlTGVhc2VIABI5ChJzZXRfc3RhdGVfZGVhZGJhbmQYCCABKAsyGy50ZW5kb24udjEuU2V0U3RhdGVEZWFkYmFuZEgAEiMKBmRpc2FybRgJIAEoCzIRLnRlbmRvbi52MS5EaXNhcm1IABIqCgpzZXRfb3V0cHV0GAogASgLMhQudGVuZG9uLnYxLlNldE91dHB1dEgAEiMKBmNvdXBsZRgLIAEoCzIRLnRlbmRvbi52MS5Db3VwbGVIABIjCgZlbmdhZ2UYDCABKAsyES50ZW5kb24udjEuRW5nYWdlSAASKQoJZGlzZW5nYWdlGA0gASgLMhQudGVuZG9uLnYxLkRpc2VuZ2FnZUgAEigKCXNldF9zY2FsZRgOIAEoCzITLnRlbmRvbi52MS5TZXRTY2FsZUgAEigKCXNldF9zaGFyZRgPIAEoCzITLnRlbmRvbi52MS5TZXRTaGFyZUgAEioKCmxlYXNlX2xvc3QYByABKAsyFC50ZW5kb24udjEuTGVhc2VMb3N0SABCBAoCb3AiKgoMU2V0U3RhdGVSYXRlEgoKAmh6GAEgASgNEg4KBmRldmljZRgCIAEoDSJMChBTZXRTdGF0ZURlYWRiYW5kEg0KBXNoYXJlGAEgASgBEhEKCWZsb29yX21wcxgCIAEoARIWCg5tYXhfc2lsZW5jZV91cxgDIAEoDSIXCgVSZWFybRIOCgZkZXZpY2UYASABKA0iGAoGRGlzYXJtEg4KBmRldmljZRgBIAEoDSKfBAoGQ291cGxlEg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEiEKBHJvbGUYAyABKA4yEy50ZW5kb24udjEuUG9ydFJvbGUSKQoGbWV0aG9kGAQgASgOMhkudGVuZG9uLnYxLkNvdXBsaW5nTWV0aG9kEhYKDnBvc2l0aW9uX3NjYWxlGAUgASgBEhMKC2ZvcmNlX3NjYWxlGAYgASgBEiEKCHJvdGF0aW9uGAcgASgLMg8udGVuZG9uLnYxLlF1YXQSDAoEYXhlcxgIIAEoDRIVCg1zdGlmZm5lc3NfbnBtGAkgASgBEhsKE211dHVhbF9kYW1waW5nX25zcG0YCiABKAESFAoMZGFtcGluZ19uc3BtGAsgASgBEhYKDmFkYXB0X3RvX2RlbGF5GAwgASgIEg0KBXB1cnNlGA0gASgIEhEKCXBlcmlvZF91cxgOIAEoDRIQCghhYnNvbHV0ZRgPIAEoCBIdChV0dXJuX3N0aWZmbmVzc19ubXByYWQYECABKAESHAoUdHVybl9kYW1waW5nX25tc3ByYWQYESABKAESGgoSZ3JpcF9zdGlmZm5lc3NfbnBtGBIgASgBEhkKEWdyaXBfZGFtcGluZ19uc3BtGBMgASgBEhgKEGRyaWZ0X3JhdGVfcGVyX3MYFCABKAESJAoEcmF0ZRgVIAEoCzIWLnRlbmRvbi52MS5SYXRlQ29udHJvbCJNCgtSYXRlQ29udHJvbBITCgtkZWFkX3pvbmVfbRgBIAEoARISCgpnYWluX3Blcl9zGAIgASgBEhUKDW1heF9zcGVlZF9tcHMYAyABKAEiGAoGRW5nYWdlEg4KBmRldmljZRgBIAEoDSIbCglEaXNlbmdhZ2USDgoGZGV2aWNlGAEgASgNIkcKCFNldFNjYWxlEg4KBmRldmljZRgBIAEoDRIWCg5wb3NpdGlvbl9zY2FsZRgCIAEoARITCgtmb3JjZV9zY2FsZRgDIAEoASI6CghTZXRTaGFyZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVzaGFyZRgDIAEoASJwCglTZXRPdXRwdXQSDgoGZGV2aWNlGAEgASgNEg4KBm91dHB1dBgCIAEoDRINCgNyZ2IYAyABKAdIABIpCgl2aWJyYXRpb24YBCABKAsyFC50ZW5kb24udjEuVmlicmF0aW9uSABCCQoHc2V0dGluZyJJCglWaWJyYXRpb24SEQoJYW1wbGl0dWRlGAEgASgBEhQKDGZyZXF1ZW5jeV9oehgCIAEoARITCgtkdXJhdGlvbl9tcxgDIAEoDSIqCghEZXNjcmliZRIOCgZkZXZpY2UYASABKA0SDgoGaGFuZGxlGAIgASgIIiwKCVRha2VMZWFzZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDSIsCglHaXZlTGVhc2USDgoGZGV2aWNlGAEgASgNEg8KB2NoYW5uZWwYAiABKA0iOAoJTGVhc2VMb3N0Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEgoKAnRvGAMgASgJIrQBCgpDb250cm9sQWNrEgoKAmlkGAEgASgNEh0KBGNvZGUYAiABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAyABKAkSDwoHd2FpdF9tcxgEIAEoDRIsCgZkZXZpY2UYBSABKAsyHC50ZW5kb24udjEuRGV2aWNlRGVzY3JpcHRpb24SLAoGaGFuZGxlGAYgASgLMhwudGVuZG9uLnYxLkhhbmRsZURlc2NyaXB0aW9uIuoCChFEZXZpY2VEZXNjcmlwdGlvbhIOCgZkZXZpY2UYASABKA0SDAoEbmFtZRgCIAEoCRINCgVtb2RlbBgDIAEoCRIUCgxwb3NpdGlvbl9kb2YYBCABKA0SEQoJZm9yY2VfZG9mGAUgASgNEigKD3dvcmtzcGFjZV9taW5fbRgGIAEoCzIPLnRlbmRvbi52MS5WZWMzEigKD3dvcmtzcGFjZV9tYXhfbRgHIAEoCzIPLnRlbmRvbi52MS5WZWMzEhMKC21heF9mb3JjZV9uGAggASgBEhoKEmNvbnRpbnVvdXNfZm9yY2VfbhgJIAEoARIZChFtYXhfc3RpZmZuZXNzX25wbRgKIAEoARIdChVwb3NpdGlvbl9yZXNvbHV0aW9uX20YCyABKAESDwoHbG9vcF9oehgMIAEoDRIvCghjaGFubmVscxgNIAMoCzIdLnRlbmRvbi52MS5DaGFubmVsRGVzY3JpcHRpb24i1gIKEUhhbmRsZURlc2NyaXB0aW9uEg4KBmRldmljZRgBIAEoDRItChRvcGVyYXRvcl9mcm9tX2RldmljZRgCIAEoCzIPLnRlbmRvbi52MS5RdWF0Eg8KB2J1dHRvbnMYAyADKAkSHAoUb3JpZW50YXRpb25fbWVhc3VyZWQYBCABKAgSFQoNbWF4X3RvcnF1ZV9ubRgFIAEoARIdChBncmlwcGVyX29wZW5fcmFkGAYgASgBSACIAQESGwoTbWF4X2dyaXBwZXJfZm9yY2VfbhgHIAEoARINCgVncm91cBgIIAEoCRIdCgRoYW5kGAkgASgOMg8udGVuZG9uLnYxLkhhbmQSDgoGam9pbnRzGAogAygJEi0KB291dHB1dHMYCyADKAsyHC50ZW5kb24udjEuT3V0cHV0RGVzY3JpcHRpb25CEwoRX2dyaXBwZXJfb3Blbl9yYWQiRgoRT3V0cHV0RGVzY3JpcHRpb24SDAoEbmFtZRgBIAEoCRIjCgRraW5kGAIgASgOMhUudGVuZG9uLnYxLk91dHB1dEtpbmQiagoSQ2hhbm5lbERlc2NyaXB0aW9uEgwKBG5hbWUYASABKAkSJAoEcnVsZRgCIAEoDjIWLnRlbmRvbi52MS5DaGFubmVsUnVsZRIQCghsZWFzZV9tcxgDIAEoDRIOCgZob2xkZXIYBCABKAkiNAoDQnllEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZyZWFzb24YAiABKAki3gQKCkxpbmtSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZm9yY2VzGAQgASgEEhMKC2xhdGVfc2VydmVyGAUgASgEEhQKDGxhdGVfbmV0d29yaxgGIAEoBBITCgtsYXRlX2VuZ2luZRgHIAEoBBIVCg13b3JzdF9sYXRlX25zGAggASgEEhYKDmxvbmdlc3RfZ2FwX25zGAkgASgEEiUKCnJvdW5kX3RyaXAYCiABKAsyES50ZW5kb24udjEuRGVsYXlzEiQKCXRvX3NlcnZlchgLIAEoCzIRLnRlbmRvbi52MS5EZWxheXMSJAoJdG9fY2xpZW50GAwgASgLMhEudGVuZG9uLnYxLkRlbGF5cxIXCg9jbG9ja19vZmZzZXRfbnMYDSABKBISFwoPY2xvY2tfZHJpZnRfcHBtGA4gASgBEhYKDmNsb2NrX2Vycm9yX25zGA8gASgEEhAKCHJlY2VpdmVkGBAgASgEEgwKBGxvc3QYESABKAQSEQoJcmVvcmRlcmVkGBIgASgEEhIKCmR1cGxpY2F0ZWQYEyABKAQSDQoFd29yZHMYFCABKAkSFAoMbGF0ZV91bmtub3duGBUgASgEEhoKEnJlZnVzZWRfbm90X2Zpbml0ZRgWIAEoBBIdChVyZWZ1c2VkX291dF9vZl9ib3VuZHMYFyABKAQSHAoUcmVmdXNlZF91bmtub3duX3RpY2sYGCABKAQSHAoUcmVmdXNlZF9vbGRfc2VxdWVuY2UYGSABKAQiKwoGRGVsYXlzEhEKCW1lZGlhbl9ucxgBIAEoEhIOCgZwOTlfbnMYAiABKBIi4wUKCVBvcnRTdGF0ZRIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRINCgVlcG9jaBgDIAEoBBIQCghzZXF1ZW5jZRgEIAEoBBIVCg1hbnN3ZXJzX2Vwb2NoGAUgASgEEg8KB2Fuc3dlcnMYBiABKAQSDwoHdGltZV9ucxgHIAEoEBIVCg1yb3VuZF90cmlwX25zGAggASgEEiMKBXBoYXNlGAkgASgOMhQudGVuZG9uLnYxLlBvcnRQaGFzZRISCgplbmdhZ2VtZW50GAogASgEEg8KB2J1dHRvbnMYCyABKAcSIwoKcG9zaXRpb25fbRgMIAEoCzIPLnRlbmRvbi52MS5WZWMzEiUKDHZlbG9jaXR5X21wcxgNIAEoCzIPLnRlbmRvbi52MS5WZWMzEiAKB2ZvcmNlX24YDiABKAsyDy50ZW5kb24udjEuVmVjMxIoCg9jb250YWN0X2ZvcmNlX24YDyABKAsyDy50ZW5kb24udjEuVmVjMxIRCglhY2NvdW50X2oYECABKAESDgoGbmVlZF9qGBEgASgBEg8KB2dpdmVuX2oYEiABKAESDwoHdGFrZW5fahgTIAEoARImCg13YXZlX2ludGVncmFsGBQgASgLMg8udGVuZG9uLnYxLlZlYzMSFQoNd2F2ZV9lbmVyZ3lfahgVIAEoARInCgdzdXJmYWNlGBYgASgLMhYudGVuZG9uLnYxLlBvcnRTdXJmYWNlEiEKBHR1cm4YFyABKAsyEy50ZW5kb24udjEuUG9ydFR1cm4SIQoEZ3JpcBgYIAEoCzITLnRlbmRvbi52MS5Qb3J0R3JpcBITCgtlbmVyZ3lfaW5fahgZIAEoARISCgVzaGFyZRgaIAEoAUgAiAEBEhYKDnBvc2l0aW9uX3NjYWxlGBsgASgBEhMKC2ZvcmNlX3NjYWxlGBwgASgBEg8KB29mX3BlZXIYHSABKAhCCAoGX3NoYXJlIn4KCFBvcnRUdXJuEh0KBHR1cm4YASABKAsyDy50ZW5kb24udjEuUXVhdBIvChZhbmd1bGFyX3ZlbG9jaXR5X3JhZHBzGAIgASgLMg8udGVuZG9uLnYxLlZlYzMSIgoJdG9ycXVlX25tGAMgASgLMg8udGVuZG9uLnYxLlZlYzMiiQEKCFBvcnRHcmlwEhEKCW9wZW5pbmdfbRgBIAEoARIUCgx2ZWxvY2l0eV9tcHMYAiABKAESDwoHZm9yY2VfbhgDIAEoARIRCglhY2NvdW50X2oYBCABKAESDgoGbmVlZF9qGAUgASgBEg8KB2dpdmVuX2oYBiABKAESDwoHdGFrZW5fahgHIAEoASJXCgtQb3J0U3VyZmFjZRIfCgZub3JtYWwYASABKAsyDy50ZW5kb24udjEuVmVjMxIQCghvZmZzZXRfbRgCIAEoARIVCg1zdGlmZm5lc3NfbnBtGAMgASgBIvQBCgxEZXZpY2VSZXBvcnQSDgoGbnVtYmVyGAEgASgEEhAKCHVudGlsX25zGAIgASgQEg8KB3NwYW5fbnMYAyABKAQSDgoGZGV2aWNlGAQgASgNEg0KBXN0ZXBzGAUgASgEEg4KBm1pc3NlZBgGIAEoBBIQCghvdmVycnVucxgHIAEoBBIOCgZ1bnNlZW4YCCABKAQSHAoQbGF0ZW5lc3NfdXNfbG9nMhgJIAMoBEICEAESIQoGc2FmZXR5GAogASgOMhEudGVuZG9uLnYxLlNhZmV0eRINCgVmYXVsdBgLIAEoCRIQCghkZWdyYWRlZBgMIAEoCSKOAQoKUGVlclJlcG9ydBIOCgZkZXZpY2UYASABKA0SDwoHY2hhbm5lbBgCIAEoDRIMCgRuYW1lGAMgASgJEhQKDHN0YXRlX29uZV9pbhgEIAEoDRIWCg5mb3JjZXNfcmVmdXNlZBgFIAEoCBIjCgRsaW5rGAYgASgLMhUudGVuZG9uLnYxLkxpbmtSZXBvcnQikgEKBUhlbGxvEhMKC3ZlcnNpb25fbWluGAEgASgNEhMKC3ZlcnNpb25fbWF4GAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZRIMCgRuYW1lGAQgASgJEhAKCGZlYXR1cmVzGAUgAygJEiAKBmNsYWltcxgGIAMoCzIQLnRlbmRvbi52MS5DbGFpbSJHCgVDbGFpbRIOCgZkZXZpY2UYASABKAkSDwoHY2hhbm5lbBgCIAEoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUiXgoGQW5zd2VyEiUKB3dlbGNvbWUYASABKAsyEi50ZW5kb24udjEuV2VsY29tZUgAEiUKB3JlZnVzZWQYAiABKAsyEi50ZW5kb24udjEuUmVmdXNlZEgAQgYKBGJvZHki6wEKB1dlbGNvbWUSDwoHdmVyc2lvbhgBIAEoDRIQCghmZWF0dXJlcxgCIAMoCRIdCgRyb2xlGAMgASgOMg8udGVuZG9uLnYxLlJvbGUSEwoLZGV2aWNlX25hbWUYBCABKAkSEwoLbWF4X2ZvcmNlX24YBSABKAESHQoVcG9zaXRpb25fcmVzb2x1dGlvbl9tGAYgASgBEg8KB2xvb3BfaHoYByABKA0SEgoKdGltZW91dF9tcxgIIAEoDRIOCgZzZXJ2ZXIYCSABKAkSIAoGZ3JhbnRzGAogAygLMhAudGVuZG9uLnYxLkdyYW50IkcKBUdyYW50Eg4KBmRldmljZRgBIAEoDRIPCgdjaGFubmVsGAIgASgNEh0KBHJvbGUYAyABKA4yDy50ZW5kb24udjEuUm9sZSJiCgdSZWZ1c2VkEh0KBGNvZGUYASABKA4yDy50ZW5kb24udjEuQ29kZRIOCgZkZXRhaWwYAiABKAkSEwoLdmVyc2lvbl9taW4YAyABKA0SEwoLdmVyc2lvbl9tYXgYBCABKA0qhQEKBE1vZGUSFAoQTU9ERV9VTlNQRUNJRklFRBAAEg0KCU1PREVfSURMRRABEg8KC01PREVfQUNUSVZFEAISEAoMTU9ERV9IT0xESU5HEAMSEQoNTU9ERV9ERUNBWUlORxAEEhIKDk1PREVfU0FGRV9TVE9QEAUSDgoKTU9ERV9GQVVMVBAGKlMKCFBvcnRSb2xlEhkKFVBPUlRfUk9MRV9VTlNQRUNJRklFRBAAEhQKEFBPUlRfUk9MRV9MRUFERVIQARIWChJQT1JUX1JPTEVfRk9MTE9XRVIQAiqPAgoOQ291cGxpbmdNZXRob2QSHwobQ09VUExJTkdfTUVUSE9EX1VOU1BFQ0lGSUVEEAASJQohQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX1BPU0lUSU9OEAESIgoeQ09VUExJTkdfTUVUSE9EX1BPU0lUSU9OX0ZPUkNFEAISGQoVQ09VUExJTkdfTUVUSE9EX1dBVkVTEAMSGwoXQ09VUExJTkdfTUVUSE9EX1NVUkZBQ0UQBBIdChlDT1VQTElOR19NRVRIT0RfUEFTU0lWSVRZEAUSIAocQ09VUExJTkdfTUVUSE9EX1NFVF9QT1NJVElPThAGEhgKFENPVVBMSU5HX01FVEhPRF9SQVRFEAcqSwoKT3V0cHV0S2luZBIWChJPVVRQVVRfVU5TUEVDSUZJRUQQABIPCgtPVVRQVVRfTEFNUBABEhQKEE9VVFBVVF9WSUJSQVRJT04QAiozCgRIYW5kEgwKCEhBTkRfQU5ZEAASDQoJSEFORF9MRUZUEAESDgoKSEFORF9SSUdIVBACKlwKC0NoYW5uZWxSdWxlEhwKGENIQU5ORUxfUlVMRV9VTlNQRUNJRklFRBAAEhQKEENIQU5ORUxfUlVMRV9TVU0QARIZChVDSEFOTkVMX1JVTEVfUFJJT1JJVFkQAirKAQoJUG9ydFBoYXNlEhoKFlBPUlRfUEhBU0VfVU5TUEVDSUZJRUQQABIUChBQT1JUX1BIQVNFX0FMT05FEAESFgoSUE9SVF9QSEFTRV9DT1VQTEVEEAISFwoTUE9SVF9QSEFTRV9BTElHTklORxADEhYKElBPUlRfUEhBU0VfRU5HQUdFRBAEEhcKE1BPUlRfUEhBU0VfQ0xVVENIRUQQBRITCg9QT1JUX1BIQVNFX0xPU1QQBhIUChBQT1JUX1BIQVNFX0ZBVUxUEAcqvAEKBlNhZmV0eRIWChJTQUZFVFlfVU5TUEVDSUZJRUQQABIRCg1TQUZFVFlfQUJTRU5UEAESEgoOU0FGRVRZX09QRU5JTkcQAhITCg9TQUZFVFlfRklSTVdBUkUQAxISCg5TQUZFVFlfVU5IT01FRBAEEhAKDFNBRkVUWV9IT01FRBAFEhAKDFNBRkVUWV9BUk1FRBAGEhAKDFNBRkVUWV9GQVVMVBAHEhQKEFNBRkVUWV9VTkdVQVJERUQQCCq9AQoEQ29kZRIUChBDT0RFX1VOU1BFQ0lGSUVEEAASCwoHQ09ERV9PSxABEhAKDENPREVfSU5WQUxJRBACEhQKEENPREVfVU5TVVBQT1JURUQQAxINCglDT0RFX0JVU1kQBBIPCgtDT0RFX0RFTklFRBAFEhEKDUNPREVfU0hVVERPV04QBhISCg5DT0RFX1RJTUVEX09VVBAHEhAKDENPREVfRVhQSVJFRBAIEhEKDUNPREVfUkVQTEFDRUQQCSpECgRSb2xlEhQKEFJPTEVfVU5TUEVDSUZJRUQQABIRCg1ST0xFX09CU0VSVkVSEAESEwoPUk9MRV9DT05UUk9MTEVSEAJiBnByb3RvMw");
 
 /**
  * @generated from message tendon.v1.Datagram
@@ -163,8 +163,8 @@ export type Frame = Message<"tendon.v1.Frame"> & {
     case: "peerReport";
   } | {
     /**
-     * Only between peers that both named the feature "teleoperation", either way, unreliable: of each device and channel
-     * the highest sequence of the highest epoch wins
+     * Only between peers that both named the feature "teleoperation", either way, unreliable: of each device, channel
+     * and end the highest sequence of the highest epoch wins. To an observer of the device, of both ends of its coupling
      *
      * @generated from field: tendon.v1.PortState port_state = 9;
      */
@@ -781,6 +781,18 @@ export type Control = Message<"tendon.v1.Control"> & {
     case: "disengage";
   } | {
     /**
+     * @generated from field: tendon.v1.SetScale set_scale = 14;
+     */
+    value: SetScale;
+    case: "setScale";
+  } | {
+    /**
+     * @generated from field: tendon.v1.SetShare set_share = 15;
+     */
+    value: SetShare;
+    case: "setShare";
+  } | {
+    /**
      * server → client
      *
      * @generated from field: tendon.v1.LeaseLost lease_lost = 7;
@@ -907,10 +919,10 @@ export const DisarmSchema: GenMessage<Disarm> = /*@__PURE__*/
   messageDesc(file_tendon, 15);
 
 /**
- * My device is the other end of this one: what my end is like. From whoever has claimed the channel as a controller, to a
- * server that granted "teleoperation". CODE_OK: they fit; the client is sent no states any more but PortStates, and sends
- * them. CODE_INVALID: the first thing that differs, in words. CODE_UNSUPPORTED: that device is not to be coupled.
- * CODE_BUSY: it is coupled with another client.
+ * My device is the other end of this one: what my end is like. From whoever has claimed the channel as a controller, to
+ * a server that granted "teleoperation". CODE_OK: they fit; the client is sent no states any more but PortStates, and
+ * sends them. CODE_INVALID: the first thing that differs, in words. CODE_UNSUPPORTED: that device is not to be coupled.
+ * CODE_BUSY: that channel is coupled with another client; a follower with several leaders has one for each channel.
  *
  * @generated from message tendon.v1.Couple
  */
@@ -1008,6 +1020,57 @@ export type Couple = Message<"tendon.v1.Couple"> & {
    * @generated from field: uint32 period_us = 14;
    */
   periodUs: number;
+
+  /**
+   * a place of the leader is a place of the follower: offsets are zero, and the two align first
+   *
+   * @generated from field: bool absolute = 15;
+   */
+  absolute: boolean;
+
+  /**
+   * As the leader feels them; a stiffness of 0: that part of the handle is not coupled.
+   *
+   * [0, 1e12]: of the orientations
+   *
+   * @generated from field: double turn_stiffness_nmprad = 16;
+   */
+  turnStiffnessNmprad: number;
+
+  /**
+   * [0, 1e12]
+   *
+   * @generated from field: double turn_damping_nmsprad = 17;
+   */
+  turnDampingNmsprad: number;
+
+  /**
+   * [0, 1e12]: of the grippers, at the fingers
+   *
+   * @generated from field: double grip_stiffness_npm = 18;
+   */
+  gripStiffnessNpm: number;
+
+  /**
+   * [0, 1e12]
+   *
+   * @generated from field: double grip_damping_nspm = 19;
+   */
+  gripDampingNspm: number;
+
+  /**
+   * [0, 1e12]: COUPLING_METHOD_PASSIVITY
+   *
+   * @generated from field: double drift_rate_per_s = 20;
+   */
+  driftRatePerS: number;
+
+  /**
+   * COUPLING_METHOD_RATE; absent with the others
+   *
+   * @generated from field: tendon.v1.RateControl rate = 21;
+   */
+  rate?: RateControl | undefined;
 };
 
 /**
@@ -1016,6 +1079,41 @@ export type Couple = Message<"tendon.v1.Couple"> & {
  */
 export const CoupleSchema: GenMessage<Couple> = /*@__PURE__*/
   messageDesc(file_tendon, 16);
+
+/**
+ * The leader's handle, pulled back to its centre, says how fast the follower moves.
+ *
+ * @generated from message tendon.v1.RateControl
+ */
+export type RateControl = Message<"tendon.v1.RateControl"> & {
+  /**
+   * [0, 1e12]: the follower stands while the leader is nearer than this to its centre
+   *
+   * @generated from field: double dead_zone_m = 1;
+   */
+  deadZoneM: number;
+
+  /**
+   * (0, 1e12]: speed of the follower, in the leader's scale, for each metre beyond that
+   *
+   * @generated from field: double gain_per_s = 2;
+   */
+  gainPerS: number;
+
+  /**
+   * (0, 1e12]: of the follower, in the leader's scale
+   *
+   * @generated from field: double max_speed_mps = 3;
+   */
+  maxSpeedMps: number;
+};
+
+/**
+ * Describes the message tendon.v1.RateControl.
+ * Use `create(RateControlSchema)` to create a new message.
+ */
+export const RateControlSchema: GenMessage<RateControl> = /*@__PURE__*/
+  messageDesc(file_tendon, 17);
 
 /**
  * The operator's act: couples the handles, at the leader's server. Only from a controller of the device. CODE_OK: the
@@ -1037,7 +1135,7 @@ export type Engage = Message<"tendon.v1.Engage"> & {
  * Use `create(EngageSchema)` to create a new message.
  */
 export const EngageSchema: GenMessage<Engage> = /*@__PURE__*/
-  messageDesc(file_tendon, 17);
+  messageDesc(file_tendon, 18);
 
 /**
  * Ends that, at either end. Only from a controller of the device.
@@ -1058,12 +1156,87 @@ export type Disengage = Message<"tendon.v1.Disengage"> & {
  * Use `create(DisengageSchema)` to create a new message.
  */
 export const DisengageSchema: GenMessage<Disengage> = /*@__PURE__*/
-  messageDesc(file_tendon, 18);
+  messageDesc(file_tendon, 19);
+
+/**
+ * The scales of the coupling from now on, at the leader's server. Only from a controller of the device, while the
+ * leader is not engaged or holds its clutch: else CODE_BUSY. CODE_OK: the device's loop has the order.
+ * CODE_UNSUPPORTED: that device has no coupling, or is the follower.
+ *
+ * @generated from message tendon.v1.SetScale
+ */
+export type SetScale = Message<"tendon.v1.SetScale"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0.01, 100]: follower over leader
+   *
+   * @generated from field: double position_scale = 2;
+   */
+  positionScale: number;
+
+  /**
+   * [0.01, 100]: leader over follower
+   *
+   * @generated from field: double force_scale = 3;
+   */
+  forceScale: number;
+};
+
+/**
+ * Describes the message tendon.v1.SetScale.
+ * Use `create(SetScaleSchema)` to create a new message.
+ */
+export const SetScaleSchema: GenMessage<SetScale> = /*@__PURE__*/
+  messageDesc(file_tendon, 20);
+
+/**
+ * How much the leader of that channel counts among the leaders of a follower, at the follower's server. It gets there
+ * within 0.5 s, and the others share what is left as they did. Only from a controller of the device. CODE_UNSUPPORTED:
+ * that device has no coupling, or one leader only, or is a leader.
+ *
+ * @generated from message tendon.v1.SetShare
+ */
+export type SetShare = Message<"tendon.v1.SetShare"> & {
+  /**
+   * [0, 15]
+   *
+   * @generated from field: uint32 device = 1;
+   */
+  device: number;
+
+  /**
+   * [0, 7]
+   *
+   * @generated from field: uint32 channel = 2;
+   */
+  channel: number;
+
+  /**
+   * [0, 1]
+   *
+   * @generated from field: double share = 3;
+   */
+  share: number;
+};
+
+/**
+ * Describes the message tendon.v1.SetShare.
+ * Use `create(SetShareSchema)` to create a new message.
+ */
+export const SetShareSchema: GenMessage<SetShare> = /*@__PURE__*/
+  messageDesc(file_tendon, 21);
 
 /**
  * Sets a lamp of the device, or makes it vibrate: from a controller of the device that holds one of its channels. To a
  * server that granted the feature "outputs". An output is off again when the client that set it gives a channel of the
- * device up or loses it, and when the device is disarmed. CODE_INVALID: the device has no such output, or not of that kind.
+ * device up or loses it, and when the device is disarmed. CODE_INVALID: the device has no such output, or not of that
+ * kind.
  *
  * @generated from message tendon.v1.SetOutput
  */
@@ -1109,7 +1282,7 @@ export type SetOutput = Message<"tendon.v1.SetOutput"> & {
  * Use `create(SetOutputSchema)` to create a new message.
  */
 export const SetOutputSchema: GenMessage<SetOutput> = /*@__PURE__*/
-  messageDesc(file_tendon, 19);
+  messageDesc(file_tendon, 22);
 
 /**
  * A pulse. It ends by itself; another one takes its place at once.
@@ -1144,7 +1317,7 @@ export type Vibration = Message<"tendon.v1.Vibration"> & {
  * Use `create(VibrationSchema)` to create a new message.
  */
 export const VibrationSchema: GenMessage<Vibration> = /*@__PURE__*/
-  messageDesc(file_tendon, 20);
+  messageDesc(file_tendon, 23);
 
 /**
  * What a device is and can do: answered with a DeviceDescription. Of any device that the server has, claimed or not.
@@ -1172,7 +1345,7 @@ export type Describe = Message<"tendon.v1.Describe"> & {
  * Use `create(DescribeSchema)` to create a new message.
  */
 export const DescribeSchema: GenMessage<Describe> = /*@__PURE__*/
-  messageDesc(file_tendon, 21);
+  messageDesc(file_tendon, 24);
 
 /**
  * I want to be the one whose forces this channel takes. From whoever has claimed it as a controller. CODE_OK: you are,
@@ -1201,7 +1374,7 @@ export type TakeLease = Message<"tendon.v1.TakeLease"> & {
  * Use `create(TakeLeaseSchema)` to create a new message.
  */
 export const TakeLeaseSchema: GenMessage<TakeLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 22);
+  messageDesc(file_tendon, 25);
 
 /**
  * I do not want to be it any more.
@@ -1229,7 +1402,7 @@ export type GiveLease = Message<"tendon.v1.GiveLease"> & {
  * Use `create(GiveLeaseSchema)` to create a new message.
  */
 export const GiveLeaseSchema: GenMessage<GiveLease> = /*@__PURE__*/
-  messageDesc(file_tendon, 23);
+  messageDesc(file_tendon, 26);
 
 /**
  * You are not it any more. Only to a client that named the feature "channels".
@@ -1264,7 +1437,7 @@ export type LeaseLost = Message<"tendon.v1.LeaseLost"> & {
  * Use `create(LeaseLostSchema)` to create a new message.
  */
 export const LeaseLostSchema: GenMessage<LeaseLost> = /*@__PURE__*/
-  messageDesc(file_tendon, 24);
+  messageDesc(file_tendon, 27);
 
 /**
  * @generated from message tendon.v1.ControlAck
@@ -1316,7 +1489,7 @@ export type ControlAck = Message<"tendon.v1.ControlAck"> & {
  * Use `create(ControlAckSchema)` to create a new message.
  */
 export const ControlAckSchema: GenMessage<ControlAck> = /*@__PURE__*/
-  messageDesc(file_tendon, 25);
+  messageDesc(file_tendon, 28);
 
 /**
  * What a device is and can do.
@@ -1419,7 +1592,7 @@ export type DeviceDescription = Message<"tendon.v1.DeviceDescription"> & {
  * Use `create(DeviceDescriptionSchema)` to create a new message.
  */
 export const DeviceDescriptionSchema: GenMessage<DeviceDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 26);
+  messageDesc(file_tendon, 29);
 
 /**
  * What the handle of a device is and can do. To a client of a server that granted the feature "handle".
@@ -1512,7 +1685,7 @@ export type HandleDescription = Message<"tendon.v1.HandleDescription"> & {
  * Use `create(HandleDescriptionSchema)` to create a new message.
  */
 export const HandleDescriptionSchema: GenMessage<HandleDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 27);
+  messageDesc(file_tendon, 30);
 
 /**
  * @generated from message tendon.v1.OutputDescription
@@ -1536,7 +1709,7 @@ export type OutputDescription = Message<"tendon.v1.OutputDescription"> & {
  * Use `create(OutputDescriptionSchema)` to create a new message.
  */
 export const OutputDescriptionSchema: GenMessage<OutputDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 28);
+  messageDesc(file_tendon, 31);
 
 /**
  * @generated from message tendon.v1.ChannelDescription
@@ -1576,7 +1749,7 @@ export type ChannelDescription = Message<"tendon.v1.ChannelDescription"> & {
  * Use `create(ChannelDescriptionSchema)` to create a new message.
  */
 export const ChannelDescriptionSchema: GenMessage<ChannelDescription> = /*@__PURE__*/
-  messageDesc(file_tendon, 29);
+  messageDesc(file_tendon, 32);
 
 /**
  * @generated from message tendon.v1.Bye
@@ -1600,7 +1773,7 @@ export type Bye = Message<"tendon.v1.Bye"> & {
  * Use `create(ByeSchema)` to create a new message.
  */
 export const ByeSchema: GenMessage<Bye> = /*@__PURE__*/
-  messageDesc(file_tendon, 30);
+  messageDesc(file_tendon, 33);
 
 /**
  * What became of a client's forces and datagrams, as the server saw it: why a force was late, and what the network
@@ -1784,7 +1957,7 @@ export type LinkReport = Message<"tendon.v1.LinkReport"> & {
  * Use `create(LinkReportSchema)` to create a new message.
  */
 export const LinkReportSchema: GenMessage<LinkReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 31);
+  messageDesc(file_tendon, 34);
 
 /**
  * @generated from message tendon.v1.Delays
@@ -1810,7 +1983,7 @@ export type Delays = Message<"tendon.v1.Delays"> & {
  * Use `create(DelaysSchema)` to create a new message.
  */
 export const DelaysSchema: GenMessage<Delays> = /*@__PURE__*/
-  messageDesc(file_tendon, 32);
+  messageDesc(file_tendon, 35);
 
 /**
  * One end of a coupling of two devices, told to the other. Vectors are in the base frame and the scale of the SENDER's
@@ -1972,6 +2145,57 @@ export type PortState = Message<"tendon.v1.PortState"> & {
    * @generated from field: tendon.v1.PortSurface surface = 22;
    */
   surface?: PortSurface | undefined;
+
+  /**
+   * absent: the orientations are not coupled
+   *
+   * @generated from field: tendon.v1.PortTurn turn = 23;
+   */
+  turn?: PortTurn | undefined;
+
+  /**
+   * absent: the grippers are not coupled
+   *
+   * @generated from field: tendon.v1.PortGrip grip = 24;
+   */
+  grip?: PortGrip | undefined;
+
+  /**
+   * [0, 1e6]: COUPLING_METHOD_PASSIVITY: total that its port took in, in this epoch
+   *
+   * @generated from field: double energy_in_j = 25;
+   */
+  energyInJ: number;
+
+  /**
+   * [0, 1]: of a follower: how much this leader counts; absent: it is the only one
+   *
+   * @generated from field: optional double share = 26;
+   */
+  share?: number | undefined;
+
+  /**
+   * Of a leader, in use from this state on. 0: as in Couple.
+   *
+   * [0.01, 100] or 0
+   *
+   * @generated from field: double position_scale = 27;
+   */
+  positionScale: number;
+
+  /**
+   * [0.01, 100] or 0
+   *
+   * @generated from field: double force_scale = 28;
+   */
+  forceScale: number;
+
+  /**
+   * to an observer: of the other end of the device's coupling, as it came to the server
+   *
+   * @generated from field: bool of_peer = 29;
+   */
+  ofPeer: boolean;
 };
 
 /**
@@ -1979,7 +2203,103 @@ export type PortState = Message<"tendon.v1.PortState"> & {
  * Use `create(PortStateSchema)` to create a new message.
  */
 export const PortStateSchema: GenMessage<PortState> = /*@__PURE__*/
-  messageDesc(file_tendon, 33);
+  messageDesc(file_tendon, 36);
+
+/**
+ * How a handle has turned since its offset was taken.
+ *
+ * @generated from message tendon.v1.PortTurn
+ */
+export type PortTurn = Message<"tendon.v1.PortTurn"> & {
+  /**
+   * in the axes of the sender's base frame; of length 1 ± 0.001
+   *
+   * @generated from field: tendon.v1.Quat turn = 1;
+   */
+  turn?: Quat | undefined;
+
+  /**
+   * @generated from field: tendon.v1.Vec3 angular_velocity_radps = 2;
+   */
+  angularVelocityRadps?: Vec3 | undefined;
+
+  /**
+   * on whoever holds the handle, really applied
+   *
+   * @generated from field: tendon.v1.Vec3 torque_nm = 3;
+   */
+  torqueNm?: Vec3 | undefined;
+};
+
+/**
+ * Describes the message tendon.v1.PortTurn.
+ * Use `create(PortTurnSchema)` to create a new message.
+ */
+export const PortTurnSchema: GenMessage<PortTurn> = /*@__PURE__*/
+  messageDesc(file_tendon, 37);
+
+/**
+ * A gripper, measured at its fingers. It is a port of its own, with an account of its own.
+ *
+ * @generated from message tendon.v1.PortGrip
+ */
+export type PortGrip = Message<"tendon.v1.PortGrip"> & {
+  /**
+   * [-1e12, 1e12]
+   *
+   * @generated from field: double opening_m = 1;
+   */
+  openingM: number;
+
+  /**
+   * [-1e12, 1e12]
+   *
+   * @generated from field: double velocity_mps = 2;
+   */
+  velocityMps: number;
+
+  /**
+   * [-1e12, 1e12]: on the fingers, > 0 opens them; really applied
+   *
+   * @generated from field: double force_n = 3;
+   */
+  forceN: number;
+
+  /**
+   * [-1e3, 1e3]: these four as in PortState
+   *
+   * @generated from field: double account_j = 4;
+   */
+  accountJ: number;
+
+  /**
+   * [0, 1e3]
+   *
+   * @generated from field: double need_j = 5;
+   */
+  needJ: number;
+
+  /**
+   * [0, 1e6]
+   *
+   * @generated from field: double given_j = 6;
+   */
+  givenJ: number;
+
+  /**
+   * [0, 1e6]
+   *
+   * @generated from field: double taken_j = 7;
+   */
+  takenJ: number;
+};
+
+/**
+ * Describes the message tendon.v1.PortGrip.
+ * Use `create(PortGripSchema)` to create a new message.
+ */
+export const PortGripSchema: GenMessage<PortGrip> = /*@__PURE__*/
+  messageDesc(file_tendon, 38);
 
 /**
  * A flat, springy surface that the sender's tool touches, or touched last. It only pushes.
@@ -2014,7 +2334,7 @@ export type PortSurface = Message<"tendon.v1.PortSurface"> & {
  * Use `create(PortSurfaceSchema)` to create a new message.
  */
 export const PortSurfaceSchema: GenMessage<PortSurface> = /*@__PURE__*/
-  messageDesc(file_tendon, 34);
+  messageDesc(file_tendon, 39);
 
 /**
  * How a device's loop does. Numbers of things are of the time that the report tells of.
@@ -2114,7 +2434,7 @@ export type DeviceReport = Message<"tendon.v1.DeviceReport"> & {
  * Use `create(DeviceReportSchema)` to create a new message.
  */
 export const DeviceReportSchema: GenMessage<DeviceReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 35);
+  messageDesc(file_tendon, 40);
 
 /**
  * How the engine does whose forces a channel takes.
@@ -2170,7 +2490,7 @@ export type PeerReport = Message<"tendon.v1.PeerReport"> & {
  * Use `create(PeerReportSchema)` to create a new message.
  */
 export const PeerReportSchema: GenMessage<PeerReport> = /*@__PURE__*/
-  messageDesc(file_tendon, 36);
+  messageDesc(file_tendon, 41);
 
 /**
  * @generated from message tendon.v1.Hello
@@ -2220,7 +2540,7 @@ export type Hello = Message<"tendon.v1.Hello"> & {
  * Use `create(HelloSchema)` to create a new message.
  */
 export const HelloSchema: GenMessage<Hello> = /*@__PURE__*/
-  messageDesc(file_tendon, 37);
+  messageDesc(file_tendon, 42);
 
 /**
  * With claims, `role` of the Hello is the highest among them.
@@ -2253,7 +2573,7 @@ export type Claim = Message<"tendon.v1.Claim"> & {
  * Use `create(ClaimSchema)` to create a new message.
  */
 export const ClaimSchema: GenMessage<Claim> = /*@__PURE__*/
-  messageDesc(file_tendon, 38);
+  messageDesc(file_tendon, 43);
 
 /**
  * @generated from message tendon.v1.Answer
@@ -2282,7 +2602,7 @@ export type Answer = Message<"tendon.v1.Answer"> & {
  * Use `create(AnswerSchema)` to create a new message.
  */
 export const AnswerSchema: GenMessage<Answer> = /*@__PURE__*/
-  messageDesc(file_tendon, 39);
+  messageDesc(file_tendon, 44);
 
 /**
  * @generated from message tendon.v1.Welcome
@@ -2362,7 +2682,7 @@ export type Welcome = Message<"tendon.v1.Welcome"> & {
  * Use `create(WelcomeSchema)` to create a new message.
  */
 export const WelcomeSchema: GenMessage<Welcome> = /*@__PURE__*/
-  messageDesc(file_tendon, 40);
+  messageDesc(file_tendon, 45);
 
 /**
  * @generated from message tendon.v1.Grant
@@ -2395,7 +2715,7 @@ export type Grant = Message<"tendon.v1.Grant"> & {
  * Use `create(GrantSchema)` to create a new message.
  */
 export const GrantSchema: GenMessage<Grant> = /*@__PURE__*/
-  messageDesc(file_tendon, 41);
+  messageDesc(file_tendon, 46);
 
 /**
  * @generated from message tendon.v1.Refused
@@ -2431,7 +2751,7 @@ export type Refused = Message<"tendon.v1.Refused"> & {
  * Use `create(RefusedSchema)` to create a new message.
  */
 export const RefusedSchema: GenMessage<Refused> = /*@__PURE__*/
-  messageDesc(file_tendon, 42);
+  messageDesc(file_tendon, 47);
 
 /**
  * @generated from enum tendon.v1.Mode
@@ -2551,6 +2871,21 @@ export enum CouplingMethod {
    * @generated from enum value: COUPLING_METHOD_SURFACE = 4;
    */
   SURFACE = 4,
+
+  /**
+   * @generated from enum value: COUPLING_METHOD_PASSIVITY = 5;
+   */
+  PASSIVITY = 5,
+
+  /**
+   * @generated from enum value: COUPLING_METHOD_SET_POSITION = 6;
+   */
+  SET_POSITION = 6,
+
+  /**
+   * @generated from enum value: COUPLING_METHOD_RATE = 7;
+   */
+  RATE = 7,
 }
 
 /**
@@ -2680,6 +3015,8 @@ export enum PortPhase {
   COUPLED = 2,
 
   /**
+   * absolute maps: the leader is led to where the follower is
+   *
    * @generated from enum value: PORT_PHASE_ALIGNING = 3;
    */
   ALIGNING = 3,
