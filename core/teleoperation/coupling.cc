@@ -340,6 +340,25 @@ void Coupling::disengage() noexcept {
   if (in_act() || phase_ == PortPhase::kAligning) leave(PortPhase::kCoupled);
 }
 
+void Coupling::renew() noexcept {
+  disengage();
+  if (phase_ != PortPhase::kFault) phase_ = PortPhase::kAlone;
+  const std::uint64_t epoch = ++config_.spring.epoch;
+  spring_.renew(epoch);
+  if (purse_) purse_->renew(epoch);
+  newest_ = {};
+  lost_sequence_ = 0;
+  seen_ = 0;
+  if (!leads()) engagement_ = 0;
+  peer_anew_ = false;
+  gap_ = gap_before_ = Duration::zero();
+  stretch_began_ = now_;
+  wave_joined_ = false;
+  if (renderer_) renderer_.emplace();
+  if (!leads() && scaled_) rescale(config_.map.position_scale, config_.map.force_scale);
+  if (!leads()) scaled_ = false;
+}
+
 bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
   const bool bound = phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || wave_;
   if (!leads() || bound || !fits(position_scale, 0.01, 100) || !fits(force_scale, 0.01, 100)) return false;

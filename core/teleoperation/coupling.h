@@ -66,6 +66,10 @@ namespace tendon {
 /// account at each act beside that, so that the port's promise is L ≥ −energy · acts. 0: the hand brings the handle there.
 /// What is left of the distance when it engages is drawn together as the ramp rises.
 ///
+/// **Another peer** (renew): who takes a channel over has an epoch that is not above that of the one before. renew()
+/// forgets the peer, so that any epoch is heard, and raises our own by one, so that no total and no act of before counts.
+/// Whatever was engaged is not any more, and its force fades.
+///
 /// **Scales that change** (set_scale): the leader's u is stretched by the old s_x over the new, so that its mapped place
 /// stays where it is, and its states tell the new scales. The follower takes them from the first state that tells them.
 /// The force that this changes fades from the old to the new within kFade. Purse says what becomes of energy: in the
@@ -167,6 +171,9 @@ class Coupling {
   bool engage() noexcept;
   /// Either end.
   void disengage() noexcept;
+
+  /// The other end is another one from now on, or one that has been away.
+  void renew() noexcept;
 
   /// The scales from now on, leader only, 0.01 … 100. False, and nothing happens, while it is engaged or aligning, with
   /// waves, at a follower, and for a scale out of its bounds.

@@ -38,9 +38,8 @@ enum class CouplingMethod : std::uint8_t {
   kRate,                  ///< the leader's place says how fast the follower moves
 };
 inline constexpr std::array kCouplingMethods = {
-    CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves,
-    CouplingMethod::kSurface,          CouplingMethod::kPassivity,     CouplingMethod::kSetPosition,
-    CouplingMethod::kRate};
+    CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves, CouplingMethod::kSurface,
+    CouplingMethod::kPassivity,        CouplingMethod::kSetPosition,   CouplingMethod::kRate};
 
 /// As scenes and refusals call it: "position-position".
 std::string_view to_string(CouplingMethod method) noexcept;
@@ -63,7 +62,7 @@ struct PortSurface {
 
 /// How a handle has turned since its offset was taken.
 struct PortTurn {
-  Quat turn{};                            ///< in the axes of the sender's base frame; of length 1 ± 0.001
+  Quat turn{};                           ///< in the axes of the sender's base frame; of length 1 ± 0.001
   Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, zero while `turn` is frozen
   Vec3 torque = Vec3::Zero();            ///< N·m, on whoever holds the handle, really applied
 };
@@ -107,9 +106,9 @@ struct PortState {
   double wave_energy = 0;                ///< J, WaveMessage::energy; 0 … kMostTotal of PurseMessage
   std::optional<PortTurn> turn{};        ///< empty: the orientations are not coupled
   std::optional<PortGrip> grip{};        ///< empty: the grippers are not coupled
-  double energy_in = 0;          ///< J, of passivity: total that its port took in, in this epoch; as wave_energy
+  double energy_in = 0;           ///< J, of passivity: total that its port took in, in this epoch; as wave_energy
   std::optional<double> share{};  ///< 0 … 1, of a follower: how much this leader counts; empty: it is the only one
-  double position_scale = 0;     ///< of a leader, in use from this state on: 0.01 … 100; 0: as both scenes say
+  double position_scale = 0;      ///< of a leader, in use from this state on: 0.01 … 100; 0: as both scenes say
   double force_scale = 0;
 };
 

@@ -36,6 +36,14 @@ PositionPosition<N>::PositionPosition(const Config& config) : config_(config), s
 }
 
 template <int N>
+void PositionPosition<N>::renew(std::uint64_t epoch) noexcept {
+  config_.epoch = epoch;
+  newest_ = {};
+  loop_ = loop_before_ = Duration::zero();
+  knows_loop_ = false;
+}
+
+template <int N>
 void PositionPosition<N>::become(double stiffness, double damping, double own_damping) noexcept {
   config_.stiffness = stiffness;
   config_.damping = damping;

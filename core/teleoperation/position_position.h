@@ -94,6 +94,9 @@ class PositionPosition {
   /// What to send in this period, after `command`.
   PortMotion<N> message() const noexcept;
 
+  /// Forgets the other end, and has another epoch itself (Purse::renew).
+  void renew(std::uint64_t epoch) noexcept;
+
   /// K, D and B from now on, each in its bounds of Config. K goes there within kSettling.
   void become(double stiffness, double damping, double own_damping) noexcept;
 

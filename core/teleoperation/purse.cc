@@ -57,6 +57,11 @@ void Purse::receive(std::size_t peer, const PurseMessage& message) noexcept {
   from.arrived = message.taken;
 }
 
+void Purse::renew(std::uint64_t epoch) noexcept {
+  config_.epoch = epoch;
+  for (Peer& peer : peers_) peer = {.sent = peer.sent};
+}
+
 void Purse::revalue(std::size_t peer, double joule, double start) noexcept {
   if (peer >= config_.peers) return;
   config_.joule[peer] = joule;

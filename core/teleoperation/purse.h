@@ -106,6 +106,10 @@ class Purse {
   /// At any time before settle(); peer < Config::peers, else nothing happens.
   void receive(std::size_t peer, const PurseMessage& message) noexcept;
 
+  /// Forgets all peers, whose next message may be of any epoch, and begins an epoch of its own: above every one before,
+  /// so that no total of before counts again. Energy that was under way is lost.
+  void renew(std::uint64_t epoch) noexcept;
+
   /// One joule of the peer is worth `joule` here from now on, and ε is `start`. What it has given and is not credited
   /// yet is lost, because nobody knows at which worth it was given.
   void revalue(std::size_t peer, double joule, double start) noexcept;

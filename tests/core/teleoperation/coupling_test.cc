@@ -99,6 +99,38 @@ TEST(Coupling, AFaultOfEitherDisengagesBothAndItsEndEngagesNobody) {
   }
 }
 
+/// It comes with a lower epoch than the leader that it replaces, whose force fades and whose act is over.
+TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
+  Ports ports = far_apart(5);
+  ports.leader.begin(9);
+  ASSERT_TRUE(ports.engage());
+  ports.leader.put({0.01, 0, 0});
+  ports.run(400);
+  const double pulled = ports.follower.demand.force.norm();
+  ASSERT_GT(pulled, 0.1);
+  const PortState last = ports.told_there;
+  ports.leader.begin(4);
+  ports.run(30);
+  EXPECT_NE(phase(ports.leader), PortPhase::kEngaged);
+  ports.follower.coupling->renew();
+  double step = 0;
+  Vec3 before = ports.follower.demand.force;
+  ports.run(60, [&](int) {
+    step = std::max(step, (ports.follower.demand.force - before).norm());
+    before = ports.follower.demand.force;
+  });
+  EXPECT_LT(step, 0.05 * pulled + 0.02) << "it fades";
+  EXPECT_EQ(before, Vec3(Vec3::Zero()));
+  expect_coupled(ports, "the new one is heard");
+  ports.follower.coupling->receive(last, Port::at(ports.now));
+  expect_no_engagement(ports, 300, "an act of the one before");
+  ports.follower.coupling->renew();
+  ports.run(20);
+  EXPECT_TRUE(ports.engage());
+  EXPECT_GE(ports.least_account(), kRounding);
+  EXPECT_GE(ports.least_sum, kRounding);
+}
+
 TEST(Coupling, AnActThatAFollowerHeardInItsFaultNeverEngagesIt) {
   Played follower(coupling_of(PortRole::kFollower));
   follower.step();

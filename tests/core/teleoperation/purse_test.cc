@@ -180,6 +180,23 @@ TEST(Purse, ANewEpochOfThePeerVoidsTheTotalsAndTheOldNeverCountsAgain) {
   EXPECT_EQ(purse.refused(), 0U);
 }
 
+/// Another peer may be of a lower epoch; the same one must not be credited again.
+TEST(Purse, ARenewedPurseHearsAnyPeerAndCountsNoTotalTwice) {
+  Purse purse({.max_power = 100, .max_account = 100});
+  purse.receive(0, from_peer(9, 1, 1, 2));
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 2);
+  purse.renew(2);
+  purse.receive(0, from_peer(10, 1, 1, 2.5));
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0) << "it answers the epoch before";
+  purse.renew(3);
+  PurseMessage other = from_peer(1, 1, 1, 0.5);
+  other.epoch = 3;
+  other.answers_epoch = 3;
+  purse.receive(0, other);
+  EXPECT_EQ(purse.settle(period_of(0, 0)).credit, 0.5) << "of a lower epoch than the one before";
+  EXPECT_EQ(purse.message(0).epoch, 3U);
+}
+
 TEST(Purse, TotalsThatAnswerAnEpochOfOursThatIsOverAreNotCounted) {
   Purse restarted({.epoch = 2});
   restarted.receive(0, from_peer(50, 0, 0.03, 0.08));  // answers epoch 1: who had that epoch has already spent it
