@@ -114,6 +114,7 @@ std::vector<Listable> make_listables() {
   add("teleoperation", "ties the handle to one of another server", [](Scene& scene) {
     scene.loop.control.limiter.shared_account = false;
     scene.teleoperation.reset();
+    scene.loop.control.leaders.clear();
     return drop(scene.loop.control.coupling);
   });
   control("admittance", "the handle follows a tool of another mass", &HapticController::Config::admittance);

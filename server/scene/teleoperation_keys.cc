@@ -42,6 +42,7 @@ struct CoupledAxes {
 
 /// A displacement, a force or the share of one.
 constexpr Number kScale{.least = 0.01, .most = 100};
+constexpr Number kShare{.least = 0, .most = 1};
 
 template <class Table>
 void declare_map(Table& keys, Draft& draft) {
@@ -118,6 +119,15 @@ void declare_teleoperation(Table& scene, Draft& draft) {
       engage.key("button", draft.engage_button, Count{31}, "for \"button\": its number",
                  Absent{.text = "required with \"button\""});
       engage.key("ramp_ms", coupling.ramp, kAboveZero, "the force rises from zero for this long");
+    });
+    keys.tables("leader", peer.leaders, Couplings::kMost, [](Table& leader, Scene::Teleoperation::Leader& one) {
+      leader.key("channel", one.channel, Label{}, "of this device, a [[channel]]: the one that this leader takes",
+                 kRequired);
+      leader.key(
+          "share", one.share, kShare,
+          "of a follower with several leaders, 2 or more: how much this one counts until a guest says otherwise; "
+          "together 1",
+          kRequired);
     });
   });
 }
