@@ -364,6 +364,46 @@ TEST(Couplings, ARobotHoldsItsPlaceAsFarAsNobodyLeadsIt) {
   EXPECT_GE(star.least_sum, kRounding);
 }
 
+TEST(Couplings, ARobotThatIsLetGoOnTheMoveFeelsNoStep) {
+  PortSetup robot = follower_setup();
+  robot.coupling.holds_place = true;
+  std::vector<Star::Leader> of{led(0.3, [](double t) { return 0.02 * std::sin(6 * t); }),
+                               led(
+                                   0.7, [](double) { return 0.0; }, 2)};
+  Star star(robot, of);
+  ASSERT_TRUE(star.engage(0));
+  star.run(2100 - star.now);
+  const Vec3 before = star.follower.x();
+  star.run(1);
+  ASSERT_GT((star.follower.x() - before).norm(), 0.08e-3) << "0.08 m/s";
+  star.leaders[0].coupling().disengage();
+  EXPECT_LT(largest_step(star, 500), 0.05);
+}
+
+TEST(Couplings, TogetherGiveNoMoreThanTheAccountHas) {
+  std::vector<CoupledLeader> four;
+  for (std::uint32_t i = 0; i < 4; ++i) four.push_back({.channel = i, .share = 0.25});
+  Couplings couplings(coupling_of(PortRole::kFollower), four);
+  double given = 0;
+  for (int ms = 0; ms < 50; ++ms) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      PortState peer;
+      peer.epoch = 5 + i;
+      peer.sequence = static_cast<std::uint64_t>(ms) + 1;
+      peer.answers_epoch = 1;
+      peer.phase = ms < 10 ? PortPhase::kCoupled : PortPhase::kEngaged;
+      peer.engagement = ms < 10 ? 0 : 1;
+      peer.need = 1;  // of all there is
+      couplings[i].receive(peer, Port::at(ms));
+    }
+    couplings.command({Port::at(ms), Vec3::Zero(), Vec3::Zero()}, 0, true);
+    const Purse::Settlement paid = couplings.settle(0.01, 0, std::chrono::milliseconds(1));
+    EXPECT_LE(paid.withdraw, 0.01) << ms;
+    given += paid.withdraw;
+  }
+  EXPECT_GT(given, 0.005);
+}
+
 TEST(Couplings, NoWorldWithTwoToFourLeadersGivesOutEnergy) {
   double least_sum = 0;
   double least_account = 0;
