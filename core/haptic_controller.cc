@@ -30,7 +30,7 @@ HapticController::HapticController(const Config& config)
     if (config.rotation) {
       throw std::invalid_argument("coupling: expected no rotation, because a coupling moves a point only");
     }
-    coupling_.emplace(*config.coupling);
+    couplings_.emplace(*config.coupling, config.leaders);
   }
   if (config.friction_map) {
     if (!config.limiter.parts.adaptive_friction) {
@@ -164,19 +164,19 @@ void HapticController::add_coupling(const Motion& hand, const Step& step, ForceC
   if (started_) {
     const Vec3 dx = last_ ? Vec3(hand.position - last_->position) : Vec3(Vec3::Zero());
     const bool shares = config_.limiter.shared_account;
-    coupling_->observe({step.was_applied, dx, step.held},
-                       shares ? limiter_.payable() : std::numeric_limits<double>::infinity());
+    couplings_->observe({step.was_applied, dx, step.held},
+                        shares ? limiter_.payable() : std::numeric_limits<double>::infinity());
   }
-  const Demand<3> demand = coupling_->command(hand, buttons_, ready());
+  const Demand<3> demand = couplings_->command(hand, buttons_, ready());
   wanted.force += demand.force;
   wanted.stiffness += demand.stiffness;
   const bool silent = wanted.mode == Mode::kIdle || wanted.mode == Mode::kSafeStop;
-  if (silent && coupling_->live()) wanted.mode = Mode::kActive;
+  if (silent && couplings_->live()) wanted.mode = Mode::kActive;
 }
 
-/// What the peer has paid raises the account, what this port pays lowers it: before the force is bounded by it.
+/// What the peers have paid raises the account, what this port pays lowers it: before the force is bounded by it.
 void HapticController::settle(const Vec3& wanted, Duration elapsed) noexcept {
-  if (coupling_) settled_ = coupling_->settle(limiter_.payable(), limiter_.worst_loss(wanted), elapsed);
+  if (couplings_) settled_ = couplings_->settle(limiter_.payable(), limiter_.worst_loss(wanted), elapsed);
   limiter_.credit(settled_.credit);
   limiter_.withdraw(settled_.withdraw);
 }
@@ -195,7 +195,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   step.hand_force = hand_force;
   if (handle != nullptr) note(*handle, wanted, step);
   book(hand, applied, handle, step);
-  if (coupling_) add_coupling(hand, step, wanted);
+  if (couplings_) add_coupling(hand, step, wanted);
   last_ = hand;
   if (wrench_) last_orientation_ = handle->turning->orientation;
   if (grip_) last_opening_ = handle->grip->opening;
@@ -319,7 +319,7 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied, const Han
   last_at_ = now;
   started_ = true;
   if (++missed_ >= config_.max_missed && fault_ == Fault::kNone) fault_ = Fault::kDeviceSilent;
-  if (coupling_) coupling_->command_unseen(now, ready());
+  if (couplings_) couplings_->command_unseen(now, ready());
   settled_ = {};
 
   add_accounts(step);

@@ -14,7 +14,7 @@
 #include "core/ledger/friction_map.h"
 #include "core/remote/force_channels.h"
 #include "core/remote/remote_force.h"
-#include "core/teleoperation/coupling.h"
+#include "core/teleoperation/couplings.h"
 
 namespace tendon {
 
@@ -88,11 +88,11 @@ struct HandleSample {
 ///
 ///     account ← the interval just ended, with the force really held         (Limiter::observe)
 ///     F ← newest remote force, held, faded or stopped by its age            (HeldForce; several: ForceChannels)
-///     F ← F + what ties the handle to the one of a peer                     (Coupling, when listed)
+///     F ← F + what ties the handle to the one of a peer, or of several      (Couplings, when listed)
 ///     F ← the force that makes the handle follow a tool which F acts on     (AdmittanceLoop, when listed)
 ///     F ← ‖F‖ ≤ max_force                                                   (saturate)
 ///     F ← ‖F − F_before‖ ≤ max_slew · T                                     (limit_slew)
-///     account ← what the peer's port has paid, less what this one pays      (Coupling::settle, with a purse)
+///     account ← what the peer's port has paid, less what this one pays      (Couplings::settle, with a purse)
 ///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
 ///
 /// A handle with motors that turn it goes the same way as a wrench: force and torque together are shortened, so that
@@ -138,6 +138,8 @@ class HapticController {
     std::optional<AdmittanceLoop<3>::Config> admittance{};
     /// Ties the handle to the one of a peer; with a purse the limiter has a shared_account. Not together with rotation.
     std::optional<Coupling::Config> coupling{};
+    /// Of a follower with several leaders: one `coupling` for each of them (Couplings); empty: it has one.
+    std::vector<CoupledLeader> leaders{};
     Duration watchdog{};   ///< the device's own; 0 = it has none
     double max_force = 0;  ///< N; > 0
     double max_slew = 0;   ///< N/s; > 0, may be infinite
@@ -179,7 +181,7 @@ class HapticController {
                  const HandleSample* handle = nullptr) noexcept;
 
   /// The same, but `wanted` is given instead of derived from the remote forces observed and the coupling, and so is
-  /// what the purse had settled. Replays recorded steps, of a scene without `coupling`.
+  /// what the purses had settled in sum. Replays recorded steps, of a scene without `coupling`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr,
             const Purse::Settlement& settled = {}) noexcept;
@@ -188,15 +190,13 @@ class HapticController {
   /// grip go into the record, and what was held into the accounts.
   Step step_unseen(LocalTime now, const Vec3& applied, const HandleSample* handle = nullptr) noexcept;
 
-  /// The end of the coupling, which takes the peer's states and the operator's acts; null when the scene lists none.
-  Coupling* coupling() noexcept { return coupling_ ? &*coupling_ : nullptr; }
+  /// The ends of the couplings, which take the peers' states and the operator's acts; null when the scene lists none.
+  Couplings* couplings() noexcept { return couplings_ ? &*couplings_ : nullptr; }
   /// For the coupling, before the step: the handle's buttons, and whether the device gives forces.
   void notice(std::uint32_t buttons, bool armed) noexcept {
     buttons_ = buttons;
     armed_ = armed;
   }
-  /// What the coupling's purse settled in the newest step.
-  const Purse::Settlement& settled() const noexcept { return settled_; }
 
   Fault fault() const noexcept { return fault_; }
   /// Clears the fault, and ends `disarm`. Forces start again from idle: the next fresh one is ramped in.
@@ -229,7 +229,7 @@ class HapticController {
   std::optional<WrenchPort> wrench_;  ///< in place of limiter_
   std::optional<GripPort> grip_;
   ForceChannels held_;
-  std::optional<Coupling> coupling_;
+  std::optional<Couplings> couplings_;
   Purse::Settlement settled_{};
   std::uint32_t buttons_ = 0;
   bool armed_ = true;

@@ -50,6 +50,14 @@ void put_state(DeviceState& state, std::uint32_t device, const StepRecord& recor
   state.hand_force = record.hand_force;
 }
 
+void carry_out(const HapticOrder& order, Couplings& couplings) noexcept {
+  if (order.coupling >= couplings.size()) return;
+  if (order.kind == HapticOrder::Kind::kEngage) couplings[order.coupling].engage();
+  if (order.kind == HapticOrder::Kind::kDisengage) couplings[order.coupling].disengage();
+  if (order.kind == HapticOrder::Kind::kSetScale) couplings[order.coupling].set_scale(order.scales[0], order.scales[1]);
+  if (order.kind == HapticOrder::Kind::kShare) couplings.set_share(order.coupling, order.share);
+}
+
 }  // namespace
 
 HapticLoop::HapticLoop(const Config& config, Device& device, Mailboxes& mail)
@@ -100,13 +108,10 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
         device_.arm();
         break;
       case HapticOrder::Kind::kEngage:
-        if (Coupling* const coupling = controller_.coupling()) coupling->engage();
-        break;
       case HapticOrder::Kind::kDisengage:
-        if (Coupling* const coupling = controller_.coupling()) coupling->disengage();
-        break;
+      case HapticOrder::Kind::kShare:
       case HapticOrder::Kind::kSetScale:
-        if (Coupling* const coupling = controller_.coupling()) coupling->set_scale(order->scales[0], order->scales[1]);
+        if (Couplings* const couplings = controller_.couplings()) carry_out(*order, *couplings);
         break;
     }
     mail_.orders.pop();
@@ -114,16 +119,20 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
   for (std::size_t channel = 0; channel < config_.control.channels.size(); ++channel) {
     if (const RemoteForce* force = mail_.forces[channel].take()) controller_.observe(*force, channel);
   }
-  if (Coupling* const coupling = controller_.coupling()) {
-    peer_.reset();
-    if (const ArrivedPort* const peer = mail_.port_in.take()) {
-      coupling->receive(peer->state, now);
-      peer_ = *peer;
-    }
-  }
+  if (Couplings* const couplings = controller_.couplings()) take_ports(*couplings, now);
   // The last force of a source that has gone may still lie in its box, and must not count as fresh. Releasing twice
   // does no harm, because the number of a source is never used again.
   for (std::size_t i = 0; i < releases; ++i) controller_.release(now, released[i].source, released[i].channel);
+}
+
+void HapticLoop::take_ports(Couplings& couplings, LocalTime now) noexcept {
+  for (std::size_t i = 0; i < couplings.size(); ++i) {
+    peers_[i].reset();
+    if (const ArrivedPort* const peer = mail_.port_in[i].take()) {
+      couplings[i].receive(peer->state, now);
+      peers_[i] = *peer;
+    }
+  }
 }
 
 void HapticLoop::set_outputs(LocalTime now) noexcept {
@@ -154,7 +163,7 @@ HandleSample HapticLoop::handle_in(const PositionSample& sample) noexcept {
 
 void HapticLoop::take_step(LocalTime now, StepRecord& record) noexcept {
   const auto sample = device_.read(now);
-  if (controller_.coupling() != nullptr) controller_.notice(sample ? sample->buttons : buttons_, device_.armed());
+  if (controller_.couplings() != nullptr) controller_.notice(sample ? sample->buttons : buttons_, device_.armed());
   if (!sample) {
     const HandleSample handle{.torque = applied_.torque, .grip_force = applied_.grip};
     const bool whole = rest_ && rest_->turns_or_grips;
@@ -218,7 +227,7 @@ LocalTime HapticLoop::step(LocalTime now) noexcept {
   record.disarmed = disarmed_;
   record.buttons = buttons_;
   watch_device();
-  if (controller_.coupling() != nullptr) publish_port(record);
+  if (controller_.couplings() != nullptr) publish_ports(record);
   publish(record);
 
   due_ += config_.period;
@@ -262,22 +271,27 @@ void HapticLoop::publish(const StepRecord& record) noexcept {
 }
 
 /// The contact that a follower feels is what its force sensor measures of whatever moves its handle.
-void HapticLoop::publish_port(const StepRecord& record) noexcept {
-  Coupling& coupling = *controller_.coupling();
-  PortRecord port{
-      .tick = record.tick,
-      .at = record.hand.at,
-      .settled = controller_.settled(),
-      .stiffness = coupling.stiffness(),
-      .round_trip = coupling.round_trip(),
-      .sent = coupling.message(record.applied, record.hand_force),
-  };
-  if (peer_) {
-    port.peer = peer_->state;
-    port.peer_arrived = peer_->at;
+void HapticLoop::publish_ports(const StepRecord& record) noexcept {
+  Couplings& couplings = *controller_.couplings();
+  const auto& leaders = config_.control.leaders;
+  for (std::size_t i = 0; i < couplings.size(); ++i) {
+    Coupling& coupling = couplings[i];
+    PortRecord port{
+        .tick = record.tick,
+        .channel = leaders.empty() ? 0 : leaders[i].channel,
+        .at = record.hand.at,
+        .settled = couplings.settled(i),
+        .stiffness = coupling.stiffness(),
+        .round_trip = coupling.round_trip(),
+        .sent = coupling.message(record.applied, record.hand_force),
+    };
+    if (peers_[i]) {
+      port.peer = peers_[i]->state;
+      port.peer_arrived = peers_[i]->at;
+    }
+    mail_.port_out[i].put(port.sent);
+    if (!mail_.ports.try_push(port)) mail_.ports_lost.fetch_add(1, std::memory_order_relaxed);
   }
-  mail_.port_out.put(port.sent);
-  if (!mail_.ports.try_push(port)) mail_.ports_lost.fetch_add(1, std::memory_order_relaxed);
 }
 
 void HapticLoop::stop() noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -62,6 +63,7 @@ class HapticLoop {
   };
 
   void take_mail(LocalTime now) noexcept;
+  void take_ports(Couplings& couplings, LocalTime now) noexcept;
   [[gnu::noinline]] void set_outputs(LocalTime now) noexcept;  // a device without any pays a branch
   HandleSample handle_in(const PositionSample& sample) noexcept;
   void take_rest(const PositionSample& sample, const Motion& hand, StepRecord& record) noexcept;
@@ -71,7 +73,7 @@ class HapticLoop {
   void watch_device() noexcept;
   void rearm() noexcept;
   void publish(const StepRecord& record) noexcept;
-  void publish_port(const StepRecord& record) noexcept;
+  void publish_ports(const StepRecord& record) noexcept;
 
   Config config_;
   Device& device_;
@@ -82,8 +84,8 @@ class HapticLoop {
   std::optional<Rest> rest_;       ///< empty: the device tells a position only
   bool has_more_motors_;           ///< than those of its position
   bool has_outputs_;
-  std::array<std::uint32_t, kMostOutputs> outputs_set_{};  ///< numbers of the settings that the device has
-  std::optional<ArrivedPort> peer_;                        ///< of a coupling: what came since the step before
+  std::array<std::uint32_t, kMostOutputs> outputs_set_{};             ///< numbers of the settings that the device has
+  std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< by coupling: what came since the step before
   Effort applied_;
   std::uint64_t tick_ = 0;
   LocalTime due_{};

@@ -11,6 +11,7 @@
 #include "core/exchange/spsc_ring.h"
 #include "core/remote/remote_force.h"
 #include "core/teleoperation/port_state.h"
+#include "core/teleoperation/shares.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/guests/health.h"
@@ -25,14 +26,17 @@ struct HapticOrder {
     kRelease,    ///< `source` no longer has `channel`: its force is no longer fresh
     kRearm,      ///< clear the latched fault, and take kDisarm back
     kDisarm,     ///< no force until kRearm
-    kEngage,     ///< the operator's act of a coupling
+    kEngage,     ///< the operator's act of `coupling`
     kDisengage,  ///< … and its end
     kSetScale,   ///< of a coupling: `scales`
+    kShare,      ///< the leader of `coupling` is to count `share`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
   std::uint32_t source = 0;
   std::array<double, 2> scales{};  ///< of positions and of forces
+  std::uint32_t coupling = 0;  ///< of the device: 0 where it has one
+  double share = 0;            ///< 0 … 1
 };
 
 /// What the other end of a coupling has told.
@@ -47,9 +51,9 @@ struct ArrivedPort {
 ///     network ──forces─▶ haptic      one box for each channel; newest wins: an older force is worth nothing
 ///     network ──orders─▶ haptic      all of them, in order
 ///     network ─outputs──▶ haptic     lamps and vibration; newest wins: it says all of them
-///     network ──port in─▶ haptic     of a coupling: the peer's port; newest wins
+///     network ──port in─▶ haptic     a box for each coupling: the peer's port; newest wins
 ///     haptic  ──state──▶ network     newest wins
-///     haptic  ──port out▶ network    of a coupling: this port; newest wins
+///     haptic  ──port out▶ network    a box for each coupling: this port; newest wins
 ///     haptic  ──steps──▶ log         all of them; what does not fit is counted
 ///     haptic  ──ports──▶ log         of a coupling: all of them; what does not fit is counted
 ///     haptic  ──flight─▶ log         the steps before a fault, frozen by it
@@ -62,7 +66,7 @@ struct Mailboxes {
   /// In values; powers of two.
   struct Capacities {
     std::size_t steps = 16384;  ///< 16 s at 1 kHz: the log thread may wait that long for a slow disk
-    std::size_t ports = 1;      ///< of a device with a coupling as many as steps
+    std::size_t ports = 1;      ///< of a device with a coupling as many as steps, for each of its couplings
     std::size_t flight = 2048;  ///< the last 2 s at 1 kHz
     std::size_t datagrams = 4096;
   };
@@ -78,8 +82,8 @@ struct Mailboxes {
   SpscRing<HapticOrder> orders{kOrders};
   Latest<DeviceState> state;
   Latest<OutputSettings> outputs;
-  Latest<ArrivedPort> port_in;
-  Latest<PortState> port_out;
+  std::array<Latest<ArrivedPort>, Shares::kMost> port_in;  ///< by coupling, as port_out
+  std::array<Latest<PortState>, Shares::kMost> port_out;
   SpscRing<StepRecord> steps;
   std::atomic<std::uint64_t> steps_lost{0};
   SpscRing<PortRecord> ports;

@@ -55,6 +55,9 @@ NetworkLoop::NetworkLoop(const Config& config, Link& link, const std::vector<Mai
   for (std::size_t i = 0; i < std::min(config.couplings.size(), devices_.size()); ++i) {
     devices_[i].coupling = config.couplings[i];
   }
+  for (std::size_t i = 0; i < std::min(config.leaders.size(), devices_.size()); ++i) {
+    devices_[i].leaders = config.leaders[i];
+  }
   config_.secret = {};  // the doorman has taken what it needs
 }
 
@@ -365,7 +368,7 @@ void leave_out_handle(DeviceState& state) {
 
 void NetworkLoop::publish(LocalTime now) {
   for (std::uint32_t number = 0; number < devices_.size(); ++number) {
-    if (devices_[number].coupling) publish_port(now, number);
+    if (devices_[number].coupling) publish_ports(now, number);
     const DeviceState* state = devices_[number].mail->state.take();
     if (state == nullptr) continue;
     devices_[number].sampled.observe(state->tick, LocalTime(state->sampled.time_since_epoch()), now);
@@ -477,21 +480,28 @@ void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) 
     return;
   }
   leases_.renew(now, port.device, port.channel);
-  devices_[port.device].mail->port_in.put({port, now});
+  const ServedDevice& device = devices_[port.device];
+  if (const auto coupling = coupling_by(device, port.channel)) device.mail->port_in[*coupling].put({port, now});
+}
+
+void NetworkLoop::publish_ports(LocalTime now, std::uint32_t device) {
+  for (std::uint32_t coupling = 0; coupling < Shares::kMost; ++coupling) {
+    const PortState* const port = devices_[device].mail->port_out[coupling].take();
+    if (port != nullptr) publish_port(now, device, coupling, *port);
+  }
 }
 
 /// Our end of a coupling goes to whoever has the other one.
-void NetworkLoop::publish_port(LocalTime now, std::uint32_t device) {
-  const PortState* const port = devices_[device].mail->port_out.take();
-  if (port == nullptr) return;
-  devices_[device].phase = port->phase;
+void NetworkLoop::publish_port(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port) {
+  devices_[device].phase = port.phase;
   for (const Dialled& dialled : dialled_) {
-    if (dialled.device == device) dialled.peer->send(now, *port);
+    if (dialled.device == device) dialled.peer->send(now, port);
   }
   for (Guest& guest : guests_) {
     if (guest.gone || !guest.coupled || guest.coupled->device != device) continue;
+    if (coupling_by(devices_[device], guest.coupled->channel) != coupling) continue;
     PortFrame frame;
-    static_cast<PortState&>(frame) = *port;
+    static_cast<PortState&>(frame) = port;
     frame.device = device;
     frame.channel = guest.coupled->channel;
     guest.session.send(frame);
@@ -503,7 +513,7 @@ bool NetworkLoop::receive_of_peer(LocalTime now, const Address& from, std::span<
   for (Dialled& dialled : dialled_) {
     if (!dialled.peer->is_from_server(from, datagram)) continue;
     dialled.peer->receive(now, from, datagram);
-    if (const auto port = dialled.peer->take()) devices_[dialled.device].mail->port_in.put({*port, now});
+    if (const auto port = dialled.peer->take()) devices_[dialled.device].mail->port_in[0].put({*port, now});
     return true;
   }
   return false;

@@ -57,6 +57,8 @@ class NetworkLoop {
     std::vector<HandleDescription> handles{};  ///< likewise; fewer: of the others nothing is known
     /// Likewise; empty: that device is not to be coupled.
     std::vector<std::optional<Couple>> couplings{};
+    /// Likewise, of a follower with several leaders: the channels by which they come; empty: one, by any channel.
+    std::vector<std::vector<std::uint32_t>> leaders{};
     /// The servers that this one dials.
     struct Dial {
       std::uint32_t device = 0;  ///< ours
@@ -165,7 +167,8 @@ class NetworkLoop {
   void take_port(LocalTime now, Guest& guest, const PortFrame& port);
   bool receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   LocalTime turn_peers(LocalTime now);
-  void publish_port(LocalTime now, std::uint32_t device);
+  void publish_ports(LocalTime now, std::uint32_t device);
+  void publish_port(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port);
   void take_refused(Guest& guest);
   void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);

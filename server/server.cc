@@ -2,6 +2,7 @@
 #include "server/server.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <filesystem>
 #include <span>
@@ -154,7 +155,9 @@ Server::DeviceRuntime::DeviceRuntime(const Scene& the_scene, const Mailboxes::Ca
       safe(scene.safety ? std::make_unique<SafeDevice>(*scene.safety, *device) : nullptr),
       mail(capacities),
       haptic(scene.loop, safe ? *safe : *device, mail),
-      meter(scene.loop.period) {}
+      meter(scene.loop.period) {
+  told_phase.fill(PortPhase::kAlone);
+}
 
 Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Guardian* guardian) {
   DeviceRuntimes devices;
@@ -166,7 +169,9 @@ Server::DeviceRuntimes Server::runtimes_of(const std::vector<Scene>& scenes, Gua
     }
     Mailboxes::Capacities capacities;
     if (!devices.empty()) capacities.datagrams = 1;  // all go to the first
-    capacities.ports = scene.teleoperation ? capacities.steps : 1;
+    // A power of two.
+    const std::size_t couplings = std::max<std::size_t>(scene.loop.control.leaders.size(), 1);
+    capacities.ports = scene.teleoperation ? std::bit_ceil(couplings) * capacities.steps : 1;
     devices.push_back(std::make_unique<DeviceRuntime>(scene, capacities, guardian));
   }
   return devices;
@@ -194,7 +199,9 @@ NetworkLoop::Config Server::network_config(const DeviceRuntimes& devices) {
   for (std::uint32_t number = 0; number < devices.size(); ++number) {
     const Scene& of_device = devices[number]->scene;
     auto& coupling = config.couplings.emplace_back();
+    auto& leaders = config.leaders.emplace_back();
     if (!of_device.teleoperation) continue;
+    for (const CoupledLeader& leader : of_device.loop.control.leaders) leaders.push_back(leader.channel);
     coupling = couple_of(*of_device.loop.control.coupling);
     const Scene::Teleoperation& peer = *of_device.teleoperation;
     if (!peer.dial) continue;
@@ -356,7 +363,7 @@ void Server::drain_to_recorder(LocalTime now) {
       // The haptic thread pushes what the coupling did before the step.
       for (const PortRecord* port = runtime.mail.ports.front(); port != nullptr && port->tick <= step->tick;
            port = runtime.mail.ports.front()) {
-        report_phase(runtime, port->sent.phase);
+        report_phase(runtime, *port);
         if (recorder_) recorder_->record(*port, device);
         runtime.mail.ports.pop();
       }
@@ -447,10 +454,13 @@ void Server::report_counts(DeviceRuntime& runtime) {
 }
 
 /// Says where its end of a coupling stands, when that has changed.
-void Server::report_phase(DeviceRuntime& runtime, PortPhase phase) {
-  if (std::exchange(runtime.told_phase, phase) == phase) return;
+void Server::report_phase(DeviceRuntime& runtime, const PortRecord& port) {
+  const PortPhase phase = port.sent.phase;
+  if (std::exchange(runtime.told_phase[port.channel], phase) == phase) return;
   const bool trouble = phase == PortPhase::kLost || phase == PortPhase::kFault;
-  const std::string text = prefix(runtime) + "teleoperation: " + std::string(to_string(phase));
+  const bool several = !runtime.scene.loop.control.leaders.empty();
+  const std::string leader = several ? runtime.scene.channels[port.channel].name + ": " : "";
+  const std::string text = prefix(runtime) + "teleoperation: " + leader + std::string(to_string(phase));
   trouble ? log::warn(text) : log::info(text);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -95,7 +96,7 @@ class Server {
     DeviceCounts told_counts;
     std::uint64_t told_steps_lost = 0;
     std::uint64_t told_ports_lost = 0;
-    PortPhase told_phase = PortPhase::kAlone;
+    std::array<PortPhase, limits::kMaxChannels> told_phase;  ///< by channel
   };
   using DeviceRuntimes = std::vector<std::unique_ptr<DeviceRuntime>>;
 
@@ -113,7 +114,7 @@ class Server {
   void tell_of_recording();
   void report_health(LocalTime now, DeviceRuntime& runtime);
   void report_counts(DeviceRuntime& runtime);
-  void report_phase(DeviceRuntime& runtime, PortPhase phase);
+  void report_phase(DeviceRuntime& runtime, const PortRecord& port);
   void report_trouble(DeviceRuntime& runtime);
   void report_safety(DeviceRuntime& runtime);
   void save_flight(DeviceRuntime& runtime);

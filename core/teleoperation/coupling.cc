@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "core/base/expect.h"
 #include "core/base/rotation.h"
+#include "core/teleoperation/shares.h"
 
 namespace tendon {
 
@@ -67,6 +70,11 @@ bool fits(double value, double low, double high) noexcept { return value >= low 
 bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
 
 bool is_scale(double scale) noexcept { return scale == 0 || fits(scale, 0.01, 100); }
+
+/// Of the others only one leader at a time can be right.
+bool can_be_shared(CouplingMethod method) noexcept {
+  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce;
+}
 
 bool has(std::uint32_t buttons, std::uint32_t bit) noexcept { return (buttons >> bit & 1U) != 0; }
 
@@ -172,6 +180,15 @@ Coupling::Coupling(const Config& config)
   refuse_of(config.clutch.has_value(), "clutch", PortRole::kLeader);
   refuse_of(config.engage_by.has_value(), "engage_by", PortRole::kLeader);
   refuse_of(config.holds_place, "holds_place", PortRole::kFollower);
+  refuse_of(config.share.has_value(), "share", PortRole::kFollower);
+  if (config.share) {
+    expect(fits(*config.share, 0, 1), "share", *config.share, "0 to 1");
+    if (!can_be_shared(config.method)) {
+      throw std::invalid_argument("method: expected position-position or position-force with several leaders, found " +
+                                  std::string(to_string(config.method)));
+    }
+    share_ = *config.share;
+  }
   if (config.clutch) expect(config.clutch->bit <= 31, "clutch.bit", config.clutch->bit, "0 to 31");
   if (config.engage_by) {
     expect(*config.engage_by <= 31, "engage_by", *config.engage_by, "0 to 31");
@@ -199,7 +216,7 @@ Vec3 Coupling::bounded(const Vec3& force) const noexcept {
 bool Coupling::live() const noexcept { return phase_ == PortPhase::kEngaged && (!leads() || answered_); }
 double Coupling::stiffness() const noexcept {
   if (renderer_) return newest_.surface ? at_leader(*newest_.surface, map_, 1).stiffness : 0;
-  if (!wave_) return spring_.stiffness();
+  if (!wave_) return share_ * spring_.stiffness();
   // B/d, with half of the round trip for one way.
   const double impedance = config_.spring.own_damping * (leads() ? 1 : map_.stiffness_at_follower(1));
   return impedance / (seconds(round_trip()) / 2 + seconds(wave_->playout() + kLineWaits));
@@ -557,12 +574,29 @@ Demand<3> Coupling::blended(const Motion& hand) noexcept {
   if (phase_ == PortPhase::kAligning) return aligning(hand);
   demand.force *= gain_;
   demand.stiffness *= gain_;
-  if (!place_) return demand;
-  const double stiffness = map_.stiffness_at_follower(config_.spring.stiffness);
-  const double damping = map_.stiffness_at_follower(config_.spring.own_damping);
-  demand.force += (1 - gain_) * bounded(stiffness * (*place_ - hand.position) - damping * hand.velocity);
-  demand.stiffness += (1 - gain_) * stiffness * Mat3::Identity();
+  if (place_) {
+    const double held = 1 - std::max(gain_, others_);
+    const double stiffness = map_.stiffness_at_follower(config_.spring.stiffness);
+    const double damping = map_.stiffness_at_follower(config_.spring.own_damping);
+    demand.force += held * bounded(stiffness * (*place_ - hand.position) - damping * hand.velocity);
+    demand.stiffness += held * stiffness * Mat3::Identity();
+  }
+  demand.force *= share_;
+  demand.stiffness *= share_;
   return demand;
+}
+
+void Coupling::set_share(double share, double others) noexcept {
+  if (!config_.share) return;
+  share_ = share;
+  // A leader that has gone leaves the place to be taken up slowly.
+  others_ = std::max(others, others_ - seconds(elapsed_) / seconds(kFade));
+}
+
+void Coupling::follow_share() noexcept {
+  if (!leads()) return;
+  const double most = gain_ > 0 ? seconds(elapsed_) / seconds(Shares::kHandOver) : 1;
+  share_ = std::clamp(newest_.share.value_or(1), share_ - most, share_ + most);
 }
 
 Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
@@ -581,12 +615,13 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   new_act_ = false;
   if (turned || !driven()) gain_ = 0;
   if (driven() && !turned) gain_ = std::min(1.0, gain_ + seconds(elapsed_) / seconds(config_.ramp));
-  if (phase_ == PortPhase::kFault || gain_ == 1) {
+  if (phase_ == PortPhase::kFault || gain_ == 1 || others_ == 1) {
     place_.reset();
   } else if (config_.holds_place && (!place_ || (turned && ended))) {
     place_ = hand.position;
   }
 
+  follow_share();
   Demand<3> demand = blended(hand);
   const bool stepped = turned || std::exchange(rescaled_, false) || aligns != was_aligning_;
   was_aligning_ = aligns;
@@ -659,14 +694,17 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
     state.position_scale = map_.position_scale();
     state.force_scale = map_.force_scale();
   }
+  if (config_.share) state.share = share_;
   if (wave_) {
     state.wave_integral = sent_wave_.integral;
     state.wave_energy = sent_wave_.energy;
   }
   if (purse_) {
     const PurseMessage paid = purse_->message(0);
-    state.account = paid.account;
-    state.need = paid.need;
+    // A leader answers for its part of the follower only (Couplings).
+    const double part = leads() ? 1 : share_;
+    state.account = part * paid.account;
+    state.need = part * paid.need;
     state.given = paid.given;
     state.taken = paid.taken;
   }

@@ -112,6 +112,11 @@ namespace tendon {
 /// that is not finite, or beyond 10¹² m or m/s, gives a demand that is not finite, which the limiter turns to zero; it
 /// moves nothing else. A force or contact that is not finite is told as 0 or as not measured.
 ///
+/// **Share.** Of several leaders of one follower (Couplings) the law is multiplied by its share α at both ends: K, D, B
+/// and max_force of this pair are α times what the scene says, and so is the contact force that a leader feels. The
+/// follower tells it (PortState::share); the leader goes there no faster than Shares::kHandOver allows, so that a state
+/// that comes late makes no step. Where the follower tells none, there is one leader, and α = 1.
+///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Coupling {
  public:
@@ -159,6 +164,8 @@ class Coupling {
     Duration ramp = std::chrono::milliseconds(300);       ///< > 0
     Duration peer_period = std::chrono::milliseconds(1);  ///< > 0: how often states of the peer are sent
     bool holds_place = false;                             ///< follower only: a robot, which no hand holds
+    /// Follower only, of one of several leaders: α at first, 0 … 1. Methods position-position and position-force.
+    std::optional<double> share{};
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -178,6 +185,9 @@ class Coupling {
   /// The scales from now on, leader only, 0.01 … 100. False, and nothing happens, while it is engaged or aligning, with
   /// waves, at a follower, and for a scale out of its bounds.
   bool set_scale(double position_scale, double force_scale) noexcept;
+  /// Of a follower that has Config::share: α from the next `command` on; and how far the ramp of another of its leaders
+  /// has come, because a robot holds its place only as far as none leads it.
+  void set_share(double share, double others) noexcept;
 
   /// The interval that has just ended, and the account after it was booked, J (SharesAccount::payable; +∞ for a port
   /// without a limiter). Not when the interval was not seen.
@@ -196,6 +206,8 @@ class Coupling {
 
   PortPhase phase() const noexcept { return phase_; }
   bool live() const noexcept;
+  double gain() const noexcept { return gain_; }  ///< 0 … 1, how far the ramp of the law has come
+  double share() const noexcept { return share_; }
   double stiffness() const noexcept;  ///< in use at this end, N/m: K, of waves B/d, of surface that of the model
   Duration round_trip() const noexcept { return spring_.round_trip(); }
   double account() const noexcept;                                          ///< J; 0 without a purse
@@ -231,6 +243,7 @@ class Coupling {
   void begin_act() noexcept;
   void receive_wave(const PortState& peer, bool anew) noexcept;
   Demand<3> blended(const Motion& hand) noexcept;
+  void follow_share() noexcept;
   Vec3 mapped(const Vec3& displacement) const noexcept;
   Vec3 coupled(const Vec3& vector) const noexcept;
   Vec3 bounded(const Vec3& force) const noexcept;
@@ -291,6 +304,8 @@ class Coupling {
   bool was_driven_ = false;
   bool was_aligning_ = false;
   double gain_ = 0;           ///< of the law
+  double share_ = 1;          ///< α
+  double others_ = 0;         ///< follower: the gain of another leader
   double fade_ = 0;           ///< of `left_`
   Vec3 left_ = Vec3::Zero();  ///< N, by which the force was above the present one when what drives it changed
   Vec3 last_ = Vec3::Zero();  ///< N, wanted last

@@ -47,6 +47,8 @@ struct PurseMessage {
 /// and only the largest that was heard counts. So Σ L_i = Σ A_i + Σ (G_ij − R_ij) + Σ discarded_i ≥ 0, term by term. ∎
 /// It needs no common clock, no acknowledgement, nothing sent again. It holds while no hold is longer than T_max; a
 /// longer one costs what OutputBound says.
+/// Several purses may settle for one account, one after the other, each with what is left of it as `payable`
+/// (Couplings): what they give in a period is then bounded as the theorem asks.
 ///
 /// **What is given** brings the accounts to one ratio of account to need, what is under way counted in:
 ///

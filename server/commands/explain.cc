@@ -114,6 +114,7 @@ std::vector<Listable> make_listables() {
   add("teleoperation", "ties the handle to one of another server", [](Scene& scene) {
     scene.loop.control.limiter.shared_account = false;
     scene.teleoperation.reset();
+    scene.loop.control.leaders.clear();
     return drop(scene.loop.control.coupling);
   });
   control("admittance", "the handle follows a tool of another mass", &HapticController::Config::admittance);
@@ -358,6 +359,9 @@ std::string in_words(const Scene& scene, const Explanation& explanation) {
        << (!std::holds_alternative<SimulatedDevice::Config>(scene.device) ? ", which stands in for the real one" : "")
        << "; measured here and now, ± " << std::llround(std::ceil(resolution_ns)) << " ns\n";
   if (const auto& coupling = scene.loop.control.coupling) put_coupling(*coupling, scene.loop.control.limiter, text);
+  for (const CoupledLeader& leader : scene.loop.control.leaders) {
+    text << "  " << scene.channels[leader.channel].name << " counts " << leader.share << " of that\n";
+  }
   text << "in other threads: " << scene.channels.size() << (scene.channels.size() == 1 ? " channel" : " channels")
        << " for engines" << (scene.network.keys ? ", sealed" : "") << ", "
        << (scene.recording ? "a recording" : "no recording") << '\n';

@@ -50,6 +50,14 @@ View* view_of(Guest& guest, std::uint32_t device) {
 Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
 const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
 
+std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel) {
+  if (!device.coupling) return std::nullopt;
+  if (device.leaders.empty()) return 0;
+  const auto leader = std::find(device.leaders.begin(), device.leaders.end(), channel);
+  if (leader == device.leaders.end()) return std::nullopt;
+  return static_cast<std::uint32_t>(leader - device.leaders.begin());
+}
+
 std::vector<ServedDevice> served_devices(const std::vector<DeviceDescription>& about,
                                          const std::vector<HandleDescription>& handles,
                                          const std::vector<Mailboxes*>& mail) {

@@ -104,11 +104,16 @@ struct ServedDevice {
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
   std::optional<Couple> coupling{};     ///< what our end is like; empty: it is not to be coupled
-  PortPhase phase = PortPhase::kAlone;  ///< of our end, as its loop told it last
+  PortPhase phase = PortPhase::kAlone;  ///< of our end, as its loop told it last; of several the newest told
+  /// The channels by which its leaders come, in the order of its couplings; empty: it has one coupling, by any channel.
+  std::vector<std::uint32_t> leaders{};
   Outputs outputs{};
   std::optional<Health> told{};  ///< to observers, last; empty before there was any
   std::uint64_t reports = 0;     ///< told so far
 };
+
+/// The coupling of the device that comes by this channel; empty: none does.
+std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel);
 
 /// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of
 /// devices or channels is out of range, two of them share a name, or there are not as many mailboxes as devices.

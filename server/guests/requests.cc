@@ -10,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/base/expect.h"
 #include "server/guests/couple.h"
 
 namespace tendon {
@@ -89,16 +90,19 @@ Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /
   return {.code = Code::kUnsupported, .detail = "that is the server's to say"};
 }
 
-/// A device has one other end: the client that was first.
+/// A coupling has one other end: the client that was first.
 Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   if (!asker.guest.may_couple) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature teleoperation"};
   }
   const ServedDevice& device = asker.devices[theirs.device];
   if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+  const auto wanted = coupling_by(device, theirs.channel);
+  if (!wanted) return {.code = Code::kUnsupported, .detail = "no leader comes by this channel"};
   for (const Guest& guest : asker.guests) {
     if (guest.gone || guest.id() == asker.guest.id()) continue;
-    if (guest.coupled && guest.coupled->device == theirs.device) {
+    if (guest.coupled && guest.coupled->device == theirs.device &&
+        coupling_by(device, guest.coupled->channel) == wanted) {
       return {.code = Code::kBusy, .detail = "it is coupled with \"" + guest.name + "\""};
     }
   }
@@ -121,11 +125,19 @@ Outcome engage(LocalTime /*now*/, const Asker& asker, const Engage& wanted) {
   return order(asker, wanted.device, {.kind = HapticOrder::Kind::kEngage}, "told to engage");
 }
 
+/// The other end of a coupling ends that one; anybody else ends all of the device.
 Outcome disengage(LocalTime /*now*/, const Asker& asker, const Disengage& wanted) {
-  if (!asker.devices[wanted.device].coupling) {
-    return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+  const ServedDevice& device = asker.devices[wanted.device];
+  if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
+  const auto& own = asker.guest.coupled;
+  const bool one = own && own->device == wanted.device;
+  const std::uint32_t first = one ? coupling_by(device, own->channel).value_or(0) : 0;
+  const auto last = one ? first : static_cast<std::uint32_t>(std::max<std::size_t>(device.leaders.size(), 1)) - 1;
+  for (std::uint32_t coupling = first; coupling <= last; ++coupling) {
+    const bool taken = device.mail->orders.try_push({.kind = HapticOrder::Kind::kDisengage, .coupling = coupling});
+    if (!taken) return {.code = Code::kBusy};
   }
-  return order(asker, wanted.device, {.kind = HapticOrder::Kind::kDisengage}, "told to disengage");
+  return {.warning = "told to disengage by \"" + asker.guest.name + "\""};
 }
 
 /// A change of scale would move what is engaged.
@@ -144,8 +156,23 @@ Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted)
                "told to change its scales");
 }
 
-Outcome set_share(LocalTime /*now*/, const Asker& /*asker*/, const SetShare& /*wanted*/) {
-  return {.code = Code::kUnsupported, .detail = "this device has no leaders to choose from"};
+Outcome set_share(LocalTime /*now*/, const Asker& asker, const SetShare& wanted) {
+  const ServedDevice& device = asker.devices[wanted.device];
+  const auto refused = [](std::string why) { return Outcome{.code = Code::kUnsupported, .detail = std::move(why)}; };
+  if (!device.coupling) return refused("this device has no [teleoperation]");
+  if (device.coupling->role == PortRole::kLeader) {
+    return refused("this device is a leader: its follower has the shares");
+  }
+  if (device.leaders.empty()) return refused("this device has one leader only");
+  const auto coupling = coupling_by(device, wanted.channel);
+  if (!coupling) return refused("no leader comes by this channel");
+  if (!(wanted.share >= 0 && wanted.share <= 1)) {
+    return {.code = Code::kInvalid, .detail = "expected a share of 0 to 1"};
+  }
+  const HapticOrder order{.kind = HapticOrder::Kind::kShare, .coupling = *coupling, .share = wanted.share};
+  if (!device.mail->orders.try_push(order)) return {.code = Code::kBusy};
+  return {.warning = "\"" + device.about.channels[wanted.channel].name + "\" is to count " + rounded(wanted.share, 3) +
+                     ", said by \"" + asker.guest.name + "\""};
 }
 
 /// Nobody sets the lamps of a device whose forces are another's.

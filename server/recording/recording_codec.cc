@@ -274,6 +274,7 @@ std::string encode(const StepRecord& step) {
 std::string encode(const PortRecord& port) {
   pb::Port out;
   out.set_tick(port.tick);
+  out.set_channel(port.channel);
   out.set_credited_j(port.settled.credit);
   out.set_withdrawn_j(port.settled.withdraw);
   out.set_stiffness_n_per_m(port.stiffness);
@@ -375,6 +376,7 @@ PortRecord decode_port(std::string_view message, LocalTime at) {
   const auto in = parse<pb::Port>(message);
   PortRecord out;
   out.tick = in.tick();
+  out.channel = in.channel();
   out.at = at;
   out.settled = {.credit = in.credited_j(), .withdraw = in.withdrawn_j()};
   out.stiffness = in.stiffness_n_per_m();

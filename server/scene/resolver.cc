@@ -378,6 +378,7 @@ class SceneResolver {
       blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
             "expected a number above 0: it is the impedance of the waves");
     }
+    resolve_leaders(coupling);
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;
@@ -407,6 +408,46 @@ class SceneResolver {
     if (draft_.absolute_map && !springs) {
       blame("teleoperation.map.absolute", {},
             "expected the method position-position, position-force or surface: the others have no absolute places");
+    }
+  }
+
+  /// Several leaders of a follower.
+  void resolve_leaders(const Coupling::Config& coupling) {
+    const Scene::Teleoperation& peer = *draft_.scene.teleoperation;
+    const std::vector<Scene::Channel>& channels = draft_.scene.channels;
+    if (peer.leaders.empty()) return;
+    const std::string table = "teleoperation.leader";
+    if (coupling.role == PortRole::kLeader) {
+      blame(table, {}, "expected none: a leader knows nothing of the others, the follower lists them");
+    }
+    if (peer.dial) {
+      blame("teleoperation.dial", {},
+            "expected none with [[teleoperation.leader]]: several leaders dial their follower");
+    }
+    if (peer.leaders.size() < 2) blame(table, {}, "expected 2 to 4 tables, or none for one leader by any channel");
+    if (coupling.method != CouplingMethod::kPositionPosition && coupling.method != CouplingMethod::kPositionForce) {
+      blame("teleoperation.method", {},
+            "expected \"position-position\" or \"position-force\" with several leaders, found " +
+                in_quotes(to_string(coupling.method)));
+    }
+    double sum = 0;
+    auto& leaders = draft_.scene.loop.control.leaders;
+    for (std::size_t i = 0; i < peer.leaders.size(); ++i) {
+      const std::string key = table + "[" + std::to_string(i) + "].channel";
+      const auto& [channel, share] = peer.leaders[i];
+      const auto named = std::ranges::find(channels, channel, &Scene::Channel::name);
+      if (named == channels.end()) {
+        blame(key, {}, "expected the name of a [[channel]], found " + in_quotes(channel));
+      }
+      const auto number = static_cast<std::uint32_t>(named - channels.begin());
+      if (std::ranges::count(leaders, number, &CoupledLeader::channel) > 0) {
+        blame(key, {}, "expected a channel of its own, found " + in_quotes(channel) + " again");
+      }
+      leaders.push_back({.channel = number, .share = share});
+      sum += share;
+    }
+    if (!(std::abs(sum - 1) <= Shares::kRounding)) {
+      blame(table, {}, "expected shares that are 1 together, found " + digits(sum));
     }
   }
 

@@ -64,6 +64,12 @@ struct Scene {
     std::optional<std::filesystem::path> key;  ///< of this server, for the peer; empty: in the clear
     std::string device;                        ///< of the peer; empty: its first
     std::string channel;                       ///< of it; empty: its first
+    /// Of a follower.
+    struct Leader {
+      std::string channel;  ///< of this device
+      double share = 0;     ///< α at first
+    };
+    std::vector<Leader> leaders{};  ///< loop.control.leaders has them by number; empty: one, by any channel
   };
 
   std::string name;  ///< of the device, as clients claim it

@@ -42,6 +42,7 @@ struct CoupledAxes {
 
 /// A displacement, a force or the share of one.
 constexpr Number kScale{.least = 0.01, .most = 100};
+constexpr Number kShare{.least = 0, .most = 1};
 
 template <class Table>
 void declare_map(Table& keys, Draft& draft) {
@@ -129,6 +130,15 @@ void declare_teleoperation(Table& scene, Draft& draft) {
           "align_energy_mj", draft.align_energy, Number{.least = 0, .most = 1e6},
           "of a leader with map.absolute: what its motor may put in by itself at each act, to draw the handle there; "
           "the port gives out so much at most. 0: the hand brings it there");
+    });
+    keys.tables("leader", peer.leaders, Couplings::kMost, [](Table& leader, Scene::Teleoperation::Leader& one) {
+      leader.key("channel", one.channel, Label{}, "of this device, a [[channel]]: the one that this leader takes",
+                 kRequired);
+      leader.key(
+          "share", one.share, kShare,
+          "of a follower with several leaders, 2 or more: how much this one counts until a guest says otherwise; "
+          "together 1",
+          kRequired);
     });
   });
 }

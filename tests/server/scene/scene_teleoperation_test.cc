@@ -183,5 +183,68 @@ TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {
             "s.toml:10: teleoperation.clutch: expected none: the leader clutches");
 }
 
+/// Twelve lines after those of kMinimal; what follows begins at line 16.
+const std::string kTwoLeaders =
+    "[[channel]]\n"
+    "name = \"trainer\"\n"
+    "[[channel]]\n"
+    "name = \"trainee\"\n"
+    "[teleoperation]\n"
+    "role = \"follower\"\n"
+    "[teleoperation.coupling]\n"
+    "stiffness_n_per_m = 400\n"
+    "damping_n_s_per_m = 4\n"
+    "[teleoperation.purse]\n";
+
+std::string leader(const std::string& channel, const std::string& share) {
+  return "[[teleoperation.leader]]\nchannel = \"" + channel + "\"\nshare = " + share + "\n";
+}
+
+TEST(SceneTeleoperation, AFollowerNamesItsLeadersByTheirChannels) {
+  const Scene scene = minimal_and(kTwoLeaders + leader("trainee", "0.3") + leader("trainer", "0.7"));
+  const auto& leaders = scene.loop.control.leaders;
+  ASSERT_EQ(leaders.size(), 2U);
+  EXPECT_EQ(leaders[0].channel, 1U);
+  EXPECT_EQ(leaders[0].share, 0.3);
+  EXPECT_EQ(leaders[1].channel, 0U);
+  EXPECT_EQ(leaders[1].share, 0.7);
+  EXPECT_TRUE(minimal_and(kTwoLeaders).loop.control.leaders.empty());
+  EXPECT_NO_THROW(minimal_and(kTwoLeaders + leader("trainer", "0.9999999995") + leader("trainee", "0")));
+}
+
+TEST(SceneTeleoperation, SaysWhyLeadersCannotBeSo) {
+  const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
+  const std::string two = leader("trainer", "0.7") + leader("trainee", "0.3");
+  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("trainee", "0.2")),
+            "s.toml:14: teleoperation.leader: expected shares that are 1 together, found 0.9");
+  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "1")),
+            "s.toml:14: teleoperation.leader: expected 2 to 4 tables, or none for one leader by any channel");
+  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("robot", "0.3")),
+            "s.toml:18: teleoperation.leader[1].channel: expected the name of a [[channel]], found \"robot\"");
+  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("trainer", "0.3")),
+            "s.toml:18: teleoperation.leader[1].channel: expected a channel of its own, found \"trainer\" again");
+  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "1.2") + leader("trainee", "-0.2")),
+            "s.toml:16: teleoperation.leader[0].share: expected a number from 0 to 1, found 1.2");
+  EXPECT_EQ(refusal(kTwoLeaders + two + two + leader("trainer", "0")),
+            "s.toml:14: teleoperation.leader: expected 1 to 4 tables [[teleoperation.leader]], found an array");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = kTwoLeaders + two;
+    text.replace(text.find(from), from.size(), to);
+    return refusal(text);
+  };
+  EXPECT_EQ(with("role = \"follower\"", "role = \"leader\""),
+            "s.toml:14: teleoperation.leader: expected none: a leader knows nothing of the others, the follower lists "
+            "them");
+  EXPECT_EQ(with("role = \"follower\"\n", "role = \"follower\"\ndial = \"127.0.0.1:47999\"\n"),
+            "s.toml:10: teleoperation.dial: expected none with [[teleoperation.leader]]: several leaders dial their "
+            "follower");
+  for (const std::string method : {"waves", "surface", "passivity", "set-position", "rate"}) {
+    EXPECT_EQ(with("role = \"follower\"\n", "role = \"follower\"\nmethod = \"" + method + "\"\n"),
+              "s.toml:10: teleoperation.method: expected \"position-position\" or \"position-force\" with several "
+              "leaders, found \"" +
+                  method + "\"");
+  }
+}
+
 }  // namespace
 }  // namespace tendon

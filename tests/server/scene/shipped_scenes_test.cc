@@ -72,6 +72,20 @@ TEST(ShippedScenes, RecordedHandFollowsTheRecordingBesideIt) {
   EXPECT_EQ(target(read_scene(folder.path() / "scene.toml"), 1).position, Vec3(0.0375, 0, 0));
 }
 
+TEST(ShippedScenes, ATrainerAndATraineeLeadOneDevice) {
+  const std::filesystem::path folder(TENDON_SCENES);
+  const Scene follower = read_scene(folder / "shared_follower.toml");
+  double sum = 0;
+  for (const CoupledLeader& leader : follower.loop.control.leaders) {
+    sum += leader.share;
+    const Scene scene = read_scene(folder / (follower.channels[leader.channel].name + ".toml"));
+    EXPECT_EQ(scene.teleoperation->channel, follower.channels[leader.channel].name);
+    EXPECT_EQ(to_string(*scene.teleoperation->dial), to_string(follower.network.listen));
+  }
+  EXPECT_EQ(follower.loop.control.leaders.size(), 2U);
+  EXPECT_EQ(sum, 1);
+}
+
 TEST(SceneReference, TheKindsOfATableStandUnderItsOwnHeading) {
   const std::string text = scene_reference();
   const std::size_t device = text.find("[device]\n");

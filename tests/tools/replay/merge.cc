@@ -5,6 +5,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -32,6 +33,7 @@ struct End {
   struct Came {
     std::pair<std::uint64_t, std::uint64_t> which;
     LocalTime by;
+    std::uint32_t channel;
   };
   std::vector<Came> came;
 };
@@ -45,7 +47,7 @@ End read_end(const std::filesystem::path& path) {
       const LocalTime at{Duration(static_cast<Duration::rep>(message->log_time))};
       const PortRecord port = recording::decode_port(message->data, at);
       end.sent[{port.sent.epoch, port.sent.sequence}] = at;
-      if (port.peer) end.came.push_back({{port.peer->epoch, port.peer->sequence}, port.peer_arrived});
+      if (port.peer) end.came.push_back({{port.peer->epoch, port.peer->sequence}, port.peer_arrived, port.channel});
     } catch (const std::invalid_argument& error) {
       reader.corrupt(message->offset, error.what());
     }
@@ -79,10 +81,20 @@ std::vector<ClockBound> bounds_between(const End& leader, const End& follower, c
   return bounds;
 }
 
-/// Copies the messages of one recording, in its order.
+/// The channels by which the leader's states came to the follower.
+std::set<std::uint32_t> channels_of(const End& leader, const End& follower) {
+  std::set<std::uint32_t> channels;
+  for (const End::Came& came : follower.came) {
+    if (leader.sent.contains(came.which)) channels.insert(came.channel);
+  }
+  return channels;
+}
+
+/// Copies the messages of one recording, in its order. Of the ports of its couplings those by `channels`.
 class Copy {
  public:
-  Copy(const std::filesystem::path& path, std::string prefix) : reader_(open(path)), prefix_(std::move(prefix)) {
+  Copy(const std::filesystem::path& path, std::string prefix, std::set<std::uint32_t> channels)
+      : reader_(open(path)), prefix_(std::move(prefix)), ports_by_(std::move(channels)) {
     next();
   }
 
@@ -101,12 +113,19 @@ class Copy {
 
  private:
   void next() {
-    message_.reset();
-    if (const auto message = reader_.next()) message_.emplace(*message);
+    do {
+      message_.reset();
+      if (const auto message = reader_.next()) message_.emplace(*message);
+    } while (message_ && is_of_another_leader(*message_));
+  }
+  bool is_of_another_leader(const McapReader::Message& message) const {
+    return message.channel.topic == recording::kPort.topic &&
+           !ports_by_.contains(recording::decode_port(message.data, LocalTime{}).channel);
   }
 
   McapReader reader_;
   std::string prefix_;
+  std::set<std::uint32_t> ports_by_;
   std::map<std::string, std::uint16_t> channels_;
   std::optional<McapReader::Message> message_;
 };
@@ -115,7 +134,8 @@ void check(bool written, const FileSink& sink) {
   if (!written) throw std::runtime_error(sink.path().string() + ": " + sink.error());
 }
 
-void write(const MergeOptions& options, const std::vector<ClockBound>& bounds) {
+void write(const MergeOptions& options, const std::vector<ClockBound>& bounds,
+           const std::set<std::uint32_t>& channels) {
   FileSink sink(options.out);
   McapWriter writer("tendon " + std::string(version_text()), sink);
   const auto schema = writer.add_schema(recording::kClock.schema, recording::kEncoding, recording::schema_data());
@@ -124,8 +144,8 @@ void write(const MergeOptions& options, const std::vector<ClockBound>& bounds) {
     const auto at = static_cast<std::uint64_t>(bound.at.time_since_epoch().count());
     writer.write(clock, at, recording::encode(ClockRecord{.offset = bound.offset, .error = bound.error}));
   }
-  Copy leader(options.leader, "/leader");
-  Copy follower(options.follower, "/follower");
+  Copy leader(options.leader, "/leader", {0});
+  Copy follower(options.follower, "/follower", channels);
   const auto in_leaders_time = [&](LocalTime at) { return at - offset_at(bounds, at - bounds.front().offset); };
   while (!leader.done() || !follower.done()) {
     const LocalTime next = follower.done() ? LocalTime::max() : in_leaders_time(follower.at());
@@ -145,8 +165,10 @@ void merge(const MergeOptions& options, std::ostream& out) {
   if (std::filesystem::exists(options.out)) {
     throw std::runtime_error(options.out.string() + ": there is such a file; a merge overwrites none");
   }
-  const auto bounds = bounds_between(read_end(options.leader), read_end(options.follower), options);
-  write(options, bounds);
+  const End leader = read_end(options.leader);
+  const End follower = read_end(options.follower);
+  const auto bounds = bounds_between(leader, follower, options);
+  write(options, bounds, channels_of(leader, follower));
   std::vector<Duration> errors;
   for (const ClockBound& bound : bounds) errors.push_back(bound.error);
   std::ranges::sort(errors);

@@ -17,7 +17,8 @@ struct MergeOptions {
 /// Writes an MCAP file with every message of both, the leader's channels under /leader and the follower's under
 /// /follower (/leader/haptic/step), their bytes as they were recorded and the follower's times moved by the offset of
 /// the clocks; and /merge/clock, a ClockBound (recording.proto) each second. The bound comes from the PortStates that
-/// both recorded (clock_bound.h). Of a server with several devices its first device is the coupled one.
+/// both recorded (clock_bound.h). Of a server with several devices its first device is the coupled one. Of a follower
+/// with several leaders the ports of this one are taken, and those of the others left out.
 ///
 /// Tells `out` the offset and the bound. Throws std::runtime_error when a file cannot be read or written, when `out`
 /// exists, when the two are not the two ends of one coupling, or when one of the clocks stepped.

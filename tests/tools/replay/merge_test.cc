@@ -9,6 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "server/recording/byte_sink.h"
 #include "server/recording/mcap_reader.h"
@@ -99,6 +100,46 @@ TEST_F(Merge, ProvesABoundOfHalfTheRoundTrip) {
   std::ostringstream out;
   merge({.leader = leader_, .follower = follower_, .out = both_, .json = false}, out);
   EXPECT_NE(out.str().find("± 2.98"), std::string::npos) << out.str();
+}
+
+/// As a follower of several leaders records it: a port for each of them in each step.
+void record_follower_of(const std::filesystem::path& file, const std::vector<std::uint64_t>& leaders, Duration ahead) {
+  FileSink sink(file);
+  Recorder recorder({.scene = {.text = "", .seed = 1, .version = "1", .commit = "c", .unix_offset = 1000s},
+                     .ports = true,
+                     .started = LocalTime(ahead)},
+                    sink);
+  for (std::uint64_t tick = 1; tick <= 10'000; ++tick) {
+    const LocalTime at = LocalTime(ahead) + tick * 1ms;
+    for (std::size_t i = 0; i < leaders.size(); ++i) {
+      PortRecord port{.tick = tick, .channel = static_cast<std::uint32_t>(i), .at = at};
+      port.sent.epoch = 2;
+      port.sent.sequence = tick;
+      if (tick > 3) {
+        port.peer.emplace();
+        port.peer->epoch = leaders[i];
+        port.peer->sequence = tick - 3 - i;
+        port.peer_arrived = at - 20us;
+      }
+      recorder.record(port);
+    }
+    StepRecord step;
+    step.tick = tick;
+    step.hand.at = at;
+    recorder.record(step);
+  }
+  recorder.close();
+}
+
+TEST_F(Merge, FindsTheStatesOfOneLeaderAmongThoseOfSeveral) {
+  const auto shared = folder_.path() / "shared.mcap";
+  record_follower_of(shared, {7, 1}, kAhead);
+  std::ostringstream out;
+  merge({.leader = leader_, .follower = shared, .out = both_, .json = true}, out);
+  // The way from this leader takes a millisecond longer than the way back.
+  EXPECT_NE(out.str().find("\"offset_s\":0.2504"), std::string::npos) << out.str();
+  EXPECT_EQ(read(both_).messages.at("/follower/haptic/port"), 10'000) << "those of the other leader are left out";
+  EXPECT_EQ(read(both_).messages.at("/leader/haptic/port"), 10'000);
 }
 
 TEST_F(Merge, OverwritesNothingAndRefusesWhatIsNoPair) {

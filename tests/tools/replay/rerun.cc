@@ -76,9 +76,9 @@ Step Rerun::take(const StepRecord& recorded, const Effort& held) {
   const HandleSample* const handle = sample ? &*sample : nullptr;
   if (!recorded.reasons.has(Reason::kUnseen)) {
     missed_ = 0;
-    const bool has_port = port_.tick == recorded.tick;
+    const bool has_port = settled_at_ == recorded.tick;
     return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded), handle,
-                            has_port ? port_.settled : Purse::Settlement{});
+                            has_port ? settled_ : Purse::Settlement{});
   }
   // Of a position that was not believed the record has only that it was not.
   ++missed_;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "core/haptic_controller.h"
 #include "server/recording/records.h"
@@ -26,9 +27,13 @@ class Rerun {
   Rerun(const HapticController::Config& control, Held held)
       : controller_(without_coupling(control)), max_missed_(control.max_missed), held_(held) {}
 
-  /// What the coupling's purse settled in the next step, if that has this tick. The rest of a coupling is in the force
-  /// that was wanted.
-  void settled(const PortRecord& port) { port_ = port; }
+  /// What the purse of a coupling settled in the next step, if that has this tick. The couplings of a step follow each
+  /// other as they were recorded. The rest of a coupling is in the force that was wanted.
+  void settled(const PortRecord& port) {
+    if (std::exchange(settled_at_, port.tick) != port.tick) settled_ = {};
+    settled_.credit += port.settled.credit;
+    settled_.withdraw += port.settled.withdraw;
+  }
 
   /// `recorded` with what this controller makes of it. `applied` is its own force with kOwn, else the recorded one.
   StepRecord step(const StepRecord& recorded);
@@ -36,6 +41,7 @@ class Rerun {
  private:
   static HapticController::Config without_coupling(HapticController::Config control) {
     control.coupling.reset();
+    control.leaders.clear();
     return control;
   }
   Step take(const StepRecord& recorded, const Effort& held);
@@ -45,7 +51,8 @@ class Rerun {
   std::uint32_t missed_ = 0;  ///< readings in a row
   Held held_;
   Effort own_;
-  PortRecord port_;  ///< tick 0: none yet
+  Purse::Settlement settled_;     ///< of all couplings
+  std::uint64_t settled_at_ = 0;  ///< tick; 0: none yet
 };
 
 /// What of a step a law decides, and that is not the same bit for bit: "energy_j: recorded 0.1, again 0.2". Empty when
