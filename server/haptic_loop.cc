@@ -55,6 +55,7 @@ void carry_out(const HapticOrder& order, Couplings& couplings) noexcept {
   if (order.kind == HapticOrder::Kind::kEngage) couplings[order.coupling].engage();
   if (order.kind == HapticOrder::Kind::kDisengage) couplings[order.coupling].disengage();
   if (order.kind == HapticOrder::Kind::kSetScale) couplings[order.coupling].set_scale(order.scales[0], order.scales[1]);
+  if (order.kind == HapticOrder::Kind::kRenew) couplings[order.coupling].renew();
   if (order.kind == HapticOrder::Kind::kShare) couplings.set_share(order.coupling, order.share);
 }
 
@@ -111,7 +112,9 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
       case HapticOrder::Kind::kDisengage:
       case HapticOrder::Kind::kShare:
       case HapticOrder::Kind::kSetScale:
+      case HapticOrder::Kind::kRenew:
         if (Couplings* const couplings = controller_.couplings()) carry_out(*order, *couplings);
+        if (order->kind == HapticOrder::Kind::kRenew) peer_numbers_.at(order->coupling) = order->source;
         break;
     }
     mail_.orders.pop();
@@ -128,7 +131,8 @@ void HapticLoop::take_mail(LocalTime now) noexcept {
 void HapticLoop::take_ports(Couplings& couplings, LocalTime now) noexcept {
   for (std::size_t i = 0; i < couplings.size(); ++i) {
     peers_[i].reset();
-    if (const ArrivedPort* const peer = mail_.port_in[i].take()) {
+    const ArrivedPort* const peer = mail_.port_in[i].take();
+    if (peer != nullptr && peer->peer == peer_numbers_[i]) {
       couplings[i].receive(peer->state, now);
       peers_[i] = *peer;
     }

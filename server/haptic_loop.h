@@ -85,6 +85,7 @@ class HapticLoop {
   bool has_more_motors_;           ///< than those of its position
   bool has_outputs_;
   std::array<std::uint32_t, kMostOutputs> outputs_set_{};             ///< numbers of the settings that the device has
+  std::array<std::uint32_t, Couplings::kMost> peer_numbers_{};        ///< by coupling: of whom states are taken
   std::array<std::optional<ArrivedPort>, Couplings::kMost> peers_{};  ///< by coupling: what came since the step before
   Effort applied_;
   std::uint64_t tick_ = 0;

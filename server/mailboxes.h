@@ -28,21 +28,23 @@ struct HapticOrder {
     kDisarm,     ///< no force until kRearm
     kEngage,     ///< the operator's act of `coupling`
     kDisengage,  ///< … and its end
-    kSetScale,   ///< of a coupling: `scales`
+    kSetScale,   ///< of `coupling`: `scales`
+    kRenew,      ///< the other end of `coupling` is another one: `source` is its number
     kShare,      ///< the leader of `coupling` is to count `share`
   };
   Kind kind = Kind::kRearm;
   std::uint32_t channel = 0;
   std::uint32_t source = 0;
   std::array<double, 2> scales{};  ///< of positions and of forces
-  std::uint32_t coupling = 0;  ///< of the device: 0 where it has one
-  double share = 0;            ///< 0 … 1
+  std::uint32_t coupling = 0;      ///< of the device: 0 where it has one
+  double share = 0;                ///< 0 … 1
 };
 
 /// What the other end of a coupling has told.
 struct ArrivedPort {
   PortState state;
-  LocalTime at{};  ///< by which it had come
+  LocalTime at{};          ///< by which it had come
+  std::uint32_t peer = 0;  ///< the number of that end among all that the coupling has had
 };
 
 /// All that passes between the haptic thread of one device and the other threads of the server. There is nothing else

@@ -285,6 +285,7 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
   const DeviceDescription& about = devices_[lost.device].about;
   notice(false, "\"" + winner.name + "\" takes " + about.name + "/" + about.channels[lost.channel].name + " from \"" +
                     loser.name + "\"");
+  loser.uncouple(lost.device, lost.channel);
   const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = winner.name};
   if (loser.can_lose && loser.session.request(news)) return;
   // The guest does not know the request, or does not answer.
@@ -481,7 +482,9 @@ void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) 
   }
   leases_.renew(now, port.device, port.channel);
   const ServedDevice& device = devices_[port.device];
-  if (const auto coupling = coupling_by(device, port.channel)) device.mail->port_in[*coupling].put({port, now});
+  if (const auto coupling = coupling_by(device, port.channel)) {
+    device.mail->port_in[*coupling].put({port, now, device.peers[*coupling]});
+  }
 }
 
 void NetworkLoop::publish_ports(LocalTime now, std::uint32_t device) {
@@ -513,16 +516,29 @@ bool NetworkLoop::receive_of_peer(LocalTime now, const Address& from, std::span<
   for (Dialled& dialled : dialled_) {
     if (!dialled.peer->is_from_server(from, datagram)) continue;
     dialled.peer->receive(now, from, datagram);
-    if (const auto port = dialled.peer->take()) devices_[dialled.device].mail->port_in[0].put({*port, now});
+    look_at(dialled);
+    ServedDevice& device = devices_[dialled.device];
+    const auto port = dialled.peer->take();
+    if (port && dialled.coupled) device.mail->port_in[0].put({*port, now, device.peers[0]});
     return true;
   }
   return false;
+}
+
+/// Each time that it couples the device's loop forgets whom it was coupled with before.
+void NetworkLoop::look_at(Dialled& dialled) {
+  if (!dialled.peer->coupled()) {
+    dialled.coupled = false;
+  } else if (!dialled.coupled) {
+    dialled.coupled = renew_peer(devices_[dialled.device], 0);
+  }
 }
 
 LocalTime NetworkLoop::turn_peers(LocalTime now) {
   LocalTime next = LocalTime::max();
   for (Dialled& dialled : dialled_) {
     next = std::min(next, dialled.peer->turn(now));
+    look_at(dialled);
     for (Peer::Notice& said : dialled.peer->take_notices()) notice(said.warning, std::move(said.text));
   }
   return next;

@@ -164,6 +164,12 @@ class NetworkLoop {
   void open(LocalTime now, Guest guest);
   void take_events(LocalTime now, Guest& guest);
   void take_force(LocalTime now, Guest& guest, const ForceCommand& command);
+  struct Dialled {
+    std::uint32_t device;
+    std::unique_ptr<Peer> peer;
+    bool coupled = false;  ///< and the device's loop knows
+  };
+  void look_at(Dialled& dialled);
   void take_port(LocalTime now, Guest& guest, const PortFrame& port);
   bool receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   LocalTime turn_peers(LocalTime now);
@@ -197,10 +203,6 @@ class NetworkLoop {
   std::vector<Guest> guests_;
   std::vector<Guest> half_open_;  ///< oldest first
   /// A server that this one dials, and for which of its devices.
-  struct Dialled {
-    std::uint32_t device;
-    std::unique_ptr<Peer> peer;
-  };
   std::vector<Dialled> dialled_;
   bool dials_ = false;
   std::uint32_t next_connection_id_;

@@ -50,6 +50,14 @@ View* view_of(Guest& guest, std::uint32_t device) {
 Guest* guest_of(std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
 const Guest* guest_of(const std::vector<Guest>& guests, std::uint32_t id) { return find_guest(guests, id); }
 
+bool renew_peer(ServedDevice& device, std::uint32_t coupling) {
+  const std::uint32_t number = device.peers.at(coupling) + 1;
+  const HapticOrder order{.kind = HapticOrder::Kind::kRenew, .source = number, .coupling = coupling};
+  if (!device.mail->orders.try_push(order)) return false;
+  device.peers.at(coupling) = number;
+  return true;
+}
+
 std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel) {
   if (!device.coupling) return std::nullopt;
   if (device.leaders.empty()) return 0;

@@ -65,10 +65,14 @@ struct Guest {
   RefusedForces refused{};           ///< since its session opened
   RefusedForces refused_told{};      ///< … as of the newest report
   bool hopeless = false;             ///< as it was told to the operator
-  std::optional<Seat> coupled{};     ///< its device is the other end of this one
+  std::optional<Seat> coupled{};     ///< its device is the other end of this one, while it holds that channel
   bool gone = false;                 ///< it has left, and is forgotten at the end of the turn
 
   std::uint32_t id() const noexcept { return session.connection_id(); }
+  /// It does not hold the channel any more.
+  void uncouple(std::uint32_t device, std::uint32_t channel) noexcept {
+    if (coupled && coupled->device == device && coupled->channel == channel) coupled.reset();
+  }
 };
 
 /// Whether the guest has claimed the channel as a controller.
@@ -107,6 +111,7 @@ struct ServedDevice {
   PortPhase phase = PortPhase::kAlone;  ///< of our end, as its loop told it last; of several the newest told
   /// The channels by which its leaders come, in the order of its couplings; empty: it has one coupling, by any channel.
   std::vector<std::uint32_t> leaders{};
+  std::array<std::uint32_t, Shares::kMost> peers{};  ///< by coupling: how many other ends it has had
   Outputs outputs{};
   std::optional<Health> told{};  ///< to observers, last; empty before there was any
   std::uint64_t reports = 0;     ///< told so far
@@ -114,6 +119,9 @@ struct ServedDevice {
 
 /// The coupling of the device that comes by this channel; empty: none does.
 std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel);
+
+/// The coupling has another end from now on: its loop forgets the one before. False when there is no room for the order.
+bool renew_peer(ServedDevice& device, std::uint32_t coupling);
 
 /// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of
 /// devices or channels is out of range, two of them share a name, or there are not as many mailboxes as devices.

@@ -83,6 +83,7 @@ Outcome take_lease(LocalTime now, const Asker& asker, const TakeLease& wanted) {
 
 Outcome give_lease(LocalTime /*now*/, const Asker& asker, const GiveLease& given) {
   asker.leases.give(given.device, given.channel, asker.guest.id());
+  asker.guest.uncouple(given.device, given.channel);
   return {};
 }
 
@@ -90,12 +91,12 @@ Outcome lease_lost(LocalTime /*now*/, const Asker& /*asker*/, const LeaseLost& /
   return {.code = Code::kUnsupported, .detail = "that is the server's to say"};
 }
 
-/// A coupling has one other end: the client that was first.
+/// A coupling has one other end: the client that was first, as long as it holds its channel.
 Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   if (!asker.guest.may_couple) {
     return {.code = Code::kUnsupported, .detail = "the Hello did not name the feature teleoperation"};
   }
-  const ServedDevice& device = asker.devices[theirs.device];
+  ServedDevice& device = asker.devices[theirs.device];
   if (!device.coupling) return {.code = Code::kUnsupported, .detail = "this device has no [teleoperation]"};
   const auto wanted = coupling_by(device, theirs.channel);
   if (!wanted) return {.code = Code::kUnsupported, .detail = "no leader comes by this channel"};
@@ -108,6 +109,7 @@ Outcome couple(LocalTime /*now*/, const Asker& asker, const Couple& theirs) {
   }
   std::string difference = first_difference(theirs, *device.coupling);
   if (!difference.empty()) return {.code = Code::kInvalid, .detail = std::move(difference)};
+  if (!renew_peer(device, *wanted)) return {.code = Code::kBusy};
   asker.guest.coupled = Seat{.device = theirs.device, .channel = theirs.channel, .role = Role::kController};
   return {.warning = "coupled with \"" + asker.guest.name + "\""};
 }

@@ -104,7 +104,9 @@ class Desk {
  public:
   Desk(Wire& wire, const std::string& address, const Address& server, const std::string& channel, LocalTime now)
       : end(wire, parse_address(address)), connection_(end, server, {.seed = std::uint64_t{77}}) {
-    Hello hello{.role = Role::kController, .name = "desk"};
+    Hello hello;
+    hello.role = Role::kController;
+    hello.name = "desk";
     hello.features = {std::string(kFeatureChannels), std::string(kFeatureTeleoperation)};
     hello.claims = {{.device = "", .channel = channel, .role = Role::kController}};
     connection_.greet(now, hello);
@@ -184,6 +186,33 @@ class TwoLeaders : public testing::Test {
   std::unique_ptr<Place> trainee_;
   std::unique_ptr<Desk> desk_;
 };
+
+/// The first was started later than the other, so that its epoch is the higher one.
+TEST_F(TwoLeaders, WhoTakesAChannelOverIsHeardAndEngagesByAnActOfItsOwn) {
+  follower_ = std::make_unique<Place>(wire_, scene_of("shared_follower.toml", {}), 1, now_);
+  trainer_ = std::make_unique<Place>(wire_, scene_of("trainer.toml", {}), 20, now_);
+  desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50001", follower_->end.self, "desk", now_);
+  run(milliseconds(1500));
+  ASSERT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged);
+  trainee_ = std::make_unique<Place>(wire_, scene_of("trainee.toml", {"teleoperation.channel=\"trainer\""}), 3, now_);
+  run(milliseconds(1500));
+  EXPECT_EQ(trainee_->phase(), PortPhase::kAlone) << "the trainer has the channel";
+  EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged);
+  cut_ = trainer_->end.self;
+  run(seconds(4));
+  EXPECT_EQ(trainee_->phase(), PortPhase::kCoupled);
+  EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kCoupled) << "engaged by nobody";
+  cut_.reset();
+  trainee_->mail->orders.try_push({HapticOrder::Kind::kEngage});
+  run(milliseconds(600));
+  EXPECT_EQ(trainee_->phase(), PortPhase::kEngaged);
+  EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged);
+  EXPECT_NE(trainer_->phase(), PortPhase::kEngaged) << "the one before is out, though it is back";
+  const Vec3 from = follower_->position;
+  run(milliseconds(600));
+  EXPECT_GT((follower_->position - from).norm(), 2e-3) << "it leads";
+  expect_sound();
+}
 
 TEST_F(TwoLeaders, EachEngagesByItsOwnButtonAndTheFollowerIsBetweenThem) {
   place();
