@@ -199,7 +199,6 @@ void write(const Couple& from, pb::Couple& to) {
   to.set_grip_stiffness_npm(from.grip_stiffness);
   to.set_grip_damping_nspm(from.grip_damping);
   to.set_drift_rate_per_s(from.drift_rate);
-  to.clear_rate();
   if (from.rate) {
     to.mutable_rate()->set_dead_zone_m(from.rate->dead_zone);
     to.mutable_rate()->set_gain_per_s(from.rate->gain);

@@ -338,8 +338,8 @@ class ForceClient:
         return self._session is not None and self._session.request(Disengage(self._place.device)) is not None
 
     def set_scale(self, position_scale: float, force_scale: float) -> bool:
-        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held.
-        False as for rearm(); ValueError beyond 0.01 … 100."""
+        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is
+        held. False as for rearm(); ValueError beyond 0.01 … 100."""
         wanted = SetScale(self._place.device, position_scale, force_scale)
         if not is_scale(wanted):
             raise ValueError(f"set_scale({position_scale}, {force_scale}): expected two scales, each 0.01 … 100")

@@ -227,8 +227,8 @@ class AnyClient:
         return self._ask(self._guest.core.disengage)
 
     def set_scale(self, position_scale: float, force_scale: float) -> bool:
-        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held.
-        False when there is no session."""
+        """The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is
+        held. False when there is no session."""
         return self._ask(lambda: self._guest.core.set_scale(position_scale, force_scale))
 
     def set_share(self, channel: int, share: float) -> bool:

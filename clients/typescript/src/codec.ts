@@ -10,7 +10,7 @@ import {
 import {
   readDeviceReport, readPeerReport, readReport, writeDeviceReport, writePeerReport, writeReport,
 } from "./codec_reports.js";
-import { readCouple, readPort, writeCouple, writePort } from "./codec_ports.js";
+import { isSetScale, isSetShare, readCouple, readPort, writeCouple, writePort } from "./codec_ports.js";
 import {
   areFeatures, clip, isEnum, isText, readQuat, readVec3, writeFeatures, writeQuat, writeVec3,
 } from "./fields.js";
@@ -184,7 +184,7 @@ function readBody(body: Body): Frame | undefined {
     case "control": {
       const { id, op } = body.value;
       const request = readRequest(op);
-      const isLost = (op.case === "couple" || op.case === "setOutput") && !request; // it is known, and out of bounds
+      const isLost = kBounded.has(op.case) && !request; // it is known, and out of bounds
       const good = id > 0 && !isLost && (!request || isRequest(request));
       return good ? { kind: "control", value: { id, request } } : undefined;
     }
@@ -423,6 +423,9 @@ const writeForce = (from: ForceCommand): pb.ForceCommand =>
     ...(from.gripForce !== undefined && { gripperForceN: from.gripForce }),
   });
 
+/** readRequest() itself looks at the bounds of these. */
+const kBounded = new Set<pb.Control["op"]["case"]>(["couple", "setOutput", "setScale", "setShare"]);
+
 /** Its values are within bounds. */
 function isRequest(request: Request): boolean {
   if (request.kind === "setStateDeadband") return isBounded(request.share) && isBounded(request.floor);
@@ -550,6 +553,14 @@ function readRequest(op: pb.Control["op"]): Request | undefined {
       const couple = readCouple(op.value);
       return couple && { kind: op.case, ...couple };
     }
+    case "setScale": {
+      const { device, positionScale, forceScale } = op.value;
+      return isSetScale(op.value) ? { kind: op.case, device, positionScale, forceScale } : undefined;
+    }
+    case "setShare": {
+      const { device, channel, share } = op.value;
+      return isSetShare(op.value) ? { kind: op.case, device, channel, share } : undefined;
+    }
     case "describe":
       return { kind: op.case, device: op.value.device, ...(op.value.handle && { handle: true }) };
     case "takeLease":
@@ -583,6 +594,14 @@ function writeRequest(request: Request | undefined): pb.Control["op"] {
     case "couple": {
       const { kind, ...couple } = request;
       return { case: kind, value: writeCouple(couple) };
+    }
+    case "setScale": {
+      const { kind, ...scales } = request;
+      return { case: kind, value: create(pb.SetScaleSchema, scales) };
+    }
+    case "setShare": {
+      const { kind, ...of } = request;
+      return { case: kind, value: create(pb.SetShareSchema, of) };
     }
     case "describe":
       return { case: request.kind, value: create(pb.DescribeSchema, { device: request.device, handle: request.handle ?? false }) };

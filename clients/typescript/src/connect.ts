@@ -50,6 +50,10 @@ export interface Guest {
   /** The operator's act of a coupling, at the leader's server, and its end. */
   engage(): boolean;
   disengage(): boolean;
+  /** The scales of a coupling from now on, at the leader's server, while it is not engaged or its clutch is held. */
+  setScale(positionScale: number, forceScale: number): boolean;
+  /** How much the leader of that channel counts among several, at the follower's server. */
+  setShare(channel: number, share: number): boolean;
   /** Sets a lamp of the device, or starts a pulse of vibration (`outputs` in the config). */
   setOutput(output: number, setting: LampColour | Vibration): boolean;
   /** Asks for the channel's lease, once more when it is lost before the answer; or gives it up. */
@@ -157,6 +161,12 @@ class RealTimeGuest implements Guest {
   }
   disengage(): boolean {
     return this.#ask(() => this.#client.disengage());
+  }
+  setScale(positionScale: number, forceScale: number): boolean {
+    return this.#ask(() => this.#client.setScale(positionScale, forceScale));
+  }
+  setShare(channel: number, share: number): boolean {
+    return this.#ask(() => this.#client.setShare(channel, share));
   }
   setOutput(output: number, setting: LampColour | Vibration): boolean {
     return this.#ask(() => this.#client.setOutput(output, setting));

@@ -2,6 +2,7 @@
 import { randomBytes } from "@noble/hashes/utils";
 import { objection, usable, type Touch } from "./answer.js";
 import { isSetting, type ControlAck } from "./codec.js";
+import { isSetScale, isSetShare } from "./codec_ports.js";
 import { checkForceDeadband, checkStateDeadband, Deadband, foretell, type ForceDeadband } from "./deadband.js";
 import { expect } from "./expect.js";
 import { ClientHandshake } from "./handshake.js";
@@ -282,6 +283,26 @@ export class ForceClient {
   /** The end of that, at either end's server. False as for rearm(). */
   disengage(): boolean {
     return this.#session?.request({ kind: "disengage", device: this.#place.device }) !== undefined;
+  }
+  /**
+   * The scales of the coupling from now on, at the leader's server, while it is not engaged or its clutch is held: each
+   * 0.01 … 100, or a RangeError. False as for rearm().
+   */
+  setScale(positionScale: number, forceScale: number): boolean {
+    if (!isSetScale({ positionScale, forceScale })) {
+      throw new RangeError(`setScale(${positionScale}, ${forceScale}): expected two scales, each 0.01 … 100`);
+    }
+    return this.#session?.request({ kind: "setScale", device: this.#place.device, positionScale, forceScale }) !== undefined;
+  }
+  /**
+   * How much the leader of that channel of our device counts among several, at the follower's server: 0 … 1, or a
+   * RangeError. False as for rearm().
+   */
+  setShare(channel: number, share: number): boolean {
+    if (!isSetShare({ channel, share })) {
+      throw new RangeError(`setShare(${channel}, ${share}): expected a channel 0 … 7 and a share 0 … 1`);
+    }
+    return this.#session?.request({ kind: "setShare", device: this.#place.device, channel, share }) !== undefined;
   }
 
   /**

@@ -202,8 +202,8 @@ export interface StateDeadband {
 }
 
 /**
- * Either way, newest wins (the highest sequence of the highest epoch of a device and channel): one end of a coupling,
- * told to the other. Vectors are in the base frame and the scale of the sender's device.
+ * Either way, newest wins (the highest sequence of the highest epoch of a device, channel and end): one end of a coupling,
+ * told to the other; both ends, told to an observer. Vectors are in the base frame and the scale of the sender's device.
  */
 export interface PortState {
   /** Of the server of the session, whichever way this goes. */
@@ -244,6 +244,43 @@ export interface PortState {
   readonly waveEnergy?: number | undefined;
   /** Of CouplingMethod.SURFACE; absent: the tool has touched nothing yet. */
   readonly surface?: PortSurface | undefined;
+  /** Absent: the orientations are not coupled. */
+  readonly turn?: PortTurn | undefined;
+  /** Absent: the grippers are not coupled. */
+  readonly grip?: PortGrip | undefined;
+  /** J, of CouplingMethod.PASSIVITY: total that its port took in, in this epoch; absent: 0. */
+  readonly energyIn?: number | undefined;
+  /** 0 … 1, of a follower: how much this leader counts; absent: it is the only one, which is not 0. */
+  readonly share?: number | undefined;
+  /** Of a leader, in use from this state on: 0.01 … 100; absent: as in Couple. */
+  readonly positionScale?: number | undefined;
+  readonly forceScale?: number | undefined;
+  /** To an observer: of the other end of the device's coupling. */
+  readonly ofPeer?: boolean | undefined;
+}
+
+/** How a handle has turned since its offset was taken. */
+export interface PortTurn {
+  /** In the axes of the sender's base frame, of length 1. */
+  readonly turn: Quat;
+  /** rad/s: zero while `turn` is frozen. */
+  readonly angularVelocity: Vec3;
+  /** N·m, on whoever holds the sender's handle, really applied. */
+  readonly torque: Vec3;
+}
+
+/** A gripper, measured at its fingers. It is a port of its own, with an account of its own. */
+export interface PortGrip {
+  /** m, and m/s. */
+  readonly opening: number;
+  readonly velocity: number;
+  /** N, on the fingers, > 0 opens them; really applied. */
+  readonly force: number;
+  /** J, these four as in PortState. */
+  readonly account: number;
+  readonly need: number;
+  readonly given: number;
+  readonly taken: number;
 }
 
 /** A flat, springy surface that a follower's tool touches, or touched last. It only pushes. */
@@ -279,6 +316,44 @@ export interface Couple {
   readonly purse: boolean;
   /** Between two PortStates. */
   readonly periodUs: number;
+  /** A place of the leader is a place of the follower: the two align before they engage. */
+  readonly absolute?: boolean | undefined;
+  /** N·m/rad and N·m·s/rad, as the leader feels them; absent: the orientations are not coupled. */
+  readonly turnStiffness?: number | undefined;
+  readonly turnDamping?: number | undefined;
+  /** N/m and N·s/m, at the leader's fingers; absent: the grippers are not coupled. */
+  readonly gripStiffness?: number | undefined;
+  readonly gripDamping?: number | undefined;
+  /** 1/s, of CouplingMethod.PASSIVITY. */
+  readonly driftRate?: number | undefined;
+  /** Of CouplingMethod.RATE. */
+  readonly rate?: RateControl | undefined;
+}
+
+/** The leader's handle, pulled back to its centre, says how fast the follower moves. In the leader's scale. */
+export interface RateControl {
+  /** m: nearer to its centre the follower stands. */
+  readonly deadZone: number;
+  /** 1/s, > 0: speed for each metre beyond that. */
+  readonly gain: number;
+  /** m/s, > 0. */
+  readonly maxSpeed: number;
+}
+
+/** The scales of a coupling from now on. */
+export interface SetScale {
+  readonly device: number;
+  /** Follower over leader, and leader over follower: 0.01 … 100. */
+  readonly positionScale: number;
+  readonly forceScale: number;
+}
+
+/** How much the leader of that channel counts among the leaders of a follower. */
+export interface SetShare {
+  readonly device: number;
+  readonly channel: number;
+  /** 0 … 1. */
+  readonly share: number;
 }
 
 /** What an output is: a lamp, or vibration by something else than the motors of the position. */
@@ -318,12 +393,17 @@ export interface SetOutput {
 /**
  * Reliable. Client → server: set the rate of a device's states; clear a latched fault; no force until then;
  * describe the device; take or give up a channel's lease; set the deadband of states; set a lamp or start a pulse; be the other end
- * of a device; the operator's act that couples the handles, and its end. Server → client: a lease is lost.
+ * of a device; the operator's act that couples the handles, and its end; the scales of a coupling, and the share of a
+ * leader. Server → client: a lease is lost.
  */
 export type Request =
   | { readonly kind: "setStateRate"; readonly hz: number; readonly device: number }
   | { readonly kind: "rearm" | "disarm" | "engage" | "disengage"; readonly device: number }
   | ({ readonly kind: "couple" } & Couple)
+  /** From a controller of the leader's device, while it is not engaged or its clutch is held. */
+  | ({ readonly kind: "setScale" } & SetScale)
+  /** From a controller of the device of a follower with several leaders. */
+  | ({ readonly kind: "setShare" } & SetShare)
   /** From whoever holds a channel of the device, to a server that has agreed to kFeatureOutputs. */
   | ({ readonly kind: "setOutput" } & SetOutput)
   /** With `handle` the answer is a HandleDescription. Only for a server that has agreed to kFeatureHandle. */

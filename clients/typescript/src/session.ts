@@ -59,7 +59,7 @@ function streamOf({ kind, value }: Diagnosis): string {
 function numberOf({ kind, value }: Diagnosis): bigint {
   return kind === "deviceReport" ? value.number : value.link.number;
 }
-const placeOf = ({ device, channel }: PortState): string => `${device}/${channel}`;
+const endOf = ({ device, channel, ofPeer }: PortState): string => `${device}/${channel}/${ofPeer ? "peer" : "own"}`;
 /** Removes and returns the entry that was put in first. */
 function takeFirst<Value>(from: Map<string, Value>): Value | undefined {
   for (const [key, value] of from) {
@@ -214,7 +214,7 @@ export class Session {
     this.#diagnosesToSend.set(streamOf(diagnosis), diagnosis);
   }
   sendPort(port: PortState): void {
-    this.#portsToSend.set(placeOf(port), port);
+    this.#portsToSend.set(endOf(port), port);
   }
   /** Queues a reliable request and returns its id; undefined when 16 are open. */
   request(request: Request): number | undefined {
@@ -373,10 +373,10 @@ export class Session {
       }
       case "port": {
         const { epoch, sequence } = frame.value;
-        const newest = this.#newestPort.get(placeOf(frame.value));
+        const newest = this.#newestPort.get(endOf(frame.value));
         if (!newest || epoch > newest.epoch || (epoch === newest.epoch && sequence > newest.sequence)) {
-          this.#newestPort.set(placeOf(frame.value), frame.value);
-          this.#portsArrived.set(placeOf(frame.value), frame.value);
+          this.#newestPort.set(endOf(frame.value), frame.value);
+          this.#portsArrived.set(endOf(frame.value), frame.value);
         } else {
           ++this.stats.stale;
         }

@@ -328,6 +328,10 @@ class Dice(random.Random):
                 if field.name == "normal" and self.random() < 0.7:  # by chance none is a unit vector
                     length = self.choice([1, 1, 1, 1, 1.0009, 1.0011, -0.9991, 0.9989])
                     inside.x, inside.y, inside.z = self.choice([(length, 0, 0), (0.6 * length, 0, 0.8 * length)])
+                if isinstance(inside, pb.Quat) and self.random() < 0.7:  # nor is it a rotation
+                    length = self.choice([1, 1, 1, 1, 1.0009, 1.0011, -0.9991, 0.9989])
+                    turns = [(length, 0, 0, 0), (0.6 * length, 0, 0.8 * length, 0)]
+                    inside.w, inside.x, inside.y, inside.z = self.choice(turns)
             else:
                 setattr(message, field.name, self.value(field))
         if isinstance(message, pb.DeviceReport) and self.random() < 0.7:  # by chance they are hardly ever enough

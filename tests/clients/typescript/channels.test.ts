@@ -97,6 +97,24 @@ describe("devices and channels", () => {
     }
   });
 
+  it("scales and shares of a coupling are asked for within their bounds", () => {
+    const { world } = controller(1, kFair, kNamed, { grants: kHeld });
+    assert.equal(world.client.setScale(1, 1) || world.client.setShare(0, 0), false, "there is no session to ask in");
+    world.runMs(100);
+    assert.ok(world.client.setScale(0.01, 100) && world.client.setShare(7, 0) && world.client.setShare(0, 1));
+    world.runMs(20);
+    assert.deepEqual(world.server.requests.slice(-3), [
+      { kind: "setScale", device: 1, positionScale: 0.01, forceScale: 100 },
+      { kind: "setShare", device: 1, channel: 7, share: 0 }, { kind: "setShare", device: 1, channel: 0, share: 1 },
+    ]);
+    for (const [position, force] of [[0.0099, 1], [1, 100.1], [NaN, 1]] as const) {
+      assert.throws(() => world.client.setScale(position, force), /setScale/);
+    }
+    for (const [channel, share] of [[8, 0.5], [-1, 0.5], [0.5, 0.5], [0, -0.001], [0, 1.001], [0, NaN]] as const) {
+      assert.throws(() => world.client.setShare(channel, share), /setShare/);
+    }
+  });
+
   it("the handle is described where the server knows that, anew each session", () => {
     const kHandle: HandleDescription = {
       device: 0, operatorFromDevice: { w: 0.5, x: -0.5, y: 0.5, z: 0.5 }, buttons: ["right", "forward"],

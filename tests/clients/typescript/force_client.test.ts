@@ -6,7 +6,7 @@ import { describe, it } from "node:test";
 import { decodeData, encodeAnswerMessage } from "../../../clients/typescript/src/codec.js";
 import { encodeAnswer } from "../../../clients/typescript/src/datagram.js";
 import { ForceClient, type ClientConfig } from "../../../clients/typescript/src/force_client.js";
-import { Code, Mode, Role, type DeviceState } from "../../../clients/typescript/src/messages.js";
+import { Code, Mode, PortPhase, Role, type DeviceState, type PortState } from "../../../clients/typescript/src/messages.js";
 import { NoiseSeal } from "../../../clients/typescript/src/seal.js";
 import { Session } from "../../../clients/typescript/src/session.js";
 import { fromMilliseconds, kSecond } from "../../../clients/typescript/src/time.js";
@@ -16,6 +16,7 @@ import { readVectors } from "./support/vectors.js";
 import { controller, kFair, kFoul, kPush, kWelcome, World, type ServerConduct } from "./support/world.js";
 
 const kKey = new Random(99).bytes(32);
+const kNowhere = { x: 0, y: 0, z: 0 };
 const kSuites = [["suite 0", undefined], ["suite 1", kKey]] as const;
 
 for (const [suite, key] of kSuites) {
@@ -217,6 +218,28 @@ describe("reconnection", () => {
     world.server.forces.length = 0;
     world.runMs(1000);
     assert.equal(world.server.forces[0]!.command.sequence, 1n);
+  });
+});
+
+describe("the two ends of a coupling", () => {
+  it("are streams of their own", () => {
+    const [ours, theirs] = [new Session({ connectionId: 1 }, 0n), new Session({ connectionId: 1 }, 0n)];
+    const port = (epoch: bigint, peer: boolean): PortState => ({
+      device: 1, channel: 1, epoch, sequence: 1n, answersEpoch: 0n, answers: 0n, timeNs: 0n, roundTripNs: 0n,
+      phase: PortPhase.ENGAGED, engagement: 0n, buttons: 0, position: kNowhere, velocity: kNowhere, force: kNowhere, account: 0,
+      need: 0, given: 0, taken: 0, ...(peer && { ofPeer: true }),
+    });
+    const arrived = (...ports: PortState[]): PortState[] => {
+      for (const one of ports) theirs.sendPort(one);
+      for (let datagram; (datagram = theirs.nextDatagram(0n)); ) ours.receive(0n, datagram);
+      const out: PortState[] = [];
+      for (let event; (event = ours.nextEvent()); ) if (event.kind === "port") out.push(event.port);
+      return out;
+    };
+    assert.deepEqual(arrived(port(9n, true), port(5n, false)), [port(9n, true), port(5n, false)]);
+    assert.equal(ours.stats.stale, 0);
+    assert.deepEqual(arrived(port(4n, false)), []);
+    assert.equal(ours.stats.stale, 1);
   });
 });
 

@@ -17,7 +17,7 @@ import {
 } from "../../../clients/typescript/src/datagram.js";
 import {
   Code, CouplingMethod, Hand, Mode, OutputKind, PortPhase, PortRole, reasonNames, Role, Safety, type Couple, type DeviceReport,
-  type PeerReport, type PortState,
+  type PeerReport, type PortGrip, type PortState, type PortTurn, type RateControl, type Request,
 } from "../../../clients/typescript/src/messages.js";
 import { PlainSeal } from "../../../clients/typescript/src/seal.js";
 import { toHex } from "./support/bytes.js";
@@ -250,7 +250,13 @@ describe("WIRE.md", () => {
     purse: true, periodUs: 1000,
   };
 
-  it("port, port-contact and port-model say what the page says", () => {
+  const kTurn: PortTurn = {
+    turn: { w: 0.6, x: 0, y: 0.8, z: 0 }, angularVelocity: { x: 0, y: 0.25, z: 0 }, torque: { x: 0, y: -0.5, z: 0 },
+  };
+  const kGrip: PortGrip = { opening: 0.0625, velocity: -0.125, force: 2, account: -0.25, need: 0.5, given: 0.75, taken: 1.25 };
+  const kRate: RateControl = { deadZone: 0.125, gain: 2.5, maxSpeed: 0.75 };
+
+  it("port, port-contact, port-model and port-all say what the page says", () => {
     assert.deepEqual(contentOf("port").frames, [{ kind: "port", value: kPort }]);
     const value = { ...kPort, contactForce: { x: -2, y: 0, z: 0.5 }, account: -0.25, need: 0, given: 0, taken: 0 };
     assert.deepEqual(contentOf("port-contact").frames, [{ kind: "port", value }]);
@@ -259,11 +265,31 @@ describe("WIRE.md", () => {
       surface: { normal: { x: 0, y: 0.6, z: 0.8 }, offset: -0.125, stiffness: 500 },
     };
     assert.deepEqual(contentOf("port-model").frames, [{ kind: "port", value: model }]);
+    const all = {
+      ...model, phase: PortPhase.ALIGNING, turn: kTurn, grip: kGrip, energyIn: 3.5, share: 0.25, positionScale: 0.5, forceScale: 2,
+      ofPeer: true,
+    };
+    assert.deepEqual(contentOf("port-all").frames, [{ kind: "port", value: all }]);
   });
 
-  it("couple, engage and disengage say what the page says", () => {
+  it("a share of nothing is not the same as none", () => {
+    for (const port of [kPort, { ...kPort, share: 0 }]) {
+      const content = decodeData(concat(encodeHead(1n, undefined), encodeFrame({ kind: "port", value: port })));
+      assert.deepEqual(content?.frames, [{ kind: "port", value: port }]);
+    }
+  });
+
+  it("couple, engage, disengage, scales and shares say what the page says", () => {
     const requestOf = (name: string): unknown => contentOf(name).frames.map((frame) => frame.kind === "control" && frame.value);
     assert.deepEqual(requestOf("control-couple"), [{ id: 15, request: { kind: "couple", ...kCouple } }]);
+    const all = {
+      ...kCouple, method: CouplingMethod.RATE, absolute: true, turnStiffness: 0.5, turnDamping: 0.0625, gripStiffness: 200,
+      gripDamping: 1.5, driftRate: 0.25, rate: kRate,
+    };
+    assert.deepEqual(requestOf("control-couple-all"), [{ id: 20, request: { kind: "couple", ...all } }]);
+    const scales = { kind: "setScale", device: 1, positionScale: 0.25, forceScale: 4 };
+    assert.deepEqual(requestOf("control-set-scale"), [{ id: 21, request: scales }]);
+    assert.deepEqual(requestOf("control-set-share"), [{ id: 22, request: { kind: "setShare", device: 1, channel: 1, share: 0.75 } }]);
     assert.deepEqual(requestOf("control-engage"), [{ id: 16, request: { kind: "engage", device: 1 } }]);
     assert.deepEqual(requestOf("control-disengage"), [{ id: 17, request: { kind: "disengage", device: 1 } }]);
   });
@@ -290,17 +316,31 @@ describe("WIRE.md", () => {
       { surface: { normal: { x: 0, y: 0.6, z: 0.802 }, offset: 0, stiffness: 1 } },
       { surface: { normal: { x: 0, y: 0.6, z: 0.8 }, offset: 1.1e12, stiffness: 1 } },
       { surface: { normal: { x: 0, y: 0.6, z: 0.8 }, offset: 0, stiffness: -1 } },
+      { turn: { ...kTurn, turn: { w: 0.602, x: 0, y: 0.8, z: 0 } } }, { turn: { ...kTurn, angularVelocity: { x: NaN, y: 0, z: 0 } } },
+      { turn: { ...kTurn, torque: { x: 0, y: Infinity, z: 0 } } }, { grip: { ...kGrip, opening: NaN } },
+      { grip: { ...kGrip, velocity: Infinity } }, { grip: { ...kGrip, force: 1.1e12 } }, { grip: { ...kGrip, account: -1000.1 } },
+      { grip: { ...kGrip, need: -0.1 } }, { grip: { ...kGrip, given: 1e6 + 1 } }, { grip: { ...kGrip, taken: -0.1 } },
+      { energyIn: -0.1 }, { energyIn: 1e6 + 1 }, { share: -0.001 }, { share: 1.001 }, { share: NaN }, { positionScale: 0.0099 },
+      { positionScale: -1 }, { forceScale: 100.1 }, { forceScale: NaN },
     ];
     const couples: Partial<Couple>[] = [
       { device: 16 }, { channel: 8 }, { role: 0 as PortRole }, { role: 3 as PortRole }, { method: 0 as CouplingMethod },
-      { method: 5 as CouplingMethod }, { positionScale: 0.0099 }, { positionScale: NaN }, { forceScale: 100.1 },
+      { method: 8 as CouplingMethod }, { positionScale: 0.0099 }, { positionScale: NaN }, { forceScale: 100.1 },
       { rotation: { w: 0.602, x: 0, y: 0.8, z: 0 } }, { axes: 0 }, { axes: 8 }, { stiffness: -1 }, { mutualDamping: Infinity },
-      { damping: NaN }, { periodUs: 0 }, { periodUs: 10_000_001 },
+      { damping: NaN }, { periodUs: 0 }, { periodUs: 10_000_001 }, { turnStiffness: -1 }, { turnDamping: Infinity },
+      { gripStiffness: NaN }, { gripDamping: -1 }, { driftRate: 1.1e12 }, { rate: { ...kRate, deadZone: -1 } },
+      { rate: { ...kRate, gain: 0 } }, { rate: { ...kRate, maxSpeed: 0 } }, { rate: { ...kRate, maxSpeed: Infinity } },
+    ];
+    const requests: Request[] = [
+      { kind: "setScale", device: 16, positionScale: 1, forceScale: 1 }, { kind: "setScale", device: 1, positionScale: 0.0099, forceScale: 1 },
+      { kind: "setScale", device: 1, positionScale: 1, forceScale: NaN }, { kind: "setShare", device: 16, channel: 1, share: 0.5 },
+      { kind: "setShare", device: 1, channel: 8, share: 0.5 }, { kind: "setShare", device: 1, channel: 1, share: 1.001 },
     ];
     const frames = [
       ...ports.map((change) => encodeFrame({ kind: "port", value: { ...kPort, ...change } })),
       ...couples.map((change) =>
         encodeFrame({ kind: "control", value: { id: 1, request: { kind: "couple", ...kCouple, ...change } } })),
+      ...requests.map((request) => encodeFrame({ kind: "control", value: { id: 1, request } })),
     ];
     for (const [i, frame] of frames.entries()) {
       const good = encodeFrame({ kind: "port", value: kPort });

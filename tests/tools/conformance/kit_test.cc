@@ -48,7 +48,8 @@ std::set<std::string_view> failed(const Report& report) {
 
 Report server_report(int suite, Fault fault) {
   crypto::start();
-  const Options options{.key = key_of(suite), .long_checks = fault == Fault::kNeverRenews};
+  const Options options{
+      .key = key_of(suite), .long_checks = fault == Fault::kNeverRenews, .follower = fault != Fault::kKnowsNoCoupling};
   ToyServer server(options.key, fault);
   ToyWire wire(server, true);
   Report report(Side::kServer);
@@ -152,6 +153,15 @@ TEST(ConformanceKit, AServerThatKnowsNoChannelsPassesAndIsNotJudgedByThem) {
   }
 }
 
+TEST(ConformanceKit, AServerThatKnowsNoCouplingPassesAndIsNotJudgedByIt) {
+  for (int suite = 0; suite < 2; ++suite) {
+    const Report all = server_report(suite, Fault::kNone);
+    const Report older = server_report(suite, Fault::kKnowsNoCoupling);
+    EXPECT_TRUE(older.passed()) << "suite " << suite << "\n" << told(older);
+    EXPECT_EQ(older.count(Outcome::kNotApplicable), all.count(Outcome::kNotApplicable) + 3) << "suite " << suite;
+  }
+}
+
 TEST(ConformanceKit, AClientThatKeepsAllRulesPasses) {
   for (int suite = 0; suite < 2; ++suite) {
     for (const pb::Role role : {pb::ROLE_CONTROLLER, pb::ROLE_OBSERVER}) {
@@ -214,6 +224,19 @@ INSTANTIATE_TEST_SUITE_P(Server, BrokenToy,
                                                      {Fault::kDiagnosesUnasked, "diagnostics-unasked"},
                                                      {Fault::kTellsOfTheHandleUnasked, "handle-unasked"},
                                                      {Fault::kTellsTheOrientationUnasked, "handle-unasked"},
+                                                     {Fault::kCouplesUnasked, "couple-unasked"},
+                                                     {Fault::kCouplesWhatDiffers, "couple-differs"},
+                                                     {Fault::kDiffersWithoutAWord, "couple-differs"},
+                                                     {Fault::kNeverCouples, "couple"},
+                                                     {Fault::kStatesWhileCoupled, "couple"},
+                                                     {Fault::kCoupledInSilence, "couple"},
+                                                     {Fault::kPortsBeyondBounds, "couple"},
+                                                     {Fault::kPortsOfOneSequence, "couple"},
+                                                     {Fault::kEngagesAFollower, "engage-at-leader"},
+                                                     {Fault::kScalesAFollower, "scale-at-leader"},
+                                                     {Fault::kSharesOneLeader, "share-of-several"},
+                                                     {Fault::kSetsOutputsUnasked, "output-unasked"},
+                                                     {Fault::kSetsAnyOutput, "output-unknown"},
                                                  })),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(Client, BrokenToy,

@@ -17,6 +17,7 @@ struct Options {
   std::optional<Key> key{};  ///< suite 1 when set
   bool loopback = true;      ///< the peer is on this machine
   bool long_checks = false;  ///< also those that take ten minutes
+  bool follower = false;     ///< a server's device 0 is a follower that fits the kit (server_coupling_checks.h)
   std::uint8_t suite() const noexcept { return key ? 1 : 0; }
 };
 

@@ -27,6 +27,7 @@ constexpr std::string_view kNewest = "State, force and report: newest wins";
 constexpr std::string_view kRequests = "Requests: exactly once, in order, answered";
 constexpr std::string_view kChannels = "Channels and leases";
 constexpr std::string_view kDropped = "Dropped and counted";
+constexpr std::string_view kTeleoperation = "Teleoperation";
 
 constexpr Side kServer = Side::kServer;
 constexpr Side kClient = Side::kClient;
@@ -173,6 +174,21 @@ constexpr std::array kChecks = {
           "Only an observer that named the feature diagnostics is told these"},
     Check{"handle-unasked", kServer, kSession, "Report",
           "Only a client that named the feature handle is told which buttons are held."},
+    Check{"couple-unasked", kServer, kSession, kTeleoperation,
+          "that device is not to be coupled, or the feature was not granted"},
+    Check{"couple-differs", kServer, kSession, kTeleoperation,
+          "they do not; detail names the first thing that differs"},
+    Check{"couple", kServer, kSession, kTeleoperation,
+          "The server sends this client no states of that device any more, but PortStates"},
+    Check{"engage-at-leader", kServer, kSession, kTeleoperation,
+          "At a follower, and where there is no coupling, engage is answered CODE_UNSUPPORTED."},
+    Check{"scale-at-leader", kServer, kSession, kTeleoperation,
+          "CODE_UNSUPPORTED: the device has no coupling, or is the follower"},
+    Check{"share-of-several", kServer, kSession, kTeleoperation,
+          "CODE_UNSUPPORTED: the device has no coupling, has one leader only, or is a leader"},
+    Check{"output-unasked", kServer, kSession, "Older peers",
+          "no description names outputs, and set_output is answered CODE_UNSUPPORTED"},
+    Check{"output-unknown", kServer, kWire, kData, "answered CODE_INVALID beyond the device's last"},
     // The end.
     Check{"bye-silence", kBoth, kSession, kStates, "nothing is sent, accepted or counted any more"},
     Check{"bye-thrice", kBoth, kSession, kStates, "Bye is said three times, what was not sent is dropped"},

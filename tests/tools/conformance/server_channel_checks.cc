@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "tests/tools/conformance/server_coupling_checks.h"
+
 namespace tendon::conformance {
 namespace {
 
@@ -105,18 +107,17 @@ void ChannelChecks::check_from_outside(Conversation& observer, std::uint32_t id)
   if (described && described->has_device()) about_ = described->device();
 }
 
-std::optional<ServerGuest::Session> ChannelChecks::check_channels() {
-  if (!channels_) return guest_.enter(pb::ROLE_CONTROLLER);
+std::optional<ServerGuest::Session> ChannelChecks::check_channels(std::uint32_t& id) {
+  if (!channels_) return guest_.enter(with_coupling(guest_.hello(pb::ROLE_CONTROLLER)));
   const bool named = about_ && about_->channels_size() > 0;
   const std::string device = named ? about_->name() : "";
   const std::string channel = named ? about_->channels(0).name() : "";
-  auto session =
-      guest_.enter(claiming({claim(pb::ROLE_OBSERVER, device), claim(pb::ROLE_CONTROLLER, device, channel)}));
+  auto session = guest_.enter(
+      with_coupling(claiming({claim(pb::ROLE_OBSERVER, device), claim(pb::ROLE_CONTROLLER, device, channel)})));
   if (!session) return session;
   guest_.report.judge(
       "claims-granted", first_of_both(session->welcome), session->welcome.ShortDebugString(),
       "two grants, first an observer's of device 0, then the controller's of its channel 0, which is free");
-  std::uint32_t id = 0;
   check_description(session->talk, session->welcome, id);
   check_lease(session->talk, id);
   check_deadband(session->talk, session->welcome, id);

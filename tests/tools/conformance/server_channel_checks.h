@@ -19,8 +19,9 @@ class ChannelChecks {
   void check_claims();
   /// Of one who has not claimed the channel as a controller. `id`: its next request.
   void check_from_outside(Conversation& observer, std::uint32_t id);
-  /// A session that has claimed by name, and still goes on.
-  std::optional<ServerGuest::Session> check_channels();
+  /// A session that has claimed by name, with the features for check_coupling(), and still goes on. `id`: its newest
+  /// request.
+  std::optional<ServerGuest::Session> check_channels(std::uint32_t& id);
   /// The link reports in all that was heard.
   void check_reports(const Conversation& talk);
 

@@ -11,6 +11,7 @@
 
 #include "tests/tools/conformance/conversation.h"
 #include "tests/tools/conformance/server_channel_checks.h"
+#include "tests/tools/conformance/server_coupling_checks.h"
 #include "tests/tools/conformance/server_guest.h"
 #include "tests/tools/conformance/server_opening_checks.h"
 #include "tests/tools/conformance/server_request_checks.h"
@@ -220,6 +221,7 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
   check_answer_again(guest, session);
   check_second_controller(guest);
   check_requests(guest, talk);
+  check_unasked(guest, talk, 22);
   // More than a second after the others: there is one more report to come.
   pb::Datagram last_force;
   *last_force.add_frames() = forces.frame(forces.next++);
@@ -240,8 +242,10 @@ void check_conversation(ServerGuest& guest, ChannelChecks& channels, ServerGuest
 }
 
 void check_end(ServerGuest& guest, ChannelChecks& channels) {
-  auto first = channels.check_channels();
+  std::uint32_t id = 0;
+  auto first = channels.check_channels(id);
   if (!first) return;
+  check_coupling(guest, *first, id + 1);
   if (guest.options.suite() == 0) {
     guest.report.not_applicable("replaced", "suite 0 has no keys");
     guest.report.not_applicable("bye-thrice", "a server of suite 0 says Bye when it goes down");

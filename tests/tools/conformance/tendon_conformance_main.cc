@@ -22,6 +22,7 @@ struct Line {
   std::string log;
   std::vector<std::string> command;
   bool long_checks = false;
+  bool follower = false;
   bool json = false;
 };
 
@@ -58,6 +59,7 @@ Options options_of(const Line& line) {
 
 int judge_server(const Line& line) {
   Options options = options_of(line);
+  options.follower = line.follower;
   const Address address = parse_address(line.server);
   options.loopback = is_loopback(address);
   UdpWire wire = UdpWire::to_server(address);
@@ -104,6 +106,8 @@ int run(int argc, char** argv) {
   };
   CLI::App* const server = app.add_subcommand("server", "Be the clients of a server");
   server->add_option("ADDRESS", line.server, "Where it listens; it needs no other controller")->required();
+  server->add_flag("--follower", line.follower,
+                   "Its device 0 is the follower of a coupling that fits the kit (README.md)");
   common(server);
   CLI::App* const client = app.add_subcommand(
       "client", "Be the server of a client, which is started several times, and asked to end by SIGTERM");

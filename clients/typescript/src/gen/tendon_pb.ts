@@ -164,7 +164,7 @@ export type Frame = Message<"tendon.v1.Frame"> & {
   } | {
     /**
      * Only between peers that both named the feature "teleoperation", either way, unreliable: of each device, channel
-     * and end the highest sequence of the highest epoch wins. To an observer of the device, of both ends of its coupling
+     * and end the highest sequence of the highest epoch wins. To an observer of the device, both ends of its coupling
      *
      * @generated from field: tendon.v1.PortState port_state = 9;
      */

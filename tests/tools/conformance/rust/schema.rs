@@ -119,11 +119,17 @@ static LEASE_LOST: Schema =
 static DEADBAND: Schema =
     message(&[Field(1, Real, One, SIGNED), Field(2, Real, One, SIGNED), Field(3, Unsigned32, One, Any)]);
 
+static RATE_CONTROL: Schema = message(&[
+    Field(1, Real, One, POSITIVE),
+    Field(2, Real, One, Above(0.0, LARGE)),
+    Field(3, Real, One, Above(0.0, LARGE)),
+]);
+
 static COUPLE: Schema = message(&[
     Field(1, Unsigned32, One, DEVICE),
     Field(2, Unsigned32, One, CHANNEL),
     Field(3, Enum, One, Whole(1, 2)),
-    Field(4, Enum, One, Whole(1, 4)),
+    Field(4, Enum, One, Whole(1, 7)),
     Field(5, Real, One, Between(0.01, 100.0)),
     Field(6, Real, One, Between(0.01, 100.0)),
     Field(7, Sub(&QUATERNION), Required, Any),
@@ -134,6 +140,25 @@ static COUPLE: Schema = message(&[
     Field(12, Bool, One, Any),
     Field(13, Bool, One, Any),
     Field(14, Unsigned32, One, Whole(1, 10_000_000)),
+    Field(15, Bool, One, Any),
+    Field(16, Real, One, POSITIVE),
+    Field(17, Real, One, POSITIVE),
+    Field(18, Real, One, POSITIVE),
+    Field(19, Real, One, POSITIVE),
+    Field(20, Real, One, POSITIVE),
+    Field(21, Sub(&RATE_CONTROL), Optional, Any),
+]);
+
+static SET_SCALE: Schema = message(&[
+    Field(1, Unsigned32, One, DEVICE),
+    Field(2, Real, One, Between(0.01, 100.0)),
+    Field(3, Real, One, Between(0.01, 100.0)),
+]);
+
+static SET_SHARE: Schema = message(&[
+    Field(1, Unsigned32, One, DEVICE),
+    Field(2, Unsigned32, One, CHANNEL),
+    Field(3, Real, One, Between(0.0, 1.0)),
 ]);
 
 static VIBRATION: Schema = Schema {
@@ -173,8 +198,10 @@ pub static CONTROL: Schema = Schema {
         Field(11, Sub(&COUPLE), Optional, Any),
         Field(12, Sub(&OF_DEVICE), Optional, Any),
         Field(13, Sub(&OF_DEVICE), Optional, Any),
+        Field(14, Sub(&SET_SCALE), Optional, Any),
+        Field(15, Sub(&SET_SHARE), Optional, Any),
     ],
-    oneof: &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
+    oneof: &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
     rule: |_| true,
 };
 
@@ -291,30 +318,62 @@ static PORT_SURFACE: Schema = Schema {
     rule: |node| node.sub(1).map_or(false, |normal| near_one(&normal.reals::<3>())),
 };
 
-pub static PORT_STATE: Schema = message(&[
-    Field(1, Unsigned32, One, DEVICE),
-    Field(2, Unsigned32, One, CHANNEL),
-    Field(3, Unsigned64, One, Whole(1, MOST)),
-    Field(4, Unsigned64, One, Whole(1, MOST)),
-    Field(5, Unsigned64, One, Any),
-    Field(6, Unsigned64, One, Any),
-    Field(7, Fixed64, One, TIME),
-    Field(8, Unsigned64, One, Whole(0, 10_000_000_000)),
-    Field(9, Enum, One, Whole(1, 7)),
-    Field(10, Unsigned64, One, Any),
-    Field(11, Fixed32, One, Any),
-    Field(12, Sub(&VECTOR), Optional, Any),
-    Field(13, Sub(&VECTOR), Optional, Any),
-    Field(14, Sub(&VECTOR), Optional, Any),
-    Field(15, Sub(&VECTOR), Optional, Any),
-    Field(16, Real, One, Between(-1e3, 1e3)),
-    Field(17, Real, One, Between(0.0, 1e3)),
-    Field(18, Real, One, Between(0.0, 1e6)),
-    Field(19, Real, One, Between(0.0, 1e6)),
-    Field(20, Sub(&VECTOR), Optional, Any),
-    Field(21, Real, One, Between(0.0, 1e6)),
-    Field(22, Sub(&PORT_SURFACE), Optional, Any),
+static PORT_TURN: Schema = message(&[
+    Field(1, Sub(&QUATERNION), Required, Any),
+    Field(2, Sub(&VECTOR), Optional, Any),
+    Field(3, Sub(&VECTOR), Optional, Any),
 ]);
+
+static PORT_GRIP: Schema = message(&[
+    Field(1, Real, One, SIGNED),
+    Field(2, Real, One, SIGNED),
+    Field(3, Real, One, SIGNED),
+    Field(4, Real, One, Between(-1e3, 1e3)),
+    Field(5, Real, One, Between(0.0, 1e3)),
+    Field(6, Real, One, Between(0.0, 1e6)),
+    Field(7, Real, One, Between(0.0, 1e6)),
+]);
+
+/// A scale of 0 stands for the one in Couple.
+fn scale_or_none(scale: f64) -> bool {
+    scale == 0.0 || scale >= 0.01
+}
+
+pub static PORT_STATE: Schema = Schema {
+    fields: &[
+        Field(1, Unsigned32, One, DEVICE),
+        Field(2, Unsigned32, One, CHANNEL),
+        Field(3, Unsigned64, One, Whole(1, MOST)),
+        Field(4, Unsigned64, One, Whole(1, MOST)),
+        Field(5, Unsigned64, One, Any),
+        Field(6, Unsigned64, One, Any),
+        Field(7, Fixed64, One, TIME),
+        Field(8, Unsigned64, One, Whole(0, 10_000_000_000)),
+        Field(9, Enum, One, Whole(1, 7)),
+        Field(10, Unsigned64, One, Any),
+        Field(11, Fixed32, One, Any),
+        Field(12, Sub(&VECTOR), Optional, Any),
+        Field(13, Sub(&VECTOR), Optional, Any),
+        Field(14, Sub(&VECTOR), Optional, Any),
+        Field(15, Sub(&VECTOR), Optional, Any),
+        Field(16, Real, One, Between(-1e3, 1e3)),
+        Field(17, Real, One, Between(0.0, 1e3)),
+        Field(18, Real, One, Between(0.0, 1e6)),
+        Field(19, Real, One, Between(0.0, 1e6)),
+        Field(20, Sub(&VECTOR), Optional, Any),
+        Field(21, Real, One, Between(0.0, 1e6)),
+        Field(22, Sub(&PORT_SURFACE), Optional, Any),
+        Field(23, Sub(&PORT_TURN), Optional, Any),
+        Field(24, Sub(&PORT_GRIP), Optional, Any),
+        Field(25, Real, One, Between(0.0, 1e6)),
+        Field(26, Real, Optional, Between(0.0, 1.0)),
+        Field(27, Real, One, Between(0.0, 100.0)),
+        Field(28, Real, One, Between(0.0, 100.0)),
+        Field(29, Bool, One, Any),
+    ],
+    oneof: &[],
+    rule: |node| scale_or_none(node.real(27)) && scale_or_none(node.real(28)),
+};
 
 pub static FRAME: Schema = Schema {
     fields: &[

@@ -91,7 +91,21 @@ enum class Fault : std::uint8_t {
   kDiagnosesUnasked,
   kTellsOfTheHandleUnasked,
   kTellsTheOrientationUnasked,
+  kCouplesUnasked,
+  kCouplesWhatDiffers,
+  kDiffersWithoutAWord,
+  kNeverCouples,
+  kStatesWhileCoupled,
+  kCoupledInSilence,
+  kPortsBeyondBounds,
+  kPortsOfOneSequence,
+  kEngagesAFollower,
+  kScalesAFollower,
+  kSharesOneLeader,
+  kSetsOutputsUnasked,
+  kSetsAnyOutput,
   kKnowsNoChannels,  ///< no fault: an older server
+  kKnowsNoCoupling,  ///< nor that
   // A client's.
   kShortHello,
   kHelloWithConnection,

@@ -30,6 +30,16 @@ bool claims_good(const pb::Hello& hello) {
   return roles.empty() || *roles.rbegin() == hello.role();
 }
 
+/// In what a leader does not fit this toy, a follower; empty: it does.
+std::string difference(const pb::Couple& theirs) {
+  if (theirs.role() != pb::PORT_ROLE_LEADER) return "role: yours and mine follower";
+  if (theirs.method() != pb::COUPLING_METHOD_POSITION_POSITION) return "method: mine position-position";
+  if (theirs.position_scale() != 1) return "map.position_scale: mine 1";
+  if (theirs.axes() != 7) return "map.axes: mine xyz";
+  if (theirs.stiffness_npm() != 1000) return "coupling.stiffness_n_per_m: mine 1000";
+  return theirs.purse() ? "" : "purse: mine true";
+}
+
 Key key_from(std::uint8_t first) { return Key(Bytes32{std::byte{first}, std::byte{0x5A}}); }
 
 }  // namespace
@@ -107,6 +117,10 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
     if (std::ranges::count(hello.features(), "channels") > 0) yes.mutable_welcome()->add_features("channels");
     for (const pb::Claim& claim : hello.claims()) yes.mutable_welcome()->add_grants()->set_role(claim.role());
   }
+  for (const std::string feature : {"teleoperation", "outputs"}) {
+    const bool asked = std::ranges::count(hello.features(), feature) > 0;
+    if (asked && !is(Fault::kKnowsNoCoupling)) yes.mutable_welcome()->add_features(feature);
+  }
   if (is(Fault::kGrantsUnasked) && hello.claims().empty()) {
     yes.mutable_welcome()->add_grants()->set_role(hello.role());
   }
@@ -129,6 +143,7 @@ void ToyServer::greet(LocalTime now, int port, Span datagram) {
       .open = false,
       .waiting = {},
       .answered = {}};
+  member.features.assign(yes.welcome().features().begin(), yes.welcome().features().end());
   members_.push_back(std::move(member));
 }
 
@@ -178,6 +193,29 @@ pb::Code ToyServer::set_deadband(Member& member, const pb::SetStateDeadband& ask
   const bool stays = is(Fault::kDeadbandForEver) && silence_us == 0;
   if (!stays && !is(Fault::kSendsTheForetold)) member.silence = silence_us / 1000;
   return pb::CODE_OK;
+}
+
+void ToyServer::couple(Member& member, const pb::Couple& theirs, pb::ControlAck& ack) const {
+  if (std::ranges::count(member.features, "teleoperation") == 0 && !is(Fault::kCouplesUnasked)) {
+    return ack.set_code(pb::CODE_UNSUPPORTED);
+  }
+  const std::string what = is(Fault::kNeverCouples) && difference(theirs).empty() ? "the weather" : difference(theirs);
+  if (!what.empty() && !is(Fault::kCouplesWhatDiffers)) {
+    if (!is(Fault::kDiffersWithoutAWord)) ack.set_detail(what);
+    return ack.set_code(pb::CODE_INVALID);
+  }
+  member.coupled = what.empty();
+}
+
+pb::Frame ToyServer::port(LocalTime now, Member& member) const {
+  pb::Frame frame;
+  pb::PortState& port = *frame.mutable_port_state();
+  port.set_epoch(1);
+  port.set_sequence(is(Fault::kPortsOfOneSequence) ? 1 : ++member.ports);
+  port.set_time_ns(ns(now));
+  port.set_phase(pb::PORT_PHASE_COUPLED);
+  if (is(Fault::kPortsBeyondBounds)) port.set_account_j(1001);
+  return frame;
 }
 
 std::optional<pb::Frame> ToyServer::report(LocalTime now, Member& member) const {
@@ -276,6 +314,17 @@ void ToyServer::execute(Member& member, const pb::Control& control) {
     if (holder() == &member && !is(Fault::kKeepsTheLease)) holder_ = 0;
   } else if (control.has_set_state_deadband()) {
     ack.set_code(set_deadband(member, control.set_state_deadband()));
+  } else if (control.has_couple() && !is(Fault::kKnowsNoCoupling)) {
+    couple(member, control.couple(), ack);
+  } else if (control.has_set_output() && std::ranges::count(member.features, "outputs") > 0) {
+    if (!is(Fault::kSetsAnyOutput)) ack.set_code(pb::CODE_INVALID);
+  } else if (control.has_couple() || control.has_set_output() || control.has_engage() || control.has_set_scale() ||
+             control.has_set_share()) {
+    const bool done = (is(Fault::kSetsOutputsUnasked) && control.has_set_output()) ||
+                      (is(Fault::kEngagesAFollower) && control.has_engage()) ||
+                      (is(Fault::kScalesAFollower) && control.has_set_scale()) ||
+                      (is(Fault::kSharesOneLeader) && control.has_set_share());
+    if (!done) ack.set_code(pb::CODE_UNSUPPORTED);
   } else {
     ack.set_code(pb::CODE_UNSUPPORTED);
     if (is(Fault::kSilentToUnknownRequests)) return;
@@ -292,8 +341,10 @@ void ToyServer::tick(LocalTime now) {
     if (member.session.closed || !(member.open || is(Fault::kStatesWhileHalfOpen))) continue;
     std::vector<pb::Frame> frames = std::exchange(member.due, {});
     if (auto told = report(now, member)) frames.push_back(std::move(*told));
+    if (member.coupled && !is(Fault::kCoupledInSilence)) frames.push_back(port(now, member));
     const bool foretold = tick_ - member.said_at < member.silence;  // its hand rests
-    if (tick_ % member.every == 0 && !foretold && !(member.silence > 0 && is(Fault::kSilentWithDeadband))) {
+    const bool sees = !member.coupled || is(Fault::kStatesWhileCoupled);
+    if (sees && tick_ % member.every == 0 && !foretold && !(member.silence > 0 && is(Fault::kSilentWithDeadband))) {
       member.said_at = tick_;
       frames.emplace_back();
       pb::DeviceState& state = *frames.back().mutable_state();

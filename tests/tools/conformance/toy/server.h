@@ -37,12 +37,17 @@ class ToyServer : public ToyPeer {
     std::map<std::uint32_t, pb::ControlAck> answered;
     std::uint32_t next_request = 1;
     std::vector<pb::Frame> due{};
+    std::vector<std::string> features{};
+    bool coupled = false;
+    std::uint64_t ports = 0;
   };
   bool is(Fault fault) const noexcept { return fault_ == fault; }
   void greet(LocalTime now, int port, Span datagram);
   void refuse(int port, const Greeting& greeting, pb::Code code);
   void take(Member& member, const pb::Frame& frame);
   void execute(Member& member, const pb::Control& control);
+  void couple(Member& member, const pb::Couple& theirs, pb::ControlAck& ack) const;
+  pb::Frame port(LocalTime now, Member& member) const;
   pb::Code set_deadband(Member& member, const pb::SetStateDeadband& asked) const;
   pb::DeviceDescription describe() const;
   const Member* holder() const;
