@@ -166,6 +166,8 @@ class NetworkLoop {
   bool receive_of_peer(LocalTime now, const Address& from, std::span<const std::byte> datagram);
   LocalTime turn_peers(LocalTime now);
   void publish_port(LocalTime now, std::uint32_t device);
+  void show_ports(LocalTime now, PortFrame mine);
+  void arrived(LocalTime now, std::uint32_t device, std::uint32_t channel, const PortState& port);
   void take_refused(Guest& guest);
   void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);

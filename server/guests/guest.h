@@ -38,6 +38,8 @@ struct View {
   std::uint64_t last_state = 0;   ///< tick
   std::optional<StateDeadband> deadband{};
   std::uint32_t pressed = 0;  ///< buttons that were held at any time since the last state
+  LocalTime ports_due{};      ///< the ends of its coupling are told again, at the earliest
+  bool peer_waits = false;    ///< the other end has told something since then
 };
 
 /// Somebody with a session.
@@ -51,7 +53,8 @@ struct Guest {
   bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
   bool sees_handle;         ///< … and kFeatureHandle
   bool sees_joints;         ///< … and kFeatureJoints
-  bool may_couple;          ///< … and kFeatureTeleoperation
+  bool may_couple;          ///< … and kFeatureTeleoperation, as a controller
+  bool sees_ports;          ///< … and kFeatureTeleoperation, as an observer
   bool sees_outputs;        ///< … and kFeatureOutputs
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
@@ -104,6 +107,7 @@ struct ServedDevice {
   SampledSteps sampled{};
   std::vector<ServedChannel> channels{};
   std::optional<Couple> coupling{};  ///< what our end is like; empty: it is not to be coupled
+  PortFrame peer_port{};             ///< what the other end told last, for observers
   Outputs outputs{};
   std::optional<Health> told{};  ///< to observers, last; empty before there was any
   std::uint64_t reports = 0;     ///< told so far
