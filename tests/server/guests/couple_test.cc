@@ -335,16 +335,21 @@ TEST_F(Coupled, AnObserverIsToldTheEndsAtMost50TimesASecond) {
 
 TEST_F(Coupled, APeerThatIsGoneIsToldNoMore) {
   place();
+  Viewer early(wire_, "127.0.0.1:4001", leader_->end.self, true, now_);
+  viewers_ = {&early};
   run(seconds(2));
+  ASSERT_FALSE(early.peers.empty());
   cut_ = true;
   run(milliseconds(100));
   cut_ = false;
   follower_.reset();
   Viewer late(wire_, "127.0.0.1:4000", leader_->end.self, true, now_);
-  viewers_ = {&late};
+  viewers_ = {&early, &late};
+  early.peers.clear();
   run(milliseconds(500));
   EXPECT_GT(late.own.size(), 20U);
   EXPECT_TRUE(late.peers.empty()) << "what it told before this observer came is old";
+  EXPECT_LE(early.peers.size(), 1U) << "and was told";
 }
 
 TEST_F(Coupled, OtherObserversAndDevicesAreToldOfNoEnds) {
