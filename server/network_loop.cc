@@ -17,6 +17,8 @@ namespace {
 using enum DatagramSieve::Sender;
 
 constexpr std::size_t kMaxNotices = 64;
+/// Between two times that an observer is told of both ends of a coupling: people look at them.
+constexpr Duration kShowPortsEvery = std::chrono::milliseconds(20);
 
 bool contains(const std::vector<std::string>& features, std::string_view feature) {
   return std::find(features.begin(), features.end(), feature) != features.end();
@@ -221,7 +223,8 @@ void NetworkLoop::admit(LocalTime now, const Address& from, const Doorman::Guest
                 contains(welcome.features, kFeatureDiagnostics),
                 contains(welcome.features, kFeatureHandle),
                 contains(welcome.features, kFeatureJoints),
-                contains(welcome.features, kFeatureTeleoperation),
+                contains(welcome.features, kFeatureTeleoperation) && role == Role::kController,
+                contains(welcome.features, kFeatureTeleoperation) && role == Role::kObserver,
                 contains(welcome.features, kFeatureOutputs),
                 std::move(seats),
                 std::move(views),
@@ -356,6 +359,12 @@ void leave_out_what_no_frame_carries(DeviceState& state) {
     state.joints.reset();
 }
 
+/// An observer has seen no Couple: the leader's end tells it the scales.
+void tell_scales(PortState& leader, const Couple& coupling) {
+  if (leader.position_scale == 0) leader.position_scale = coupling.position_scale;
+  if (leader.force_scale == 0) leader.force_scale = coupling.force_scale;
+}
+
 /// But for the buttons.
 void leave_out_handle(DeviceState& state) {
   state.turning.reset();
@@ -481,10 +490,26 @@ void NetworkLoop::take_port(LocalTime now, Guest& guest, const PortFrame& port) 
     return;
   }
   leases_.renew(now, port.device, port.channel);
-  const ServedDevice& device = devices_[port.device];
-  if (const auto coupling = coupling_by(device, port.channel)) {
-    device.mail->port_in[*coupling].put({port, now, device.peers[*coupling]});
-  }
+  const auto coupling = coupling_by(devices_[port.device], port.channel);
+  if (coupling) arrived(now, port.device, *coupling, port.channel, port);
+}
+
+/// For the haptic thread; and for observers, when they are told next.
+void NetworkLoop::arrived(LocalTime now, std::uint32_t number, std::uint32_t coupling, std::uint32_t channel,
+                          const PortState& port) {
+  ServedDevice& device = devices_[number];
+  device.mail->port_in[coupling].put({port, now, device.peers[coupling]});
+  const auto waits = [&](Guest& guest) {
+    View* const view = guest.sees_ports ? view_of(guest, number) : nullptr;
+    if (view != nullptr) view->ports[coupling].peer_waits = true;
+    return view != nullptr;
+  };
+  if (std::count_if(guests_.begin(), guests_.end(), waits) == 0) return;
+  PortFrame& frame = device.peer_ports[coupling];
+  static_cast<PortState&>(frame) = port;
+  frame.device = number;
+  frame.channel = channel;
+  frame.of_peer = true;
 }
 
 void NetworkLoop::publish_ports(LocalTime now, std::uint32_t device) {
@@ -500,14 +525,36 @@ void NetworkLoop::publish_port(LocalTime now, std::uint32_t device, std::uint32_
   for (const Dialled& dialled : dialled_) {
     if (dialled.device == device) dialled.peer->send(now, port);
   }
+  PortFrame frame;
+  static_cast<PortState&>(frame) = port;
+  frame.device = device;
+  const auto& leaders = devices_[device].leaders;
+  if (coupling < leaders.size()) frame.channel = leaders[coupling];
   for (Guest& guest : guests_) {
     if (guest.gone || !guest.coupled || guest.coupled->device != device) continue;
     if (coupling_by(devices_[device], guest.coupled->channel) != coupling) continue;
-    PortFrame frame;
-    static_cast<PortState&>(frame) = port;
-    frame.device = device;
     frame.channel = guest.coupled->channel;
     guest.session.send(frame);
+  }
+  show_ports(now, coupling, frame);
+}
+
+/// Both ends of a coupling go to the observers that want them, as often as they want states and at most 50 times a
+/// second. `mine` is our end, with the channel of the other one.
+void NetworkLoop::show_ports(LocalTime now, std::uint32_t coupling, PortFrame mine) {
+  ServedDevice& device = devices_[mine.device];
+  PortFrame& theirs = device.peer_ports[coupling];
+  tell_scales(device.coupling->role == PortRole::kLeader ? mine : theirs, *device.coupling);
+  for (Guest& guest : guests_) {
+    View* const view = guest.sees_ports && !guest.gone ? view_of(guest, mine.device) : nullptr;
+    if (view == nullptr || now < view->ports[coupling].due) continue;
+    const std::uint64_t every =
+        std::max<std::uint64_t>(view->state_every, guest.adaptation ? guest.adaptation->one_in() : 1);
+    const Duration period =
+        static_cast<std::int64_t>(every) * Duration(std::chrono::seconds(1)) / std::max(device.about.loop_hz, 1U);
+    view->ports[coupling].due = now + std::max(kShowPortsEvery, period);
+    guest.session.send(mine);
+    if (std::exchange(view->ports[coupling].peer_waits, false)) guest.session.send(theirs);
   }
 }
 
@@ -517,9 +564,8 @@ bool NetworkLoop::receive_of_peer(LocalTime now, const Address& from, std::span<
     if (!dialled.peer->is_from_server(from, datagram)) continue;
     dialled.peer->receive(now, from, datagram);
     look_at(dialled);
-    ServedDevice& device = devices_[dialled.device];
     const auto port = dialled.peer->take();
-    if (port && dialled.coupled) device.mail->port_in[0].put({*port, now, device.peers[0]});
+    if (port && dialled.coupled) arrived(now, dialled.device, 0, 0, *port);
     return true;
   }
   return false;

@@ -175,6 +175,9 @@ class NetworkLoop {
   LocalTime turn_peers(LocalTime now);
   void publish_ports(LocalTime now, std::uint32_t device);
   void publish_port(LocalTime now, std::uint32_t device, std::uint32_t coupling, const PortState& port);
+  void show_ports(LocalTime now, std::uint32_t coupling, PortFrame mine);
+  void arrived(LocalTime now, std::uint32_t number, std::uint32_t coupling, std::uint32_t channel,
+               const PortState& port);
   void take_refused(Guest& guest);
   void blame(const Guest& guest, Lateness::Cause cause, std::uint64_t count);
   void answer(LocalTime now, Guest& guest, std::uint32_t id, const Request& request);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "clients/dashboard/board.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace tendon::dash {
@@ -38,7 +39,11 @@ void Board::tell(Press press) {
 
 void Board::welcomed(const Welcome& welcome) {
   welcome_ = welcome;
-  for (auto& [number, device] : devices_) device.handle.reset();
+  for (auto& [number, device] : devices_) {
+    device.handle.reset();
+    device.ports.reset();
+    device.ports_waiting.clear();
+  }
   ++sessions_;
   ++version_;
 }
@@ -104,10 +109,55 @@ void Board::observe(const PeerReport& report) {
   engine.silent_for = 0;
 }
 
+void Board::observe(const PortFrame& port) {
+  Device& device = devices_[port.device];
+  if (port.of_peer) {
+    if (!device.ports) return;  // its own end comes first
+    device.ports->peer = port;
+    if (!device.ports_waiting.empty()) device.ports_waiting.back().peer = port;
+    return;
+  }
+  if (!device.ports) device.ports.emplace();
+  device.ports->own = port;
+  device.ports->at = device.newest ? device.newest->sampled : PeerTime{};
+  if (port.phase == PortPhase::kAlone || port.phase == PortPhase::kLost) device.ports->peer.reset();
+  if (device.ports_waiting.size() >= kMaxPortsWaiting) device.ports_waiting.erase(device.ports_waiting.begin());
+  device.ports_waiting.push_back(*device.ports);
+}
+
+std::vector<Board::Ports> Board::take_ports(std::uint32_t number) {
+  const auto device = devices_.find(number);
+  if (device == devices_.end()) return {};
+  return std::exchange(device->second.ports_waiting, {});
+}
+
 std::vector<DeviceState> Board::take_states(std::uint32_t number) {
   const auto device = devices_.find(number);
   if (device == devices_.end()) return {};
   return std::exchange(device->second.waiting, {});
+}
+
+std::optional<PortRole> role_of(const Board::Ports& ports) {
+  // An observer is told the scales by the leader's end only.
+  if (ports.own.position_scale > 0) return PortRole::kLeader;
+  if (ports.peer && ports.peer->position_scale > 0) return PortRole::kFollower;
+  return std::nullopt;
+}
+
+std::optional<double> pair_account(const Board::Ports& ports) {
+  const auto role = role_of(ports);
+  if (!role || !ports.peer) return std::nullopt;
+  const bool leads = *role == PortRole::kLeader;
+  const PortFrame& leader = leads ? ports.own : *ports.peer;
+  const PortFrame& follower = leads ? *ports.peer : ports.own;
+  if (leader.need <= 0 || follower.need <= 0) return std::nullopt;
+  if (leader.answers_epoch != follower.epoch || follower.answers_epoch != leader.epoch) return std::nullopt;
+  const double worth = leader.force_scale / leader.position_scale;
+  // A payment is told by its payer and by its receiver in the payer's joules. Of two states that are not of one time
+  // the receiver's may be the newer one.
+  const double to_follower = std::max(0.0, leader.given - follower.taken);
+  const double to_leader = std::max(0.0, follower.given - leader.taken);
+  return leader.account + to_follower + worth * (follower.account + to_leader);
 }
 
 }  // namespace tendon::dash

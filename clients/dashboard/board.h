@@ -22,11 +22,14 @@ enum class Contact : std::uint8_t {
   kLost,        ///< a session has ended; it tries again
 };
 
-/// The result of the newest press of a button that arms or disarms.
+/// What the buttons of the page order.
+enum class Order : std::uint8_t { kArm, kDisarm, kEngage, kDisengage };
+
+/// The result of the newest press of a button.
 struct Press {
   enum class State : std::uint8_t { kUnderWay, kDone, kFailed };
   std::uint32_t device = 0;
-  bool arm = false;  ///< otherwise a disarming
+  Order order = Order::kDisarm;
   State state = State::kUnderWay;
   std::string words;  ///< for people
 };
@@ -41,6 +44,8 @@ class Board {
   /// a second at 1 kHz; the page takes them sixty times a second.
   static constexpr std::size_t kMaxWaiting = 500;
   static constexpr std::size_t kReasons = 32;
+  /// Half a second of both ends of a coupling, for the page; when there are more, the oldest are dropped.
+  static constexpr std::size_t kMaxPortsWaiting = 25;
 
   /// The engine at one channel of a device, as the server last reported it.
   struct Engine {
@@ -54,6 +59,13 @@ class Board {
     RefusedForces refused{};
     /// Reports on the device since the last report on this engine. Reports on an engine end when it leaves.
     std::uint64_t silent_for = 0;
+  };
+
+  /// Both ends of a device's coupling at one time.
+  struct Ports {
+    PeerTime at{};  ///< the device's newest sample when `own` came: a port's own time is of no clock
+    PortFrame own;
+    std::optional<PortFrame> peer;  ///< the newest that had come; empty: none, or the device is alone or has lost it
   };
 
   struct Device {
@@ -72,6 +84,8 @@ class Board {
     std::uint64_t overruns = 0;
     std::uint64_t unseen = 0;
     std::map<std::uint32_t, Engine> engines;  ///< by channel
+    std::optional<Ports> ports;               ///< the newest; empty: the device has no coupling
+    std::vector<Ports> ports_waiting;         ///< not yet told to the page, in order; at most kMaxPortsWaiting
   };
 
   void tell(Contact contact, std::string words);
@@ -85,6 +99,7 @@ class Board {
   void observe(const DeviceState& state);
   void observe(const DeviceReport& report);
   void observe(const PeerReport& report);
+  void observe(const PortFrame& port);
   void observe(const LinkStats& link) { link_ = link; }
 
   Contact contact() const noexcept { return contact_; }
@@ -99,6 +114,8 @@ class Board {
   std::uint64_t version() const noexcept { return version_; }
   /// Takes out the waiting states of a device; empty for a device that does not exist.
   std::vector<DeviceState> take_states(std::uint32_t device);
+  /// The same of both ends of its coupling.
+  std::vector<Ports> take_ports(std::uint32_t device);
 
  private:
   Contact contact_ = Contact::kGreeting;
@@ -110,5 +127,13 @@ class Board {
   std::uint64_t version_ = 1;
   std::map<std::uint32_t, Device> devices_;
 };
+
+/// Whether the device leads or follows; empty: not known yet.
+std::optional<PortRole> role_of(const Board::Ports& ports);
+
+/// J of the leader that both ends of a coupling may still give out: both accounts, and what one has paid and the other
+/// has not heard of yet. One joule of the follower is s_f/s_x of the leader's. Empty: the scales are not known, no end
+/// has a purse, or the two ends have not heard of each other yet.
+std::optional<double> pair_account(const Board::Ports& ports);
 
 }  // namespace tendon::dash

@@ -155,7 +155,7 @@ int run(const Options& options) {
   std::optional<UdpTransport> operator_link;
   std::optional<Operator> operates;
   Abilities abilities{.server = options.server.text(), .recordings = recordings.has_value()};
-  std::function<std::string(std::uint32_t, Operator::Order)> press;
+  std::function<std::string(std::uint32_t, Order)> press;
   if (arms) {
     if (key->role != Role::kController) {
       throw std::runtime_error(options.key_file + ": an observer's key; --arm wants a controller's");
@@ -166,7 +166,7 @@ int run(const Options& options) {
                      Operator::Config{.channel = options.arm_channel, .key = key->key, .seed = seed_from_system()},
                      board);
     abilities.arming_objection = [&](std::uint32_t device) { return operates->objection(device); };
-    press = [&](std::uint32_t device, Operator::Order order) { return operates->press(read_clock(), device, order); };
+    press = [&](std::uint32_t device, Order order) { return operates->press(read_clock(), device, order); };
   }
   const std::string pass = arms ? new_pass() : std::string();
   Feed feed(board, abilities, counts, start);

@@ -76,6 +76,13 @@ void Feed::tick(LocalTime now) {
   std::vector<std::uint32_t> devices;
   for (const auto& [number, device] : board_.devices()) devices.push_back(number);
   for (const std::uint32_t number : devices) {
+    const std::vector<Board::Ports> ports = board_.take_ports(number);
+    std::string both;
+    for (auto& [id, page] : pages_) {
+      if (page.device != number || ports.empty()) continue;
+      if (both.empty()) both = ports_json(number, ports);
+      page.post.put(PagePost::Kind::kPorts, both);
+    }
     const std::vector<DeviceState> states = board_.take_states(number);
     if (states.empty()) continue;
     std::string text;

@@ -58,6 +58,8 @@ class Exposition {
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 constexpr std::array kModes = {Mode::kIdle,     Mode::kActive,   Mode::kHolding,
                                Mode::kDecaying, Mode::kSafeStop, Mode::kFault};
+constexpr std::array kPhases = {PortPhase::kAlone,    PortPhase::kCoupled, PortPhase::kAligning, PortPhase::kEngaged,
+                                PortPhase::kClutched, PortPhase::kLost,    PortPhase::kFault};
 constexpr std::array kSafeties = {Safety::kAbsent, Safety::kOpening, Safety::kFirmware, Safety::kUnhomed,
                                   Safety::kHomed,  Safety::kArmed,   Safety::kFault,    Safety::kUnguarded};
 
@@ -153,6 +155,39 @@ void add_devices(Exposition& out, const Board& board) {
   reported([&](const Label& label, const Device& device, const Report&) { out.add({label}, lateness(device)); });
 }
 
+void add_ports(Exposition& out, const Board& board) {
+  using Label = ClientMetric::Label;
+  const auto ends = [&](auto value) {
+    each(board, [&](const Label& label, const Board::Device& device) {
+      if (!device.ports) return;
+      value(Labels{label, {"end", "own"}}, device.ports->own);
+      if (device.ports->peer) value(Labels{label, {"end", "peer"}}, *device.ports->peer);
+    });
+  };
+  out.begin("tendon_port_phase", MetricType::Gauge, "1 for the phase of an end of the coupling, 0 for the others.");
+  ends([&](const Labels& labels, const PortFrame& port) {
+    for (const PortPhase phase : kPhases) {
+      Labels with_phase = labels;
+      with_phase.push_back({"phase", std::string(name(phase))});
+      out.add(std::move(with_phase), port.phase == phase ? 1.0 : 0.0);
+    }
+  });
+  out.begin("tendon_port_account_joules", MetricType::Gauge, "What an end may still give out, in its own joules.");
+  ends([&](const Labels& labels, const PortFrame& port) {
+    if (port.need > 0) out.add(labels, port.account);
+  });
+  out.begin("tendon_port_pair_joules", MetricType::Gauge,
+            "What both ends may still give out, and what is under way between them, in joules of the leader.");
+  each(board, [&](const Label& label, const Board::Device& device) {
+    const auto pair = device.ports ? pair_account(*device.ports) : std::nullopt;
+    if (pair) out.add({label}, *pair);
+  });
+  out.begin("tendon_port_round_trip_seconds", MetricType::Gauge, "Round trip between the ends, as each measures it.");
+  ends([&](const Labels& labels, const PortFrame& port) {
+    if (port.round_trip > Duration::zero()) out.add(labels, seconds(port.round_trip));
+  });
+}
+
 void add_engines(Exposition& out, const Board& board) {
   const auto engines = [&](auto value) {
     each(board, [&](const ClientMetric::Label& label, const Board::Device& device) {
@@ -219,6 +254,7 @@ std::string metrics_text(const Board& board, const WebCounts& web, const BridgeC
   out.add({}, board.sessions());
   add_devices(out, board);
   add_engines(out, board);
+  add_ports(out, board);
   out.begin("tendon_dash_pages", MetricType::Gauge, "Pages that look on.");
   out.add({}, web.pages);
   out.begin("tendon_dash_requests_total", MetricType::Counter, "HTTP requests.");

@@ -44,7 +44,8 @@ void Observer::greet(LocalTime now) {
   Hello hello;
   hello.role = Role::kObserver;
   hello.name = config_.name;
-  hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics), std::string(kFeatureHandle)};
+  hello.features = {std::string(kFeatureChannels), std::string(kFeatureDiagnostics), std::string(kFeatureHandle),
+                    std::string(kFeatureTeleoperation)};
   claims_ = counted_ && names_.size() > 1;
   if (claims_) {
     for (const auto& [number, name] : names_) hello.claims.push_back({name, "", Role::kObserver});
@@ -101,6 +102,8 @@ void Observer::take_event(LocalTime now, const Session::Event& event) {
     board_.observe(loop->report);
   } else if (const auto* peer = std::get_if<Session::PeerReportArrived>(&event)) {
     board_.observe(peer->report);
+  } else if (const auto* port = std::get_if<Session::PortArrived>(&event)) {
+    board_.observe(port->port);
   } else if (const auto* answered = std::get_if<Session::RequestAnswered>(&event)) {
     take_answer(now, *answered);
   } else if (const auto* asked = std::get_if<Session::RequestArrived>(&event)) {

@@ -28,6 +28,24 @@ std::string because(const std::string& detail, Code code) {
   return detail.empty() ? "the server refuses (code " + std::to_string(static_cast<int>(code)) + ")" : detail;
 }
 
+/// Of two orders the higher one ends the other.
+int rank(Order order) {
+  switch (order) {
+    case Order::kDisarm:
+      return 2;
+    case Order::kDisengage:
+      return 1;
+    case Order::kArm:
+    case Order::kEngage:
+      return 0;
+  }
+  return 0;
+}
+
+bool is_engaged(PortPhase phase) {
+  return phase == PortPhase::kAligning || phase == PortPhase::kEngaged || phase == PortPhase::kClutched;
+}
+
 }  // namespace
 
 Operator::Operator(Link& link, const Address& server, const Config& config, Board& board)
@@ -59,10 +77,11 @@ std::string Operator::objection(std::uint32_t number) const {
 std::string Operator::press(LocalTime now, std::uint32_t device, Order order) {
   if (under_way_) {
     if (device == device_ && order == order_) return {};
-    if (order_ == Order::kDisarm || order == Order::kArm) return "Another order is under way.";
-    finish(now, false, "Ended by a disarming.");
+    if (rank(order) <= rank(order_)) return "Another order is under way.";
+    finish(now, false, order == Order::kDisarm ? "Ended by a disarming." : "Ended by a disengaging.");
   }
   if (std::string words = objection(device); !words.empty()) return words;
+  if (std::string words = coupling_objection(board_.devices().at(device), order); !words.empty()) return words;
   ForceClient::Config config;
   config.name = config_.name;
   config.device = board_.devices().at(device).about->name;
@@ -78,11 +97,33 @@ std::string Operator::press(LocalTime now, std::uint32_t device, Order order) {
   under_way_ = true;
   asked_ = false;
   give_up_ = now + config_.patience;
-  board_.tell(Press{.device = device,
-                    .arm = order == Order::kArm,
-                    .state = Press::State::kUnderWay,
-                    .words = order == Order::kArm ? "Asking the server to arm …" : "Asking the server to disarm …"});
+  tell(Press::State::kUnderWay, "Asking the server to " + std::string(name(order)) + " …");
   return {};
+}
+
+std::string Operator::coupling_objection(const Board::Device& device, Order order) const {
+  if (order != Order::kEngage && order != Order::kDisengage) return {};
+  if (!device.ports) return "This device has no coupling.";
+  if (order == Order::kDisengage) return {};
+  switch (device.ports->own.phase) {
+    case PortPhase::kAlone:
+      return "There is no other end.";
+    case PortPhase::kLost:
+      return "The other end is silent.";
+    case PortPhase::kFault:
+      return "This device gives no force now.";
+    case PortPhase::kAligning:
+    case PortPhase::kEngaged:
+    case PortPhase::kClutched:
+      return "The two ends are engaged already.";
+    case PortPhase::kCoupled:
+      break;
+  }
+  return role_of(*device.ports) == PortRole::kFollower ? "The other end leads: only there the two are engaged." : "";
+}
+
+void Operator::tell(Press::State state, std::string words) {
+  board_.tell(Press{.device = device_, .order = order_, .state = state, .words = std::move(words)});
 }
 
 void Operator::turn(LocalTime now) {
@@ -95,7 +136,6 @@ void Operator::turn(LocalTime now) {
 
 /// The part of a press up to the server's answer.
 void Operator::ask(LocalTime now) {
-  const bool arm = order_ == Order::kArm;
   client_->turn(now);
   const ForceClient::Phase phase = client_->phase();
   if (phase != ForceClient::Phase::kGreeting && phase != ForceClient::Phase::kOpen) {
@@ -111,11 +151,9 @@ void Operator::ask(LocalTime now) {
     const bool seen = device != board_.devices().end() && device->second.newest;
     answered_ = seen ? device->second.newest->sampled : PeerTime{};
     give_up_ = now + config_.granted_within;
-    return board_.tell(Press{.device = device_,
-                             .arm = arm,
-                             .state = Press::State::kUnderWay,
-                             .words = arm ? "The server has asked the safety layer: the handle has to rest …"
-                                          : "The server has passed it on …"});
+    return tell(Press::State::kUnderWay, order_ == Order::kArm
+                                             ? "The server has asked the safety layer: the handle has to rest …"
+                                             : "The server has passed it on …");
   }
   if (now >= give_up_) {
     return finish(now, false,
@@ -124,7 +162,7 @@ void Operator::ask(LocalTime now) {
   }
   if (asked_ || phase != ForceClient::Phase::kOpen) return;
   if (client_->holds()) {
-    asked_ = arm ? client_->rearm() : client_->disarm();
+    asked_ = send();
     client_->turn(now);
   } else if (const auto& about = client_->description()) {
     // A client has taken the channel since the Board's last description.
@@ -133,10 +171,44 @@ void Operator::ask(LocalTime now) {
   }
 }
 
+bool Operator::send() {
+  switch (order_) {
+    case Order::kArm:
+      return client_->rearm();
+    case Order::kDisarm:
+      return client_->disarm();
+    case Order::kEngage:
+      return client_->engage();
+    case Order::kDisengage:
+      return client_->disengage();
+  }
+  return false;
+}
+
 /// The part of a press after the server's answer: watches what the device does.
 void Operator::look(LocalTime now) {
   const auto found = board_.devices().find(device_);
   const Board::Device* const device = found != board_.devices().end() ? &found->second : nullptr;
+  if (order_ == Order::kEngage || order_ == Order::kDisengage) return look_at_coupling(now, device);
+  look_at_safety(now, device);
+}
+
+void Operator::look_at_coupling(LocalTime now, const Board::Device* device) {
+  const bool known = device != nullptr && device->ports;
+  const bool engaged = known && is_engaged(device->ports->own.phase);
+  if (order_ == Order::kEngage && engaged) {
+    finish(now, true, "Engaged: the two handles are coupled.");
+  } else if (order_ == Order::kDisengage && known && !engaged) {
+    finish(now, true, "Disengaged: the handles are free of each other.");
+  } else if (now >= give_up_) {
+    finish(now, false,
+           order_ == Order::kEngage
+               ? "Not engaged. Both devices have to be armed, and the network has to carry both ways."
+               : "The server has taken the order, but the device does not show it.");
+  }
+}
+
+void Operator::look_at_safety(LocalTime now, const Board::Device* device) {
   const DeviceState* const state =
       device != nullptr && device->newest && device->newest->sampled > answered_ ? &*device->newest : nullptr;
   const DeviceReport* const report =
@@ -168,10 +240,7 @@ void Operator::finish(LocalTime now, bool done, std::string words) {
   if (client_) client_->stop(now);
   client_.reset();
   under_way_ = false;
-  board_.tell(Press{.device = device_,
-                    .arm = order_ == Order::kArm,
-                    .state = done ? Press::State::kDone : Press::State::kFailed,
-                    .words = std::move(words)});
+  tell(done ? Press::State::kDone : Press::State::kFailed, std::move(words));
 }
 
 void Operator::stop(LocalTime now) {

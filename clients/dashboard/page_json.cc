@@ -42,7 +42,7 @@ std::string_view state_name(Press::State state) noexcept {
 Json in_json(const std::optional<Press>& press) {
   if (!press) return nullptr;
   return {{"device", press->device},
-          {"order", press->arm ? "arm" : "disarm"},
+          {"order", name(press->order)},
           {"state", state_name(press->state)},
           {"words", press->words}};
 }
@@ -203,6 +203,19 @@ void add_handle(Json& json, std::span<const DeviceState> states) {
   }
 }
 
+Json in_json(const PortFrame& port) {
+  const auto plain = [](const Vec3& v) -> Json { return {plotted(v.x()), plotted(v.y()), plotted(v.z())}; };
+  const bool has_purse = port.need > 0;
+  return {{"phase", name(port.phase)},
+          {"position_m", plain(port.position)},
+          {"force_n", plain(port.force)},
+          {"contact_n", port.contact_force ? plain(*port.contact_force) : Json()},
+          {"account_j", has_purse ? Json(plotted(port.account)) : Json()},
+          {"round_trip_ms", port.round_trip > Duration::zero() ? Json(milliseconds(port.round_trip)) : Json()},
+          {"stiffness_n_per_m", port.surface ? Json(plotted(port.surface->stiffness)) : Json()},
+          {"share", port.share ? Json(*port.share) : Json()}};
+}
+
 /// The text of a JSON value. Bytes that are not UTF-8 become U+FFFD; NaN and infinities become null.
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
@@ -244,6 +257,40 @@ std::string_view name(Safety safety) noexcept {
       return "fault";
     case Safety::kUnguarded:
       return "unguarded";
+  }
+  return "unknown";
+}
+
+std::string_view name(PortPhase phase) noexcept {
+  switch (phase) {
+    case PortPhase::kAlone:
+      return "alone";
+    case PortPhase::kCoupled:
+      return "coupled";
+    case PortPhase::kAligning:
+      return "aligning";
+    case PortPhase::kEngaged:
+      return "engaged";
+    case PortPhase::kClutched:
+      return "clutched";
+    case PortPhase::kLost:
+      return "lost";
+    case PortPhase::kFault:
+      return "fault";
+  }
+  return "unknown";
+}
+
+std::string_view name(Order order) noexcept {
+  switch (order) {
+    case Order::kArm:
+      return "arm";
+    case Order::kDisarm:
+      return "disarm";
+    case Order::kEngage:
+      return "engage";
+    case Order::kDisengage:
+      return "disengage";
   }
   return "unknown";
 }
@@ -306,6 +353,23 @@ std::string states_json(std::uint32_t device, std::span<const DeviceState> state
   add_stiffness(json, states);
   add_handle(json, states);
   return text_of(json);
+}
+
+std::string ports_json(std::uint32_t device, std::span<const Board::Ports> ports) {
+  Json rows = Json::array();
+  for (const Board::Ports& both : ports) {
+    const auto role = role_of(both);
+    const PortFrame* const leader = !role ? nullptr : *role == PortRole::kLeader ? &both.own : &*both.peer;
+    const auto pair = pair_account(both);
+    rows.push_back({{"at_us", nanoseconds(both.at) / 1e3},
+                    {"role", role ? Json(*role == PortRole::kLeader ? "leader" : "follower") : Json()},
+                    {"own", in_json(both.own)},
+                    {"peer", both.peer ? in_json(*both.peer) : Json()},
+                    {"position_scale", leader != nullptr ? Json(leader->position_scale) : Json()},
+                    {"force_scale", leader != nullptr ? Json(leader->force_scale) : Json()},
+                    {"pair_j", pair ? Json(plotted(*pair)) : Json()}});
+  }
+  return text_of({{"type", "ports"}, {"device", device}, {"rows", std::move(rows)}});
 }
 
 std::string reports_json(std::uint32_t number, const Board& board) {

@@ -39,6 +39,9 @@ std::string server_json(const Board& board, const Abilities& abilities);
 /// or the page did not keep up.
 std::string states_json(std::uint32_t device, std::span<const DeviceState> states);
 
+/// {"type":"ports",…}: both ends of a device's coupling, one row for each time, in order.
+std::string ports_json(std::uint32_t device, std::span<const Board::Ports> ports);
+
 /// {"type":"reports",…}: the state of a device's loop and of its engines. Sent once a second.
 std::string reports_json(std::uint32_t device, const Board& board);
 
@@ -50,6 +53,9 @@ std::string_view name(Mode mode) noexcept;
 /// "armed", "fault" …
 std::string_view name(Safety safety) noexcept;
 std::string_view name(Contact contact) noexcept;
+/// "engaged", "clutched" …
+std::string_view name(PortPhase phase) noexcept;
+std::string_view name(Order order) noexcept;
 /// "energy", "max_force" … of bit `bit` of core/base/reason.h; "bit_20" of one that has no name yet.
 std::string reason_name(std::size_t bit);
 

@@ -19,8 +19,9 @@ namespace tendon::dash {
 class PagePost {
  public:
   enum class Kind : std::uint8_t {
-    kServer,   ///< only the newest text of each of these two kinds is kept
+    kServer,   ///< only the newest text of each of these kinds is kept
     kReports,  //
+    kPorts,    //
   };
   /// The most batches that wait, an eighth of a second: a page can catch up with that, and the hand on the screen does
   /// not look late.
@@ -59,6 +60,7 @@ class PagePost {
     batches_.clear();
     beside_.clear();
     newest_[static_cast<std::size_t>(Kind::kReports)].reset();
+    newest_[static_cast<std::size_t>(Kind::kPorts)].reset();
     skipped_ = 0;
   }
 
@@ -67,7 +69,7 @@ class PagePost {
     std::string text;
     std::size_t states;
   };
-  std::array<std::optional<std::string>, 2> newest_;
+  std::array<std::optional<std::string>, 3> newest_;
   std::map<std::uint32_t, std::string> beside_;
   std::deque<Batch> batches_;
   std::uint64_t skipped_ = 0;

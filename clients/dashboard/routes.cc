@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <type_traits>
 
 #include "clients/dashboard/page_json.h"
@@ -16,8 +17,14 @@ constexpr std::string_view kContentSecurity =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-constexpr std::string_view kArmPath = "/api/arm";
-constexpr std::string_view kDisarmPath = "/api/disarm";
+struct OrderPath {
+  std::string_view path;
+  Order order;
+};
+constexpr OrderPath kOrders[] = {{"/api/arm", Order::kArm},
+                                 {"/api/disarm", Order::kDisarm},
+                                 {"/api/engage", Order::kEngage},
+                                 {"/api/disengage", Order::kDisengage}};
 
 /// Prometheus' text format.
 constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
@@ -181,7 +188,7 @@ bool Routes::may_bridge(std::string_view origin) const {
          is_loopback_name(host_name(origin_host(origin)));
 }
 
-Reply Routes::order(const Request& request, std::string_view path) const {
+Reply Routes::order(const Request& request, std::string_view path, Order order) const {
   if (request.method != "POST") return plain(405, "only POST", "POST");
   if (!request.host || !is_our_host(*request.host)) {
     return plain(421, "this is not what this machine is called; see --host of tendon-dash");
@@ -203,14 +210,14 @@ Reply Routes::order(const Request& request, std::string_view path) const {
   if (named) rest.remove_prefix(kQuery.size());
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), device);
   if (!named || error != std::errc{} || end != rest.data() + rest.size()) return plain(400, "expected ?device=N");
-  const std::string objection =
-      sources_.press(device, path == kArmPath ? Operator::Order::kArm : Operator::Order::kDisarm);
+  const std::string objection = sources_.press(device, order);
   return objection.empty() ? plain(202, "begun") : plain(409, objection);
 }
 
 Answer Routes::answer(const Request& request) const {
   const std::string_view path = request.target.substr(0, request.target.find('?'));
-  if (path == kArmPath || path == kDisarmPath) return order(request, path);
+  const auto* const ordered = std::ranges::find(kOrders, path, &OrderPath::path);
+  if (ordered != std::end(kOrders)) return order(request, path, ordered->order);
   if (request.method != "GET" && request.method != "HEAD") return plain(405, "only GET and HEAD");
   if (!request.host || !is_our_host(*request.host)) {
     return plain(421, "this is not what this machine is called; see --host of tendon-dash");

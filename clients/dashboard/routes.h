@@ -62,7 +62,7 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 ///     GET /metrics             for Prometheus
 ///     GET /api/recordings      the list of recordings
 ///     GET /recordings/NAME     the bytes of one; Range is understood
-///     POST /api/arm?device=N, POST /api/disarm?device=N     begins it; /live tells the result
+///     POST /api/arm?device=N   begins it, as disarm, engage and disengage; /live tells the result
 ///
 /// Any page that is open in a browser on this machine could send these requests. Therefore:
 /// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts. Another name that has been
@@ -70,11 +70,11 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 /// * **Origin** of a WebSocket must be that same host for /live, and a page of this machine or one of Config::origins
 ///   for /bridge; otherwise 403. A program that is no browser sends no Origin. Other origins cannot read anything else,
 ///   because no CORS header is ever sent.
-/// * **Arming** moves a machine, so only this page in a browser on this machine may do it; otherwise 403. It is refused
-///   from another machine, through a proxy, with another Origin, and from a program that sends no Origin. A form or a
-///   script of another page cannot send this page's Origin. Other people may use this machine too, so `Authorization:
-///   Bearer PASS` must have the pass that was printed for the person who started the program. 202: begun; 409: not now,
-///   with the reason.
+/// * **Arming**, like the other three orders, moves a machine, so only this page in a browser on this machine may do it;
+///   otherwise 403. It is refused from another machine, through a proxy, with another Origin, and from a program that
+///   sends no Origin. A form or a script of another page cannot send this page's Origin. Other people may use this
+///   machine too, so `Authorization: Bearer PASS` must have the pass that was printed for the person who started the
+///   program. 202: begun; 409: not now, with the reason.
 /// * Everything else takes GET and HEAD only: 405. A path that is not listed above is 404. The only name that is looked
 ///   up in a file system is the plain name of a recording.
 ///
@@ -92,7 +92,7 @@ class Routes {
     std::function<std::string()> metrics;
     /// Begins an order. Returns why it does not begin; an empty string when it does. A function that is not set: nobody
     /// may arm.
-    std::function<std::string(std::uint32_t device, Operator::Order order)> press{};
+    std::function<std::string(std::uint32_t device, Order order)> press{};
     std::string pass{};  ///< for `press`; only characters that a header and an address may have
   };
 
@@ -106,7 +106,7 @@ class Routes {
  private:
   bool is_our_host(std::string_view host) const;
   bool may_bridge(std::string_view origin) const;
-  Reply order(const Request& request, std::string_view path) const;
+  Reply order(const Request& request, std::string_view path, Order order) const;
   Reply file(const Request& request, std::string_view path) const;
   Reply recording(const Request& request, std::string_view name) const;
 

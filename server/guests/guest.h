@@ -38,6 +38,12 @@ struct View {
   std::uint64_t last_state = 0;   ///< tick
   std::optional<StateDeadband> deadband{};
   std::uint32_t pressed = 0;  ///< buttons that were held at any time since the last state
+  /// Of a coupling of the device.
+  struct Ports {
+    LocalTime due{};          ///< its ends are told again, at the earliest
+    bool peer_waits = false;  ///< the other end has told something since then
+  };
+  std::array<Ports, Shares::kMost> ports{};
 };
 
 /// Somebody with a session.
@@ -51,7 +57,8 @@ struct Guest {
   bool diagnoses;           ///< it has asked for what only kFeatureDiagnostics brings
   bool sees_handle;         ///< … and kFeatureHandle
   bool sees_joints;         ///< … and kFeatureJoints
-  bool may_couple;          ///< … and kFeatureTeleoperation
+  bool may_couple;          ///< … and kFeatureTeleoperation, as a controller
+  bool sees_ports;          ///< … and kFeatureTeleoperation, as an observer
   bool sees_outputs;        ///< … and kFeatureOutputs
   std::vector<Seat> seats;  ///< `role` is what its Welcome says
   std::vector<View> views;
@@ -112,6 +119,7 @@ struct ServedDevice {
   /// The channels by which its leaders come, in the order of its couplings; empty: it has one coupling, by any channel.
   std::vector<std::uint32_t> leaders{};
   std::array<std::uint32_t, Shares::kMost> peers{};  ///< by coupling: how many other ends it has had
+  std::array<PortFrame, Shares::kMost> peer_ports{};  ///< by coupling: what the other end told last, for observers
   Outputs outputs{};
   std::optional<Health> told{};  ///< to observers, last; empty before there was any
   std::uint64_t reports = 0;     ///< told so far

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A coupling as demonstrations: one episode for each time that the operator engaged.
+import type { Moment } from "./demonstration.js";
 import type { Coupling, PoseMap, Port, Step, Vec3 } from "./recording.js";
 
 export interface Frame {
@@ -71,6 +72,53 @@ export function episodesOf({ leader, follower, map }: Coupling, fps: number): Ep
       frames.push({
         state: [...step.position, ...step.velocity], contact: step.contact, action: add(offset, mapped(map, wish.displacement)),
       });
+    }
+    if (frames.length > 1) episodes.push({ frames });
+  }
+  return episodes;
+}
+
+/** s: a robot that heard nothing of the hand for that long has lost it. */
+const kSilence = 0.5;
+/** s: times of ns, as sums of floating-point numbers, are not exact. */
+const kRounding = 1e-7;
+
+/** The stretches in which a robot followed, from the act that engaged it on; a clutch belongs to it. */
+function followed(moments: readonly Moment[]): Moment[][] {
+  const found: Moment[][] = [];
+  let open = false;
+  let before = -Infinity;
+  for (const moment of moments) {
+    const goesOn: boolean = open && moment.t >= before && moment.t - before < kSilence;
+    const engaged = moment.phase === "engaged";
+    open = engaged || (goesOn && moment.phase === "clutched");
+    if (open && goesOn) found.at(-1)!.push(moment);
+    else if (open) found.push([moment]);
+    before = moment.t;
+  }
+  return found;
+}
+
+/**
+ * The same of a robot that is a guest. Its velocity is the difference from one frame to the next, 0 in the first; its
+ * wish stands still while it holds its place.
+ */
+export function episodesOfRobot(moments: readonly Moment[], fps: number): Episode[] {
+  const episodes: Episode[] = [];
+  for (const act of followed(moments)) {
+    const robot = new Latest<Moment>(act);
+    const [from, to] = [act[0]!.t + kRounding, act.at(-1)!.t + kRounding];
+    const frames: Frame[] = [];
+    let last = act[0]!.position;
+    let wish = act[0]!.target ?? last;
+    let at = 0;
+    for (let k = 0; from + k / fps <= to; ++k) {
+      const moment = robot.at(from + k / fps)!;
+      for (; act[at] !== moment; ++at) wish = act[at]!.target ?? wish;
+      wish = moment.target ?? wish;
+      const velocity = less(moment.position, last).map((d) => d * fps);
+      frames.push({ state: [...moment.position, ...velocity], contact: moment.contact, action: wish });
+      last = moment.position;
     }
     if (frames.length > 1) episodes.push({ frames });
   }

@@ -1,15 +1,17 @@
 #!/usr/bin/env node
 // SPDX-License-Identifier: Apache-2.0
 import { parseArgs } from "node:util";
-import { episodesOf, type Episode } from "./episodes.js";
+import { readDemonstration } from "./demonstration.js";
+import { episodesOf, episodesOfRobot, type Episode } from "./episodes.js";
 import { writeDataset } from "./lerobot.js";
 import { readCoupling } from "./recording.js";
 
 const kHelp = `tendon-dataset: makes a robot-learning dataset of recordings of a coupling. LeRobot v2.1, without videos.
 
-Usage: tendon-dataset PAIR.mcap... --out DIR [OPTIONS]
+Usage: tendon-dataset FILE... --out DIR [OPTIONS]
 
-  PAIR.mcap               What tendon-replay --merge has written: a leader and its follower
+  FILE.mcap               What tendon-replay --merge has written: a leader and its follower
+  FILE.jsonl              What a robot's program has written: tendon.demonstration of clients/python
   -h, --help              Print this and leave
   --out DIR               The dataset: a folder that is empty or does not exist
   --fps NUMBER            Frames per second, 1 to 1000 [30]
@@ -44,7 +46,7 @@ function options() {
     throw new RangeError(`--fps: expected a whole number from 1 to 1000, got "${values.fps}"`);
   }
   if (values.out === undefined) throw new RangeError("--out: missing, expected a folder for the dataset");
-  if (positionals.length === 0) throw new RangeError("PAIR.mcap: missing, expected a merged recording");
+  if (positionals.length === 0) throw new RangeError("FILE: missing, expected a merged recording or a demonstration");
   return { ...values, out: values.out, fps, recordings: positionals };
 }
 
@@ -52,7 +54,9 @@ async function main(): Promise<void> {
   const { recordings, json, ...config } = options();
   const episodes: Episode[] = [];
   for (const recording of recordings) {
-    episodes.push(...episodesOf(await readCoupling(recording), config.fps));
+    episodes.push(...(recording.endsWith(".jsonl")
+      ? episodesOfRobot(await readDemonstration(recording), config.fps)
+      : episodesOf(await readCoupling(recording), config.fps)));
     if (process.stderr.isTTY) process.stderr.write(`read ${recording}: ${episodes.length} episodes so far\n`);
   }
   const frames = writeDataset(episodes, config);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/reason.h"
+#include "tests/clients/dashboard/full_board.h"
 
 namespace tendon::dash {
 namespace {
@@ -122,6 +123,62 @@ TEST(Board, IsANewVersionWhenThatWhichThePageShowsHasChanged) {
   EXPECT_EQ(board.devices().size(), 1U);
   board.counted(1);
   EXPECT_FALSE(changed());
+}
+
+TEST(Board, KeepsBothEndsOfACouplingUntilOneIsAlone) {
+  Board board;
+  const Board::Ports ports = both_ends();
+  board.observe(*ports.peer);
+  EXPECT_FALSE(board.devices().contains(0) && board.devices().at(0).ports) << "an end without its own is none";
+  board.observe(ports.own);
+  board.observe(*ports.peer);
+  PortFrame own = ports.own;
+  own.sequence = 2;
+  board.observe(own);
+  auto rows = board.take_ports(0);
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_TRUE(rows[0].peer);
+  EXPECT_TRUE(rows[1].peer) << "the newest that had come";
+  EXPECT_TRUE(board.take_ports(0).empty());
+  own.phase = PortPhase::kLost;
+  board.observe(own);
+  EXPECT_FALSE(board.devices().at(0).ports->peer);
+  EXPECT_FALSE(board.take_ports(0).front().peer);
+  for (int i = 0; i < 1000; ++i) board.observe(own);
+  EXPECT_EQ(board.take_ports(0).size(), Board::kMaxPortsWaiting);
+  board.observe(own);
+  board.welcomed(Welcome{});
+  EXPECT_FALSE(board.devices().at(0).ports) << "perhaps another server";
+  EXPECT_TRUE(board.take_ports(0).empty());
+}
+
+TEST(PairAccount, IsBothAccountsAndWhatIsUnderWayInTheLeadersJoules) {
+  Board::Ports ports = both_ends();
+  EXPECT_EQ(role_of(ports), PortRole::kLeader);
+  EXPECT_NEAR(pair_account(ports).value(), 0.125 + 0.25 + 0.005, 1e-12);
+  ports.own.position_scale = 0.5;  // one joule of the follower is worth 2/0.5 of the leader's
+  ports.own.force_scale = 2;
+  EXPECT_NEAR(pair_account(ports).value(), 0.125 + 4 * 0.25 + 0.005, 1e-12);
+  ports.peer->given = 0.01;
+  ports.own.taken = 0.004;
+  EXPECT_NEAR(pair_account(ports).value(), 0.125 + 4 * (0.25 + 0.006) + 0.005, 1e-12);
+  std::swap(ports.own, *ports.peer);
+  EXPECT_EQ(role_of(ports), PortRole::kFollower);
+  EXPECT_NEAR(pair_account(ports).value(), 0.125 + 4 * (0.25 + 0.006) + 0.005, 1e-12) << "at the follower's server";
+}
+
+TEST(PairAccount, IsNotSaidWhereItIsNotKnown) {
+  const auto without = [](auto change) {
+    Board::Ports ports = both_ends();
+    change(ports);
+    return pair_account(ports);
+  };
+  EXPECT_TRUE(without([](Board::Ports&) {}));
+  EXPECT_FALSE(without([](Board::Ports& p) { p.peer.reset(); }));
+  EXPECT_FALSE(without([](Board::Ports& p) { p.own.position_scale = 0; })) << "the scales are not known";
+  EXPECT_FALSE(without([](Board::Ports& p) { p.peer->need = 0; })) << "it has no purse";
+  EXPECT_FALSE(without([](Board::Ports& p) { p.own.answers_epoch = 8; })) << "of a peer that has started anew";
+  EXPECT_FALSE(without([](Board::Ports& p) { p.peer->answers_epoch = 0; }));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 // Chromium, and what a person sees in it. TENDON_BROWSER names the program.
 import assert from "node:assert/strict";
 import { after, before } from "node:test";
-import { packageOf } from "./support.mjs";
+import { packageOf, until } from "./support.mjs";
 
 const { chromium } = packageOf("clients/dashboard/page", "playwright-core");
 /** No GPU: WebGL is computed too, for the 3-D view. */
@@ -33,6 +33,12 @@ export async function visit(test, url, { at = url, before = () => {}, ...options
 }
 
 export const shown = (page) => page.locator("main.live").getAttribute("data-states").then(Number);
+/** Engages a coupling while the hand is far from the wall behind the follower: then the follower will run into it. */
+export async function engage(page) {
+  const x = page.locator("[data-chart=position] .key .value").first();
+  await until("the hand is far back", async () => Number((await x.textContent()).replace("−", "-")) < -12);
+  await page.locator("#engage:not(:disabled)").click();
+}
 export const says = (page, selector, text) => page.locator(selector, { hasText: text }).first().waitFor();
 /** Pixels of a plot that are not empty. */
 export const painted = (page, selector) =>

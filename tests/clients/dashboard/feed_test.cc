@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/clients/dashboard/full_board.h"
+
 namespace tendon::dash {
 namespace {
 
@@ -109,6 +111,29 @@ TEST_F(FeedTest, TellsOfTheOtherDevicesBesideWhereAPageAsks) {
   states(0, 1);
   tick();
   EXPECT_EQ(types(all(page)), Types{"reports"});
+}
+
+TEST_F(FeedTest, TellsOfTheCouplingOfTheWatchedDevice) {
+  const auto left = feed_.join(now_);
+  const auto right = feed_.join(now_);
+  EXPECT_TRUE(feed_.hear(now_, right, "watch 1"));
+  tick();
+  all(left);
+  all(right);
+  board_.observe(both_ends().own);
+  board_.observe(*both_ends().peer);
+  tick();
+  const auto texts = all(left);
+  ASSERT_EQ(types(texts), Types{"ports"});
+  EXPECT_EQ(texts[0]["rows"].size(), 1U);
+  EXPECT_TRUE(all(right).empty());
+  tick();
+  EXPECT_TRUE(all(left).empty());
+  board_.observe(both_ends().own);
+  tick();
+  EXPECT_TRUE(feed_.hear(now_, left, "watch 1"));
+  tick();
+  EXPECT_EQ(types(all(left)), Types{"reports"}) << "of the device before";
 }
 
 TEST_F(FeedTest, ReportsOnceASecond) {

@@ -6,6 +6,31 @@
 
 namespace tendon::dash {
 
+/// Both ends of a coupling, of scales 1 and 1, that have heard of each other. The leader has paid 30 mJ, of which 5 mJ are
+/// under way.
+inline Board::Ports both_ends() {
+  Board::Ports ports;
+  PortFrame& leader = ports.own;
+  leader.epoch = 7;
+  leader.answers_epoch = 9;
+  leader.phase = PortPhase::kEngaged;
+  leader.account = 0.125;
+  leader.need = 1e-3;
+  leader.given = 0.03;
+  leader.round_trip = std::chrono::milliseconds(40);
+  leader.position_scale = leader.force_scale = 1;
+  PortFrame& follower = ports.peer.emplace();
+  follower.of_peer = true;
+  follower.epoch = 9;
+  follower.answers_epoch = 7;
+  follower.phase = PortPhase::kEngaged;
+  follower.account = 0.25;
+  follower.need = 1e-3;
+  follower.taken = 0.025;
+  follower.round_trip = std::chrono::milliseconds(41);
+  return ports;
+}
+
 /// A board of which nothing is missing.
 inline Board full_board() {
   Board board;
@@ -45,6 +70,8 @@ inline Board full_board() {
   peer.link.received = 3000;
   peer.link.lost = 12;
   board.observe(peer);
+  board.observe(both_ends().own);
+  board.observe(*both_ends().peer);
   return board;
 }
 

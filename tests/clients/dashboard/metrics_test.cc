@@ -41,6 +41,12 @@ TEST(DashMetrics, ExportWhatIsOnTheBoard) {
           R"(tendon_engine_delay_seconds{device="left",channel="main",engine="wall",way="round_trip",quantile="0.99"} 0.125)",
           R"(tendon_engine_forces_late_total{device="left",channel="main",engine="wall",cause="network"} 4)",
           R"(tendon_engine_datagrams_lost{device="left",channel="main",engine="wall"} 12)",
+          R"(tendon_port_phase{device="left",end="own",phase="engaged"} 1)",
+          R"(tendon_port_phase{device="left",end="peer",phase="lost"} 0)",
+          R"(tendon_port_account_joules{device="left",end="own"} 0.125)",
+          R"(tendon_port_account_joules{device="left",end="peer"} 0.25)",
+          R"(tendon_port_pair_joules{device="left"} 0.38)",
+          R"(tendon_port_round_trip_seconds{device="left",end="peer"} 0.041)",
           "tendon_dash_pages 2",
           "tendon_dash_requests_total 7",
           R"(tendon_bridge_datagrams_total{way="to_server"} 5)",
@@ -67,6 +73,7 @@ TEST(DashMetrics, LeaveOutWhatIsNotKnown) {
   EXPECT_TRUE(has_line(text, "tendon_up 0"));
   EXPECT_EQ(text.find("tendon_device_"), std::string::npos);
   EXPECT_EQ(text.find("tendon_engine_"), std::string::npos);
+  EXPECT_EQ(text.find("tendon_port_"), std::string::npos);
   EXPECT_EQ(text.find("tendon_server_info"), std::string::npos);
 }
 

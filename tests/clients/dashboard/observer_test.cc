@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +33,7 @@ class ObserverTest : public testing::Test {
       config.devices.push_back(
           {.name = name, .model = "model of " + name, .max_force = 8, .loop_hz = 1000, .channels = {{.name = "main"}}});
       config.devices.back().device = static_cast<std::uint32_t>(config.devices.size() - 1);
+      if (port_) config.couplings.emplace_back(Couple{.role = PortRole::kLeader});
       config.handles.push_back({.buttons = {"button " + std::to_string(config.handles.size())}});
       mail_.push_back(std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .flight = 16, .datagrams = 1}));
       mail.push_back(mail_.back().get());
@@ -51,6 +53,7 @@ class ObserverTest : public testing::Test {
         state.force_wanted = Vec3(1, 2, 3);
         state.buttons = 2;
         mail_[i]->state.put(state);
+        if (port_) mail_[i]->port_out.put(*port_);
       }
       if (loop_) loop_->turn(now_);
       observer_.turn(now_);
@@ -65,6 +68,7 @@ class ObserverTest : public testing::Test {
     for (const auto& [number, device] : board_.devices()) names.push_back(device.about ? device.about->name : "?");
     return names;
   }
+  double seconds_since(PeerTime at) const { return tendon::seconds(now_.time_since_epoch() - at.time_since_epoch()); }
   using Names = std::vector<std::string>;
 
   LocalTime now_{seconds(1000)};
@@ -74,6 +78,7 @@ class ObserverTest : public testing::Test {
   std::vector<std::unique_ptr<Mailboxes>> mail_;
   std::unique_ptr<NetworkLoop> loop_;
   std::uint64_t tick_ = 0;
+  std::optional<PortState> port_;  ///< of every device
   Board board_;
   Observer observer_{own_, server_.self, {.seed = 1}, board_, now_};
 };
@@ -170,6 +175,24 @@ TEST_F(ObserverTest, SaysWhyItIsRefused) {
   run(seconds(1));
   EXPECT_EQ(board_.contact(), Contact::kRefused);
   EXPECT_EQ(board_.words(), "127.0.0.1:47100 refuses: there are 0 observers already");
+}
+
+TEST_F(ObserverTest, IsToldTheEndsOfACoupling) {
+  port_.emplace();
+  port_->epoch = port_->sequence = 1;
+  serve({"left"});
+  for (int i = 0; i < 1000; ++i, ++port_->sequence) run(milliseconds(1));
+  ASSERT_TRUE(board_.devices().at(0).ports);
+  EXPECT_EQ(role_of(*board_.devices().at(0).ports), PortRole::kLeader);
+  EXPECT_FALSE(board_.devices().at(0).ports->peer);
+  EXPECT_NEAR(seconds_since(board_.devices().at(0).ports->at), 0, 0.03);
+  EXPECT_GT(board_.take_ports(0).size(), 10U);
+  port_.reset();
+  loop_.reset();
+  run(seconds(4));
+  serve({"left"}, 1000);
+  run(seconds(3));
+  EXPECT_FALSE(board_.devices().at(0).ports) << "another server, without a coupling";
 }
 
 TEST_F(ObserverTest, SaysByeWhenItStops) {

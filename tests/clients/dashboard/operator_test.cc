@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/dashboard/observer.h"
@@ -22,7 +23,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using Order = Operator::Order;
 using State = Press::State;
 
 /// A handle at rest.
@@ -66,6 +66,7 @@ class OperatorTest : public testing::Test {
     safe_ = guarded ? std::make_unique<SafeDevice>(SafeDevice::Config{}, handle_) : nullptr;
     haptic_ = std::make_unique<HapticLoop>(haptic, safe_ ? static_cast<Device&>(*safe_) : static_cast<Device&>(handle_),
                                            *mail_);
+    if (port_) config.couplings = {Couple{.role = PortRole::kLeader}};
     network_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_.get()});
   }
 
@@ -91,6 +92,7 @@ class OperatorTest : public testing::Test {
   void run(Duration length) {
     for (const LocalTime end = now_ + length; now_ < end; now_ += milliseconds(1)) {
       if (shaking_) handle_.position.x() += 1e-3 * ((++steps_ / 20) % 2 == 0 ? 1 : -1);
+      if (port_) couple();
       haptic_->step(now_);
       while (mail_->steps.front() != nullptr) mail_->steps.pop();
       ++health_.steps;
@@ -112,6 +114,20 @@ class OperatorTest : public testing::Test {
         }
       }
     }
+  }
+  /// In place of a haptic thread with a coupling.
+  void couple() {
+    const HapticOrder* const order = mail_->orders.front();
+    if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kEngage) port_->phase = PortPhase::kEngaged;
+    if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kDisengage) port_->phase = PortPhase::kCoupled;
+    ++port_->sequence;
+    mail_->port_out.put(*port_);
+  }
+  void serve_leader() {
+    port_.emplace();
+    port_->epoch = 1;
+    port_->phase = PortPhase::kCoupled;
+    serve(false);
   }
   /// As long as a press is under way.
   const Press& settle() {
@@ -138,7 +154,9 @@ class OperatorTest : public testing::Test {
   Health health_;
   int steps_ = 0;
   bool shaking_ = false;
-  bool blind_ = false;  ///< what the server tells the observer is lost
+  std::optional<PortState> port_;  ///< of a coupling
+  bool obeys_ = true;              ///< … which does what it is told
+  bool blind_ = false;             ///< what the server tells the observer is lost
   Board board_;
   Observer observer_{observer_end_, server_.self, {.key = operator_key_.key, .seed = 1}, board_, now_};
   std::optional<ForceClient> engine_;
@@ -255,10 +273,10 @@ TEST_F(OperatorTest, ADisarmingGoesBeforeAnArmingAndNothingBeforeADisarming) {
   run(milliseconds(2));
   EXPECT_EQ(person.press(now_, 0, Order::kArm), "") << "the same again is the same";
   EXPECT_EQ(person.press(now_, 0, Order::kDisarm), "");
-  EXPECT_FALSE(board_.press()->arm);
+  EXPECT_EQ(board_.press()->order, Order::kDisarm);
   EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is under way.");
   EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
-  EXPECT_FALSE(board_.press()->arm);
+  EXPECT_EQ(board_.press()->order, Order::kDisarm);
   run(seconds(3));
   EXPECT_EQ(safe_->status().state, SafetyState::kHomed);
 }
@@ -300,6 +318,60 @@ TEST_F(OperatorTest, AnOrderIsNotDoneBeforeTheDeviceShowsIt) {
   EXPECT_EQ(settle().state, State::kFailed);
   EXPECT_EQ(board_.press()->words,
             "The server has taken the order, but the device does not show it. Take its power away.");
+}
+
+TEST_F(OperatorTest, EngagesAndDisengagesALeader) {
+  serve_leader();
+  Operator& person = with(operator_key_, "operator");
+  start_engine(engine_key_, "main");
+  run(seconds(2));
+  ASSERT_EQ(person.press(now_, 0, Order::kEngage), "");
+  EXPECT_EQ(board_.press()->order, Order::kEngage);
+  EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
+  EXPECT_EQ(board_.press()->words, "Engaged: the two handles are coupled.");
+  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "The two ends are engaged already.");
+  ASSERT_EQ(person.press(now_, 0, Order::kDisengage), "");
+  EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
+  EXPECT_EQ(port_->phase, PortPhase::kCoupled);
+  EXPECT_EQ(holder(0), "wall");
+  EXPECT_EQ(engine_->stats().sessions, 1U) << "the engine was not disturbed";
+}
+
+TEST_F(OperatorTest, SaysWhyNothingIsEngaged) {
+  Operator& person = with(operator_key_, "operator");
+  run(seconds(2));
+  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "This device has no coupling.");
+  serve_leader();
+  run(seconds(8));
+  const std::pair<PortPhase, const char*> cases[] = {{PortPhase::kAlone, "There is no other end."},
+                                                     {PortPhase::kLost, "The other end is silent."},
+                                                     {PortPhase::kFault, "This device gives no force now."}};
+  for (const auto& [phase, words] : cases) {
+    port_->phase = phase;
+    run(milliseconds(100));
+    EXPECT_EQ(person.press(now_, 0, Order::kEngage), words);
+  }
+  port_->phase = PortPhase::kCoupled;
+  obeys_ = false;
+  run(milliseconds(100));
+  ASSERT_EQ(person.press(now_, 0, Order::kEngage), "");
+  EXPECT_EQ(settle().state, State::kFailed);
+  EXPECT_NE(board_.press()->words.find("Not engaged."), std::string::npos) << board_.press()->words;
+}
+
+TEST_F(OperatorTest, DisengagingEndsAnEngagingAndADisarmingBoth) {
+  serve_leader();
+  obeys_ = false;
+  Operator& person = with(operator_key_, "operator");
+  run(seconds(2));
+  ASSERT_EQ(person.press(now_, 0, Order::kEngage), "");
+  run(milliseconds(2));
+  EXPECT_EQ(person.press(now_, 0, Order::kArm), "Another order is under way.");
+  EXPECT_EQ(person.press(now_, 0, Order::kDisengage), "");
+  EXPECT_EQ(person.press(now_, 0, Order::kEngage), "Another order is under way.");
+  EXPECT_EQ(person.press(now_, 0, Order::kDisarm), "");
+  EXPECT_EQ(settle().state, State::kDone) << board_.press()->words;
+  EXPECT_EQ(board_.press()->order, Order::kDisarm);
 }
 
 }  // namespace

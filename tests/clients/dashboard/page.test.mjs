@@ -5,8 +5,8 @@ import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
-import { painted, picture, says, shown, visit } from "./browser.mjs";
-import { Program, makeKeys, scratch, startDash, startServer, until } from "./support.mjs";
+import { engage, painted, picture, says, shown, visit } from "./browser.mjs";
+import { Program, makeKeys, metric, scratch, startDash, startPair, startServer, until } from "./support.mjs";
 
 it("shows the server live, pauses when told to, and goes on", async (test) => {
   const folder = scratch(test);
@@ -56,6 +56,37 @@ it("shows the device that was chosen", async (test) => {
   await until("there are fewer again: those of the second", async () => (await shown(page)) > 50);
   assert.ok(await x());
   assert.equal(await page.locator("nav a", { hasText: "Recordings" }).isVisible(), false, "there is no folder");
+  assert.equal(await page.locator(".coupling").isVisible(), false, "there is no coupling");
+});
+
+it("shows both ends of a coupling, engages and disengages them", async (test) => {
+  const folder = scratch(test);
+  const { leader, follower } = await startPair(test, folder);
+  const { url, operatorUrl } = await startDash(test, leader.address, "--key", join(folder, "operator.key"), "--arm", "main");
+  const page = await visit(test, url, { at: operatorUrl });
+  await says(page, "[data-tile=port-own]", "This end (leader)Coupled");
+  await says(page, "[data-tile=port-peer]", "Other end (follower)Coupled");
+  assert.equal(await page.locator("#disengage").isDisabled(), true);
+  await engage(page);
+  await says(page, ".coupling .result[data-level=good]", "Engaged: the two handles are coupled.");
+  for (const end of ["own", "peer"]) await says(page, `[data-tile=port-${end}][data-level=good] .value`, "Engaged");
+  await says(page, "[data-tile=port-pair] .value", "mJ");
+  assert.match(await page.locator("[data-tile=port-trip] .value").textContent(), /^[\d.]+\sms$/);
+  for (const chart of ["ends", "touch", "accounts"]) await until(chart, async () => (await painted(page, `[data-chart=${chart}] canvas`)) > 2000);
+  const newest = (chart, name) => page.locator(`[data-chart=${chart}] .key`, { hasText: name }).locator(".value").textContent();
+  await until("the wall is felt", async () => Number(await newest("touch", "contact of the follower")) > 0.2 && Number(await newest("touch", "felt at the leader")) > 0.2);
+  assert.equal(await metric(url, 'tendon_port_phase{device="leader",end="peer",phase="engaged"}'), 1);
+  assert.ok((await metric(url, 'tendon_port_pair_joules{device="leader"}')) > 0);
+  const { url: other } = await startDash(test, follower.address);
+  const phone = await visit(test, other, { viewport: { width: 390, height: 844 } });
+  await says(phone, "[data-tile=port-own]", "This end (follower)Engaged");
+  assert.equal(await phone.locator("#engage").isVisible(), false, "it only looks on");
+  assert.equal(await phone.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth), true, "a phone scrolls down, not sideways");
+  await page.click("#disengage");
+  await says(page, "[data-tile=port-own] .value", "Coupled");
+  await says(page, ".coupling .result[data-level=good]", "Disengaged");
+  await follower.program.stop();
+  await says(page, "[data-tile=port-peer] .note", "nothing is heard of it");
 });
 
 it("says in words that nobody answers, and finds the server when it comes", async (test) => {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/reason.h"
+#include "tests/clients/dashboard/full_board.h"
 
 namespace tendon::dash {
 namespace {
@@ -145,7 +146,7 @@ TEST(PageJson, TellsWhetherADeviceMayBeArmedAndWhatBecameOfThePress) {
   EXPECT_TRUE(text["press"].is_null());
   EXPECT_EQ(text["devices"][0]["arming_objection"], kArmingNeeds);
   const auto version = board.version();
-  board.tell(Press{.device = 1, .arm = true, .state = Press::State::kFailed, .words = "Not armed."});
+  board.tell(Press{.device = 1, .order = Order::kArm, .state = Press::State::kFailed, .words = "Not armed."});
   EXPECT_GT(board.version(), version) << "or no page is told";
   const Abilities may{.server = "", .arms = true, .arming_objection = [](std::uint32_t device) {
                         return device == 1 ? std::string("held") : std::string();
@@ -155,6 +156,46 @@ TEST(PageJson, TellsWhetherADeviceMayBeArmedAndWhatBecameOfThePress) {
   EXPECT_EQ(text["devices"][0]["arming_objection"], "");
   EXPECT_EQ(text["devices"][1]["arming_objection"], "held");
   EXPECT_EQ(text["press"], (json{{"device", 1}, {"order", "arm"}, {"state", "failed"}, {"words", "Not armed."}}));
+}
+
+TEST(PageJson, TellsBothEndsOfACouplingInRows) {
+  Board::Ports ports = both_ends();
+  ports.at = PeerTime(microseconds(1'000'123));
+  ports.own.position = Vec3(0.25, 0, -0.5);
+  ports.own.force = Vec3(-2, 0, 0);
+  ports.peer->contact_force = Vec3(0, 0.5, 0);
+  ports.peer->surface = PortSurface{.stiffness = 500};
+  ports.peer->share = 0.75;
+  Board::Ports alone;
+  alone.own.phase = PortPhase::kAlone;
+  const json text = json::parse(ports_json(2, std::vector{ports, alone}));
+  EXPECT_EQ(text["type"], "ports");
+  EXPECT_EQ(text["device"], 2);
+  ASSERT_EQ(text["rows"].size(), 2U);
+  const json& row = text["rows"][0];
+  EXPECT_EQ(row["at_us"], 1'000'123.0);
+  EXPECT_EQ(row["role"], "leader");
+  EXPECT_EQ(row["position_scale"], 1.0);
+  EXPECT_EQ(row["force_scale"], 1.0);
+  EXPECT_EQ(row["pair_j"], 0.38);
+  EXPECT_EQ(row["own"], (json{{"phase", "engaged"},
+                              {"position_m", {0.25, 0.0, -0.5}},
+                              {"force_n", {-2.0, 0.0, 0.0}},
+                              {"contact_n", nullptr},
+                              {"account_j", 0.125},
+                              {"round_trip_ms", 40.0},
+                              {"stiffness_n_per_m", nullptr},
+                              {"share", nullptr}}));
+  EXPECT_EQ(row["peer"]["contact_n"], (json{0.0, 0.5, 0.0}));
+  EXPECT_EQ(row["peer"]["stiffness_n_per_m"], 500.0);
+  EXPECT_EQ(row["peer"]["share"], 0.75);
+  const json& lone = text["rows"][1];
+  for (const char* unknown : {"role", "peer", "position_scale", "force_scale", "pair_j"}) {
+    EXPECT_TRUE(lone[unknown].is_null()) << unknown;
+  }
+  EXPECT_EQ(lone["own"]["phase"], "alone");
+  EXPECT_TRUE(lone["own"]["account_j"].is_null()) << "it has no purse";
+  EXPECT_TRUE(lone["own"]["round_trip_ms"].is_null());
 }
 
 TEST(PageJson, TellsHowTheLoopAndTheEnginesDo) {

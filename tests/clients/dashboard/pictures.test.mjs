@@ -6,9 +6,9 @@
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { it } from "node:test";
-import { says, shown, visit } from "./browser.mjs";
+import { engage, says, shown, visit } from "./browser.mjs";
 import { fakeFeed } from "./fake_feed.mjs";
-import { Program, kRoot, makeKeys, scratch, startDash, startServer, until } from "./support.mjs";
+import { Program, kRoot, makeKeys, scratch, startDash, startPair, startServer, until } from "./support.mjs";
 
 const shoot = (page, name, more = {}) => page.screenshot({ path: join(kRoot, "deploy/screenshots", `${name}.png`), ...more });
 const kDark = { colorScheme: "dark", viewport: { width: 1280, height: 960 } };
@@ -144,4 +144,15 @@ it("a recording in 3-D: pressed into a wall", async (test) => {
     await page.waitForTimeout(150);
   }
   await shoot(page, "space-recording");
+});
+
+it("both ends of a coupling", async (test) => {
+  const folder = scratch(test);
+  const { leader } = await startPair(test, folder, "delay=uniform(15ms,25ms) loss=2%");
+  const { url, operatorUrl } = await startDash(test, leader.address, "--key", join(folder, "operator.key"), "--arm", "main");
+  const page = await visit(test, url, { ...kLight, viewport: { width: 1280, height: 650 }, at: operatorUrl });
+  await engage(page);
+  await says(page, "[data-tile=port-peer] .value", "Engaged");
+  await until("twelve seconds are shown", async () => (await shown(page)) > 12_000);
+  await shoot(page, "coupling");
 });

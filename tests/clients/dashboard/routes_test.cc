@@ -174,14 +174,14 @@ TEST_F(RoutesTest, KnowsNoOtherMethodAndNoOtherPath) {
 }
 
 TEST_F(RoutesTest, OnlyItsOwnPageOnThisMachineMayArmByPost) {
-  std::vector<std::pair<std::uint32_t, Operator::Order>> pressed;
+  std::vector<std::pair<std::uint32_t, Order>> pressed;
   std::string objection;
   const Routes routes({.hosts = {"dash.lab"}, .origins = {"https://lab.example"}},
                       {.page = kPage,
                        .recordings = nullptr,
                        .metrics = [] { return std::string(); },
                        .press =
-                           [&](std::uint32_t device, Operator::Order order) {
+                           [&](std::uint32_t device, Order order) {
                              if (objection.empty()) pressed.emplace_back(device, order);
                              return objection;
                            },
@@ -195,11 +195,17 @@ TEST_F(RoutesTest, OnlyItsOwnPageOnThisMachineMayArmByPost) {
   Request other = good;
   other.target = "/api/disarm?device=15";
   EXPECT_EQ(answer(other).status, 202U);
-  EXPECT_EQ(pressed, (decltype(pressed){{3, Operator::Order::kArm}, {15, Operator::Order::kDisarm}}));
+  other.target = "/api/engage?device=0";
+  EXPECT_EQ(answer(other).status, 202U);
+  other.target = "/api/disengage?device=0";
+  EXPECT_EQ(answer(other).status, 202U);
+  EXPECT_EQ(pressed,
+            (decltype(pressed){{3, Order::kArm}, {15, Order::kDisarm}, {0, Order::kEngage}, {0, Order::kDisengage}}));
   pressed.clear();
 
   const auto refused = [&](unsigned status, const auto& change) {
-    for (const char* target : {"/api/arm?device=3", "/api/disarm?device=3"}) {
+    for (const char* target :
+         {"/api/arm?device=3", "/api/disarm?device=3", "/api/engage?device=3", "/api/disengage?device=3"}) {
       Request request = good;
       request.target = target;
       change(request);

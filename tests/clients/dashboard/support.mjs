@@ -3,7 +3,7 @@
 // Programs of ours, as a user starts them, and patience.
 import { spawn } from "node:child_process";
 import { createSocket } from "node:dgram";
-import { copyFileSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { connect } from "node:net";
 import { tmpdir } from "node:os";
@@ -74,6 +74,23 @@ export async function startServer(test, folder, scenes, ...more) {
   const paths = scenes.map((scene) => (scene.endsWith(".toml") ? scene : join(kRoot, "deploy/scenes", `${scene}.toml`)));
   const program = new Program(test, "tendond", [...paths, ...(more.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"]), "--json", ...more], folder);
   return { program, address: JSON.parse(await program.line('"listening"')).address };
+}
+
+/**
+ * The two servers of follower.toml and leader.toml, coupled. The leader lets the holder of operator.key in, and is engaged by request.
+ * `network`: a profile of tendon-inject between them.
+ */
+export async function startPair(test, folder, network = "delay=10ms") {
+  await makeKeys(test, folder, ["operator"]);
+  const scene = readFileSync(join(kRoot, "deploy/scenes/leader.toml"), "utf8")
+    .replace(/\[\[device\.hand\.press\]\] {9}# the act[^[]*/, "")
+    .replace('by = "button"\nbutton = 0', 'by = "request"');
+  writeFileSync(join(folder, "leader.toml"), `${scene}\n[network]\nkeys = "keys"\n`);
+  const follower = await startServer(test, folder, ["follower"], "--record", "/dev/null");
+  const inject = new Program(test, "tendon-inject", ["--listen", "127.0.0.1:0", "--to", follower.address, "--profile", network, "--seed", "8", "--json"]);
+  const dial = JSON.parse(await inject.line('"start"')).listen;
+  const leader = await startServer(test, folder, [join(folder, "leader.toml")], "--record", "/dev/null", "--dial", dial);
+  return { leader, follower };
 }
 
 /** tendon-dash; where its page is. */

@@ -4,9 +4,11 @@ import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { describe, it, type TestContext } from "node:test";
-import { episodesOf } from "../../../clients/dataset/src/episodes.js";
+import { readDemonstration, type Moment } from "../../../clients/dataset/src/demonstration.js";
+import { episodesOf, episodesOfRobot } from "../../../clients/dataset/src/episodes.js";
 import { writeDataset } from "../../../clients/dataset/src/lerobot.js";
 import { mapOf, readCoupling, type Coupling, type Vec3 } from "../../../clients/dataset/src/recording.js";
+import { kRoot } from "../typescript/support/paths.js";
 import { readJson, readLines, readParquetFile } from "./read_back.js";
 
 function scratch(test: TestContext): string {
@@ -117,5 +119,71 @@ describe("readCoupling", () => {
     const file = join(scratch(test), "no.mcap");
     writeFileSync(file, "nothing of this kind");
     await assert.rejects(readCoupling(file), new RegExp("no\\.mcap: "));
+  });
+});
+
+/**
+ * At 100 Hz: engaged from tick 51 on, clutched from 151 to 200; 0.5/4096 m a tick. tests/clients/python writes the same
+ * bytes.
+ */
+const kDemonstration = join(kRoot, "tests/clients/demonstration.jsonl");
+
+describe("episodesOfRobot", () => {
+  it("makes of a robot's own file what another reader of Parquet reads", async (test) => {
+    const out = join(scratch(test), "set");
+    const episodes = episodesOfRobot(await readDemonstration(kDemonstration), 50);
+    assert.equal(episodes.length, 1, "a clutch ends nothing");
+    const frames = writeDataset(episodes, { out, fps: 50, task: "press", robot: "arm" });
+    assert.equal(frames, 125);
+    const columns = readParquetFile(join(out, "data/chunk-000/episode_000000.parquet"));
+    const step = 0.5 / 4096;
+    const row = (name: string, k: number): readonly number[] => columns.get(name)!.values[k] as readonly number[];
+    for (let k = 0; k < 50; ++k) {
+      // At tick 51 + 2 k the tool is where it was to go at the tick before.
+      near(row("action", k)[0]!, 0.25 + 2 * k * step);
+      near(row("observation.state", k)[0]!, 0.25 + Math.max(2 * k - 1, 0) * step);
+      near(row("observation.state", k)[2]!, 0.125);
+      near(row("observation.contact_force", k)[2]!, (51 + 2 * k) / 64);
+    }
+    near(row("observation.state", 0)[3]!, 0);
+    near(row("observation.state", 20)[3]!, 100 * step);
+    for (const k of [50, 60, 74]) near(row("action", k)[0]!, 0.25 + 99 * step);
+    near(row("observation.state", 70)[3]!, 0);
+    near(row("action", 124)[0]!, 0.25 + (99 + 98) * step);
+    near(columns.get("timestamp")!.values[124] as number, 2.48);
+  });
+
+  it("ends an episode where the robot stands or hears nothing", () => {
+    const moment = (t: number, phase: string): Moment => ({ t, phase, position: [t, 0, 0], target: [t, 0, 0] });
+    const parts = (moments: Moment[]): number[] => episodesOfRobot(moments, 10).map(({ frames }) => frames.length);
+    const engaged = (from: number, to: number): Moment[] => Array.from({ length: to - from }, (_, i) => moment((from + i) / 100, "engaged"));
+    assert.deepEqual(parts([...engaged(0, 101), ...engaged(200, 251)]), [11, 6], "silence");
+    assert.deepEqual(parts([...engaged(0, 101), moment(1.01, "coupled"), ...engaged(102, 153)]), [11, 6]);
+    assert.deepEqual(parts([...engaged(300, 401), ...engaged(0, 51)]), [11, 6], "the server has started anew");
+    assert.deepEqual(parts([moment(0, "clutched"), moment(0.2, "clutched"), moment(0.3, "coupled")]), [], "no act");
+  });
+});
+
+describe("readDemonstration", () => {
+  const file = (test: TestContext, text: string): string => {
+    const path = join(scratch(test), "press.jsonl");
+    writeFileSync(path, text);
+    return path;
+  };
+  const kHead = '{"kind":"tendon demonstration","version":1}\n';
+  const kLine = '{"tick":2,"sampled_ns":20000000,"phase":"engaged","position_m":[1,0,0],"target_m":null}\n';
+
+  it("leaves out a last line that was cut off", async (test) => {
+    assert.deepEqual(await readDemonstration(file(test, `${kHead}${kLine}${kLine.slice(0, 30)}`)), [
+      { t: 0.02, phase: "engaged", position: [1, 0, 0], target: undefined, contact: undefined },
+    ]);
+  });
+
+  it("names file and line of what it does not understand", async (test) => {
+    const refuses = (text: string, why: RegExp) => assert.rejects(readDemonstration(file(test, text)), why);
+    await refuses("", /press\.jsonl: expected a demonstration, and it is empty/);
+    await refuses(kLine, /line 1: expected \{"kind":"tendon demonstration","version":1\}/);
+    await refuses(`${kHead}${kLine.replace("[1,0,0]", "[1,0]")}`, /line 2: position_m: expected three numbers/);
+    await refuses(`${kHead}{"tick":\n${kLine}`, /line 2: /);
   });
 });

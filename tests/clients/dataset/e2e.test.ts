@@ -2,7 +2,7 @@
 //
 // Real processes: a hand leads the device of another server, both record, and the two recordings become a dataset.
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawnSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -46,4 +46,33 @@ it("what an operator did becomes a dataset", async (test) => {
   assert.ok(spread(x("observation.state")) > 0.01, "the tool followed");
   assert.ok(Math.min(...x("observation.contact_force")) < -0.3, "it touched the wall");
   assert.throws(() => execFileSync("node", [tool, file("leader"), "--out", join(folder, "no")], { stdio: "pipe" }), /both ends of a coupling/);
+});
+
+it("what a robot that is a guest did becomes a dataset", async (test) => {
+  const tendond = findTendond(test);
+  if (!tendond) return;
+  const python = "/usr/bin/python3";
+  if (spawnSync(python, ["-c", "import google.protobuf, nacl.bindings"]).status !== 0) return test.skip("python3-protobuf or python3-nacl is missing");
+  const folder = mkdtempSync(join(tmpdir(), "tendon-dataset-"));
+  test.after(() => rmSync(folder, { recursive: true }));
+  const server = new Program(test, tendond, [scene("robot"), "--listen", "127.0.0.1:0", "--json", "--record", "/dev/null"]);
+  const file = join(folder, "press.jsonl");
+  const robot = new Program(test, python, [
+    join(kRoot, "tests/clients/dataset/robot.py"), "--server", await address(server), "--demonstration", file, "--duration-s", "7",
+  ]);
+  assert.equal(await robot.end(), 0, robot.lines.join("\n"));
+  const out = join(folder, "press");
+  const tool = join(kRoot, "clients/dataset/dist/main.js");
+  const said = execFileSync("node", [tool, file, "--out", out, "--fps", "50", "--task", "press", "--json"], { encoding: "utf8" });
+  const { episodes, frames } = JSON.parse(said) as { episodes: number; frames: number };
+  assert.equal(episodes, 1);
+  assert.ok(frames > 80, said);
+  const columns = readParquetFile(join(out, "data/chunk-000/episode_000000.parquet"));
+  const rows = (name: string, i: number): number[] => columns.get(name)!.values.map((row) => (row as number[])[i]!);
+  assert.equal(rows("action", 0).length, frames);
+  const [wish, place] = [rows("action", 2), rows("observation.state", 2)];
+  assert.ok(Math.max(...wish) - Math.min(...wish) > 0.01, "the hand moved");
+  wish.forEach((z, k) => assert.ok(Math.abs(z - place[k]!) < 0.01, "the tool follows its wish"));
+  const force = rows("observation.contact_force", 2);
+  place.forEach((z, k) => assert.ok(Math.abs(force[k]! - Math.max(0, -300 * z)) < 1e-3, "they are of one moment"));
 });

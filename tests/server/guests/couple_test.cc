@@ -4,17 +4,22 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "devices/simulated/simulated_device.h"
+#include "protocol/handshake.h"
+#include "protocol/session.h"
 #include "server/haptic_loop.h"
 #include "server/network_loop.h"
 #include "server/scene/scene.h"
@@ -38,9 +43,58 @@ Scene scene_of(const std::string& name, const std::vector<std::string>& settings
   return parse_scene(text_of(name), name, ".", settings);
 }
 
-/// A server with one coupled device.
+/// An observer in the clear; it names the feature or does not.
+class Viewer {
+ public:
+  Viewer(Wire& wire, const std::string& address, const Address& server, bool names_it, LocalTime now)
+      : end(wire, parse_address(address)),
+        server_(server),
+        handshake_({.hello = {.role = Role::kObserver,
+                              .name = "viewer",
+                              .features = names_it ? std::vector{std::string(kFeatureTeleoperation)}
+                                                   : std::vector<std::string>()}},
+                   now) {}
+
+  void turn(LocalTime now) {
+    std::array<std::byte, kMaxDatagram> buffer;
+    Address from;
+    while (const std::size_t size = end.receive(from, buffer)) {
+      const auto datagram = std::span(buffer).first(size);
+      session ? void(session->receive(now, datagram)) : void(handshake_.receive(now, datagram));
+      if (session || !handshake_.outcome()) continue;
+      const auto& accepted = std::get<ClientHandshake::Accepted>(*handshake_.outcome());
+      session.emplace(Session::Config{.connection_id = accepted.connection_id}, now);
+    }
+    while (const auto event = session ? session->next_event() : std::nullopt) {
+      if (const auto* port = std::get_if<Session::PortArrived>(&*event)) {
+        (port->port.of_peer ? peers : own).push_back({now, port->port});
+      }
+      states += std::holds_alternative<Session::StateArrived>(*event) ? 1 : 0;
+    }
+    while (const std::size_t size =
+               session ? session->next_datagram(now, buffer) : handshake_.next_datagram(now, buffer)) {
+      end.send(server_, std::span(buffer).first(size));
+    }
+  }
+
+  End end;
+  std::optional<Session> session;
+  struct Seen {
+    LocalTime at;
+    PortFrame port;
+  };
+  std::vector<Seen> own;
+  std::vector<Seen> peers;
+  std::size_t states = 0;
+
+ private:
+  Address server_;
+  ClientHandshake handshake_;
+};
+
+/// A server with one coupled device; or one that knows of no coupling.
 struct Place {
-  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now)
+  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true)
       : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
     scene.loop.control.coupling->spring.epoch = epoch;
     haptic = std::make_unique<HapticLoop>(scene.loop, device, *mail);
@@ -48,8 +102,8 @@ struct Place {
     config.secret.fill(std::byte{7});
     config.first_connection_id = static_cast<std::uint32_t>(epoch);
     config.devices = {{.name = scene.name, .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
-    config.couplings = {couple_of(*scene.loop.control.coupling)};
-    if (scene.teleoperation->dial) {
+    if (is_coupled) config.couplings = {couple_of(*scene.loop.control.coupling)};
+    if (is_coupled && scene.teleoperation->dial) {
       config.dials.push_back(
           {0,
            {.server = *scene.teleoperation->dial, .name = scene.name, .seed = epoch, .couple = *config.couplings[0]}});
@@ -114,6 +168,7 @@ class Coupled : public testing::Test {
       for (Place* one : {leader_.get(), follower_.get()}) {
         if (one != nullptr) one->step(now_);
       }
+      for (Viewer* one : viewers_) one->turn(now_);
       for (const std::size_t count = wire_.size(); count_ < count; ++count_) {
         if (cut_ || dice_.chance(loss_)) continue;
         under_way_.push_back({now_ + delay_ + dice_.milliseconds(0, jitter_ms_), wire_[count_]});
@@ -127,6 +182,9 @@ class Coupled : public testing::Test {
           if (one != nullptr && one->end.self == under_way_[i].datagram.to) {
             one->end.inbox.push_back(under_way_[i].datagram);
           }
+        }
+        for (Viewer* one : viewers_) {
+          if (one->end.self == under_way_[i].datagram.to) one->end.inbox.push_back(under_way_[i].datagram);
         }
         under_way_.erase(under_way_.begin() + static_cast<std::ptrdiff_t>(i));
       }
@@ -147,6 +205,7 @@ class Coupled : public testing::Test {
   std::uint64_t epoch_ = 0;
   std::unique_ptr<Place> leader_;
   std::unique_ptr<Place> follower_;
+  std::vector<Viewer*> viewers_;
 };
 
 TEST_F(Coupled, AFollowerGoesWhereTheHandOfAnotherServerGoes) {
@@ -265,6 +324,90 @@ TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
                           [](const auto& said) { return said.find("yours") != std::string::npos; }),
             1)
       << "once";
+}
+
+TEST_F(Coupled, AnObserverThatNamesTheFeatureIsToldBothEnds) {
+  delay_ = milliseconds(10);
+  place({"teleoperation.map.position_scale=0.5"}, {"teleoperation.map.position_scale=0.5"});
+  Viewer at_leader(wire_, "127.0.0.1:4000", leader_->end.self, true, now_);
+  Viewer at_follower(wire_, "127.0.0.1:4001", follower_->end.self, true, now_);
+  viewers_ = {&at_leader, &at_follower};
+  std::map<std::uint64_t, Vec3> leads;
+  std::map<std::uint64_t, Vec3> follows;
+  run(seconds(3), [&] {
+    leads[leader_->newest.sent.sequence] = leader_->newest.sent.position;
+    follows[follower_->newest.sent.sequence] = follower_->newest.sent.position;
+  });
+  ASSERT_GT(at_leader.own.size(), 100U);
+  ASSERT_GT(at_leader.peers.size(), 100U);
+  ASSERT_GT(at_follower.own.size(), 100U);
+  ASSERT_GT(at_follower.peers.size(), 100U);
+  EXPECT_EQ(at_leader.own.back().port.phase, PortPhase::kEngaged);
+  const auto same = [](const std::vector<Viewer::Seen>& seen, const std::map<std::uint64_t, Vec3>& told) {
+    return std::ranges::all_of(seen, [&](const Viewer::Seen& one) {
+      return told.contains(one.port.sequence) && one.port.position == told.at(one.port.sequence);
+    });
+  };
+  EXPECT_TRUE(same(at_leader.own, leads));
+  EXPECT_TRUE(same(at_leader.peers, follows));
+  EXPECT_TRUE(same(at_follower.own, follows));
+  EXPECT_TRUE(same(at_follower.peers, leads));
+  EXPECT_EQ(at_leader.own.back().port.position_scale, 0.5) << "an observer has seen no Couple";
+  EXPECT_EQ(at_leader.own.back().port.force_scale, 1);
+  EXPECT_EQ(at_leader.peers.back().port.position_scale, 0) << "a follower's end has no scales";
+  EXPECT_EQ(at_follower.own.back().port.position_scale, 0);
+  EXPECT_EQ(at_follower.peers.back().port.position_scale, 0.5);
+}
+
+TEST_F(Coupled, AnObserverIsToldTheEndsAtMost50TimesASecond) {
+  place();
+  Viewer viewer(wire_, "127.0.0.1:4000", leader_->end.self, true, now_);
+  viewers_ = {&viewer};
+  run(seconds(2));
+  const auto told = [&](std::vector<Viewer::Seen>& seen) {
+    seen.clear();
+    run(seconds(1));
+    for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_GE(seen[i].at - seen[i - 1].at, milliseconds(20));
+    return seen.size();
+  };
+  EXPECT_GE(told(viewer.own), 49U);
+  EXPECT_LE(told(viewer.peers), 51U);
+  ASSERT_TRUE(viewer.session->request(SetStateRate{.hz = 10, .device = 0}));
+  run(milliseconds(100));
+  EXPECT_NEAR(static_cast<double>(told(viewer.own)), 10, 1);
+  EXPECT_NEAR(static_cast<double>(told(viewer.peers)), 10, 1) << "as often as states";
+}
+
+TEST_F(Coupled, APeerThatIsGoneIsToldNoMore) {
+  place();
+  Viewer early(wire_, "127.0.0.1:4001", leader_->end.self, true, now_);
+  viewers_ = {&early};
+  run(seconds(2));
+  ASSERT_FALSE(early.peers.empty());
+  cut_ = true;
+  run(milliseconds(100));
+  cut_ = false;
+  follower_.reset();
+  Viewer late(wire_, "127.0.0.1:4000", leader_->end.self, true, now_);
+  viewers_ = {&early, &late};
+  early.peers.clear();
+  run(milliseconds(500));
+  EXPECT_GT(late.own.size(), 20U);
+  EXPECT_TRUE(late.peers.empty()) << "what it told before this observer came is old";
+  EXPECT_LE(early.peers.size(), 1U) << "and was told";
+}
+
+TEST_F(Coupled, OtherObserversAndDevicesAreToldOfNoEnds) {
+  follower_ = std::make_unique<Place>(wire_, scene_of("follower.toml"), ++epoch_, now_, false);
+  leader_ = std::make_unique<Place>(wire_, scene_of("leader.toml"), ++epoch_, now_);
+  Viewer silent(wire_, "127.0.0.1:4000", leader_->end.self, false, now_);
+  Viewer named(wire_, "127.0.0.1:4001", follower_->end.self, true, now_);
+  viewers_ = {&silent, &named};
+  run(seconds(1));
+  EXPECT_GT(silent.states, 900U);
+  EXPECT_EQ(silent.own.size() + silent.peers.size(), 0U) << "it names no feature";
+  EXPECT_GT(named.states, 900U);
+  EXPECT_EQ(named.own.size() + named.peers.size(), 0U) << "its device has no coupling";
 }
 
 TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {

@@ -7,12 +7,14 @@
 
 #include "server/build_info.h"
 #include "tests/support/run_tool.h"
+#include "tests/tools/lab/recordings/pair_report.h"
 #include "tests/tools/lab/recordings/report.h"
 
 int main(int argc, char** argv) {
   tendon::lab::ReportOptions options;
   std::vector<std::string> recordings;
   std::string picture;
+  bool pairs = false;
   CLI::App app("Sums up recorded runs as a table and a picture.", "tendon-report");
   app.set_version_flag("--version", tendon::version_text());
   app.add_option("RECORDING", recordings, "recordings of tendond, one column each")
@@ -23,6 +25,7 @@ int main(int argc, char** argv) {
   app.add_option("--label", options.labels, "what a run is called; once for each recording, in order")
       ->type_name("TEXT")
       ->allow_extra_args(false);
+  app.add_flag("--pairs", pairs, "the recordings are of two coupled ends each, as `tendon-replay --merge` writes them");
   app.add_flag("--json", options.json, "one JSON object for each recording on stdout instead of the table");
   app.footer(
       "\nExample: the same motion without and with the limiter\n"
@@ -32,7 +35,7 @@ int main(int argc, char** argv) {
   return tendon::run_tool(app, argc, argv, [&] {
     options.recordings.assign(recordings.begin(), recordings.end());
     if (!picture.empty()) options.picture = picture;
-    tendon::lab::report(options, std::cout);
+    pairs ? tendon::lab::report_pairs(options, std::cout) : tendon::lab::report(options, std::cout);
     return 0;
   });
 }

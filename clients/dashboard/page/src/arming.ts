@@ -1,15 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 import { h, mark, say } from "./dom.js";
-import type { PressInfo, ServerMessage } from "./stream.js";
+import type { Order, PressInfo, ServerMessage } from "./stream.js";
 import type { Level } from "./words.js";
-
-type Order = "arm" | "disarm";
 
 /** From the address that tendon-dash says when it starts: `#/operator/PASS`. Of this tab only, and of no history. */
 const kPass = "operator-pass";
 export function takePass(pass: string): void {
   sessionStorage.setItem(kPass, pass);
   location.replace("#/live");
+}
+
+/** Whether this tab may press: tendon-dash may, and the tab has the pass. */
+export const mayPress = (server: ServerMessage | undefined): boolean => server?.arms === true && sessionStorage.getItem(kPass) !== null;
+
+/** Begins an order; why it does not begin, or undefined when it does. */
+export async function press(order: Order, device: number): Promise<string | undefined> {
+  try {
+    const answer = await fetch(`/api/${order}?device=${device}`, { method: "POST", headers: { authorization: `Bearer ${sessionStorage.getItem(kPass)}` } });
+    return answer.ok ? undefined : (await answer.text()).trim();
+  } catch {
+    return "tendon-dash does not answer. The request was probably not carried out.";
+  }
 }
 
 /** How long a success is shown: later the device's state may have changed. A failure stays. */
@@ -25,7 +36,7 @@ export class Arming {
   readonly #meaning = h("span", { class: "quiet" });
   readonly #result = h("p", { class: "result", role: "status", hidden: true });
   readonly #needs = h("p", { class: "quiet needs", hidden: true });
-  readonly #buttons: Readonly<Record<Order, HTMLButtonElement>>;
+  readonly #buttons: Readonly<Record<"arm" | "disarm", HTMLButtonElement>>;
   readonly #group: HTMLElement;
   #device = 0;
   /** Why our own press was not taken; until the next one, or until the server of this page tells something newer. */
@@ -34,7 +45,7 @@ export class Arming {
   #toldAt = -Infinity;
 
   constructor() {
-    const button = (order: Order, text: string): HTMLButtonElement =>
+    const button = (order: "arm" | "disarm", text: string): HTMLButtonElement =>
       h("button", { type: "button", id: order, disabled: true, click: () => void this.#press(order) }, text);
     this.#buttons = { disarm: button("disarm", "Disarm"), arm: button("arm", "Arm") };
     this.#group = h("span", { class: "orders" }, this.#buttons.disarm, this.#buttons.arm);
@@ -57,11 +68,12 @@ export class Arming {
     // Nor is an arming shown when the device is no longer armed.
     const over = server?.press?.order === "arm" && state.level !== "good";
     const old = server?.press?.state === "done" && (over || performance.now() - this.#toldAt > kToldMs);
-    const press = server?.press?.device === device && !old ? server.press : undefined;
+    const ours = server?.press?.order === "arm" || server?.press?.order === "disarm";
+    const press = ours && server?.press?.device === device && !old ? server.press : undefined;
     const objection = server ? (server.devices.find((d) => d.number === device)?.arming_objection ?? "The server has not listed its devices yet.") : "tendon-dash does not answer.";
     const busy = server?.press?.state === "under_way" ? server.press : undefined;
-    const withoutPass = server?.arms === true && sessionStorage.getItem(kPass) === null;
-    this.#group.hidden = server?.arms !== true || withoutPass;
+    const withoutPass = server?.arms === true && !mayPress(server);
+    this.#group.hidden = !mayPress(server);
     this.#buttons.arm.disabled = objection !== "" || busy !== undefined;
     // It goes before an arming.
     this.#buttons.disarm.disabled = objection !== "" || busy?.order === "disarm";
@@ -75,14 +87,9 @@ export class Arming {
 
   async #press(order: Order): Promise<void> {
     this.#refused = undefined;
-    try {
-      const answer = await fetch(`/api/${order}?device=${this.#device}`, { method: "POST", headers: { authorization: `Bearer ${sessionStorage.getItem(kPass)}` } });
-      if (!answer.ok) this.#refused = (await answer.text()).trim();
-    } catch {
-      this.#refused = "tendon-dash does not answer. The request was probably not carried out.";
-    }
+    this.#refused = await press(order, this.#device);
   }
 }
 
-const levelOf = (press: PressInfo | undefined): Level =>
+export const levelOf = (press: PressInfo | undefined): Level =>
   press === undefined ? "off" : press.state === "done" ? "good" : press.state === "failed" ? "bad" : "notice";

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 import uPlot from "uplot";
 import { h, mark, say, theme } from "./dom.js";
-import { thin, type Column, type Track } from "./track.js";
+import { thin, type Column, type Plotted } from "./track.js";
 import { digits } from "./words.js";
 
-export interface Line {
-  readonly column: Column;
+export interface Line<C extends string = Column> {
+  readonly column: C;
   readonly name: string;
   /** CSS variable of its colour; told apart by dashes and width as well. */
   readonly colour: string;
@@ -17,19 +17,19 @@ export interface Line {
   readonly toggle?: string;
 }
 
-export interface ChartSpec {
+export interface ChartSpec<C extends string = Column> {
   readonly id: string;
   readonly title: string;
   readonly unit: string;
   /** From SI to `unit`. */
   readonly scale: number;
-  readonly lines: readonly Line[];
+  readonly lines: readonly Line<C>[];
   /** The axis begins at zero. */
   readonly positive?: boolean;
   /** The axis shows at least this much. */
   readonly least: number;
   /** Lines that may leave the axis: values far beyond the others would flatten them. */
-  readonly mayLeave?: Column;
+  readonly mayLeave?: C;
 }
 
 /** The requests of a user who drags or scrolls a chart. */
@@ -45,7 +45,7 @@ export interface ChartEvents {
 const heightFor = (width: number): number => (width < 500 ? 168 : 196);
 
 /** One plot over time: lines with a unit, and a legend that tells their values at the cursor and shows or hides lines. */
-export class Chart {
+export class Chart<C extends string = Column> {
   readonly element: HTMLElement;
   #plot: uPlot;
   readonly #box: HTMLElement;
@@ -54,7 +54,7 @@ export class Chart {
   #width = 0;
   #shared: [number, number] | undefined;
 
-  constructor(readonly spec: ChartSpec, events: ChartEvents) {
+  constructor(readonly spec: ChartSpec<C>, events: ChartEvents) {
     this.#values = spec.lines.map(() => h("span", { class: "value" }));
     this.#shown = spec.lines.map((line) => line.toggle === undefined);
     const keys = spec.lines.map((line, i) => h("span", { class: "key", hidden: !this.#shown[i] }, swatch(line), line.name, " ", this.#values[i]!));
@@ -118,7 +118,7 @@ export class Chart {
   }
 
   /** Shows [from, to]; the legend tells what was at `cursor`. */
-  draw(track: Track, from: number, to: number, cursor: number): void {
+  draw(track: Plotted<C>, from: number, to: number, cursor: number): void {
     const width = this.#box.clientWidth;
     if (width === 0) return;
     if (width !== this.#width) {
@@ -182,7 +182,7 @@ export class Chart {
   }
 }
 
-function swatch(line: Line): HTMLElement {
+function swatch(line: Line<string>): HTMLElement {
   const box = h("span", { class: "swatch" });
   const style = !line.dash ? "solid" : (line.dash[0] ?? 0) > 3 ? "dashed" : "dotted";
   box.style.borderTop = `${line.fill ? 2 : Math.max(2, line.width ?? 2)}px ${style} var(--${line.colour})`;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 import { Arming } from "./arming.js";
+import { Coupling } from "./coupling.js";
+import type { ChartEvents } from "./chart.js";
 import { h, mark, say } from "./dom.js";
 import { Scrubber } from "./scrubber.js";
 import { contactOf } from "./space/figure.js";
 import type { Shown } from "./space/stage.js";
-import { Stream, type Message, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
+import { Stream, type Message, type PortsMessage, type ReportsMessage, type ServerMessage, type StatesMessage } from "./stream.js";
 import { Track, noHandle, type HandleSample } from "./track.js";
 import { View, type Facts } from "./view.js";
 import { count, digits, duration, kDisarmed, kDisarmedBit, kSafety, moment } from "./words.js";
@@ -25,6 +27,7 @@ export class Live {
   readonly #beside = new Map<number, { track: Track; zero: number }>();
   readonly #stream: Stream;
   readonly #view: View;
+  readonly #coupling: Coupling;
   readonly #scrubber: Scrubber;
   readonly #arming = new Arming();
   readonly #pause: HTMLButtonElement;
@@ -56,7 +59,7 @@ export class Live {
       if (half < 0.001) return;
       this.#setStill({ from: middle - half, to: Math.min(middle + half, Math.max(this.#track.last, middle)) });
     };
-    this.#view = new View({
+    const events: ChartEvents = {
       zoom: (from, to) => this.#setStill({ from, to }),
       reset: () => this.#setStill(undefined),
       hover: (time) => {
@@ -66,7 +69,9 @@ export class Live {
       changed: () => {
         this.#dirty = this.#spaceDirty = true;
       },
-    });
+    };
+    this.#view = new View(events);
+    this.#coupling = new Coupling(events);
     this.#scrubber = new Scrubber((from, to) => this.#setStill({ from, to }));
     this.#scrubber.element.hidden = true;
     this.element = h("main", { class: "live" },
@@ -77,7 +82,7 @@ export class Live {
           h("button", { type: "button", id: "zoom-in", "aria-label": "Zoom in", title: "Zoom in", click: () => zoom(0.5) }, "+"),
           h("button", { type: "button", id: "zoom-out", "aria-label": "Zoom out", title: "Zoom out", click: () => zoom(2) }, "−")),
         this.#pause),
-      this.#arming.element, this.#scrubber.element, this.#view.element);
+      this.#arming.element, this.#scrubber.element, this.#coupling.element, this.#view.element);
     this.#stream = new Stream((message) => this.#take(message), (open) => this.#changed(open));
     this.#loop();
   }
@@ -85,6 +90,7 @@ export class Live {
   repaint(): void {
     this.#scrubber.repaint();
     this.#view.repaint();
+    this.#coupling.repaint();
     this.#dirty = true;
   }
 
@@ -97,6 +103,7 @@ export class Live {
   #take(message: Message): void {
     this.#dirty = this.#spaceDirty = true;
     if (message.type === "states") this.#takeStates(message);
+    else if (message.type === "ports") this.#takePorts(message);
     else if (message.type === "reports") this.#reports = message.device === this.#watched ? message : this.#reports;
     else this.#takeServer(message);
   }
@@ -109,10 +116,17 @@ export class Live {
       if (this.#zero === undefined || sampled - this.#zero < this.#track.last) {
         this.#zero = sampled;
         this.#track.clear();
+        this.#coupling.clear();
         this.#setStill(undefined);
       }
       push(this.#track, message, i, sampled - this.#zero);
     }
+  }
+
+  /** Its times are those of the device's steps. */
+  #takePorts(message: PortsMessage): void {
+    if (message.device !== this.#watched || this.#zero === undefined) return;
+    for (const row of message.rows) this.#coupling.push(row.at_us / 1e6 - this.#zero, row);
   }
 
   #takeBeside(message: StatesMessage): void {
@@ -153,6 +167,7 @@ export class Live {
     this.#zero = undefined;
     this.#reports = undefined;
     this.#track.clear();
+    this.#coupling.clear();
     this.#view.clear();
     this.#setStill(undefined);
     // Its states of until now came sixty times a second; now all come.
@@ -222,12 +237,13 @@ export class Live {
 
   #draw(): void {
     const { from, to } = this.#still ?? this.#following();
-    this.#view.space();
+    const space = this.#view.space();
     const info = this.#server?.devices.find((d) => d.number === this.#watched);
     say(this.#about, info ? `${info.model}, ${count(info.loop_hz)} steps per second, at most ${digits(info.max_force_n)} N` : "");
     const cursor = this.#hover !== undefined && this.#still ? this.#hover : to;
     const facts = this.#facts();
     this.#view.draw(this.#track, from, to, cursor, this.#still ? moment(cursor) : "", facts);
+    this.#coupling.draw(this.#open ? this.#server : undefined, this.#watched, from, to, cursor, !space);
     this.#arming.draw(this.#open ? this.#server : undefined, this.#watched, facts.state);
     if (this.#still) this.#scrubber.draw([this.#track], from, to);
     mark(this.element, "data-states", String(this.#track.end));

@@ -30,10 +30,12 @@ export interface DeviceInfo {
   /** Why it cannot be armed and disarmed from here now; empty: it can. */
   readonly arming_objection: string;
 }
-/** What became of the newest press of a button that arms or disarms. */
+/** What the buttons order. */
+export type Order = "arm" | "disarm" | "engage" | "disengage";
+/** What became of the newest press of a button. */
 export interface PressInfo {
   readonly device: number;
-  readonly order: "arm" | "disarm";
+  readonly order: Order;
   readonly state: "under_way" | "done" | "failed";
   readonly words: string;
 }
@@ -118,7 +120,38 @@ export interface ReportsMessage {
   readonly loop: LoopReport | null;
   readonly engines: readonly EngineReport[];
 }
-export type Message = ServerMessage | StatesMessage | ReportsMessage;
+type Place = readonly [number, number, number];
+/** One end of a coupling. The position is from where it was coupled, in the end's own axes and scale, as the forces are. */
+export interface PortEnd {
+  readonly phase: string;
+  readonly position_m: Place;
+  readonly force_n: Place;
+  /** Null: not measured. */
+  readonly contact_n: Place | null;
+  /** Joules of its own; null: it has no purse. */
+  readonly account_j: number | null;
+  readonly round_trip_ms: number | null;
+  /** Of the surface that it has found. */
+  readonly stiffness_n_per_m: number | null;
+  readonly share: number | null;
+}
+export interface PortRow {
+  readonly at_us: number;
+  readonly role: "leader" | "follower" | null;
+  readonly own: PortEnd;
+  /** Null: nothing is heard of it. */
+  readonly peer: PortEnd | null;
+  readonly position_scale: number | null;
+  readonly force_scale: number | null;
+  /** Joules of the leader. */
+  readonly pair_j: number | null;
+}
+export interface PortsMessage {
+  readonly type: "ports";
+  readonly device: number;
+  readonly rows: readonly PortRow[];
+}
+export type Message = ServerMessage | StatesMessage | ReportsMessage | PortsMessage;
 
 /** The way to tendon-dash, which is found again when it was gone. */
 export class Stream {

@@ -37,8 +37,19 @@ const kColumns = ["x", "y", "z", "wx", "wy", "wz", "ax", "ay", "az", "permitted"
 /** A column of numbers; `wanted` and `applied` are the norms. */
 export type Column = (typeof kColumns)[number];
 
+/** What a plot reads: rows in the order of their times, in columns. */
+export interface Plotted<C extends string> {
+  readonly t: ArrayLike<number>;
+  readonly begin: number;
+  readonly end: number;
+  readonly length: number;
+  column(name: C): ArrayLike<number>;
+  /** Index of the first row at or after `time`. */
+  at(time: number): number;
+}
+
 /** Steps in the order of their times, in columns; of a live device the newest `limit` of them. */
-export class Track {
+export class Track implements Plotted<Column> {
   t = new Float64Array(4096);
   reasons = new Uint32Array(4096);
   mode = new Uint8Array(4096);
@@ -146,8 +157,8 @@ export class Track {
 }
 
 /** What a plot of `columns` pixels can show of steps: with more steps than that, the least and the most in each pixel; gaps are null. */
-export function thin(
-  track: Track, names: readonly Column[], from: number, to: number, columns: number, scale: number,
+export function thin<C extends string>(
+  track: Plotted<C>, names: readonly C[], from: number, to: number, columns: number, scale: number,
 ): [number[], ...(number | null)[][]] {
   const first = Math.max(track.begin, track.at(from) - 1);
   const last = Math.min(track.end, track.at(to) + 1);
@@ -199,7 +210,7 @@ export function thin(
 }
 
 /** s, from one step to the next. */
-export function usualStep(track: Track): number {
+export function usualStep(track: Pick<Plotted<string>, "t" | "begin" | "length">): number {
   const n = Math.min(track.length, 200);
   return n < 2 ? 0.001 : (track.t[track.begin + n - 1]! - track.t[track.begin]!) / (n - 1);
 }

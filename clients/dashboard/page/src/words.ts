@@ -29,7 +29,7 @@ export const kReasons: readonly ReasonWords[] = [
   { bit: 11, name: "Watchdog", meaning: "a step came so late that the device's own watchdog let go", limits: false },
 ];
 
-interface StateWords {
+export interface StateWords {
   readonly name: string;
   readonly meaning: string;
   readonly level: Level;
@@ -54,6 +54,17 @@ export const kSafety: Readonly<Record<string, StateWords>> = {
   armed: { name: "Armed", meaning: "gives forces", level: "good" },
   fault: { name: "Fault", meaning: "gives no force until it is armed again", level: "bad" },
   unguarded: { name: "Gives forces", meaning: "its scene lists no safety layer: there is nothing to arm", level: "good" },
+};
+
+/** Phases of an end of a coupling. */
+export const kPhases: Readonly<Record<string, StateWords>> = {
+  alone: { name: "Alone", meaning: "nothing is heard of another end", level: "off" },
+  coupled: { name: "Coupled", meaning: "hears the other end and waits to be engaged: no force", level: "off" },
+  aligning: { name: "Aligning", meaning: "the leader is led to where the follower is", level: "notice" },
+  engaged: { name: "Engaged", meaning: "the two handles move together", level: "good" },
+  clutched: { name: "Clutched", meaning: "the leader is free, the follower stays where it is", level: "notice" },
+  lost: { name: "Lost", meaning: "the other end fell silent: to be engaged anew", level: "bad" },
+  fault: { name: "Fault", meaning: "its device gives no force", level: "bad" },
 };
 
 /** Bit 13 of the reasons: there is no force, whatever state the safety layer last reported. */

@@ -49,11 +49,15 @@ Trace read_trace(const std::filesystem::path& recording, const RunSummary& summa
 
 }  // namespace
 
-void report(const ReportOptions& options, std::ostream& out) {
+void check(const ReportOptions& options) {
   if (options.recordings.empty()) throw std::invalid_argument("expected one recording or more");
   if (!options.labels.empty() && options.labels.size() != options.recordings.size())
     throw std::invalid_argument("expected one label for each recording, got " + std::to_string(options.labels.size()) +
                                 " for " + std::to_string(options.recordings.size()));
+}
+
+void report(const ReportOptions& options, std::ostream& out) {
+  check(options);
   if (options.picture) check_picture(*options.picture, options.recordings.size());
 
   std::vector<Run> runs;

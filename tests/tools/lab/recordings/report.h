@@ -18,6 +18,9 @@ struct ReportOptions {
   bool json = false;                                  ///< one object for each recording instead of the table
 };
 
+/// Throws std::invalid_argument unless there are recordings, and labels for all of them or none.
+void check(const ReportOptions& options);
+
 /// Reads the recordings, writes the table (or JSON) to `out`, and draws the picture.
 ///
 /// A recording that was cut off is read as far as it goes, and the report says so. Throws std::invalid_argument when

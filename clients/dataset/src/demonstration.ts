@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads what the program of a robot that follows a hand has written down: JSON lines of clients/python's
+// tendon.demonstration.
+import { createReadStream } from "node:fs";
+import { createInterface } from "node:readline";
+import type { Vec3 } from "./recording.js";
+
+/** The robot as a state of the hand came. */
+export interface Moment {
+  /** s, when the hand was sampled, by the clock of its server. */
+  readonly t: number;
+  /** "engaged", "clutched" … */
+  readonly phase: string;
+  /** m, of the tool, in the robot's frame. */
+  readonly position: Vec3;
+  /** m, where it is to go; undefined: it holds its place. */
+  readonly target?: Vec3 | undefined;
+  /** N, of the surroundings on the tool; undefined: not measured. */
+  readonly contact?: Vec3 | undefined;
+}
+
+const kKind = "tendon demonstration";
+const kVersion = 1;
+
+function vec3(name: string, value: unknown): Vec3 {
+  if (Array.isArray(value) && value.length === 3 && value.every(Number.isFinite)) return value as unknown as Vec3;
+  throw new Error(`${name}: expected three numbers`);
+}
+
+function momentOf(line: Record<string, unknown>): Moment {
+  const { sampled_ns: sampled, phase, position_m: position, target_m: target, contact_n: contact } = line;
+  if (typeof sampled !== "number") throw new Error("sampled_ns: expected a number");
+  if (typeof phase !== "string") throw new Error("phase: expected a text");
+  return {
+    t: sampled * 1e-9,
+    phase,
+    position: vec3("position_m", position),
+    target: target == null ? undefined : vec3("target_m", target),
+    contact: contact == null ? undefined : vec3("contact_n", contact),
+  };
+}
+
+/** Throws an Error that names file and line when it is not such a file. A last line that was cut off is left out. */
+export async function readDemonstration(file: string): Promise<Moment[]> {
+  const moments: Moment[] = [];
+  let number = 0;
+  let broken: Error | undefined;
+  for await (const text of createInterface({ input: createReadStream(file) })) {
+    if (broken) throw broken;
+    ++number;
+    try {
+      const line = JSON.parse(text) as Record<string, unknown>;
+      if (number > 1) moments.push(momentOf(line));
+      else if (line?.["kind"] !== kKind || line["version"] !== kVersion) {
+        throw new Error(`expected {"kind":"${kKind}","version":${kVersion}}`);
+      }
+    } catch (error) {
+      broken = new Error(`${file}, line ${number}: ${error instanceof Error ? error.message : String(error)}`);
+      if (!(error instanceof SyntaxError) || number === 1) throw broken;
+    }
+  }
+  if (number === 0) throw new Error(`${file}: expected a demonstration, and it is empty`);
+  return moments;
+}

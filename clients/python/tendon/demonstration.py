@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes down what a robot that follows a hand did, for robot learning (clients/dataset).
+
+    with Demonstration("press.jsonl") as demonstration:
+        def step(hand):
+            pose = robot.pose()
+            target = follow.target(hand, pose, time.monotonic_ns())
+            contact = robot.contact()
+            demonstration.add(hand, pose, target, follow.phase, contact)
+            ...
+
+The server's recording knows the hand, and not the robot. This file knows the robot: where its tool was when a state of
+the hand came, and where the tool was to go then.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from os import PathLike
+from types import TracebackType
+
+from .messages import DeviceState
+from .teleop import Following, Pose, ToolContact
+
+KIND = "tendon demonstration"
+VERSION = 1
+
+
+class Demonstration:
+    """A file of JSON lines. The first names its kind and version; then one for each state of the hand:
+
+        tick          of the state: by it the line meets the hand's step in the server's recording
+        sampled_ns    when the hand was sampled, server clock
+        phase         "engaged", "clutched" …, as Follower.phase
+        position_m    of the tool, robot's frame
+        target_m      where it is to go; null: the robot holds its place
+        contact_n     of the surroundings on the tool; absent: not measured
+
+    A state with a pose, target or contact that is not finite is left out. Nothing is overwritten: FileExistsError.
+    Lines go through a buffer, so that `add` seldom waits for the disk.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self._file = open(path, "x", encoding="utf-8")
+        self._write({"kind": KIND, "version": VERSION})
+
+    def __enter__(self) -> Demonstration:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def add(
+        self, hand: DeviceState, pose: Pose, target: Pose | None, phase: Following, contact: ToolContact | None = None
+    ) -> None:
+        """`pose`: what Follower.target was given for `hand`; `target`: what it returned."""
+        line: dict[str, object] = {"tick": hand.tick, "sampled_ns": hand.sampled_ns, "phase": phase.name.lower()}
+        line["position_m"] = _three(pose.position)
+        line["target_m"] = None if target is None else _three(target.position)
+        if contact is not None:
+            line["contact_n"] = _three(contact.force)
+        numbers = [x for value in line.values() if isinstance(value, list) for x in value]
+        if all(map(math.isfinite, numbers)):
+            self._write(line)
+
+    def close(self) -> None:
+        self._file.close()
+
+    def _write(self, line: dict[str, object]) -> None:
+        self._file.write(json.dumps(line, separators=(",", ":")) + "\n")
+
+
+def _three(v: Sequence[float]) -> list[float]:
+    x, y, z = v
+    return [float(x), float(y), float(z)]
