@@ -104,7 +104,9 @@ class Desk {
  public:
   Desk(Wire& wire, const std::string& address, const Address& server, const std::string& channel, LocalTime now)
       : end(wire, parse_address(address)), connection_(end, server, {.seed = std::uint64_t{77}}) {
-    Hello hello{.role = Role::kController, .name = "desk"};
+    Hello hello;
+    hello.role = Role::kController;
+    hello.name = "desk";
     hello.features = {std::string(kFeatureChannels), std::string(kFeatureTeleoperation)};
     hello.claims = {{.device = "", .channel = channel, .role = Role::kController}};
     connection_.greet(now, hello);
