@@ -25,8 +25,8 @@ struct CoupledLeader {
 ///     F_i = α_i (K (u_i − y_i) + D (u̇_i − ẏ_i) − B ẏ_i)        at leader i
 ///
 /// so that in free motion x_f = Σ α_i x_i over the leaders that are engaged, their α_i over their sum. Each pair is a
-/// pair of α_i K, α_i D and α_i B, so all that is said of one pair holds of each (PositionPosition: α K ≤ 2 α B/T_loop),
-/// and with all leaders engaged the follower renders B once. By position-force leader i feels α_i times the contact.
+/// pair of α_i K, α_i D and α_i B: all that is said of one pair holds of each (PositionPosition: α K ≤ 2 α B/T_loop).
+/// With all leaders engaged the follower renders B once. By position-force leader i feels α_i times the contact.
 ///
 /// **Each engages by its own act**, clutches, falls silent and is lost by itself; its own offsets make that nothing
 /// moves. A leader that is not engaged counts for nothing: its spring is absent, and the springs of the others do not
@@ -34,17 +34,17 @@ struct CoupledLeader {
 /// leader has it.
 ///
 /// **One account.** All couplings pay and are paid from the one account of the device's limiter, one after the other:
-/// each sees what those before it have left. That is what the theorem of purse.h asks for. Before the bound coupling j
-/// gives ΔG_j ≤ max(A_j, 0), A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k; so a gift never takes the account below zero, and one
-/// that is below zero gives nothing: Σ ΔG ≤ max(A + Σ R, 0), with nothing in between that raises A but R. The force is
-/// limited once, after all of them. A move of α under stretch, which costs ½ ΔK δ², is work that this account or that of
-/// the leader pays when it is felt, like any other work of a spring; where there is none, the limiter leaves less of the
-/// force.
+/// each sees what those before it have left. That is what the theorem of purse.h asks for. Before the bound coupling
+/// j gives ΔG_j ≤ max(A_j, 0), A_j = A + Σ_{k≤j} R_k − Σ_{k<j} ΔG_k. So a gift never takes the account below zero, and
+/// an account that is below zero gives nothing: Σ ΔG ≤ max(A + Σ R, 0), and nothing in between raises A but R. The
+/// force is limited once, after all of them. A move of α under stretch, which costs ½ ΔK δ², is work that this account
+/// or that of the leader pays when it is felt, like any other work of a spring; where there is none, the limiter
+/// leaves less of the force.
 ///
 /// **What a leader is told** of the account and of the need is its part, α_i A and α_i n. The ratio A/n, by which the
 /// ports give, is the same for all; but leaders that were each told the whole need would each send what is missing, and
-/// the follower would send some of it back: 2 … 4 leaders that press together sent 7 … 17 % more to and fro, and felt no
-/// more. It is a matter of balance: no promise depends on it.
+/// the follower would send some of it back: 2 … 4 leaders that press together sent 7 … 17 % more to and fro, and felt
+/// no more. It is a matter of balance: no promise depends on it.
 ///
 /// **Trust.** Each peer has a purse of its own, with max_power and max_account of its own: against n peers that lie the
 /// port alone keeps L ≥ −n (max_account + max_power · t).

@@ -21,8 +21,8 @@ struct StepRecord : Step {
   std::uint32_t buttons = 0;    ///< bit i is set while button i of the handle was held
 };
 
-/// What a coupling did in one haptic step: with the StepRecord of the same tick, and the other couplings of that tick in
-/// their order, enough to repeat it.
+/// What a coupling did in one haptic step: with the StepRecord of the same tick, and the other couplings of that tick
+/// in their order, enough to repeat it.
 struct PortRecord {
   std::uint64_t tick = 0;
   std::uint32_t channel = 0;        ///< of the device, by which the leader comes; 0 where there is one coupling

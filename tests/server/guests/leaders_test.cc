@@ -48,7 +48,8 @@ struct Place {
     config.secret.fill(std::byte{7});
     config.first_connection_id = static_cast<std::uint32_t>(1000 * epoch);
     DeviceDescription about{.name = scene.name, .model = "device", .loop_hz = 1000};
-    for (const Scene::Channel& channel : scene.channels) about.channels.push_back({.name = channel.name});
+    for (const Scene::Channel& channel : scene.channels)
+      about.channels.push_back({.name = channel.name, .lease = channel.lease});
     config.devices = {about};
     config.couplings = {couple_of(*scene.loop.control.coupling)};
     auto& leaders = config.leaders.emplace_back();
@@ -276,9 +277,23 @@ TEST_F(TwoLeaders, AChannelHasOneOtherEndAndAnotherChannelAnother) {
   EXPECT_EQ(asked(couple).detail, "no leader comes by this channel");
   desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", follower_->end.self, "trainer", now_);
   couple.channel = kTrainer;
+  run(milliseconds(300));
   const auto answer = asked(couple);
   EXPECT_EQ(answer.code, Code::kBusy);
   EXPECT_EQ(answer.detail, "it is coupled with \"" + trainer_->scene.name + "\"");
+}
+
+TEST_F(TwoLeaders, WhoeverTakesTheChannelOfASilentLeaderMayCouple) {
+  place();
+  run(seconds(3));
+  cut_ = trainer_->end.self;
+  desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", follower_->end.self, "trainer", now_);
+  run(milliseconds(700));  // the lease is over, and the session is not
+  ASSERT_EQ(asked(TakeLease{.device = 0, .channel = kTrainer}).code, Code::kOk);
+  Couple couple = couple_of(*trainer_->scene.loop.control.coupling);
+  couple.channel = kTrainer;
+  EXPECT_EQ(asked(couple).code, Code::kOk);
+  EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kEngaged);
 }
 
 TEST_F(TwoLeaders, OfWhomOneFallsSilentTheOtherGoesOn) {

@@ -215,8 +215,8 @@ TEST(SceneTeleoperation, AFollowerNamesItsLeadersByTheirChannels) {
 TEST(SceneTeleoperation, SaysWhyLeadersCannotBeSo) {
   const auto refusal = [](const std::string& more) { return error_of_minimal_and(more); };
   const std::string two = leader("trainer", "0.7") + leader("trainee", "0.3");
-  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("trainee", "0.2")),
-            "s.toml:14: teleoperation.leader: expected shares that are 1 together, found 0.9");
+  EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("trainee", "0.25")),
+            "s.toml:14: teleoperation.leader: expected shares that are 1 together, found 0.95");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "1")),
             "s.toml:14: teleoperation.leader: expected 2 to 4 tables, or none for one leader by any channel");
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "0.7") + leader("robot", "0.3")),
@@ -226,7 +226,7 @@ TEST(SceneTeleoperation, SaysWhyLeadersCannotBeSo) {
   EXPECT_EQ(refusal(kTwoLeaders + leader("trainer", "1.2") + leader("trainee", "-0.2")),
             "s.toml:16: teleoperation.leader[0].share: expected a number from 0 to 1, found 1.2");
   EXPECT_EQ(refusal(kTwoLeaders + two + two + leader("trainer", "0")),
-            "s.toml:14: teleoperation.leader: expected 1 to 4 tables [[teleoperation.leader]], found an array");
+            "s.toml:14: teleoperation.leader: expected 1 to 4 tables [[teleoperation.leader]], found an array of 5");
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string text = kTwoLeaders + two;
     text.replace(text.find(from), from.size(), to);

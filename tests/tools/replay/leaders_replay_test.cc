@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -107,7 +108,7 @@ TEST(LeadersReplay, AFollowerOfTwoDecidesTheSameAgainToTheLastBit) {
   EXPECT_GT(paid[0], 0);
   EXPECT_GT(paid[1], 0);
   EXPECT_EQ(first_difference(all, 0), "");
-  EXPECT_NE(first_difference(all, 1).find("energy_j"), std::string::npos) << "one of them is not enough";
+  EXPECT_NE(first_difference(all, 1), "") << "one of them is not enough";
 }
 
 }  // namespace
