@@ -118,7 +118,7 @@ struct ServedDevice {
   PortPhase phase = PortPhase::kAlone;  ///< of our end, as its loop told it last; of several the newest told
   /// The channels by which its leaders come, in the order of its couplings; empty: it has one coupling, by any channel.
   std::vector<std::uint32_t> leaders{};
-  std::array<std::uint32_t, Shares::kMost> peers{};  ///< by coupling: how many other ends it has had
+  std::array<std::uint32_t, Shares::kMost> peers{};   ///< by coupling: how many other ends it has had
   std::array<PortFrame, Shares::kMost> peer_ports{};  ///< by coupling: what the other end told last, for observers
   Outputs outputs{};
   std::optional<Health> told{};  ///< to observers, last; empty before there was any
