@@ -102,7 +102,9 @@ TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButOneComeToRest) {
       EXPECT_GE(outcome.account, kRounding) << which;
       EXPECT_LE(outcome.most, 8 * (1 + 1e-9)) << which;
       const double bounces = method == CouplingMethod::kPositionForce ? hard.bounces : 0;
-      EXPECT_LT(outcome.unrest, std::max(bounces, 0.02)) << which;
+      // The handle of rate is held out, so that a follower without a wall goes on.
+      const double asked = method == CouplingMethod::kRate ? 0.06 : 0;
+      EXPECT_LT(outcome.unrest, std::max({bounces, asked, 0.02})) << which;
     }
   }
 }
