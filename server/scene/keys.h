@@ -69,6 +69,7 @@ struct Draft {
   Coupling::Config coupling;             ///< of [teleoperation], when there is one
   Vec3 map_rotation = Vec3::Zero();      ///< rad, rotation vector
   std::optional<double> coupling_force;  ///< N
+  std::optional<double> drift_rate;      ///< 1/s
   bool engages_by_button = false;
   std::optional<std::uint32_t> engage_button;
   std::vector<Vec3> places;

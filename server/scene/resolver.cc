@@ -358,7 +358,10 @@ class SceneResolver {
     coupling.spring.period = draft_.scene.loop.period;
     coupling.spring.max_force = draft_.coupling_force.value_or(control.max_force);
     const Law law = control.limiter.law;
-    if (coupling.method == CouplingMethod::kPositionPosition && law != Law::kNone && !coupling.purse) {
+    resolve_method(coupling);
+    const bool pays = coupling.method == CouplingMethod::kPositionPosition ||
+                      coupling.method == CouplingMethod::kPassivity || coupling.method == CouplingMethod::kSetPosition;
+    if (pays && law != Law::kNone && !coupling.purse) {
       blame("teleoperation.purse", {"teleoperation"},
             "missing, expected this table: behind a limiter of its own a follower cannot move unless the leader pays");
     }
@@ -380,6 +383,34 @@ class SceneResolver {
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;
+  }
+
+  /// What some methods need, and the others have no use for.
+  void resolve_method(Coupling::Config& coupling) const {
+    const std::string named = "\"" + std::string(to_string(coupling.method)) + "\"";
+    if (coupling.method == CouplingMethod::kRate && !coupling.rate) {
+      blame("teleoperation.rate", {"teleoperation.method"},
+            "missing, expected this table with method " + named + ": how fast the follower moves");
+    }
+    if (coupling.method != CouplingMethod::kRate && coupling.rate) {
+      blame("teleoperation.rate", {}, "expected none with method " + named + ": only \"rate\" has a speed");
+    }
+    if (coupling.centring > 0 && coupling.role == PortRole::kFollower) {
+      blame("teleoperation.rate.centring_n_per_m", {}, "expected none or 0: the leader's handle is centred");
+    }
+    if (draft_.drift_rate && coupling.method != CouplingMethod::kPassivity) {
+      blame("teleoperation.coupling.drift_rate_per_s", {},
+            "expected none with method " + named + ": only \"passivity\" corrects drift");
+    }
+    coupling.drift_rate = draft_.drift_rate.value_or(coupling.drift_rate);
+    if (coupling.method == CouplingMethod::kSetPosition && coupling.spring.damping > 0) {
+      blame("teleoperation.coupling.mutual_damping_n_s_per_m", {},
+            "expected none or 0 with method " + named + ": it uses no velocity of the other end");
+    }
+    if (coupling.method == CouplingMethod::kPassivity && !(coupling.spring.own_damping > 0)) {
+      blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
+            "expected a number above 0: nothing else takes energy up, so that nothing could begin to move");
+    }
   }
 
   /// Motors that turn the handle, and the motor of its gripper, have bounds of their own. A scene has to have them when
