@@ -380,6 +380,7 @@ TEST(CouplingRate, AContactIsFeltButNeverMovesTheFollower) {
     const Vec3 before = ports.follower.x();
     ports.run(1000);
     EXPECT_LT((ports.follower.x() - before).norm(), 1e-4) << one_way;
+    EXPECT_LT(ports.follower.outside().x(), -0.5) << one_way << ": it goes on pressing";
     EXPECT_GE(ports.least_sum, kRounding) << one_way;
     EXPECT_GE(ports.least_account(), kRounding) << one_way;
   }
