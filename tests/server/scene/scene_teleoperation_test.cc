@@ -161,16 +161,16 @@ TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
             "s.toml:6: teleoperation.rate: missing, expected this table with method \"rate\": how fast the follower "
             "moves");
   EXPECT_EQ(refusal("waves", purse + kRate),
-            "s.toml:10: teleoperation.rate: expected none with method \"waves\": only \"rate\" has a speed");
+            "s.toml:11: teleoperation.rate: expected none with method \"waves\": only \"rate\" has a speed");
   EXPECT_EQ(refusal("rate", purse + kRate + "centring_n_per_m = 200\n", "follower"),
-            "s.toml:14: teleoperation.rate.centring_n_per_m: expected none or 0: the leader's handle is centred");
+            "s.toml:15: teleoperation.rate.centring_n_per_m: expected none or 0: the leader's handle is centred");
   EXPECT_EQ(refusal("rate", purse + "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\n"),
-            "s.toml:10: teleoperation.rate.max_speed_mm_per_s: missing, expected a number above 0 mm/s");
+            "s.toml:11: teleoperation.rate.max_speed_mm_per_s: missing, expected a number above 0 mm/s");
   EXPECT_EQ(refusal("surface", "drift_rate_per_s = 5\n" + purse),
-            "s.toml:8: teleoperation.coupling.drift_rate_per_s: expected none with method \"surface\": only "
+            "s.toml:9: teleoperation.coupling.drift_rate_per_s: expected none with method \"surface\": only "
             "\"passivity\" corrects drift");
   EXPECT_EQ(refusal("set-position", "mutual_damping_n_s_per_m = 1\n" + purse),
-            "s.toml:8: teleoperation.coupling.mutual_damping_n_s_per_m: expected none or 0 with method "
+            "s.toml:9: teleoperation.coupling.mutual_damping_n_s_per_m: expected none or 0 with method "
             "\"set-position\": it uses no velocity of the other end");
   EXPECT_EQ(refusal("passivity", "[teleoperation.purse]\n"),
             "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: nothing else takes energy "
