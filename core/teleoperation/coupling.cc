@@ -18,8 +18,10 @@ namespace {
 /// K, D and B of this end.
 PositionPosition<3>::Config spring_of(const Coupling::Config& config, const PoseMap& map) {
   PositionPosition<3>::Config spring = config.spring;
+  const bool both = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kSetPosition;
   // The leader of a position–force coupling has no spring: the follower's is not in a loop with the delay.
-  if (config.method != CouplingMethod::kPositionPosition) spring.adapt_to_delay = false;
+  if (!both) spring.adapt_to_delay = false;
+  if (config.method == CouplingMethod::kSetPosition) spring.damping = 0;  // no velocity travels
   if (config.role == PortRole::kLeader) return spring;
   for (double* const value : {&spring.stiffness, &spring.damping, &spring.own_damping}) {
     *value = map.stiffness_at_follower(*value);
@@ -166,9 +168,7 @@ Coupling::Coupling(const Config& config)
     }
   }
   if (config.absolute) {
-    const bool springs = config.method == CouplingMethod::kPositionPosition ||
-                         config.method == CouplingMethod::kPositionForce || config.method == CouplingMethod::kSurface;
-    expect(springs, "absolute", 1, "none: this method has no absolute places");
+    expect(has_places(config.method), "absolute", 1, "none: this method has no absolute places");
     expect(!config.clutch, "clutch", 1, "none: an absolute map has no offset that it could change");
     expect_above_zero(config.absolute->within, "absolute.within");
     expect_not_negative(config.absolute->energy, "absolute.energy");
@@ -195,6 +195,27 @@ Coupling::Coupling(const Config& config)
     expect(!config.clutch || config.clutch->bit != *config.engage_by, "engage_by", *config.engage_by,
            "another button than the clutch's");
   }
+  if (config.method == CouplingMethod::kPassivity) {
+    expect_above_zero(config.spring.own_damping, "own_damping");
+    if (leads()) {
+      passive_leader_.emplace(
+          PassivityLeader<3>::Config{.max_damping = config.spring.own_damping, .period = config.spring.period});
+    } else {
+      passive_follower_.emplace(PassivityFollower<3>::Config{
+          .drift_rate = config.drift_rate, .period = config.spring.period, .stiffness = spring_.stiffness()});
+    }
+  }
+  const bool by_rate = config.method == CouplingMethod::kRate;
+  expect(config.rate.has_value() == by_rate, "rate", config.rate ? 1 : 0, "one of method rate, and of no other");
+  if (config.rate) {
+    expect_not_negative(config.rate->dead_zone, "rate.dead_zone");
+    expect_above_zero(config.rate->gain, "rate.gain");
+    expect_above_zero(config.rate->max_speed, "rate.max_speed");
+  }
+  expect_not_negative(config.drift_rate, "drift_rate");
+  expect_not_negative(config.centring, "centring");
+  refuse_of(config.centring > 0, "centring", PortRole::kLeader);
+  expect_above_zero(seconds(config.max_delay), "max_delay");
   expect_above_zero(seconds(config.ramp), "ramp");
   expect_above_zero(seconds(config.peer_period), "peer_period");
 }
@@ -215,6 +236,7 @@ Vec3 Coupling::bounded(const Vec3& force) const noexcept {
 
 bool Coupling::live() const noexcept { return phase_ == PortPhase::kEngaged && (!leads() || answered_); }
 double Coupling::stiffness() const noexcept {
+  if (rests_at_zero()) return config_.centring;
   if (renderer_) return newest_.surface ? at_leader(*newest_.surface, map_, 1).stiffness : 0;
   if (!wave_) return share_ * spring_.stiffness();
   // B/d, with half of the round trip for one way.
@@ -233,6 +255,10 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
   }
   const bool anew = peer.epoch > newest_.epoch;
   if (!anew && (peer.epoch < newest_.epoch || peer.sequence <= newest_.sequence)) return;
+  if (!anew && peer.energy_in < newest_.energy_in) {
+    ++refused_;
+    return;
+  }
   if (purse_) {
     const std::uint64_t before = purse_->refused();
     purse_->receive(0, {.epoch = peer.epoch,
@@ -249,15 +275,17 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
   }
   take_scales(peer);
   // It refuses none of those that are left: either all of a state is taken or nothing.
-  spring_.receive({.epoch = peer.epoch,
-                   .sequence = peer.sequence,
-                   .answers_epoch = peer.answers_epoch,
-                   .answers = peer.answers,
-                   .time = peer.time,
-                   .round_trip = peer.round_trip,
-                   .position = mapped(peer.position),
-                   .velocity = mapped(peer.velocity)});
+  spring_.receive(
+      {.epoch = peer.epoch,
+       .sequence = peer.sequence,
+       .answers_epoch = peer.answers_epoch,
+       .answers = peer.answers,
+       .time = peer.time,
+       .round_trip = peer.round_trip,
+       .position = mapped(peer.position),
+       .velocity = config_.method == CouplingMethod::kSetPosition ? Vec3(Vec3::Zero()) : mapped(peer.velocity)});
   if (wave_) receive_wave(peer, anew);
+  receive_energy(peer, anew);
   if (anew) {
     peer_anew_ = true;
     if (renderer_) renderer_.emplace();
@@ -289,8 +317,31 @@ void Coupling::receive_wave(const PortState& peer, bool anew) noexcept {
   }
 }
 
+/// Of passivity. What a peer took in before this port heard of its epoch may have been used already.
+void Coupling::receive_energy(const PortState& peer, bool anew) noexcept {
+  const double joule = leads() ? map_.leader_joule() : map_.follower_joule();
+  if (!anew) heard_energy_ += joule * (peer.energy_in - newest_.energy_in);
+  ++heard_sequence_;
+  if (passive_leader_) {
+    passive_leader_->receive(
+        {.sequence = heard_sequence_, .force = -map_.force_to_leader(peer.force), .energy_in = heard_energy_});
+  }
+  if (passive_follower_) {
+    passive_follower_->receive({.sequence = heard_sequence_,
+                                .velocity = mapped(peer.velocity),
+                                .displacement = mapped(peer.position),
+                                .energy_in = heard_energy_});
+  }
+}
+
 void Coupling::observe(const Interval<3>& interval, double payable) noexcept {
   payable_ = payable;
+  if (passive_leader_ && was_live_) {
+    energy_in_ =
+        passive_leader_
+            ->observe({.applied = coupled(interval.applied), .dx = coupled(interval.dx), .held = interval.held})
+            .energy_in;
+  }
   if (!wave_) return;
   Interval<3> end{.applied = wave_force_, .dx = Vec3::Zero(), .held = interval.held};
   if (wave_moves_) {
@@ -377,7 +428,7 @@ void Coupling::renew() noexcept {
 }
 
 bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
-  const bool bound = phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || wave_;
+  const bool bound = phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || keeps_scales(config_.method);
   if (!leads() || bound || !fits(position_scale, 0.01, 100) || !fits(force_scale, 0.01, 100)) return false;
   if (!config_.absolute) u_ *= map_.position_scale() / position_scale;
   rescale(position_scale, force_scale);
@@ -412,7 +463,7 @@ bool Coupling::tells_our_scales(const PortState& peer) const noexcept {
 /// A follower takes the leader's. Energy counts only between two states that both tell the scales in use: between others
 /// nobody knows at which worth it was given.
 void Coupling::take_scales(const PortState& peer) noexcept {
-  if (wave_) return;
+  if (keeps_scales(config_.method)) return;
   const bool before = !heard() || tells_our_scales(newest_);
   if (!leads() && !tells_our_scales(peer)) {
     const bool told = peer.position_scale > 0 && peer.force_scale > 0;
@@ -430,9 +481,10 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   ready_ = ready;
   ++sequence_;
   const Duration age = heard() ? now - arrived_ : Duration::max();
-  fresh_ = age <= patience();
-  silent_ = age > patience() + kStale;
-  const bool gone = age > patience() + kLostAfter;
+  const bool late = round_trip() / 2 > config_.max_delay;
+  fresh_ = !late && age <= patience();
+  silent_ = late || age > patience() + kStale;
+  const bool gone = late || age > patience() + kLostAfter;
   if (std::exchange(peer_anew_, false)) {
     seen_ = 0;
     if (!leads()) engagement_ = 0;
@@ -507,6 +559,9 @@ void Coupling::begin_act() noexcept {
   if (estimator_) estimator_.emplace(config_.surface);
   surface_.reset();
   if (wave_) wave_->forgive();
+  reference_ = u_;
+  reference_velocity_.setZero();
+  if (passive_follower_) passive_follower_->begin(reference_);
 }
 
 /// p₀ follows the handle while u stands still, and the other way round.
@@ -517,6 +572,7 @@ void Coupling::place(const Vec3& position) noexcept {
   } else if (live() && was_live_ && !new_act_) {
     u_ = position - offset_;
   } else {
+    if (rests_at_zero()) u_.setZero();
     offset_ = position - u_;
   }
   was_live_ = live();
@@ -525,13 +581,28 @@ void Coupling::place(const Vec3& position) noexcept {
 /// Of whole gain, along the coupled axes. Spring and line count periods, so they are asked in each.
 Demand<3> Coupling::law(const Vec3& velocity) noexcept {
   const Vec3 speed = coupled(velocity);
-  Demand<3> demand = spring_.command(coupled(u_), speed);
-  if (wave_) {
-    demand = line(speed);
-  } else if (leads() && config_.method != CouplingMethod::kPositionPosition) {
-    demand = felt();
-    demand.force = bounded(demand.force - config_.spring.own_damping * speed);
+  const bool pays = config_.method == CouplingMethod::kSetPosition;
+  Demand<3> demand = spring_.command(coupled(u_), speed, pays ? payable_ : std::numeric_limits<double>::infinity());
+  switch (config_.method) {
+    case CouplingMethod::kPositionPosition:
+    case CouplingMethod::kSetPosition:
+      break;
+    case CouplingMethod::kWaves:
+      demand = line(speed);
+      break;
+    case CouplingMethod::kPositionForce:
+    case CouplingMethod::kSurface:
+      if (leads()) demand = felt(speed);
+      break;
+    case CouplingMethod::kPassivity:
+      demand = leads() ? passive_leader_->command(speed) : following(speed);
+      if (leads()) demand.force -= config_.spring.own_damping * speed;
+      break;
+    case CouplingMethod::kRate:
+      demand = leads() ? centred(speed) : following(speed);
+      break;
   }
+  demand.force = bounded(demand.force);
   for (int i = 0; i < 3; ++i) demand.stiffness.col(i) = coupled(demand.stiffness.col(i));
   return demand;
 }
@@ -546,11 +617,54 @@ Demand<3> Coupling::line(const Vec3& speed) noexcept {
 }
 
 /// By the leader, of what the follower touches.
-Demand<3> Coupling::felt() noexcept {
-  if (!renderer_) return {map_.force_to_leader(newest_.contact_force.value_or(Vec3::Zero()))};
-  if (!live()) return {Vec3::Zero()};
-  if (newest_.surface && peer_serves()) renderer_->receive(at_leader(*newest_.surface, map_, newest_.sequence));
-  return renderer_->command(u_, std::max(payable_ - renderer_->energy(u_), 0.0)).demand;
+Demand<3> Coupling::felt(const Vec3& speed) noexcept {
+  Demand<3> demand{Vec3::Zero()};
+  if (!renderer_) {
+    demand.force = map_.force_to_leader(newest_.contact_force.value_or(Vec3::Zero()));
+  } else if (live()) {
+    if (newest_.surface && peer_serves()) renderer_->receive(at_leader(*newest_.surface, map_, newest_.sequence));
+    demand = renderer_->command(u_, std::max(payable_ - renderer_->energy(u_), 0.0)).demand;
+  }
+  demand.force -= config_.spring.own_damping * speed;
+  return demand;
+}
+
+/// By the leader of rate. The contact force alone holds the handle within the dead zone.
+Demand<3> Coupling::centred(const Vec3& speed) noexcept {
+  Vec3 contact = map_.force_to_leader(newest_.contact_force.value_or(Vec3::Zero()));
+  const double most = config_.centring * config_.rate->dead_zone;
+  const double size = contact.norm();
+  if (size > most) contact *= most / size;
+  return {contact - config_.centring * coupled(u_) - config_.spring.own_damping * speed,
+          config_.centring * Mat3::Identity()};
+}
+
+/// m/s, of the follower's reference: what the leader's handle asks for.
+Vec3 Coupling::asked_velocity() const noexcept {
+  if (!live() || !fresh_ || newest_.phase != PortPhase::kEngaged) return Vec3::Zero();
+  const Vec3 handle = map_.coupled_at_leader(newest_.position);
+  const double away = handle.norm();
+  const double beyond = away - config_.rate->dead_zone;
+  if (!(beyond > 0)) return Vec3::Zero();
+  return map_.to_follower(handle * (std::min(config_.rate->gain * beyond, config_.rate->max_speed) / away));
+}
+
+/// By a follower of passivity or rate, whose spring pulls its tool to its own reference.
+Demand<3> Coupling::following(const Vec3& speed) noexcept {
+  const double stiffness = spring_.stiffness();
+  const Vec3 tool = coupled(u_);
+  if (config_.rate) {
+    reference_velocity_ = asked_velocity();
+    const Vec3 ahead = reference_ + seconds(config_.spring.period) * reference_velocity_ - tool;
+    // No farther than its force reaches: it turns back at once.
+    const double farthest = config_.spring.max_force / stiffness;
+    const double distance = ahead.norm();
+    reference_ = tool + (distance > farthest ? Vec3(ahead * (farthest / distance)) : ahead);
+  }
+  const double mutual = map_.stiffness_at_follower(config_.spring.damping);
+  const double own = map_.stiffness_at_follower(config_.spring.own_damping);
+  return {stiffness * (reference_ - tool) + mutual * (reference_velocity_ - speed) - own * speed,
+          stiffness * Mat3::Identity()};
 }
 
 /// Towards where the follower is: the far end of a spring leaves the handle at kAlignSpeed.
@@ -643,6 +757,7 @@ void Coupling::skip() noexcept {
     line(Vec3::Zero());
   }
   u_velocity_.setZero();
+  if (rests_at_zero()) u_.setZero();
   was_live_ = was_live_ && live();
   was_driven_ = was_driven_ && driven();
   last_.setZero();
@@ -695,6 +810,13 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
     state.force_scale = map_.force_scale();
   }
   if (config_.share) state.share = share_;
+  if (passive_follower_ && live()) {
+    const auto step = passive_follower_->step(coupled(applied));
+    reference_ = passive_follower_->displacement();
+    reference_velocity_ = step.velocity;
+    energy_in_ = step.message.energy_in;
+  }
+  state.energy_in = std::min(energy_in_, PurseMessage::kMostTotal);
   if (wave_) {
     state.wave_integral = sent_wave_.integral;
     state.wave_energy = sent_wave_.energy;

@@ -12,6 +12,7 @@
 #include "core/teleoperation/pose_map.h"
 #include "core/teleoperation/position_position.h"
 #include "core/teleoperation/purse.h"
+#include "core/teleoperation/two_channel_passivity.h"
 #include "core/teleoperation/wave_variables.h"
 
 namespace tendon {
@@ -73,7 +74,7 @@ namespace tendon {
 /// **Scales that change** (set_scale): the leader's u is stretched by the old s_x over the new, so that its mapped place
 /// stays where it is, and its states tell the new scales. The follower takes them from the first state that tells them.
 /// The force that this changes fades from the old to the new within kFade. Purse says what becomes of energy: in the
-/// leader's joules of each moment, the pair gives out nothing. Method waves keeps its scales.
+/// leader's joules of each moment, the pair gives out nothing. Waves and passivity keep their scales (keeps_scales).
 ///
 /// **Ladder.** Age: how long ago the newest state came. v = max(3 periods of the peer, 20 ms, twice the longest gap
 /// of at most kMostGap between two newer states lately):
@@ -81,6 +82,8 @@ namespace tendon {
 ///     age > v            the peer's velocity counts as zero (PositionPosition does so at 20 ms already)
 ///     age > v + 20 ms    the force fades within kFade; with `holds_place` (a robot) it stays: the last place is held
 ///     age > v + 250 ms   phase lost. Force zero; with `holds_place` the place where the TOOL is now is held
+///
+/// While half of the measured round trip is above max_delay the last rung is reached at once: no state is fresh.
 ///
 /// A robot (`holds_place`) holds the place where it stopped being live, with its own spring of whole K and B along all
 /// axes, whenever it is ready and not live; the ramp blends it with the law.
@@ -96,6 +99,30 @@ namespace tendon {
 /// surface is forgotten with each act. waves: a WavePort of impedance B at both ends, B_f = B/(s_f s_x); K and D are
 /// not used, but for the place of a robot. All forces of the coupling are bounded by max_force.
 ///
+/// set-position: F = K(ȳ − u) − B u̇ at both ends, ȳ the nearest to the peer's mapped u with ½ K ‖ȳ − u‖² ≤ payable
+/// (paid_stretch). K adapts to the delay as that of position-position; no velocity of the peer is used, nor D, so
+/// that states may be seldom and irregular. With a follower that only follows, as in position-force, the leader felt a tenth of what was at the wall
+/// (0.17 of 4.1 N at 50 ms): the follower's stiffer spring drew the account that the leader's stretch needs.
+///
+/// passivity: the leader's force is s_f Rᵀ(−F_follower) − (α + B) u̇_l (PassivityLeader), F_follower what the follower's
+/// device exerts on its tool. The follower's spring of K_f pulls the tool to a reference that begins at u and moves as
+/// PassivityFollower says, with λ = drift_rate. α is at most B: the damping that the scene lets each handle bear, for a
+/// device's own friction is too little to take anything up. B besides, because E_in is 0 without it and nothing could
+/// begin to move. E_in is what the port took in by this coupling's acts; of a peer's epoch only what came after this port
+/// first heard of that epoch counts, because the rest may have been used. By itself it gives out some mJ, because tools
+/// have mass and the ends look one period ahead: the pair needs limiters and a purse, too.
+///
+/// rate: u_l begins at 0 whenever the leader becomes live, and that place is the centre. In the leader's scale
+///
+///     F_l = −K_c u_l − B u̇_l + f,     f = s_f Rᵀ f_contact, no longer than K_c · dead_zone
+///     v = gain (‖u_l‖ − dead_zone)₊ û_l,  ‖v‖ ≤ max_speed;     the follower's reference moves by s_x R v T in a period
+///
+/// The follower's spring of K_f pulls its tool to the reference, which runs at most max_force/K_f ahead of the tool. f
+/// alone cannot push the handle out of its dead zone, so a contact never moves the follower. The reference stands in each
+/// period in which the newest state has the handle in its dead zone, is not of a live leader, or is older than v of the
+/// ladder. A hand that holds its handle out does no work: a follower behind a limiter of its own goes on only as far as
+/// its account pays for what friction takes beyond the limiter's lower bounds.
+///
 /// **Waves and phases.** What the line sends is paid from the limiter's account, and what comes is paid into it, so that
 /// the pair is passive whatever was cut. What limiter and motors leave of the force is what the line books; what they
 /// cut is sent later (WavePort::SharedAccount), and what the ramp takes is not cut, so that nothing shifts the two places
@@ -103,14 +130,16 @@ namespace tendon {
 /// line's own spring. An end that is not engaged takes up what comes and sends nothing.
 ///
 /// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while it is live and its
-/// peer is engaged (not clutched) and not silent. Its `joule` is the map's. Method position-position needs it for the
-/// pair to be passive; without it a limiter at each end keeps each by itself passive, and the follower cannot move. Nor
-/// can a follower of position-force or surface without a purse, if it has a limiter. Waves carry their own energy.
+/// peer is engaged (not clutched) and not silent. Its `joule` is the map's. The pair of position-position, set-position
+/// or passivity needs it to be passive; without it a limiter at each end keeps each by itself passive, and the follower
+/// cannot move. Nor can a follower of another method without a purse, if it has a limiter, but by waves, which carry
+/// their own energy.
 ///
-/// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent, or
-/// that the purse refuses, changes nothing and is counted in `refused`. One that is not newer is passed over. A hand
-/// that is not finite, or beyond 10¹² m or m/s, gives a demand that is not finite, which the limiter turns to zero; it
-/// moves nothing else. A force or contact that is not finite is told as 0 or as not measured.
+/// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent,
+/// whose energy_in has fallen within its epoch, or that the purse refuses, changes nothing and is counted in `refused`.
+/// One that is not newer is passed over. A hand that is not finite, or beyond 10¹² m or m/s, gives a demand that is not
+/// finite, which the limiter turns to zero; it moves nothing else. A force or contact that is not finite is told as 0 or
+/// as not measured.
 ///
 /// **Share.** Of several leaders of one follower (Couplings) the law is multiplied by its share α at both ends: K, D, B
 /// and max_force of this pair are α times what the scene says, and so is the contact force that a leader feels. The
@@ -157,7 +186,7 @@ class Coupling {
     /// Of method surface; in the follower's scale, and used there only.
     SurfaceEstimator<3>::Config surface{
         .contact_force = 0.1, .first_stiffness = 200, .max_stiffness = 5000, .least_travel = 2e-4, .memory = 300};
-    /// Of position-position, position-force and surface; not with a clutch. Empty: places count from where each end was.
+    /// Of methods that have places (has_places); not with a clutch. Empty: places count from where each end was.
     std::optional<Absolute> absolute{};
     std::optional<Button> clutch{};            ///< leader only
     std::optional<std::uint32_t> engage_by{};  ///< leader: bit of the button whose press is the act; empty: engage()
@@ -166,6 +195,10 @@ class Coupling {
     bool holds_place = false;                             ///< follower only: a robot, which no hand holds
     /// Follower only, of one of several leaders: α at first, 0 … 1. Methods position-position and position-force.
     std::optional<double> share{};
+    double drift_rate = 100;               ///< λ, 1/s, ≥ 0; of method passivity
+    std::optional<RateControl> rate{};     ///< of method rate, which needs it
+    double centring = 0;                   ///< K_c, N/m, ≥ 0; leader only, of method rate
+    Duration max_delay = Duration::max();  ///< > 0; a link with a longer way counts as lost
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -183,7 +216,7 @@ class Coupling {
   void renew() noexcept;
 
   /// The scales from now on, leader only, 0.01 … 100. False, and nothing happens, while it is engaged or aligning, with
-  /// waves, at a follower, and for a scale out of its bounds.
+  /// a method that keeps its scales, at a follower, and for a scale out of its bounds.
   bool set_scale(double position_scale, double force_scale) noexcept;
   /// Of a follower that has Config::share: α from the next `command` on; and how far the ramp of another of its leaders
   /// has come, because a robot holds its place only as far as none leads it.
@@ -239,9 +272,14 @@ class Coupling {
   void skip() noexcept;
   Demand<3> law(const Vec3& velocity) noexcept;
   Demand<3> line(const Vec3& speed) noexcept;
-  Demand<3> felt() noexcept;
+  Demand<3> felt(const Vec3& speed) noexcept;
+  Demand<3> centred(const Vec3& speed) noexcept;
+  Demand<3> following(const Vec3& speed) noexcept;
+  Vec3 asked_velocity() const noexcept;
+  bool rests_at_zero() const noexcept { return leads() && config_.method == CouplingMethod::kRate; }
   void begin_act() noexcept;
   void receive_wave(const PortState& peer, bool anew) noexcept;
+  void receive_energy(const PortState& peer, bool anew) noexcept;
   Demand<3> blended(const Motion& hand) noexcept;
   void follow_share() noexcept;
   Vec3 mapped(const Vec3& displacement) const noexcept;
@@ -253,6 +291,13 @@ class Coupling {
   PositionPosition<3> spring_;
   std::optional<Purse> purse_;
   std::optional<WavePort<3>> wave_;
+  std::optional<PassivityLeader<3>> passive_leader_;
+  std::optional<PassivityFollower<3>> passive_follower_;
+  double heard_energy_ = 0;  ///< J, that the peer took in since this port heard of its present epoch, or the former
+  std::uint64_t heard_sequence_ = 0;
+  double energy_in_ = 0;           ///< J, that this port took in
+  Vec3 reference_ = Vec3::Zero();  ///< m, follower of passivity or rate: where its spring pulls the tool, as its u
+  Vec3 reference_velocity_ = Vec3::Zero();
   std::optional<SurfaceEstimator<3>> estimator_;  ///< follower
   std::optional<SurfaceRenderer<3>> renderer_;    ///< leader
   std::optional<PortSurface> surface_;            ///< follower: found in this act

@@ -94,10 +94,7 @@ Demand<N> PassiveSetPosition<N>::command(const Vec<N>& position, const Vec<N>& v
   const double step = std::min(seconds(config_.longest_hold) / kSettling, 1.0);
   stiffness_ += step * (aim_ - stiffness_);
   if (newest_.sequence == 0) return {0 * (position + velocity)};  // not finite when one of them is not
-  Vec<N> stretch = newest_.position - position;
-  const double farthest = std::sqrt(2 * std::max(ledger_.energy(), 0.0) / stiffness_);
-  const double distance = stretch.norm();
-  if (distance > farthest) stretch *= farthest / distance;
+  const Vec<N> stretch = paid_stretch<N>(newest_.position - position, stiffness_, ledger_.energy());
   Vec<N> force = stiffness_ * stretch - config_.damping * velocity;
   if (config_.damping > 0 || config_.bounded_acceleration) {
     const double most = permitted(force);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -16,6 +18,15 @@ struct SetPosition {
   std::uint64_t sequence = 0;        ///< 1, 2, …; a message with one that is not above the newest is dropped
   Vec<N> position = Vec<N>::Zero();  ///< m
 };
+
+/// As much of a spring's stretch y − x (m) as an account pays for: the nearest to it with ½ K ‖stretch‖² ≤ energy (J,
+/// +∞ is allowed). K in N/m, > 0. Thread-safe: yes. Realtime-safe: yes.
+template <int N>
+Vec<N> paid_stretch(const Vec<N>& stretch, double stiffness, double energy) noexcept {
+  const double farthest = std::sqrt(2 * std::max(energy, 0.0) / stiffness);
+  const double distance = stretch.norm();
+  return distance > farthest ? Vec<N>(stretch * (farthest / distance)) : stretch;
+}
 
 /// Ties the handle with a spring to a position that arrives late, seldom and in jumps, and moves the spring's other
 /// end only as far as there is energy to stretch it: passive set-position modulation.

@@ -60,6 +60,17 @@ struct PortSurface {
   double stiffness = 0;         ///< N/m, ≥ 0; 0: there is none
 };
 
+/// Whether a place of the leader can stand for one of the follower (Coupling::Absolute): the others go by velocities.
+constexpr bool has_places(CouplingMethod method) noexcept {
+  return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce ||
+         method == CouplingMethod::kSurface || method == CouplingMethod::kSetPosition;
+}
+
+/// Whether its scales are those of the scenes for good, because its totals are sums in one scale.
+constexpr bool keeps_scales(CouplingMethod method) noexcept {
+  return method == CouplingMethod::kWaves || method == CouplingMethod::kPassivity;
+}
+
 /// How a handle has turned since its offset was taken.
 struct PortTurn {
   Quat turn{};                           ///< in the axes of the sender's base frame; of length 1 ± 0.001

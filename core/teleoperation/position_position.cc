@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/expect.h"
+#include "core/teleoperation/passive_set_position.h"
 
 namespace tendon {
 
@@ -74,7 +75,7 @@ void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
 }
 
 template <int N>
-Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& velocity) noexcept {
+Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& velocity, double energy) noexcept {
   ++sequence_;
   position_ = position;
   velocity_ = velocity;
@@ -101,7 +102,7 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
   const double ahead = std::min(late, seconds(kMostAhead));
   const Vec<N> there = newest_.position + ahead * newest_.velocity;
   const Vec<N> speed = late > ahead ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
-  force += stiffness_ * (there - position) + config_.damping * (speed - velocity);
+  force += stiffness_ * paid_stretch<N>(there - position, stiffness_, energy) + config_.damping * (speed - velocity);
   if (std::isfinite(config_.max_force)) {
     const double size = force.stableNorm();
     if (size > config_.max_force) force *= config_.max_force / size;

@@ -89,7 +89,9 @@ class PositionPosition {
   void receive(const PortMotion<N>& message) noexcept;
 
   /// Begins a period: the force to want in it, and the spring behind it. The caller maps positions (clutch, scale).
-  Demand<N> command(const Vec<N>& position, const Vec<N>& velocity) noexcept;
+  /// `energy`, J: the spring is stretched only as far as this pays (paid_stretch).
+  Demand<N> command(const Vec<N>& position, const Vec<N>& velocity,
+                    double energy = std::numeric_limits<double>::infinity()) noexcept;
 
   /// What to send in this period, after `command`.
   PortMotion<N> message() const noexcept;

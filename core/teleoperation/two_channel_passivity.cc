@@ -58,6 +58,12 @@ void PassivityFollower<N>::receive(const LeaderMessage<N>& message) noexcept {
 }
 
 template <int N>
+void PassivityFollower<N>::begin(const Vec<N>& displacement) noexcept {
+  displacement_ = newest_.displacement = displacement;
+  fresh_ = false;
+}
+
+template <int N>
 auto PassivityFollower<N>::step(const Vec<N>& force) noexcept -> Command {
   const double period = seconds(config_.period);
   ++sent_.sequence;

@@ -108,8 +108,14 @@ class PassivityFollower {
 
   void receive(const LeaderMessage<N>& message) noexcept;
 
+  /// The tool's controller follows from `displacement` (m) on, where the leader's newest one is, too. Energies stay.
+  void begin(const Vec<N>& displacement) noexcept;
+
   /// One step: `force` is what the tool's controller exerts on the tool in the period that begins.
   Command step(const Vec<N>& force) noexcept;
+
+  /// m, ∫ v dt: where the tool's controller is to be after the newest step.
+  const Vec<N>& displacement() const noexcept { return displacement_; }
 
   /// The energy that may still be given out, J; below zero only by rounding.
   double energy() const noexcept { return newest_.energy_in - out_; }

@@ -312,10 +312,23 @@ double operational_stiffness(const LimiterConfig& limiter) {
 void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter, std::ostream& text) {
   const bool leads = coupling.role == PortRole::kLeader;
   const bool waves = coupling.method == CouplingMethod::kWaves;
+  const bool springs =
+      coupling.method == CouplingMethod::kPositionPosition || coupling.method == CouplingMethod::kSetPosition;
   const auto& spring = coupling.spring;
   text << "teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by " << to_string(coupling.method)
        << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
-  if (!waves && coupling.method != CouplingMethod::kPositionPosition) return;
+  if (coupling.method == CouplingMethod::kPassivity) {
+    text << "  the follower's spring has " << spring.stiffness << " N/m at every round trip; in free motion the leader "
+         << "feels a damper of " << spring.own_damping << " to " << 2 * spring.own_damping
+         << " N·s/m, and what it takes to move the follower\n";
+  }
+  if (coupling.rate) {
+    const double scale = coupling.map.position_scale * 1e3;
+    text << "  the follower moves at " << coupling.rate->gain * scale * 1e-3
+         << " mm/s for each mm of the leader beyond " << coupling.rate->dead_zone * 1e3 << " mm, at most "
+         << coupling.rate->max_speed * scale << " mm/s\n";
+  }
+  if (!waves && !springs) return;
   text << "  the two limiters let no stiffness above " << std::llround(operational_stiffness(limiter) / 2)
        << " N/m be felt, if the other end is like this one\n"
        << "  round trip      stiffness   in free motion like a " << (waves ? "mass" : "damper") << " of\n";

@@ -31,6 +31,25 @@ std::string differ(const std::string& key, const std::string& yours, const std::
   return key + ": yours " + yours + ", mine " + mine;
 }
 
+std::string difference_of_rates(const std::optional<RateControl>& theirs, const std::optional<RateControl>& mine) {
+  if (theirs.has_value() != mine.has_value()) return differ("rate", name(theirs.has_value()), name(mine.has_value()));
+  if (!theirs) return {};
+  struct Row {
+    const char* key;
+    double RateControl::*value;
+    double per_si;
+  };
+  constexpr Row kRows[] = {{"rate.dead_zone_mm", &RateControl::dead_zone, 1e3},
+                           {"rate.gain_per_s", &RateControl::gain, 1},
+                           {"rate.max_speed_mm_per_s", &RateControl::max_speed, 1e3}};
+  for (const Row& row : kRows) {
+    const double yours = *theirs.*row.value;
+    const double ours = *mine.*row.value;
+    if (!alike(yours, ours)) return differ(row.key, rounded(yours * row.per_si, 6), rounded(ours * row.per_si, 6));
+  }
+  return {};
+}
+
 }  // namespace
 
 Couple couple_of(const Coupling::Config& config) {
@@ -49,6 +68,8 @@ Couple couple_of(const Coupling::Config& config) {
   couple.purse = config.purse.has_value();
   couple.absolute = config.absolute.has_value();
   couple.period = config.spring.period;
+  if (config.method == CouplingMethod::kPassivity) couple.drift_rate = config.drift_rate;
+  couple.rate = config.rate;
   return couple;
 }
 
@@ -63,7 +84,8 @@ std::string first_difference(const Couple& theirs, const Couple& mine) {
                            {"map.force_scale", &Couple::force_scale},
                            {"coupling.stiffness_n_per_m", &Couple::stiffness},
                            {"coupling.damping_n_s_per_m", &Couple::damping},
-                           {"coupling.mutual_damping_n_s_per_m", &Couple::mutual_damping}};
+                           {"coupling.mutual_damping_n_s_per_m", &Couple::mutual_damping},
+                           {"coupling.drift_rate_per_s", &Couple::drift_rate}};
   for (const Row& row : kRows) {
     const double yours = theirs.*row.value;
     if (!alike(yours, mine.*row.value)) return differ(row.key, name(yours), name(mine.*row.value));
@@ -83,7 +105,7 @@ std::string first_difference(const Couple& theirs, const Couple& mine) {
     return differ("map.absolute", name(theirs.absolute), name(mine.absolute));
   }
   if (theirs.purse != mine.purse) return differ("purse", name(theirs.purse), name(mine.purse));
-  return {};
+  return difference_of_rates(theirs.rate, mine.rate);
 }
 
 }  // namespace tendon

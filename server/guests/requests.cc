@@ -147,8 +147,10 @@ Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted)
   const ServedDevice& device = asker.devices[wanted.device];
   std::string objection = no_leader(device, "sets the scales");
   if (!objection.empty()) return {.code = Code::kUnsupported, .detail = std::move(objection)};
-  if (device.coupling->method == CouplingMethod::kWaves) {
-    return {.code = Code::kUnsupported, .detail = "a coupling by waves keeps the scales of its scene"};
+  if (keeps_scales(device.coupling->method)) {
+    return {.code = Code::kUnsupported,
+            .detail =
+                "a coupling by " + std::string(to_string(device.coupling->method)) + " keeps the scales of its scene"};
   }
   if (device.phase == PortPhase::kEngaged || device.phase == PortPhase::kAligning) {
     return {.code = Code::kBusy, .detail = "it is engaged: hold the clutch, or disengage it"};

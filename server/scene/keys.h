@@ -72,6 +72,7 @@ struct Draft {
   bool absolute_map = false;
   std::optional<double> align_within;  ///< m
   double align_energy = 0;             ///< J
+  std::optional<double> drift_rate;    ///< 1/s
   bool engages_by_button = false;
   std::optional<std::uint32_t> engage_button;
   std::vector<Vec3> places;

@@ -359,7 +359,10 @@ class SceneResolver {
     coupling.spring.period = draft_.scene.loop.period;
     coupling.spring.max_force = draft_.coupling_force.value_or(control.max_force);
     const Law law = control.limiter.law;
-    if (coupling.method == CouplingMethod::kPositionPosition && law != Law::kNone && !coupling.purse) {
+    resolve_method(coupling);
+    const bool pays = coupling.method == CouplingMethod::kPositionPosition ||
+                      coupling.method == CouplingMethod::kPassivity || coupling.method == CouplingMethod::kSetPosition;
+    if (pays && law != Law::kNone && !coupling.purse) {
       blame("teleoperation.purse", {"teleoperation"},
             "missing, expected this table: behind a limiter of its own a follower cannot move unless the leader pays");
     }
@@ -402,12 +405,11 @@ class SceneResolver {
       blame("teleoperation.clutch", {},
             "expected none with map.absolute: a clutch changes an offset, and there is none");
     }
-    const bool springs = coupling.method == CouplingMethod::kPositionPosition ||
-                         coupling.method == CouplingMethod::kPositionForce ||
-                         coupling.method == CouplingMethod::kSurface;
-    if (draft_.absolute_map && !springs) {
-      blame("teleoperation.map.absolute", {},
-            "expected the method position-position, position-force or surface: the others have no absolute places");
+    if (draft_.absolute_map && !has_places(coupling.method)) {
+      blame(
+          "teleoperation.map.absolute", {},
+          "expected the method position-position, position-force, surface or set-position: the others have no absolute "
+          "places");
     }
   }
 
@@ -448,6 +450,34 @@ class SceneResolver {
     }
     if (!(std::abs(sum - 1) <= Shares::kRounding)) {
       blame(table, {}, "expected shares that are 1 together, found " + digits(sum));
+    }
+  }
+
+  /// What some methods need, and the others have no use for.
+  void resolve_method(Coupling::Config& coupling) const {
+    const std::string named = "\"" + std::string(to_string(coupling.method)) + "\"";
+    if (coupling.method == CouplingMethod::kRate && !coupling.rate) {
+      blame("teleoperation.rate", {"teleoperation.method"},
+            "missing, expected this table with method " + named + ": how fast the follower moves");
+    }
+    if (coupling.method != CouplingMethod::kRate && coupling.rate) {
+      blame("teleoperation.rate", {}, "expected none with method " + named + ": only \"rate\" has a speed");
+    }
+    if (coupling.centring > 0 && coupling.role == PortRole::kFollower) {
+      blame("teleoperation.rate.centring_n_per_m", {}, "expected none or 0: the leader's handle is centred");
+    }
+    if (draft_.drift_rate && coupling.method != CouplingMethod::kPassivity) {
+      blame("teleoperation.coupling.drift_rate_per_s", {},
+            "expected none with method " + named + ": only \"passivity\" corrects drift");
+    }
+    coupling.drift_rate = draft_.drift_rate.value_or(coupling.drift_rate);
+    if (coupling.method == CouplingMethod::kSetPosition && coupling.spring.damping > 0) {
+      blame("teleoperation.coupling.mutual_damping_n_s_per_m", {},
+            "expected none or 0 with method " + named + ": it uses no velocity of the other end");
+    }
+    if (coupling.method == CouplingMethod::kPassivity && !(coupling.spring.own_damping > 0)) {
+      blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
+            "expected a number above 0: nothing else takes energy up, so that nothing could begin to move");
     }
   }
 

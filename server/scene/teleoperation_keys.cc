@@ -64,15 +64,31 @@ void declare_coupling(Table& keys, Draft& draft) {
   PositionPosition<3>::Config& spring = draft.coupling.spring;
   keys.key("stiffness_n_per_m", spring.stiffness, kAboveZero,
            "the stiffest that the spring between the handles is, as the leader feels it", kRequired);
-  keys.key("damping_n_s_per_m", spring.own_damping, kZeroOrMore,
-           "rendered at each handle by itself, as the leader feels it; of waves the impedance. Above 0 for waves, and "
-           "with adapt_to_delay");
+  keys.key(
+      "damping_n_s_per_m", spring.own_damping, kZeroOrMore,
+      "rendered at each handle by itself, as the leader feels it; of waves the impedance, of passivity also the most "
+      "that is added. Above 0 for these, and with adapt_to_delay");
   keys.key("mutual_damping_n_s_per_m", spring.damping, kZeroOrMore, "between the handles, beside the spring");
   keys.key("adapt_to_delay", spring.adapt_to_delay, YesNo{},
-           "of position-position: the stiffness is at most twice damping_n_s_per_m over the round trip, because it "
+           "of position-position and set-position: the stiffness is at most twice damping_n_s_per_m over the round "
+           "trip, because it "
            "buzzes above");
   keys.key("max_force_n", draft.coupling_force, kAboveZero, "no force of the coupling is longer than this",
            Absent{.text = "force.max_force_n"});
+  keys.key("drift_rate_per_s", draft.drift_rate, kZeroOrMore,
+           "of passivity: the follower's place is brought to the leader's at this rate, with what energy there is",
+           Absent{.text = "100"});
+}
+
+template <class Table>
+void declare_rate(Table& keys, RateControl& rate, double& centring) {
+  keys.key("dead_zone_mm", rate.dead_zone, kZeroOrMore,
+           "the follower stands while the leader's handle is nearer than this to where it engaged", kRequired);
+  keys.key("gain_per_s", rate.gain, kAboveZero,
+           "speed for each length beyond that, as the leader sees it: times position_scale at the follower", kRequired);
+  keys.key("max_speed_mm_per_s", rate.max_speed, kAboveZero, "of the follower, as the leader sees it", kRequired);
+  keys.key("centring_n_per_m", centring, kZeroOrMore,
+           "of the spring that pulls the leader's handle back. A contact is felt up to what it gives in the dead zone");
 }
 
 Names<CouplingMethod> method_names() {
@@ -89,10 +105,15 @@ void declare_teleoperation(Table& scene, Draft& draft) {
     Coupling::Config& coupling = draft.coupling;
     keys.key("role", coupling.role, Names<PortRole>{{{"leader", PortRole::kLeader}, {"follower", PortRole::kFollower}}},
              "the leader engages and clutches; the follower goes where the leader goes", kRequired);
-    keys.key("method", coupling.method, method_names(),
-             "position-position: a spring between the handles. waves: one that stays quiet when the way is long. "
-             "position-force: the leader feels the contact force that the follower measures. surface: it feels the "
-             "surface that the follower found");
+    keys.key(
+        "method", coupling.method, method_names(),
+        "position-position: a spring between the handles. waves: one that stays quiet when the way is long. "
+        "position-force: the leader feels the contact force that the follower measures. surface: it feels the "
+        "surface that the follower found. passivity: it feels the follower's motor, and neither end gives out what "
+        "the other has not taken in. set-position: springs to positions that come seldom, stretched as far as the "
+        "account pays. rate: its place says how fast the follower moves");
+    keys.key("max_delay_ms", coupling.max_delay, kAboveZero,
+             "while half of the round trip is longer, the link counts as lost", Absent{.text = "any"});
     keys.key("dial", peer.dial, NetworkAddress{}, "address of the server of the other handle",
              Absent{.text = "that server dials this one"});
     keys.key("key", peer.key, Path{}, "the key file with which this server dials, relative to this file",
@@ -106,6 +127,8 @@ void declare_teleoperation(Table& scene, Draft& draft) {
              "robot, which stays where it is. Of a follower");
     keys.table("map", [&draft](Table& map) { declare_map(map, draft); });
     keys.table("coupling", [&draft](Table& law) { declare_coupling(law, draft); });
+    keys.part("rate", coupling.rate,
+              [&coupling](Table& rate, RateControl& config) { declare_rate(rate, config, coupling.centring); });
     keys.part("purse", coupling.purse, [](Table& purse, Purse::Config& config) {
       purse.key("max_account_mj", config.max_account, Number{.least = 0, .most = 1e6, .without_least = true},
                 "no account is above this; the rest is discarded");

@@ -19,7 +19,7 @@ struct HardCase {
   const char* name;
   void (*make)(PortSetup& leader, PortSetup& follower);
   bool breaks_springs = true;  ///< springs without limiters give out energy
-  double bounces = 0;          ///< m/s, by position-force: the follower goes on bouncing on its wall
+  double bounces = 0;          ///< m/s, by position-force and passivity: the follower goes on bouncing on its wall
 };
 
 /// 5 mm to one side; the hand goes farther.
@@ -92,7 +92,7 @@ Outcome run(const HardCase& hard, CouplingMethod method, int one_way, bool limit
   return outcome;
 }
 
-TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButOneComeToRest) {
+TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButTheHeavyFollowerRest) {
   for (const HardCase& hard : kCases) {
     for (const CouplingMethod method : kCouplingMethods) {
       const Outcome outcome = run(hard, method, 25, true);
@@ -101,8 +101,11 @@ TEST(CouplingHardCases, NoPairGivesOutEnergyAndAllButOneComeToRest) {
       EXPECT_GE(outcome.sum, kRounding) << which;
       EXPECT_GE(outcome.account, kRounding) << which;
       EXPECT_LE(outcome.most, 8 * (1 + 1e-9)) << which;
-      const double bounces = method == CouplingMethod::kPositionForce ? hard.bounces : 0;
-      EXPECT_LT(outcome.unrest, std::max(bounces, 0.02)) << which;
+      const bool felt_late = method == CouplingMethod::kPositionForce || method == CouplingMethod::kPassivity;
+      const double bounces = felt_late ? hard.bounces : 0;
+      // The handle of rate is held out, so that a follower without a wall goes on.
+      const double asked = method == CouplingMethod::kRate ? 0.06 : 0;
+      EXPECT_LT(outcome.unrest, std::max({bounces, asked, 0.02})) << which;
     }
   }
 }

@@ -96,10 +96,14 @@ class CouplingWorld {
     led.spring.max_force = dice_.decades(0, 1.3);
     led.ramp = dice_.milliseconds(100, 500);
     const double method = dice_.uniform();
-    led.method = method < 0.55   ? CouplingMethod::kPositionPosition
-                 : method < 0.65 ? CouplingMethod::kPositionForce
-                 : method < 0.85 ? CouplingMethod::kWaves
-                                 : CouplingMethod::kSurface;
+    couple_by(method < 0.42   ? CouplingMethod::kPositionPosition
+              : method < 0.5  ? CouplingMethod::kPositionForce
+              : method < 0.66 ? CouplingMethod::kWaves
+              : method < 0.74 ? CouplingMethod::kSurface
+              : method < 0.84 ? CouplingMethod::kPassivity
+              : method < 0.92 ? CouplingMethod::kSetPosition
+                              : CouplingMethod::kRate,
+              led);
     if (dice_.chance(0.5)) {
       led.map.position_scale = dice_.decades(-1, 1);
       led.map.force_scale = dice_.decades(-1, 1);
@@ -108,6 +112,7 @@ class CouplingWorld {
     if (dice_.chance(0.3)) led.map.axes[dice_.bits() % 3] = false;
     PortSetup follower = leader;
     follower.coupling.role = PortRole::kFollower;
+    follower.coupling.centring = 0;
     follower.coupling.holds_place = dice_.chance(0.25);
     follower.measures_contact = dice_.chance(0.7);
     led.clutch = Coupling::Button{.bit = 4, .toggles = dice_.chance(0.3)};
@@ -197,7 +202,8 @@ class CouplingWorld {
     }
     const bool same_act = told.engagement == watch.told.engagement &&
                           (leads || told.answers_epoch == watch.told.answers_epoch);  // the leader numbers its acts
-    if (ours && same_act && !(live && watch.live)) {
+    const bool recentred = leads && port.setup.coupling.method == CouplingMethod::kRate;
+    if (ours && same_act && !(live && watch.live) && !recentred) {
       breaks(told.position != watch.told.position, "still");
     }
     if (ours && !live) breaks(told.given > watch.told.given, "gives");

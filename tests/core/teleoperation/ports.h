@@ -43,6 +43,14 @@ inline Coupling::Config coupling_of(PortRole role) {
   return config;
 }
 
+/// The same, by that method, with what it needs besides.
+inline void couple_by(CouplingMethod method, Coupling::Config& config) {
+  config.method = method;
+  if (method != CouplingMethod::kRate) return;
+  config.rate = RateControl{.dead_zone = 3e-3, .gain = 4, .max_speed = 0.05};
+  if (config.role == PortRole::kLeader) config.centring = 200;
+}
+
 class Port {
  public:
   explicit Port(const PortSetup& with) : setup(with), truth(with.friction) {
@@ -181,7 +189,8 @@ class Ports {
   bool cut_back = false;
   PortState told_there{};  ///< newest sent
   PortState told_back{};
-  int copies = 1;  ///< of each state that is sent
+  int copies = 1;     ///< of each state that is sent
+  int sent_each = 1;  ///< ms: the other states stay here
   int now = 0;
   double least_sum = 0;  ///< J, W_l + (s_f/s_x) W_f
 
@@ -189,7 +198,7 @@ class Ports {
   void turn(Port& port, Link<PortState>& in, Link<PortState>& out, bool cut, PortState& told) {
     in.deliver(now, [&](const PortState& state) { port.coupling->receive(state, Port::at(now)); });
     told = port.step(now);
-    for (int i = 0; i < copies && !cut; ++i) out.send(now, told);
+    for (int i = 0; i < copies && !cut && now % sent_each == 0; ++i) out.send(now, told);
   }
 };
 

@@ -31,6 +31,8 @@ struct Pressing {
   int one_way = 0;          // ms
   std::uint64_t seed = 1;
   double hand = kPressingHand;
+  int sent_each = 1;  // ms
+  bool adapts = true;
 };
 
 inline constexpr int kPressMs = 4000;  // ms there, as long away
@@ -39,11 +41,12 @@ inline Ports press(const Pressing& with) {
   PortSetup leader = port_of(PortRole::kLeader);
   PortSetup follower = port_of(PortRole::kFollower);
   for (PortSetup* const end : {&leader, &follower}) {
-    end->coupling.method = with.method;
+    couple_by(with.method, end->coupling);
     end->coupling.map = with.map;
     end->coupling.spring.own_damping = with.impedance;
     end->coupling.spring.stiffness = with.stiffness;
     end->coupling.spring.max_force = 8;
+    end->coupling.spring.adapt_to_delay = with.adapts;
     if (!with.purse) end->coupling.purse.reset();
   }
   leader.coupling.clutch = Coupling::Button{.bit = 0};
@@ -97,6 +100,7 @@ class Fast {
 
 inline Felt feel(const Pressing& with) {
   Ports ports = press(with);
+  ports.sent_each = with.sent_each;
   ports.run(1200);
   if (!ports.engage()) return {};
   ports.run(3000 - ports.now);

@@ -69,7 +69,13 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
   const std::string text{std::istreambuf_iterator<char>(shipped_scene), {}};
   for (const CouplingMethod method : kCouplingMethods) {
     const std::string name(to_string(method));
-    const std::vector<std::string> settings = {"teleoperation.method=" + name};
+    const bool rate = method == CouplingMethod::kRate;
+    std::vector<std::string> settings = {"teleoperation.method=" + name};
+    if (rate) {
+      for (const char* const key : {"dead_zone_mm=3", "gain_per_s=4", "max_speed_mm_per_s=50"}) {
+        settings.push_back(std::string("teleoperation.rate.") + key);
+      }
+    }
     const Scene scene = parse_scene(text, "leader.toml", ".", settings);
     const Explanation explanation = explain(scene, ticking(), kRounds);
     EXPECT_TRUE(std::ranges::any_of(explanation.parts, [](const auto& part) {
@@ -78,7 +84,13 @@ TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {
     const std::string words = in_words(scene, explanation);
     EXPECT_NE(words.find("the leader of a coupling by " + name), std::string::npos) << words;
     EXPECT_EQ(words.find("round trip") != std::string::npos,
-              method == CouplingMethod::kWaves || method == CouplingMethod::kPositionPosition)
+              method == CouplingMethod::kWaves || method == CouplingMethod::kPositionPosition ||
+                  method == CouplingMethod::kSetPosition || method == CouplingMethod::kPassivity)
+        << words;
+    EXPECT_EQ(words.find("4 mm/s for each mm of the leader beyond 3 mm, at most 50 mm/s") != std::string::npos, rate)
+        << words;
+    EXPECT_EQ(words.find("the leader feels a damper of 4 to 8 N·s/m") != std::string::npos,
+              method == CouplingMethod::kPassivity)
         << words;
   }
 }

@@ -429,11 +429,26 @@ TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
       {"map.axes: yours xz, mine xyz", [](Couple& c) { c.axes = 5; }},
       {"coupling.adapt_to_delay: yours false, mine true", [](Couple& c) { c.adapt_to_delay = false; }},
       {"map.absolute: yours true, mine false", [](Couple& c) { c.absolute = true; }},
-      {"purse: yours false, mine true", [](Couple& c) { c.purse = false; }}};
+      {"purse: yours false, mine true", [](Couple& c) { c.purse = false; }},
+      {"coupling.drift_rate_per_s: yours 5, mine 0", [](Couple& c) { c.drift_rate = 5; }},
+      {"rate: yours true, mine false", [](Couple& c) { c.rate = RateControl{}; }}};
   for (const auto& [words, change] : cases) {
     Couple other = theirs;
     change(other);
     EXPECT_EQ(first_difference(other, mine), words);
+  }
+  Couple by_rate = mine;
+  by_rate.rate = RateControl{.dead_zone = 3e-3, .gain = 4, .max_speed = 0.05};
+  const std::pair<const char*, double RateControl::*> rates[] = {
+      {"rate.dead_zone_mm: yours 6, mine 3", &RateControl::dead_zone},
+      {"rate.gain_per_s: yours 8, mine 4", &RateControl::gain},
+      {"rate.max_speed_mm_per_s: yours 100, mine 50", &RateControl::max_speed}};
+  for (const auto& [words, value] : rates) {
+    Couple other = by_rate;
+    other.role = PortRole::kFollower;
+    EXPECT_EQ(first_difference(other, by_rate), "");
+    *other.rate.*value *= 2;
+    EXPECT_EQ(first_difference(other, by_rate), words);
   }
   Couple rounded = theirs;
   rounded.stiffness *= 1 + 1e-12;

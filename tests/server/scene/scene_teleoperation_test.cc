@@ -22,6 +22,8 @@ const std::string kLeader =
     "damping_n_s_per_m = 4\n"
     "[teleoperation.purse]\n";
 
+const std::string kRate = "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\nmax_speed_mm_per_s = 50\n";
+
 TEST(SceneTeleoperation, WithoutItsTableThereIsNone) {
   const Scene scene = minimal_and("");
   EXPECT_FALSE(scene.teleoperation || scene.loop.control.coupling);
@@ -109,7 +111,8 @@ TEST(SceneTeleoperation, NamesEachMethodAndWavesShareAccountsWithoutAPurse) {
            "\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + more;
   };
   for (const CouplingMethod method : kCouplingMethods) {
-    const Scene scene = minimal_and(by(std::string(to_string(method)), "[teleoperation.purse]\n"));
+    const std::string more = method == CouplingMethod::kRate ? kRate : "";
+    const Scene scene = minimal_and(by(std::string(to_string(method)), "[teleoperation.purse]\n" + more));
     EXPECT_EQ(scene.loop.control.coupling->method, method) << to_string(method);
   }
   EXPECT_TRUE(minimal_and(by("waves")).loop.control.limiter.shared_account);
@@ -145,8 +148,58 @@ TEST(SceneTeleoperation, AnAbsoluteMapAlignsAndHasNoClutch) {
   EXPECT_EQ(
       error_of_minimal_and("[teleoperation]\nrole = \"leader\"\nmethod = \"waves\"\n[teleoperation.coupling]\n"
                            "stiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n[teleoperation.map]\nabsolute = true\n"),
-      "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force or surface: "
-      "the others have no absolute places");
+      "s.toml:11: teleoperation.map.absolute: expected the method position-position, position-force, surface or "
+      "set-position: the others have no absolute places");
+}
+
+TEST(SceneTeleoperation, TakesWhatPassivityRateAndSlowLinksNeed) {
+  const auto by = [](const std::string& role, const std::string& method, const std::string& more) {
+    return "[teleoperation]\nrole = \"" + role + "\"\nmethod = \"" + method +
+           "\"\nmax_delay_ms = 800\n[teleoperation.purse]\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n"
+           "damping_n_s_per_m = 4\n" +
+           more;
+  };
+  const Scene passivity = minimal_and(by("follower", "passivity", "drift_rate_per_s = 50\n"));
+  EXPECT_EQ(passivity.loop.control.coupling->drift_rate, 50);
+  EXPECT_EQ(passivity.loop.control.coupling->max_delay, 800ms);
+  EXPECT_EQ(minimal_and(by("leader", "passivity", "")).loop.control.coupling->drift_rate, 100);
+  EXPECT_EQ(minimal_and(kLeader).loop.control.coupling->max_delay, Duration::max());
+  const Scene rate = minimal_and(by("leader", "rate", kRate + "centring_n_per_m = 200\n"));
+  const Coupling::Config& coupling = *rate.loop.control.coupling;
+  EXPECT_EQ(*coupling.rate, (RateControl{.dead_zone = 0.003, .gain = 4, .max_speed = 0.05}));
+  EXPECT_EQ(coupling.centring, 200);
+}
+
+TEST(SceneTeleoperation, SaysWhichMethodHasNoUseForAKey) {
+  const auto refusal = [](const std::string& method, const std::string& more, const char* role = "leader") {
+    return error_of_minimal_and("[teleoperation]\nrole = \"" + std::string(role) + "\"\nmethod = \"" + method +
+                                "\"\n[teleoperation.coupling]\nstiffness_n_per_m = 400\n" + more);
+  };
+  const std::string purse = "damping_n_s_per_m = 4\n[teleoperation.purse]\n";
+  for (const char* const method : {"passivity", "set-position"}) {
+    EXPECT_EQ(
+        refusal(method, "damping_n_s_per_m = 4\n"),
+        "s.toml:4: teleoperation.purse: missing, expected this table: behind a limiter of its own a follower cannot "
+        "move unless the leader pays");
+  }
+  EXPECT_EQ(refusal("rate", purse),
+            "s.toml:6: teleoperation.rate: missing, expected this table with method \"rate\": how fast the follower "
+            "moves");
+  EXPECT_EQ(refusal("waves", purse + kRate),
+            "s.toml:11: teleoperation.rate: expected none with method \"waves\": only \"rate\" has a speed");
+  EXPECT_EQ(refusal("rate", purse + kRate + "centring_n_per_m = 200\n", "follower"),
+            "s.toml:15: teleoperation.rate.centring_n_per_m: expected none or 0: the leader's handle is centred");
+  EXPECT_EQ(refusal("rate", purse + "[teleoperation.rate]\ndead_zone_mm = 3\ngain_per_s = 4\n"),
+            "s.toml:11: teleoperation.rate.max_speed_mm_per_s: missing, expected a number above 0 mm/s");
+  EXPECT_EQ(refusal("surface", "drift_rate_per_s = 5\n" + purse),
+            "s.toml:9: teleoperation.coupling.drift_rate_per_s: expected none with method \"surface\": only "
+            "\"passivity\" corrects drift");
+  EXPECT_EQ(refusal("set-position", "mutual_damping_n_s_per_m = 1\n" + purse),
+            "s.toml:9: teleoperation.coupling.mutual_damping_n_s_per_m: expected none or 0 with method "
+            "\"set-position\": it uses no velocity of the other end");
+  EXPECT_EQ(refusal("passivity", "[teleoperation.purse]\n"),
+            "s.toml:6: teleoperation.coupling.damping_n_s_per_m: expected a number above 0: nothing else takes energy "
+            "up, so that nothing could begin to move");
 }
 
 TEST(SceneTeleoperation, SaysWhatCannotBeTogether) {

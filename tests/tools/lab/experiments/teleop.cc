@@ -18,10 +18,18 @@ namespace {
 
 constexpr int kRoundTrips[] = {0, 10, 20, 50, 100, 200, 400, 600};
 
+/// Rate has no force that comes back, so nothing to compare.
+constexpr CouplingMethod kMethods[] = {
+    CouplingMethod::kPositionPosition, CouplingMethod::kPositionForce, CouplingMethod::kWaves,
+    CouplingMethod::kSurface,          CouplingMethod::kPassivity,     CouplingMethod::kSetPosition};
+
 Pressing by(CouplingMethod method) {
   Pressing with{.method = method};
   switch (method) {
     case CouplingMethod::kPositionPosition:
+    case CouplingMethod::kPassivity:
+    case CouplingMethod::kSetPosition:
+    case CouplingMethod::kRate:
       break;
     case CouplingMethod::kWaves:
       with.impedance = 10;
@@ -45,6 +53,12 @@ const char* colour_of(CouplingMethod method) {
       return kGreen;
     case CouplingMethod::kSurface:
       return kVermilion;
+    case CouplingMethod::kPassivity:
+      return kSky;
+    case CouplingMethod::kSetPosition:
+      return kPurple;
+    case CouplingMethod::kRate:
+      break;
   }
   return kInk;
 }
@@ -94,7 +108,7 @@ void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std:
   Panel press[2] = {{.title = "First press: share of a rigid link's force", .x_label = "round trip, ms"},
                     {.title = "Second press", .x_label = "round trip, ms"}};
   for (Panel& panel : press) panel.y_range = {0, 1.05};
-  for (const CouplingMethod method : kCouplingMethods) {
+  for (const CouplingMethod method : kMethods) {
     Curve curve[2] = {
         {.name = std::string(to_string(method)), .colour = colour_of(method), .style = Curve::Style::kBold},
         {.name = std::string(to_string(method)), .colour = colour_of(method), .style = Curve::Style::kBold}};
@@ -119,7 +133,7 @@ void draw(const std::vector<TeleopRow>& rows, const TeleopOptions& options, std:
 std::vector<TeleopRow> teleop_rows(int hands, std::uint64_t seed, std::span<const int> round_trips_ms) {
   if (hands < 1 || hands > 1000) throw std::invalid_argument("hands: expected 1 to 1000");
   std::vector<TeleopRow> rows;
-  for (const CouplingMethod method : kCouplingMethods) {
+  for (const CouplingMethod method : kMethods) {
     for (const int round_trip : round_trips_ms) rows.push_back(measure(method, round_trip, hands, seed));
   }
   return rows;
