@@ -73,7 +73,7 @@ TEST(CouplingSetPosition, IsFeltAlikeAtBothEndsAndThePairIsPassive) {
   }
 }
 
-TEST(CouplingSetPosition, WithSeldomStatesAStiffSpringIsQuieterThanOneThatIsNotPaid) {
+TEST(CouplingSetPosition, WithSeldomStatesAPaidStiffSpringIsQuiet) {
   Pressing with{.stiffness = 400, .one_way = 100, .sent_each = 50, .adapts = false};
   with.method = CouplingMethod::kSetPosition;
   const Felt paid = feel(with);
@@ -171,7 +171,7 @@ class PlayedPassivity {
       peer.energy_in = energy_in;
       played.hear(peer);
       demand = played.port.command({Port::at(played.now++), Vec3::Zero(), Vec3::Zero()}, 0, true);
-      // What is wanted is applied, and the tool is stuck.
+      // The motor applies what is wanted, and the tool is stuck.
       played.told = played.port.message(demand.force, std::nullopt);
     }
     return demand.force.x();
@@ -274,7 +274,7 @@ class PlayedRate {
   Played played;
 };
 
-TEST(CouplingRate, TheFollowerStopsInThePeriodInWhichTheHandleIsInItsDeadZone) {
+TEST(CouplingRate, TheFollowerStopsInThePeriodOfTheDeadZone) {
   PlayedRate follower;
   ASSERT_TRUE(follower.played.port.live());
   double before = follower.period(PortPhase::kEngaged, 8e-3);

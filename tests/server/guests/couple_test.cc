@@ -240,6 +240,34 @@ TEST_F(Coupled, NeitherAccountFallsBelowZeroOnABadNetwork) {
   EXPECT_LT(leader_->newest.stiffness, 1000) << "2 B over the round trip";
 }
 
+TEST_F(Coupled, EachMethodMovesTheFollowerAndNoAccountFallsBelowZero) {
+  delay_ = milliseconds(10);
+  jitter_ms_ = 5;
+  loss_ = 0.05;
+  for (const CouplingMethod method :
+       {CouplingMethod::kPassivity, CouplingMethod::kSetPosition, CouplingMethod::kRate}) {
+    const std::string name(to_string(method));
+    std::vector<std::string> settings = {"teleoperation.method=" + name, "teleoperation.max_delay_ms=500"};
+    if (method == CouplingMethod::kRate) {
+      for (const char* const key : {"dead_zone_mm=3", "gain_per_s=4", "max_speed_mm_per_s=50"}) {
+        settings.push_back(std::string("teleoperation.rate.") + key);
+      }
+    }
+    place(settings, settings);
+    run(seconds(1));
+    const Vec3 before = follower_->position;
+    double most = 0;
+    run(seconds(3), [&] { most = std::max(most, (follower_->position - before).norm()); });
+    EXPECT_EQ(leader_->phase(), PortPhase::kEngaged) << name;
+    EXPECT_EQ(follower_->phase(), PortPhase::kEngaged) << name;
+    EXPECT_GT(most, 5e-3) << name;
+    EXPECT_GE(leader_->least_energy, -1e-9) << name;
+    EXPECT_GE(follower_->least_energy, -1e-9) << name;
+    leader_.reset();
+    follower_.reset();
+  }
+}
+
 TEST_F(Coupled, ACutNetworkIsLostAndOnlyAnActCouplesAgain) {
   place();
   run(seconds(2));
