@@ -265,9 +265,10 @@ void HapticLoop::publish_port(const StepRecord& record) noexcept {
       .tick = record.tick,
       .at = record.hand.at,
       .settled = controller_.settled(),
+      .grip_settled = controller_.grip_settled(),
       .stiffness = coupling.stiffness(),
       .round_trip = coupling.round_trip(),
-      .sent = coupling.message(record.applied, record.hand_force),
+      .sent = coupling.message(record.applied, record.hand_force, applied_.torque, applied_.grip),
   };
   if (peer_) {
     port.peer = peer_->state;

@@ -170,6 +170,22 @@ Coupling::Coupling(const Config& config)
     expect(!config.clutch || config.clutch->bit != *config.engage_by, "engage_by", *config.engage_by,
            "another button than the clutch's");
   }
+  if (config.turn) {
+    // The other methods have no spring at the leader, so the follower's is in no loop with the delay.
+    const bool springs = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kWaves;
+    turn_.emplace(*config.turn,
+                  TurnCoupling::End{.role = config.role,
+                                    .springs = springs,
+                                    .adapts = springs && config.spring.adapt_to_delay,
+                                    .period = config.spring.period},
+                  map_);
+  }
+  if (config.grip) {
+    GripCoupling::End end{.role = config.role, .adapts = config.spring.adapt_to_delay, .period = config.spring.period};
+    end.purse = config.purse;
+    if (end.purse) end.purse->epoch = config.spring.epoch;
+    grip_.emplace(*config.grip, end, map_);
+  }
   expect_above_zero(seconds(config.ramp), "ramp");
   expect_above_zero(seconds(config.peer_period), "peer_period");
 }
@@ -208,6 +224,10 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
   }
   const bool anew = peer.epoch > newest_.epoch;
   if (!anew && (peer.epoch < newest_.epoch || peer.sequence <= newest_.sequence)) return;
+  if (grip_ && !grip_->accepts(peer)) {
+    ++refused_;
+    return;
+  }
   if (purse_) {
     const std::uint64_t before = purse_->refused();
     purse_->receive(0, {.epoch = peer.epoch,
@@ -232,6 +252,8 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
                    .position = mapped(peer.position),
                    .velocity = mapped(peer.velocity)});
   if (wave_) receive_wave(peer, anew);
+  if (turn_) turn_->receive(peer.turn);
+  if (grip_) grip_->receive(peer);
   if (anew) {
     peer_anew_ = true;
     if (renderer_) renderer_.emplace();
@@ -313,6 +335,8 @@ bool Coupling::engage() noexcept {
   u_.setZero();
   if (renderer_) renderer_.emplace();
   if (wave_) wave_->forgive();
+  if (turn_) turn_->begin_act();
+  if (grip_) grip_->begin_act();
   return true;
 }
 
@@ -391,17 +415,54 @@ void Coupling::begin_act() noexcept {
   if (estimator_) estimator_.emplace(config_.surface);
   surface_.reset();
   if (wave_) wave_->forgive();
+  if (turn_) turn_->begin_act();
+  if (grip_) grip_->begin_act();
 }
 
 /// p₀ follows the handle while u stands still, and the other way round.
-void Coupling::place(const Vec3& position) noexcept {
+void Coupling::place(const Vec3& position, const HandleSample* handle) noexcept {
   if (new_act_) begin_act();
   if (live() && was_live_ && !new_act_) {
     u_ = position - offset_;
+    if (turn_) turn_->move(handle->turning->orientation);
   } else {
     offset_ = position - u_;
+    if (turn_) turn_->follow(handle->turning->orientation);
   }
   was_live_ = live();
+  if (turn_ && live() && !turn_->within_reach()) disengage();
+}
+
+/// Whether all that is coupled of a handle was measured.
+bool Coupling::shows_handle(const HandleSample* handle) const noexcept {
+  if (!turn_ && !grip_) return true;
+  if (handle == nullptr) return false;
+  if (turn_ &&
+      (!handle->turning || !is_rotation(handle->turning->orientation) || !fits(handle->turning->angular_velocity))) {
+    return false;
+  }
+  return !grip_ ||
+         (handle->grip && fits(handle->grip->opening, -1e12, 1e12) && fits(handle->grip->velocity, -1e12, 1e12));
+}
+
+CouplingPeriod Coupling::period(bool changed, bool placed) const noexcept {
+  return {.in_act = in_act(),
+          .live = live(),
+          .driven = driven(),
+          .changed = changed,
+          .placed = placed,
+          .holds = place_.has_value(),
+          .fault = phase_ == PortPhase::kFault,
+          .gain = gain_,
+          .fade = fade_,
+          .round_trip = round_trip(),
+          .ahead = spring_.ahead()};
+}
+
+void Coupling::command_handle(const HandleSample& handle, bool changed, bool placed) noexcept {
+  const CouplingPeriod now = period(changed, placed);
+  if (turn_) torque_ = turn_->command(*handle.turning, now);
+  if (grip_) grip_force_ = grip_->command(*handle.grip, now);
 }
 
 /// Of whole gain, along the coupled axes. Spring and line count periods, so they are asked in each.
@@ -449,13 +510,14 @@ Demand<3> Coupling::blended(const Motion& hand) noexcept {
   return demand;
 }
 
-Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
+Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready,
+                            const HandleSample* handle) noexcept {
   advance(hand.at, buttons, ready);
-  if (!fits(hand.position) || !fits(hand.velocity)) {
+  if (!fits(hand.position) || !fits(hand.velocity) || !shows_handle(handle)) {
     skip();
     return {Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
   }
-  place(hand.position);
+  place(hand.position, handle);
   u_velocity_ = live() ? hand.velocity : Vec3(Vec3::Zero());
 
   const bool turned = driven() != was_driven_ || new_act_;
@@ -464,10 +526,12 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   new_act_ = false;
   if (turned || !driven()) gain_ = 0;
   if (driven() && !turned) gain_ = std::min(1.0, gain_ + seconds(elapsed_) / seconds(config_.ramp));
+  bool placed = false;
   if (phase_ == PortPhase::kFault || gain_ == 1) {
     place_.reset();
   } else if (config_.holds_place && (!place_ || (turned && ended))) {
     place_ = hand.position;
+    placed = true;
   }
 
   Demand<3> demand = blended(hand);
@@ -476,6 +540,7 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   if (turned) left_ = last_ - demand.force;
   if (fade_ > 0) demand.force = bounded(demand.force + fade_ * left_);
   last_ = demand.force;
+  if (turn_ || grip_) command_handle(*handle, turned, placed);
   return demand;
 }
 
@@ -495,6 +560,10 @@ void Coupling::skip() noexcept {
   const double share = seconds(elapsed_) / seconds(kFade);
   gain_ = std::max(0.0, gain_ - share);
   fade_ = std::max(0.0, fade_ - share);
+  if (turn_) turn_->skip(period(false, false));
+  if (grip_) grip_->skip(period(false, false));
+  torque_.setZero();
+  grip_force_ = 0;
 }
 
 void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
@@ -502,19 +571,26 @@ void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
   skip();
 }
 
+bool Coupling::gives() const noexcept { return live() && !silent_ && newest_.phase == PortPhase::kEngaged; }
+
 Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
   loss_ = loss;
   Purse::Settlement settlement{.credit = std::exchange(taken_, 0), .withdraw = std::exchange(given_, 0)};
   if (!purse_) return settlement;
-  const bool giving = live() && !silent_ && newest_.phase == PortPhase::kEngaged;
   const double left = payable + settlement.credit - settlement.withdraw;
-  const auto paid = purse_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = giving});
+  const auto paid = purse_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = gives()});
   settlement.credit += paid.credit;
   settlement.withdraw += paid.withdraw;
   return settlement;
 }
 
-PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& contact) noexcept {
+Purse::Settlement Coupling::settle_grip(double payable, double loss, Duration elapsed) noexcept {
+  if (!grip_) return {};
+  return grip_->settle({.payable = payable, .loss = loss, .elapsed = elapsed, .giving = gives()});
+}
+
+PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque,
+                            double grip) noexcept {
   const PortMotion<3> motion = spring_.message();
   PortState state;
   state.epoch = motion.epoch;
@@ -546,6 +622,8 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
     state.given = paid.given;
     state.taken = paid.taken;
   }
+  if (turn_) state.turn = turn_->message(fits(torque) ? torque : Vec3(Vec3::Zero()));
+  if (grip_) state.grip = grip_->message(fits(grip, -1e12, 1e12) ? grip : 0);
   return state;
 }
 

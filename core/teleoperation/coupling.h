@@ -7,11 +7,14 @@
 
 #include "core/base/motion.h"
 #include "core/control/stability_controller.h"
+#include "core/handle/handle_sample.h"
+#include "core/teleoperation/grip_coupling.h"
 #include "core/teleoperation/model_mediated.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/pose_map.h"
 #include "core/teleoperation/position_position.h"
 #include "core/teleoperation/purse.h"
+#include "core/teleoperation/turn_coupling.h"
 #include "core/teleoperation/wave_variables.h"
 
 namespace tendon {
@@ -89,10 +92,15 @@ namespace tendon {
 /// pair to be passive; without it a limiter at each end keeps each by itself passive, and the follower cannot move. Nor
 /// can a follower of position-force or surface without a purse, if it has a limiter. Waves carry their own energy.
 ///
+/// **The rest of a handle.** With Config::turn the orientations are coupled (TurnCoupling), with Config::grip the
+/// grippers (GripCoupling), in the same phases, with the same ramp and fade. Force and torque share the account that
+/// `observe` and `settle` are about; the gripper's is settled by `settle_grip`. Ends whose orientations are more than
+/// 150° apart disengage.
+///
 /// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent, or
 /// that the purse refuses, changes nothing and is counted in `refused`. One that is not newer is passed over. A hand
 /// that is not finite, or beyond 10¹² m or m/s, gives a demand that is not finite, which the limiter turns to zero; it
-/// moves nothing else. A force or contact that is not finite is told as 0 or as not measured.
+/// moves nothing else; so does one whose orientation or opening is coupled and missing or not finite. A force or contact that is not finite is told as 0 or as not measured.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Coupling {
@@ -128,6 +136,8 @@ class Coupling {
     Duration ramp = std::chrono::milliseconds(300);       ///< > 0
     Duration peer_period = std::chrono::milliseconds(1);  ///< > 0: how often states of the peer are sent
     bool holds_place = false;                             ///< follower only: a robot, which no hand holds
+    std::optional<TurnCoupling::Config> turn{};           ///< empty: the orientations are not coupled
+    std::optional<GripCoupling::Config> grip{};           ///< empty: the grippers are not
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -145,22 +155,34 @@ class Coupling {
   /// without a limiter). Not when the interval was not seen.
   void observe(const Interval<3>& interval, double payable) noexcept;
 
-  /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes.
-  Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept;
+  /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes. `handle`: what of it is
+  /// coupled, at least.
+  Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
+                    const HandleSample* handle = nullptr) noexcept;
+  /// To want besides, of the newest period; zero when they are not coupled.
+  const Vec3& torque() const noexcept { return torque_; }     ///< N·m, on the hand, base axes
+  double grip_force() const noexcept { return grip_force_; }  ///< N, on the fingers; > 0 opens them
   /// The device gave no position in this period: phases and ladder only. No force.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
   /// For the limiter, after `command`, before `limit` (share). Nothing is given or credited without purse or waves.
   Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
-  /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool.
-  PortState message(const Vec3& applied, const std::optional<Vec3>& contact) noexcept;
+  /// … for the limiter of the gripper; nothing when the grippers are not coupled.
+  Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
+
+  /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool; `torque`, N·m,
+  /// and `grip`, N, applied as well.
+  PortState message(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
+                    double grip = 0) noexcept;
 
   PortPhase phase() const noexcept { return phase_; }
   bool live() const noexcept;
   double stiffness() const noexcept;  ///< in use at this end, N/m: K, of waves B/d, of surface that of the model
   Duration round_trip() const noexcept { return spring_.round_trip(); }
-  double account() const noexcept;         ///< J; 0 without a purse
+  double account() const noexcept;  ///< J; 0 without a purse
+  const TurnCoupling* turn() const noexcept { return turn_ ? &*turn_ : nullptr; }
+  const GripCoupling* grip() const noexcept { return grip_ ? &*grip_ : nullptr; }
   bool contact_measured() const noexcept;  ///< the peer's newest state has a contact force
   std::uint64_t refused() const noexcept;  ///< states
 
@@ -177,7 +199,11 @@ class Coupling {
   void advance_leader(std::uint32_t buttons) noexcept;
   void advance_follower() noexcept;
   void leave(PortPhase to) noexcept;
-  void place(const Vec3& position) noexcept;
+  void place(const Vec3& position, const HandleSample* handle) noexcept;
+  bool shows_handle(const HandleSample* handle) const noexcept;
+  void command_handle(const HandleSample& handle, bool changed, bool placed) noexcept;
+  CouplingPeriod period(bool changed, bool placed) const noexcept;
+  bool gives() const noexcept;
   void skip() noexcept;
   Demand<3> law(const Vec3& velocity) noexcept;
   Demand<3> line(const Vec3& speed) noexcept;
@@ -241,6 +267,11 @@ class Coupling {
   double fade_ = 0;           ///< of `left_`
   Vec3 left_ = Vec3::Zero();  ///< N, by which the force was above the present one when what drives it changed
   Vec3 last_ = Vec3::Zero();  ///< N, wanted last
+
+  std::optional<TurnCoupling> turn_;
+  std::optional<GripCoupling> grip_;
+  Vec3 torque_ = Vec3::Zero();
+  double grip_force_ = 0;
 };
 
 }  // namespace tendon

@@ -21,7 +21,11 @@ constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
 }  // namespace
 
 template <int N>
-PositionPosition<N>::PositionPosition(const Config& config) : config_(config), stiffness_(config.stiffness) {
+PositionPosition<N>::PositionPosition(const Config& config)
+    : config_(config),
+      stiffness_({.most = config.stiffness,
+                  .damping = config.adapt_to_delay ? config.own_damping : std::numeric_limits<double>::infinity(),
+                  .period = config.period}) {
   expect_above_zero(config.stiffness, "stiffness");
   expect_not_negative(config.damping, "damping");
   expect_not_negative(config.own_damping, "own_damping");
@@ -52,7 +56,7 @@ void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
     floor_ = std::numeric_limits<double>::infinity();
     loop_ = loop_before_ = Duration::zero();
     stretch_began_ = sequence_;
-    knows_loop_ = false;
+    stiffness_.forget();
   }
   newest_ = message;
   if (!answered) newest_.answers = 0;
@@ -73,25 +77,20 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
     }
     loop_ = std::max(loop_, counted(sequence_ - newest_.answers));
   }
-  const double loop = seconds(round_trip());
-  double quiet = config_.stiffness;
-  if (config_.adapt_to_delay && loop > 0) quiet = std::min(quiet, 2 * config_.own_damping / loop);
-  const double share = knows_loop_ ? std::min(1.0, seconds(config_.period) / seconds(kSettling)) : 1.0;
-  stiffness_ += share * (quiet - stiffness_);
-  knows_loop_ = loop > 0;
+  const double stiffness = stiffness_.follow(round_trip());
 
   const double lag = seconds(counted(sequence_) - newest_.time);
   floor_ = std::min(lag, floor_ + kFloorRise * seconds(config_.period));
   const double late = lag - floor_;
-  const double ahead = std::min(late, seconds(kMostAhead));
-  const Vec<N> there = newest_.position + ahead * newest_.velocity;
-  const Vec<N> speed = late > ahead ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
-  force += stiffness_ * (there - position) + config_.damping * (speed - velocity);
+  ahead_ = std::min(late, seconds(kMostAhead));
+  const Vec<N> there = newest_.position + ahead_ * newest_.velocity;
+  const Vec<N> speed = late > ahead_ ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
+  force += stiffness * (there - position) + config_.damping * (speed - velocity);
   if (std::isfinite(config_.max_force)) {
     const double size = force.stableNorm();
     if (size > config_.max_force) force *= config_.max_force / size;
   }
-  return {force, stiffness_ * Mat<N>::Identity()};
+  return {force, stiffness * Mat<N>::Identity()};
 }
 
 template <int N>

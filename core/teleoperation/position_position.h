@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/control/stability_controller.h"
+#include "core/teleoperation/quiet_stiffness.h"
 
 namespace tendon {
 
@@ -69,7 +70,7 @@ class PositionPosition {
   /// e is at most this.
   static constexpr Duration kMostAhead = std::chrono::milliseconds(20);
   /// The time constant with which K follows T_loop.
-  static constexpr Duration kSettling = std::chrono::milliseconds(200);
+  static constexpr Duration kSettling = QuietStiffness::kSettling;
 
   struct Config {
     double stiffness = 0;    ///< most K, N/m; > 0
@@ -94,9 +95,10 @@ class PositionPosition {
   /// What to send in this period, after `command`.
   PortMotion<N> message() const noexcept;
 
-  double stiffness() const noexcept { return stiffness_; }  ///< K in use, N/m
+  double stiffness() const noexcept { return stiffness_.value(); }  ///< K in use, N/m
   /// T_loop in use; zero until the other end has answered.
   Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }
+  double ahead() const noexcept { return ahead_; }  ///< e of the newest command, s
   std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -105,12 +107,12 @@ class PositionPosition {
   std::uint64_t sequence_ = 0;
   Vec<N> position_ = Vec<N>::Zero();
   Vec<N> velocity_ = Vec<N>::Zero();
-  double stiffness_;
+  QuietStiffness stiffness_;
   Duration loop_{};         ///< measured here: the longest of this stretch of `recovery`
   Duration loop_before_{};  ///< of the stretch before
   std::uint64_t stretch_began_ = 0;
-  bool knows_loop_ = false;
   double floor_ = 0;  ///< s, our time less the other's when its message is used: the least lately
+  double ahead_ = 0;  ///< s, e
   std::uint64_t refused_ = 0;
 };
 
