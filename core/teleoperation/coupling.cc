@@ -373,7 +373,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   const bool told = lost_sequence_ == 0 || heard_since(lost_sequence_);
   if ((phase_ == PortPhase::kAlone || phase_ == PortPhase::kLost) && fresh_ && told) {
     phase_ = PortPhase::kCoupled;
-    lost_sequence_ = 0;
+    if (std::exchange(lost_sequence_, 0) > 0) spring_.forget_round_trip();
   }
   leads() ? advance_leader(buttons) : advance_follower();
   buttons_ = buttons;

@@ -70,7 +70,8 @@ namespace tendon {
 /// A robot (`holds_place`) holds the place where it stopped being live, with its own spring of whole K and B along all
 /// axes, whenever it is ready and not live; the ramp blends it with the law.
 ///
-/// A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is safe.
+/// When a lost peer is back the round trip is measured anew, so that the silence does not soften the springs of the next
+/// act. A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is safe.
 ///
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same

@@ -40,7 +40,8 @@ namespace tendon {
 ///
 /// **Account.** One joule of the follower's gripper is worth s_f at the leader's, since openings are not scaled. The two
 /// grippers share by a purse of their own, in the same messages (PortGrip) and with the same limits as the wrench's; the
-/// theorem of Purse holds for the pair of grippers by itself.
+/// theorem of Purse holds for the pair of grippers by itself. What a follower's fingers do is paid by what a hand has
+/// done at the leader's: while nobody there has moved them, they go nowhere.
 ///
 /// **A robot keeps its grip.** Whenever a follower with `holds_place` is not live it holds the place z_h with its whole
 /// K_f, chosen once so that the force stays what it was: z_h = g_f + F/K_f, with F of its spring. What it holds is
@@ -88,9 +89,9 @@ class GripCoupling {
   /// Once a period. `force`: N, really applied.
   PortGrip message(double force) noexcept;
 
-  double stiffness() const noexcept { return stiffness_.value(); }               ///< K in use, N/m
-  double account() const noexcept { return purse_ ? purse_->account() : 0; }     ///< J; 0 without a purse
-  double asked() const noexcept { return asked_; }                               ///< w or z, m
+  double stiffness() const noexcept { return stiffness_.value(); }            ///< K in use, N/m
+  double account() const noexcept { return purse_ ? purse_->account() : 0; }  ///< J; 0 without a purse
+  double asked() const noexcept { return asked_; }                            ///< w or z, m
 
  private:
   bool leads() const noexcept { return end_.role == PortRole::kLeader; }
@@ -109,9 +110,9 @@ class GripCoupling {
 
   PortGrip newest_;
   bool heard_ = false;
-  bool came_ = false;   ///< a state, since the last period
+  bool came_ = false;    ///< a state, since the last period
   bool begins_ = false;  ///< the act, in this period
-  double asked_ = 0;    ///< m, w or z
+  double asked_ = 0;     ///< m, w or z
   bool joined_ = false;  ///< it goes with what it approached
   double told_ = 0;      ///< m
   double speed_ = 0;     ///< m/s, of it

@@ -54,12 +54,17 @@ void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
   }
   if (newest_.sequence == 0 || message.epoch > newest_.epoch) {
     floor_ = std::numeric_limits<double>::infinity();
-    loop_ = loop_before_ = Duration::zero();
-    stretch_began_ = sequence_;
+    forget_round_trip();
     stiffness_.forget();
   }
   newest_ = message;
   if (!answered) newest_.answers = 0;
+}
+
+template <int N>
+void PositionPosition<N>::forget_round_trip() noexcept {
+  loop_ = loop_before_ = Duration::zero();
+  stretch_began_ = sequence_;
 }
 
 template <int N>

@@ -89,6 +89,9 @@ class PositionPosition {
 
   void receive(const PortMotion<N>& message) noexcept;
 
+  /// After a loss of the peer: T_loop is measured anew, without the silence in it.
+  void forget_round_trip() noexcept;
+
   /// Begins a period: the force to want in it, and the spring behind it. The caller maps positions (clutch, scale).
   Demand<N> command(const Vec<N>& position, const Vec<N>& velocity) noexcept;
 
