@@ -314,6 +314,8 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   const auto& spring = coupling.spring;
   text << "teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by " << to_string(coupling.method)
        << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
+  if (coupling.turn) text << "  it turns as the other end does, too\n";
+  if (coupling.grip) text << "  their grippers are coupled, too\n";
   if (!waves && coupling.method != CouplingMethod::kPositionPosition) return;
   text << "  the two limiters let no stiffness above " << std::llround(operational_stiffness(limiter) / 2)
        << " N/m be felt, if the other end is like this one\n"

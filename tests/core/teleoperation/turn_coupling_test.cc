@@ -363,6 +363,41 @@ TEST(WholeHandles, APositionAloneIsCoupledOnADeviceWithMoreMotors) {
   EXPECT_GE(ports.least_sum, -kNanojoule);
 }
 
+/// Without the coupling: from what its step wanted, and what its two purses settled.
+TEST(WholeHandles, ARecordedStepIsTakenAgainToTheLastBit) {
+  WholeSetup leader = whole_of(PortRole::kLeader);
+  leader.along_x = {.stiffness = 400, .damping = 3, .reference = [](double t) { return 0.02 * std::sin(4 * t); }};
+  leader.turn_hand = [](double t) { return Vec3(0, 0.4 * std::sin(5 * t), 0); };
+  leader.closing = {.stiffness = 300, .damping = 3, .reference = [](double t) { return -0.015 + 0.01 * std::sin(t); }};
+  WholePorts ports(leader, whole_of(PortRole::kFollower), 10);
+  HapticController::Config config = ports.follower.control(1);
+  config.coupling.reset();
+  HapticController again(config);
+  int same = 0;
+  double given = 0;
+  bool acted = false;
+  ports.run(3000, [&] {
+    if (!acted) acted = ports.leader.coupling().engage();
+    const WholePort& port = ports.follower;
+    const Step& last = port.last;
+    ForceChannels::Wanted wanted;
+    wanted.force = last.wanted;
+    wanted.stiffness = last.stiffness;
+    wanted.mode = last.mode;
+    wanted.handle = HandleWanted{.torque = last.turn()->wanted, .grip = last.grip()->wanted};
+    const Step step = again.step(last.hand, last.was_applied, {}, wanted, &port.seen, port.controller->settled(),
+                                 port.controller->grip_settled());
+    given += port.controller->grip_settled().credit;
+    same += step.force == last.force && step.turn()->torque == last.turn()->torque &&
+                    step.grip()->force == last.grip()->force && step.energy == last.energy &&
+                    step.grip()->energy == last.grip()->energy
+                ? 1
+                : 0;
+  });
+  EXPECT_EQ(same, 3000);
+  EXPECT_GT(given, 1e-3) << "J: otherwise nothing was tested";
+}
+
 TEST(WholeHandles, RefuseImpossibleSprings) {
   const auto says = [](auto change) {
     Coupling::Config config = whole_of(PortRole::kLeader).coupling;

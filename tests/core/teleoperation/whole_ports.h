@@ -82,6 +82,13 @@ class WholePort {
   }
 
   void begin(std::uint64_t epoch) {
+    controller.emplace(control(epoch));
+    force.setZero();
+    torque.setZero();
+    grip_force = 0;
+  }
+
+  HapticController::Config control(std::uint64_t epoch) const {
     HapticController::Config config;
     config.limiter = setup.limiter;
     config.limiter.shared_account = setup.coupling.purse || setup.coupling.method == CouplingMethod::kWaves;
@@ -91,10 +98,7 @@ class WholePort {
     config.max_slew = std::numeric_limits<double>::infinity();
     config.coupling = setup.coupling;
     config.coupling->spring.epoch = epoch;
-    controller.emplace(config);
-    force.setZero();
-    torque.setZero();
-    grip_force = 0;
+    return config;
   }
 
   Coupling& coupling() { return *controller->coupling(); }
@@ -109,13 +113,13 @@ class WholePort {
     const bool flip = setup.flips && now % 2 == 1;
     const double sign = flip ? -1 : 1;
     const Quat& q = turner.q;
-    const HandleSample handle{
+    seen = {
         .turning = Turning{.orientation = {sign * q.w, sign * q.x, sign * q.y, sign * q.z}, .angular_velocity = spin_},
         .grip = Grip{.opening = opening() / kFingerArm, .velocity = finger_speed_ / kFingerArm},
         .torque = torque,
         .grip_force = grip_force};
     controller->notice(buttons, ready);
-    last = controller->step({at(now), Vec3(x(), 0, 0), Vec3(speed_, 0, 0)}, force, {}, &handle);
+    last = controller->step({at(now), Vec3(x(), 0, 0), Vec3(speed_, 0, 0)}, force, {}, &seen);
     force = last.force;
     torque = last.turn()->torque;
     grip_force = last.grip()->force;
@@ -129,6 +133,7 @@ class WholePort {
   std::uint32_t buttons = 0;
   bool ready = true;
   Step last;
+  HandleSample seen;  ///< by it
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();
   double grip_force = 0;

@@ -222,7 +222,7 @@ TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
                                                             "[teleoperation.turn]\n"
                                                             "stiffness_nm_per_rad = 0.5\n" +
                                                                 kPurse)),
-            "s.toml:7: teleoperation: turn.damping = 0, expected a number above 0 N·m·s/rad, because adapt_to_delay "
+            "s.toml:7: teleoperation: turn.damping = 0: expected a number above 0 N·m·s/rad, because adapt_to_delay "
             "lowers the stiffness to 2 B over the round trip");
 }
 
