@@ -89,8 +89,8 @@ struct Step {
 ///     F ← what the account allows, e.g. ‖F‖ ≤ f_c + 2 √(b E / T_max)         (Limiter::limit)
 ///
 /// A handle with motors that turn it goes the same way as a wrench: force and torque together are shortened, so that
-/// their direction stays, and one account bounds both (WrenchPort). Its gripper is a port of its own (GripPort). What the
-/// coupling wants of both is added to what the remote environment asks for; the wrench's account is the one that is
+/// their direction stays, and one account bounds both (WrenchPort). Its gripper is a port of its own (GripPort).
+/// What the coupling wants of both is added to what the remote environment asks for; the wrench's account is the one that is
 /// shared, also of a coupling that ties positions only.
 ///
 /// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
@@ -131,8 +131,8 @@ class HapticController {
     std::optional<GripLimits> grip{};
     /// For a device that measures the hand's force; without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
-    /// Ties the handle to the one of a peer; with a purse the limiter has a shared_account. A coupled orientation has to
-    /// be measured in every step; without `rotation` no torque is given. A coupled gripper needs `grip`.
+    /// Ties the handle to the one of a peer; with a purse the limiter has a shared_account. A coupled orientation has
+    /// to be measured in every step; without `rotation` no torque is given. A coupled gripper needs `grip`.
     std::optional<Coupling::Config> coupling{};
     Duration watchdog{};   ///< the device's own; 0 = it has none
     double max_force = 0;  ///< N; > 0

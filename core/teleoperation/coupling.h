@@ -70,8 +70,9 @@ namespace tendon {
 /// A robot (`holds_place`) holds the place where it stopped being live, with its own spring of whole K and B along all
 /// axes, whenever it is ready and not live; the ramp blends it with the law.
 ///
-/// When a lost peer is back the round trip is measured anew, so that the silence does not soften the springs of the next
-/// act. A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is safe.
+/// When a lost peer is back the round trip is measured anew, so that the silence does not soften the springs of the
+/// next act. A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is
+/// safe.
 ///
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
@@ -101,7 +102,8 @@ namespace tendon {
 /// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent, or
 /// that the purse refuses, changes nothing and is counted in `refused`. One that is not newer is passed over. A hand
 /// that is not finite, or beyond 10¹² m or m/s, gives a demand that is not finite, which the limiter turns to zero; it
-/// moves nothing else; so does one whose orientation or opening is coupled and missing or not finite. A force or contact that is not finite is told as 0 or as not measured.
+/// moves nothing else; so does one whose orientation or opening is coupled and missing or not finite. A force or
+/// contact that is not finite is told as 0 or as not measured.
 ///
 /// Thread-safe: no. Realtime-safe: all but the constructor.
 class Coupling {
@@ -172,8 +174,8 @@ class Coupling {
   /// … for the limiter of the gripper; nothing when the grippers are not coupled.
   Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
 
-  /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool; `torque`, N·m,
-  /// and `grip`, N, applied as well.
+  /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool; `torque`,
+  /// N·m, and `grip`, N, applied as well.
   PortState message(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
                     double grip = 0) noexcept;
 

@@ -78,7 +78,7 @@ void GripCoupling::approach(double target) noexcept {
   asked_ = joined_ ? target : asked_ + std::copysign(most, target - asked_);
 }
 
-/// w. What is told is w.
+/// Makes w, and tells it.
 void GripCoupling::lead(double opening, double velocity, const CouplingPeriod& period) noexcept {
   if (begins_) asked_ = heard_ ? newest_.opening + newest_.force / peers_ : opening;
   if (!period.live) joined_ = false;
@@ -88,7 +88,7 @@ void GripCoupling::lead(double opening, double velocity, const CouplingPeriod& p
   speed_ = joined_ ? velocity : 0;
 }
 
-/// z. What is told is g_f.
+/// Makes z, and tells g_f.
 void GripCoupling::go_after(double opening, double there, const CouplingPeriod& period) noexcept {
   if (begins_) {
     if (place_) {

@@ -17,8 +17,8 @@ namespace tendon {
 /// are the coupling's. A gripper is a port of its own (GripPort), with an account and a purse of its own. All methods
 /// couple grippers by springs at both ends, because both ends measure them.
 ///
-/// **Places.** g = arm · opening, m at the fingers, > 0 open. An opening means the same at both ends: no scale, no offset.
-/// What ties the two is w, the opening that the leader asks for; it tells w in place of its g:
+/// **Places.** g = arm · opening, m at the fingers, > 0 open. An opening means the same at both ends: no scale, no
+/// offset. What ties the two is w, the opening that the leader asks for; it tells w in place of its g:
 ///
 ///     not engaged                  w = g_l
 ///     the act                      w = g_f + F_f/K_f: what the follower's gripper is asked for as it is now
@@ -38,9 +38,9 @@ namespace tendon {
 /// stands still is in no loop, and while the link is dead the grip keeps its force. `stiffness` and `damping` are the
 /// leader's.
 ///
-/// **Account.** One joule of the follower's gripper is worth s_f at the leader's, since openings are not scaled. The two
-/// grippers share by a purse of their own, in the same messages (PortGrip) and with the same limits as the wrench's; the
-/// theorem of Purse holds for the pair of grippers by itself. What a follower's fingers do is paid by what a hand has
+/// **Account.** One joule of the follower's gripper is worth s_f at the leader's, since openings are not scaled. The
+/// two grippers share by a purse of their own, in the same messages (PortGrip) and with the same limits as the wrench's;
+/// the theorem of Purse holds for the pair of grippers by itself. What a follower's fingers do is paid by what a hand has
 /// done at the leader's: while nobody there has moved them, they go nowhere.
 ///
 /// **A robot keeps its grip.** Whenever a follower with `holds_place` is not live it holds the place z_h with its whole

@@ -17,12 +17,13 @@ namespace tendon {
 ///
 /// **Turns.** Each end has an offset q₀ and tells r = q q₀⁻¹, its turn since then, in its own base axes: for positions
 /// that is u. While an end is not live its r stands still and q₀ moves with the handle. When the follower becomes live
-/// it sets its r to the leader's as mapped, r_f = R r_l R⁻¹; the leader's r begins each act at 1, and goes on from where
-/// it stood, after a clutch too. So nothing turns at the other end, however often the clutch is pressed, and
+/// it sets its r to the leader's as mapped, r_f = R r_l R⁻¹; the leader's r begins each act at 1, and goes on from
+/// where it stood, after a clutch too. So nothing turns at the other end, however often the clutch is pressed, and
 ///
 ///     q_f = (R q_l q_l0⁻¹ R⁻¹) q_f0
 ///
-/// Turns are not scaled: an angle is the same at both ends. They are coupled about all axes, whatever PoseMap::axes says.
+/// Turns are not scaled: an angle is the same at both ends. They are coupled about all axes, whatever PoseMap::axes
+/// says.
 ///
 /// **Law**, with (w, v) = r · y⁻¹ and y the peer's turn as mapped, at each end by itself:
 ///
@@ -49,8 +50,8 @@ namespace tendon {
 /// both ends hold the same torque; with all others its torque is −B ω alone, because nothing measures the torque of the
 /// surroundings, and the follower's K does not adapt.
 ///
-/// A robot that is not live holds the orientation where it stopped, with the whole K; one that is turned from it by more
-/// than 150° stays where it was turned to.
+/// A robot that is not live holds the orientation where it stopped, with the whole K; one that is turned from it by
+/// more than 150° stays where it was turned to.
 ///
 /// The caller gives orientations of length 1 ± 0.001. Thread-safe: no. Realtime-safe: all but the constructor.
 class TurnCoupling {
