@@ -27,8 +27,8 @@ HapticController::HapticController(const Config& config)
   }
   if (config.grip) grip_.emplace(grip_config(config.limiter, *config.grip));
   if (config.coupling) {
-    if (config.rotation) {
-      throw std::invalid_argument("coupling: expected no rotation, because a coupling moves a point only");
+    if (config.coupling->grip && !config.grip) {
+      throw std::invalid_argument("coupling.grip: expected a gripper with a motor, whose account the coupling shares");
     }
     couplings_.emplace(*config.coupling, config.leaders);
   }
@@ -151,23 +151,27 @@ void HapticController::step_into(Step& fresh, const Motion& hand, const Vec3& ap
 
 Step HapticController::step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
                             const ForceChannels::Wanted& wanted, const HandleSample* handle,
-                            const Purse::Settlement& settled) noexcept {
+                            const Purse::Settlement& settled, const Purse::Settlement& grip_settled) noexcept {
   if (!believable(hand, handle)) return disbelieve(hand, applied, handle);
   settled_ = settled;
+  grip_settled_ = grip_settled;
   Step step;
   ForceChannels::Wanted given = wanted;
   take(step, hand, applied, hand_force, given, handle);
   return step;
 }
 
-void HapticController::add_coupling(const Motion& hand, const Step& step, ForceChannels::Wanted& wanted) noexcept {
+void HapticController::add_coupling(const Motion& hand, const HandleSample* handle, Step& step,
+                                    ForceChannels::Wanted& wanted) noexcept {
   if (started_) {
     const Vec3 dx = last_ ? Vec3(hand.position - last_->position) : Vec3(Vec3::Zero());
-    const bool shares = config_.limiter.shared_account;
-    couplings_->observe({step.was_applied, dx, step.held},
-                        shares ? limiter_.payable() : std::numeric_limits<double>::infinity());
+    double payable = std::numeric_limits<double>::infinity();
+    if (config_.limiter.shared_account) payable = wrench_ ? wrench_->payable() : limiter_.payable();
+    couplings_->observe({step.was_applied, dx, step.held}, payable);
   }
-  const Demand<3> demand = couplings_->command(hand, buttons_, ready());
+  const Demand<3> demand = couplings_->command(hand, buttons_, ready(), handle);
+  if (wrench_) step.turn()->wanted += couplings_->torque();
+  if (grip_) step.grip()->wanted += couplings_->grip_force();
   wanted.force += demand.force;
   wanted.stiffness += demand.stiffness;
   const bool silent = wanted.mode == Mode::kIdle || wanted.mode == Mode::kSafeStop;
@@ -175,10 +179,19 @@ void HapticController::add_coupling(const Motion& hand, const Step& step, ForceC
 }
 
 /// What the peers have paid raises the account, what this port pays lowers it: before the force is bounded by it.
-void HapticController::settle(const Vec3& wanted, Duration elapsed) noexcept {
-  if (couplings_) settled_ = couplings_->settle(limiter_.payable(), limiter_.worst_loss(wanted), elapsed);
-  limiter_.credit(settled_.credit);
-  limiter_.withdraw(settled_.withdraw);
+template <class Port, class Force>
+void HapticController::settle(Port& port, const Force& wanted, Duration elapsed) noexcept {
+  if (couplings_) settled_ = couplings_->settle(port.payable(), port.worst_loss(wanted), elapsed);
+  port.credit(settled_.credit);
+  port.withdraw(settled_.withdraw);
+}
+
+void HapticController::settle_grip(double wanted, Duration elapsed) noexcept {
+  if (couplings_) {
+    grip_settled_ = couplings_->settle_grip(grip_->payable(), grip_->worst_loss(Vec<1>(wanted)), elapsed);
+  }
+  grip_->credit(grip_settled_.credit);
+  grip_->withdraw(grip_settled_.withdraw);
 }
 
 /// What the handle measured, and what the remote environment asks of it.
@@ -195,7 +208,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   step.hand_force = hand_force;
   if (handle != nullptr) note(*handle, wanted, step);
   book(hand, applied, handle, step);
-  if (couplings_) add_coupling(hand, step, wanted);
+  if (couplings_) add_coupling(hand, handle, step, wanted);
   last_ = hand;
   if (wrench_) last_orientation_ = handle->turning->orientation;
   if (grip_) last_opening_ = handle->grip->opening;
@@ -244,7 +257,7 @@ void HapticController::take(Step& step, const Motion& hand, const Vec3& applied,
   const Duration elapsed = std::min(step.held, config_.limiter.longest_hold);
   const Limited slewed = limit_slew(saturated.force, applied, config_.max_slew, elapsed);
   if (friction_map_) limiter_.adapt(friction_map_->at(step.hand.position));
-  if (config_.limiter.shared_account) settle(slewed.force, step.held);
+  if (config_.limiter.shared_account) settle(limiter_, slewed.force, step.held);
   // A limit changes the environment as the hand feels it, so its stiffness is known only for an unlimited force.
   const bool as_wanted =
       !admittance_ && !disarmed_ && saturated.reasons.empty() && slewed.reasons.empty() && step.mode == wanted.mode;
@@ -274,6 +287,7 @@ void HapticController::limit_wrench(const Vec3& applied, Step& step) noexcept {
   const LimitedWrench slewed =
       limit_slew(saturated.wrench, wrench_of(applied, turn.was_applied), config_.max_slew, rotation.max_slew, elapsed);
   if (friction_map_) wrench_->adapt({friction_map_->at(step.hand.position), rotation.friction});
+  if (config_.limiter.shared_account) settle(*wrench_, slewed.wrench, step.held);
   const LimitedForce<6> limited = wrench_->limit({.force = slewed.wrench});
   step.force = limited.force.head<3>();
   turn.torque = limited.force.tail<3>();
@@ -295,6 +309,7 @@ void HapticController::limit_grip(Step& step) noexcept {
     const double most = limits.max_slew * seconds(std::min(step.held, config_.limiter.longest_hold));
     force = std::clamp(force, grip.was_applied - most, grip.was_applied + most);
   }
+  if (config_.limiter.shared_account) settle_grip(force, step.held);
   const LimitedForce<1> limited = grip_->limit({.force = Vec<1>(force)});
   grip.force = limited.force[0];
   grip.permitted = limited.permitted;
@@ -321,6 +336,7 @@ Step HapticController::step_unseen(LocalTime now, const Vec3& applied, const Han
   if (++missed_ >= config_.max_missed && fault_ == Fault::kNone) fault_ = Fault::kDeviceSilent;
   if (couplings_) couplings_->command_unseen(now, ready());
   settled_ = {};
+  grip_settled_ = {};
 
   add_accounts(step);
   step.permitted =

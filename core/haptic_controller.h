@@ -11,6 +11,7 @@
 #include "core/control/admittance_loop.h"
 #include "core/control/limiter.h"
 #include "core/handle/handle_port.h"
+#include "core/handle/handle_sample.h"
 #include "core/ledger/friction_map.h"
 #include "core/remote/force_channels.h"
 #include "core/remote/remote_force.h"
@@ -76,14 +77,6 @@ struct Step {
   const Joints* joints() const noexcept { return handle && handle->joints ? &*handle->joints : nullptr; }
 };
 
-/// What the rest of a handle has measured, and what its other motors have held since the step before.
-struct HandleSample {
-  std::optional<Turning> turning{};  ///< empty: not measured
-  std::optional<Grip> grip{};        ///< empty: no gripper
-  Vec3 torque = Vec3::Zero();        ///< N·m, on the hand, really held
-  double grip_force = 0;             ///< N, on the fingers, really held
-};
-
 /// The heart: from one look at the hand to the force it is to feel.
 ///
 ///     account ← the interval just ended, with the force really held         (Limiter::observe)
@@ -97,6 +90,8 @@ struct HandleSample {
 ///
 /// A handle with motors that turn it goes the same way as a wrench: force and torque together are shortened, so that
 /// their direction stays, and one account bounds both (WrenchPort). Its gripper is a port of its own (GripPort).
+/// What the coupling wants of both is added to what the remote environment asks for; the wrench's account is the one that is
+/// shared, also of a coupling that ties positions only.
 ///
 /// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
 /// faster than the slew limit allows: energy is a matter of safety, smoothness is not.
@@ -136,7 +131,8 @@ class HapticController {
     std::optional<GripLimits> grip{};
     /// For a device that measures the hand's force; without it the device is of impedance type.
     std::optional<AdmittanceLoop<3>::Config> admittance{};
-    /// Ties the handle to the one of a peer; with a purse the limiter has a shared_account. Not together with rotation.
+    /// Ties the handle to the one of a peer; with a purse the limiter has a shared_account. A coupled orientation has
+    /// to be measured in every step; without `rotation` no torque is given. A coupled gripper needs `grip`.
     std::optional<Coupling::Config> coupling{};
     /// Of a follower with several leaders: one `coupling` for each of them (Couplings); empty: it has one.
     std::vector<CoupledLeader> leaders{};
@@ -184,7 +180,7 @@ class HapticController {
   /// what the purses had settled in sum. Replays recorded steps, of a scene without `coupling`.
   Step step(const Motion& hand, const Vec3& applied, const std::optional<Vec3>& hand_force,
             const ForceChannels::Wanted& wanted, const HandleSample* handle = nullptr,
-            const Purse::Settlement& settled = {}) noexcept;
+            const Purse::Settlement& settled = {}, const Purse::Settlement& grip_settled = {}) noexcept;
 
   /// A haptic step in which the device gave no position: the force to apply is zero. Of `handle` the last turning and
   /// grip go into the record, and what was held into the accounts.
@@ -197,6 +193,8 @@ class HapticController {
     buttons_ = buttons;
     armed_ = armed;
   }
+  /// What the purse of the grippers settled in the newest step.
+  const Purse::Settlement& grip_settled() const noexcept { return grip_settled_; }
 
   Fault fault() const noexcept { return fault_; }
   /// Clears the fault, and ends `disarm`. Forces start again from idle: the next fresh one is ramped in.
@@ -216,8 +214,10 @@ class HapticController {
   void limit_force(const ForceChannels::Wanted& wanted, const Vec3& applied, Step& step) noexcept;
   void limit_wrench(const Vec3& applied, Step& step) noexcept;
   void limit_grip(Step& step) noexcept;
-  void add_coupling(const Motion& hand, const Step& step, ForceChannels::Wanted& wanted) noexcept;
-  void settle(const Vec3& wanted, Duration elapsed) noexcept;
+  void add_coupling(const Motion& hand, const HandleSample* handle, Step& step, ForceChannels::Wanted& wanted) noexcept;
+  template <class Port, class Force>
+  void settle(Port& port, const Force& wanted, Duration elapsed) noexcept;
+  void settle_grip(double wanted, Duration elapsed) noexcept;
   bool ready() const noexcept { return armed_ && !disarmed_ && fault_ == Fault::kNone; }
   static void note(const HandleSample& handle, const ForceChannels::Wanted& wanted, Step& step) noexcept;
   void follow_tool(Step& step) noexcept;
@@ -231,6 +231,7 @@ class HapticController {
   ForceChannels held_;
   std::optional<Couplings> couplings_;
   Purse::Settlement settled_{};
+  Purse::Settlement grip_settled_{};
   std::uint32_t buttons_ = 0;
   bool armed_ = true;
   Fault fault_ = Fault::kNone;

@@ -285,9 +285,10 @@ void HapticLoop::publish_ports(const StepRecord& record) noexcept {
         .channel = leaders.empty() ? 0 : leaders[i].channel,
         .at = record.hand.at,
         .settled = couplings.settled(i),
+        .grip_settled = controller_.grip_settled(),
         .stiffness = coupling.stiffness(),
         .round_trip = coupling.round_trip(),
-        .sent = coupling.message(record.applied, record.hand_force),
+        .sent = coupling.message(record.applied, record.hand_force, applied_.torque, applied_.grip),
     };
     if (peers_[i]) {
       port.peer = peers_[i]->state;

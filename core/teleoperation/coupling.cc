@@ -216,6 +216,22 @@ Coupling::Coupling(const Config& config)
   expect_not_negative(config.centring, "centring");
   refuse_of(config.centring > 0, "centring", PortRole::kLeader);
   expect_above_zero(seconds(config.max_delay), "max_delay");
+  if (config.turn) {
+    // The other methods have no spring at the leader, so the follower's is in no loop with the delay.
+    const bool springs = config.method == CouplingMethod::kPositionPosition || config.method == CouplingMethod::kWaves;
+    turn_.emplace(*config.turn,
+                  TurnCoupling::End{.role = config.role,
+                                    .springs = springs,
+                                    .adapts = springs && config.spring.adapt_to_delay,
+                                    .period = config.spring.period},
+                  map_);
+  }
+  if (config.grip) {
+    GripCoupling::End end{.role = config.role, .adapts = config.spring.adapt_to_delay, .period = config.spring.period};
+    end.purse = config.purse;
+    if (end.purse) end.purse->epoch = config.spring.epoch;
+    grip_.emplace(*config.grip, end, map_);
+  }
   expect_above_zero(seconds(config.ramp), "ramp");
   expect_above_zero(seconds(config.peer_period), "peer_period");
 }
@@ -255,7 +271,7 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
   }
   const bool anew = peer.epoch > newest_.epoch;
   if (!anew && (peer.epoch < newest_.epoch || peer.sequence <= newest_.sequence)) return;
-  if (!anew && peer.energy_in < newest_.energy_in) {
+  if ((!anew && peer.energy_in < newest_.energy_in) || (grip_ && !grip_->accepts(peer))) {
     ++refused_;
     return;
   }
@@ -286,6 +302,8 @@ void Coupling::receive(const PortState& peer, LocalTime now) noexcept {
        .velocity = config_.method == CouplingMethod::kSetPosition ? Vec3(Vec3::Zero()) : mapped(peer.velocity)});
   if (wave_) receive_wave(peer, anew);
   receive_energy(peer, anew);
+  if (turn_) turn_->receive(peer.turn);
+  if (grip_) grip_->receive(peer);
   if (anew) {
     peer_anew_ = true;
     if (renderer_) renderer_.emplace();
@@ -402,6 +420,8 @@ void Coupling::act() noexcept {
   if (!config_.absolute) u_.setZero();
   if (renderer_) renderer_.emplace();
   if (wave_) wave_->forgive();
+  if (turn_) turn_->begin_act();
+  if (grip_) grip_->begin_act();
 }
 
 void Coupling::disengage() noexcept {
@@ -414,6 +434,8 @@ void Coupling::renew() noexcept {
   const std::uint64_t epoch = ++config_.spring.epoch;
   spring_.renew(epoch);
   if (purse_) purse_->renew(epoch);
+  if (turn_) turn_->receive({});
+  if (grip_) grip_->renew(epoch);
   newest_ = {};
   lost_sequence_ = 0;
   seen_ = 0;
@@ -428,7 +450,8 @@ void Coupling::renew() noexcept {
 }
 
 bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
-  const bool bound = phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || keeps_scales(config_.method);
+  const bool bound =
+      phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || keeps_scales(config_.method) || grip_;
   if (!leads() || bound || !fits(position_scale, 0.01, 100) || !fits(force_scale, 0.01, 100)) return false;
   if (!config_.absolute) u_ *= map_.position_scale() / position_scale;
   rescale(position_scale, force_scale);
@@ -441,6 +464,7 @@ void Coupling::rescale(double position_scale, double force_scale) noexcept {
   map_ = map_.scaled(position_scale, force_scale);
   rescaled_ = true;
   if (renderer_) renderer_.emplace();
+  if (turn_) turn_->remap(map_);
   if (!leads()) {
     const auto at_follower = [this](double at_leader) { return map_.stiffness_at_follower(at_leader); };
     spring_.become(at_follower(config_.spring.stiffness), at_follower(config_.spring.damping),
@@ -463,7 +487,7 @@ bool Coupling::tells_our_scales(const PortState& peer) const noexcept {
 /// A follower takes the leader's. Energy counts only between two states that both tell the scales in use: between others
 /// nobody knows at which worth it was given.
 void Coupling::take_scales(const PortState& peer) noexcept {
-  if (keeps_scales(config_.method)) return;
+  if (keeps_scales(config_.method) || grip_) return;
   const bool before = !heard() || tells_our_scales(newest_);
   if (!leads() && !tells_our_scales(peer)) {
     const bool told = peer.position_scale > 0 && peer.force_scale > 0;
@@ -505,7 +529,7 @@ void Coupling::advance(LocalTime now, std::uint32_t buttons, bool ready) noexcep
   if (phase_ == PortPhase::kAligning && gone) phase_ = PortPhase::kAlone;
   if ((phase_ == PortPhase::kAlone || phase_ == PortPhase::kLost) && fresh_ && told) {
     phase_ = PortPhase::kCoupled;
-    lost_sequence_ = 0;
+    if (std::exchange(lost_sequence_, 0) > 0) spring_.forget_round_trip();
   }
   leads() ? advance_leader(buttons) : advance_follower();
   buttons_ = buttons;
@@ -562,20 +586,56 @@ void Coupling::begin_act() noexcept {
   reference_ = u_;
   reference_velocity_.setZero();
   if (passive_follower_) passive_follower_->begin(reference_);
+  if (turn_) turn_->begin_act();
+  if (grip_) grip_->begin_act();
 }
 
 /// p₀ follows the handle while u stands still, and the other way round.
-void Coupling::place(const Vec3& position) noexcept {
+void Coupling::place(const Vec3& position, const HandleSample* handle) noexcept {
   if (new_act_) begin_act();
-  if (config_.absolute) {
-    u_ = position;
-  } else if (live() && was_live_ && !new_act_) {
+  if (live() && was_live_ && !new_act_) {
     u_ = position - offset_;
+    if (turn_) turn_->move(handle->turning->orientation);
   } else {
     if (rests_at_zero()) u_.setZero();
     offset_ = position - u_;
+    if (turn_) turn_->follow(handle->turning->orientation);
   }
+  if (config_.absolute) u_ = position;
   was_live_ = live();
+  if (turn_ && live() && !turn_->within_reach()) disengage();
+}
+
+/// Whether all that is coupled of a handle was measured.
+bool Coupling::shows_handle(const HandleSample* handle) const noexcept {
+  if (!turn_ && !grip_) return true;
+  if (handle == nullptr) return false;
+  if (turn_ &&
+      (!handle->turning || !is_rotation(handle->turning->orientation) || !fits(handle->turning->angular_velocity))) {
+    return false;
+  }
+  return !grip_ ||
+         (handle->grip && fits(handle->grip->opening, -1e12, 1e12) && fits(handle->grip->velocity, -1e12, 1e12));
+}
+
+CouplingPeriod Coupling::period(bool changed, bool placed) const noexcept {
+  return {.in_act = in_act(),
+          .live = live(),
+          .driven = driven(),
+          .changed = changed,
+          .placed = placed,
+          .holds = place_.has_value(),
+          .fault = phase_ == PortPhase::kFault,
+          .gain = gain_,
+          .fade = fade_,
+          .round_trip = round_trip(),
+          .ahead = spring_.ahead()};
+}
+
+void Coupling::command_handle(const HandleSample& handle, bool changed, bool placed) noexcept {
+  const CouplingPeriod now = period(changed, placed);
+  if (turn_) torque_ = turn_->command(*handle.turning, now);
+  if (grip_) grip_force_ = grip_->command(*handle.grip, now);
 }
 
 /// Of whole gain, along the coupled axes. Spring and line count periods, so they are asked in each.
@@ -713,13 +773,14 @@ void Coupling::follow_share() noexcept {
   share_ = std::clamp(newest_.share.value_or(1), share_ - most, share_ + most);
 }
 
-Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
+Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready,
+                            const HandleSample* handle) noexcept {
   advance(hand.at, buttons, ready);
-  if (!fits(hand.position) || !fits(hand.velocity)) {
+  if (!fits(hand.position) || !fits(hand.velocity) || !shows_handle(handle)) {
     skip();
     return {Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
   }
-  place(hand.position);
+  place(hand.position, handle);
   u_velocity_ = live() ? hand.velocity : Vec3(Vec3::Zero());
 
   const bool aligns = phase_ == PortPhase::kAligning;
@@ -729,10 +790,12 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   new_act_ = false;
   if (turned || !driven()) gain_ = 0;
   if (driven() && !turned) gain_ = std::min(1.0, gain_ + seconds(elapsed_) / seconds(config_.ramp));
+  bool placed = false;
   if (phase_ == PortPhase::kFault || gain_ == 1 || others_ == 1) {
     place_.reset();
   } else if (config_.holds_place && (!place_ || (turned && ended))) {
     place_ = hand.position;
+    placed = true;
   }
 
   follow_share();
@@ -744,6 +807,7 @@ Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool read
   if (stepped) left_ = last_ - demand.force;
   if (fade_ > 0) demand.force = bounded(demand.force + fade_ * left_);
   last_ = demand.force;
+  if (turn_ || grip_) command_handle(*handle, stepped, placed);
   return demand;
 }
 
@@ -764,6 +828,10 @@ void Coupling::skip() noexcept {
   const double share = seconds(elapsed_) / seconds(kFade);
   gain_ = std::max(0.0, gain_ - share);
   fade_ = std::max(0.0, fade_ - share);
+  if (turn_) turn_->skip(period(false, false));
+  if (grip_) grip_->skip(period(false, false));
+  torque_.setZero();
+  grip_force_ = 0;
 }
 
 void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
@@ -771,20 +839,27 @@ void Coupling::command_unseen(LocalTime now, bool ready) noexcept {
   skip();
 }
 
+bool Coupling::gives() const noexcept { return live() && !silent_ && newest_.phase == PortPhase::kEngaged; }
+
 Purse::Settlement Coupling::settle(double payable, double loss, Duration elapsed) noexcept {
   loss_ = loss;
   Purse::Settlement settlement{.credit = std::exchange(taken_, 0), .withdraw = std::exchange(given_, 0)};
   settlement.withdraw += (1 - std::exchange(kept_, 1)) * std::max(payable, 0.0);
   if (!purse_) return settlement;
-  const bool giving = live() && !silent_ && newest_.phase == PortPhase::kEngaged;
   const double left = payable + settlement.credit - settlement.withdraw;
-  const auto paid = purse_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = giving});
+  const auto paid = purse_->settle({.payable = left, .loss = loss, .elapsed = elapsed, .giving = gives()});
   settlement.credit += paid.credit;
   settlement.withdraw += paid.withdraw;
   return settlement;
 }
 
-PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& contact) noexcept {
+Purse::Settlement Coupling::settle_grip(double payable, double loss, Duration elapsed) noexcept {
+  if (!grip_) return {};
+  return grip_->settle({.payable = payable, .loss = loss, .elapsed = elapsed, .giving = gives()});
+}
+
+PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque,
+                            double grip) noexcept {
   const PortMotion<3> motion = spring_.message();
   PortState state;
   state.epoch = motion.epoch;
@@ -830,6 +905,8 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
     state.given = paid.given;
     state.taken = paid.taken;
   }
+  if (turn_) state.turn = turn_->message(fits(torque) ? torque : Vec3(Vec3::Zero()));
+  if (grip_) state.grip = grip_->message(fits(grip, -1e12, 1e12) ? grip : 0);
   return state;
 }
 

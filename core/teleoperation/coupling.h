@@ -7,11 +7,14 @@
 
 #include "core/base/motion.h"
 #include "core/control/stability_controller.h"
+#include "core/handle/handle_sample.h"
+#include "core/teleoperation/grip_coupling.h"
 #include "core/teleoperation/model_mediated.h"
 #include "core/teleoperation/port_state.h"
 #include "core/teleoperation/pose_map.h"
 #include "core/teleoperation/position_position.h"
 #include "core/teleoperation/purse.h"
+#include "core/teleoperation/turn_coupling.h"
 #include "core/teleoperation/two_channel_passivity.h"
 #include "core/teleoperation/wave_variables.h"
 
@@ -74,7 +77,8 @@ namespace tendon {
 /// **Scales that change** (set_scale): the leader's u is stretched by the old s_x over the new, so that its mapped place
 /// stays where it is, and its states tell the new scales. The follower takes them from the first state that tells them.
 /// The force that this changes fades from the old to the new within kFade. Purse says what becomes of energy: in the
-/// leader's joules of each moment, the pair gives out nothing. Waves and passivity keep their scales (keeps_scales).
+/// leader's joules of each moment, the pair gives out nothing. Waves and passivity keep their scales
+/// (keeps_scales), and so does a coupling of grippers.
 ///
 /// **Ladder.** Age: how long ago the newest state came. v = max(3 periods of the peer, 20 ms, twice the longest gap
 /// of at most kMostGap between two newer states lately):
@@ -88,7 +92,9 @@ namespace tendon {
 /// A robot (`holds_place`) holds the place where it stopped being live, with its own spring of whole K and B along all
 /// axes, whenever it is ready and not live; the ramp blends it with the law.
 ///
-/// A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is safe.
+/// When a lost peer is back the round trip is measured anew, so that the silence does not soften the springs of the
+/// next act. A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is
+/// safe.
 ///
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
@@ -135,10 +141,16 @@ namespace tendon {
 /// cannot move. Nor can a follower of another method without a purse, if it has a limiter, but by waves, which carry
 /// their own energy.
 ///
+/// **The rest of a handle.** With Config::turn the orientations are coupled (TurnCoupling), with Config::grip the
+/// grippers (GripCoupling), in the same phases, with the same ramp and fade. Force and torque share the account that
+/// `observe` and `settle` are about; the gripper's is settled by `settle_grip`. Ends whose orientations are more than
+/// 150° apart disengage.
+///
 /// **Bad input.** A state with a value that is not finite or out of its bounds, that answers what we have not sent,
 /// whose energy_in has fallen within its epoch, or that the purse refuses, changes nothing and is counted in `refused`.
 /// One that is not newer is passed over. A hand that is not finite, or beyond 10¹² m or m/s, gives a demand that is not
-/// finite, which the limiter turns to zero; it moves nothing else. A force or contact that is not finite is told as 0 or
+/// finite, which the limiter turns to zero; it moves nothing else; so does one whose orientation or opening is coupled
+/// and missing or not finite. A force or contact that is not finite is told as 0 or
 /// as not measured.
 ///
 /// **Share.** Of several leaders of one follower (Couplings) the law is multiplied by its share α at both ends: K, D, B
@@ -195,10 +207,12 @@ class Coupling {
     bool holds_place = false;                             ///< follower only: a robot, which no hand holds
     /// Follower only, of one of several leaders: α at first, 0 … 1. Methods position-position and position-force.
     std::optional<double> share{};
-    double drift_rate = 100;               ///< λ, 1/s, ≥ 0; of method passivity
-    std::optional<RateControl> rate{};     ///< of method rate, which needs it
-    double centring = 0;                   ///< K_c, N/m, ≥ 0; leader only, of method rate
-    Duration max_delay = Duration::max();  ///< > 0; a link with a longer way counts as lost
+    double drift_rate = 100;                     ///< λ, 1/s, ≥ 0; of method passivity
+    std::optional<RateControl> rate{};           ///< of method rate, which needs it
+    double centring = 0;                         ///< K_c, N/m, ≥ 0; leader only, of method rate
+    Duration max_delay = Duration::max();        ///< > 0; a link with a longer way counts as lost
+    std::optional<TurnCoupling::Config> turn{};  ///< empty: the orientations are not coupled
+    std::optional<GripCoupling::Config> grip{};  ///< empty: the grippers are not
   };
 
   /// Throws std::invalid_argument naming the field, its value and what was expected.
@@ -216,7 +230,7 @@ class Coupling {
   void renew() noexcept;
 
   /// The scales from now on, leader only, 0.01 … 100. False, and nothing happens, while it is engaged or aligning, with
-  /// a method that keeps its scales, at a follower, and for a scale out of its bounds.
+  /// a method or grippers that keep their scales, at a follower, and for a scale out of its bounds.
   bool set_scale(double position_scale, double force_scale) noexcept;
   /// Of a follower that has Config::share: α from the next `command` on; and how far the ramp of another of its leaders
   /// has come, because a robot holds its place only as far as none leads it.
@@ -226,16 +240,26 @@ class Coupling {
   /// without a limiter). Not when the interval was not seen.
   void observe(const Interval<3>& interval, double payable) noexcept;
 
-  /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes.
-  Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept;
+  /// The force to want in the period that begins, and −∂F/∂x of it. `hand` in base frame axes. `handle`: what of it is
+  /// coupled, at least.
+  Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
+                    const HandleSample* handle = nullptr) noexcept;
+  /// To want besides, of the newest period; zero when they are not coupled.
+  const Vec3& torque() const noexcept { return torque_; }     ///< N·m, on the hand, base axes
+  double grip_force() const noexcept { return grip_force_; }  ///< N, on the fingers; > 0 opens them
   /// The device gave no position in this period: phases and ladder only. No force.
   void command_unseen(LocalTime now, bool ready) noexcept;
 
   /// For the limiter, after `command`, before `limit` (share). Nothing is given or credited without purse or waves.
   Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
 
-  /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool.
-  PortState message(const Vec3& applied, const std::optional<Vec3>& contact) noexcept;
+  /// … for the limiter of the gripper; nothing when the grippers are not coupled.
+  Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept;
+
+  /// What to send in this period, once, at its end. `applied`: N, on the hand; `contact`: N, on the tool; `torque`,
+  /// N·m, and `grip`, N, applied as well.
+  PortState message(const Vec3& applied, const std::optional<Vec3>& contact, const Vec3& torque = Vec3::Zero(),
+                    double grip = 0) noexcept;
 
   PortPhase phase() const noexcept { return phase_; }
   bool live() const noexcept;
@@ -246,6 +270,8 @@ class Coupling {
   double account() const noexcept;                                          ///< J; 0 without a purse
   double position_scale() const noexcept { return map_.position_scale(); }  ///< in use
   double force_scale() const noexcept { return map_.force_scale(); }
+  const TurnCoupling* turn() const noexcept { return turn_ ? &*turn_ : nullptr; }
+  const GripCoupling* grip() const noexcept { return grip_ ? &*grip_ : nullptr; }
   bool contact_measured() const noexcept;  ///< the peer's newest state has a contact force
   std::uint64_t refused() const noexcept;  ///< states
 
@@ -268,7 +294,11 @@ class Coupling {
   bool tells_our_scales(const PortState& peer) const noexcept;
   Demand<3> aligning(const Motion& hand) noexcept;
   void leave(PortPhase to) noexcept;
-  void place(const Vec3& position) noexcept;
+  void place(const Vec3& position, const HandleSample* handle) noexcept;
+  bool shows_handle(const HandleSample* handle) const noexcept;
+  void command_handle(const HandleSample& handle, bool changed, bool placed) noexcept;
+  CouplingPeriod period(bool changed, bool placed) const noexcept;
+  bool gives() const noexcept;
   void skip() noexcept;
   Demand<3> law(const Vec3& velocity) noexcept;
   Demand<3> line(const Vec3& speed) noexcept;
@@ -354,6 +384,11 @@ class Coupling {
   double fade_ = 0;           ///< of `left_`
   Vec3 left_ = Vec3::Zero();  ///< N, by which the force was above the present one when what drives it changed
   Vec3 last_ = Vec3::Zero();  ///< N, wanted last
+
+  std::optional<TurnCoupling> turn_;
+  std::optional<GripCoupling> grip_;
+  Vec3 torque_ = Vec3::Zero();
+  double grip_force_ = 0;
 };
 
 }  // namespace tendon

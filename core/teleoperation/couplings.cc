@@ -13,6 +13,8 @@ namespace {
 std::vector<Coupling> couplings_of(const Coupling::Config& config, std::span<const CoupledLeader> leaders) {
   expect(leaders.size() != 1 && leaders.size() <= Couplings::kMost, "leaders", static_cast<double>(leaders.size()),
          "none, or 2 to 4");
+  expect(leaders.empty() || (!config.turn && !config.grip), "leaders", static_cast<double>(leaders.size()),
+         "none where orientations or grippers are coupled");
   std::vector<Coupling> all;
   if (leaders.empty()) all.emplace_back(config);
   for (const CoupledLeader& leader : leaders) {
@@ -50,9 +52,10 @@ void Couplings::share(LocalTime now) noexcept {
   }
 }
 
-Demand<3> Couplings::command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept {
+Demand<3> Couplings::command(const Motion& hand, std::uint32_t buttons, bool ready,
+                             const HandleSample* handle) noexcept {
   if (all_.size() > 1) share(hand.at);
-  Demand<3> sum = all_.front().command(hand, buttons, ready);
+  Demand<3> sum = all_.front().command(hand, buttons, ready, handle);
   for (std::size_t i = 1; i < all_.size(); ++i) {
     const Demand<3> demand = all_[i].command(hand, buttons, ready);
     sum.force += demand.force;

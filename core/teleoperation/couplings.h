@@ -54,7 +54,7 @@ class Couplings {
  public:
   static constexpr std::size_t kMost = Shares::kMost;
 
-  /// `leaders`: empty for one coupling, else 2 … kMost, each by the same `config`. Throws std::invalid_argument naming
+  /// `leaders`: empty for one coupling, else 2 … kMost, each by the same `config`, which then couples positions only. Throws std::invalid_argument naming
   /// the field, its value and what was expected.
   explicit Couplings(const Coupling::Config& config, std::span<const CoupledLeader> leaders = {});
 
@@ -68,8 +68,14 @@ class Couplings {
 
   // As those of Coupling, in its order, for all of them.
   void observe(const Interval<3>& interval, double payable) noexcept;
-  Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready) noexcept;
+  Demand<3> command(const Motion& hand, std::uint32_t buttons, bool ready,
+                    const HandleSample* handle = nullptr) noexcept;
+  const Vec3& torque() const noexcept { return all_.front().torque(); }
+  double grip_force() const noexcept { return all_.front().grip_force(); }
   void command_unseen(LocalTime now, bool ready) noexcept;
+  Purse::Settlement settle_grip(double payable, double loss, Duration elapsed) noexcept {
+    return all_.front().settle_grip(payable, loss, elapsed);
+  }
   /// The sum of what they settled.
   Purse::Settlement settle(double payable, double loss, Duration elapsed) noexcept;
   /// In the newest period, of one of them.

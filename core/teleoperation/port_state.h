@@ -80,7 +80,7 @@ struct PortTurn {
 
 /// A gripper, measured at its fingers. It is a port of its own, with an account of its own.
 struct PortGrip {
-  double opening = 0;   ///< m
+  double opening = 0;   ///< m; of a leader, what it asks for (GripCoupling)
   double velocity = 0;  ///< m/s
   double force = 0;     ///< N, on the fingers, > 0 opens them; really applied
   double account = 0;   ///< J, these four as in PortState

@@ -60,6 +60,28 @@ double PoseMap::stiffness_at_follower(double at_leader) const noexcept {
   return at_leader / (force_scale_ * position_scale_);
 }
 
+Quat PoseMap::turn_to_follower(const Quat& turn) const noexcept {
+  const Vec3 axis = spin_to_follower({turn.x, turn.y, turn.z});
+  return {turn.w, axis.x(), axis.y(), axis.z()};
+}
+
+Quat PoseMap::turn_to_leader(const Quat& turn) const noexcept {
+  const Vec3 axis = spin_to_leader({turn.x, turn.y, turn.z});
+  return {turn.w, axis.x(), axis.y(), axis.z()};
+}
+
+Vec3 PoseMap::spin_to_follower(const Vec3& spin) const noexcept { return rotation_ * spin; }
+
+Vec3 PoseMap::spin_to_leader(const Vec3& spin) const noexcept { return rotation_.transpose() * spin; }
+
+double PoseMap::turn_stiffness_at_follower(double at_leader) const noexcept { return at_leader * follower_joule(); }
+
+double PoseMap::grip_stiffness_at_follower(double at_leader) const noexcept { return at_leader / force_scale_; }
+
+double PoseMap::leader_grip_joule() const noexcept { return force_scale_; }
+
+double PoseMap::follower_grip_joule() const noexcept { return 1 / force_scale_; }
+
 double PoseMap::leader_joule() const noexcept { return force_scale_ / position_scale_; }
 
 double PoseMap::follower_joule() const noexcept { return position_scale_ / force_scale_; }

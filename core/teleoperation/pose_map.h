@@ -16,6 +16,16 @@ namespace tendon {
 /// its displacement is 0 for the other end, and its force is 0 at the leader; likewise at the follower along R's
 /// columns.
 ///
+/// The rest of a handle: turns and openings of a gripper are not scaled. With r the turn of each handle from its own
+/// offset (TurnCoupling) and g the opening at the fingers (GripCoupling):
+///
+///     r_f = R r_l R⁻¹         ω_f = R ω_l       τ_l = (s_f/s_x) Rᵀ τ_f,  so K_l = (s_f/s_x) K_f of turning
+///     g_f = g_l                                 F_l = s_f F_f,           so K_l = s_f K_f of gripping
+///
+/// With that scale of torques τ·ω is worth what F·ẋ is, s_x/s_f at the follower: force and torque share an account. A
+/// grip has one of its own, in which a joule of the leader is 1/s_f joules of the follower. Turns are coupled about all
+/// axes, whatever `axes` says.
+///
 /// Immutable. Thread-safe. Realtime-safe: all but the constructor.
 class PoseMap {
  public:
@@ -46,6 +56,14 @@ class PoseMap {
   Vec3 coupled_at_follower(const Vec3& vector) const noexcept;
 
   double stiffness_at_follower(double at_leader) const noexcept;  ///< K_l → K_f; dampers likewise
+  Quat turn_to_follower(const Quat& turn) const noexcept;         ///< R r R⁻¹
+  Quat turn_to_leader(const Quat& turn) const noexcept;           ///< R⁻¹ r R
+  Vec3 spin_to_follower(const Vec3& spin) const noexcept;         ///< rad/s: R ω, about all axes
+  Vec3 spin_to_leader(const Vec3& spin) const noexcept;
+  double turn_stiffness_at_follower(double at_leader) const noexcept;  ///< N·m/rad; dampers likewise
+  double grip_stiffness_at_follower(double at_leader) const noexcept;  ///< N/m; dampers likewise
+  double leader_grip_joule() const noexcept;                           ///< as leader_joule, of grippers: s_f
+  double follower_grip_joule() const noexcept;                         ///< 1/s_f
   double leader_joule() const noexcept;    ///< what one joule of the follower is worth at the leader: s_f/s_x
   double follower_joule() const noexcept;  ///< … and the other way round: s_x/s_f
 

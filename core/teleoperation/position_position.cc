@@ -22,7 +22,11 @@ constexpr Duration kMostTime = std::chrono::nanoseconds(std::int64_t{1} << 60);
 }  // namespace
 
 template <int N>
-PositionPosition<N>::PositionPosition(const Config& config) : config_(config), stiffness_(config.stiffness) {
+PositionPosition<N>::PositionPosition(const Config& config)
+    : config_(config),
+      stiffness_({.most = config.stiffness,
+                  .damping = config.adapt_to_delay ? config.own_damping : std::numeric_limits<double>::infinity(),
+                  .period = config.period}) {
   expect_above_zero(config.stiffness, "stiffness");
   expect_not_negative(config.damping, "damping");
   expect_not_negative(config.own_damping, "own_damping");
@@ -40,8 +44,8 @@ template <int N>
 void PositionPosition<N>::renew(std::uint64_t epoch) noexcept {
   config_.epoch = epoch;
   newest_ = {};
-  loop_ = loop_before_ = Duration::zero();
-  knows_loop_ = false;
+  forget_round_trip();
+  stiffness_.forget();
 }
 
 template <int N>
@@ -49,6 +53,7 @@ void PositionPosition<N>::become(double stiffness, double damping, double own_da
   config_.stiffness = stiffness;
   config_.damping = damping;
   config_.own_damping = own_damping;
+  stiffness_.become(stiffness, config_.adapt_to_delay ? own_damping : std::numeric_limits<double>::infinity());
 }
 
 template <int N>
@@ -66,12 +71,17 @@ void PositionPosition<N>::receive(const PortMotion<N>& message) noexcept {
   }
   if (newest_.sequence == 0 || message.epoch > newest_.epoch) {
     floor_ = std::numeric_limits<double>::infinity();
-    loop_ = loop_before_ = Duration::zero();
-    stretch_began_ = sequence_;
-    knows_loop_ = false;
+    forget_round_trip();
+    stiffness_.forget();
   }
   newest_ = message;
   if (!answered) newest_.answers = 0;
+}
+
+template <int N>
+void PositionPosition<N>::forget_round_trip() noexcept {
+  loop_ = loop_before_ = Duration::zero();
+  stretch_began_ = sequence_;
 }
 
 template <int N>
@@ -89,25 +99,20 @@ Demand<N> PositionPosition<N>::command(const Vec<N>& position, const Vec<N>& vel
     }
     loop_ = std::max(loop_, counted(sequence_ - newest_.answers));
   }
-  const double loop = seconds(round_trip());
-  double quiet = config_.stiffness;
-  if (config_.adapt_to_delay && loop > 0) quiet = std::min(quiet, 2 * config_.own_damping / loop);
-  const double share = knows_loop_ ? std::min(1.0, seconds(config_.period) / seconds(kSettling)) : 1.0;
-  stiffness_ += share * (quiet - stiffness_);
-  knows_loop_ = loop > 0;
+  const double stiffness = stiffness_.follow(round_trip());
 
   const double lag = seconds(counted(sequence_) - newest_.time);
   floor_ = std::min(lag, floor_ + kFloorRise * seconds(config_.period));
   const double late = lag - floor_;
-  const double ahead = std::min(late, seconds(kMostAhead));
-  const Vec<N> there = newest_.position + ahead * newest_.velocity;
-  const Vec<N> speed = late > ahead ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
-  force += stiffness_ * paid_stretch<N>(there - position, stiffness_, energy) + config_.damping * (speed - velocity);
+  ahead_ = std::min(late, seconds(kMostAhead));
+  const Vec<N> there = newest_.position + ahead_ * newest_.velocity;
+  const Vec<N> speed = late > ahead_ ? Vec<N>(Vec<N>::Zero()) : newest_.velocity;
+  force += stiffness * paid_stretch<N>(there - position, stiffness, energy) + config_.damping * (speed - velocity);
   if (std::isfinite(config_.max_force)) {
     const double size = force.stableNorm();
     if (size > config_.max_force) force *= config_.max_force / size;
   }
-  return {force, stiffness_ * Mat<N>::Identity()};
+  return {force, stiffness * Mat<N>::Identity()};
 }
 
 template <int N>

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/control/stability_controller.h"
+#include "core/teleoperation/quiet_stiffness.h"
 
 namespace tendon {
 
@@ -69,7 +70,7 @@ class PositionPosition {
   /// e is at most this.
   static constexpr Duration kMostAhead = std::chrono::milliseconds(20);
   /// The time constant with which K follows T_loop.
-  static constexpr Duration kSettling = std::chrono::milliseconds(200);
+  static constexpr Duration kSettling = QuietStiffness::kSettling;
 
   struct Config {
     double stiffness = 0;    ///< most K, N/m; > 0
@@ -88,6 +89,9 @@ class PositionPosition {
 
   void receive(const PortMotion<N>& message) noexcept;
 
+  /// After a loss of the peer: T_loop is measured anew, without the silence in it.
+  void forget_round_trip() noexcept;
+
   /// Begins a period: the force to want in it, and the spring behind it. The caller maps positions (clutch, scale).
   /// `energy`, J: the spring is stretched only as far as this pays (paid_stretch).
   Demand<N> command(const Vec<N>& position, const Vec<N>& velocity,
@@ -102,9 +106,10 @@ class PositionPosition {
   /// K, D and B from now on, each in its bounds of Config. K goes there within kSettling.
   void become(double stiffness, double damping, double own_damping) noexcept;
 
-  double stiffness() const noexcept { return stiffness_; }  ///< K in use, N/m
+  double stiffness() const noexcept { return stiffness_.value(); }  ///< K in use, N/m
   /// T_loop in use; zero until the other end has answered.
   Duration round_trip() const noexcept { return std::max({loop_, loop_before_, newest_.round_trip}); }
+  double ahead() const noexcept { return ahead_; }  ///< e of the newest command, s
   std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -113,12 +118,12 @@ class PositionPosition {
   std::uint64_t sequence_ = 0;
   Vec<N> position_ = Vec<N>::Zero();
   Vec<N> velocity_ = Vec<N>::Zero();
-  double stiffness_;
+  QuietStiffness stiffness_;
   Duration loop_{};         ///< measured here: the longest of this stretch of `recovery`
   Duration loop_before_{};  ///< of the stretch before
   std::uint64_t stretch_began_ = 0;
-  bool knows_loop_ = false;
   double floor_ = 0;  ///< s, our time less the other's when its message is used: the least lately
+  double ahead_ = 0;  ///< s, e
   std::uint64_t refused_ = 0;
 };
 

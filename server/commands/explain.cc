@@ -61,10 +61,12 @@ std::vector<Listable> make_listables() {
       [](Scene& scene) { return drop(std::get<SimulatedDevice::Config>(scene.device).environment); });
   add("device.rotation", "the handle turns, in the operator's hand", [](Scene& scene) {
     scene.loop.control.rotation.reset();
+    if (auto& coupling = scene.loop.control.coupling) coupling->turn.reset();
     return drop(std::get<SimulatedDevice::Config>(scene.device).rotation);
   });
   add("device.gripper", "two fingers that open and close", [](Scene& scene) {
     scene.loop.control.grip.reset();
+    if (auto& coupling = scene.loop.control.coupling) coupling->grip.reset();
     return drop(std::get<SimulatedDevice::Config>(scene.device).gripper);
   });
   effect("viscous_friction_n_s_per_m", "true viscous friction", &Device::viscous_friction);
@@ -110,6 +112,14 @@ std::vector<Listable> make_listables() {
       if (!loop.limiter.parts.adaptive_friction) loop.friction_map.reset();
       return there;
     });
+  });
+  add("teleoperation.turn", "ties the orientations", [](Scene& scene) {
+    auto& coupling = scene.loop.control.coupling;
+    return coupling && drop(coupling->turn);
+  });
+  add("teleoperation.grip", "ties the grippers", [](Scene& scene) {
+    auto& coupling = scene.loop.control.coupling;
+    return coupling && drop(coupling->grip);
   });
   add("teleoperation", "ties the handle to one of another server", [](Scene& scene) {
     scene.loop.control.limiter.shared_account = false;

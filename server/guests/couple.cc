@@ -70,6 +70,14 @@ Couple couple_of(const Coupling::Config& config) {
   couple.period = config.spring.period;
   if (config.method == CouplingMethod::kPassivity) couple.drift_rate = config.drift_rate;
   couple.rate = config.rate;
+  if (config.turn) {
+    couple.turn_stiffness = config.turn->stiffness;
+    couple.turn_damping = config.turn->damping;
+  }
+  if (config.grip) {
+    couple.grip_stiffness = config.grip->stiffness;
+    couple.grip_damping = config.grip->damping;
+  }
   return couple;
 }
 
@@ -85,7 +93,11 @@ std::string first_difference(const Couple& theirs, const Couple& mine) {
                            {"coupling.stiffness_n_per_m", &Couple::stiffness},
                            {"coupling.damping_n_s_per_m", &Couple::damping},
                            {"coupling.mutual_damping_n_s_per_m", &Couple::mutual_damping},
-                           {"coupling.drift_rate_per_s", &Couple::drift_rate}};
+                           {"coupling.drift_rate_per_s", &Couple::drift_rate},
+                           {"turn.stiffness_nm_per_rad", &Couple::turn_stiffness},
+                           {"turn.damping_nm_s_per_rad", &Couple::turn_damping},
+                           {"grip.stiffness_n_per_m", &Couple::grip_stiffness},
+                           {"grip.damping_n_s_per_m", &Couple::grip_damping}};
   for (const Row& row : kRows) {
     const double yours = theirs.*row.value;
     if (!alike(yours, mine.*row.value)) return differ(row.key, name(yours), name(mine.*row.value));

@@ -147,6 +147,9 @@ Outcome set_scale(LocalTime /*now*/, const Asker& asker, const SetScale& wanted)
   const ServedDevice& device = asker.devices[wanted.device];
   std::string objection = no_leader(device, "sets the scales");
   if (!objection.empty()) return {.code = Code::kUnsupported, .detail = std::move(objection)};
+  if (device.coupling->grip_stiffness > 0) {
+    return {.code = Code::kUnsupported, .detail = "a coupling of grippers keeps the scales of its scene"};
+  }
   if (keeps_scales(device.coupling->method)) {
     return {.code = Code::kUnsupported,
             .detail =

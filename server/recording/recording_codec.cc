@@ -277,6 +277,8 @@ std::string encode(const PortRecord& port) {
   out.set_channel(port.channel);
   out.set_credited_j(port.settled.credit);
   out.set_withdrawn_j(port.settled.withdraw);
+  out.set_grip_credited_j(port.grip_settled.credit);
+  out.set_grip_withdrawn_j(port.grip_settled.withdraw);
   out.set_stiffness_n_per_m(port.stiffness);
   out.set_round_trip_ns(port.round_trip.count());
   put(out.mutable_sent(), port.sent);
@@ -379,6 +381,7 @@ PortRecord decode_port(std::string_view message, LocalTime at) {
   out.channel = in.channel();
   out.at = at;
   out.settled = {.credit = in.credited_j(), .withdraw = in.withdrawn_j()};
+  out.grip_settled = {.credit = in.grip_credited_j(), .withdraw = in.grip_withdrawn_j()};
   out.stiffness = in.stiffness_n_per_m();
   out.round_trip = Duration(in.round_trip_ns());
   out.sent = port_state(in.sent());

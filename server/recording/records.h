@@ -25,14 +25,15 @@ struct StepRecord : Step {
 /// in their order, enough to repeat it.
 struct PortRecord {
   std::uint64_t tick = 0;
-  std::uint32_t channel = 0;        ///< of the device, by which the leader comes; 0 where there is one coupling
-  LocalTime at{};                   ///< of the step's position
-  Purse::Settlement settled{};      ///< J, what the limiter was credited with, and what was withdrawn
-  double stiffness = 0;             ///< N/m, K in use
-  Duration round_trip{};            ///< in use; 0: not known
-  PortState sent{};                 ///< to the peer
-  std::optional<PortState> peer{};  ///< that came since the step before; the newest
-  LocalTime peer_arrived{};         ///< by which it had come; of use with `peer` only
+  std::uint32_t channel = 0;         ///< of the device, by which the leader comes; 0 where there is one coupling
+  LocalTime at{};                    ///< of the step's position
+  Purse::Settlement settled{};       ///< J, what the limiter was credited with, and what was withdrawn
+  Purse::Settlement grip_settled{};  ///< J, likewise that of the gripper
+  double stiffness = 0;              ///< N/m, K in use
+  Duration round_trip{};             ///< in use; 0: not known
+  PortState sent{};                  ///< to the peer
+  std::optional<PortState> peer{};   ///< that came since the step before; the newest
+  LocalTime peer_arrived{};          ///< by which it had come; of use with `peer` only
 };
 
 /// How far the follower's clock was ahead of the leader's.

@@ -340,10 +340,8 @@ class SceneResolver {
               "another machine");
       }
     }
-    if (control.rotation) {
-      blame("teleoperation", {},
-            "expected a device without motors that turn its handle: a coupling moves a point only");
-    }
+    resolve_coupled_turn(control);
+    resolve_coupled_grip(control);
     if (!leads && coupling.clutch) blame("teleoperation.clutch", {}, "expected none: the leader clutches");
     if (leads && coupling.holds_place) {
       blame("teleoperation.on_loss", {}, "expected \"release\": a hand holds the leader");
@@ -432,6 +430,10 @@ class SceneResolver {
             "expected \"position-position\" or \"position-force\" with several leaders, found " +
                 in_quotes(to_string(coupling.method)));
     }
+    if (coupling.turn || coupling.grip) {
+      blame(coupling.turn ? "teleoperation.turn" : "teleoperation.grip", {},
+            "expected none with several leaders, who share positions only");
+    }
     double sum = 0;
     auto& leaders = draft_.scene.loop.control.leaders;
     for (std::size_t i = 0; i < peer.leaders.size(); ++i) {
@@ -478,6 +480,48 @@ class SceneResolver {
     if (coupling.method == CouplingMethod::kPassivity && !(coupling.spring.own_damping > 0)) {
       blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
             "expected a number above 0: nothing else takes energy up, so that nothing could begin to move");
+    }
+  }
+
+  void resolve_coupled_turn(const HapticController::Config& control) {
+    Coupling::Config& coupling = draft_.coupling;
+    if (!coupling.turn) return;
+    const bool leads = coupling.role == PortRole::kLeader;
+    if (!draft_.simulated.rotation) {
+      blame("teleoperation.turn", {},
+            "expected a device with [device.rotation]: this one does not measure how its handle is turned");
+    }
+    if (!leads && !control.rotation) {
+      blame("teleoperation.turn", {},
+            "expected a device with max_torque_nm in [device.rotation]: without motors that turn its handle a follower "
+            "cannot turn as the leader does");
+    }
+    if (control.rotation) coupling.turn->max_torque = control.rotation->max_torque;
+    const bool waves = coupling.method == CouplingMethod::kWaves;
+    if (waves && control.limiter.law != Law::kNone && !coupling.purse) {
+      blame("teleoperation.purse", {"teleoperation.turn"},
+            "missing, expected this table: waves carry no turns, so what turns the follower has to be paid");
+    }
+  }
+
+  /// Both ends have a motor: one end pays out of what its gripper has taken in, the other needs it to move at all.
+  void resolve_coupled_grip(const HapticController::Config& control) {
+    Coupling::Config& coupling = draft_.coupling;
+    if (!coupling.grip) return;
+    if (!draft_.simulated.gripper) {
+      blame("teleoperation.grip", {},
+            "expected a device with [device.gripper]: this one does not measure how far a gripper is open");
+    }
+    if (!control.grip) {
+      blame("teleoperation.grip", {},
+            "expected a device with max_force_n in [device.gripper]: a gripper without a motor neither follows nor is "
+            "felt");
+    }
+    coupling.grip->arm = control.grip->arm;
+    coupling.grip->max_force = control.grip->max_force;
+    if (control.limiter.law != Law::kNone && !coupling.purse) {
+      blame("teleoperation.purse", {"teleoperation.grip"},
+            "missing, expected this table: behind a limiter of its own a gripper cannot move unless the leader pays");
     }
   }
 

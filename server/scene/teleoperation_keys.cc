@@ -135,6 +135,20 @@ void declare_teleoperation(Table& scene, Draft& draft) {
       purse.key("max_power_w", config.max_power, kAboveZero,
                 "the peer's energy is believed up to this power, once max_account_mj has been used up");
     });
+    keys.part("turn", coupling.turn, [](Table& turn, TurnCoupling::Config& config) {
+      turn.key("stiffness_nm_per_rad", config.stiffness, kAboveZero,
+               "of the spring that couples the orientations, as the leader feels it", kRequired);
+      turn.key("damping_nm_s_per_rad", config.damping, kZeroOrMore,
+               "rendered at each handle by itself, as the leader feels it. Above 0 with adapt_to_delay");
+    });
+    keys.part("grip", coupling.grip, [](Table& grip, GripCoupling::Config& config) {
+      grip.key("stiffness_n_per_m", config.stiffness, kAboveZero,
+               "of the spring that couples the grippers, at the fingers, as the leader feels it", kRequired);
+      grip.key("damping_n_s_per_m", config.damping, kZeroOrMore,
+               "rendered at each gripper by itself, as the leader feels it. Above 0 with adapt_to_delay");
+      grip.key("speed_mm_per_s", config.speed, kAboveZero,
+               "so fast do the fingers of the follower go to the opening of the leader's, until they are there");
+    });
     keys.part("clutch", coupling.clutch, [](Table& clutch, Coupling::Button& button) {
       clutch.key("button", button.bit, Count{31}, "number of the button that frees the leader's handle", kRequired);
       clutch.key("toggle", button.toggles, YesNo{}, "each press changes it; otherwise as long as it is held");

@@ -21,6 +21,7 @@ constexpr std::array kUnits = {
     Unit{"_mm_per_s", "mm/s", 1e3},
     Unit{"_m_per_s2", "m/s²", 1},
     Unit{"_nm_per_s", "N·m/s", 1},
+    Unit{"_mm_per_s", "mm/s", 1e3},
     Unit{"_m_per_s", "m/s", 1},
     Unit{"_n_per_m", "N/m", 1},
     Unit{"_n_per_s", "N/s", 1},

@@ -33,7 +33,8 @@ target_link_libraries(core_coupling_worlds PRIVATE tendon_core tendon_warnings G
 target_precompile_headers(core_coupling_worlds REUSE_FROM tendon_test_pch)
 
 # The leader gives while it is clutched: the theorem allows it, the manual does not.
-coupling_mutant(gives-while-clutched "giving = live() &&" "giving = in_act() &&" "gives")
+coupling_mutant(gives-while-clutched "gives() const noexcept { return live() &&"
+  "gives() const noexcept { return in_act() &&" "gives")
 # Who was lost is engaged again when its peer is back.
 coupling_mutant(engages-after-a-loss "fresh_ && told) {
     phase_ = PortPhase::kCoupled"

@@ -30,8 +30,8 @@ std::function<Duration()> ticking() {
 /// Whatever a scene may leave out of a haptic step: the effects of the device, the tables that are parts, one key.
 std::set<std::string> optional_parts() {
   std::set<std::string> keys = {
-      "device.hand", "device.environment", "device.rotation", "device.gripper", "loop.max_speed_m_per_s", "safety",
-      "limiter",     "admittance",         "teleoperation"};
+      "device.hand", "device.environment", "device.rotation", "device.gripper",     "loop.max_speed_m_per_s", "safety",
+      "limiter",     "admittance",         "teleoperation",   "teleoperation.turn", "teleoperation.grip"};
   std::istringstream reference(scene_reference());
   std::string table;
   for (std::string line; std::getline(reference, line);) {
@@ -62,6 +62,17 @@ TEST(Explain, OnlyWhatIsListedHasACost) {
   EXPECT_EQ(listed, (std::set<std::string>{"admittance", "device.effects.coulomb_friction_n",
                                            "device.effects.force_sensor", "device.effects.max_force_n",
                                            "device.effects.viscous_friction_n_s_per_m", "device.hand", "limiter"}));
+}
+
+TEST(Explain, NamesWhatOfAHandleIsCoupled) {
+  std::set<std::string> listed;
+  for (const auto& part : explain(shipped("stylus_leader.toml"), ticking(), kRounds).parts) {
+    if (part.cost_ns) listed.insert(std::string(part.key));
+  }
+  for (const char* const part :
+       {"device.rotation", "device.gripper", "teleoperation", "teleoperation.turn", "teleoperation.grip"}) {
+    EXPECT_TRUE(listed.contains(part)) << part;
+  }
 }
 
 TEST(Explain, SaysHowACouplingIsFeltByEachMethod) {

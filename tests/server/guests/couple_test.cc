@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/rotation.h"
 #include "devices/simulated/simulated_device.h"
 #include "protocol/handshake.h"
 #include "protocol/session.h"
@@ -121,6 +122,8 @@ struct Place {
     }
     while (const StepRecord* record = mail->steps.front()) {
       least_energy = std::min(least_energy, record->energy);
+      if (record->grip() != nullptr) least_energy = std::min(least_energy, record->grip()->energy);
+      if (record->handle) handle = *record->handle;
       position = record->hand.position;
       force = record->applied;
       mail->steps.pop();
@@ -144,17 +147,20 @@ struct Place {
   double least_energy = 0;  // J
   Vec3 position = Vec3::Zero();
   Vec3 force = Vec3::Zero();
+  HandleStep handle;
   std::vector<std::string> notices;
 };
 
 class Coupled : public testing::Test {
  protected:
-  void place(const std::vector<std::string>& leader = {}, const std::vector<std::string>& follower = {}) {
-    follower_ = std::make_unique<Place>(wire_, scene_of("follower.toml", follower), ++epoch_, now_);
-    std::string text = text_of("leader.toml");
-    if (without_clutch_)
-      text.erase(text.find("[teleoperation.clutch]"), std::string("[teleoperation.clutch]\nbutton = 1\n").size());
-    leader_ = std::make_unique<Place>(wire_, parse_scene(text, "leader.toml", ".", leader), ++epoch_, now_);
+  void place(const std::vector<std::string>& leader = {}, const std::vector<std::string>& follower = {},
+             const std::string& handles = "") {
+    follower_ = std::make_unique<Place>(wire_, scene_of(handles + "follower.toml", follower), ++epoch_, now_);
+    const std::string name = handles + "leader.toml";
+    std::string text = text_of(name);
+    const std::string clutch = "[teleoperation.clutch]\nbutton = 1\n";
+    if (without_clutch_) text.erase(text.find(clutch), clutch.size());
+    leader_ = std::make_unique<Place>(wire_, parse_scene(text, name, ".", leader), ++epoch_, now_);
   }
 
   struct Under {
@@ -343,6 +349,45 @@ TEST_F(Coupled, AServerThatWasKilledIsFoundAgainAndWaitsForAnAct) {
   EXPECT_EQ(follower_->phase(), PortPhase::kCoupled);
 }
 
+TEST_F(Coupled, AStylusTurnsAndGripsAsTheOneOfAnotherServer) {
+  delay_ = milliseconds(10);
+  jitter_ms_ = 5;
+  loss_ = 0.02;
+  place({}, {}, "stylus_");
+  run(seconds(3));
+  ASSERT_EQ(follower_->phase(), PortPhase::kEngaged);
+  double turned = 0;
+  double apart = 0;
+  double gripped = 0;
+  double grips_apart = 0;
+  const Quat led_from = leader_->handle.turn->hand.orientation;
+  const Quat from = follower_->handle.turn->hand.orientation;
+  const double open_from = follower_->handle.grip->hand.opening;
+  run(seconds(3), [&] {
+    const Vec3 led = turn_between(led_from, leader_->handle.turn->hand.orientation);
+    const Vec3 followed = turn_between(from, follower_->handle.turn->hand.orientation);
+    turned = std::max(turned, followed.norm());
+    apart = std::max(apart, (led - followed).norm());
+    gripped = std::max(gripped, std::abs(follower_->handle.grip->hand.opening - open_from));
+    grips_apart =
+        std::max(grips_apart, std::abs(follower_->handle.grip->hand.opening - leader_->handle.grip->hand.opening));
+  });
+  EXPECT_GT(turned, 0.3) << "rad";
+  EXPECT_LT(apart, 0.5 * turned) << "it is late";
+  EXPECT_GT(gripped, 0.1) << "rad";
+  EXPECT_LT(grips_apart, 0.5 * gripped);
+  EXPECT_GT(leader_->newest.sent.grip->given, 0);
+  EXPECT_GE(leader_->least_energy, -1e-9);
+  EXPECT_GE(follower_->least_energy, -1e-9);
+}
+
+TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
+  place();
+  run(seconds(2));
+  ASSERT_EQ(leader_->phase(), PortPhase::kEngaged);
+  EXPECT_FALSE(leader_->newest.sent.turn || leader_->newest.sent.grip);
+}
+
 TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
   place({"teleoperation.coupling.stiffness_n_per_m=300"});
   run(seconds(2));
@@ -452,6 +497,10 @@ TEST(FirstDifference, NamesEachKeyThatTwoEndsMustHaveAlike) {
       {"coupling.stiffness_n_per_m: yours 1001, mine 1000", [](Couple& c) { c.stiffness = 1001; }},
       {"coupling.damping_n_s_per_m: yours 5, mine 4", [](Couple& c) { c.damping = 5; }},
       {"coupling.mutual_damping_n_s_per_m: yours 1, mine 0", [](Couple& c) { c.mutual_damping = 1; }},
+      {"turn.stiffness_nm_per_rad: yours 1, mine 0", [](Couple& c) { c.turn_stiffness = 1; }},
+      {"turn.damping_nm_s_per_rad: yours 2, mine 0", [](Couple& c) { c.turn_damping = 2; }},
+      {"grip.stiffness_n_per_m: yours 300, mine 0", [](Couple& c) { c.grip_stiffness = 300; }},
+      {"grip.damping_n_s_per_m: yours 3, mine 0", [](Couple& c) { c.grip_damping = 3; }},
       {"map.rotation_deg: yours [0, 0, 180], mine [0, 0, 0]",
        [](Couple& c) { c.rotation = {.w = 0, .x = 0, .y = 0, .z = 1}; }},
       {"map.axes: yours xz, mine xyz", [](Couple& c) { c.axes = 5; }},

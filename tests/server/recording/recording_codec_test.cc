@@ -100,6 +100,7 @@ PortRecord a_port() {
   port.tick = 77;
   port.at = testing::ms(77);
   port.settled = {.credit = 1.25e-3, .withdraw = 0.5e-3};
+  port.grip_settled = {.credit = 0.75e-3, .withdraw = 0.25e-3};
   port.stiffness = 128;
   port.round_trip = std::chrono::milliseconds(50);
   port.sent.epoch = 5;
@@ -142,6 +143,8 @@ TEST(RecordingCodec, APortComesBackWithAllThatItHad) {
   EXPECT_EQ(read.peer_arrived, port.peer_arrived);
   EXPECT_EQ(read.settled.credit, port.settled.credit);
   EXPECT_EQ(read.settled.withdraw, port.settled.withdraw);
+  EXPECT_EQ(read.grip_settled.credit, port.grip_settled.credit);
+  EXPECT_EQ(read.grip_settled.withdraw, port.grip_settled.withdraw);
   EXPECT_EQ(read.sent.phase, PortPhase::kClutched);
   EXPECT_EQ(read.sent.position, port.sent.position);
   EXPECT_EQ(read.sent.time, port.sent.time);

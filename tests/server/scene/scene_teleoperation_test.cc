@@ -299,5 +299,73 @@ TEST(SceneTeleoperation, SaysWhyLeadersCannotBeSo) {
   }
 }
 
+const std::string kRotation = "[device.rotation]\ninertia_kg_m2 = 2e-5\nviscous_friction_nm_s_per_rad = 1e-3\n";
+const std::string kGripper =
+    "[device.gripper]\nopen_deg = 30\narm_mm_per_rad = 60\nmass_kg = 0.02\nviscous_friction_n_s_per_m = 1\n";
+const std::string kTurnBounds = "[limiter.rotation]\ncoulomb_friction_nm = 0\nviscous_friction_nm_s_per_rad = 9e-4\n";
+const std::string kGripBounds = "[limiter.gripper]\ncoulomb_friction_n = 0\nviscous_friction_n_s_per_m = 0.9\n";
+const std::string kMotors = "max_torque_nm = 0.2\n";
+const std::string kGripMotor = "max_force_n = 3\n";
+
+std::string coupled_handle(const std::string& role, const std::string& what, const std::string& more = {}) {
+  return "[teleoperation]\nrole = \"" + role + "\"\n" + more +
+         "[teleoperation.coupling]\nstiffness_n_per_m = 400\ndamping_n_s_per_m = 4\n" + what;
+}
+const std::string kTurn = "[teleoperation.turn]\nstiffness_nm_per_rad = 0.5\ndamping_nm_s_per_rad = 0.005\n";
+const std::string kGrip = "[teleoperation.grip]\nstiffness_n_per_m = 300\ndamping_n_s_per_m = 3\nspeed_mm_per_s = 40\n";
+const std::string kPurse = "[teleoperation.purse]\n";
+
+TEST(SceneTeleoperation, CouplesOrientationsAndGrippersThatItLists) {
+  const Scene scene = minimal_and(kRotation + kMotors + kGripper + kGripMotor + kTurnBounds + kGripBounds +
+                                  coupled_handle("follower", kTurn + kGrip + kPurse));
+  const Coupling::Config& coupling = *scene.loop.control.coupling;
+  ASSERT_TRUE(coupling.turn && coupling.grip);
+  EXPECT_EQ(coupling.turn->stiffness, 0.5);
+  EXPECT_EQ(coupling.turn->damping, 0.005);
+  EXPECT_EQ(coupling.turn->max_torque, 0.2);
+  EXPECT_EQ(coupling.grip->stiffness, 300);
+  EXPECT_EQ(coupling.grip->damping, 3);
+  EXPECT_DOUBLE_EQ(coupling.grip->speed, 0.04);
+  EXPECT_DOUBLE_EQ(coupling.grip->arm, 0.06);
+  EXPECT_EQ(coupling.grip->max_force, 3);
+  const Scene points = minimal_and(kRotation + kMotors + kTurnBounds + kLeader);
+  EXPECT_TRUE(points.loop.control.rotation && points.loop.control.coupling);
+  EXPECT_FALSE(points.loop.control.coupling->turn) << "a position alone, on a device with six motors";
+  EXPECT_TRUE(minimal_and(kRotation + coupled_handle("leader", kTurn + kPurse)).loop.control.coupling->turn)
+      << "a leader that measures its orientation and feels no torque";
+}
+
+TEST(SceneTeleoperation, RefusesHandlesThatCannotBeCoupled) {
+  EXPECT_EQ(error_of_minimal_and(coupled_handle("leader", kTurn + kPurse)),
+            "s.toml:9: teleoperation.turn: expected a device with [device.rotation]: this one does not measure how its "
+            "handle is turned");
+  EXPECT_EQ(error_of_minimal_and(kRotation + coupled_handle("follower", kTurn + kPurse)),
+            "s.toml:12: teleoperation.turn: expected a device with max_torque_nm in [device.rotation]: without motors "
+            "that turn its handle a follower cannot turn as the leader does");
+  EXPECT_EQ(
+      error_of_minimal_and(coupled_handle("follower", kGrip + kPurse)),
+      "s.toml:9: teleoperation.grip: expected a device with [device.gripper]: this one does not measure how far a "
+      "gripper is open");
+  EXPECT_EQ(
+      error_of_minimal_and(kGripper + coupled_handle("leader", kGrip + kPurse)),
+      "s.toml:14: teleoperation.grip: expected a device with max_force_n in [device.gripper]: a gripper without a "
+      "motor neither follows nor is felt");
+  EXPECT_EQ(
+      error_of_minimal_and(kGripper + kGripMotor + kGripBounds +
+                           coupled_handle("follower", kGrip, "method = \"surface\"\n")),
+      "s.toml:19: teleoperation.purse: missing, expected this table: behind a limiter of its own a gripper cannot "
+      "move unless the leader pays");
+  EXPECT_EQ(error_of_minimal_and(kRotation + kMotors + kTurnBounds +
+                                 coupled_handle("follower", kTurn, "method = \"waves\"\n")),
+            "s.toml:17: teleoperation.purse: missing, expected this table: waves carry no turns, so what turns the "
+            "follower has to be paid");
+  EXPECT_EQ(error_of_minimal_and(kRotation + coupled_handle("leader",
+                                                            "[teleoperation.turn]\n"
+                                                            "stiffness_nm_per_rad = 0.5\n" +
+                                                                kPurse)),
+            "s.toml:7: teleoperation: turn.damping = 0: expected a number above 0 N·m·s/rad, because adapt_to_delay "
+            "lowers the stiffness to 2 B over the round trip");
+}
+
 }  // namespace
 }  // namespace tendon

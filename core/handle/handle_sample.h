@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "core/base/motion.h"
+
+namespace tendon {
+
+/// What the rest of a handle has measured, and what its other motors have held since the step before.
+struct HandleSample {
+  std::optional<Turning> turning{};  ///< empty: not measured
+  std::optional<Grip> grip{};        ///< empty: no gripper
+  Vec3 torque = Vec3::Zero();        ///< N·m, on the hand, really held
+  double grip_force = 0;             ///< N, on the fingers, really held
+};
+
+}  // namespace tendon
