@@ -325,8 +325,8 @@ void put_coupling(const Coupling::Config& coupling, const LimiterConfig& limiter
   const bool springs =
       coupling.method == CouplingMethod::kPositionPosition || coupling.method == CouplingMethod::kSetPosition;
   const auto& spring = coupling.spring;
-  text << "teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by " << to_string(coupling.method)
-       << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
+  text << std::right << "teleoperation: the " << (leads ? "leader" : "follower") << " of a coupling by "
+       << to_string(coupling.method) << (coupling.purse ? ", whose ports pay each other" : "") << ".\n";
   if (coupling.method == CouplingMethod::kPassivity) {
     text << "  the follower's spring has " << spring.stiffness << " N/m at every round trip; in free motion the leader "
          << "feels a damper of " << spring.own_damping << " to " << 2 * spring.own_damping

@@ -97,6 +97,62 @@ TEST(HapticLoop, AMillionStepsMakeNoHeapCall) {
   EXPECT_GT(limited, 500U);
 }
 
+// Four leaders that engage, clutch, fall silent and are given other shares.
+TEST(HapticLoop, OfAFollowerWithFourLeadersMakesNoHeapCall) {
+  SimulatedDevice device(find_device_profile("falcon")->device());
+  HapticLoop::Config config;
+  config.control.limiter = {.law = Law::kAolPlus, .friction = {0.05, 0.26}, .longest_hold = milliseconds(2)};
+  config.control.limiter.shared_account = true;
+  config.control.max_force = 8;
+  config.control.max_slew = 1000;
+  auto& coupling = config.control.coupling.emplace();
+  coupling.role = PortRole::kFollower;
+  coupling.spring = {.stiffness = 400, .own_damping = 4, .period = milliseconds(1)};
+  coupling.purse.emplace();
+  coupling.holds_place = true;
+  for (std::uint32_t i = 0; i < 4; ++i) config.control.leaders.push_back({.channel = i, .share = 0.25});
+  config.control.channels.assign(4, ChannelRule::kSum);
+  const auto mail = std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .ports = 64});
+  HapticLoop loop(config, device, *mail);
+  std::uint64_t calls = 0;
+  std::uint64_t engaged = 0;
+  LocalTime now(std::chrono::seconds(1));
+  for (std::uint64_t n = 1; n <= 20'000; ++n) {
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      if (n % 3000 > 2500 && i == n / 3000 % 4) continue;  // silent
+      PortState peer;
+      peer.epoch = 5 + i;
+      peer.sequence = n;
+      peer.answers_epoch = 1;
+      peer.answers = n - 1;
+      peer.time = milliseconds(n);
+      peer.engagement = n / 1000 + (n % 1000 < 100 ? 0 : 1);
+      peer.phase = n % 1000 < 100 ? PortPhase::kCoupled : n % 1000 < 800 ? PortPhase::kEngaged : PortPhase::kClutched;
+      peer.position = Vec3(0.01 * std::sin(0.01 * static_cast<double>(n)), 0, 0);
+      peer.need = 1e-3;
+      peer.given = 1e-6 * static_cast<double>(n);
+      mail->port_in[i].put({peer, now});
+    }
+    if (n % 700 == 0) {
+      mail->orders.try_push({.kind = HapticOrder::Kind::kShare,
+                             .coupling = static_cast<std::uint32_t>(n / 700 % 4),
+                             .share = 0.1 * static_cast<double>(n % 11)});
+    }
+    {
+      const HeapGuard guard;
+      now = loop.step(now);
+      calls += guard.calls();
+    }
+    while (mail->steps.front() != nullptr) mail->steps.pop();
+    for (const PortRecord* port = mail->ports.front(); port != nullptr; port = mail->ports.front()) {
+      if (port->sent.phase == PortPhase::kEngaged) ++engaged;
+      mail->ports.pop();
+    }
+  }
+  EXPECT_EQ(calls, 0U);
+  EXPECT_GT(engaged, 20'000U);
+}
+
 // Every part of the safety layer, armed, at fault, unarmed.
 TEST(SafeDevice, MakesNoHeapCallWhateverHappens) {
   SimulatedDevice::Config still = find_device_profile("falcon")->device();

@@ -424,10 +424,10 @@ TEST(Couplings, NoWorldWithTwoToFourLeadersGivesOutEnergy) {
       of.push_back(leader);
     }
     Star star(held_follower(dice.decades(1, 4)), of);
-    for (int act = 0; act < 15; ++act) {
+    for (int act = 0; act < 18; ++act) {
       star.run(static_cast<int>(dice.within(20, 250)));
       const std::size_t which = dice.bits() % count;
-      switch (dice.bits() % 6) {
+      switch (dice.bits() % 9) {
         case 0:
           star.cut[which] = !star.cut[which];
           break;
@@ -437,6 +437,10 @@ TEST(Couplings, NoWorldWithTwoToFourLeadersGivesOutEnergy) {
         case 2:
         case 3:
           star.set_share(which, dice.uniform());
+          break;
+        case 4:
+          if (dice.chance(0.3)) star.leaders[which].begin(100 + static_cast<std::uint64_t>(act));
+          if (dice.chance(0.1)) star.follower.begin(100 + static_cast<std::uint64_t>(act));
           break;
         default:
           star.leaders[which].coupling().engage();
