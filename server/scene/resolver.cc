@@ -357,6 +357,7 @@ class SceneResolver {
     coupling.spring.period = draft_.scene.loop.period;
     coupling.spring.max_force = draft_.coupling_force.value_or(control.max_force);
     const Law law = control.limiter.law;
+    resolve_leaders(coupling);
     resolve_method(coupling);
     const bool pays = coupling.method == CouplingMethod::kPositionPosition ||
                       coupling.method == CouplingMethod::kPassivity || coupling.method == CouplingMethod::kSetPosition;
@@ -379,7 +380,6 @@ class SceneResolver {
       blame("teleoperation.coupling.damping_n_s_per_m", {"teleoperation.method"},
             "expected a number above 0: it is the impedance of the waves");
     }
-    resolve_leaders(coupling);
     control.limiter.shared_account = shares;
     build("teleoperation", [&coupling] { Coupling{coupling}; });
     control.coupling = coupling;
