@@ -87,6 +87,47 @@ TEST(CouplingSetPosition, WithSeldomStatesAPaidStiffSpringIsQuiet) {
   EXPECT_GT(not_paid.buzz, 5e-3);
 }
 
+/// The account pays for the stretch, so the spring need not know the delay.
+TEST(CouplingSetPosition, AStiffSpringThatDoesNotAdaptHoldsAndRestsAtEveryDelay) {
+  for (const int one_way : {0, 25, 100, 300}) {
+    const Felt felt = feel({.method = CouplingMethod::kSetPosition, .one_way = one_way, .adapts = false});
+    print("set-position, K 400 at round trip " + std::to_string(2 * one_way) + " ms", felt);
+    expect_passive(felt, std::to_string(one_way));
+    const double ideal = (kPressingDepth - kPressingWallAt) / (1 / kPressingHand + 1.0 / 400 + 1.0 / 500);
+    EXPECT_NEAR(felt.first, ideal, 0.1 * ideal) << one_way;
+    EXPECT_NEAR(felt.second, ideal, 0.02 * ideal + 0.04) << one_way;
+    EXPECT_LT(felt.buzz, 2e-3) << one_way;
+  }
+}
+
+/// Peak force in N, in free motion of ± 20 mm at 0.5 Hz.
+double drag(CouplingMethod method, bool adapts, int one_way) {
+  Pressing with{.method = method, .one_way = one_way, .adapts = adapts};
+  with.wall = 0;
+  const Ports made = press(with);
+  PortSetup leader = made.leader.setup;
+  leader.around[0] = {
+      .stiffness = 400, .damping = 3, .reference = [](double t) { return 0.02 * std::sin(std::numbers::pi * t); }};
+  Ports ports(leader, made.follower.setup, bad_way(one_way, 1), bad_way(one_way, 2));
+  ports.run(1200);
+  EXPECT_TRUE(ports.engage());
+  ports.run(2000);
+  double most = 0;
+  ports.run(4000, [&](int) { most = std::max(most, ports.leader.applied.norm()); });
+  return most;
+}
+
+TEST(CouplingSetPosition, ThePriceOfTheStiffSpringIsItsDragInFreeMotion) {
+  for (const int one_way : {0, 25, 100, 300}) {
+    const double stiff = drag(CouplingMethod::kSetPosition, false, one_way);
+    const double soft = drag(CouplingMethod::kSetPosition, true, one_way);
+    std::cout << "drag at round trip " << 2 * one_way << " ms: K 400 " << stiff << " N, adapted " << soft << " N\n";
+    if (one_way >= 100) {
+      EXPECT_GT(stiff, 3 * soft) << one_way;
+    }
+  }
+}
+
 TEST(CouplingSetPosition, TheSpringIsStretchedAsFarAsTheAccountPays) {
   auto config = coupling_of(PortRole::kFollower);
   config.method = CouplingMethod::kSetPosition;
