@@ -90,8 +90,8 @@ struct Step {
 ///
 /// A handle with motors that turn it goes the same way as a wrench: force and torque together are shortened, so that
 /// their direction stays, and one account bounds both (WrenchPort). Its gripper is a port of its own (GripPort).
-/// What the coupling wants of both is added to what the remote environment asks for; the wrench's account is the one that is
-/// shared, also of a coupling that ties positions only.
+/// What the coupling wants of both is added to what the remote environment asks for; the wrench's account is the one
+/// that is shared, also of a coupling that ties positions only.
 ///
 /// The limiter comes last, so nothing after it can lift a force above its bound; it may cut a force
 /// faster than the slew limit allows: energy is a matter of safety, smoothness is not.

@@ -20,8 +20,8 @@ namespace tendon::dash {
 /// A page watches one device, at first the server's first one. The line "watch N" changes to device N; with "watch N
 /// beside" the page also gets the newest state of each other device, once a tick: the 3-D view shows all of them.
 ///
-/// Every tick the page gets the new states of its device and of its coupling, and once a second the reports on the loop and the engines.
-/// Each text is made once for all pages that watch the same device.
+/// Every tick the page gets the new states of its device and of its coupling, and once a second the reports on the loop
+/// and the engines. Each text is made once for all pages that watch the same device.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Feed {

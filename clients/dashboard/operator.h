@@ -12,8 +12,8 @@
 
 namespace tendon::dash {
 
-/// Arms and disarms devices, and engages and disengages couplings, for the person who presses the page's buttons. It has
-/// no socket, clock or thread.
+/// Arms and disarms devices, and engages and disengages couplings, for the person who presses the page's buttons. It
+/// has no socket, clock or thread.
 ///
 /// Each press is a session of its own, beside the Observer's: a controller with the operator's key that claims one
 /// channel of the device, holds it, sends the order and never a force, and leaves at the answer. Between two

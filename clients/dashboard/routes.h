@@ -70,7 +70,8 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 /// * **Origin** of a WebSocket must be that same host for /live, and a page of this machine or one of Config::origins
 ///   for /bridge; otherwise 403. A program that is no browser sends no Origin. Other origins cannot read anything else,
 ///   because no CORS header is ever sent.
-/// * **Arming**, like the other three orders, moves a machine, so only this page in a browser on this machine may do it;
+/// * **Arming**, like the other three orders, moves a machine, so only this page in a browser on this machine may do
+/// it;
 ///   otherwise 403. It is refused from another machine, through a proxy, with another Origin, and from a program that
 ///   sends no Origin. A form or a script of another page cannot send this page's Origin. Other people may use this
 ///   machine too, so `Authorization: Bearer PASS` must have the pass that was printed for the person who started the

@@ -484,8 +484,8 @@ bool Coupling::tells_our_scales(const PortState& peer) const noexcept {
          told(peer.force_scale, config_.map.force_scale) == map_.force_scale();
 }
 
-/// A follower takes the leader's. Energy counts only between two states that both tell the scales in use: between others
-/// nobody knows at which worth it was given.
+/// A follower takes the leader's. Energy counts only between two states that both tell the scales in use: between
+/// others nobody knows at which worth it was given.
 void Coupling::take_scales(const PortState& peer) noexcept {
   if (keeps_scales(config_.method) || grip_) return;
   const bool before = !heard() || tells_our_scales(newest_);

@@ -65,19 +65,19 @@ namespace tendon {
 /// ends the force at once. (So does the limiter, when it has to.) Periods without a position lower the ramp as fast.
 ///
 /// **Absolute maps** (Config::absolute): u = p at both ends, p_f = s_x R p_l, and no clutch. The act is aligning first:
-/// the leader is drawn to where the follower is, by its spring whose far end moves at kAlignSpeed, with at most kAlignForce,
-/// while the follower stands still. A limiter lets it draw with what the hand has put in; `energy` (J) is paid into the
-/// account at each act beside that, so that the port's promise is L ≥ −energy · acts. 0: the hand brings the handle there.
-/// What is left of the distance when it engages is drawn together as the ramp rises.
+/// the leader is drawn to where the follower is, by its spring whose far end moves at kAlignSpeed, with at most
+/// kAlignForce, while the follower stands still. A limiter lets it draw with what the hand has put in; `energy` (J) is
+/// paid into the account at each act beside that, so that the port's promise is L ≥ −energy · acts. 0: the hand brings
+/// the handle there. What is left of the distance when it engages is drawn together as the ramp rises.
 ///
 /// **Another peer** (renew): who takes a channel over has an epoch that is not above that of the one before. renew()
-/// forgets the peer, so that any epoch is heard, and raises our own by one, so that no total and no act of before counts.
-/// Whatever was engaged is not any more, and its force fades.
+/// forgets the peer, so that any epoch is heard, and raises our own by one, so that no total and no act of before
+/// counts. Whatever was engaged is not any more, and its force fades.
 ///
-/// **Scales that change** (set_scale): the leader's u is stretched by the old s_x over the new, so that its mapped place
-/// stays where it is, and its states tell the new scales. The follower takes them from the first state that tells them.
-/// The force that this changes fades from the old to the new within kFade. Purse says what becomes of energy: in the
-/// leader's joules of each moment, the pair gives out nothing. Waves and passivity keep their scales
+/// **Scales that change** (set_scale): the leader's u is stretched by the old s_x over the new, so that its mapped
+/// place stays where it is, and its states tell the new scales. The follower takes them from the first state that tells
+/// them. The force that this changes fades from the old to the new within kFade. Purse says what becomes of energy: in
+/// the leader's joules of each moment, the pair gives out nothing. Waves and passivity keep their scales
 /// (keeps_scales), and so does a coupling of grippers.
 ///
 /// **Ladder.** Age: how long ago the newest state came. v = max(3 periods of the peer, 20 ms, twice the longest gap
@@ -93,8 +93,8 @@ namespace tendon {
 /// axes, whenever it is ready and not live; the ramp blends it with the law.
 ///
 /// When a lost peer is back the round trip is measured anew, so that the silence does not soften the springs of the
-/// next act. A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which is
-/// safe.
+/// next act. A state that comes before the last rung ramps the force in again. Energy that was under way is lost, which
+/// is safe.
 ///
 /// **Laws.** position-position: F = K(y − u) + D(ẏ − u̇) − B u̇ at both ends (PositionPosition), y the peer's u mapped.
 /// K, D, B are those of the leader; the follower's are smaller by s_f s_x. position-force: the follower has the same
@@ -107,16 +107,17 @@ namespace tendon {
 ///
 /// set-position: F = K(ȳ − u) − B u̇ at both ends, ȳ the nearest to the peer's mapped u with ½ K ‖ȳ − u‖² ≤ payable
 /// (paid_stretch). K adapts to the delay as that of position-position; no velocity of the peer is used, nor D, so
-/// that states may be seldom and irregular. With a follower that only follows, as in position-force, the leader felt a tenth of what was at the wall
-/// (0.17 of 4.1 N at 50 ms): the follower's stiffer spring drew the account that the leader's stretch needs.
+/// that states may be seldom and irregular. With a follower that only follows, as in position-force, the leader felt a
+/// tenth of what was at the wall (0.17 of 4.1 N at 50 ms): the follower's stiffer spring drew the account that the
+/// leader's stretch needs.
 ///
-/// passivity: the leader's force is s_f Rᵀ(−F_follower) − (α + B) u̇_l (PassivityLeader), F_follower what the follower's
-/// device exerts on its tool. The follower's spring of K_f pulls the tool to a reference that begins at u and moves as
-/// PassivityFollower says, with λ = drift_rate. α is at most B: the damping that the scene lets each handle bear, for a
-/// device's own friction is too little to take anything up. B besides, because E_in is 0 without it and nothing could
-/// begin to move. E_in is what the port took in by this coupling's acts; of a peer's epoch only what came after this port
-/// first heard of that epoch counts, because the rest may have been used. By itself it gives out some mJ, because tools
-/// have mass and the ends look one period ahead: the pair needs limiters and a purse, too.
+/// passivity: the leader's force is s_f Rᵀ(−F_follower) − (α + B) u̇_l (PassivityLeader), F_follower what the
+/// follower's device exerts on its tool. The follower's spring of K_f pulls the tool to a reference that begins at u
+/// and moves as PassivityFollower says, with λ = drift_rate. α is at most B: the damping that the scene lets each
+/// handle bear, for a device's own friction is too little to take anything up. B besides, because E_in is 0 without it
+/// and nothing could begin to move. E_in is what the port took in by this coupling's acts; of a peer's epoch only what
+/// came after this port first heard of that epoch counts, because the rest may have been used. By itself it gives out
+/// some mJ, because tools have mass and the ends look one period ahead: the pair needs limiters and a purse, too.
 ///
 /// rate: u_l begins at 0 whenever the leader becomes live, and that place is the centre. In the leader's scale
 ///
@@ -124,16 +125,16 @@ namespace tendon {
 ///     v = gain (‖u_l‖ − dead_zone)₊ û_l,  ‖v‖ ≤ max_speed;     the follower's reference moves by s_x R v T in a period
 ///
 /// The follower's spring of K_f pulls its tool to the reference, which runs at most max_force/K_f ahead of the tool. f
-/// alone cannot push the handle out of its dead zone, so a contact never moves the follower. The reference stands in each
-/// period in which the newest state has the handle in its dead zone, is not of a live leader, or is older than v of the
-/// ladder. A hand that holds its handle out does no work: a follower behind a limiter of its own goes on only as far as
-/// its account pays for what friction takes beyond the limiter's lower bounds.
+/// alone cannot push the handle out of its dead zone, so a contact never moves the follower. The reference stands in
+/// each period in which the newest state has the handle in its dead zone, is not of a live leader, or is older than v
+/// of the ladder. A hand that holds its handle out does no work: a follower behind a limiter of its own goes on only as
+/// far as its account pays for what friction takes beyond the limiter's lower bounds.
 ///
-/// **Waves and phases.** What the line sends is paid from the limiter's account, and what comes is paid into it, so that
-/// the pair is passive whatever was cut. What limiter and motors leave of the force is what the line books; what they
-/// cut is sent later (WavePort::SharedAccount), and what the ramp takes is not cut, so that nothing shifts the two places
-/// against each other for good. A clutched leader holds its end of the line where it is: the follower stays there on the
-/// line's own spring. An end that is not engaged takes up what comes and sends nothing.
+/// **Waves and phases.** What the line sends is paid from the limiter's account, and what comes is paid into it, so
+/// that the pair is passive whatever was cut. What limiter and motors leave of the force is what the line books; what
+/// they cut is sent later (WavePort::SharedAccount), and what the ramp takes is not cut, so that nothing shifts the two
+/// places against each other for good. A clutched leader holds its end of the line where it is: the follower stays
+/// there on the line's own spring. An end that is not engaged takes up what comes and sends nothing.
 ///
 /// **Purse.** With Config::purse the port pays and is paid (Purse); it gives only while it is live and its
 /// peer is engaged (not clutched) and not silent. Its `joule` is the map's. The pair of position-position, set-position

@@ -54,8 +54,8 @@ class Couplings {
  public:
   static constexpr std::size_t kMost = Shares::kMost;
 
-  /// `leaders`: empty for one coupling, else 2 … kMost, each by the same `config`, which then couples positions only. Throws std::invalid_argument naming
-  /// the field, its value and what was expected.
+  /// `leaders`: empty for one coupling, else 2 … kMost, each by the same `config`, which then couples positions only.
+  /// Throws std::invalid_argument naming the field, its value and what was expected.
   explicit Couplings(const Coupling::Config& config, std::span<const CoupledLeader> leaders = {});
 
   std::size_t size() const noexcept { return all_.size(); }

@@ -39,9 +39,9 @@ namespace tendon {
 /// leader's.
 ///
 /// **Account.** One joule of the follower's gripper is worth s_f at the leader's, since openings are not scaled. The
-/// two grippers share by a purse of their own, in the same messages (PortGrip) and with the same limits as the wrench's;
-/// the theorem of Purse holds for the pair of grippers by itself. What a follower's fingers do is paid by what a hand has
-/// done at the leader's: while nobody there has moved them, they go nowhere.
+/// two grippers share by a purse of their own, in the same messages (PortGrip) and with the same limits as the
+/// wrench's; the theorem of Purse holds for the pair of grippers by itself. What a follower's fingers do is paid by
+/// what a hand has done at the leader's: while nobody there has moved them, they go nowhere.
 ///
 /// **A robot keeps its grip.** Whenever a follower with `holds_place` is not live it holds the place z_h with its whole
 /// K_f, chosen once so that the force stays what it was: z_h = g_f + F/K_f, with F of its spring. What it holds is

@@ -44,7 +44,8 @@ inline constexpr std::array kCouplingMethods = {
 /// As scenes and refusals call it: "position-position".
 std::string_view to_string(CouplingMethod method) noexcept;
 
-/// Method rate: the leader's handle, pulled back to its centre, says how fast the follower moves. In the leader's scale.
+/// Method rate: the leader's handle, pulled back to its centre, says how fast the follower moves. In the leader's
+/// scale.
 struct RateControl {
   double dead_zone = 0;  ///< m, ≥ 0: nearer to its centre the follower stands
   double gain = 0;       ///< 1/s, > 0: speed for each metre beyond that

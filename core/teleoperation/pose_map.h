@@ -12,8 +12,8 @@ namespace tendon {
 ///     u_f = s_x R u_l             F_l = s_f Rᵀ F_f
 ///     K_l = s_f s_x K_f           one joule of the leader is s_x/s_f joules of the follower
 ///
-/// `R` turns the leader's base frame into the follower's. An axis of the LEADER's frame that is not coupled is left out:
-/// its displacement is 0 for the other end, and its force is 0 at the leader; likewise at the follower along R's
+/// `R` turns the leader's base frame into the follower's. An axis of the LEADER's frame that is not coupled is left
+/// out: its displacement is 0 for the other end, and its force is 0 at the leader; likewise at the follower along R's
 /// columns.
 ///
 /// The rest of a handle: turns and openings of a gripper are not scaled. With r the turn of each handle from its own

@@ -38,11 +38,11 @@ struct PortMotion {
 ///
 /// **T_loop** is measured without a clock: a message says which of our motions it answers, and our periods since then
 /// are counted, so delay, loss and the other end's waiting are all in it. Both ends take the longer of what they
-/// measured: two different K would hold two different forces. T_loop rises at once; it falls after `recovery`, being the
-/// longest of the last one to two of these, so that a held force does not waver. K follows with kSettling: the two ends
-/// learn of a longer way at different times, and a step of K would be felt. When nothing comes T_loop grows and K falls;
-/// when to give up is the caller's business (the loss ladder). A change of K under stretch costs ½ ΔK δ², which the
-/// accounts pay.
+/// measured: two different K would hold two different forces. T_loop rises at once; it falls after `recovery`, being
+/// the longest of the last one to two of these, so that a held force does not waver. K follows with kSettling: the two
+/// ends learn of a longer way at different times, and a step of K would be felt. When nothing comes T_loop grows and K
+/// falls; when to give up is the caller's business (the loss ladder). A change of K under stretch costs ½ ΔK δ², which
+/// the accounts pay.
 ///
 /// **Why y + ẏ e.** A message that is 5 ms later than the last one leaves y 1 mm behind at 0.2 m/s: 0.4 N of noise at
 /// 400 N/m. Measured free motion at RTT 10 ms with 5 ms of jitter: see the README.

@@ -63,10 +63,10 @@ struct PurseMessage {
 /// leader's `joule` is s_f/s_x and the follower's s_x/s_f, each the worth of one of the **peer's** joules here. Then
 /// W_l + (s_f/s_x) W_f stays ≥ 0.
 ///
-/// **Scales that change.** A joule that was given at one worth must not be credited at a higher one, and an account must
-/// not be worth more to a peer than when it was filled. So whoever changes `joule` (revalue) forgoes what is under way
-/// until the peer tells that it knows, and the follower gives up the part of its account by which (s_f/s_x) A has grown:
-/// in the leader's joules no change of scale raises the sum of the accounts.
+/// **Scales that change.** A joule that was given at one worth must not be credited at a higher one, and an account
+/// must not be worth more to a peer than when it was filled. So whoever changes `joule` (revalue) forgoes what is under
+/// way until the peer tells that it knows, and the follower gives up the part of its account by which (s_f/s_x) A has
+/// grown: in the leader's joules no change of scale raises the sum of the accounts.
 ///
 /// **Epochs.** A port that starts anew has forgotten what it gave and took; its new purse has an epoch above all that
 /// it had before (a counter that survives, or the time of day at the start: no two machines' are compared). Totals

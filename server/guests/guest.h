@@ -128,7 +128,8 @@ struct ServedDevice {
 /// The coupling of the device that comes by this channel; empty: none does.
 std::optional<std::uint32_t> coupling_by(const ServedDevice& device, std::uint32_t channel);
 
-/// The coupling has another end from now on: its loop forgets the one before. False when there is no room for the order.
+/// The coupling has another end from now on: its loop forgets the one before. False when there is no room for the
+/// order.
 bool renew_peer(ServedDevice& device, std::uint32_t coupling);
 
 /// The devices, one for each of `mail`; a device's number is its place. Throws std::invalid_argument when the number of

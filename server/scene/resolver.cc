@@ -556,8 +556,8 @@ class SceneResolver {
         GripLimits{.friction = friction, .arm = device->arm, .max_force = draft_.max_grip.value_or(*device->max_force)};
   }
 
-  /// The friction that the limiter may count on there. `truth`: the simulated device's; of its viscous part it may count
-  /// on `share`.
+  /// The friction that the limiter may count on there. `truth`: the simulated device's; of its viscous part it may
+  /// count on `share`.
   Friction handle_friction(bool has_motor, const Draft::FrictionBounds& given, const std::array<std::string, 2>& keys,
                            const Friction& truth, const std::string& motor, double share = 1) const {
     const Law law = draft_.scene.loop.control.limiter.law;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The hard cases of teleoperation with the coupling that the server runs, by each method, with its limiters and without.
+// The hard cases of teleoperation with the coupling that the server runs, by each method, with its limiters and
+// without.
 #include <gtest/gtest.h>
 
 #include <algorithm>

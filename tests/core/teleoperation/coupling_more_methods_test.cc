@@ -12,6 +12,7 @@
 #include <string>
 
 #include "core/base/rotation.h"
+#include "tests/core/teleoperation/expect_felt.h"
 #include "tests/core/teleoperation/ports.h"
 #include "tests/core/teleoperation/pressing.h"
 
@@ -19,19 +20,6 @@ namespace tendon {
 namespace {
 
 constexpr double kFriction = 0.02;  // N, Coulomb, of each port here
-
-void print(const std::string& name, const Felt& felt) {
-  std::cout << name << std::fixed << std::setprecision(3) << ": felt " << felt.first << ", " << felt.second
-            << " N, wall " << felt.wall << " N, ripple " << felt.ripple * 1e3 << " mN, buzz " << felt.buzz * 1e3
-            << " mm/s, least sum " << felt.sum * 1e3 << " mJ, account " << felt.account * 1e3 << " mJ, K "
-            << felt.stiffness << "\n";
-}
-
-void expect_passive(const Felt& felt, const std::string& name) {
-  EXPECT_GE(felt.sum, kRounding) << name;
-  EXPECT_GE(felt.account, kRounding) << name;
-  EXPECT_TRUE(felt.live) << name;
-}
 
 /// A hand that waves for `seconds`, with nothing in the follower's way: rms of the two places' distance, the way taken
 /// out of it, m.

@@ -82,7 +82,8 @@ TEST(CouplingScale, ATenthBecomesTenBetweenClutchesAndNothingMoves) {
   EXPECT_GE(ports.least_account(), kRounding);
 }
 
-/// A robot that presses while its leader is clutched has another spring afterwards: its force goes there, it does not jump.
+/// A robot that presses while its leader is clutched has another spring afterwards: its force goes there, it does not
+/// jump.
 TEST(CouplingScale, UnderForceTheForceFadesToTheNewOne) {
   PortSetup leader = led([](double t) { return t < 0.5 ? 0 : 0.02; });
   PortSetup follower = port_of(PortRole::kFollower);

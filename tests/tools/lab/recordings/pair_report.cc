@@ -151,8 +151,8 @@ Curve curve(const std::string& name, const char* colour, const PairRun::Line& li
   return made;
 }
 
-/// One range for the panels of a row, so that two runs are compared by eye; unless that would hide one of them: then each
-/// has its own, and says so.
+/// One range for the panels of a row, so that two runs are compared by eye; unless that would hide one of them: then
+/// each has its own, and says so.
 void share_range(std::span<Panel> row) {
   constexpr double kTooDifferent = 8;
   constexpr double kFar = std::numeric_limits<double>::infinity();

@@ -44,7 +44,8 @@ PortRecord port(std::uint64_t tick, double credit, double withdraw) {
 
 TEST(PairObserver, CountsWhatIsUnderWayToThePair) {
   PairObserver observer;
-  // A hand has put in 10 J here, and one 1 J there. In step 2 the leader gives 4 J, which the follower has from step 4 on.
+  // A hand has put in 10 J here, and one 1 J there. In step 2 the leader gives 4 J, which the follower has from step 4
+  // on.
   for (std::uint64_t tick = 1; tick <= 6; ++tick) {
     observer.observe(kLeader, step(tick, tick <= 2 ? 10 : 6));
     observer.observe(kFollower, step(tick, tick <= 4 ? 1 : 5));
