@@ -113,6 +113,59 @@ TEST(Teleoperation, OtherMethodsLeadToo) {
   }
 }
 
+/// Orientation and gripper go with the position, and each step of the three accounts is the same when it is taken again.
+TEST(Teleoperation, AStylusTurnsAndGripsTheOneOfAnotherServer) {
+  const testing::ScratchFolder folder;
+  const auto followed = folder.path() / "follower.mcap";
+  const auto led = folder.path() / "leader.mcap";
+  Server follower(folder.path(), scene("stylus_follower.toml"), {"--record", followed.string()});
+  Server leader(folder.path(), scene("stylus_leader.toml"), {"--record", led.string(), "--dial", follower.address()});
+  leader.process().wait_for_line("teleoperation: engaged");
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  leader.stop();
+  follower.stop();
+  expect_sound(led, folder.path());
+  expect_sound(followed, folder.path());
+  const Recording tool = read_recording(followed);
+  double farthest = 1;  // |w| of the turn since the start: 1 is none
+  double opened = 0;
+  const StepRecord& first = tool.steps.front();
+  ASSERT_TRUE(first.turn() != nullptr && first.grip() != nullptr);
+  for (const StepRecord& step : tool.steps) {
+    if (step.turn() == nullptr || step.grip() == nullptr) continue;
+    const Quat& a = first.turn()->hand.orientation;
+    const Quat& b = step.turn()->hand.orientation;
+    farthest = std::min(farthest, std::abs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z));
+    opened = std::max(opened, std::abs(step.grip()->hand.opening - first.grip()->hand.opening));
+  }
+  EXPECT_GT(2 * std::acos(std::min(farthest, 1.0)), 0.03) << "rad";
+  EXPECT_GT(opened, 0.02) << "rad";
+}
+
+/// Each by its own act; the recordings of the three replay.
+TEST(Teleoperation, TwoHandsLeadOneDevice) {
+  const testing::ScratchFolder folder;
+  const auto file = [&](const std::string& name) { return folder.path() / (name + ".mcap"); };
+  Server follower(folder.path(), scene("shared_follower.toml"), {"--record", file("follower").string()});
+  Server trainer(folder.path(), scene("trainer.toml"),
+                 {"--record", file("trainer").string(), "--dial", follower.address()});
+  Server trainee(folder.path(), scene("trainee.toml"),
+                 {"--record", file("trainee").string(), "--dial", follower.address()});
+  trainer.process().wait_for_line("teleoperation: engaged");
+  trainee.process().wait_for_line("teleoperation: engaged");
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  trainee.stop();
+  trainer.stop();
+  follower.stop();
+  for (const char* const name : {"follower", "trainer", "trainee"}) expect_sound(file(name), folder.path());
+  double farthest = 0;
+  const Recording tool = read_recording(file("follower"));
+  for (const StepRecord& step : tool.steps) {
+    farthest = std::max(farthest, (step.hand.position - tool.steps.front().hand.position).norm());
+  }
+  EXPECT_GT(farthest, 2e-3) << "it is led";
+}
+
 /// What the two must not do with limiters: it shows that the demonstration demonstrates something.
 TEST(Teleoperation, WithoutLimitersTheSamePairGivesOutEnergyThatNobodyPutIn) {
   const testing::ScratchFolder folder;

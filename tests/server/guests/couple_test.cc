@@ -95,7 +95,9 @@ class Viewer {
 
 /// A server with one coupled device; or one that knows of no coupling.
 struct Place {
-  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true)
+  /// `key`: with which the one dials and the other lets in.
+  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true,
+        const std::optional<Key>& key = {})
       : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
     scene.loop.control.coupling->spring.epoch = epoch;
     haptic = std::make_unique<HapticLoop>(scene.loop, device, *mail);
@@ -108,6 +110,9 @@ struct Place {
       config.dials.push_back(
           {0,
            {.server = *scene.teleoperation->dial, .name = scene.name, .seed = epoch, .couple = *config.couplings[0]}});
+      config.dials.back().peer.key = key;
+    } else if (key) {
+      config.keys = {{.name = "leader", .role = Role::kController, .key = *key}};
     }
     network = std::make_unique<NetworkLoop>(config, end, std::vector<Mailboxes*>{mail.get()});
     network->turn(now);
@@ -334,6 +339,24 @@ TEST_F(Coupled, AnAbsoluteMapEngagesWhereTheTwoMeet) {
   EXPECT_EQ(leader_->phase(), PortPhase::kEngaged);
   EXPECT_EQ(follower_->phase(), PortPhase::kEngaged);
   EXPECT_LT((leader_->position - follower_->position).norm(), 6e-3) << "the places are each other's";
+}
+
+/// A sealed session is found by its number: the coupling does not even notice.
+TEST_F(Coupled, AnEndWhoseAddressChangesStaysEngaged) {
+  const Key key = Ratchet(std::uint64_t{5}).next();
+  follower_ = std::make_unique<Place>(wire_, scene_of("follower.toml"), ++epoch_, now_, true, key);
+  leader_ = std::make_unique<Place>(wire_, scene_of("leader.toml"), ++epoch_, now_, true, key);
+  run(seconds(2));
+  ASSERT_EQ(follower_->phase(), PortPhase::kEngaged);
+  leader_->end.self = parse_address("127.0.0.1:50123");
+  bool left = false;
+  run(seconds(2), [&] { left = left || follower_->phase() != PortPhase::kEngaged; });
+  EXPECT_FALSE(left);
+  EXPECT_EQ(leader_->phase(), PortPhase::kEngaged);
+  EXPECT_EQ(follower_->network->stats().roamed, 1U);
+  const Vec3 from = follower_->position;
+  run(milliseconds(500));
+  EXPECT_GT((follower_->position - from).norm(), 2e-3) << "it goes on following";
 }
 
 TEST_F(Coupled, AServerThatWasKilledIsFoundAgainAndWaitsForAnAct) {
