@@ -378,15 +378,15 @@ TEST(WholeHandles, ARecordedStepIsTakenAgainToTheLastBit) {
   bool acted = false;
   ports.run(3000, [&] {
     if (!acted) acted = ports.leader.coupling().engage();
-    const WholePort& port = ports.follower;
+    WholePort& port = ports.follower;
     const Step& last = port.last;
     ForceChannels::Wanted wanted;
     wanted.force = last.wanted;
     wanted.stiffness = last.stiffness;
     wanted.mode = last.mode;
     wanted.handle = HandleWanted{.torque = last.turn()->wanted, .grip = last.grip()->wanted};
-    const Step step = again.step(last.hand, last.was_applied, {}, wanted, &port.seen, port.controller->settled(),
-                                 port.controller->grip_settled());
+    const Step step = again.step(last.hand, last.was_applied, {}, wanted, &port.seen,
+                                 port.controller->couplings()->settled(0), port.controller->grip_settled());
     given += port.controller->grip_settled().credit;
     same += step.force == last.force && step.turn()->torque == last.turn()->torque &&
                     step.grip()->force == last.grip()->force && step.energy == last.energy &&

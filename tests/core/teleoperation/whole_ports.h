@@ -101,7 +101,7 @@ class WholePort {
     return config;
   }
 
-  Coupling& coupling() { return *controller->coupling(); }
+  Coupling& coupling() { return (*controller->couplings())[0]; }
   double x() const { return x_.x; }
   double opening() const { return -fingers_.x; }
   void put(double x) { x_.x = x; }

@@ -78,8 +78,7 @@ Step Rerun::take(const StepRecord& recorded, const Effort& held) {
     missed_ = 0;
     const bool has_port = settled_at_ == recorded.tick;
     return controller_.step(recorded.hand, applied, recorded.hand_force, wanted_in(recorded), handle,
-                            has_port ? settled_ : Purse::Settlement{},
-                            has_port ? port_.grip_settled : Purse::Settlement{});
+                            has_port ? settled_ : Purse::Settlement{}, has_port ? grip_settled_ : Purse::Settlement{});
   }
   // Of a position that was not believed the record has only that it was not.
   ++missed_;

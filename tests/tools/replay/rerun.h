@@ -33,6 +33,7 @@ class Rerun {
     if (std::exchange(settled_at_, port.tick) != port.tick) settled_ = {};
     settled_.credit += port.settled.credit;
     settled_.withdraw += port.settled.withdraw;
+    grip_settled_ = port.grip_settled;
   }
 
   /// `recorded` with what this controller makes of it. `applied` is its own force with kOwn, else the recorded one.
@@ -51,8 +52,9 @@ class Rerun {
   std::uint32_t missed_ = 0;  ///< readings in a row
   Held held_;
   Effort own_;
-  Purse::Settlement settled_;     ///< of all couplings
-  std::uint64_t settled_at_ = 0;  ///< tick; 0: none yet
+  Purse::Settlement settled_;       ///< of all couplings
+  Purse::Settlement grip_settled_;  ///< of the grippers, which only a single coupling ties
+  std::uint64_t settled_at_ = 0;    ///< tick; 0: none yet
 };
 
 /// What of a step a law decides, and that is not the same bit for bit: "energy_j: recorded 0.1, again 0.2". Empty when
