@@ -53,7 +53,7 @@ class ObserverTest : public testing::Test {
         state.force_wanted = Vec3(1, 2, 3);
         state.buttons = 2;
         mail_[i]->state.put(state);
-        if (port_) mail_[i]->port_out.put(*port_);
+        if (port_) mail_[i]->port_out[0].put(*port_);
       }
       if (loop_) loop_->turn(now_);
       observer_.turn(now_);

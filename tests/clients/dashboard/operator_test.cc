@@ -121,7 +121,7 @@ class OperatorTest : public testing::Test {
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kEngage) port_->phase = PortPhase::kEngaged;
     if (order != nullptr && obeys_ && order->kind == HapticOrder::Kind::kDisengage) port_->phase = PortPhase::kCoupled;
     ++port_->sequence;
-    mail_->port_out.put(*port_);
+    mail_->port_out[0].put(*port_);
   }
   void serve_leader() {
     port_.emplace();

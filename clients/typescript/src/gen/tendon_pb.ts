@@ -2175,7 +2175,7 @@ export type PortState = Message<"tendon.v1.PortState"> & {
   share?: number | undefined;
 
   /**
-   * Of a leader, in use from this state on. 0: as in Couple.
+   * Of a leader, in use from this state on. 0: as in Couple. An observer has seen no Couple, and is told them.
    *
    * [0.01, 100] or 0
    *
