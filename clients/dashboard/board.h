@@ -63,7 +63,7 @@ class Board {
 
   /// Both ends of a device's coupling at one time.
   struct Ports {
-    PeerTime at{};  ///< the device's newest sample when `own` came: a port's own time is of no clock
+    PeerTime at;  ///< the device's newest sample when `own` came: a port's own time is of no clock
     PortFrame own;
     std::optional<PortFrame> peer;  ///< the newest that had come; empty: none, or the device is alone or has lost it
   };

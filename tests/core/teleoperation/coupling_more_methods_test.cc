@@ -76,7 +76,7 @@ TEST(CouplingSetPosition, WithSeldomStatesAPaidStiffSpringIsQuiet) {
 }
 
 /// The account pays for the stretch, so the spring need not know the delay.
-TEST(CouplingSetPosition, AStiffSpringThatDoesNotAdaptHoldsAndRestsAtEveryDelay) {
+TEST(CouplingSetPosition, AStiffSpringThatDoesNotAdaptHoldsAtEveryDelay) {
   for (const int one_way : {0, 25, 100, 300}) {
     const Felt felt = feel({.method = CouplingMethod::kSetPosition, .one_way = one_way, .adapts = false});
     print("set-position, K 400 at round trip " + std::to_string(2 * one_way) + " ms", felt);
