@@ -87,7 +87,7 @@ TEST(CouplingAbsolute, AHandThatDoesNotComeIsLeftAloneAfterFiveSeconds) {
 }
 
 /// Nobody holds the handle; friction is all that keeps it.
-TEST(CouplingAbsolute, AMotorWithEnergyOfItsOwnDrawsTheHandleThereAndGivesNoMore) {
+TEST(CouplingAbsolute, AMotorWithEnergyOfItsOwnDrawsItThereAndGivesNoMore) {
   constexpr double kEnergy = 0.02;
   Ports ports(end_of(PortRole::kLeader, kEnergy), end_of(PortRole::kFollower));
   ports.leader.put({0.04, 0, 0});
