@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <list>
+#include <map>
+#include <vector>
 
 #include "tests/support/dice.h"
 
@@ -36,29 +37,32 @@ class Link {
     const int extra = static_cast<int>(dice_.within(0, network_.jitter + 1));
     if (lost || (now >= network_.cut_from && now < network_.cut_until)) return;
     const int at = now + network_.delay + extra + (now >= network_.longer_from ? network_.longer_by : 0);
-    under_way_.push_back({at, message});
+    under_way_.emplace(at, Parcel{sent_++, message});
     if (network_.repeated > 0 && dice_.chance(network_.repeated)) {
-      under_way_.push_back({at + static_cast<int>(dice_.within(0, 1000)), message});
+      under_way_.emplace(at + static_cast<int>(dice_.within(0, 1000)), Parcel{sent_++, message});
     }
   }
 
-  /// Calls `receive` with every message that arrives in period `now`.
+  /// Calls `receive` with every message that arrives in period `now`, in the order in which they were sent.
   template <class Receive>
   void deliver(int now, Receive receive) {
-    for (const auto& [at, message] : under_way_) {
-      if (at <= now) receive(message);
-    }
-    std::erase_if(under_way_, [now](const Parcel& parcel) { return parcel.at <= now; });
+    const auto last = under_way_.upper_bound(now);
+    std::vector<const Parcel*> arrived;
+    for (auto parcel = under_way_.begin(); parcel != last; ++parcel) arrived.push_back(&parcel->second);
+    std::ranges::sort(arrived, {}, &Parcel::number);
+    for (const Parcel* const parcel : arrived) receive(parcel->message);
+    under_way_.erase(under_way_.begin(), last);
   }
 
  private:
   struct Parcel {
-    int at;
+    std::uint64_t number;
     Message message;
   };
   Network network_;
   Dice dice_;
-  std::list<Parcel> under_way_;  // a vector would move all of them each time
+  std::multimap<int, Parcel> under_way_;  ///< by the period in which it arrives
+  std::uint64_t sent_ = 0;
 };
 
 }  // namespace tendon
