@@ -290,8 +290,6 @@ void NetworkLoop::dispossess(LocalTime now, Guest& loser, const Guest& winner, c
                     loser.name + "\"");
   loser.uncouple(lost.device, lost.channel);
   const LeaseLost news{.device = lost.device, .channel = lost.channel, .to = winner.name};
-  const auto& coupled = loser.coupled;
-  if (coupled && coupled->device == lost.device && coupled->channel == lost.channel) loser.coupled.reset();
   if (loser.can_lose && loser.session.request(news)) return;
   // The guest does not know the request, or does not answer.
   loser.session.close(Code::kReplaced, "\"" + winner.name + "\" has taken this place");

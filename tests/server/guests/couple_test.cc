@@ -5,25 +5,18 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/rotation.h"
-#include "devices/simulated/simulated_device.h"
 #include "protocol/handshake.h"
 #include "protocol/session.h"
-#include "server/haptic_loop.h"
-#include "server/network_loop.h"
-#include "server/scene/scene.h"
+#include "tests/server/guests/place.h"
 #include "tests/support/dice.h"
 #include "tests/support/wire.h"
 
@@ -34,15 +27,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-std::string text_of(const std::string& scene) {
-  std::ifstream file(std::filesystem::path(TENDON_SOURCE_DIR) / "deploy" / "scenes" / scene);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-Scene scene_of(const std::string& name, const std::vector<std::string>& settings = {}) {
-  return parse_scene(text_of(name), name, ".", settings);
-}
 
 /// An observer in the clear; it names the feature or does not.
 class Viewer {
@@ -91,69 +75,6 @@ class Viewer {
  private:
   Address server_;
   ClientHandshake handshake_;
-};
-
-/// A server with one coupled device; or one that knows of no coupling.
-struct Place {
-  /// `key`: with which the one dials and the other lets in.
-  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now, bool is_coupled = true,
-        const std::optional<Key>& key = {})
-      : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
-    scene.loop.control.coupling->spring.epoch = epoch;
-    haptic = std::make_unique<HapticLoop>(scene.loop, device, *mail);
-    NetworkLoop::Config config;
-    config.secret.fill(std::byte{7});
-    config.first_connection_id = static_cast<std::uint32_t>(epoch);
-    config.devices = {{.name = scene.name, .model = "device", .loop_hz = 1000, .channels = {{.name = "main"}}}};
-    if (is_coupled) config.couplings = {couple_of(*scene.loop.control.coupling)};
-    if (is_coupled && scene.teleoperation->dial) {
-      config.dials.push_back(
-          {0,
-           {.server = *scene.teleoperation->dial, .name = scene.name, .seed = epoch, .couple = *config.couplings[0]}});
-      config.dials.back().peer.key = key;
-    } else if (key) {
-      config.keys = {{.name = "leader", .role = Role::kController, .key = *key}};
-    }
-    network = std::make_unique<NetworkLoop>(config, end, std::vector<Mailboxes*>{mail.get()});
-    network->turn(now);
-  }
-
-  void step(LocalTime now) {
-    haptic->step(now);
-    network->turn(now);
-    for (const PortRecord* port = mail->ports.front(); port != nullptr; port = mail->ports.front()) {
-      newest = *port;
-      mail->ports.pop();
-    }
-    while (const StepRecord* record = mail->steps.front()) {
-      least_energy = std::min(least_energy, record->energy);
-      if (record->grip() != nullptr) least_energy = std::min(least_energy, record->grip()->energy);
-      if (record->handle) handle = *record->handle;
-      position = record->hand.position;
-      force = record->applied;
-      mail->steps.pop();
-    }
-    for (const auto& said : network->take_notices()) notices.push_back(said.text);
-  }
-  PortPhase phase() const { return newest.sent.phase; }
-  bool said(const std::string& words) const {
-    return std::any_of(notices.begin(), notices.end(),
-                       [&](const std::string& one) { return one.find(words) != std::string::npos; });
-  }
-
-  Scene scene;
-  End end;
-  SimulatedDevice device;
-  std::unique_ptr<Mailboxes> mail =
-      std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .ports = 16, .flight = 2, .datagrams = 1});
-  std::unique_ptr<HapticLoop> haptic;
-  std::unique_ptr<NetworkLoop> network;
-  PortRecord newest;
-  double least_energy = 0;  // J
-  Vec3 position = Vec3::Zero();
-  Vec3 force = Vec3::Zero();
-  HandleStep handle;
-  std::vector<std::string> notices;
 };
 
 class Coupled : public testing::Test {
@@ -247,8 +168,8 @@ TEST_F(Coupled, NeitherAccountFallsBelowZeroOnABadNetwork) {
   EXPECT_EQ(leader_->phase(), PortPhase::kEngaged);
   EXPECT_GE(leader_->least_energy, -1e-9);
   EXPECT_GE(follower_->least_energy, -1e-9);
-  EXPECT_GT(leader_->newest.sent.given, 0);
-  EXPECT_LT(leader_->newest.stiffness, 1000) << "2 B over the round trip";
+  EXPECT_GT(leader_->newest().sent.given, 0);
+  EXPECT_LT(leader_->newest().stiffness, 1000) << "2 B over the round trip";
 }
 
 TEST_F(Coupled, EachMethodMovesTheFollowerAndNoAccountFallsBelowZero) {
@@ -287,7 +208,7 @@ TEST_F(Coupled, ACutNetworkIsLostAndOnlyAnActCouplesAgain) {
   run(milliseconds(400));
   EXPECT_EQ(leader_->phase(), PortPhase::kLost);
   EXPECT_EQ(follower_->phase(), PortPhase::kLost);
-  EXPECT_EQ(leader_->newest.sent.velocity, Vec3(0, 0, 0));
+  EXPECT_EQ(leader_->newest().sent.velocity, Vec3(0, 0, 0));
   run(milliseconds(600));
   cut_ = false;
   run(seconds(3));
@@ -307,13 +228,13 @@ TEST_F(Coupled, BothEndsTakeNewScalesWhileTheClutchIsHeld) {
   const HapticOrder order{.kind = HapticOrder::Kind::kSetScale, .scales = {0.25, 2}};
   leader_->mail->orders.try_push(order);
   run(milliseconds(50));
-  EXPECT_EQ(follower_->newest.sent.position_scale, 0) << "it is engaged: nothing changes";
+  EXPECT_EQ(follower_->newest().sent.position_scale, 0) << "it is engaged: nothing changes";
   run(milliseconds(4200));  // its hand holds the clutch from 6 s on
   ASSERT_EQ(leader_->phase(), PortPhase::kClutched);
   leader_->mail->orders.try_push(order);
   run(milliseconds(10));
-  EXPECT_EQ(follower_->newest.sent.position_scale, 0.25);
-  EXPECT_EQ(follower_->newest.sent.force_scale, 2);
+  EXPECT_EQ(follower_->newest().sent.position_scale, 0.25);
+  EXPECT_EQ(follower_->newest().sent.force_scale, 2);
   run(milliseconds(900));
   ASSERT_EQ(leader_->phase(), PortPhase::kEngaged);
   const Vec3 from = leader_->position;
@@ -399,7 +320,7 @@ TEST_F(Coupled, AStylusTurnsAndGripsAsTheOneOfAnotherServer) {
   EXPECT_LT(apart, 0.5 * turned) << "it is late";
   EXPECT_GT(gripped, 0.1) << "rad";
   EXPECT_LT(grips_apart, 0.5 * gripped);
-  EXPECT_GT(leader_->newest.sent.grip->given, 0);
+  EXPECT_GT(leader_->newest().sent.grip->given, 0);
   EXPECT_GE(leader_->least_energy, -1e-9);
   EXPECT_GE(follower_->least_energy, -1e-9);
 }
@@ -408,7 +329,7 @@ TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
   place();
   run(seconds(2));
   ASSERT_EQ(leader_->phase(), PortPhase::kEngaged);
-  EXPECT_FALSE(leader_->newest.sent.turn || leader_->newest.sent.grip);
+  EXPECT_FALSE(leader_->newest().sent.turn || leader_->newest().sent.grip);
 }
 
 TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
@@ -431,8 +352,8 @@ TEST_F(Coupled, AnObserverThatNamesTheFeatureIsToldBothEnds) {
   std::map<std::uint64_t, Vec3> leads;
   std::map<std::uint64_t, Vec3> follows;
   run(seconds(3), [&] {
-    leads[leader_->newest.sent.sequence] = leader_->newest.sent.position;
-    follows[follower_->newest.sent.sequence] = follower_->newest.sent.position;
+    leads[leader_->newest().sent.sequence] = leader_->newest().sent.position;
+    follows[follower_->newest().sent.sequence] = follower_->newest().sent.position;
   });
   ASSERT_GT(at_leader.own.size(), 100U);
   ASSERT_GT(at_leader.peers.size(), 100U);

@@ -3,25 +3,16 @@
 // Three servers: a device with two leaders. And a guest at the follower's that moves the shares. On virtual time.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
-#include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "devices/simulated/simulated_device.h"
 #include "protocol/connection.h"
 #include "server/guests/couple.h"
-#include "server/haptic_loop.h"
-#include "server/network_loop.h"
-#include "server/scene/scene.h"
+#include "tests/server/guests/place.h"
 #include "tests/support/wire.h"
 
 namespace tendon {
@@ -32,73 +23,6 @@ using std::chrono::seconds;
 
 constexpr std::uint32_t kTrainer = 1;  // channels of shared_follower.toml
 constexpr std::uint32_t kTrainee = 2;
-
-Scene scene_of(const std::string& name, const std::vector<std::string>& settings) {
-  std::ifstream file(std::filesystem::path(TENDON_SOURCE_DIR) / "deploy" / "scenes" / name);
-  return parse_scene(std::string{std::istreambuf_iterator<char>(file), {}}, name, ".", settings);
-}
-
-/// A server with one coupled device.
-struct Place {
-  Place(Wire& wire, const Scene& the_scene, std::uint64_t epoch, LocalTime now)
-      : scene(the_scene), end(wire, scene.network.listen), device(scene.simulated()) {
-    scene.loop.control.coupling->spring.epoch = epoch;
-    haptic = std::make_unique<HapticLoop>(scene.loop, device, *mail);
-    NetworkLoop::Config config;
-    config.secret.fill(std::byte{7});
-    config.first_connection_id = static_cast<std::uint32_t>(1000 * epoch);
-    DeviceDescription about{.name = scene.name, .model = "device", .loop_hz = 1000};
-    for (const Scene::Channel& channel : scene.channels)
-      about.channels.push_back({.name = channel.name, .lease = channel.lease});
-    config.devices = {about};
-    config.couplings = {couple_of(*scene.loop.control.coupling)};
-    auto& leaders = config.leaders.emplace_back();
-    for (const CoupledLeader& leader : scene.loop.control.leaders) leaders.push_back(leader.channel);
-    if (scene.teleoperation->dial) {
-      config.dials.push_back({0,
-                              {.server = *scene.teleoperation->dial,
-                               .name = scene.name,
-                               .seed = epoch,
-                               .channel = scene.teleoperation->channel,
-                               .couple = *config.couplings[0]}});
-    }
-    network = std::make_unique<NetworkLoop>(config, end, std::vector<Mailboxes*>{mail.get()});
-    network->turn(now);
-  }
-
-  void step(LocalTime now) {
-    haptic->step(now);
-    network->turn(now);
-    for (const PortRecord* port = mail->ports.front(); port != nullptr; port = mail->ports.front()) {
-      newest[port->channel] = *port;
-      mail->ports.pop();
-    }
-    while (const StepRecord* record = mail->steps.front()) {
-      least_energy = std::min(least_energy, record->energy);
-      position = record->hand.position;
-      mail->steps.pop();
-    }
-    for (const auto& said : network->take_notices()) notices.push_back(said.text);
-  }
-  PortPhase phase(std::uint32_t channel = 0) { return newest[channel].sent.phase; }
-  double share(std::uint32_t channel) { return newest[channel].sent.share.value_or(-1); }
-  bool said(const std::string& words) const {
-    return std::any_of(notices.begin(), notices.end(),
-                       [&](const std::string& one) { return one.find(words) != std::string::npos; });
-  }
-
-  Scene scene;
-  End end;
-  SimulatedDevice device;
-  std::unique_ptr<Mailboxes> mail =
-      std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .ports = 32, .flight = 2, .datagrams = 1});
-  std::unique_ptr<HapticLoop> haptic;
-  std::unique_ptr<NetworkLoop> network;
-  std::map<std::uint32_t, PortRecord> newest;  ///< by channel
-  double least_energy = 0;                     ///< J
-  Vec3 position = Vec3::Zero();
-  std::vector<std::string> notices;
-};
 
 /// A guest that claims a channel and asks for things.
 class Desk {
@@ -220,11 +144,11 @@ TEST_F(TwoLeaders, EachEngagesByItsOwnButtonAndTheFollowerIsBetweenThem) {
   run(milliseconds(1500));
   EXPECT_EQ(follower_->phase(kTrainer), PortPhase::kEngaged);
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kCoupled) << "its hand has not pressed yet";
-  EXPECT_EQ(follower_->share(kTrainer), 0.7);
+  EXPECT_EQ(follower_->newest(kTrainer).sent.share, 0.7);
   run(seconds(1));
   EXPECT_EQ(follower_->phase(kTrainee), PortPhase::kEngaged);
   EXPECT_EQ(trainee_->phase(), PortPhase::kEngaged);
-  EXPECT_EQ(trainee_->newest[0].peer->share, 0.3);
+  EXPECT_EQ(trainee_->newest(0).peer->share, 0.3);
   run(milliseconds(400));  // the ramp
   const std::array from{follower_->position, trainer_->position, trainee_->position};
   run(milliseconds(400));
@@ -238,11 +162,11 @@ TEST_F(TwoLeaders, AGuestMovesTheSharesWithinHalfASecond) {
   place();
   run(milliseconds(2600));
   ASSERT_EQ(asked(SetShare{.device = 0, .channel = kTrainee, .share = 0.9}).code, Code::kOk);
-  EXPECT_GT(follower_->share(kTrainee), 0.3);
-  EXPECT_LT(follower_->share(kTrainee), 0.4) << "on a straight line";
+  EXPECT_GT(follower_->newest(kTrainee).sent.share, 0.3);
+  EXPECT_LT(follower_->newest(kTrainee).sent.share, 0.4) << "on a straight line";
   run(milliseconds(500));
-  EXPECT_EQ(follower_->share(kTrainee), 0.9);
-  EXPECT_NEAR(follower_->share(kTrainer), 0.1, 1e-12);
+  EXPECT_EQ(follower_->newest(kTrainee).sent.share, 0.9);
+  EXPECT_NEAR(follower_->newest(kTrainer).sent.share.value_or(-1), 0.1, 1e-12);
   EXPECT_TRUE(follower_->said("\"trainee\" is to count 0.9, said by \"desk\""));
   EXPECT_EQ(trainee_->phase(), PortPhase::kEngaged);
   expect_sound();
