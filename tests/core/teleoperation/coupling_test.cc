@@ -112,6 +112,7 @@ TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
   ports.leader.begin(4);
   ports.run(30);
   EXPECT_NE(phase(ports.leader), PortPhase::kEngaged);
+  const std::uint64_t epoch = ports.told_back.epoch;
   ports.follower.coupling->renew();
   double step = 0;
   Vec3 before = ports.follower.demand.force;
@@ -122,6 +123,7 @@ TEST(Coupling, AnotherLeaderIsHeardAfterARenewalAndEngagesByItsOwnAct) {
   EXPECT_LT(step, 0.05 * pulled + 0.02) << "it fades";
   EXPECT_EQ(before, Vec3(Vec3::Zero()));
   expect_coupled(ports, "the new one is heard");
+  EXPECT_EQ(ports.told_back.epoch, epoch + 1) << "no total that answers the former one counts again";
   ports.follower.coupling->receive(last, Port::at(ports.now));
   expect_no_engagement(ports, 300, "an act of the one before");
   ports.follower.coupling->renew();

@@ -332,6 +332,36 @@ TEST_F(Coupled, APortWhoseHandleIsNotCoupledTellsNoTurnAndNoGrip) {
   EXPECT_FALSE(leader_->newest().sent.turn || leader_->newest().sent.grip);
 }
 
+/// The clock of its machine has gone back meanwhile: its epoch is below the one that the leader knows.
+TEST_F(Coupled, AServerThatComesBackWithALowerEpochIsHeard) {
+  epoch_ = 10;
+  place();
+  run(seconds(2));
+  ASSERT_EQ(leader_->phase(), PortPhase::kEngaged);
+  follower_ = std::make_unique<Place>(wire_, scene_of("follower.toml"), 3, now_);
+  run(seconds(5));
+  EXPECT_EQ(leader_->phase(), PortPhase::kCoupled);
+  EXPECT_EQ(follower_->phase(), PortPhase::kCoupled);
+}
+
+/// It lies in the box while the loop is told of another end.
+TEST_F(Coupled, AStateOfTheEndBeforeIsNotTakenForOneOfTheNew) {
+  Place follower(wire_, scene_of("follower.toml"), 1, now_);
+  PortState state;
+  state.epoch = 9;
+  state.sequence = 1;
+  const auto taken = [&](std::uint32_t peer) {
+    ++state.sequence;
+    follower.mail->port_in[0].put({state, now_, peer});
+    follower.step(now_ += milliseconds(1));
+    return follower.newest().peer.has_value();
+  };
+  EXPECT_TRUE(taken(0));
+  follower.mail->orders.try_push({.kind = HapticOrder::Kind::kRenew, .source = 1});
+  EXPECT_FALSE(taken(0));
+  EXPECT_TRUE(taken(1));
+}
+
 TEST_F(Coupled, ScenesThatDoNotFitAreNamedByTheirFirstKey) {
   place({"teleoperation.coupling.stiffness_n_per_m=300"});
   run(seconds(2));

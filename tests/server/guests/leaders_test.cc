@@ -112,6 +112,27 @@ class TwoLeaders : public testing::Test {
   std::unique_ptr<Desk> desk_;
 };
 
+TEST_F(TwoLeaders, AGuestSetsTheScalesOfALeaderThatIsNotEngaged) {
+  place();
+  run(milliseconds(300));
+  const SetScale wanted{.position_scale = 0.5, .force_scale = 2};
+  const auto refused = asked(wanted);
+  EXPECT_EQ(refused.code, Code::kUnsupported);
+  EXPECT_EQ(refused.detail, "this device is the follower: the leader sets the scales");
+  desk_ = std::make_unique<Desk>(wire_, "127.0.0.1:50002", trainer_->end.self, "main", now_);
+  run(milliseconds(100));
+  EXPECT_EQ(asked(wanted).code, Code::kOk);
+  run(milliseconds(50));
+  EXPECT_EQ(follower_->newest(kTrainer).sent.position_scale, 0.5) << "the follower took it";
+  EXPECT_EQ(follower_->newest(kTrainee).sent.position_scale, 0) << "of that leader only";
+  run(milliseconds(1000));
+  ASSERT_EQ(trainer_->phase(), PortPhase::kEngaged);
+  const auto busy = asked(wanted);
+  EXPECT_EQ(busy.code, Code::kBusy);
+  EXPECT_EQ(busy.detail, "it is engaged: hold the clutch, or disengage it");
+  expect_sound();
+}
+
 /// The first was started later than the other, so that its epoch is the higher one.
 TEST_F(TwoLeaders, WhoTakesAChannelOverIsHeardAndEngagesByAnActOfItsOwn) {
   follower_ = std::make_unique<Place>(wire_, scene_of("shared_follower.toml", {}), 1, now_);
