@@ -12,8 +12,8 @@ namespace tendon::lab {
 namespace {
 
 constexpr int kWidth = 1600;
-constexpr int kRow = 470;      ///< pixels for a row of panels
-constexpr int kHeading = 110;  ///< … and for what is above all of them
+constexpr int kRow = 470;          ///< pixels for a row of panels
+constexpr int kAbovePanels = 110;  ///< … and for what is above all of them
 constexpr std::size_t kMostPoints = 1200;
 constexpr std::size_t kNamesInRow = 4;  ///< of the key; two rows of it have room, each further one takes …
 constexpr int kKeyRow = 18;             ///< … pixels
@@ -99,7 +99,7 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
   check_picture_name(path);
   const std::size_t rows = (panels.size() + 1) / 2;
   const int keys = room_for_keys(panels);
-  const int height = kHeading + (kRow + keys) * static_cast<int>(rows);
+  const int height = kAbovePanels + (kRow + keys) * static_cast<int>(rows);
   std::ostringstream out;
   out << begin_picture(path, kWidth, height) << "set border 3 lc rgb '" << kPale << "'\n"
       << "set tics nomirror out scale 0.6 textcolor rgb '" << kPale << "'\n"
@@ -123,7 +123,7 @@ std::string panels_script(const std::filesystem::path& path, const std::string& 
     const double left = p % 2 == 0 ? 0.045 : 0.545;
     const double right = left + 0.435;
     const std::size_t row = p / 2;
-    const double top = kHeading + static_cast<double>(row) * (kRow + keys) + keys + 74;
+    const double top = kAbovePanels + static_cast<double>(row) * (kRow + keys) + keys + 74;
     out << "set lmargin at screen " << left << "\nset rmargin at screen " << right << "\nset tmargin at screen "
         << up(top) << "\nset bmargin at screen " << up(top + kRow - 144) << "\n";
     out << "set label " << literal(panel.title) << " at screen " << left << "," << up(top - keys - 54)

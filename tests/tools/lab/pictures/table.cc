@@ -83,9 +83,6 @@ std::size_t width(std::string_view text) {
       std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
-std::string padded(const std::string& text, std::size_t to) {
-  return text + std::string(to - std::min(to, width(text)), ' ');
-}
 std::string padded_left(const std::string& text, std::size_t to) {
   return std::string(to - std::min(to, width(text)), ' ') + text;
 }
@@ -180,6 +177,10 @@ std::optional<double> p99_ms(const std::optional<Spread>& times) {
 }
 
 }  // namespace
+
+std::string padded(const std::string& text, std::size_t to) {
+  return text + std::string(to - std::min(to, width(text)), ' ');
+}
 
 std::string with_unit(double value, std::string_view unit) {
   const std::string symbol = " " + std::string(unit);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -22,6 +23,9 @@ struct Run {
 
 /// "12.3 mJ": three significant digits and a prefix from n to G; a true minus sign, "0 J", "∞ N".
 std::string with_unit(double value, std::string_view unit);
+
+/// `text` with spaces after it, `to` columns wide on a terminal: it has no combining and no wide characters.
+std::string padded(const std::string& text, std::size_t to);
 
 /// A figure that each run has, and an explanation below when one needs it. Text for people, UTF-8, aligned.
 std::string to_table(std::span<const Run> runs);

@@ -94,15 +94,6 @@ std::string sentence(const PairRun& run) {
 constexpr std::size_t kName = 46;
 constexpr std::size_t kCell = 26;
 
-std::size_t width(const std::string& text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
-std::string padded(const std::string& text, std::size_t to) {
-  return text + std::string(to - std::min(to, width(text)), ' ');
-}
-
 double largest(const PairRun::Line& line) {
   double most = 0;
   for (const auto& [time, value] : line) most = std::max(most, std::abs(value));
@@ -154,7 +145,7 @@ Curve curve(const std::string& name, const char* colour, const PairRun::Line& li
 /// One range for the panels of a row, so that two runs are compared by eye; unless that would hide one of them: then
 /// each has its own, and says so.
 void share_range(std::span<Panel> row) {
-  constexpr double kTooDifferent = 8;
+  constexpr double kOwnScaleBeyond = 8;
   constexpr double kFar = std::numeric_limits<double>::infinity();
   std::vector<Extremes> ranges(row.size());
   Extremes all;
@@ -169,7 +160,7 @@ void share_range(std::span<Panel> row) {
   const double size = all.most - all.least;
   if (!(size > 0)) return;
   for (Panel& panel : row) {
-    if (size > kTooDifferent * smallest) {
+    if (size > kOwnScaleBeyond * smallest) {
       panel.title += " (a scale of its own)";
     } else {
       panel.y_range = {all.least - 0.05 * size, all.most + 0.05 * size};
