@@ -9,6 +9,7 @@
 
 #include "core/base/expect.h"
 #include "core/base/rotation.h"
+#include "core/teleoperation/port_values.h"
 #include "core/teleoperation/shares.h"
 
 namespace tendon {
@@ -67,10 +68,6 @@ SurfaceModel<3> at_leader(const PortSurface& from, const PoseMap& map, std::uint
           .stiffness = stiffer * from.stiffness * length * length};
 }
 
-// False for what is not a number.
-bool fits(double value, double low, double high) noexcept { return value >= low && value <= high; }
-bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
-
 /// Of the others only one leader at a time can be right.
 bool can_be_shared(CouplingMethod method) noexcept {
   return method == CouplingMethod::kPositionPosition || method == CouplingMethod::kPositionForce;
@@ -108,7 +105,7 @@ Coupling::Coupling(const Config& config)
   refuse_of(config.holds_place, "holds_place", PortRole::kFollower);
   refuse_of(config.share.has_value(), "share", PortRole::kFollower);
   if (config.share) {
-    expect(fits(*config.share, 0, 1), "share", *config.share, "0 to 1");
+    expect(within(*config.share, 0, 1), "share", *config.share, "0 to 1");
     if (!can_be_shared(config.method)) {
       throw std::invalid_argument("method: expected position-position or position-force with several leaders, found " +
                                   std::string(to_string(config.method)));
@@ -378,7 +375,7 @@ void Coupling::renew() noexcept {
 bool Coupling::set_scale(double position_scale, double force_scale) noexcept {
   const bool bound =
       phase_ == PortPhase::kEngaged || phase_ == PortPhase::kAligning || keeps_scales(config_.method) || grip_;
-  if (!leads() || bound || !fits(position_scale, 0.01, 100) || !fits(force_scale, 0.01, 100)) return false;
+  if (!leads() || bound || !within(position_scale, 0.01, 100) || !within(force_scale, 0.01, 100)) return false;
   if (!config_.absolute) u_ *= map_.position_scale() / position_scale;
   rescale(position_scale, force_scale);
   scaled_ = true;
@@ -537,11 +534,11 @@ bool Coupling::shows_handle(const HandleSample* handle) const noexcept {
   if (!turn_ && !grip_) return true;
   if (handle == nullptr) return false;
   if (turn_ &&
-      (!handle->turning || !is_rotation(handle->turning->orientation) || !fits(handle->turning->angular_velocity))) {
+      (!handle->turning || !is_rotation(handle->turning->orientation) || !within(handle->turning->angular_velocity))) {
     return false;
   }
   return !grip_ ||
-         (handle->grip && fits(handle->grip->opening, -1e12, 1e12) && fits(handle->grip->velocity, -1e12, 1e12));
+         (handle->grip && within(handle->grip->opening, -1e12, 1e12) && within(handle->grip->velocity, -1e12, 1e12));
 }
 
 CouplingPeriod Coupling::period(bool changed, bool placed) const noexcept {
@@ -702,7 +699,7 @@ void Coupling::follow_share() noexcept {
 Demand<3> Coupling::command(const Motion& hand, std::uint32_t buttons, bool ready,
                             const HandleSample* handle) noexcept {
   advance(hand.at, buttons, ready);
-  if (!fits(hand.position) || !fits(hand.velocity) || !shows_handle(handle)) {
+  if (!within(hand.position) || !within(hand.velocity) || !shows_handle(handle)) {
     skip();
     return {Vec3::Constant(std::numeric_limits<double>::quiet_NaN())};
   }
@@ -799,8 +796,8 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
   state.buttons = buttons_;
   state.position = u_;
   state.velocity = u_velocity_;
-  if (fits(applied)) state.force = applied;
-  if (contact && fits(*contact)) state.contact_force = contact;
+  if (within(applied)) state.force = applied;
+  if (contact && within(*contact)) state.contact_force = contact;
   if (estimator_ && live() && state.contact_force) {
     const SurfaceModel<3> found = estimator_->observe(u_, *contact);
     surface_ = {.normal = found.normal, .offset = found.offset, .stiffness = found.stiffness};
@@ -831,8 +828,8 @@ PortState Coupling::message(const Vec3& applied, const std::optional<Vec3>& cont
     state.given = paid.given;
     state.taken = paid.taken;
   }
-  if (turn_) state.turn = turn_->message(fits(torque) ? torque : Vec3(Vec3::Zero()));
-  if (grip_) state.grip = grip_->message(fits(grip, -1e12, 1e12) ? grip : 0);
+  if (turn_) state.turn = turn_->message(within(torque) ? torque : Vec3(Vec3::Zero()));
+  if (grip_) state.grip = grip_->message(within(grip, -1e12, 1e12) ? grip : 0);
   return state;
 }
 

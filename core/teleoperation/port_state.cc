@@ -4,17 +4,14 @@
 #include <chrono>
 
 #include "core/base/rotation.h"
+#include "core/teleoperation/port_values.h"
 #include "core/teleoperation/purse.h"
 
 namespace tendon {
 
 namespace {
 
-// False for what is not a number.
-bool fits(double value, double low, double high) noexcept { return value >= low && value <= high; }
-bool fits(const Vec3& vector) noexcept { return (vector.array().abs() <= 1e12).all(); }
-
-bool is_scale(double scale) noexcept { return scale == 0 || fits(scale, 0.01, 100); }
+bool is_scale(double scale) noexcept { return scale == 0 || within(scale, 0.01, 100); }
 
 }  // namespace
 
@@ -59,20 +56,20 @@ std::string_view to_string(PortPhase phase) noexcept {
 }
 
 bool is_sound(const PortSurface& surface) noexcept {
-  return fits(surface.normal.norm(), 0.999, 1.001) && fits(surface.offset, -1e12, 1e12) &&
-         fits(surface.stiffness, 0, 1e12);
+  return within(surface.normal.norm(), 0.999, 1.001) && within(surface.offset, -1e12, 1e12) &&
+         within(surface.stiffness, 0, 1e12);
 }
 
 bool is_sound(const PortTurn& turn) noexcept {
-  return is_rotation(turn.turn) && fits(turn.angular_velocity) && fits(turn.torque);
+  return is_rotation(turn.turn) && within(turn.angular_velocity) && within(turn.torque);
 }
 
 bool is_sound(const PortGrip& grip) noexcept {
   constexpr double kAccount = PurseMessage::kMostAccount;
   constexpr double kTotal = PurseMessage::kMostTotal;
-  return fits(grip.opening, -1e12, 1e12) && fits(grip.velocity, -1e12, 1e12) && fits(grip.force, -1e12, 1e12) &&
-         fits(grip.account, -kAccount, kAccount) && fits(grip.need, 0, kAccount) && fits(grip.given, 0, kTotal) &&
-         fits(grip.taken, 0, kTotal);
+  return within(grip.opening, -1e12, 1e12) && within(grip.velocity, -1e12, 1e12) && within(grip.force, -1e12, 1e12) &&
+         within(grip.account, -kAccount, kAccount) && within(grip.need, 0, kAccount) && within(grip.given, 0, kTotal) &&
+         within(grip.taken, 0, kTotal);
 }
 
 bool is_sound(const PortState& state) noexcept {
@@ -81,13 +78,14 @@ bool is_sound(const PortState& state) noexcept {
   constexpr double kTotal = PurseMessage::kMostTotal;
   return state.epoch > 0 && state.sequence > 0 && state.time >= -kMostTime && state.time <= kMostTime &&
          state.round_trip >= Duration::zero() && state.round_trip <= PortState::kMostRoundTrip &&
-         state.phase >= PortPhase::kAlone && state.phase <= PortPhase::kFault && fits(state.position) &&
-         fits(state.velocity) && fits(state.force) && (!state.contact_force || fits(*state.contact_force)) &&
-         fits(state.account, -kAccount, kAccount) && fits(state.need, 0, kAccount) && fits(state.given, 0, kTotal) &&
-         fits(state.taken, 0, kTotal) && fits(state.wave_integral) && fits(state.wave_energy, 0, kTotal) &&
-         (!state.surface || is_sound(*state.surface)) && (!state.turn || is_sound(*state.turn)) &&
-         (!state.grip || is_sound(*state.grip)) && fits(state.energy_in, 0, kTotal) &&
-         (!state.share || fits(*state.share, 0, 1)) && is_scale(state.position_scale) && is_scale(state.force_scale);
+         state.phase >= PortPhase::kAlone && state.phase <= PortPhase::kFault && within(state.position) &&
+         within(state.velocity) && within(state.force) && (!state.contact_force || within(*state.contact_force)) &&
+         within(state.account, -kAccount, kAccount) && within(state.need, 0, kAccount) &&
+         within(state.given, 0, kTotal) && within(state.taken, 0, kTotal) && within(state.wave_integral) &&
+         within(state.wave_energy, 0, kTotal) && (!state.surface || is_sound(*state.surface)) &&
+         (!state.turn || is_sound(*state.turn)) && (!state.grip || is_sound(*state.grip)) &&
+         within(state.energy_in, 0, kTotal) && (!state.share || within(*state.share, 0, 1)) &&
+         is_scale(state.position_scale) && is_scale(state.force_scale);
 }
 
 }  // namespace tendon

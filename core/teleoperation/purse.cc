@@ -4,13 +4,11 @@
 #include <cmath>
 
 #include "core/base/expect.h"
+#include "core/teleoperation/port_values.h"
 
 namespace tendon {
 
 namespace {
-
-// False for what is not a number.
-bool within(double value, double low, double high) noexcept { return value >= low && value <= high; }
 
 bool possible(const PurseMessage& message) noexcept {
   constexpr double kAccount = PurseMessage::kMostAccount;
