@@ -9,7 +9,7 @@
 namespace tendon {
 namespace {
 
-constexpr double kWholeAtAnyDelay = std::numeric_limits<double>::infinity();
+constexpr double kUnboundedGrip = std::numeric_limits<double>::infinity();
 
 std::optional<Purse> purse_of(const GripCoupling::End& end, const PoseMap& map) {
   if (!end.purse) return std::nullopt;
@@ -38,7 +38,7 @@ GripCoupling::GripCoupling(const Config& config, const End& end, const PoseMap& 
       whole_(end.role == PortRole::kLeader ? config.stiffness : map.grip_stiffness_at_follower(config.stiffness)),
       peers_(end.role == PortRole::kLeader ? map.grip_stiffness_at_follower(config.stiffness) : config.stiffness),
       damping_(end.role == PortRole::kLeader ? config.damping : map.grip_stiffness_at_follower(config.damping)),
-      stiffness_({.most = whole_, .damping = end.adapts ? damping_ : kWholeAtAnyDelay, .period = end.period}),
+      stiffness_({.most = whole_, .damping = end.adapts ? damping_ : kUnboundedGrip, .period = end.period}),
       purse_(purse_of(end, map)) {
   expect_above_zero(config.stiffness, "grip.stiffness");
   expect_not_negative(config.damping, "grip.damping");

@@ -7,7 +7,7 @@
 namespace tendon {
 namespace {
 
-constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+constexpr double kUnboundedTurn = std::numeric_limits<double>::infinity();
 
 /// The gradient of 4 K (1 − |w|); see the header.
 Vec3 spring(double stiffness, const Quat& rest, const Quat& q) noexcept {
@@ -24,7 +24,7 @@ TurnCoupling::TurnCoupling(const Config& config, const End& end, const PoseMap& 
       whole_(end.role == PortRole::kLeader ? config.stiffness : map.turn_stiffness_at_follower(config.stiffness)),
       damping_(end.role == PortRole::kLeader ? config.damping : map.turn_stiffness_at_follower(config.damping)),
       max_torque_(config.max_torque),
-      stiffness_({.most = whole_, .damping = end.adapts ? damping_ : kUnbounded, .period = end.period}) {
+      stiffness_({.most = whole_, .damping = end.adapts ? damping_ : kUnboundedTurn, .period = end.period}) {
   expect_above_zero(config.stiffness, "turn.stiffness");
   expect_not_negative(config.damping, "turn.damping");
   if (end.adapts) {
@@ -39,7 +39,7 @@ void TurnCoupling::remap(const PoseMap& map) noexcept {
   if (leads()) return;
   whole_ = map.turn_stiffness_at_follower(config_.stiffness);
   damping_ = map.turn_stiffness_at_follower(config_.damping);
-  stiffness_.become(whole_, end_.adapts ? damping_ : kUnbounded);
+  stiffness_.become(whole_, end_.adapts ? damping_ : kUnboundedTurn);
 }
 
 void TurnCoupling::receive(const std::optional<PortTurn>& peer) noexcept {
