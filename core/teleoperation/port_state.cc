@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/teleoperation/port_state.h"
 
-#include <chrono>
-
 #include "core/base/rotation.h"
 #include "core/teleoperation/port_values.h"
 #include "core/teleoperation/purse.h"
