@@ -203,7 +203,7 @@ void ForceClient::open(LocalTime now, const Welcome& welcome) {
   stats_.left_out = {};
   ask_lease_ = config_.take_lease && role_ == Role::kController && !holds_ ? now : LocalTime::max();
   Session& session = *connection_.session();
-  if (claims()) session.request(Describe{.device = place_.device});
+  if (claims() || agreed_to(kFeatureHandle)) session.request(Describe{.device = place_.device});
   if (agreed_to(kFeatureHandle)) session.request(Describe{.device = place_.device, .handle = true});
   deadband_request_ = config_.state_deadband ? session.request(*config_.state_deadband) : std::nullopt;
   foretell_ = false;

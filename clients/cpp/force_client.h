@@ -182,6 +182,10 @@ class ForceClient {
   /// to the server.
   LocalTime turn(LocalTime now);
 
+  /// Shows the callback the newest state once more, in the next turn: for an engine whose answer has changed since it saw
+  /// that state, and for which the next state would come late. Nothing happens without a state.
+  void answer_again() { unseen_ = newest_; }
+
   /// Asks the server to clear a latched fault of its device, and to take a disarm back; with a safety layer it is the
   /// request to arm. Controllers only: an observer is refused. False when there is no session to ask in, or too many
   /// requests are open.
@@ -222,7 +226,8 @@ class ForceClient {
 
   /// What the server said of itself and its device when the newest session opened; empty before that.
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
-  /// What the device is and can do, when we have named a device or a channel and the server has answered; empty before.
+  /// What the device is and can do, once the server has answered; empty before, and for good when we have named neither
+  /// a device nor a channel and the server does not know kFeatureHandle.
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
   /// How the device lies before the operator, its buttons' names, and what else its handle can do, once the server has
   /// answered; empty before, and for good when the server does not know kFeatureHandle.

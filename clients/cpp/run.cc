@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <deque>
 #include <exception>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "clients/cpp/machine.h"
+#include "clients/cpp/stop_signals.h"
 #include "clients/cpp/udp_transport.h"
 
 namespace tendon {
@@ -24,31 +24,6 @@ using Json = nlohmann::ordered_json;  // members in the order in which they are 
 
 /// Longest sleep: a signal that slips in just before the sleep is noticed after it.
 constexpr Duration kLongestWait = std::chrono::milliseconds(100);
-
-volatile std::sig_atomic_t stop_asked = 0;
-
-/// SIGINT and SIGTERM ask for a stop; a second one of the same kind ends the process as usual.
-class StopSignals {
- public:
-  StopSignals() {
-    stop_asked = 0;
-    struct sigaction action {};
-    action.sa_handler = [](int) { stop_asked = 1; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
-  }
-  ~StopSignals() {
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-
- private:
-  struct sigaction old_int_ {};
-  struct sigaction old_term_ {};
-};
 
 double milliseconds(Duration d) { return std::chrono::duration<double, std::milli>(d).count(); }
 
@@ -248,7 +223,7 @@ int run_with(const Options& options, const std::map<std::string, Callback>& call
     }
     LocalTime now = start;
     LocalTime quiet = heard != nullptr ? start + options.silence : LocalTime::max();
-    while (now < end && stop_asked == 0) {
+    while (now < end && !signals.asked()) {
       LocalTime next = end;
       for (Guest& guest : guests) {
         const std::optional<LocalTime> due = guest.turn(now);

@@ -87,6 +87,8 @@ std::size_t UdpTransport::receive(Address& from, std::span<std::byte> buffer) {
 
 LocalTime UdpTransport::received_by(LocalTime now) const { return std::max(now, read_clock()); }
 
+int UdpTransport::descriptor() const { return socket_->socket.native_handle(); }
+
 void UdpTransport::wait(Duration timeout) {
   UdpTransport* const alone = this;
   wait_for_any({&alone, 1}, timeout);
@@ -95,7 +97,7 @@ void UdpTransport::wait(Duration timeout) {
 void UdpTransport::wait_for_any(std::span<UdpTransport* const> transports, Duration timeout) {
   std::vector<pollfd> readable;
   for (UdpTransport* const transport : transports) {
-    readable.push_back({transport->socket_->socket.native_handle(), POLLIN, 0});
+    readable.push_back({transport->descriptor(), POLLIN, 0});
   }
   const Duration left = std::max(timeout, Duration::zero());
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);

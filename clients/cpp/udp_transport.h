@@ -40,6 +40,10 @@ class UdpTransport : public Link {
   /// The time by std::chrono::steady_clock, as run() passes it.
   LocalTime received_by(LocalTime now) const override;
 
+  /// The socket's file descriptor, for a caller that sleeps on other things too: poll() says when it can be read. Another
+  /// one after look_up_again().
+  int descriptor() const;
+
   /// Sleeps until a datagram can be received or `timeout` is over; a signal handler may end it sooner.
   /// A timeout of zero or less does not sleep.
   void wait(Duration timeout);

@@ -74,7 +74,7 @@ const std::vector<Door>& front_doors() {
       {"nlohmann's JSON",
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/engine/self_test.cc", "clients/cpp/run.cc",
-        "clients/dashboard/page_json.cc", "clients/softbody/explain.cc", "*_main.cc"}},
+        "clients/dashboard/page_json.cc", "clients/plug/desk.cc", "clients/softbody/explain.cc", "*_main.cc"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
        {"google/protobuf/", "*.pb.h", "protocol/wire/fields.h", "protocol/wire/frame_codec.h"},

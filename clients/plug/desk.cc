@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/plug/desk.h"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "clients/cpp/machine.h"
+
+namespace tendon::plug {
+namespace {
+
+/// A signal that slips in just before the sleep is noticed after it.
+constexpr Duration kLongestWait = std::chrono::milliseconds(100);
+constexpr Duration kLineEvery = std::chrono::seconds(1);
+
+Plug::Config config_of(const DeskConfig& config, const std::string& device) {
+  Plug::Config of_plug{.client = config.client, .new_seed = seed_from_system, .observe = config.observe};
+  of_plug.client.device = device;
+  return of_plug;
+}
+
+}  // namespace
+
+Desk::Place::Place(const DeskConfig& config, const std::string& device, LocalTime now)
+    : name(device.empty() ? "device" : device),
+      watcher(config.server),
+      controller(config.server),
+      plug({watcher, watcher.server()}, {controller, controller.server()}, config_of(config, device), now) {}
+
+Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_line_(now + kLineEvery) {
+  if (config_.devices.empty()) config_.devices.emplace_back();
+  for (const std::string& device : config_.devices) places_.emplace_back(config_, device, now);
+}
+
+std::optional<std::size_t> Desk::find(std::string_view name) const {
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (places_[i].name == name) return i;
+  }
+  return {};
+}
+
+void Desk::say(const std::string& sentence) const {
+  if (!config_.quiet) std::cerr << "tendon-plug: " << sentence << '\n';
+}
+
+/// The server may have another address by now. Where nobody answered at one, the next one is tried.
+void Desk::look_up_again(Place& place) {
+  try {
+    place.watcher.look_up_again(true);
+    place.controller.look_up_again(true);
+    place.plug.move_to(place.watcher.server(), place.controller.server());
+  } catch (const std::runtime_error& error) {
+    say(place.name + ": " + error.what());
+  }
+}
+
+LocalTime Desk::turn(LocalTime now, std::span<const Count> counts) {
+  LocalTime next = LocalTime::max();
+  for (Place& place : places_) {
+    next = std::min(next, place.plug.turn(now));
+    while (const auto sentence = place.plug.next_sentence()) say(place.name + ": " + *sentence);
+    const bool lost = place.plug.lost();
+    if (lost && !place.looked_up) look_up_again(place);
+    place.looked_up = lost;
+  }
+  if (config_.json) {
+    if (now >= next_line_) {
+      write_line(counts);
+      next_line_ = now + kLineEvery;
+    }
+    next = std::min(next, next_line_);
+  }
+  return next;
+}
+
+void Desk::write_line(std::span<const Count> counts) {
+  for (const Place& place : places_) {
+    const Plug& plug = place.plug;
+    nlohmann::ordered_json line = {
+        {"device", place.name},
+        {"states", plug.states()},
+        {"forces", plug.forces()},
+        {"dropped", plug.forces_dropped()},
+        {"unusable", plug.forces_unusable()},
+        {"owner", plug.owner()},
+        {"pushes", plug.pushes()},
+        {"round_trip_ms", std::chrono::duration<double, std::milli>(plug.link().smoothed_round_trip).count()}};
+    for (const auto& [name, count] : counts) line[std::string(name)] = count;
+    std::cout << line << std::endl;
+  }
+}
+
+std::vector<int> Desk::descriptors() const {
+  std::vector<int> all;
+  for (const Place& place : places_) {
+    all.push_back(place.watcher.descriptor());
+    all.push_back(place.controller.descriptor());
+  }
+  return all;
+}
+
+void Desk::wait(std::span<pollfd> others, LocalTime now, LocalTime until) {
+  polled_.assign(others.begin(), others.end());
+  for (const int descriptor : descriptors()) polled_.push_back({descriptor, POLLIN, 0});
+  const Duration left = std::clamp(until - now, Duration::zero(), kLongestWait);
+  const auto whole = std::chrono::duration_cast<std::chrono::seconds>(left);
+  const timespec time{static_cast<time_t>(whole.count()), static_cast<long>((left - whole).count())};
+  if (::ppoll(polled_.data(), polled_.size(), &time, nullptr) <= 0) {
+    for (pollfd& one : others) one.revents = 0;
+    return;
+  }
+  std::copy_n(polled_.begin(), others.size(), others.begin());
+}
+
+void Desk::stop(LocalTime now) {
+  for (Place& place : places_) place.plug.stop(now);
+}
+
+}  // namespace tendon::plug

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-plug: programs that exist already use a Tendon device without new code. One subcommand for each way in.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <utility>
+
+#include "clients/cpp/key_file.h"
+#include "clients/plug/subcommands.h"
+
+namespace tendon::plug {
+namespace {
+
+/// "" when `check` accepts the text, else what it throws.
+CLI::Validator accepted_by(std::function<void(const std::string&)> check) {
+  return CLI::Validator(
+      [check = std::move(check)](const std::string& text) -> std::string {
+        try {
+          check(text);
+          return {};
+        } catch (const std::exception& error) {
+          return error.what();
+        }
+      },
+      "");
+}
+
+}  // namespace
+
+void add_common(CLI::App& app, DeskConfig& desk) {
+  app.add_option_function<std::string>(
+         "--server", [&](const std::string& text) { desk.server = text; },
+         "Where tendond listens: a host name or an address")
+      ->type_name("HOST:PORT")
+      ->default_str(desk.server.text())
+      ->check(accepted_by([](const std::string& text) { ServerName{text}; }));
+  app.add_option_function<std::string>(
+         "--key", [&](const std::string& file) { desk.client.key = read_client_key(file).key; },
+         "Key file (see `tendond keygen`); needed unless the server is on this machine and has no keys")
+      ->type_name("FILE")
+      ->check(accepted_by([](const std::string& file) { read_client_key(file); }));
+  app.add_option("--device", desk.devices, "A device's name; several times for several. None: the server's first one")
+      ->type_name("NAME");
+  app.add_option("--channel", desk.client.channel, "Name of the device's channel that takes the forces")
+      ->type_name("NAME");
+  app.add_flag("--take-lease", desk.client.take_lease, "Ask for the channel until it is ours");
+  app.add_flag("--observe", desk.observe, "Send no forces");
+  app.add_flag("--json", desk.json, "One JSON object per line on stdout, once a second for each device");
+}
+
+namespace {
+
+int run(int argc, char** argv) {
+  CLI::App app(
+      "Programs that exist already use a Tendon device without new code. tendon-plug runs beside the old program; "
+      "Tendon's sealed and limited wire crosses the network.",
+      "tendon-plug");
+  app.footer("Example: tendon-plug vrpn --server lab:47100 --name Phantom0=right");
+  app.set_help_flag("-h,--help", "Print this text and exit");
+  app.set_version_flag("--version", TENDON_VERSION);
+  app.require_subcommand(1);
+  Chosen chosen;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return chosen();
+}
+
+}  // namespace
+}  // namespace tendon::plug
+
+int main(int argc, char** argv) {
+  try {
+    return tendon::plug::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "tendon-plug: " << error.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+#include "clients/plug/desk.h"
+
+namespace CLI {
+class App;
+}
+
+namespace tendon::plug {
+
+/// What the chosen subcommand does once the whole command line has been read; returns the exit code. An exception is
+/// said on stderr and ends the program with 1.
+using Chosen = std::function<int()>;
+
+/// The options that every bridge has: --server, --key, --device, --channel, --take-lease, --observe, --json.
+void add_common(CLI::App& app, DeskConfig& desk);
+
+// Each bridge adds its subcommand, in FOLDER/…_main.cc, and sets `chosen` when it is the one.
+
+}  // namespace tendon::plug
