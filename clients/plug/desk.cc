@@ -7,6 +7,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "clients/cpp/machine.h"
 
@@ -50,8 +51,9 @@ void Desk::say(const std::string& sentence) const {
 /// The server may have another address by now. Where nobody answered at one, the next one is tried.
 void Desk::look_up_again(Place& place) {
   try {
-    place.watcher.look_up_again(true);
-    place.controller.look_up_again(true);
+    const bool another = place.phase == ForceClient::Phase::kUnanswered;
+    place.watcher.look_up_again(another);
+    place.controller.look_up_again(another);
     place.plug.move_to(place.watcher.server(), place.controller.server());
   } catch (const std::runtime_error& error) {
     say(place.name + ": " + error.what());
@@ -63,9 +65,8 @@ LocalTime Desk::turn(LocalTime now, std::span<const Count> counts) {
   for (Place& place : places_) {
     next = std::min(next, place.plug.turn(now));
     while (const auto sentence = place.plug.next_sentence()) say(place.name + ": " + *sentence);
-    const bool lost = place.plug.lost();
-    if (lost && !place.looked_up) look_up_again(place);
-    place.looked_up = lost;
+    const ForceClient::Phase phase = place.plug.phase();
+    if (phase != std::exchange(place.phase, phase) && is_between_attempts(phase)) look_up_again(place);
   }
   if (config_.json) {
     if (now >= next_line_) {

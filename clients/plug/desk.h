@@ -79,7 +79,7 @@ class Desk {
     UdpTransport watcher;
     UdpTransport controller;
     Plug plug;
-    bool looked_up = false;  ///< since it was lost
+    ForceClient::Phase phase = ForceClient::Phase::kGreeting;
   };
 
   void look_up_again(Place& place);

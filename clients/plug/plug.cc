@@ -9,10 +9,13 @@ namespace {
 
 using Phase = ForceClient::Phase;
 
-bool waits(const ForceClient& client) {
-  const Phase phase = client.phase();
-  return phase == Phase::kUnanswered || phase == Phase::kRefused || phase == Phase::kLost;
-}
+/// The states of two sessions may overtake each other. One that is older by so many ticks comes from a server that has
+/// started anew.
+constexpr std::uint64_t kReordered = 1000;
+
+constexpr std::size_t kMaxSentences = 16;
+
+bool is_open(const std::unique_ptr<ForceClient>& client) { return client && client->phase() == Phase::kOpen; }
 
 }  // namespace
 
@@ -31,14 +34,12 @@ std::unique_ptr<ForceClient> Plug::new_client(LocalTime now, bool controls) {
     return std::make_unique<ForceClient>(way.link, way.server, config, physics, now);
   }
   config.take_lease = false;
-  const Watch watch = [this](const DeviceState& state, const LinkStats&) {
-    if (!pushes()) take(state, now_);
-  };
+  const Watch watch = [this](const DeviceState& state, const LinkStats&) { take(state, now_); };
   return std::make_unique<ForceClient>(way.link, way.server, config, watch, now);
 }
 
 void Plug::take(const DeviceState& state, LocalTime now) {
-  if (state_ && state_->tick == state.tick) return;
+  if (state_ && state_->tick >= state.tick && state_->tick - state.tick < kReordered) return;
   state_ = state;
   arrived_ = now;
   ++states_;
@@ -84,9 +85,10 @@ LocalTime Plug::turn(LocalTime now) {
   if (controller_) {
     next = std::min(next, controller_->turn(now));
     learn_from(*controller_);
+    note_changes();
   }
   if (pushes()) {
-    if (watcher_) {
+    if (watcher_ && controller_->stats().states > 0) {
       watcher_->stop(now);
       watcher_.reset();
     }
@@ -96,6 +98,7 @@ LocalTime Plug::turn(LocalTime now) {
   if (watcher_) {
     next = std::min(next, watcher_->turn(now));
     learn_from(*watcher_);
+    note_changes();
   }
   if (lost()) {
     state_.reset();
@@ -157,23 +160,32 @@ std::string Plug::connection_in_words() const {
   return {};
 }
 
+std::string Plug::force_in_words() const {
+  if (pushes()) return "takes the forces of a program";
+  if (!controller_) return said_of_force_.empty() ? "" : "takes no forces any more: no program asks for one";
+  const ForceClient::Stats stats = controller_->stats();
+  if (is_between_attempts(stats.phase)) return "takes no forces: " + stats.reason;
+  if (stats.phase != Phase::kOpen) return {};
+  return "takes no forces: " + (stats.lease_lost_to.empty() ? "another engine" : stats.lease_lost_to) +
+         " has the channel" + (config_.client.take_lease ? "; asking for it" : "; --take-lease asks for it");
+}
+
+void Plug::note_changes() {
+  const auto note = [&](std::string& said, std::string words) {
+    if (words.empty() || words == said) return;
+    said = words;
+    sentences_.push_back(std::move(words));
+    if (sentences_.size() > kMaxSentences) sentences_.pop_front();
+  };
+  note(said_, connection_in_words());
+  note(said_of_force_, force_in_words());
+}
+
 std::optional<std::string> Plug::next_sentence() {
-  if (stopped_) return {};
-  if (std::string words = connection_in_words(); !words.empty() && words != said_) return said_ = std::move(words);
-  std::string of_force;
-  if (pushes()) {
-    of_force = "takes the forces of a program";
-  } else if (controller_ && controller_->phase() == Phase::kOpen) {
-    const std::string& by = controller_->stats().lease_lost_to;
-    of_force = "takes no forces: " + (by.empty() ? "another engine" : by) + " has the channel" +
-               (config_.client.take_lease ? "; asking for it" : "; --take-lease asks for it");
-  } else if (controller_ && waits(*controller_)) {
-    of_force = "takes no forces: " + controller_->stats().reason;
-  } else if (!controller_ && !said_of_force_.empty()) {
-    of_force = "takes no forces any more: no program asks for one";
-  }
-  if (of_force.empty() || of_force == said_of_force_) return {};
-  return said_of_force_ = std::move(of_force);
+  if (sentences_.empty()) return {};
+  std::string sentence = std::move(sentences_.front());
+  sentences_.pop_front();
+  return sentence;
 }
 
 void Plug::move_to(const Address& watcher, const Address& controller) {
@@ -183,9 +195,9 @@ void Plug::move_to(const Address& watcher, const Address& controller) {
   if (controller_) controller_->move_to(controller);
 }
 
-bool Plug::lost() const noexcept {
-  return !stopped_ && (!watcher_ || waits(*watcher_)) && (!controller_ || waits(*controller_)) &&
-         (watcher_ || controller_);
+Phase Plug::phase() const noexcept {
+  if (stopped_) return Phase::kStopped;
+  return is_open(watcher_) || is_open(controller_) ? Phase::kOpen : speaker().phase();
 }
 
 void Plug::stop(LocalTime now) {

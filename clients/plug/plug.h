@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -35,8 +36,8 @@ class Plug {
   using Program = std::uint32_t;
 
   struct Config {
-    ForceClient::Config client;  ///< name, device, channel, key, take_lease …; `seed` is replaced by `new_seed`
-    std::function<Seed()> new_seed;
+    ForceClient::Config client{};  ///< name, device, channel, key, take_lease …; `seed` is replaced by `new_seed`
+    std::function<Seed()> new_seed{};
     bool observe = false;                     ///< no force of any program is sent
     Duration idle = std::chrono::seconds(1);  ///< … without a force asked for: the owner and the channel are let go
   };
@@ -86,13 +87,16 @@ class Plug {
   std::uint64_t forces_unusable() const noexcept;                     ///< not sent: not finite, or out of bounds
   LinkStats link() const;                                             ///< of the session that the states come by
 
-  /// Each change in a sentence, once: connected, lost, refused, no answer, controls, controls no more. Empty: nothing
-  /// new.
+  /// Each change in a sentence, once: connected, lost, refused, no answer, controls, controls no more. The
+  /// newest 16 that nobody has taken. Empty: nothing new.
   std::optional<std::string> next_sentence();
 
-  /// The server is found at another address: for the next attempts. `lost` says that both sessions wait for one.
+  /// Of the session that the states come by; kStopped after stop().
+  ForceClient::Phase phase() const noexcept;
+  /// Whether no session is open: not yet, or not any more.
+  bool lost() const noexcept { return phase() != ForceClient::Phase::kOpen; }
+  /// The server is found at other addresses, for the next attempts. To be called while `lost`.
   void move_to(const Address& watcher, const Address& controller);
-  bool lost() const noexcept;
 
   /// Says Bye. Any further turn does nothing.
   void stop(LocalTime now);
@@ -105,6 +109,8 @@ class Plug {
   void end_controller(LocalTime now);
   const ForceClient& speaker() const noexcept { return watcher_ ? *watcher_ : *controller_; }
   std::string connection_in_words() const;
+  std::string force_in_words() const;
+  void note_changes();
 
   Way watcher_way_;
   Way controller_way_;
@@ -127,9 +133,16 @@ class Plug {
   std::uint64_t dropped_ = 0;
   std::uint64_t forces_before_ = 0;  ///< of the controllers that have ended
   std::uint64_t unusable_before_ = 0;
-  std::string said_;           ///< the newest sentence about the connection
-  std::string said_of_force_;  ///< likewise, about the channel
+  std::deque<std::string> sentences_;  ///< that nobody has taken yet
+  std::string said_;                   ///< the newest sentence about the connection
+  std::string said_of_force_;          ///< likewise, about the channel
   bool stopped_ = false;
 };
+
+/// Whether an attempt or a session is over and the next attempt not begun.
+constexpr bool is_between_attempts(ForceClient::Phase phase) {
+  return phase == ForceClient::Phase::kUnanswered || phase == ForceClient::Phase::kRefused ||
+         phase == ForceClient::Phase::kLost;
+}
 
 }  // namespace tendon::plug

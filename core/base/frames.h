@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/LU>  // determinant()
 #include <optional>
 #include <span>
 #include <string>

@@ -61,8 +61,7 @@ LocalTime Server::turn(LocalTime now) {
     if (const auto* force = std::get_if<Session::ForceArrived>(&*event)) {
       forces.emplace_back(now, force->command);
     } else if (const auto* request = std::get_if<Session::RequestArrived>(&*event)) {
-      const auto* described = std::get_if<Describe>(&request->request);
-      if (described == nullptr || !described->handle) requests.push_back(request->request);
+      if (!std::holds_alternative<Describe>(request->request)) requests.push_back(request->request);
       if (const auto* wanted = std::get_if<TakeLease>(&request->request)) {
         give_lease(request->id, *wanted);
       } else {

@@ -100,7 +100,7 @@ class Server {
   std::vector<LocalTime> attempts;  ///< when Hellos with a good cookie came, one per attempt
   std::vector<Hello> hellos;        ///< … and what they said
   std::vector<std::pair<LocalTime, ForceCommand>> forces;
-  std::vector<Request> requests;  ///< but for the handle's description: everybody asks for that
+  std::vector<Request> requests;  ///< but for descriptions: everybody asks for those
   std::optional<Code> closed;     ///< how the last session ended
   int welcomes = 0;
   std::uint64_t tick = 0;  ///< of the newest state sent

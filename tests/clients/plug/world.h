@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/plug/plug.h"
+#include "devices/simulated/simulated_device.h"
+#include "server/haptic_loop.h"
+#include "server/network_loop.h"
+#include "server/scene/scene.h"
+#include "tests/support/wire.h"
+
+namespace tendon::plug {
+
+/// The server's loops with a shipped scene, and plugs that reach it, on virtual time: one haptic step each millisecond,
+/// and `delay` each way. Nothing is random but the simulated device.
+class World {
+ public:
+  explicit World(const std::string& scene_file, const std::vector<std::string>& settings = {}, int delay_ms = 0)
+      : scene_(parse_scene(text_of(scene_file), scene_file, ".", settings)), delay_ms_(delay_ms) {
+    open_server();
+  }
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  /// A plug of its own: its two sessions are two more clients of the server.
+  Plug& add_plug(Plug::Config config = {}) {
+    config.new_seed = [this] {
+      Seed seed;
+      seed.bytes[0] = static_cast<std::byte>(++seeds_);
+      return seed;
+    };
+    Guest& guest = guests_.emplace_back();
+    const auto n = std::to_string(guests_.size());
+    guest.watcher = std::make_unique<End>(wire_, parse_address("127.0.0.2:1" + n));
+    guest.controller = std::make_unique<End>(wire_, parse_address("127.0.0.3:1" + n));
+    guest.plug = std::make_unique<Plug>(Plug::Way{*guest.watcher, kServer}, Plug::Way{*guest.controller, kServer},
+                                        std::move(config), now);
+    return *guest.plug;
+  }
+
+  /// Lets time pass; `each` is called each millisecond, after the plugs' turns.
+  void run(int milliseconds, const std::function<void()>& each = nullptr) {
+    for (int i = 0; i < milliseconds; ++i) {
+      now += std::chrono::milliseconds(1);
+      turn_server();
+      if (haptic_) haptic_->step(now);
+      turn_server();
+      turn_plugs();
+      if (each) {
+        each();
+        turn_plugs();  // what was asked leaves now
+      }
+      carry();
+    }
+  }
+
+  /// The server dies without a word; it may come back, and knows nothing of before.
+  void kill_server() {
+    network_.reset();
+    haptic_.reset();
+  }
+  void open_server() {
+    ++epoch_;
+    device_ = std::make_unique<SimulatedDevice>(scene_.simulated());
+    mail_ = std::make_unique<Mailboxes>(Mailboxes::Capacities{.steps = 16, .ports = 1, .flight = 2, .datagrams = 1});
+    haptic_ = std::make_unique<HapticLoop>(scene_.loop, *device_, *mail_);
+    NetworkLoop::Config config;
+    config.secret.fill(std::byte{7});
+    config.first_connection_id = 1000 * epoch_;
+    DeviceDescription about{.name = "device", .model = "simulated falcon", .loop_hz = 1000};
+    for (const Scene::Channel& channel : scene_.channels) {
+      about.channels.push_back({.name = channel.name, .lease = channel.lease});
+    }
+    if (about.channels.empty()) about.channels.push_back({.name = "main"});
+    config.devices = {about};
+    config.handles = {handle};
+    network_ = std::make_unique<NetworkLoop>(config, server_, std::vector<Mailboxes*>{mail_.get()});
+    network_->turn(now);
+  }
+
+  /// Datagrams go through, or are lost.
+  bool connected = true;
+  LocalTime now = LocalTime(std::chrono::seconds(1000));
+  StepRecord step;           ///< the newest haptic step
+  double least_energy = 0;   ///< J, of the ledger: below zero is energy that nobody put in
+  HandleDescription handle;  ///< what the server says of it from its next start on
+
+ private:
+  struct Guest {
+    std::unique_ptr<End> watcher;
+    std::unique_ptr<End> controller;
+    std::unique_ptr<Plug> plug;
+  };
+  struct UnderWay {
+    LocalTime due;
+    Datagram datagram;
+  };
+  inline static const Address kServer = parse_address("127.0.0.1:47100");
+
+  static std::string text_of(const std::string& scene) {
+    std::ifstream file(std::filesystem::path(TENDON_SOURCE_DIR) / "deploy" / "scenes" / scene);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  void turn_server() {
+    if (!network_) return;
+    network_->turn(now);
+    while (const StepRecord* record = mail_->steps.front()) {
+      step = *record;
+      least_energy = std::min(least_energy, record->energy);
+      mail_->steps.pop();
+    }
+  }
+  void turn_plugs() {
+    for (Guest& guest : guests_) {
+      while (guest.plug->turn(now) <= now) {
+      }
+    }
+    collect();
+  }
+  void collect() {
+    for (; !wire_.empty(); wire_.pop_front()) {
+      if (connected) under_way_.push_back({now + std::chrono::milliseconds(delay_ms_), std::move(wire_.front())});
+    }
+  }
+  void carry() {
+    collect();
+    for (; !under_way_.empty() && under_way_.front().due <= now; under_way_.pop_front()) {
+      const Datagram& datagram = under_way_.front().datagram;
+      if (datagram.to == kServer) server_.inbox.push_back(datagram);
+      for (Guest& guest : guests_) {
+        for (End* end : {guest.watcher.get(), guest.controller.get()}) {
+          if (end->self == datagram.to) end->inbox.push_back(datagram);
+        }
+      }
+    }
+  }
+
+  Scene scene_;
+  int delay_ms_;
+  std::uint32_t epoch_ = 0;
+  int seeds_ = 0;
+  Wire wire_;
+  End server_{wire_, kServer};
+  std::deque<UnderWay> under_way_;
+  std::unique_ptr<SimulatedDevice> device_;
+  std::unique_ptr<Mailboxes> mail_;
+  std::unique_ptr<HapticLoop> haptic_;
+  std::unique_ptr<NetworkLoop> network_;
+  std::deque<Guest> guests_;
+};
+
+}  // namespace tendon::plug
