@@ -14,4 +14,4 @@ _tendon() {
   fi
 }
 complete -o default -F _tendon \
-  tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash
+  tendond tendon-inject tendon-softbody tendon-lab tendon-report tendon-identify tendon-replay tendon-conformance tendon-dash tendon-plug

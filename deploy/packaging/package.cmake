@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` brings, and the two Debian packages that `cpack` makes of it: `tendon`, to run, and `libtendon-dev`, to write
-# an engine with: find_package(tendon), tendon::client.
+# What `cmake --install` brings, and the three Debian packages that `cpack` makes of it: `tendon`, to run; `tendon-plug`, for the
+# machine of a program that exists already, which needs nothing else; and `libtendon-dev`, to write an engine with:
+# find_package(tendon), tendon::client.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -14,6 +15,8 @@ if(TARGET tendon-dash)
   install(TARGETS tendon-dash COMPONENT programs)
   install(DIRECTORY deploy/monitoring DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon COMPONENT programs)
 endif()
+install(TARGETS tendon-plug COMPONENT plug)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-plug COMPONENT plug)
 # What belongs to the whole machine is for packages only: `cmake --install` into a home folder leaves /etc alone.
 install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
 install(FILES deploy/systemd/tendond.service DESTINATION lib/systemd/system COMPONENT machine EXCLUDE_FROM_ALL)
@@ -24,12 +27,13 @@ set(completions ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 foreach(program ${programs})
   install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME ${program} COMPONENT programs)
 endforeach()
+install(FILES deploy/packaging/completion.bash DESTINATION ${completions} RENAME tendon-plug COMPONENT plug)
 
 # A manual page is what --help says.
 find_program(HELP2MAN help2man)
 if(HELP2MAN)
   set(pages)
-  foreach(program ${programs})
+  foreach(program ${programs} tendon-plug)
     set(page ${CMAKE_CURRENT_BINARY_DIR}/man/${program}.1)
     add_custom_command(OUTPUT ${page}.gz
       COMMAND ${HELP2MAN} --no-info --no-discard-stderr --section 1 --version-string ${PROJECT_VERSION}
@@ -38,9 +42,13 @@ if(HELP2MAN)
       COMMAND gzip -9nf ${page}
       DEPENDS ${program} VERBATIM)
     list(APPEND pages ${page}.gz)
+    if(program STREQUAL "tendon-plug")
+      install(FILES ${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT plug)
+    else()
+      install(FILES ${page}.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
+    endif()
   endforeach()
   add_custom_target(man ALL DEPENDS ${pages})
-  install(FILES ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
 else()
   message(STATUS "No help2man: no manual pages")
 endif()
@@ -79,11 +87,12 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_PACKAGE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL programs machine injector conformance development)
+set(CPACK_COMPONENTS_ALL programs machine injector conformance plug development)
 set(CPACK_COMPONENT_PROGRAMS_GROUP run)
 set(CPACK_COMPONENT_MACHINE_GROUP run)
 set(CPACK_COMPONENT_INJECTOR_GROUP run)
 set(CPACK_COMPONENT_CONFORMANCE_GROUP run)
+set(CPACK_COMPONENT_PLUG_GROUP plug)
 set(CPACK_COMPONENT_DEVELOPMENT_GROUP dev)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_RUN_PACKAGE_NAME tendon)
@@ -94,6 +103,12 @@ set(CPACK_DEBIAN_RUN_DESCRIPTION "Networked haptics server with an energy-boundi
  Runs the loop of a haptic device at 1 kHz and bounds every force so that the device never gives out more energy than it took in,
  while physics engines anywhere on the network send forces late, rarely or wrong.")
 set(CPACK_DEBIAN_RUN_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_SOURCE_DIR}/deploy/packaging/conffiles)
+set(CPACK_DEBIAN_PLUG_PACKAGE_NAME tendon-plug)
+set(CPACK_DEBIAN_PLUG_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PLUG_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PLUG_DESCRIPTION "Haptic devices of a Tendon server for programs that exist already
+ Runs beside a program that knows CHAI3D, VRPN, Inverse-compatible JSON or ROS 2, and gives it the device of a Tendon server
+ anywhere on the network, behind an output limiter that bounds its energy.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libtendon-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libeigen3-dev, libprotobuf-dev, libsodium-dev")

@@ -6,6 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <numbers>
+#include <string>
 #include <vector>
 
 #include "tests/support/dice.h"
@@ -75,12 +81,40 @@ TEST(View, AHandleInItsMiddleIsNotTurnedWhateverTheFrame) {
   }
 }
 
+/// M (x, y, z) as the page writes it: "(−z, −x, y)".
+std::string in_words(const Frame& frame) {
+  std::string text = frame.per_metre == 1 ? "(" : std::to_string(std::lround(frame.per_metre)) + " (";
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      if (frame.from_operator(i, j) == 0) continue;
+      text += std::string(i > 0 ? ", " : "") + (frame.from_operator(i, j) < 0 ? "\u2212" : "") + "xyz"[j];
+    }
+  }
+  return text + ")";
+}
+
+TEST(View, ThePageForNewcomersTellsTheFramesAsTheyAre) {
+  std::ifstream file(std::filesystem::path(TENDON_SOURCE_DIR) / "clients" / "COMING_FROM.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  for (const auto& [name, row] : std::map<std::string, std::string>{{"chai3d", "| CHAI3D | to the user, right, up |"},
+                                                                    {"openhaptics", "| right, up, to the user |"},
+                                                                    {"inverse", "| right, forward, up |"},
+                                                                    {"ros", "| forward, left, up |"},
+                                                                    {"unity", "| right, up, forward |"},
+                                                                    {"unreal", "| forward, right, up |"}}) {
+    ASSERT_NE(find_frame(name), nullptr) << name;
+    EXPECT_NE(page.find(row + " " + in_words(*find_frame(name)) + " |"), std::string::npos)
+        << name << ": " << row << " " << in_words(*find_frame(name));
+  }
+}
+
 TEST(View, TurnsTheStylusAboutTheProgramsOwnAxis) {
   // A quarter turn to the left about the axis that points up: up is z in ROS, y for VRPN.
   const Quat left = rotation_by(Vec3(0, std::numbers::pi / 2, 0));
   EXPECT_TRUE((View(*find_frame("ros"), {}).orientation(left) * Vec3::UnitX()).isApprox(Vec3::UnitY(), 1e-12))
       << "ahead has become left";
-  EXPECT_TRUE((View(*find_frame("vrpn"), {}).orientation(left) * -Vec3::UnitZ()).isApprox(-Vec3::UnitX(), 1e-12));
+  EXPECT_TRUE(
+      (View(*find_frame("openhaptics"), {}).orientation(left) * -Vec3::UnitZ()).isApprox(-Vec3::UnitX(), 1e-12));
 }
 
 }  // namespace
