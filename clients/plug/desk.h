@@ -20,8 +20,8 @@ namespace tendon::plug {
 /// What the command line says for every bridge.
 struct DeskConfig {
   ServerName server = "127.0.0.1:47100";
-  ForceClient::Config client;        ///< `device` and `seed` are set for each plug
-  std::vector<std::string> devices;  ///< their names; none: the server's first device, which is called "device"
+  ForceClient::Config client{};        ///< `device` and `seed` are set for each plug
+  std::vector<std::string> devices{};  ///< their names; none: the server's first device, which is called "device"
   bool observe = false;
   bool quiet = false;  ///< says nothing on stderr
   bool json = false;   ///< a line a second on stdout

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/plug/desk.h"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <stdexcept>
+#include <string>
+
+#include "clients/cpp/machine.h"
+
+namespace tendon::plug {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr LocalTime kStart{seconds(1000)};
+
+TEST(Desk, NamesTheHostThatNobodyKnows) {
+  try {
+    Desk desk({.server = "haptics.invalid:47100"}, kStart);
+    FAIL() << "expected a sentence";
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(std::string(error.what()).starts_with("cannot find haptics.invalid: ")) << error.what();
+  }
+}
+
+TEST(Desk, HasAPlugForEachNameAndOneWithoutNames) {
+  Desk two({.server = "127.0.0.1:9", .devices = {"left", "right"}}, kStart);
+  ASSERT_EQ(two.size(), 2U);
+  EXPECT_EQ(two.find("right"), 1U);
+  EXPECT_FALSE(two.find("device"));
+  EXPECT_EQ(two.descriptors().size(), 4U);
+  Desk one({.server = "127.0.0.1:9"}, kStart);
+  EXPECT_EQ(one.name(0), "device");
+}
+
+TEST(Desk, SaysOnceThatNobodyAnswersHoweverOftenItTries) {
+  Desk desk({.server = "127.0.0.1:9", .devices = {"right"}}, kStart);
+  testing::internal::CaptureStderr();
+  for (LocalTime now = kStart; now < kStart + seconds(20); now += milliseconds(10)) desk.turn(now);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "tendon-plug: right: no answer from 127.0.0.1:9; is tendond running there? Trying on\n");
+}
+
+TEST(Desk, ThatIsQuietSaysNothing) {
+  Desk desk({.server = "127.0.0.1:9", .quiet = true}, kStart);
+  testing::internal::CaptureStderr();
+  for (LocalTime now = kStart; now < kStart + seconds(5); now += milliseconds(10)) desk.turn(now);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Desk, WritesALineForEachDeviceOnceASecondWithTheBridgesCounts) {
+  Desk desk({.server = "127.0.0.1:9", .devices = {"left", "right"}, .quiet = true, .json = true}, kStart);
+  const std::array counts = {Desk::Count{"clients", 3}};
+  testing::internal::CaptureStdout();
+  for (LocalTime now = kStart; now <= kStart + seconds(1); now += milliseconds(100)) desk.turn(now, counts);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(),
+            R"({"device":"left","states":0,"forces":0,"dropped":0,"unusable":0,"owner":0,"pushes":false,)"
+            R"("round_trip_ms":0.0,"clients":3})"
+            "\n"
+            R"({"device":"right","states":0,"forces":0,"dropped":0,"unusable":0,"owner":0,"pushes":false,)"
+            R"("round_trip_ms":0.0,"clients":3})"
+            "\n");
+}
+
+TEST(Desk, WakesForAProgramThatHasSomethingToSay) {
+  Desk desk({.server = "127.0.0.1:9"}, kStart);
+  std::array<int, 2> pair{};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, pair.data()), 0);
+  std::array<pollfd, 1> programs = {{{pair[0], POLLIN, 0}}};
+  desk.wait(programs, kStart, kStart + milliseconds(1));
+  EXPECT_EQ(programs[0].revents, 0);
+  ASSERT_EQ(::write(pair[1], "x", 1), 1);
+  const LocalTime before = read_clock();
+  desk.wait(programs, kStart, kStart + seconds(5));
+  EXPECT_EQ(programs[0].revents, POLLIN);
+  EXPECT_LT(read_clock() - before, milliseconds(90)) << "it did not sleep its longest";
+  ::close(pair[0]);
+  ::close(pair[1]);
+}
+
+}  // namespace
+}  // namespace tendon::plug
