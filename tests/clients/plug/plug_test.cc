@@ -70,7 +70,7 @@ TEST(Plug, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
   world.run(200, [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0)); });
   double wanted = 0;
   world.run(100, [&] {
-    // What was asked for at the end of the last millisecond is what the device's next step has.
+    // The device's next step has the force that was asked for at the end of the last millisecond.
     EXPECT_NEAR(world.step.wanted.y(), wanted, 1e-9);
     wanted += 1e-3;
     plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(wanted));
