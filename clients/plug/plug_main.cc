@@ -30,6 +30,7 @@ CLI::Validator accepted_by(std::function<void(const std::string&)> check) {
 }  // namespace
 
 void add_common(CLI::App& app, DeskConfig& desk) {
+  desk.client.name = "tendon-plug " + app.get_name();
   app.add_option_function<std::string>(
          "--server", [&](const std::string& text) { desk.server = text; },
          "Where tendond listens: a host name or an address")

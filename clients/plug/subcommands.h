@@ -15,7 +15,8 @@ namespace tendon::plug {
 /// said on stderr and ends the program with 1.
 using Chosen = std::function<int()>;
 
-/// The options that every bridge has: --server, --key, --device, --channel, --take-lease, --observe, --json.
+/// The options that every bridge has: --server, --key, --device, --channel, --take-lease, --observe, --json. The
+/// server knows it as "tendon-plug" with the subcommand's name.
 void add_common(CLI::App& app, DeskConfig& desk);
 
 // Each bridge adds its subcommand, in FOLDER/…_main.cc, and sets `chosen` when it is the one.

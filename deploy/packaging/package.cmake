@@ -16,6 +16,8 @@ if(TARGET tendon-dash)
   install(DIRECTORY deploy/monitoring DESTINATION ${CMAKE_INSTALL_DATADIR}/tendon COMPONENT programs)
 endif()
 install(TARGETS tendon-plug COMPONENT plug)
+# Where the program looks for them: beside its own folder.
+install(TARGETS hdPhantom HD LIBRARY DESTINATION lib/tendon/chai3d COMPONENT plug)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tendon-plug COMPONENT plug)
 # What belongs to the whole machine is for packages only: `cmake --install` into a home folder leaves /etc alone.
 install(FILES deploy/udev/60-tendon.rules DESTINATION lib/udev/rules.d COMPONENT machine EXCLUDE_FROM_ALL)
