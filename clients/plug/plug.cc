@@ -69,7 +69,13 @@ void Plug::learn_from(const ForceClient& client) {
   if (client.phase() != Phase::kOpen) return;
   if (!welcome_) welcome_ = client.welcome();
   if (!description_) description_ = client.description();
-  if (!handle_) handle_ = client.handle();
+  if (!handle_ && client.handle()) {
+    handle_ = client.handle();
+    if (!handle_->operator_from_device) {
+      note(said_of_axes_,
+           "does not say how it lies before the operator; x is taken as right, y as up, z as to the user");
+    }
+  }
 }
 
 void Plug::end_controller(LocalTime now) {
@@ -191,13 +197,14 @@ std::string Plug::force_in_words() const {
          " has the channel" + (config_.client.take_lease ? "; asking for it" : "; --take-lease asks for it");
 }
 
+void Plug::note(std::string& said, std::string words) {
+  if (words.empty() || words == said) return;
+  said = words;
+  sentences_.push_back(std::move(words));
+  if (sentences_.size() > kMaxSentences) sentences_.pop_front();
+}
+
 void Plug::note_changes() {
-  const auto note = [&](std::string& said, std::string words) {
-    if (words.empty() || words == said) return;
-    said = words;
-    sentences_.push_back(std::move(words));
-    if (sentences_.size() > kMaxSentences) sentences_.pop_front();
-  };
   note(said_, connection_in_words());
   note(said_of_force_, force_in_words());
 }

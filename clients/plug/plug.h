@@ -89,7 +89,7 @@ class Plug {
   std::uint64_t forces_unusable() const noexcept;                     ///< not sent: not finite, or out of bounds
   LinkStats link() const;                                             ///< of the session that the states come by
 
-  /// Each change in a sentence, once: connected, lost, refused, no answer, controls, controls no more. The
+  /// Each change in a sentence, once: connected, lost, refused, no answer, axes unknown, controls, controls no more. The
   /// newest 16 that nobody has taken. Empty: nothing new.
   std::optional<std::string> next_sentence();
 
@@ -113,6 +113,7 @@ class Plug {
   const ForceClient& speaker() const noexcept { return watcher_ ? *watcher_ : *controller_; }
   std::string connection_in_words() const;
   std::string force_in_words() const;
+  void note(std::string& said, std::string words);
   void note_changes();
 
   Way watcher_way_;
@@ -139,6 +140,7 @@ class Plug {
   std::uint64_t unusable_before_ = 0;
   std::deque<std::string> sentences_;  ///< that nobody has taken yet
   std::string said_;                   ///< the newest sentence about the connection
+  std::string said_of_axes_;           ///< … about how the device lies
   std::string said_of_force_;          ///< likewise, about the channel
   bool stopped_ = false;
 };

@@ -220,6 +220,23 @@ TEST(Plug, AStallOf200MsFadesTheForceAndEndsWithoutASecondHandshake) {
   EXPECT_FALSE(one_has(sentences_of(plug), "lost"));
 }
 
+TEST(Plug, SaysOnceWhenItDoesNotKnowHowTheDeviceLies) {
+  World unknown("demo.toml");
+  Plug& plug = unknown.add_plug();
+  unknown.run(200);
+  EXPECT_TRUE(one_has(sentences_of(plug), "does not say how it lies"));
+  unknown.run(200, [&] { plug.push(kOld, unknown.now, unknown.now + milliseconds(50), Vec3(0, 0, 0)); });
+  EXPECT_FALSE(one_has(sentences_of(plug), "does not say how it lies"));
+
+  World known("demo.toml");
+  known.handle.operator_from_device = Quat{};
+  known.kill_server();
+  known.open_server();
+  Plug& told = known.add_plug();
+  known.run(200);
+  EXPECT_FALSE(one_has(sentences_of(told), "does not say how it lies"));
+}
+
 TEST(Plug, SaysByeToTheServerAndIsSilentAfterwards) {
   World world("demo.toml");
   Plug& plug = world.add_plug();

@@ -149,7 +149,7 @@ TEST(Chai3dHost, IsReadyWhenEveryDeviceHasToldWhereItIs) {
   EXPECT_EQ(theatre.hands->device[0].workspace_radius, Host::kWorkspaceRadius) << "the server describes no box";
 }
 
-TEST(Chai3dHost, TellsNoOldPlaceAfterTheServerHasGoneAndTheNewOneWhenItIsBack) {
+TEST(Chai3dHost, TellsTheAgeOfTheLastPlaceWhenTheServerHasGone) {
   Theatre theatre("demo.toml");
   theatre.run(200);
   const std::int64_t before = theatre.hand.at_ns;
