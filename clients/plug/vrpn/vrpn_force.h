@@ -29,8 +29,8 @@ struct Hand {
 ///                                             the dynamic one, until the hand turns back
 ///
 /// A plane that is felt alone is a Contact too, so that it never pulls between two answers; together with another thing
-/// it is not, because a Contact would cut that one's pull. Coefficients are cut to 0 … 1, as VRPN's server does, and the
-/// dynamic one to the static one.
+/// it is not, because a Contact would cut that one's pull. Coefficients are cut to 0 … 1, as VRPN's server does, and
+/// the dynamic one to the static one.
 ///
 /// Thread-safe: no. Realtime-safe: yes.
 class Drawing {
@@ -64,8 +64,8 @@ class Drawing {
 /// The same in the device base frame.
 Touch in_base_frame(Touch touch, const View& view);
 
-/// Whether a program that has drawn something still means it. VRPN has no heartbeat: a frozen program looks like one that
-/// wants its force to stay. But one that goes on sending can be told from one that has stopped:
+/// Whether a program that has drawn something still means it. VRPN has no heartbeat: a frozen program looks like one
+/// that wants its force to stay. But one that goes on sending can be told from one that has stopped:
 ///
 ///     stale after 10 × the median gap of the last 8, 100 ms … 2 s, once three have come
 ///

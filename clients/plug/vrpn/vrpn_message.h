@@ -11,7 +11,7 @@
 
 #include "protocol/messages.h"
 
-// VRPN's bytes ⇄ values. clients/plug/VRPN.md is the page: each layout, and golden messages that a test compares with
+// VRPN's bytes ⇄ values. VRPN.md is the page: each layout, and golden messages that a test compares with
 // these functions. Everything is big-endian. No socket, no clock; what a stranger sends is never believed: a function
 // that reads returns nothing when the bytes are too few, too many, or not finite.
 //

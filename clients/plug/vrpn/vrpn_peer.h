@@ -13,23 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include "clients/plug/view.h"
 #include "clients/plug/vrpn/vrpn_force.h"
 #include "clients/plug/vrpn/vrpn_message.h"
+#include "clients/plug/vrpn/vrpn_station.h"
 
 namespace tendon::plug::vrpn {
-
-/// A device under the name that VRPN programs ask for: Tracker, Button, Analog and ForceDevice at once.
-struct Station {
-  std::string name;
-  View view;
-  double stiffest = 1000;  ///< N/m, of a plane with spring 1: the device's, where it is known
-  std::optional<DeviceDescription::Box> workspace{};  ///< device base frame
-  int buttons = 0;                                    ///< that it has
-  std::uint32_t loop_hz = 1000;
-
-  Hand hand(const DeviceState& state) const { return {view.position(state.position), view.position(state.velocity)}; }
-};
 
 /// One instant: for intervals, and for the stamps of messages.
 struct Moment {
@@ -37,7 +25,7 @@ struct Moment {
   Duration since_1970{};
 };
 
-/// The conversation with one VRPN program (clients/plug/VRPN.md). Bytes and instants go in; bytes, sentences and what the
+/// The conversation with one VRPN program (VRPN.md). Bytes and instants go in; bytes, sentences and what the
 /// program has drawn come out. It has no socket and no clock.
 ///
 ///     Peer peer(stations, number, now);
@@ -46,12 +34,14 @@ struct Moment {
 ///     peer.report(now, i, state, round_trip);                            for each new state of station i
 ///     write peer.stream(), peer.sent(n); send each of peer.datagrams()   to peer.udp_port()
 ///
-/// * **Bounded.** A message that says it is longer than kLongestPayload, a cookie of another major version and more than
-///   kMaxUnread bytes that the program does not read end it (`end()`). Everything else that makes no sense is counted.
+/// * **Bounded.** A message that says it is longer than kLongestPayload, a cookie of another major version and more
+///   than kMaxUnread bytes that the program does not read end it (`end()`). Everything else that makes no sense is
+///   counted.
 /// * **Newest wins.** Of more than kMaxPerSecond messages in a second all but the newest of each batch are skipped and
 ///   counted; descriptions never are.
-/// * **Reports.** Pose at every state; velocity, force and channels at every tenth; a button when it changes. By UDP once
-///   the program has described a port, and as one datagram a state where they fit; buttons and texts always by TCP.
+/// * **Reports.** Pose at every state; velocity, force and channels at every tenth; a button when it changes. By UDP
+///   once the program has described a port, and as one datagram a state where they fit; buttons and texts always by
+///   TCP.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Peer {

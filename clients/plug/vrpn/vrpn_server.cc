@@ -24,8 +24,6 @@ constexpr int kMaxDatagrams = 256;           ///< of one client in one turn
 constexpr std::size_t kMaxRead = 64 * 1024;  ///< from one client's stream in one turn: 256 messages of 256 bytes
 constexpr int kPortTries = 16;
 constexpr std::size_t kEach = 2;  ///< sockets of a client
-constexpr Duration kAskAgain = std::chrono::milliseconds(500);
-constexpr Duration kAskedFor = std::chrono::seconds(1);
 /// A machine that has vanished without a word is noticed after as many seconds.
 constexpr int kKeepAliveS = 2;
 constexpr int kKeepAlives = 3;
@@ -92,16 +90,9 @@ struct Server::Client {
         name("client " + std::to_string(its_number) + " (" + to_string(from) + ")"),
         dialling(dialled),
         until(now.at + kPatience),
-        peer(stations, now),
-        asked(stations.size()) {}
-
-  struct Asked {
-    LocalTime at{};         ///< the last time that its drawing was asked for
-    bool any = false;       ///< a drawing is asked for
-    bool stale = false;     ///< … but the program has fallen silent
-    bool owned = false;     ///< another one owns the device, and the program has been told
-    bool for_long = false;  ///< it has been said that the drawing lives as long as the connection
-  };
+        peer(stations, now) {
+    for (std::size_t i = 0; i < stations.size(); ++i) askers.emplace_back(number, name, i);
+  }
 
   Descriptor tcp;
   Descriptor udp;
@@ -111,13 +102,13 @@ struct Server::Client {
   bool dialling;    ///< we have asked for the connection, and it is not there yet
   LocalTime until;  ///< … or the cookie must be there
   Peer peer;
-  std::vector<Asked> asked;
-  std::string over;  ///< why it is dropped; empty: it stays
+  std::vector<Asker> askers;  ///< one for each station
+  std::string over;           ///< why it is dropped; empty: it stays
 };
 
 Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(std::move(config)), dialled_(now) {
   for (const Alias& alias : config_.names) {
-    stations_.push_back({.name = alias.name, .view = View(*find_frame("openhaptics"), {})});
+    stations_.push_back({.name = alias.name});
   }
   seen_.resize(stations_.size());
   buffer_.resize(kMaxRead);
@@ -165,32 +156,10 @@ std::span<const Desk::Count> Server::counts() {
   return counts_;
 }
 
-/// What the device's server says of it.
-void Server::learn(std::size_t i) {
-  const Plug& plug = desk_.plug(config_.names[i].place);
-  Seen& seen = seen_[i];
-  const bool described = plug.description().has_value();
-  const bool handle = plug.handle().has_value();
-  if (described == seen.described && handle == seen.handle) return;
-  seen.described = described;
-  seen.handle = handle;
-  Station& station = stations_[i];
-  if (described) {
-    station.workspace = plug.description()->workspace;
-    if (plug.description()->max_stiffness > 0) station.stiffest = plug.description()->max_stiffness;
-  }
-  if (plug.welcome() && plug.welcome()->loop_hz > 0) station.loop_hz = plug.welcome()->loop_hz;
-  if (!handle) return;
-  station.buttons = static_cast<int>(plug.handle()->buttons.size());
-  station.view = View(*find_frame("openhaptics"), plug.handle()->operator_from_device);
-  if (plug.handle()->operator_from_device || std::exchange(seen.said, true)) return;
-  desk_.say(station.name + ": the scene does not say which way is up (axes); its own axes are taken for VRPN's");
-}
-
 void Server::serve_states(const Moment& now) {
   for (std::size_t i = 0; i < stations_.size(); ++i) {
     const Plug& plug = desk_.plug(config_.names[i].place);
-    learn(i);
+    if (const auto sentence = stations_[i].learn(plug)) desk_.say(*sentence);
     if (plug.lost() != seen_[i].lost) {
       seen_[i].lost = plug.lost();
       for (const auto& client : clients_) {
@@ -314,50 +283,6 @@ void Server::read(const Moment& now, Client& client, short ready, short datagram
   if (client.peer.udp_port() && !client.udp) open_udp(now, client);
 }
 
-/// Asks for what a client has drawn around a station, where that is due. Whether a force was asked for.
-bool Server::ask(const Moment& now, Client& client, std::size_t i) {
-  Client::Asked& asked = client.asked[i];
-  Station& station = stations_[i];
-  Plug& plug = desk_.plug(config_.names[i].place);
-  Drawing& drawing = client.peer.drawing(i);
-  const Freshness& freshness = client.peer.freshness(i);
-  const bool changed = client.peer.take_change(i);
-  if (drawing.empty()) {
-    if (!changed || !asked.any) return false;
-    asked = {.owned = asked.owned};  // zero is asked for once; then the plug lets it go
-  } else if (now.at >= freshness.until()) {
-    if (!std::exchange(asked.stale, true)) {
-      desk_.say(station.name + ": " + client.name + " draws no force any more and has ended none; it fades");
-    }
-    return false;
-  } else if (!changed && now.at - asked.at < kAskAgain) {
-    return false;
-  } else {
-    asked.any = true;
-    if (std::exchange(asked.stale, false)) desk_.say(station.name + ": " + client.name + " draws again");
-  }
-  asked.at = now.at;
-  const LocalTime until = drawing.empty() ? LocalTime::max() : freshness.until();
-  const Plug::Answer answer = plug.ask(
-      client.number, now.at, std::min(until, now.at + kAskedFor), [&drawing, &station](const DeviceState& state) {
-        return in_base_frame(drawing.touch(station.hand(state), station.stiffest), station.view);
-      });
-  if (answer != Plug::Answer::kTaken) {
-    if (!std::exchange(asked.owned, true)) {
-      const std::string why =
-          answer == Plug::Answer::kOwned ? "another program has this device's force" : "tendon-plug only observes";
-      client.peer.tell(now, i, Severity::kWarning, "your force is not felt: " + why);
-      desk_.say(station.name + ": the force of " + client.name + " is not felt: " + why);
-    }
-    return false;
-  }
-  if (std::exchange(asked.owned, false)) client.peer.tell(now, i, Severity::kNormal, "your force is felt now");
-  if (asked.any && !changed && until == LocalTime::max() && !std::exchange(asked.for_long, true)) {
-    desk_.say(station.name + ": what " + client.name + " has drawn lives as long as its connection");
-  }
-  return true;
-}
-
 void Server::write(Client& client) {
   if (client.dialling || !client.over.empty()) return;
   if (client.udp && client.peer.udp_port()) {
@@ -409,7 +334,12 @@ LocalTime Server::turn(const Moment& now) {
     }
     while (const auto sentence = client.peer.next_sentence()) desk_.say(client.name + ": " + *sentence);
     if (!was_open && client.peer.open()) desk_.say(client.name + " is here");
-    for (std::size_t i = 0; i < stations_.size(); ++i) asked = ask(now, client, i) || asked;
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+      Asker& asker = client.askers[i];
+      asked =
+          asker.turn(now.at, now.since_1970, desk_.plug(config_.names[i].place), stations_[i], client.peer) || asked;
+      if (const auto sentence = asker.next_sentence()) desk_.say(*sentence);
+    }
     write(client);
     if (!client.peer.open() && now.at >= client.until && client.over.empty()) {
       client.over = client.dialling ? "does not answer" : "does not say that it speaks VRPN";

@@ -40,15 +40,14 @@ class Descriptor {
 ///     Server server(desk, config, now);
 ///     for (…) desk.turn(now, server.counts()); next = server.turn(moment); desk.wait(server.polled(), now, next);
 ///
-/// * **Two ways in.** A datagram that names a TCP port, whereupon we connect to that port *of the address that the datagram
-///   came from*; or a TCP connection to us. The address in the datagram's text is never used, nor is the one in the
-///   description of a UDP port. A connection that we open is never waited for; at most kDialsPerSecond, and one at a time
-///   to the same port; without an answer it is given up after kPatience.
-/// * **Limits.** kMaxClients, those that are being connected to with them; further ones are closed, and said once until a
-///   place is free. One whose cookie does not come within kPatience is dropped.
-/// * **Forces.** What a program draws is asked for at its Desk's plug, and again twice a second while it is fresh
-///   (Freshness), so that it stays the owner. A program that has ended its drawing asks for zero until the plug lets it
-///   go. When its connection ends it is let go at once: the server fades its last force.
+/// * **Two ways in.** A datagram that names a TCP port, whereupon we connect to that port *of the address that the
+///   datagram came from*; or a TCP connection to us. The address in the datagram's text is never used, nor is the one
+///   in the description of a UDP port. A connection that we open is never waited for; at most kDialsPerSecond, and one
+///   at a time to the same port; without an answer it is given up after kPatience.
+/// * **Limits.** kMaxClients, those that are being connected to with them; further ones are closed, and said once until
+///   a place is free. One whose cookie does not come within kPatience is dropped.
+/// * **Forces.** Each program has an Asker for each station. When its connection ends it is let go at once: the server
+///   fades its last force.
 ///
 /// Thread-safe: no. Realtime-safe: no (system calls).
 class Server {
@@ -72,8 +71,8 @@ class Server {
 
   const Address& address() const noexcept { return address_; }
 
-  /// Serves everybody, after Desk::turn and Desk::wait. The latest time for the next turn; `now` when something has been
-  /// asked for that should leave at once.
+  /// Serves everybody, after Desk::turn and Desk::wait. The latest time for the next turn; `now` when something has
+  /// been asked for that should leave at once.
   LocalTime turn(const Moment& now);
   /// For Desk::wait. Another set after each turn.
   std::span<pollfd> polled() { return polled_; }
@@ -83,7 +82,6 @@ class Server {
   struct Client;
 
   void serve_states(const Moment& now);
-  void learn(std::size_t station);
   void take_hello(const Moment& now);
   void dial(const Moment& now, const Address& to);
   void take_connections(const Moment& now);
@@ -91,7 +89,6 @@ class Server {
   void read(const Moment& now, Client& client, short ready, short datagrams_ready);
   void finish_dial(const Moment& now, Client& client, short ready);
   void open_udp(const Moment& now, Client& client);
-  bool ask(const Moment& now, Client& client, std::size_t station);
   void write(Client& client);
   void drop(Client& client, const std::string& why);
   void poll_again();
@@ -104,9 +101,6 @@ class Server {
   std::vector<Station> stations_;
   struct Seen {
     std::uint64_t states = 0;
-    bool described = false;
-    bool handle = false;
-    bool said = false;  ///< that nobody knows which way is up
     bool lost = false;
   };
   std::vector<Seen> seen_;
