@@ -36,7 +36,8 @@ bool Drawing::draw(const Plane& plane) {
   surface->plane.offset /= length;
   surface->plane.spring = std::clamp(plane.spring, 0.0, 1.0);
   surface->plane.static_friction = std::clamp(plane.static_friction, 0.0, 1.0);
-  surface->plane.dynamic_friction = std::clamp(plane.dynamic_friction, 0.0, surface->plane.static_friction);
+  const double sticks = surface->plane.static_friction;
+  surface->plane.dynamic_friction = std::clamp(plane.dynamic_friction, kLeastSlip * sticks, sticks);
   return true;
 }
 
@@ -53,7 +54,7 @@ Vec3 Drawing::friction(Surface& surface, const Vec3& at, double pressure) {
   const Vec3 bend = along - *surface.foot;
   const double length = bend.norm();
   const double sticks = surface.plane.static_friction;
-  if (sticks <= 0 || length <= 0) return Vec3::Zero();
+  if (sticks <= 0) return Vec3::Zero();
   const double share = surface.plane.dynamic_friction / sticks;
   const double longest = surface.slips ? share * kBristle : kBristle;
   surface.slips = length >= longest * (1 - kRounding);

@@ -38,6 +38,9 @@ class Drawing {
   static constexpr std::size_t kPlanes = 4;
   static constexpr double kLeastDamping = 0.1;
   static constexpr double kBristle = 0.2e-3;  ///< m
+  /// The dynamic coefficient is at least this share of the static one: a bristle that is not bent at all would not know
+  /// which way it slips, and would stick again at once.
+  static constexpr double kLeastSlip = 0.1;
 
   /// Replaces the field. One without force and jacobian ends it.
   void draw(const ForceField& field);
