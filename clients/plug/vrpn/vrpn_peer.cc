@@ -153,10 +153,11 @@ void Peer::take(const Moment& now, const Message& message) {
   };
   const std::int32_t* const sender = of(message.sender, senders_);
   const Name* const name = of(message.type, types_);
-  if (sender == nullptr || *sender == kNobody || name == nullptr) {
+  if (sender == nullptr || name == nullptr) {
     ++counts_.nonsense;
     return;
   }
+  if (*sender == kNobody) return;
   const auto station = static_cast<std::size_t>(*sender);
   if (name->type) {
     understand(now, station, *name->type, message.payload);

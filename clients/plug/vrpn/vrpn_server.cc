@@ -69,6 +69,7 @@ void set(int socket, int level, int option, int value) { ::setsockopt(socket, le
 
 void set_up_stream(int socket) {
   set(socket, IPPROTO_TCP, TCP_NODELAY, 1);
+  set(socket, SOL_SOCKET, SO_SNDBUF, static_cast<int>(Peer::kMaxUnread));
   set(socket, SOL_SOCKET, SO_KEEPALIVE, 1);
   set(socket, IPPROTO_TCP, TCP_KEEPIDLE, kKeepAliveS);
   set(socket, IPPROTO_TCP, TCP_KEEPINTVL, kKeepAliveS);

@@ -11,6 +11,9 @@ namespace tendon::plug::vrpn {
 namespace {
 
 constexpr Duration kAskAgain = std::chrono::milliseconds(500);
+/// Each ask is a datagram. A program that says more waits for the next state at most, which is answered by the newest
+/// that it has said: VRPN's own ff_client sends 60 000 fields a second, as fast as it can.
+constexpr Duration kShortest = std::chrono::microseconds(250);
 /// … is fresh for longer than that, so that a turn that comes late loses nothing, and not for ever: a plug that hangs
 /// must not push.
 constexpr Duration kAskedFor = std::chrono::seconds(1);
@@ -36,6 +39,7 @@ std::optional<std::string> Station::learn(const Plug& plug) {
 }
 
 bool Asker::turn(LocalTime now, Duration since_1970, Plug& plug, const Station& station, Peer& peer) {
+  if (asks_ && now - at_ < kShortest) return false;
   Drawing& drawing = peer.drawing(i_);
   const bool changed = peer.take_change(i_);
   const LocalTime until = drawing.empty() ? LocalTime::max() : peer.freshness(i_).until();

@@ -35,8 +35,9 @@ struct Station {
 class Peer;
 
 /// Asks a plug for what a program has drawn around its station: at a change, and again twice a second while it is fresh
-/// (Freshness), so that the program stays the owner. Once its drawing has ended, zero is asked for; then the plug lets
-/// the program go. A program whose force is not felt, because another one has the device, is told.
+/// (Freshness), so that the program stays the owner; at most 4000 times a second. Once its drawing has ended, zero is
+/// asked for; then the plug lets the program go. A program whose force is not felt, because another one has the device,
+/// is told.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Asker {

@@ -137,6 +137,31 @@ TEST(VrpnWorld, AChangeOfAFieldIsInTheNextDatagram) {
   }
 }
 
+TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
+  World world("demo.toml");
+  Plug& plug = world.add_plug();
+  Station station{.name = "Phantom0"};
+  Old old(world, plug, station, 1);
+  world.run(200, [&] { old.turn(); });
+  std::uint64_t before = 0;
+  double asked = 0;
+  for (int i = 0; i < 200; ++i) {
+    if (i == 100) before = plug.forces();
+    world.run(1, [&] {
+      if (i > 100) {
+        EXPECT_NEAR(world.step.wanted.y(), asked, 1.1e-3) << "the newest of them with the next state";
+      }
+      for (int k = 0; k < 60; ++k) {  // in one millisecond
+        asked = static_cast<double>(static_cast<float>(1e-3 * i + 1e-5 * k));
+        old.says(constant(Vec3(0, asked, 0)));
+        old.turn();
+        for (int turns = 0; turns < 4; ++turns) plug.turn(world.now);
+      }
+    });
+  }
+  EXPECT_LE(plug.forces() - before, 250U) << "one for each state, and one more";
+}
+
 TEST(VrpnWorld, EveryStateIsOnePoseAndNoForceIsAskedForByOneThatWatches) {
   World world("demo.toml");
   Plug& plug = world.add_plug();
