@@ -84,6 +84,8 @@ class Peer {
   const Freshness& freshness(std::size_t station) const { return wishes_[station].freshness; }
   bool take_change(std::size_t station) { return std::exchange(wishes_[station].changed, false); }
 
+  /// Whether it has sent more than its share: who reads it may let it wait.
+  bool is_above_its_share() const { return allowance_ < 1; }
   bool open() const { return open_; }  ///< its cookie has come, and is right
   /// Why the conversation is over; empty while it is not.
   const std::string& end() const { return end_; }

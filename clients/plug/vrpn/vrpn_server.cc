@@ -23,6 +23,8 @@ constexpr int kMaxHellos = 64;               ///< in one turn
 constexpr int kMaxDatagrams = 256;           ///< of one client in one turn
 constexpr std::size_t kMaxRead = 64 * 1024;  ///< from one client's stream in one turn: 256 messages of 256 bytes
 constexpr int kPortTries = 16;
+/// A program that sends more than its share is read so much later: in batches, instead of one wake-up a message.
+constexpr Duration kRest = std::chrono::microseconds(500);
 constexpr std::size_t kEach = 2;  ///< sockets of a client
 /// A machine that has vanished without a word is noticed after as many seconds.
 constexpr int kKeepAliveS = 2;
@@ -102,6 +104,7 @@ struct Server::Client {
   std::string name;
   bool dialling;    ///< we have asked for the connection, and it is not there yet
   LocalTime until;  ///< … or the cookie must be there
+  LocalTime rests_until{};
   Peer peer;
   std::vector<Asker> askers;  ///< one for each station
   std::string over;           ///< why it is dropped; empty: it stays
@@ -131,7 +134,7 @@ Server::Server(Desk& desk, Config config, LocalTime now) : desk_(desk), config_(
     }
   }
   if (!udp_) throw std::runtime_error("cannot listen at " + to_string(config_.listen) + ": " + words_of(error));
-  poll_again();
+  poll_again(now);
 }
 
 Server::~Server() {
@@ -259,6 +262,7 @@ void Server::open_udp(const Moment& now, Client& client) {
 }
 
 void Server::read(const Moment& now, Client& client, short ready, short datagrams_ready) {
+  const std::uint64_t before = client.peer.counts().messages;
   if ((ready & (POLLIN | POLLERR | POLLHUP)) != 0) {
     for (std::size_t left = kMaxRead; left > 0;) {
       const ssize_t got = ::recv(client.tcp.number(), buffer_.data(), left, 0);
@@ -281,6 +285,7 @@ void Server::read(const Moment& now, Client& client, short ready, short datagram
     }
   }
   client.peer.end_of_batch(now);
+  if (client.peer.counts().messages > before && client.peer.is_above_its_share()) client.rests_until = now.at + kRest;
   if (client.peer.udp_port() && !client.udp) open_udp(now, client);
 }
 
@@ -347,6 +352,7 @@ LocalTime Server::turn(const Moment& now) {
     }
     if (!client.peer.end().empty()) client.over = "is dropped: " + client.peer.end();
     if (!client.peer.open()) next = std::min(next, client.until);
+    if (client.rests_until > now.at) next = std::min(next, client.rests_until);
   }
   if (polled_[0].revents != 0) take_hello(now);
   if (polled_[1].revents != 0) take_connections(now);
@@ -355,19 +361,20 @@ LocalTime Server::turn(const Moment& now) {
     if (!client->over.empty()) drop(*client, client->over);
   }
   std::erase_if(clients_, [](const auto& client) { return !client->over.empty(); });
-  poll_again();
+  poll_again(now.at);
   return asked ? now.at : next;
 }
 
-void Server::poll_again() {
+void Server::poll_again(LocalTime now) {
   polled_.clear();
   polled_.push_back({udp_.number(), POLLIN, 0});
   polled_.push_back({tcp_.number(), POLLIN, 0});
   for (const auto& client : clients_) {
+    const bool reads = client->rests_until <= now;
     const bool writes = client->dialling || !client->peer.stream().empty();
-    const auto events = static_cast<short>(writes ? POLLIN | POLLOUT : POLLIN);
+    const auto events = static_cast<short>((reads ? POLLIN : 0) | (writes ? POLLOUT : 0));
     polled_.push_back({client->tcp.number(), events, 0});
-    polled_.push_back({client->udp.number(), POLLIN, 0});  // −1 is passed over
+    polled_.push_back({reads ? client->udp.number() : -1, POLLIN, 0});  // −1 is passed over
   }
 }
 

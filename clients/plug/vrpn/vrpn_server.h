@@ -91,7 +91,7 @@ class Server {
   void open_udp(const Moment& now, Client& client);
   void write(Client& client);
   void drop(Client& client, const std::string& why);
-  void poll_again();
+  void poll_again(LocalTime now);
 
   Desk& desk_;
   Config config_;

@@ -236,6 +236,30 @@ def test_every_state_is_one_report(stage):
     assert reports > 1000
 
 
+@pytest.mark.parametrize("udp", [True, False], ids=["datagrams", "stream"])
+def test_a_program_without_a_pause_is_felt_by_its_newest_field_and_delays_nobody(stage, udp):
+    with Client(stage.address, udp=udp) as client:
+        client.wait(POSE)
+        before = stage.plug.counts()
+        end = time.monotonic() + 3
+        n = 0
+        while time.monotonic() < end:
+            for _ in range(20):
+                n += 1
+                client.force_field(force=(0, 0.1 + 1e-7 * n, 0))
+            client.read(0)
+            client.inbox.clear()
+        after = stage.plug.counts()
+        last = 0.1 + 1e-7 * n
+        while True:  # it goes on, because a datagram may be lost
+            client.force_field(force=(0, last, 0))
+            if abs(client.wait(FORCE)[1] - last) < 1e-6:
+                break
+    assert abs(after["reports"] - before["reports"] - after["states"] + before["states"]) <= 2
+    assert after["skipped"] > before["skipped"]
+    assert after["forces"] - before["forces"] < 7 * (after["states"] - before["states"])
+
+
 def test_a_button_is_told_when_it_changes_and_a_server_that_comes_back_is_found(tmp_path):
     with server(tmp_path, BUTTON) as first:
         address = first.address()

@@ -145,10 +145,10 @@ TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
   world.run(200, [&] { old.turn(); });
   std::uint64_t before = 0;
   double asked = 0;
-  for (int i = 0; i < 200; ++i) {
-    if (i == 100) before = plug.forces();
+  for (int i = 0; i < 400; ++i) {
+    if (i == 300) before = plug.forces();
     world.run(1, [&] {
-      if (i > 100) {
+      if (i > 300) {
         EXPECT_NEAR(world.step.wanted.y(), asked, 1.1e-3) << "the newest of them with the next state";
       }
       for (int k = 0; k < 60; ++k) {  // in one millisecond
