@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // tendon-plug vrpn: VRPN programs use a Tendon device.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -113,22 +113,22 @@ int run_vrpn(VrpnOptions& options) {
 
 void add_vrpn(CLI::App& app, Chosen& chosen) {
   CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
-  const auto options = std::make_shared<VrpnOptions>();
-  options->desk.client.name = "tendon-plug vrpn";
-  add_common(*vrpn, options->desk);
+  static VrpnOptions options;  // the command line is parsed into it, after this function
+  options.desk.client.name = "tendon-plug vrpn";
+  add_common(*vrpn, options.desk);
   vrpn->add_option(
-          "--name", options->names,
+          "--name", options.names,
           "A name that VRPN programs ask for, and its device (the first one without it); several times for several. "
           "None: each --device under its own name, or else Phantom0")
       ->type_name("NAME=DEVICE");
-  vrpn->add_option("--listen", options->listen, "Where programs connect, TCP and UDP; port 0: any")
+  vrpn->add_option("--listen", options.listen, "Where programs connect, TCP and UDP; port 0: any")
       ->type_name("HOST:PORT")
       ->capture_default_str();
-  vrpn->add_flag("--anybody", options->anybody,
+  vrpn->add_flag("--anybody", options.anybody,
                  "Listen beyond this machine: whoever reaches the port moves a motor, for VRPN asks nobody who he is");
-  vrpn->add_option("--duration-s", options->duration_s, "End after so long; 0: at Ctrl-C")
+  vrpn->add_option("--duration-s", options.duration_s, "End after so long; 0: at Ctrl-C")
       ->check(CLI::NonNegativeNumber);
-  vrpn->callback([options, &chosen] { chosen = [options] { return run_vrpn(*options); }; });
+  vrpn->callback([&chosen] { chosen = [] { return run_vrpn(options); }; });
 }
 
 }  // namespace tendon::plug

@@ -41,7 +41,7 @@ def stage(tmp_path_factory):
         assert it.plug.process.poll() is None, it.plug.err.read_text()
 
 
-def test_the_golden_messages_of_the_page_are_what_this_client_says_and_reads():
+def test_the_golden_messages_are_what_this_client_says_and_reads():
     page = (ROOT / "clients" / "plug" / "vrpn" / "VRPN.md").read_text(encoding="utf-8")
     golden = {}
     for name, block in re.findall(r"^```golden (\S+)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
@@ -65,7 +65,7 @@ def test_the_golden_messages_of_the_page_are_what_this_client_says_and_reads():
 
 @pytest.mark.parametrize("by_hello", [True, False], ids=["hello", "tcp"])
 @pytest.mark.parametrize("udp", [True, False], ids=["datagrams", "stream"])
-def test_poses_come_and_forces_are_felt_by_both_ways_in_and_both_transports(stage, by_hello, udp):
+def test_poses_come_and_forces_are_felt_by_every_way(stage, by_hello, udp):
     with Client(stage.address, by_hello=by_hello, udp=udp) as client:
         assert client.their_cookie == COOKIE
         end = time.monotonic() + 30
@@ -85,7 +85,7 @@ def test_poses_come_and_forces_are_felt_by_both_ways_in_and_both_transports(stag
         assert len(client.wait("vrpn_Tracker Velocity")) == 10
 
 
-def test_types_and_senders_are_renumbered_at_any_time_and_descriptions_may_be_late(stage):
+def test_numbers_change_at_any_time_and_descriptions_may_be_late(stage):
     with Client(stage.address, by_hello=False, describe=False) as client:
         for seed in range(5):  # nonsense, before anything is described
             client.send(seed, 7 * seed, field(force=(0, 1, 0)))
@@ -156,7 +156,7 @@ def test_a_hello_to_a_port_where_nobody_answers_keeps_nobody_waiting(stage):
     assert after["reports"] - before["reports"] >= 0.9 * (after["states"] - before["states"])
 
 
-def test_a_name_that_nobody_has_is_answered_by_a_list_of_those_that_there_are(stage):
+def test_a_name_that_nobody_has_is_answered_by_a_list(stage):
     with Client(stage.address, name="Tracker7"):
         assert "there is Phantom0" in stage.plug.wait_for('it asks for "Tracker7"')
 
@@ -198,7 +198,7 @@ def test_the_seventeenth_program_finds_no_place_until_one_leaves(stage):
             pass
 
 
-def test_a_program_that_never_reads_is_dropped_and_the_others_do_not_notice(stage):
+def test_a_program_that_never_reads_is_dropped_and_nobody_notices(stage):
     with Client(stage.address, by_hello=False) as deaf, Client(stage.address) as client:
         end = time.monotonic() + 30
         while "it does not read what it is sent" not in stage.plug.err.read_text():
@@ -237,7 +237,7 @@ def test_every_state_is_one_report(stage):
 
 
 @pytest.mark.parametrize("udp", [True, False], ids=["datagrams", "stream"])
-def test_a_program_without_a_pause_is_felt_by_its_newest_field_and_delays_nobody(stage, udp):
+def test_a_program_without_a_pause_is_felt_by_its_newest_field(stage, udp):
     with Client(stage.address, udp=udp) as client:
         client.wait(POSE)
         before = stage.plug.counts()
@@ -260,7 +260,7 @@ def test_a_program_without_a_pause_is_felt_by_its_newest_field_and_delays_nobody
     assert after["forces"] - before["forces"] < 7 * (after["states"] - before["states"])
 
 
-def test_a_button_is_told_when_it_changes_and_a_server_that_comes_back_is_found(tmp_path):
+def test_a_button_is_told_and_a_server_that_comes_back_is_found(tmp_path):
     with server(tmp_path, BUTTON) as first:
         address = first.address()
         with plug(tmp_path, address) as between, Client(between.address()) as client:
@@ -306,7 +306,7 @@ def given_out(folder: Path, *more: str) -> dict:
 
 
 @pytest.mark.skipif(not (PROGRAMS / "tendon-report").exists(), reason="tendon-report is not built")
-def test_a_wall_20_ms_away_gives_out_nothing_with_the_limiter_and_more_than_1_j_without(tmp_path):
+def test_a_wall_20_ms_away_is_passive_with_the_limiter_only(tmp_path):
     limited = given_out(tmp_path / "limited")
     assert limited["energy_given_out_j"] <= 1e-9 or limited["overruns"] > 0, limited
     assert limited["peak_force_n"] > 1, limited

@@ -109,7 +109,7 @@ TEST(VrpnPlane, DampingBelowATenthIsIgnoredAndNeverMakesAPlanePull) {
   EXPECT_EQ(felt(drawing, Vec3(0, -0.001, 0), Vec3(0, 5, 0)).force.y(), 0) << "coming out fast";
 }
 
-TEST(VrpnPlane, FrictionSticksWithTheStaticCoefficientAndSlipsWithTheDynamicOne) {
+TEST(VrpnPlane, FrictionSticksAtTheStaticCoefficientAndSlipsAtTheOther) {
   Drawing drawing;
   drawing.draw(Plane{.normal = Vec3::UnitY(), .spring = 1, .dynamic_friction = 0.2, .static_friction = 0.5});
   constexpr double kPressure = 2;  // N
