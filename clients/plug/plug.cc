@@ -2,6 +2,7 @@
 #include "clients/plug/plug.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace tendon::plug {
@@ -14,6 +15,15 @@ using Phase = ForceClient::Phase;
 constexpr std::uint64_t kReordered = 1000;
 
 constexpr std::size_t kMaxSentences = 16;
+constexpr int kMaxLeftOver = 256;
+
+/// What still comes for a session that is over. Otherwise whoever sleeps on the link would be woken for ever.
+void leave_unread(Link& link) {
+  std::array<std::byte, kMaxDatagram> buffer;
+  Address from;
+  for (int i = 0; i < kMaxLeftOver && link.receive(from, buffer) > 0; ++i) {
+  }
+}
 
 bool is_open(const std::unique_ptr<ForceClient>& client) { return client && client->phase() == Phase::kOpen; }
 
@@ -100,6 +110,8 @@ LocalTime Plug::turn(LocalTime now) {
     learn_from(*watcher_);
     note_changes();
   }
+  if (!watcher_) leave_unread(watcher_way_.link);
+  if (!controller_) leave_unread(controller_way_.link);
   if (lost()) {
     state_.reset();
     welcome_.reset();

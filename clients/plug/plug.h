@@ -26,6 +26,7 @@ namespace tendon::plug {
 /// * **Freshness.** A force that was asked for until T answers states until T, and then nothing is sent: the server
 ///   holds, fades and stops the old force as for any engine that falls silent (protocol/SESSION.md). An old force is
 ///   never sent as if it were new.
+/// * **Nothing stays unread.** A turn takes what comes by the link of a session that is over, and drops it.
 /// * **At once.** What is asked for now is sent in the next turn, in answer to the newest state, and again in answer to
 ///   every state that comes while it is fresh.
 ///
