@@ -97,7 +97,7 @@ void Peer::take_stream(const Moment& now, Bytes bytes) {
     open_ = true;
     describe_all(now);
   }
-  for (;;) {
+  while (end_.empty()) {
     const First first = first_message(std::span(in_).subspan(used));
     if (first.broken) {
       end_ = "it sends a message of an impossible length";

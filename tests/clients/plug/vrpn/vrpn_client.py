@@ -291,7 +291,7 @@ def main() -> None:
             poses = [one for one in client.inbox if one[1] == "vrpn_Tracker Pos_Quat"]
             client.inbox.clear()
             if options.what == "press" and time.monotonic() >= next_field:
-                next_field = time.monotonic() + 1 / options.rate_hz
+                next_field = max(next_field, time.monotonic() - 0.01) + 1 / options.rate_hz
                 client.force_field(force=(-2, 0, 0))
             elif options.what == "wall" and poses and time.monotonic() >= next_field:
                 next_field += 1 / options.rate_hz
