@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -393,6 +398,36 @@ TEST_F(VrpnPeer, SurvivesAHundredThousandMutatedMessages) {
   }
   EXPECT_GT(ended, 100U);
   EXPECT_GT(drawn, 1000U);
+}
+
+/// The bytes that VRPN's own programs sent to a server, NAME.stream, by TCP from the cookie on.
+TEST(VrpnCaptures, WhatRealProgramsSentIsUnderstood) {
+  const char* const data = std::getenv("TENDON_DATA");  // NOLINT(concurrency-mt-unsafe): one thread
+  if (data == nullptr) GTEST_SKIP() << "TENDON_DATA is not set: no bytes of real programs";
+  const std::filesystem::path folder = std::filesystem::path(data) / "vrpn";
+  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << folder << " is not there: no bytes of real programs";
+  int replayed = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".stream") continue;
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    std::array<Station, 1> stations;
+    stations[0].name = "Tracker0";
+    for (const std::size_t piece : {std::size_t{1}, std::size_t{1000}, bytes.size()}) {
+      const Moment now{LocalTime(std::chrono::seconds(1)), {}};
+      Peer peer(stations, now);
+      for (std::size_t at = 0; at < bytes.size(); at += piece) {
+        peer.take_stream(now, std::as_bytes(std::span(bytes)).subspan(at, std::min(piece, bytes.size() - at)));
+        peer.end_of_batch(now);
+      }
+      EXPECT_TRUE(peer.open()) << entry.path();
+      EXPECT_EQ(peer.end(), "") << entry.path();
+      EXPECT_EQ(peer.counts().nonsense, 0U) << entry.path();
+      EXPECT_GT(peer.counts().messages, 0U) << entry.path();
+    }
+    ++replayed;
+  }
+  EXPECT_GT(replayed, 0) << folder << " has no NAME.stream";
 }
 
 }  // namespace
