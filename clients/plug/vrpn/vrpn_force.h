@@ -17,6 +17,13 @@ struct Hand {
   Vec3 velocity = Vec3::Zero();  ///< m/s
 };
 
+/// A plane that is drawn, and the bristle of its friction.
+struct Surface {
+  Plane plane;                 ///< with a normal of length 1
+  std::optional<Vec3> foot{};  ///< of the bristle; empty: the hand is outside
+  bool slips = false;
+};
+
 /// What one program has drawn around one device: a force field and four planes. Their sum is felt:
 ///
 ///     field    F = force + J (x − origin)     where |x − origin| ≤ radius; stiffness −J, valid radius − |x − origin|
@@ -53,11 +60,6 @@ class Drawing {
   Touch touch(const Hand& hand, double stiffest);
 
  private:
-  struct Surface {
-    Plane plane;                 ///< with a normal of length 1
-    std::optional<Vec3> foot{};  ///< of the bristle; empty: the hand is outside
-    bool slips = false;
-  };
   static Vec3 friction(Surface& surface, const Vec3& at, double pressure);
 
   std::optional<ForceField> field_;

@@ -16,7 +16,6 @@ constexpr std::string_view kMagic = "vrpn: ver. 07.38";
 constexpr std::size_t kMajor = 14;  ///< bytes up to the last point, with it
 constexpr std::size_t kLogMode = 18;
 constexpr std::size_t kAlignment = 8;
-constexpr int kLowestPort = 1024;
 
 constexpr std::size_t padded(std::size_t size) { return (size + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -106,7 +105,7 @@ std::optional<std::uint16_t> port_in_hello(Bytes datagram) {
   text.remove_prefix(space + 1);
   int port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  if (error != std::errc() || end != text.data() + text.size() || port < kLowestPort || port > 0xffff) return {};
+  if (error != std::errc() || end != text.data() + text.size() || port < kLowestPort || port > kHighestPort) return {};
   return static_cast<std::uint16_t>(port);
 }
 

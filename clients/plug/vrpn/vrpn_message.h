@@ -33,6 +33,10 @@ inline constexpr std::size_t kLongestName = 99;
 /// Senders and types are numbered below this, each end for itself.
 inline constexpr std::int32_t kMostNumbers = 2000;
 
+/// Ports below this one are the system's: no program is expected there.
+inline constexpr int kLowestPort = 1024;
+inline constexpr int kHighestPort = 0xffff;
+
 // Types that every VRPN knows. Ours are the numbers of `Type`.
 inline constexpr std::int32_t kSenderDescription = -1;  ///< the sender field is the number
 inline constexpr std::int32_t kTypeDescription = -2;    ///< likewise

@@ -9,8 +9,6 @@
 namespace tendon::plug::vrpn {
 namespace {
 
-constexpr int kLowestPort = 1024;
-constexpr int kHighestPort = 0xffff;
 constexpr std::size_t kMaxSentences = 32;  ///< not yet said
 constexpr double kTurnTime = 0.01;  ///< s: a quaternion tells a turn of up to half a circle in it, 50 turns a second
 constexpr double kSlowest = 1;      ///< Hz
