@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-plug vrpn: VRPN programs use a Tendon device.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/machine.h"
+#include "clients/cpp/stop_signals.h"
+#include "clients/plug/subcommands.h"
+#include "clients/plug/vrpn/vrpn_server.h"
+
+namespace tendon::plug {
+namespace {
+
+struct VrpnOptions {
+  DeskConfig desk;
+  std::vector<std::string> names;
+  std::string listen = "127.0.0.1:3883";
+  bool anybody = false;
+  double duration_s = 0;
+};
+
+/// Desk::turn is called again at once, at most so often, while something computed has yet to leave.
+constexpr int kTurnsAtOnce = 4;
+
+/// "Phantom0=right", or "Phantom0" for the first device. Adds the device to the desk's.
+vrpn::Server::Alias alias_of(const std::string& text, std::vector<std::string>& devices) {
+  const std::size_t equals = text.find('=');
+  const std::string name = text.substr(0, equals);
+  if (name.empty() || name.size() > vrpn::kLongestName || name.find_first_of("@: /") != std::string::npos) {
+    throw std::runtime_error("--name " + text + ": expected NAME=DEVICE, with a name of at most " +
+                             std::to_string(vrpn::kLongestName) + " characters without @, :, / and spaces");
+  }
+  if (equals == std::string::npos) {
+    if (devices.empty()) devices.emplace_back();
+    return {name, 0};
+  }
+  const std::string device = text.substr(equals + 1);
+  const auto found = std::ranges::find(devices, device);
+  const auto place = static_cast<std::size_t>(found - devices.begin());
+  if (found == devices.end()) devices.push_back(device);
+  return {name, place};
+}
+
+vrpn::Server::Config config_of(VrpnOptions& options) {
+  vrpn::Server::Config config{.listen = parse_address(options.listen), .names = {}};
+  if (!is_ipv4(config.listen)) throw std::runtime_error("--listen " + options.listen + ": VRPN has IPv4 only");
+  if (!is_loopback(config.listen) && !options.anybody) {
+    throw std::runtime_error(
+        "--listen " + options.listen +
+        ": whoever reaches this port moves a motor, for VRPN asks nobody who he is; --anybody says "
+        "that this is meant");
+  }
+  for (const std::string& text : options.names) config.names.push_back(alias_of(text, options.desk.devices));
+  if (config.names.empty() && options.desk.devices.empty())
+    config.names.push_back(alias_of("Phantom0", options.desk.devices));
+  if (options.names.empty()) {
+    for (std::size_t i = config.names.size(); i < options.desk.devices.size(); ++i) {
+      config.names.push_back({options.desk.devices[i], i});
+    }
+  }
+  for (std::size_t i = 0; i < config.names.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (config.names[i].name == config.names[k].name) {
+        throw std::runtime_error("--name " + config.names[i].name + ": it is there twice");
+      }
+    }
+  }
+  return config;
+}
+
+int run_vrpn(VrpnOptions& options) {
+  const vrpn::Server::Config config = config_of(options);
+  const StopSignals signals;
+  const LocalTime start = read_clock();
+  const LocalTime end = options.duration_s > 0 ? start + from_seconds(options.duration_s) : LocalTime::max();
+  Desk desk(options.desk, start);
+  vrpn::Server server(desk, config, start);
+  if (options.desk.json) {
+    std::cout << nlohmann::json{{"event", "listening"}, {"address", to_string(server.address())}} << std::endl;
+  }
+  std::string names;
+  for (const auto& alias : config.names)
+    names += (names.empty() ? "" : ", ") + alias.name + " (" + desk.name(alias.place) + ")";
+  desk.say("VRPN at " + to_string(server.address()) + ": " + names);
+  if (!is_loopback(config.listen)) desk.say("whoever reaches this port moves a motor: VRPN asks nobody who he is");
+  // Messages are stamped with the time of day, which may be set meanwhile.
+  Duration to_1970{};
+  LocalTime look_again = start;
+  LocalTime now = start;
+  while (!signals.asked() && now < end) {
+    if (now >= look_again) {
+      to_1970 = std::chrono::system_clock::now().time_since_epoch() - now.time_since_epoch();
+      look_again = now + std::chrono::seconds(1);
+    }
+    LocalTime next = desk.turn(now, server.counts());
+    for (int i = 0; i < kTurnsAtOnce && next <= now; ++i) next = desk.turn(now = read_clock(), server.counts());
+    next = std::min(next, server.turn({now, now.time_since_epoch() + to_1970}));
+    now = read_clock();
+    desk.wait(server.polled(), now, std::min(next, end));
+    now = read_clock();
+  }
+  desk.stop(now);
+  return 0;
+}
+
+}  // namespace
+
+void add_vrpn(CLI::App& app, Chosen& chosen) {
+  CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
+  static VrpnOptions options;  // the command line is parsed into it, after this function
+  options.desk.client.name = "tendon-plug vrpn";
+  add_common(*vrpn, options.desk);
+  vrpn->add_option(
+          "--name", options.names,
+          "A name that VRPN programs ask for, and its device (the first one without it); several times for several. "
+          "None: each --device under its own name, or else Phantom0")
+      ->type_name("NAME=DEVICE");
+  vrpn->add_option("--listen", options.listen, "Where programs connect, TCP and UDP; port 0: any")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  vrpn->add_flag("--anybody", options.anybody,
+                 "Listen beyond this machine: whoever reaches the port moves a motor, for VRPN asks nobody who he is");
+  vrpn->add_option("--duration-s", options.duration_s, "End after so long; 0: at Ctrl-C")
+      ->check(CLI::NonNegativeNumber);
+  vrpn->callback([&chosen] { chosen = [] { return run_vrpn(options); }; });
+}
+
+}  // namespace tendon::plug

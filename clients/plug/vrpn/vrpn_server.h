@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <poll.h>
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/plug/desk.h"
+#include "clients/plug/vrpn/vrpn_peer.h"
+
+namespace tendon::plug::vrpn {
+
+/// A file descriptor that is closed with its owner.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  ~Descriptor();
+  int number() const noexcept { return number_; }
+  explicit operator bool() const noexcept { return number_ >= 0; }
+
+ private:
+  int number_ = -1;
+};
+
+/// The sockets of a VRPN server: one port, TCP and UDP.
+///
+///     Server server(desk, config, now);
+///     for (…) desk.turn(now, server.counts()); next = server.turn(moment); desk.wait(server.polled(), now, next);
+///
+/// * **Two ways in.** A datagram that names a TCP port, whereupon we connect to that port *of the address that the
+///   datagram came from*; or a TCP connection to us. The address in the datagram's text is never used, nor is the one
+///   in the description of a UDP port. A connection that we open is never waited for; at most kDialsPerSecond, and one
+///   at a time to the same port; without an answer it is given up after kPatience.
+/// * **Limits.** kMaxClients, those that are being connected to with them; further ones are closed, and said once until
+///   a place is free. One whose cookie does not come within kPatience is dropped.
+/// * **Forces.** Each program has an Asker for each station. When its connection ends it is let go at once: the server
+///   fades its last force.
+///
+/// Thread-safe: no. Realtime-safe: no (system calls).
+class Server {
+ public:
+  static constexpr std::size_t kMaxClients = 16;
+  static constexpr int kDialsPerSecond = 20;
+  static constexpr Duration kPatience = std::chrono::seconds(3);
+
+  struct Alias {
+    std::string name;   ///< that VRPN programs ask for
+    std::size_t place;  ///< of the device at the desk
+  };
+  struct Config {
+    Address listen;  ///< IPv4; port 0: any
+    std::vector<Alias> names;
+  };
+
+  /// Throws std::runtime_error "cannot listen at …: …".
+  Server(Desk& desk, Config config, LocalTime now);
+  ~Server();
+
+  const Address& address() const noexcept { return address_; }
+
+  /// Serves everybody, after Desk::turn and Desk::wait. The latest time for the next turn; `now` when something has
+  /// been asked for that should leave at once.
+  LocalTime turn(const Moment& now);
+  /// For Desk::wait. Another set after each turn.
+  std::span<pollfd> polled() { return polled_; }
+  std::span<const Desk::Count> counts();
+
+ private:
+  struct Client;
+
+  void serve_states(const Moment& now);
+  void take_hello(const Moment& now);
+  void dial(const Moment& now, const Address& to);
+  void take_connections(const Moment& now);
+  bool has_place(const std::string& whom);
+  void read(const Moment& now, Client& client, short ready, short datagrams_ready);
+  void finish_dial(const Moment& now, Client& client, short ready);
+  void open_udp(const Moment& now, Client& client);
+  void write(Client& client);
+  void drop(Client& client, const std::string& why);
+  void poll_again(LocalTime now);
+
+  Desk& desk_;
+  Config config_;
+  Address address_;
+  Descriptor tcp_;
+  Descriptor udp_;
+  std::vector<Station> stations_;
+  struct Seen {
+    std::uint64_t states = 0;
+    bool lost = false;
+  };
+  std::vector<Seen> seen_;
+  std::deque<std::unique_ptr<Client>> clients_;
+  std::uint32_t last_number_ = 0;
+  bool full_said_ = false;
+  double dials_ = kDialsPerSecond;
+  LocalTime dialled_{};
+  Peer::Counts gone_;  ///< of clients that have left
+  std::vector<Desk::Count> counts_;
+  std::vector<pollfd> polled_;
+  Buffer buffer_;
+};
+
+}  // namespace tendon::plug::vrpn

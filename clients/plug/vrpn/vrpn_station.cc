@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/plug/vrpn/vrpn_station.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "clients/plug/vrpn/vrpn_peer.h"
+
+namespace tendon::plug::vrpn {
+namespace {
+
+constexpr Duration kAskAgain = std::chrono::milliseconds(500);
+/// Each ask is a datagram. A program that says more waits for the next state at most, which is answered by the newest
+/// that it has said: VRPN's own ff_client sends 60 000 fields a second, as fast as it can.
+constexpr Duration kShortest = std::chrono::microseconds(250);
+/// … is fresh for longer than that, so that a turn that comes late loses nothing, and not for ever: a plug that hangs
+/// must not push.
+constexpr Duration kAskedFor = std::chrono::seconds(1);
+
+}  // namespace
+
+std::optional<std::string> Station::learn(const Plug& plug) {
+  const bool description_is_there = plug.description().has_value();
+  const bool handle_is_there = plug.handle().has_value();
+  if (description_is_there == described && handle_is_there == handle_is_known) return {};
+  described = description_is_there;
+  handle_is_known = handle_is_there;
+  if (plug.welcome() && plug.welcome()->loop_hz > 0) loop_hz = plug.welcome()->loop_hz;
+  if (described) {
+    workspace = plug.description()->workspace;
+    if (plug.description()->max_stiffness > 0) stiffest = plug.description()->max_stiffness;
+  }
+  if (!handle_is_known) return {};
+  buttons = static_cast<int>(plug.handle()->buttons.size());
+  view = View(*find_frame("openhaptics"), plug.handle()->operator_from_device);
+  if (plug.handle()->operator_from_device || std::exchange(axes_said, true)) return {};
+  return name + ": the scene does not say which way is up (axes); the device's own axes are taken for VRPN's";
+}
+
+bool Asker::turn(LocalTime now, Duration since_1970, Plug& plug, const Station& station, Peer& peer) {
+  if (asks_ && now - at_ < kShortest) return false;
+  Drawing& drawing = peer.drawing(i_);
+  const bool changed = peer.take_change(i_);
+  const LocalTime until = drawing.empty() ? LocalTime::max() : peer.freshness(i_).until();
+  if (drawing.empty()) {
+    if (!changed || !asks_) return false;
+    asks_ = is_stale_ = for_long_ = false;
+  } else if (now >= until) {
+    if (!std::exchange(is_stale_, true)) {
+      sentence_ = station.name + ": " + who_ + " is silent and has not ended its force; it fades";
+    }
+    return false;
+  } else if (!changed && now - at_ < kAskAgain) {
+    return false;
+  } else {
+    asks_ = true;
+    if (std::exchange(is_stale_, false)) sentence_ = station.name + ": " + who_ + " draws again";
+  }
+  at_ = now;
+  const Physics physics = [&drawing, &station](const DeviceState& state) {
+    return in_base_frame(drawing.touch(station.hand(state), station.stiffest), station.view);
+  };
+  const Plug::Answer answer = plug.ask(number_, now, std::min(until, now + kAskedFor), physics);
+  const Moment moment{now, since_1970};
+  if (answer != Plug::Answer::kTaken) {
+    if (std::exchange(is_refused_, true)) return false;
+    const std::string why =
+        answer == Plug::Answer::kOwned ? "another program has this device's force" : "tendon-plug only observes";
+    peer.tell(moment, i_, Severity::kWarning, "your force is not felt: " + why);
+    sentence_ = station.name + ": the force of " + who_ + " is not felt: " + why;
+    return false;
+  }
+  if (std::exchange(is_refused_, false)) {
+    peer.tell(moment, i_, Severity::kNormal, "your force is felt now");
+    sentence_ = station.name + ": the force of " + who_ + " is felt now";
+  } else if (asks_ && !changed && until == LocalTime::max() && !std::exchange(for_long_, true)) {
+    sentence_ = station.name + ": what " + who_ + " has drawn lives as long as its connection";
+  }
+  return true;
+}
+
+}  // namespace tendon::plug::vrpn

@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tendon-plug vrpn against a client that was written from VRPN.md alone, on real sockets."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from vrpn_client import COOKIE, UDP, Client, description, field, message, messages_in, plane
+from vrpn_stage import BUTTON, PROGRAMS, ROOT, Program, plug, server
+
+if not (PROGRAMS / "tendon-plug").exists():
+    pytest.skip("tendon-plug is not built", allow_module_level=True)
+
+FORCE = "vrpn_ForceDevice Force"
+POSE = "vrpn_Tracker Pos_Quat"
+
+
+class Stage:
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.server = server(folder)
+        self.plug = plug(folder, self.server.address())
+        self.address = self.plug.address()
+        self.plug.wait_for("connected to")
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory):
+    it = Stage(tmp_path_factory.mktemp("vrpn"))
+    with it.server, it.plug:
+        yield it
+        assert it.plug.process.poll() is None, it.plug.err.read_text()
+
+
+def test_the_golden_messages_are_what_this_client_says_and_reads():
+    page = (ROOT / "clients" / "plug" / "vrpn" / "VRPN.md").read_text(encoding="utf-8")
+    golden = {}
+    for name, block in re.findall(r"^```golden (\S+)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        golden[name] = bytes.fromhex(" ".join(line.partition(";")[0] for line in block.splitlines()))
+    assert golden["cookie"] == COOKIE
+    assert golden["hello"] == b"127.0.0.1 40000\0"
+
+    def said(sender, type_, payload):
+        return message(sender, type_, payload, stamp=1700000000.25, sequence=7)
+
+    assert golden["sender-description"] == said(0, -1, description("Phantom0"))
+    assert golden["udp-description"] == said(40001, UDP, b"127.0.0.1\0")
+    values = {"origin": (0.01, 0.02, 0.03), "force": (1, -2, 3), "radius": 0.25}
+    assert golden["force-field"] == said(0, 13, field(jacobian=(-100, 0, 0, 0, -200, 0, 5, 0, -300), **values))
+    assert golden["plane"] == said(0, 14, plane((0, 2, 0, 0.02), 0.8, 0.001, 0.25, 0.5, index=1, cycles=4))
+    for name, data in golden.items():
+        if name not in ("cookie", "hello"):
+            ((_, _, stamp, _, end),) = messages_in(data)
+            assert (stamp, end) == (1700000000.25, len(data)), name
+
+
+@pytest.mark.parametrize("by_hello", [True, False], ids=["hello", "tcp"])
+@pytest.mark.parametrize("udp", [True, False], ids=["datagrams", "stream"])
+def test_poses_come_and_forces_are_felt_by_every_way(stage, by_hello, udp):
+    with Client(stage.address, by_hello=by_hello, udp=udp) as client:
+        assert client.their_cookie == COOKIE
+        end = time.monotonic() + 30
+        force = (0.0, 0.0, 0.0)
+        while abs(force[1] - 0.7) > 1e-3:
+            assert time.monotonic() < end, force
+            client.force_field(force=(0, 0.7, 0))
+            force = client.wait(FORCE)
+        pose = client.wait(POSE, lambda pose: pose[3] > 1e-3)
+        assert abs(pose[2]) < 1e-3 and abs(pose[4]) < 1e-3, pose
+        assert pose[5:9] == (0, 0, 0, 1)
+        while udp and client.by_datagram == 0:  # what came before by the stream is read first
+            assert time.monotonic() < end
+            client.wait(POSE)
+        assert (client.by_datagram > 0) == udp
+        assert len(client.wait("vrpn_Analog Channel")) == 4
+        assert len(client.wait("vrpn_Tracker Velocity")) == 10
+
+
+def test_numbers_change_at_any_time_and_descriptions_may_be_late(stage):
+    with Client(stage.address, by_hello=False, describe=False) as client:
+        for seed in range(5):  # nonsense, before anything is described
+            client.send(seed, 7 * seed, field(force=(0, 1, 0)))
+        for _ in range(3):
+            client.describe("Phantom0")
+            for name in Client.TYPES:
+                client.describe_type(name)
+            client.say("vrpn_Base ping_message")
+            assert client.wait("vrpn_Base pong_message") == b""
+            client.say("vrpn_Tracker Request_Tracker_To_Room")
+            assert client.wait("vrpn_Tracker To_Room") == (0, 0, 0, 0, 0, 0, 1)
+        assert client.wait(POSE)
+
+
+def test_another_minor_version_talks_and_another_major_one_is_refused(stage):
+    with Client(stage.address, by_hello=False, cookie=COOKIE.replace(b"07.38", b"07.30")) as client:
+        assert client.wait(POSE)
+    stage.plug.wait_for("another minor version of VRPN")
+    with Client(stage.address, by_hello=False, cookie=COOKIE.replace(b"07.38", b"06.01")) as client:
+        assert client.wait_closed()
+    stage.plug.wait_for("its first bytes are not those of VRPN 07")
+
+
+def test_an_update_rate_is_this_clients_own(stage):
+    with Client(stage.address) as slow, Client(stage.address) as fast:
+        slow.say("vrpn_Tracker set_update_rate", struct.pack(">d", 50))
+        slow.wait("vrpn_Analog Channel")
+        slow.wait("vrpn_Analog Channel")
+        counts = [0, 0]
+        end = time.monotonic() + 1
+        while time.monotonic() < end:
+            for i, client in enumerate((slow, fast)):
+                client.read(0.001)
+                counts[i] += sum(1 for one in client.inbox if one[1] == POSE)
+                client.inbox.clear()
+        assert counts[1] > 8 * counts[0] > 0, counts  # 20 to 1, and the machine pauses
+
+
+def test_nothing_is_dialled_that_the_hello_names(stage):
+    """The text says 127.0.0.2, the datagram comes from 127.0.0.1."""
+    other = socket.create_server(("127.0.0.2", 0))
+    other.settimeout(1)
+    ours = socket.create_server(("127.0.0.1", other.getsockname()[1]))
+    ours.settimeout(30)
+    lob = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    host, _, port = stage.address.rpartition(":")
+    lob.sendto(f"127.0.0.2 {other.getsockname()[1]}\0".encode(), (host, int(port)))
+    with ours.accept()[0]:
+        pass
+    with pytest.raises(TimeoutError):
+        other.accept()
+
+
+def test_a_hello_to_a_port_where_nobody_answers_keeps_nobody_waiting(stage):
+    closed = socket.create_server(("127.0.0.1", 0))
+    port = closed.getsockname()[1]
+    closed.close()
+    host, _, server_port = stage.address.rpartition(":")
+    lob = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with Client(stage.address) as client:
+        client.wait(POSE)
+        before = stage.plug.counts()
+        for text in (f"a {port}\0", "a 22\0", "nonsense", "", "a -1\0", "a 99999\0"):
+            for _ in range(5):
+                lob.sendto(text.encode(), (host, int(server_port)))
+        after = stage.plug.counts()
+        client.wait(POSE)
+    assert after["reports"] - before["reports"] >= 0.9 * (after["states"] - before["states"])
+
+
+def test_a_name_that_nobody_has_is_answered_by_a_list(stage):
+    with Client(stage.address, name="Tracker7"):
+        assert "there is Phantom0" in stage.plug.wait_for('it asks for "Tracker7"')
+
+
+def test_a_second_program_is_told_that_it_is_not_felt(stage):
+    with Client(stage.address) as first, Client(stage.address, by_hello=False) as second:
+        first.force_field(force=(0, 0.5, 0))
+        first.wait(FORCE, lambda force: abs(force[1] - 0.5) < 1e-3)
+        second.force_field(force=(0, -0.5, 0))
+        assert "not felt" in second.wait_for_text()
+        first.force_field()
+        first.close()
+        second.force_field(force=(0, -0.5, 0))
+        second.wait(FORCE, lambda force: abs(force[1] + 0.5) < 1e-3)
+
+
+def test_the_seventeenth_program_finds_no_place_until_one_leaves(stage):
+    clients = [Client(stage.address, by_hello=False) for _ in range(16)]
+    try:
+        for client in clients:
+            client.wait(POSE)
+        host, _, port = stage.address.rpartition(":")
+        with socket.create_connection((host, int(port)), timeout=30) as one_more:
+            assert one_more.recv(100) == b""
+        stage.plug.wait_for("16 clients are the most")
+        clients.pop().close()
+        end = time.monotonic() + 30
+        while True:
+            try:
+                clients.append(Client(stage.address, by_hello=False))
+                break
+            except OSError:
+                assert time.monotonic() < end
+        clients[-1].wait(POSE)
+    finally:
+        for client in clients:
+            client.close()
+        while stage.plug.counts()["clients"] > 0:
+            pass
+
+
+def test_a_program_that_never_reads_is_dropped_and_nobody_notices(stage):
+    with Client(stage.address, by_hello=False) as deaf, Client(stage.address) as client:
+        end = time.monotonic() + 30
+        while "it does not read what it is sent" not in stage.plug.err.read_text():
+            assert time.monotonic() < end
+            client.read()
+            client.inbox.clear()
+        assert deaf.wait_closed()
+        client.wait(POSE)
+
+
+def test_a_length_of_two_to_the_31_ends_the_connection(stage):
+    with Client(stage.address, by_hello=False) as client:
+        client.send_bytes(struct.pack(">I", 1 << 31) + bytes(20))
+        assert client.wait_closed()
+    stage.plug.wait_for("a message of an impossible length")
+
+
+def test_who_says_nothing_is_dropped(stage):
+    host, _, port = stage.address.rpartition(":")
+    with socket.create_connection((host, int(port)), timeout=30) as silent:
+        while silent.recv(100):
+            pass
+    stage.plug.wait_for("does not say that it speaks VRPN")
+
+
+def test_every_state_is_one_report(stage):
+    with Client(stage.address) as client:
+        client.wait(POSE)
+        before = stage.plug.counts()
+        time.sleep(2)
+        after = stage.plug.counts()
+    reports = after["reports"] - before["reports"]
+    # Each line is written between the two.
+    assert abs(reports - (after["states"] - before["states"])) <= 2
+    assert reports > 1000
+
+
+@pytest.mark.parametrize("udp", [True, False], ids=["datagrams", "stream"])
+def test_a_program_without_a_pause_is_felt_by_its_newest_field(stage, udp):
+    with Client(stage.address, udp=udp) as client:
+        client.wait(POSE)
+        before = stage.plug.counts()
+        end = time.monotonic() + 3
+        n = 0
+        while time.monotonic() < end:
+            for _ in range(20):
+                n += 1
+                client.force_field(force=(0, 0.1 + 1e-7 * n, 0))
+            client.read(0)
+            client.inbox.clear()
+        after = stage.plug.counts()
+        last = 0.1 + 1e-7 * n
+        while True:  # it goes on, because a datagram may be lost
+            client.force_field(force=(0, last, 0))
+            if abs(client.wait(FORCE)[1] - last) < 1e-6:
+                break
+    assert abs(after["reports"] - before["reports"] - after["states"] + before["states"]) <= 2
+    assert after["skipped"] > before["skipped"]
+    assert after["forces"] - before["forces"] < 7 * (after["states"] - before["states"])
+
+
+def test_a_button_is_told_and_a_server_that_comes_back_is_found(tmp_path):
+    with server(tmp_path, BUTTON) as first:
+        address = first.address()
+        with plug(tmp_path, address) as between, Client(between.address()) as client:
+            assert client.wait("vrpn_Button Change")[0] == 0
+            first.stop()
+            assert "lost" in client.wait_for_text()
+            with server(tmp_path, BUTTON, listen=address):
+                assert client.wait(POSE)
+                assert client.wait("vrpn_Button Change", lambda change: change == (0, 1))
+                assert client.wait("vrpn_Button Change", lambda change: change == (0, 0))
+
+
+def test_beyond_this_machine_it_listens_only_when_that_is_meant(tmp_path):
+    refused = subprocess.run(
+        [PROGRAMS / "tendon-plug", "vrpn", "--listen", "0.0.0.0:0"], capture_output=True, text=True, timeout=30
+    )
+    assert refused.returncode == 1
+    assert "whoever reaches this port moves a motor" in refused.stderr
+    with Program(
+        tmp_path, "tendon-plug", "vrpn", "--listen", "0.0.0.0:0", "--anybody", "--duration-s", "60"
+    ) as meant:
+        meant.wait_for("whoever reaches this port moves a motor")
+
+
+def given_out(folder: Path, *more: str) -> dict:
+    """What tendon-report says of 6 s of a wall of 1000 N/m that a program of old draws 20 ms away."""
+    scene = (ROOT / "deploy" / "scenes" / "demo.toml").read_text()
+    folder.mkdir()
+    with server(folder, scene, "--record", "run.mcap", *more, duration_s=6) as device:
+        inject = ["--listen", "127.0.0.1:0", "--to", device.address(), "--seed", "7", "--profile", "delay=20ms"]
+        with Program(folder, "tendon-inject", *inject, "--max-release-error-us", "1e9", "--json") as network:
+            with plug(folder, network.address("listen")) as between:
+                client = [sys.executable, Path(__file__).parent / "vrpn_client.py", between.address(), "wall"]
+                with subprocess.Popen(client, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as old:
+                    try:
+                        assert device.process.wait(60) == 0, device.err.read_text()
+                    finally:
+                        old.kill()
+    report = subprocess.run(
+        [PROGRAMS / "tendon-report", "--json", folder / "run.mcap"], capture_output=True, text=True, check=True
+    )
+    return dict(json.loads(report.stdout))
+
+
+@pytest.mark.skipif(not (PROGRAMS / "tendon-report").exists(), reason="tendon-report is not built")
+def test_a_wall_20_ms_away_is_passive_with_the_limiter_only(tmp_path):
+    limited = given_out(tmp_path / "limited")
+    assert limited["energy_given_out_j"] <= 1e-9 or limited["overruns"] > 0, limited
+    assert limited["peak_force_n"] > 1, limited
+    free = given_out(tmp_path / "free", "--without-limiter")
+    assert free["energy_given_out_j"] > 1, free
+
+
+def test_a_program_that_is_killed_or_frozen_pushes_no_more(stage):
+    for number in (signal.SIGKILL, signal.SIGSTOP):
+        command = [sys.executable, Path(__file__).parent / "vrpn_client.py", stage.address, "press"]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as old, Client(stage.address) as watcher:
+            watcher.wait(FORCE, lambda force: abs(force[0] + 2) < 1e-3)
+            old.send_signal(number)
+            watcher.wait(FORCE, lambda force: force[0] == 0)
+            old.kill()
+            watcher.wait(POSE)

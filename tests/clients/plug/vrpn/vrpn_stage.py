@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tendond and tendon-plug on loopback, for tests and measurements. What they say goes into files of `folder`."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[4]
+PROGRAMS = Path(os.environ.get("TENDON_PROGRAMS", ROOT / "build" / "release" / "bin"))
+PATIENCE_S = 30
+
+STILL = """[device]
+kind = "simulated"
+profile = "falcon"
+
+[device.hand]
+stiffness_n_per_m = 300
+damping_n_s_per_m = 3
+mass_kg = 0.05
+
+[device.hand.motion]
+kind = "sine"
+amplitude_mm = 0
+frequency_hz = 1
+
+[limiter]
+kind = "none"
+"""
+"""A hand that stays where it is but for what it feels."""
+
+BUTTON = (
+    STILL
+    + """
+[[device.hand.press]]
+button = 0
+from_ms = 3000
+for_ms = 500
+"""
+)
+
+
+class Program:
+    """A running program; gone when the `with` is left."""
+
+    def __init__(self, folder: Path, name: str, *arguments: str | Path) -> None:
+        self.out = folder / f"{name}-{time.monotonic_ns()}.out"
+        self.err = self.out.with_suffix(".err")
+        command = [str(PROGRAMS / name), *map(str, arguments)]
+        with open(self.out, "wb") as out, open(self.err, "wb") as err:
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=err, cwd=folder)
+
+    def wait_for(self, text: str) -> str:
+        """The first line with `text` in it, in what it has said until now or will say."""
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            said = self.out.read_text() + self.err.read_text()
+            for line in said.splitlines():
+                if text in line:
+                    return line
+            assert time.monotonic() < end and self.process.poll() is None, f'waited in vain for "{text}":\n{said}'
+            time.sleep(0.02)
+
+    def address(self, key: str = "address") -> str:
+        return str(json.loads(self.wait_for(f'"{key}":'))[key])
+
+    def counts(self) -> dict:
+        """The next JSON line."""
+        lines = self.out.read_text().count("\n")
+        end = time.monotonic() + PATIENCE_S
+        while self.out.read_text().count("\n") <= lines:
+            assert time.monotonic() < end and self.process.poll() is None, self.err.read_text()
+            time.sleep(0.02)
+        return dict(json.loads(self.out.read_text().splitlines()[-1]))
+
+    def stop(self) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(PATIENCE_S) == 0, self.err.read_text()
+
+    def __enter__(self) -> Program:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+def server(
+    folder: Path, scene: str = STILL, *more: str | Path, listen: str = "127.0.0.1:0", duration_s: float = 300
+) -> Program:
+    file = folder / "scene.toml"
+    file.write_text(scene)
+    return Program(folder, "tendond", file, "--listen", listen, "--duration-s", str(duration_s), "--json", *more)
+
+
+def plug(folder: Path, address: str, *more: str) -> Program:
+    common = ["vrpn", "--server", address, "--listen", "127.0.0.1:0", "--json", "--duration-s", "300"]
+    return Program(folder, "tendon-plug", *common, *more)

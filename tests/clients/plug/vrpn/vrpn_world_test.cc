@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: Apache-2.0
+// VRPN programs, the logic of tendon-plug vrpn, and the server's own loops, on virtual time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/plug/vrpn/vrpn_peer.h"
+#include "tests/clients/plug/vrpn/program.h"
+#include "tests/clients/plug/world.h"
+
+namespace tendon::plug::vrpn {
+namespace {
+
+/// A program at one station.
+class Old {
+ public:
+  Old(World& world, Plug& plug, Station& station, Plug::Program number)
+      : world_(world),
+        plug_(plug),
+        station_(station),
+        number_(number),
+        peer(std::span(&station, 1), now()),
+        asker(number, "client " + std::to_string(number), 0) {
+    says(Program().hello());
+    says(Program::description(Program::kSender, kSenderDescription, station.name));
+    says(Program::all_types());
+    says(Program::message(40001, kUdpDescription, Buffer(10)));
+  }
+  Moment now() const { return {world_.now, world_.now.time_since_epoch()}; }
+  void says(const Buffer& bytes) { peer.take_stream(now(), bytes); }
+
+  /// As the loop of tendon-plug does: the state goes out, what has come is taken, the plug is asked.
+  void turn() {
+    if (const auto sentence = station_.learn(plug_)) sentences.push_back(*sentence);
+    if (plug_.state() && plug_.states() != seen_) {
+      seen_ = plug_.states();
+      peer.report(now(), 0, *plug_.state(), plug_.link().smoothed_round_trip);
+    }
+    peer.end_of_batch(now());
+    asker.turn(world_.now, now().since_1970, plug_, station_, peer);
+    if (const auto sentence = asker.next_sentence()) sentences.push_back(*sentence);
+    take(peer.stream());
+    peer.sent(peer.stream().size());
+    for (const Buffer& datagram : peer.datagrams()) take(datagram);
+    peer.datagrams().clear();
+  }
+  void leaves() { plug_.release(number_); }
+  bool said(const std::string& words) const {
+    return std::ranges::any_of(sentences, [&](const auto& one) { return one.find(words) != std::string::npos; });
+  }
+
+ private:
+  void take(Bytes bytes) {
+    for (const Said& one : reader_.take(bytes, std::exchange(first_, false))) {
+      if (one.type == "vrpn_Tracker Pos_Quat") pose = one;
+      if (one.type == "vrpn_ForceDevice Force") force = Vec3(one.number(0), one.number(8), one.number(16));
+      if (one.type == "vrpn_Base text_message") {
+        texts.emplace_back(reinterpret_cast<const char*>(one.payload.data()) + 8);
+      }
+    }
+  }
+
+  World& world_;
+  Plug& plug_;
+  Station& station_;
+  Plug::Program number_;
+  std::uint64_t seen_ = 0;
+  Reader reader_;
+  bool first_ = true;
+
+ public:
+  Peer peer;
+  Asker asker;
+  std::vector<std::string> sentences;
+  std::vector<std::string> texts;
+  std::optional<Said> pose;
+  Vec3 force = Vec3::Zero();
+};
+
+/// A hand that stays where it is but for what it feels.
+const std::vector<std::string> kStill = {"limiter.kind=\"none\"", "device.hand.motion.amplitude_mm=0"};
+
+Buffer constant(const Vec3& force) { return Program::draw(ForceField{.force = force, .radius = 1}); }
+
+TEST(VrpnWorld, AForceAlongEachAxisPushesThatWayAndTheHandsMotionIsSeenThere) {
+  // The device's x looks to the user, its y to the right, its z up.
+  for (const std::string axes : {"", "right=y up=z user=x", "right=-y up=z user=-x"}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      World world("left.toml", kStill);
+      if (!axes.empty()) {
+        world.handle.operator_from_device = quaternion_of(operator_from_device(axes));
+        world.open_server();
+      }
+      Plug& plug = world.add_plug();
+      Station station{.name = "Phantom0"};
+      Old old(world, plug, station, 1);
+      world.run(100, [&] { old.turn(); });
+      const Vec3 there = 0.8 * Vec3::Unit(axis);
+      const Vec3 before(old.pose.value().number(8), old.pose->number(16), old.pose->number(24));
+      world.run(1000, [&] {
+        old.says(constant(there));
+        old.turn();
+      });
+      const Mat3 turn = axes.empty() ? Mat3(Mat3::Identity()) : operator_from_device(axes);
+      EXPECT_TRUE(world.step.applied.isApprox(turn.transpose() * there, 1e-6))
+          << axes << ": " << world.step.applied.transpose();
+      EXPECT_TRUE(old.force.isApprox(there, 1e-6)) << "as the program is told";
+      const Vec3 moved = Vec3(old.pose->number(8), old.pose->number(16), old.pose->number(24)) - before;
+      EXPECT_GT(moved[axis], 1e-3) << axes << ": the hand gives way: " << moved.transpose();
+      EXPECT_LT((moved - moved[axis] * Vec3::Unit(axis)).norm(), 0.1 * moved[axis]);
+    }
+  }
+}
+
+TEST(VrpnWorld, AChangeOfAFieldIsInTheNextDatagram) {
+  World world("demo.toml");
+  Plug& plug = world.add_plug();
+  Station station{.name = "Phantom0"};
+  Old old(world, plug, station, 1);
+  world.run(200, [&] {
+    old.says(constant(Vec3(0, 1e-3, 0)));
+    old.turn();
+  });
+  double asked = 1e-3;
+  for (int i = 0; i < 100; ++i) {
+    world.run(1, [&] {
+      EXPECT_NEAR(world.step.wanted.y(), asked, 1e-9) << "the step after what was said";
+      asked += 1e-3;
+      old.says(constant(Vec3(0, static_cast<float>(asked), 0)));
+      old.turn();
+    });
+    asked = static_cast<double>(static_cast<float>(asked));
+  }
+}
+
+TEST(VrpnWorld, AProgramThatSendsWithoutAPauseMakesNoFloodOfForces) {
+  World world("demo.toml");
+  Plug& plug = world.add_plug();
+  Station station{.name = "Phantom0"};
+  Old old(world, plug, station, 1);
+  world.run(200, [&] { old.turn(); });
+  std::uint64_t before = 0;
+  double asked = 0;
+  for (int i = 0; i < 400; ++i) {
+    if (i == 300) before = plug.forces();
+    world.run(1, [&] {
+      if (i > 300) {
+        EXPECT_NEAR(world.step.wanted.y(), asked, 1.1e-3) << "the newest of them with the next state";
+      }
+      for (int k = 0; k < 60; ++k) {  // in one millisecond
+        asked = static_cast<double>(static_cast<float>(1e-3 * i + 1e-5 * k));
+        old.says(constant(Vec3(0, asked, 0)));
+        old.turn();
+        for (int turns = 0; turns < 4; ++turns) plug.turn(world.now);
+      }
+    });
+  }
+  EXPECT_LE(plug.forces() - before, 250U) << "one for each state, and one more";
+}
+
+TEST(VrpnWorld, EveryStateIsOnePoseAndNoForceIsAskedForByOneThatWatches) {
+  World world("demo.toml");
+  Plug& plug = world.add_plug();
+  Station station{.name = "Phantom0"};
+  Old old(world, plug, station, 1);
+  world.run(100, [&] { old.turn(); });
+  const std::uint64_t before = old.peer.counts().reports;
+  world.run(1000, [&] { old.turn(); });
+  EXPECT_EQ(old.peer.counts().reports - before, 1000U);
+  EXPECT_EQ(plug.owner(), 0U);
+  EXPECT_FALSE(plug.pushes());
+}
+
+/// The largest change of the force between two steps, and when it is zero, in ms; −1: it does not end.
+struct Fade {
+  double largest_step = 0;
+  int zero_after = -1;
+};
+Fade fade(World& world, int milliseconds, const std::function<void()>& each = nullptr) {
+  Fade result;
+  double last = world.step.applied.y();
+  for (int i = 1; i <= milliseconds; ++i) {
+    world.run(1, each);
+    const double force = world.step.applied.y();
+    result.largest_step = std::max(result.largest_step, std::abs(force - last));
+    if (force == 0 && result.zero_after < 0) result.zero_after = i;
+    if (force != 0) result.zero_after = -1;
+    last = force;
+  }
+  return result;
+}
+
+class VrpnOnAStillHand : public testing::Test {
+ protected:
+  void push(int milliseconds) {
+    world_.run(milliseconds, [&] {
+      old_.says(constant(Vec3(0, 1, 0)));
+      old_.turn();
+    });
+  }
+  World world_{"left.toml", kStill};
+  Plug& plug_ = world_.add_plug();
+  Station station_{.name = "Phantom0"};
+  Old old_{world_, plug_, station_, 1};
+};
+
+TEST_F(VrpnOnAStillHand, AProgramThatIsKilledIsFeltNoMoreWithin300Ms) {
+  push(400);
+  ASSERT_NEAR(world_.step.applied.y(), 1, 1e-6);
+  old_.leaves();
+  const Fade result = fade(world_, 500);
+  EXPECT_GT(result.zero_after, 50) << "by the ladder";
+  EXPECT_LE(result.zero_after, 300);
+  EXPECT_LT(result.largest_step, 0.05) << "no jump";
+}
+
+TEST_F(VrpnOnAStillHand, AFrozenProgramIsNotFeltAfterItsStaleTimeAndTheLadder) {
+  push(400);
+  const Fade result = fade(world_, 700, [&] { old_.turn(); });
+  EXPECT_GT(result.zero_after, 100) << "ten gaps, at least 100 ms";
+  EXPECT_LE(result.zero_after, 100 + 300);
+  EXPECT_LT(result.largest_step, 0.05);
+  EXPECT_TRUE(old_.said("is silent and has not ended its force"));
+  push(300);
+  EXPECT_TRUE(old_.said("draws again"));
+  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+}
+
+TEST_F(VrpnOnAStillHand, AFieldThatIsSentOnceStaysAndItIsSaid) {
+  world_.run(100, [&] { old_.turn(); });
+  old_.says(constant(Vec3(0, 1, 0)));
+  world_.run(5000, [&] { old_.turn(); });
+  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+  EXPECT_TRUE(old_.said("lives as long as its connection"));
+  EXPECT_EQ(plug_.owner(), 1U);
+}
+
+TEST_F(VrpnOnAStillHand, AFieldThatEndsIsZeroAndLetsTheDeviceGo) {
+  push(400);
+  old_.says(constant(Vec3::Zero()));
+  world_.run(100, [&] { old_.turn(); });
+  EXPECT_NEAR(world_.step.wanted.y(), 0, 1e-12);
+  EXPECT_EQ(plug_.owner(), 1U);
+  world_.run(1000, [&] { old_.turn(); });
+  EXPECT_EQ(plug_.owner(), 0U);
+  EXPECT_FALSE(plug_.pushes());
+}
+
+TEST_F(VrpnOnAStillHand, ASecondProgramIsToldAndTakesOverWhenTheFirstLeaves) {
+  push(400);
+  Old other(world_, plug_, station_, 2);
+  other.says(constant(Vec3(0, -1, 0)));
+  world_.run(1000, [&] {
+    old_.says(constant(Vec3(0, 1, 0)));
+    old_.turn();
+    other.turn();
+  });
+  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+  ASSERT_EQ(other.texts.size(), 1U);
+  EXPECT_NE(other.texts[0].find("not felt: another program"), std::string::npos) << other.texts[0];
+  EXPECT_TRUE(other.pose) << "it looks on";
+  old_.leaves();
+  world_.run(1000, [&] { other.turn(); });
+  EXPECT_NEAR(world_.step.applied.y(), -1, 1e-6);
+  ASSERT_EQ(other.texts.size(), 2U);
+  EXPECT_NE(other.texts[1].find("is felt now"), std::string::npos);
+}
+
+TEST_F(VrpnOnAStillHand, AStallOfTheLinkOf200MsEndsByItself) {
+  push(400);
+  world_.connected = false;
+  const Fade stalled = fade(world_, 200, [&] {
+    old_.says(constant(Vec3(0, 1, 0)));
+    old_.turn();
+  });
+  EXPECT_LT(stalled.largest_step, 0.05);
+  EXPECT_LT(world_.step.applied.y(), 0.5) << "it fades meanwhile";
+  world_.connected = true;
+  push(300);
+  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+}
+
+TEST_F(VrpnOnAStillHand, AServerThatDiesAndComesBackIsFoundAndFeltAgain) {
+  push(400);
+  const std::uint64_t before = old_.peer.counts().reports;
+  world_.kill_server();
+  push(4000);
+  EXPECT_LT(old_.peer.counts().reports, before + 100);
+  world_.open_server();
+  push(4000);
+  EXPECT_NEAR(world_.step.applied.y(), 1, 1e-6);
+  EXPECT_GT(old_.peer.counts().reports, before + 1000);
+}
+
+/// Given out by the device through 20 ms each way, J: the program answers each pose with the force of a wall.
+double given_out(bool limited, bool as_plane) {
+  // Two scenes with one hand; the limiter of the first has parts that none has.
+  World world = limited ? World("demo.toml", {}, 20) : World("left.toml", {"limiter.kind=\"none\""}, 20);
+  Plug& plug = world.add_plug();
+  Station station{.name = "Phantom0"};
+  Old old(world, plug, station, 1);
+  if (as_plane) old.says(Program::draw(Plane{.normal = -Vec3::UnitX(), .spring = 1}));
+  double pressed = 0;
+  world.run(8000, [&] {
+    if (old.pose && !as_plane) {
+      old.says(constant(Vec3(std::min(-1e-9, -1000 * old.pose->number(8)), 0, 0)));
+    }
+    old.turn();
+    pressed = std::max(pressed, std::abs(world.step.applied.x()));
+  });
+  EXPECT_GT(pressed, 1) << "it is felt";
+  return -world.least_energy;
+}
+
+TEST(VrpnWorld, AWall20MsAwayGivesOutNothingWithTheLimiterAndOver1JWithout) {
+  EXPECT_LE(given_out(true, false), 1e-9);
+  EXPECT_LE(given_out(true, true), 1e-9);
+  EXPECT_GT(given_out(false, false), 1);
+}
+
+}  // namespace
+}  // namespace tendon::plug::vrpn
