@@ -273,6 +273,19 @@ def test_a_button_is_told_and_a_server_that_comes_back_is_found(tmp_path):
                 assert client.wait("vrpn_Button Change", lambda change: change == (0, 0))
 
 
+def test_a_stylus_its_button_and_its_gripper_are_seen(tmp_path):
+    scene = (ROOT / "deploy" / "scenes" / "handle.toml").read_text()
+    with server(tmp_path, scene) as device, plug(tmp_path, device.address()) as between:
+        with Client(between.address()) as client:
+            # The hand turns it by 45 degrees about z, which points to the user, then by 30 about y, which points up.
+            turned = client.wait(POSE, lambda pose: pose[7] > 0.3)
+            assert abs(turned[5]) < 0.05 and abs(turned[6]) < 0.05, turned
+            assert sum(one * one for one in turned[5:9]) == pytest.approx(1, abs=1e-6)
+            assert client.wait("vrpn_Tracker Velocity", lambda numbers: abs(numbers[7]) > 1e-4)
+            client.wait("vrpn_Analog Channel", lambda channels: 0.05 < channels[0] < 0.5)
+            client.wait(POSE, lambda pose: pose[6] > 0.2)
+
+
 def test_beyond_this_machine_it_listens_only_when_that_is_meant(tmp_path):
     refused = subprocess.run(
         [PROGRAMS / "tendon-plug", "vrpn", "--listen", "0.0.0.0:0"], capture_output=True, text=True, timeout=30
