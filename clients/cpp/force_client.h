@@ -233,6 +233,11 @@ class ForceClient {
   /// answered; empty before, and for good when the server does not know kFeatureHandle.
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
+  /// The server's clock, estimated in the present session; empty without one, and before its first round trip.
+  std::optional<ClockOffsetEstimator::Estimate> server_clock() const noexcept {
+    return connection_.session() != nullptr ? connection_.session()->peer_clock() : std::nullopt;
+  }
+
   /// The server's newest report on our forces, once a second while they come: late ones by cause, delays, losses.
   /// From the present session; empty before the first.
   const std::optional<LinkReport>& report() const noexcept { return report_; }
