@@ -30,6 +30,7 @@ std::unique_ptr<ForceClient> Plug::new_client(LocalTime now, bool controls) {
   ForceClient::Config config = config_.client;
   config.seed = config_.new_seed();
   if (controls) {
+    config.diagnostics = false;  // they are for observers only
     const Physics physics = [this](const DeviceState& state) { return answer(state); };
     return std::make_unique<ForceClient>(way.link, way.server, config, physics, now);
   }

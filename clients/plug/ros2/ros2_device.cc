@@ -118,7 +118,8 @@ void RosDevice::learn() {
   } else {
     std::string known;
     for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-    say("--clutch " + printable(config_.clutch) + ": the device has no such button, so that nothing is sent to servo_…; " +
+    say("--clutch " + printable(config_.clutch) +
+        ": the device has no such button, so that nothing is sent to servo_…; " +
         (known.empty() ? "expected its number, 0 to 9" : "it has " + known));
   }
 }
@@ -212,12 +213,15 @@ void RosDevice::keep(std::span<const std::uint64_t> writers) {
 
 RosDiagnosis RosDevice::diagnosis() {
   using Level = RosDiagnosis::Level;
-  RosDiagnosis d{.level = Level::kOk, .name = "tendon: " + config_.name, .message = {}, .hardware_id = {}, .values = {}};
+  RosDiagnosis d{
+      .level = Level::kOk, .name = "tendon: " + config_.name, .message = {}, .hardware_id = {}, .values = {}};
   const auto complain = [&d](Level level, const std::string& sentence) {
     d.level = std::max(d.level, level);
     d.message += (d.message.empty() ? "" : "; ") + sentence;
   };
-  const auto add = [&d](std::string key, std::string value) { d.values.emplace_back(std::move(key), std::move(value)); };
+  const auto add = [&d](std::string key, std::string value) {
+    d.values.emplace_back(std::move(key), std::move(value));
+  };
   if (plug_.welcome()) add("server", plug_.welcome()->server);
   if (plug_.description()) d.hardware_id = plug_.description()->model;
   add("states", std::to_string(plug_.states() - std::exchange(states_told_, plug_.states())));

@@ -23,13 +23,15 @@ RosTime ros_time(Duration since_1970) {
 
 std::string ros_name(std::string_view device) {
   std::string name(device);
-  std::ranges::replace_if(name, [](char c) { return !is_word(c); }, '_');
+  std::ranges::replace_if(
+      name, [](char c) { return !is_word(c); }, '_');
   return name.empty() || is_digit(name.front()) ? "_" + name : name;
 }
 
 std::string printable(std::string_view text) {
   std::string all(text.substr(0, kMostPrinted));
-  std::ranges::replace_if(all, [](char c) { return c < ' ' || c > '~'; }, '?');
+  std::ranges::replace_if(
+      all, [](char c) { return c < ' ' || c > '~'; }, '?');
   return all;
 }
 

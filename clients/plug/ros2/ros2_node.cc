@@ -26,15 +26,18 @@ namespace {
 constexpr int kMostParticipants = 100;
 
 std::string configuration(const Ros2Node::Config& config) {
-  std::string interface = "address=\"127.0.0.1\" multicast=\"false\"";
+  std::string interface = "address=\"127.0.0.1\"";
+  std::string multicast = "false";
   std::vector<std::string> peers = config.peers;
   if (config.interface.empty()) {
     peers.emplace_back("127.0.0.1");
   } else {
     interface = "name=\"" + config.interface + "\"";
+    multicast = "true";
   }
   std::string xml = "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface " + interface +
-                    "/></Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+                    "/></Interfaces><AllowMulticast>" + multicast +
+                    "</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
                     "<MaxAutoParticipantIndex>" +
                     std::to_string(kMostParticipants - 1) + "</MaxAutoParticipantIndex><Peers>";
   for (const std::string& peer : peers) xml += "<Peer Address=\"" + peer + "\"/>";

@@ -29,9 +29,9 @@ namespace tendon::plug {
 class Ros2Node {
  public:
   struct Config {
-    std::uint32_t domain = 0;           ///< 0 … kMaxDomain
-    std::string interface{};            ///< a name like "eth0"; empty: the loopback
-    std::vector<std::string> peers{};   ///< host names or addresses, asked by unicast
+    std::uint32_t domain = 0;            ///< 0 … kMaxDomain
+    std::string interface {};            ///< a name like "eth0"; empty: the loopback
+    std::vector<std::string> peers{};    ///< host names or addresses, asked by unicast
     std::vector<std::string> devices{};  ///< see ros_name()
     std::optional<RosServo::Kind> servo{};
   };

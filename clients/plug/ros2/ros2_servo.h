@@ -24,7 +24,8 @@ class RosServo {
   enum class Kind : std::uint8_t { kTwist, kPose };
 
   /// `frame_id` is for the headers.
-  RosServo(Kind kind, double scale, std::string frame_id) : kind_(kind), scale_(scale), frame_id_(std::move(frame_id)) {}
+  RosServo(Kind kind, double scale, std::string frame_id)
+      : kind_(kind), scale_(scale), frame_id_(std::move(frame_id)) {}
 
   struct Output {
     std::optional<RosTwist> twist{};
