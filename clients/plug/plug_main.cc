@@ -42,6 +42,7 @@ void add_common(CLI::App& app, DeskConfig& desk) {
       ->type_name("FILE")
       ->check(accepted_by([](const std::string& file) { read_client_key(file); }));
   app.add_option("--device", desk.devices, "A device's name; several times for several. None: the server's first one")
+      ->allow_extra_args(false)
       ->type_name("NAME");
   app.add_option("--channel", desk.client.channel, "Name of the device's channel that takes the forces")
       ->type_name("NAME");
@@ -62,6 +63,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", TENDON_VERSION);
   app.require_subcommand(1);
   Chosen chosen;
+  add_chai3d(app, chosen);
   add_ros2(app, chosen);
   try {
     app.parse(argc, argv);

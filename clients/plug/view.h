@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "core/base/frames.h"
-#include "core/base/rotation.h"
+#include "protocol/frames.h"
+#include "protocol/rotation.h"
 
 namespace tendon::plug {
 

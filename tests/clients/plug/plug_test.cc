@@ -96,6 +96,33 @@ TEST(Plug, AForceThatIsTooOldIsNotSentAgainAndTheLadderLetsGo) {
   EXPECT_LT(step, 0.05) << "it fades";
 }
 
+TEST(Plug, APushIsSentOnceHoweverManyStatesCome) {
+  World world("demo.toml");
+  Plug& plug = world.add_plug();
+  world.run(100);
+  const auto push = [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 0.5, 0)); };
+  push();
+  world.run(50);
+  EXPECT_TRUE(plug.pushes());
+  EXPECT_EQ(plug.forces(), 1U) << "it has waited for the channel";
+  push();
+  world.run(2);
+  EXPECT_EQ(plug.forces(), 2U);
+  world.run(90);
+  EXPECT_EQ(plug.forces(), 2U);
+}
+
+TEST(Plug, ReadsWhatStillComesForASessionThatHasEnded) {
+  // A datagram that nobody reads would wake a sleeping bridge for ever.
+  World world("demo.toml", {}, 5);
+  Plug& plug = world.add_plug();
+  world.run(100);
+  world.run(1500, [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 0.5, 0)); });
+  EXPECT_LE(world.unread(), 1U) << "the one that has just come";
+  world.run(1500);
+  EXPECT_LE(world.unread(), 1U) << "the controller has ended, too";
+}
+
 TEST(Plug, TheFirstProgramThatAsksOwnsTheDeviceUntilItLeavesOrIsSilent) {
   World world("demo.toml");
   Plug& plug = world.add_plug();

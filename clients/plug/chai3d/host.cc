@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "clients/plug/chai3d/host.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace tendon::plug::chai3d {
+namespace {
+
+/// The one program that tendon-plug has started.
+constexpr Plug::Program kProgram = 1;
+
+std::array<double, 3> array_of(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+Vec3 vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
+
+std::int64_t nanoseconds(LocalTime time) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
+}
+
+HandNow hand_of(const DeviceState& state, const View& view, LocalTime arrived) {
+  const Mat3 rotation = state.turning ? view.orientation(state.turning->orientation) : Mat3(Mat3::Identity());
+  HandNow hand{.at_ns = nanoseconds(arrived),
+               .tick = state.tick,
+               .position = array_of(view.position(state.position)),
+               .velocity = array_of(view.position(state.velocity)),
+               .buttons = state.buttons};
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    for (Eigen::Index column = 0; column < 3; ++column) {
+      hand.rotation[static_cast<std::size_t>(3 * row + column)] = rotation(row, column);
+    }
+  }
+  return hand;
+}
+
+}  // namespace
+
+void Host::describe(std::size_t i, Plug& plug) {
+  SharedDevice& shared = hands_.device[i];
+  const DeviceDescription& about = *plug.description();
+  const std::string& model = config_.model.empty() ? about.model : config_.model;
+  shared.model = {};
+  std::copy_n(model.begin(), std::min(model.size(), shared.model.size() - 1), shared.model.begin());
+  shared.workspace_radius =
+      about.workspace ? (about.workspace->max - about.workspace->min).minCoeff() / 2 : kWorkspaceRadius;
+  devices_[i].described = true;
+  const bool all = std::all_of(devices_.begin(), devices_.begin() + hands_.devices,
+                               [](const Device& device) { return device.described; });
+  if (all) hands_.ready.store(1, std::memory_order_release);
+}
+
+bool Host::exchange(std::size_t i, Plug& plug, LocalTime now) {
+  Device& device = devices_[i];
+  SharedDevice& shared = hands_.device[i];
+  if (plug.lost()) device.view.reset();  // the next server's device may lie otherwise
+  if (!device.view && plug.state() && plug.handle() && plug.description()) {
+    device.view.emplace(*find_frame("chai3d"), plug.handle()->operator_from_device);
+  }
+  if (device.view && plug.state() && plug.states() != device.states) {
+    device.states = plug.states();
+    shared.hand.put(hand_of(*plug.state(), *device.view, plug.arrived()));
+    if (!device.described) describe(i, plug);
+    news_ = true;
+  }
+  Asked asked;
+  if (!shared.asked.get(asked) || asked.count == device.asked) return false;
+  device.asked = asked.count;
+  if (asked.open == 0) {
+    plug.release(kProgram);
+    return false;
+  }
+  if (!device.view) return false;
+  const bool turns = plug.handle() && plug.handle()->max_torque > 0;
+  Touch touch = device.view->base_force(vector_of(asked.force));
+  if (turns) touch.torque = device.view->base_torque(vector_of(asked.torque));
+  const LocalTime until = LocalTime(std::chrono::nanoseconds(asked.at_ns)) + config_.stale;
+  if (until <= now) return false;
+  return plug.push(kProgram, now, until, touch) == Plug::Answer::kTaken;
+}
+
+bool Host::announce() {
+  if (!std::exchange(news_, false)) return false;
+  hands_.news.fetch_add(1);
+  return hands_.waiting.load() > 0;
+}
+
+}  // namespace tendon::plug::chai3d

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+namespace tendon::plug::chai3d {
+
+// The memory that tendon-plug and the program that it has started share: tendon-plug makes it, and libhdPhantom.so in
+// the program maps it. Only these types cross; neither side ever waits for the other. All numbers are CHAI3D's: SI, x
+// to the user, y right, z up. Times are CLOCK_MONOTONIC, ns, which both processes share.
+
+/// A value that one writer at a time puts and any thread of either process reads: a sequence lock. A writer that dies
+/// while it writes leaves a box that cannot be read, and blocks nobody.
+///
+/// Thread-safe: one writer at a time, any readers. Realtime-safe: yes.
+template <typename T>
+class Box {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
+  static constexpr std::size_t kWords = sizeof(T) / sizeof(std::uint64_t);
+
+ public:
+  void put(const T& value) noexcept {
+    std::array<std::uint64_t, kWords> words;
+    std::memcpy(words.data(), &value, sizeof(T));
+    const std::uint64_t turn = turn_.load(std::memory_order_relaxed) | 1U;
+    turn_.store(turn, std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_release);
+    for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_relaxed);
+    turn_.store(turn + 1, std::memory_order_release);
+  }
+
+  /// False when nothing was put yet, or when a writer is writing for kTries tries in a row; `value` is unchanged then.
+  bool get(T& value) const noexcept {
+    std::array<std::uint64_t, kWords> words;
+    for (int i = 0; i < kTries; ++i) {
+      const std::uint64_t before = turn_.load(std::memory_order_acquire);
+      if (before == 0) return false;
+      if ((before & 1U) != 0) continue;
+      for (std::size_t w = 0; w < kWords; ++w) words[w] = words_[w].load(std::memory_order_relaxed);
+      std::atomic_thread_fence(std::memory_order_acquire);
+      if (turn_.load(std::memory_order_relaxed) != before) continue;
+      std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  static constexpr int kTries = 1000;  ///< some µs: a write takes 30 stores
+  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+
+  std::atomic<std::uint64_t> turn_{0};  ///< odd while it is written, 0 before the first
+  std::array<std::atomic<std::uint64_t>, kWords> words_{};
+};
+
+/// tendon-plug → program.
+struct HandNow {
+  std::int64_t at_ns = 0;  ///< when it arrived
+  std::uint64_t tick = 0;  ///< of the haptic step
+  std::array<double, 3> position{};
+  std::array<double, 3> velocity{};
+  std::array<double, 9> rotation{};  ///< row by row; the identity when it is not measured
+  std::uint64_t buttons = 0;
+};
+
+/// Program → tendon-plug.
+struct Asked {
+  std::int64_t at_ns = 0;   ///< when it was asked for
+  std::uint64_t count = 0;  ///< of this and all before: a new one is another one
+  std::uint64_t open = 0;   ///< 0: the program has closed the device and asks for nothing
+  std::array<double, 3> force{};
+  std::array<double, 3> torque{};
+};
+
+struct SharedDevice {
+  Box<HandNow> hand;
+  Box<Asked> asked;
+  std::atomic<std::int32_t> owner{0};  ///< the process that has opened it; 0: none
+  double workspace_radius = 0;         ///< m; written before `ready`, as is the next
+  std::array<char, 255> model{};       ///< with its NUL
+};
+
+struct SharedHands {
+  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::size_t kMaxDevices = 16;  ///< as many as CHAI3D has places for
+
+  std::uint32_t version = kVersion;
+  std::uint32_t devices = 0;
+  std::uint32_t paced = 1;                ///< whether the force functions wait for the next state
+  std::atomic<std::uint32_t> ready{0};    ///< 1 once every device has sent a state
+  std::atomic<std::uint32_t> news{0};     ///< grows with every state: what a futex waits on
+  std::atomic<std::uint32_t> waiting{0};  ///< threads that do
+  std::array<SharedDevice, kMaxDevices> device;
+};
+
+/// How the library finds it: the memory's path, /proc/PID/fd/N, and the abstract name of the socket that wakes
+/// tendon-plug.
+inline constexpr const char* kMemoryVariable = "TENDON_CHAI3D_MEMORY";
+inline constexpr const char* kWakeVariable = "TENDON_CHAI3D_WAKE";
+
+}  // namespace tendon::plug::chai3d
