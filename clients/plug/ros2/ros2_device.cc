@@ -182,8 +182,8 @@ void RosDevice::take(std::uint64_t writer, std::string_view called, const RosWre
   program->freshness.came(now);
   Touch touch(std::get<RosView::Wish>(wish).force);
   if (handle && handle->max_torque > 0) touch.torque = std::get<RosView::Wish>(wish).torque;
-  const auto answer = plug_.ask(program->number, now, now + program->freshness.good_for(),
-                                [touch](const DeviceState&) { return touch; });
+  touch.valid_for = program->freshness.good_for();
+  const auto answer = plug_.push(program->number, now, now + *touch.valid_for, touch);
   switch (answer) {
     case Plug::Answer::kTaken: {
       const std::string sentence = program->called + " owns the device: the hand feels its wrench_command";

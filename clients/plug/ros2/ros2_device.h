@@ -36,8 +36,8 @@ class Freshness {
 ///
 /// * Each new state is pose, twist, wrench, joint states and, with the clutch, a servo message; at most Config::rate_hz
 ///   a second. Joy goes out at once when a button changes, else 50/s.
-/// * A command is the owner's, or it is dropped; it is good for Freshness::good_for(). A torque is sent on when the
-///   device has motors for it.
+/// * A command is the owner's, or it is dropped. It is sent once, and the server is told how long it is good:
+///   Freshness::good_for(). A torque is sent on when the device has motors for it.
 /// * At most 16 programs publish commands: the commands of another one are dropped.
 ///
 /// Thread-safe: no. Realtime-safe: no.
