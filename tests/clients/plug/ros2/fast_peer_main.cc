@@ -4,10 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
-#include <deque>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -20,9 +19,10 @@
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <iostream>
-#include <map>
+#include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -102,13 +102,15 @@ class Reader {
   virtual void write(ordered_json& line, bool last) = 0;
 };
 
-/// The toggled force that is waited for: what the hand feels, along y.
+/// What `wrench` is watched for: the toggled force along y, and no force at all once no more commands are sent.
 struct Awaited {
   std::mutex mutex;
   double value = 0;
   Clock::time_point since{};
   bool waiting = false;
   Delays delays;
+  std::optional<Clock::time_point> stopped;  ///< the newest command, once no more follow
+  std::optional<Clock::duration> let_go;     ///< … until the hand felt nothing
 };
 
 template <class Message>
@@ -124,13 +126,19 @@ class ReaderOf final : public Reader, public dds::DataReaderListener {
       const auto now = std::chrono::system_clock::now().time_since_epoch();
       const auto stamp = std::chrono::seconds(message.header.sec) + std::chrono::nanoseconds(message.header.nanosec);
       const std::lock_guard lock(mutex_);
-      ++count_;
+      if (count_++ == 0) {
+        first_ = stamp;
+        first_age_ = std::chrono::duration_cast<Clock::duration>(now - stamp);
+      }
       if (stamp < newest_) ++back_;
       newest_ = stamp;
       ages_.add(us(std::chrono::duration_cast<Clock::duration>(now - stamp)));
       message_ = message;
       if constexpr (std::is_same_v<Message, WrenchStamped>) {
         const std::lock_guard lock_awaited(awaited_.mutex);
+        if (awaited_.stopped && !awaited_.let_go && message.first == std::array<double, 3>{}) {
+          awaited_.let_go = Clock::now() - *awaited_.stopped;
+        }
         if (awaited_.waiting && std::abs(message.first[1] - awaited_.value) < 1e-6) {
           awaited_.waiting = false;
           awaited_.delays.add(us(Clock::now() - awaited_.since));
@@ -145,7 +153,8 @@ class ReaderOf final : public Reader, public dds::DataReaderListener {
     if (count_ == 0) return;
     line[topic_ + "_back"] = back_;
     line[topic_ + "_frame"] = message_.header.frame_id;
-    line[topic_ + "_stamp_s"] = std::chrono::duration<double>(newest_).count();
+    line[topic_ + "_first_age_us"] = us(first_age_);
+    line[topic_ + "_span_s"] = std::chrono::duration<double>(newest_ - first_).count();
     describe(line, topic_, message_);
     if (last) ages_.write(line, topic_ + "_age");
   }
@@ -155,8 +164,10 @@ class ReaderOf final : public Reader, public dds::DataReaderListener {
   Awaited& awaited_;
   std::mutex mutex_;
   std::uint64_t count_ = 0;
-  std::uint64_t back_ = 0;  ///< messages that were older than the one before
+  std::uint64_t back_ = 0;            ///< messages that were older than the one before
+  std::chrono::nanoseconds first_{};  ///< stamps
   std::chrono::nanoseconds newest_{};
+  Clock::duration first_age_{};
   Message message_;
   Delays ages_;
 };
@@ -240,6 +251,10 @@ class Peer {
         }
         writer_->write(&wrench);
         ++written_;
+        written_at_ = now;
+      } else if (written_ > 0) {
+        const std::lock_guard lock(awaited_.mutex);
+        awaited_.stopped = written_at_;
       }
       if (now >= next_line) {
         say(false);
@@ -282,10 +297,9 @@ class Peer {
   void say(bool last) {
     ordered_json line = {{"event", last ? "end" : "seen"}, {"written", written_}};
     for (const auto& reader : readers_) reader->write(line, last);
-    if (last) {
-      const std::lock_guard lock(awaited_.mutex);
-      awaited_.delays.write(line, "round");
-    }
+    const std::lock_guard lock(awaited_.mutex);
+    if (awaited_.let_go) line["let_go_us"] = us(*awaited_.let_go);
+    if (last) awaited_.delays.write(line, "round");
     std::cout << line << std::endl;
   }
 
@@ -295,6 +309,7 @@ class Peer {
   dds::Publisher* publisher_ = nullptr;
   dds::DataWriter* writer_ = nullptr;
   std::uint64_t written_ = 0;
+  Clock::time_point written_at_{};
   Awaited awaited_;
   std::vector<std::unique_ptr<Reader>> readers_;
 };
