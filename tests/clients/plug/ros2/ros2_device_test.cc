@@ -132,6 +132,19 @@ TEST(RosDevice, AWrenchCommandIsFeltWithItsSignAndIsToldBack) {
   EXPECT_TRUE(has(sentences_of(stage.device), "publisher 71 owns the device"));
 }
 
+TEST(RosDevice, AForceAlongEachAxisOfRep103IsFeltAlongTheHands) {
+  const std::array<Vec3, 3> of_ros = {{{0.5, 0, 0}, {0, 0.5, 0}, {0, 0, 0.5}}};
+  const std::array<Vec3, 3> of_hand = {{{0, 0, -0.5}, {-0.5, 0, 0}, {0, 0.5, 0}}};  // forward, left, up
+  for (std::size_t i = 0; i < 3; ++i) {
+    Stage stage;
+    stage.run(100);
+    const RosWrench wrench{.header = {}, .force = of_ros[i], .torque = Vec3::Zero()};
+    stage.run(300, [&] { stage.device.take(kWriter, "publisher 71", wrench, stage.world.now); });
+    EXPECT_TRUE(stage.world.step.applied.isApprox(of_hand[i], 1e-6)) << i;
+    EXPECT_TRUE(stage.wrench.force.isApprox(of_ros[i], 1e-6)) << i;
+  }
+}
+
 TEST(RosDevice, NegateTurnsItAround) {
   Stage stage("demo.toml", {.name = "right", .negate = true});
   stage.run(100);

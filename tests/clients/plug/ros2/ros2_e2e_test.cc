@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "clients/cpp/machine.h"
 #include "tests/e2e/stage/process.h"
 #include "tests/e2e/stage/stage.h"
 #include "tests/server/scratch_folder.h"
@@ -27,7 +28,6 @@ namespace tendon::e2e {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::steady_clock;
 using tendon::testing::ScratchFolder;
 
 /// A stylus that goes to and fro along the operator's right, with motors that turn it, a gripper, and a button that is
@@ -155,8 +155,8 @@ class Peer : public Process {
 
   /// Waits for a line of which `holds` is true.
   std::string until(const std::function<bool(const std::string&)>& holds) {
-    const auto patience = steady_clock::now() + kPatience;
-    while (steady_clock::now() < patience) {
+    const auto patience = read_clock() + kPatience;
+    while (read_clock() < patience) {
       std::string line = wait_for_line(R"("event":)");
       if (holds(line)) return line;
     }
@@ -340,9 +340,9 @@ TEST(Ros2, ASecondPublisherIsDroppedAndTold) {
 
 /// Seconds until a reader that is told ten times a second sees no force; the hand must be pushed when it begins.
 double seconds_to_no_force(Peer& reader) {
-  const auto start = steady_clock::now();
+  const auto start = read_clock();
   reader.until_pushed(0);
-  return std::chrono::duration<double>(steady_clock::now() - start).count();
+  return std::chrono::duration<double>(read_clock() - start).count();
 }
 
 TEST(Ros2, AProgramThatIsKilledOrFrozenWithTheForceOnLetsTheHandGo) {
@@ -437,10 +437,10 @@ TEST(Ros2, ItSleepsBetweenTheStates) {
     return std::stod(words.at(13)) + std::stod(words.at(14));
   };
   const double before = ticks();
-  const auto start = steady_clock::now();
+  const auto start = read_clock();
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const double spent = (ticks() - before) / static_cast<double>(::sysconf(_SC_CLK_TCK));
-  const double share = spent / std::chrono::duration<double>(steady_clock::now() - start).count();
+  const double share = spent / std::chrono::duration<double>(read_clock() - start).count();
   std::cout << 100 * share << " % of a core\n";
   EXPECT_LT(share, 0.25) << "8 % is what is asked for; a busy wait would be 100";
 }

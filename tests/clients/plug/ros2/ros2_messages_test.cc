@@ -91,7 +91,7 @@ TEST(RosMessages, NegateGivesTheHandTheOpposite) {
   EXPECT_TRUE(std::get<RosView::Wish>(wish).torque.isApprox(Vec3(0, -0.5, 0)));
 }
 
-TEST(RosMessages, ACommandInAnotherFrameOrWithoutNumbersIsRefusedWithTheReason) {
+TEST(RosMessages, ACommandOfAnotherFrameOrNoNumberIsRefusedWithTheReason) {
   const RosView view("right", kFalcon);
   const auto foreign = view.wish(command({0, 0, 1}, "tool\n0"), false);
   EXPECT_EQ(std::get<std::string>(foreign),
@@ -102,7 +102,7 @@ TEST(RosMessages, ACommandInAnotherFrameOrWithoutNumbersIsRefusedWithTheReason) 
   EXPECT_EQ(std::get<std::string>(view.wish(command({0, nan, 1}, ""), false)), "a number of it is not finite");
 }
 
-TEST(RosMessages, JoyHasTheButtonsByTheirNamesOrderAndTheGripperFromClosedToOpen) {
+TEST(RosMessages, JoyHasTheButtonsInOrderAndTheGripperFromClosedToOpen) {
   HandleDescription handle;
   handle.buttons = {"trigger", "clutch", "a"};
   handle.gripper_open = 0.5;
