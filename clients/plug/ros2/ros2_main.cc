@@ -83,34 +83,39 @@ class Ros2Bridge {
     const LocalTime end = options_.duration_s < 1e9 ? now + from_seconds(options_.duration_s) : LocalTime::max();
     LocalTime next_diagnosis = now + kDiagnosticsEvery;
     LocalTime next_take = now;
+    bool rings = true;  // a command may be there
     for (; !signals.asked() && now < end; now = read_clock()) {
       const std::array<Desk::Count, 4> counts = {{{"published", node_.published()},
                                                   {"unsent", node_.unsent()},
                                                   {"superseded", node_.superseded()},
                                                   {"refused", refused()}}};
-      LocalTime next = std::min({desk_.turn(now, counts), next_diagnosis, end});
-      const bool takes = now >= next_take;
-      if (takes && take(now)) {
+      LocalTime next = std::min({turn(now, counts), next_diagnosis, end});
+      if (rings && take(now)) {
         next_take = now + kLeastGap;
-        next = std::min(next, desk_.turn(now, counts));
+        next = std::min(next, turn(now, counts));
       }
       publish(now);
       if (now >= next_diagnosis) {
         diagnose(now);
         next_diagnosis = now + kDiagnosticsEvery;
       }
-      if (takes) {
-        std::array<pollfd, 1> bell = {{{node_.descriptor(), POLLIN, 0}}};
-        desk_.wait(bell, now, next);
-      } else {
-        desk_.wait({}, now, std::min(next, next_take));
-      }
+      std::array<pollfd, 1> bell = {{{node_.descriptor(), POLLIN, 0}}};
+      const bool listens = now >= next_take;
+      desk_.wait(std::span(bell).first(listens ? 1 : 0), now, listens ? next : std::min(next, next_take));
+      rings = bell[0].revents != 0;
     }
     desk_.stop(read_clock());
     return 0;
   }
 
  private:
+  /// All that is due now: what a turn has computed leaves in the one after it.
+  LocalTime turn(LocalTime now, std::span<const Desk::Count> counts) {
+    LocalTime next = now;
+    for (int turns = 0; next <= now && turns < 4; ++turns) next = desk_.turn(now, counts);
+    return next;
+  }
+
   static Ros2Node::Config config(const Ros2Options& options, const Desk& desk) {
     Ros2Node::Config config{.domain = options.domain,
                             .interface = options.interface,
