@@ -43,6 +43,9 @@ struct Touch {
   /// spring is positive. Only in answer to a state with an orientation.
   std::optional<Mat3> angular_stiffness{};
   std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
+  /// How long the server may take this answer as fresh, for an engine that knows it: > 0, at most limits::kMaxValidFor.
+  /// Empty: Config::valid_for.
+  std::optional<Duration> valid_for{};
   /// The engine knows no force: nothing is sent, because a zero would look known. The rest does not matter.
   bool unknown = false;
 };
@@ -232,6 +235,11 @@ class ForceClient {
   /// How the device lies before the operator, its buttons' names, and what else its handle can do, once the server has
   /// answered; empty before, and for good when the server does not know kFeatureHandle.
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
+
+  /// The server's clock, estimated in the present session; empty without one, and before its first round trip.
+  std::optional<ClockOffsetEstimator::Estimate> server_clock() const noexcept {
+    return connection_.session() != nullptr ? connection_.session()->peer_clock() : std::nullopt;
+  }
 
   /// The server's newest report on our forces, once a second while they come: late ones by cause, delays, losses.
   /// From the present session; empty before the first.

@@ -40,23 +40,26 @@ std::unique_ptr<ForceClient> Plug::new_client(LocalTime now, bool controls) {
   ForceClient::Config config = config_.client;
   config.seed = config_.new_seed();
   if (controls) {
+    config.diagnostics = false;  // they are for observers only
     const Physics physics = [this](const DeviceState& state) { return answer(state); };
     return std::make_unique<ForceClient>(way.link, way.server, config, physics, now);
   }
   config.take_lease = false;
-  const Watch watch = [this](const DeviceState& state, const LinkStats&) { take(state, now_); };
+  const Watch watch = [this](const DeviceState& state, const LinkStats&) { take(state, *watcher_); };
   return std::make_unique<ForceClient>(way.link, way.server, config, watch, now);
 }
 
-void Plug::take(const DeviceState& state, LocalTime now) {
+void Plug::take(const DeviceState& state, const ForceClient& from) {
   if (state_ && state_->tick >= state.tick && state_->tick - state.tick < kReordered) return;
   state_ = state;
-  arrived_ = now;
+  arrived_ = now_;
+  const auto clock = from.server_clock();
+  sampled_ = clock ? std::min(clock->to_local(state.sampled), now_) : now_;
   ++states_;
 }
 
 Touch Plug::answer(const DeviceState& state) {
-  take(state, now_);
+  take(state, *controller_);
   Touch touch;
   touch.unknown = true;
   if (!physics_ || now_ >= until_) return touch;

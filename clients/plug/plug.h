@@ -65,6 +65,9 @@ class Plug {
   const std::optional<DeviceState>& state() const noexcept { return state_; }
   /// When it arrived.
   LocalTime arrived() const noexcept { return arrived_; }
+  /// When it was sampled, on our clock, by the estimate of the server's clock; not later than it arrived. Before the
+  /// first round trip of a session: when it arrived.
+  LocalTime sampled() const noexcept { return sampled_; }
   /// The number of states that have come: when it has grown, state() is new.
   std::uint64_t states() const noexcept { return states_; }
   /// What the server has said of itself, the device and its handle; empty until it has.
@@ -88,6 +91,10 @@ class Plug {
   std::uint64_t forces_dropped() const noexcept { return dropped_; }  ///< asked for by others than the owner
   std::uint64_t forces_unusable() const noexcept;                     ///< not sent: not finite, or out of bounds
   LinkStats link() const;                                             ///< of the session that the states come by
+  /// The server's newest reports, of the present sessions: on our forces (while it takes them), and, with
+  /// ForceClient::Config::diagnostics and only while no force is asked for, on the device's loop.
+  std::optional<LinkReport> report() const { return controller_ ? controller_->report() : std::nullopt; }
+  std::optional<DeviceReport> device_report() const { return watcher_ ? watcher_->device_report() : std::nullopt; }
 
   /// Each change in a sentence, once: connected, lost, refused, no answer, axes unknown, controls, controls no more. The
   /// newest 16 that nobody has taken. Empty: nothing new.
@@ -105,7 +112,7 @@ class Plug {
 
  private:
   std::unique_ptr<ForceClient> new_client(LocalTime now, bool controls);
-  void take(const DeviceState& state, LocalTime now);
+  void take(const DeviceState& state, const ForceClient& from);
   void drain(Link& link);
   void learn_from(const ForceClient& client);
   Touch answer(const DeviceState& state);
@@ -125,6 +132,7 @@ class Plug {
 
   std::optional<DeviceState> state_;
   LocalTime arrived_{};
+  LocalTime sampled_{};
   std::uint64_t states_ = 0;
   std::optional<Welcome> welcome_;
   std::optional<DeviceDescription> description_;

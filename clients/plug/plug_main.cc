@@ -66,6 +66,7 @@ int run(int argc, char** argv) {
   Chosen chosen;
   add_chai3d(app, chosen);
   add_vrpn(app, chosen);
+  add_ros2(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -188,6 +188,17 @@ TEST(ForceClient, AForceIsValidForThreePeriodsAndAtLeastTwentyMilliseconds) {
   EXPECT_EQ(valid_ms({.rate_hz = 100, .valid_for = milliseconds(7)}), 7);
 }
 
+TEST(ForceClient, AnAnswerThatSaysHowLongItIsValidIsBelieved) {
+  World world(10, kFineWeather);
+  world.connect({.rate_hz = 100, .valid_for = milliseconds(7)}, [](const DeviceState& state) {
+    Touch touch = answer(state);
+    touch.valid_for = milliseconds(55);
+    return touch;
+  });
+  world.run(kSecond);
+  EXPECT_EQ(world.z->forces.back().second.valid_for, milliseconds(55));
+}
+
 TEST(ForceClient, TheStiffnessIsThatAtThePositionTheForceWasComputedFor) {
   World world(11);
   world.connect({.rate_hz = 100}, [](const DeviceState& hand) {

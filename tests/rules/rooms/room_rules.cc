@@ -66,6 +66,8 @@ const std::vector<Door>& front_doors() {
       {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/dashboard/web_server.cc"}},
       {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/fem/sparse.cc"}},
       {"CLI11", {"CLI/"}, {"server/main.cc", "clients/cpp/options.cc", "*_main.cc"}},
+      // DDS, and the types that idlc makes of ros2_types.idl.
+      {"Cyclone DDS", {"dds/", "ros2_types.h"}, {"clients/plug/ros2/ros2_node.cc"}},
       {"Eigen", {"Eigen/"}, {"core/", "protocol/", "devices/", "server/", "clients/"}},
       {"Eigen's tree of boxes", {"unsupported/Eigen/BVH"}, {"clients/softbody/effects/self_collision.cc"}},
       {"libsodium", {"sodium.h", "sodium/"}, {"protocol/secrets/crypto.cc", "devices/falcon/firmware.cc"}},

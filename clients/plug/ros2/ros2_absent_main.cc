@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-plug ros2, where it was built without DDS.
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+#include "clients/plug/subcommands.h"
+
+namespace tendon::plug {
+
+void add_ros2(CLI::App& app, Chosen& chosen) {
+  CLI::App& ros2 = *app.add_subcommand("ros2", "Not in this build: it needs cyclonedds-dev and cyclonedds-tools");
+  ros2.allow_extras();
+  ros2.callback([&chosen] {
+    chosen = []() -> int {
+      throw std::runtime_error(
+          "ros2 is not in this build: the Debian packages cyclonedds-dev and cyclonedds-tools were missing");
+    };
+  });
+}
+
+}  // namespace tendon::plug

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// tendon-plug ros2: a device as topics of ROS 2, by plain DDS.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <deque>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/machine.h"
+#include "clients/cpp/stop_signals.h"
+#include "clients/plug/ros2/ros2_device.h"
+#include "clients/plug/ros2/ros2_node.h"
+#include "clients/plug/subcommands.h"
+
+namespace tendon::plug {
+namespace {
+
+struct Ros2Options {
+  DeskConfig desk;
+  std::uint32_t domain = 0;
+  std::string interface;
+  std::vector<std::string> peers;
+  double rate_hz = 0;
+  bool negate = false;
+  std::optional<RosServo::Kind> servo;
+  std::string clutch;
+  double servo_scale = 1;
+  std::string servo_frame;
+  double duration_s = std::numeric_limits<double>::infinity();
+};
+
+constexpr Duration kDiagnosticsEvery = std::chrono::seconds(1);
+/// Commands are taken so often at most: 4000 a second. Of those that come faster the newest is taken.
+constexpr Duration kLeastGap = std::chrono::microseconds(250);
+
+/// For what goes into the XML of Cyclone's configuration.
+std::string host_or_interface(const std::string& text) {
+  const auto fits = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+           std::string_view("._:-@").find(c) != std::string_view::npos;
+  };
+  return !text.empty() && text.size() <= 255 && std::ranges::all_of(text, fits)
+             ? std::string()
+             : "expected the name of an interface or a host, or an address, got \"" + text + "\"";
+}
+
+/// What is added to LocalTime to make it the system's clock.
+Duration since_1970() {
+  const auto system = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<Duration>(system) - read_clock().time_since_epoch();
+}
+
+class Ros2Bridge {
+ public:
+  explicit Ros2Bridge(const Ros2Options& options)
+      : options_(options), desk_(options.desk, read_clock()), node_(config(options, desk_)) {
+    for (std::size_t i = 0; i < desk_.size(); ++i) {
+      RosDevice::Config of_device{.name = ros_name(desk_.name(i)),
+                                  .rate_hz = options.rate_hz,
+                                  .negate = options.negate,
+                                  .clutch = options.clutch};
+      if (options.servo) {
+        const std::string frame = options.servo_frame.empty() ? of_device.name + "_servo" : options.servo_frame;
+        of_device.servo.emplace(*options.servo, options.servo_scale, frame);
+      }
+      devices_.emplace_back(desk_.plug(i), std::move(of_device));
+    }
+  }
+
+  int run() {
+    const StopSignals signals;
+    say_what_it_is();
+    LocalTime now = read_clock();
+    const LocalTime end = options_.duration_s < 1e9 ? now + from_seconds(options_.duration_s) : LocalTime::max();
+    LocalTime next_diagnosis = now + kDiagnosticsEvery;
+    LocalTime next_take = now;
+    bool rings = true;  // a command may be there
+    for (; !signals.asked() && now < end; now = read_clock()) {
+      const std::array<Desk::Count, 4> counts = {{{"published", node_.published()},
+                                                  {"unsent", node_.unsent()},
+                                                  {"superseded", node_.superseded()},
+                                                  {"refused", refused()}}};
+      LocalTime next = std::min({turn(now, counts), next_diagnosis, end});
+      if (rings && take(now)) {
+        next_take = now + kLeastGap;
+        next = std::min(next, turn(now, counts));
+      }
+      publish(now);
+      if (now >= next_diagnosis) {
+        diagnose(now);
+        next_diagnosis = now + kDiagnosticsEvery;
+      }
+      std::array<pollfd, 1> bell = {{{node_.descriptor(), POLLIN, 0}}};
+      const bool listens = now >= next_take;
+      desk_.wait(std::span(bell).first(listens ? 1 : 0), now, listens ? next : std::min(next, next_take));
+      rings = bell[0].revents != 0;
+    }
+    desk_.stop(read_clock());
+    return 0;
+  }
+
+ private:
+  /// All that is due now: what a turn has computed leaves in the one after it.
+  LocalTime turn(LocalTime now, std::span<const Desk::Count> counts) {
+    LocalTime next = now;
+    for (int turns = 0; next <= now && turns < 4; ++turns) next = desk_.turn(now, counts);
+    return next;
+  }
+
+  static Ros2Node::Config config(const Ros2Options& options, const Desk& desk) {
+    Ros2Node::Config config{.domain = options.domain,
+                            .interface = options.interface,
+                            .peers = options.peers,
+                            .devices = {},
+                            .servo = options.servo};
+    std::map<std::string, std::string> taken;
+    for (std::size_t i = 0; i < desk.size(); ++i) {
+      const std::string name = ros_name(desk.name(i));
+      const auto [other, fresh] = taken.emplace(name, desk.name(i));
+      if (!fresh) {
+        throw std::runtime_error("--device " + desk.name(i) + ": ROS would call it " + name + ", as it calls " +
+                                 other->second);
+      }
+      config.devices.push_back(name);
+    }
+    return config;
+  }
+
+  void say_what_it_is() {
+    std::string sentence = "wrench_command is the force on the hand";
+    if (options_.negate) {
+      sentence = "--negate: wrench_command is what a robot feels or the hand exerts, and the hand gets its opposite";
+    }
+    desk_.say(sentence + "; the topic wrench always is what the device exerts on the hand");
+    if (!options_.interface.empty()) {
+      desk_.say("--interface " + options_.interface + ": whoever reaches DDS domain " +
+                std::to_string(options_.domain) + " on it moves a motor");
+    }
+    if (options_.desk.json) {
+      const nlohmann::ordered_json line = {{"event", "listening"},
+                                           {"address", "domain " + std::to_string(options_.domain)}};
+      std::cout << line << std::endl;
+    }
+  }
+
+  /// True when something was asked for.
+  bool take(LocalTime now) {
+    node_.clear();
+    bool asked = false;
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      if (const auto writers = node_.writers_if_changed(i)) devices_[i].keep(*writers);
+      if (const auto command = node_.take(i)) {
+        devices_[i].take(command->writer, command->called, command->wrench, now);
+        asked = true;
+      }
+      while (const auto sentence = devices_[i].next_sentence()) desk_.say(desk_.name(i) + ": " + *sentence);
+    }
+    return asked;
+  }
+
+  void publish(LocalTime now) {
+    const Duration offset = since_1970();
+    for (std::size_t i = 0; i < devices_.size(); ++i) node_.publish(i, devices_[i].messages(now, offset));
+  }
+
+  void diagnose(LocalTime now) {
+    std::vector<RosDiagnosis> diagnoses;
+    for (RosDevice& device : devices_) diagnoses.push_back(device.diagnosis());
+    node_.publish(diagnoses, ros_time(now.time_since_epoch() + since_1970()));
+  }
+
+  std::uint64_t refused() const {
+    std::uint64_t all = 0;
+    for (const RosDevice& device : devices_) all += device.refused();
+    return all;
+  }
+
+  Ros2Options options_;
+  Desk desk_;
+  Ros2Node node_;
+  std::deque<RosDevice> devices_;
+};
+
+}  // namespace
+
+void add_ros2(CLI::App& app, Chosen& chosen) {
+  static Ros2Options o;  // lives until the chosen subcommand has run
+  CLI::App& ros2 = *app.add_subcommand("ros2", "A device as topics of ROS 2, by plain DDS: /tendon/NAME/pose, …");
+  o.desk.client.name = "tendon-plug ros2";
+  o.desk.client.joints = true;
+  o.desk.client.diagnostics = true;
+  add_common(ros2, o.desk);
+  ros2.add_option("--domain", o.domain, "ROS_DOMAIN_ID")
+      ->envname("ROS_DOMAIN_ID")
+      ->check(CLI::Range(0U, Ros2Node::kMaxDomain))
+      ->capture_default_str();
+  const CLI::Validator host(host_or_interface, "");
+  ros2.add_option("--interface", o.interface, "The network interface; none: only this machine")
+      ->type_name("NAME")
+      ->check(host);
+  ros2.add_option("--peer", o.peers, "With --interface: a machine that multicast does not reach; several times")
+      ->type_name("HOST")
+      ->check(host)
+      ->needs("--interface");
+  ros2.add_option("--rate", o.rate_hz, "States per second at most; 0: all")
+      ->type_name("HZ")
+      ->check(CLI::Range(0.0, 10000.0));
+  ros2.add_flag("--negate", o.negate, "wrench_command is what a robot feels, or what the hand exerts");
+  const std::map<std::string, RosServo::Kind> kinds = {{"twist", RosServo::Kind::kTwist},
+                                                       {"pose", RosServo::Kind::kPose}};
+  ros2.add_option("--servo", o.servo, "Send the hand's motion to a robot arm too, while the clutch is held")
+      ->type_name("twist|pose")
+      ->transform(CLI::CheckedTransformer(kinds, CLI::ignore_case))
+      ->needs(ros2.add_option("--clutch", o.clutch, "The button that is the clutch: its name or number")
+                  ->type_name("BUTTON"));
+  ros2.add_option("--servo-scale", o.servo_scale, "The robot's motion over the hand's")
+      ->check(CLI::Range(0.001, 1000.0))
+      ->capture_default_str();
+  ros2.add_option("--servo-frame", o.servo_frame, "frame_id of what is sent to the arm; none: NAME_servo")
+      ->type_name("FRAME");
+  ros2.add_option("--duration-s", o.duration_s, "End after this time")->check(CLI::PositiveNumber);
+  ros2.callback([&chosen] { chosen = [] { return Ros2Bridge(o).run(); }; });
+}
+
+}  // namespace tendon::plug
