@@ -62,6 +62,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", TENDON_VERSION);
   app.require_subcommand(1);
   Chosen chosen;
+  add_inverse(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

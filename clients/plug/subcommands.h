@@ -19,5 +19,6 @@ using Chosen = std::function<int()>;
 void add_common(CLI::App& app, DeskConfig& desk);
 
 // Each bridge adds its subcommand, in FOLDER/…_main.cc, and sets `chosen` when it is the one.
+void add_inverse(CLI::App& app, Chosen& chosen);
 
 }  // namespace tendon::plug
