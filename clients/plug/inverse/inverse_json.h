@@ -113,9 +113,9 @@ struct DeviceNews {
 };
 
 struct News {
-  std::optional<std::uint32_t> session_id;  ///< with it, everything is told: each config too
-  std::vector<DeviceNews> devices;
-  std::vector<std::string> refused;
+  std::optional<std::uint32_t> session_id{};  ///< with it, everything is told: each config too
+  std::vector<DeviceNews> devices{};
+  std::vector<std::string> refused{};
 };
 
 std::string to_json(const News& news);

@@ -65,24 +65,26 @@ void InverseSession::see() {
   }
 }
 
-bool InverseSession::may_read(LocalTime now) {
+/// The newest message is counted before the older ones. It is read even where there is nothing left for it.
+void InverseSession::refill(LocalTime now) {
   const double passed = std::chrono::duration<double>(now - refilled_).count();
   refilled_ = now;
-  readable_ = std::min(readable_ + passed * kMostPerSecond, kMostAtOnce);
-  if (readable_ < 1) return false;
-  readable_ -= 1;
-  return true;
+  readable_ = std::clamp(readable_ + passed * kMostPerSecond, 0.0, kMostAtOnce) - 1;
 }
 
 std::vector<std::string> InverseSession::answer(LocalTime now, std::span<const std::string> messages) {
   std::vector<std::string> replies;
   replies.reserve(messages.size());
   counts_.messages += messages.size();
+  refill(now);
   for (std::size_t i = 0; i < messages.size(); ++i) {
-    if (!may_read(now) && i + 1 < messages.size()) {
-      ++counts_.skipped;
-      replies.push_back(reply(now, {}, false));
-      continue;
+    if (i + 1 < messages.size()) {
+      if (readable_ < 1) {
+        ++counts_.skipped;
+        replies.push_back(reply(now, {}, false));
+        continue;
+      }
+      readable_ -= 1;
     }
     Wish wish = read_wish(messages[i]);
     if (!wish.read) ++counts_.unread;

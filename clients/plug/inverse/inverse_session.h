@@ -82,7 +82,7 @@ class InverseSession {
   DeviceNews news_of(LocalTime now, const InverseDevice& device, Eye& eye) const;
   void take(LocalTime now, Wish& wish);
   void take(LocalTime now, const DeviceWish& asked, Wish& wish);
-  bool may_read(LocalTime now);
+  void refill(LocalTime now);
 
   Plug::Program program_;
   std::span<const InverseDevice> devices_;
