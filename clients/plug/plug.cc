@@ -2,6 +2,8 @@
 #include "clients/plug/plug.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <utility>
 
 namespace tendon::plug {
@@ -25,6 +27,14 @@ Plug::Plug(const Way& watcher, const Way& controller, Config config, LocalTime n
       config_(std::move(config)),
       watcher_(new_client(now, false)) {}
 
+/// What still comes for a session that has ended is read and forgotten, or the socket would stay ready for ever.
+void Plug::drain(Link& link) {
+  Address from;
+  std::array<std::byte, kMaxDatagram> forgotten;
+  for (int i = 0; i < config_.client.max_datagrams && link.receive(from, forgotten) > 0; ++i) {
+  }
+}
+
 std::unique_ptr<ForceClient> Plug::new_client(LocalTime now, bool controls) {
   const Way& way = controls ? controller_way_ : watcher_way_;
   ForceClient::Config config = config_.client;
@@ -47,10 +57,12 @@ void Plug::take(const DeviceState& state, LocalTime now) {
 
 Touch Plug::answer(const DeviceState& state) {
   take(state, now_);
-  if (physics_ && now_ < until_) return physics_(state);
-  Touch nothing;
-  nothing.unknown = true;
-  return nothing;
+  Touch touch;
+  touch.unknown = true;
+  if (!physics_ || now_ >= until_) return touch;
+  touch = physics_(state);
+  if (once_) physics_ = nullptr;
+  return touch;
 }
 
 void Plug::learn_from(const ForceClient& client) {
@@ -100,6 +112,8 @@ LocalTime Plug::turn(LocalTime now) {
     learn_from(*watcher_);
     note_changes();
   }
+  if (!watcher_) drain(watcher_way_.link);
+  if (!controller_) drain(controller_way_.link);
   if (lost()) {
     state_.reset();
     welcome_.reset();
@@ -109,6 +123,12 @@ LocalTime Plug::turn(LocalTime now) {
   return next;
 }
 
+Plug::Answer Plug::push(Program program, LocalTime now, LocalTime until, const Touch& touch) {
+  const Answer answer = ask(program, now, until, [touch](const DeviceState&) { return touch; });
+  if (answer == Answer::kTaken) once_ = true;
+  return answer;
+}
+
 Plug::Answer Plug::ask(Program program, LocalTime now, LocalTime until, Physics physics) {
   if (config_.observe || (owner_ != 0 && owner_ != program)) {
     ++dropped_;
@@ -116,6 +136,7 @@ Plug::Answer Plug::ask(Program program, LocalTime now, LocalTime until, Physics 
   }
   owner_ = program;
   physics_ = std::move(physics);
+  once_ = false;
   asked_ = now;
   until_ = until;
   if (stopped_) return Answer::kTaken;

@@ -23,11 +23,10 @@ namespace tendon::plug {
 ///   one makes it an observer again.
 /// * **One owner.** Of several programs the first one that asks for a force owns the device. Others are told that they
 ///   do not, and their forces are dropped. It is free again when its owner leaves or asks for nothing for Config::idle.
-/// * **Freshness.** A force that was asked for until T answers states until T, and then nothing is sent: the server
-///   holds, fades and stops the old force as for any engine that falls silent (protocol/SESSION.md). An old force is
-///   never sent as if it were new.
-/// * **At once.** What is asked for now is sent in the next turn, in answer to the newest state, and again in answer to
-///   every state that comes while it is fresh.
+/// * **Freshness.** A force is sent once, and a field answers states until its time is over. Then nothing is sent: the
+///   server holds, fades and stops the old force as for any engine that falls silent (protocol/SESSION.md). An old force
+///   is never sent as if it were new.
+/// * **At once.** What is asked for now is sent in the next turn, in answer to the newest state.
 ///
 /// Thread-safe: no. Realtime-safe: no.
 class Plug {
@@ -73,8 +72,11 @@ class Plug {
   const std::optional<DeviceDescription>& description() const noexcept { return description_; }
   const std::optional<HandleDescription>& handle() const noexcept { return handle_; }
 
-  /// `program` wants the hand to feel `physics`, which is called with every state that is answered until `until`: device
-  /// base frame, as ForceClient. It replaces what the same program asked for before.
+  /// `program` wants the hand to feel `touch`, in the device base frame: one force, as it was computed from a state that
+  /// the program has seen. It is sent once, in answer to the newest state; it waits until `until` for the channel.
+  Answer push(Program program, LocalTime now, LocalTime until, const Touch& touch);
+  /// `program` wants the hand to feel `physics`, a field whose force is known wherever the hand is: it answers the newest
+  /// state and every state until `until`. Either replaces what the same program asked for before.
   Answer ask(Program program, LocalTime now, LocalTime until, Physics physics);
   /// `program` asks for nothing any more. Nothing happens when it is not the owner.
   void release(Program program);
@@ -104,6 +106,7 @@ class Plug {
  private:
   std::unique_ptr<ForceClient> new_client(LocalTime now, bool controls);
   void take(const DeviceState& state, LocalTime now);
+  void drain(Link& link);
   void learn_from(const ForceClient& client);
   Touch answer(const DeviceState& state);
   void end_controller(LocalTime now);
@@ -127,7 +130,8 @@ class Plug {
   std::optional<HandleDescription> handle_;
 
   Program owner_ = 0;
-  Physics physics_;
+  Physics physics_;    ///< of the owner; empty: nothing to send
+  bool once_ = false;  ///< it is one force
   LocalTime asked_{};
   LocalTime until_{};
   std::uint64_t dropped_ = 0;

@@ -70,7 +70,7 @@ TEST(Plug, AForceIsOnTheWireInTheTurnInWhichItWasAskedFor) {
   world.run(200, [&] { plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(0)); });
   double wanted = 0;
   world.run(100, [&] {
-    // What was asked for at the end of the last millisecond is what the device's next step has.
+    // The device's next step has the force that was asked for at the end of the last millisecond.
     EXPECT_NEAR(world.step.wanted.y(), wanted, 1e-9);
     wanted += 1e-3;
     plug.ask(kOld, world.now, world.now + milliseconds(50), pushes_by(wanted));
@@ -94,6 +94,33 @@ TEST(Plug, AForceThatIsTooOldIsNotSentAgainAndTheLadderLetsGo) {
   EXPECT_EQ(plug.forces(), sent);
   EXPECT_EQ(last, 0);
   EXPECT_LT(step, 0.05) << "it fades";
+}
+
+TEST(Plug, APushIsSentOnceHoweverManyStatesCome) {
+  World world("demo.toml");
+  Plug& plug = world.add_plug();
+  world.run(100);
+  const auto push = [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 0.5, 0)); };
+  push();
+  world.run(50);
+  EXPECT_TRUE(plug.pushes());
+  EXPECT_EQ(plug.forces(), 1U) << "it has waited for the channel";
+  push();
+  world.run(2);
+  EXPECT_EQ(plug.forces(), 2U);
+  world.run(90);
+  EXPECT_EQ(plug.forces(), 2U);
+}
+
+TEST(Plug, ReadsWhatStillComesForASessionThatHasEnded) {
+  // A datagram that nobody reads would wake a sleeping bridge for ever.
+  World world("demo.toml", {}, 5);
+  Plug& plug = world.add_plug();
+  world.run(100);
+  world.run(1500, [&] { plug.push(kOld, world.now, world.now + milliseconds(100), Vec3(0, 0.5, 0)); });
+  EXPECT_LE(world.unread(), 1U) << "the one that has just come";
+  world.run(1500);
+  EXPECT_LE(world.unread(), 1U) << "the controller has ended, too";
 }
 
 TEST(Plug, TheFirstProgramThatAsksOwnsTheDeviceUntilItLeavesOrIsSilent) {

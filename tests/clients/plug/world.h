@@ -87,6 +87,13 @@ class World {
     network_->turn(now);
   }
 
+  /// Datagrams that have come to the plugs and that nobody has read.
+  std::size_t unread() const {
+    std::size_t all = 0;
+    for (const Guest& guest : guests_) all += guest.watcher->inbox.size() + guest.controller->inbox.size();
+    return all;
+  }
+
   /// Datagrams go through, or are lost.
   bool connected = true;
   LocalTime now = LocalTime(std::chrono::seconds(1000));
