@@ -50,6 +50,7 @@ int run_inverse(const InverseOptions& options) {
   }
   DeskConfig desk_config = options.desk;
   if (desk_config.client.name == DeskConfig{}.client.name) desk_config.client.name = "inverse";
+  desk_config.client.valid_for = InverseSession::kFresh;
   Desk desk(std::move(desk_config), read_clock());
   InverseServer server(config, desk, read_clock);
   if (!local) desk.say("whoever reaches " + to_string(server.address()) + " moves a motor");

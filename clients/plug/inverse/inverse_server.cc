@@ -45,7 +45,7 @@ using boost::system::error_code;
 
 /// Messages of all clients that one turn reads before it answers.
 constexpr std::size_t kMostInOneTurn = 256;
-/// Turns of the desk at one instant: a force leaves in the turn after the one that computed it.
+/// Turns of the desk before the clients have theirs.
 constexpr int kMostDeskTurns = 4;
 /// The longest sleep, so that patience runs out in time.
 constexpr Duration kLongestSleep = std::chrono::milliseconds(100);
@@ -359,7 +359,8 @@ struct InverseServer::State {
     });
   }
 
-  LocalTime turn_desk(LocalTime now) {
+  /// Turns the desk until nothing is due: a force leaves in the turn after the one that computed it.
+  LocalTime turn_desk() {
     const InverseCounts& counts = shared.counts;
     const std::array<Desk::Count, 6> all = {{{"clients", shared.clients},
                                              {"messages", counts.messages},
@@ -367,8 +368,12 @@ struct InverseServer::State {
                                              {"unread", counts.unread},
                                              {"refused", counts.refused},
                                              {"ignored", counts.ignored}}};
-    LocalTime next = shared.desk.turn(now, all);
-    for (int i = 1; i < kMostDeskTurns && next <= now; ++i) next = shared.desk.turn(now, all);
+    LocalTime next{};
+    for (int i = 0; i < kMostDeskTurns; ++i) {
+      const LocalTime now = shared.clock();
+      if (i > 0 && next > now) break;
+      next = shared.desk.turn(now, all);
+    }
     for (const auto& connection : shared.connections) {
       if (connection->has_session()) connection->session()->see();
     }
@@ -376,18 +381,27 @@ struct InverseServer::State {
   }
 
   void turn() {
+    LocalTime next = turn_desk();
     const LocalTime now = shared.clock();
-    LocalTime next = turn_desk(now);
     bool answered = false;
     for (const auto& connection : shared.connections) answered |= connection->answer(now);
-    if (answered) next = turn_desk(now);
+    if (answered) next = turn_desk();
     for (const auto& connection : shared.connections) connection->pump(now);
     std::erase_if(shared.connections, [](const auto& one) { return one->done(); });
     say_owners();
     watch();
-    timer.expires_after(waiting_time(std::min(next - now, kLongestSleep)));
+    wake_at(std::min(next, now + kLongestSleep), now);
+  }
+
+  /// A timer that goes off too early is left alone: the turn that it makes sets the next one.
+  void wake_at(LocalTime at, LocalTime now) {
+    if (wakes_at && *wakes_at <= at) return;
+    wakes_at = at;
+    timer.expires_after(waiting_time(at - now));
     timer.async_wait([this](error_code cancelled) {
-      if (!cancelled) turn();
+      if (cancelled) return;
+      wakes_at.reset();
+      turn();
     });
   }
 
@@ -401,13 +415,16 @@ struct InverseServer::State {
     }
   }
 
-  /// The desk's sockets are others after a look-up.
+  /// The desk's sockets are others after a look-up, which is made only while a device has no session.
   void watch() {
+    bool lost = false;
+    for (std::size_t i = 0; i < shared.desk.size(); ++i) lost = lost || shared.desk.plug(i).lost();
+    const bool may_differ = std::exchange(was_lost, lost) || lost;
     const std::vector<int> descriptors = shared.desk.descriptors();
     watched.resize(descriptors.size());
     for (std::size_t i = 0; i < descriptors.size(); ++i) {
       WatchedSocket& socket = watched[i];
-      if (const ino_t id = socket_id(descriptors[i]); socket.id != id) {
+      if (const ino_t id = may_differ ? socket_id(descriptors[i]) : socket.id; socket.id != id) {
         socket.number = ++newest_socket;
         socket.id = id;
         socket.own.emplace(context, ::dup(descriptors[i]));
@@ -431,6 +448,8 @@ struct InverseServer::State {
   asio::steady_timer accept_again{context};
   std::deque<WatchedSocket> watched;
   std::uint64_t newest_socket = 0;
+  bool was_lost = true;
+  std::optional<LocalTime> wakes_at;
   std::vector<Plug::Program> owners;
   bool answers_due = false;
   std::size_t read_before = 0;

@@ -122,7 +122,7 @@ void InverseSession::take(LocalTime now, const DeviceWish& asked, Wish& wish) {
   Touch touch = turned.base_force(asked.force.value_or(Vec3::Zero()));
   if (asked.torque) touch.torque = turned.base_torque(*asked.torque);
   touch.grip_force = asked.grip_force;
-  switch (plug.ask(program_, now, now + kFresh, [touch](const DeviceState&) { return touch; })) {
+  switch (plug.push(program_, now, now + kFresh, touch)) {
     case Plug::Answer::kTaken:
       return;
     case Plug::Answer::kOwned:

@@ -36,10 +36,10 @@ struct InverseCounts {
 /// One client's conversation: the first message, and then exactly one reply for each message of the client. It has no
 /// socket and no clock.
 ///
-/// * A force is asked of the Plug for kFresh from the message that says it. A client that falls silent sends no more
-///   forces, and the server holds, fades and stops the last one (protocol/SESSION.md).
+/// * A force is sent once, and the server takes it as fresh for kFresh, which the plugs' `client.valid_for` says. A client
+///   that falls silent, or leaves, sends no more; the server holds, fades and stops the last one (protocol/SESSION.md).
 /// * A message says all that is wanted of a device: a set_cursor_force without the word `tendon` asks for no torque.
-///   One without either asks for nothing, and what was asked before goes on until it is too old.
+///   One without either asks for nothing.
 /// * A force of zero claims nothing, because clients send it to be answered at all. It counts only from the client that
 ///   owns the device.
 /// * Of the messages that are there at once the newest is always read. The older are read while they are not more than
