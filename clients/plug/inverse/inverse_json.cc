@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -11,7 +12,6 @@ namespace tendon::plug {
 namespace {
 
 using nlohmann::json;
-using nlohmann::ordered_json;
 
 constexpr std::string_view kLetters = "XYZ";
 constexpr std::string_view kDigits = "0123456789ABCDEF";
@@ -117,62 +117,110 @@ void read_device(const json& entry, Wish& wish) {
   }
 }
 
-ordered_json xyz(const Vec3& v) { return {{"x", v.x()}, {"y", v.y()}, {"z", v.z()}}; }
+// A reply is written without a tree of values: it is made for each message, and a tree takes most of a reply's time.
 
-ordered_json arm(const DeviceNews& news, bool whole) {
-  ordered_json entry = {{"device_id", news.device_id}};
-  if (whole) {
-    entry["config"] = {{"type", "inverse3"},
-                       {"handedness", news.left_handed ? "left" : "right"},
-                       {"preset", "defaults"},
-                       {"basis", {{"permutation", news.permutation}}}};
+void add(std::string& out, double value) {
+  if (!std::isfinite(value)) {
+    out += "null";
+    return;
   }
-  if (news.state) {
-    entry["state"] = {{"cursor_position", xyz(news.state->position)},
-                      {"cursor_velocity", xyz(news.state->velocity)},
-                      {"current_cursor_force", xyz(news.state->force)},
-                      {"control_domain", "cartesian"},
-                      {"control_mode", news.in_use ? "force_control" : "idle"}};
-  }
-  entry["status"] = {{"ready", news.state.has_value()}, {"in_use", news.in_use}};
-  return entry;
+  std::array<char, 32> digits;
+  out.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
 }
 
-ordered_json grip(const DeviceNews& news, bool whole) {
-  ordered_json entry = {{"device_id", news.grip_id}};
-  if (whole) entry["config"] = {{"type", "wireless_verse_grip"}};
+void add(std::string& out, std::string_view text) {
+  const auto plain = [](char c) { return c >= ' ' && c <= '~' && c != '"' && c != '\\'; };
+  if (std::ranges::all_of(text, plain)) {
+    out.append("\"").append(text).append("\"");
+  } else {
+    out += json(text).dump(-1, ' ', false, json::error_handler_t::replace);
+  }
+}
+
+void add(std::string& out, bool value) { out += value ? "true" : "false"; }
+
+void add(std::string& out, const char* text) = delete;  // which would be a bool
+
+void add(std::string& out, const Vec3& v) {
+  add(out += "{\"x\":", v.x());
+  add(out += ",\"y\":", v.y());
+  add(out += ",\"z\":", v.z());
+  out += '}';
+}
+
+void add_arm(std::string& out, const DeviceNews& news, bool whole) {
+  add(out += "{\"device_id\":", news.device_id);
+  if (whole) {
+    out += R"(,"config":{"type":"inverse3","handedness":)";
+    add(out, std::string_view(news.left_handed ? "left" : "right"));
+    add(out += R"(,"preset":"defaults","basis":{"permutation":)", news.permutation);
+    out += "}}";
+  }
+  if (news.state) {
+    add(out += R"(,"state":{"cursor_position":)", news.state->position);
+    add(out += R"(,"cursor_velocity":)", news.state->velocity);
+    add(out += R"(,"current_cursor_force":)", news.state->force);
+    out += R"(,"control_domain":"cartesian","control_mode":)";
+    out += news.in_use ? R"("force_control"})" : R"("idle"})";
+  }
+  add(out += R"(,"status":{"ready":)", news.state.has_value());
+  add(out += R"(,"in_use":)", news.in_use);
+  out += "}}";
+}
+
+void add_grip(std::string& out, const DeviceNews& news, bool whole) {
+  add(out += "{\"device_id\":", news.grip_id);
+  if (whole) out += R"(,"config":{"type":"wireless_verse_grip"})";
   if (news.state) {
     const Quat& q = news.state->orientation;
+    add(out += R"(,"state":{"orientation":{"w":)", q.w);
+    add(out += ",\"x\":", q.x);
+    add(out += ",\"y\":", q.y);
+    add(out += ",\"z\":", q.z);
     const auto held = [&](unsigned i) { return (news.state->buttons >> i & 1U) != 0; };
-    entry["state"] = {{"orientation", {{"w", q.w}, {"x", q.x}, {"y", q.y}, {"z", q.z}}},
-                      {"buttons",
-                       {{"a", held(0)},
-                        {"b", held(1)},
-                        {"c", held(2)},
-                        {"button_0", held(0)},
-                        {"button_1", held(1)},
-                        {"button_2", held(2)},
-                        {"button_3", held(3)}}}};
+    add(out += R"(},"buttons":{"a":)", held(0));
+    add(out += R"(,"b":)", held(1));
+    add(out += R"(,"c":)", held(2));
+    add(out += R"(,"button_0":)", held(0));
+    add(out += R"(,"button_1":)", held(1));
+    add(out += R"(,"button_2":)", held(2));
+    add(out += R"(,"button_3":)", held(3));
+    out += "}}";
   }
-  entry["status"] = {{"ready", news.state.has_value()}};
-  return entry;
+  add(out += R"(,"status":{"ready":)", news.state.has_value());
+  out += "}}";
 }
 
-ordered_json ours(const DeviceNews& news) {
-  ordered_json entry = {{"device_id", news.device_id}, {"name", news.name}, {"connected", news.state.has_value()}};
-  if (!news.state) return entry;
-  const DeviceNews::State& state = *news.state;
-  entry["tick"] = state.tick;
-  entry["state_age_ms"] = state.age_ms;
-  entry["reasons"] = state.reasons;
-  entry["energy_j"] = state.energy_j;
-  entry["permitted_force_n"] = std::isfinite(state.permitted_force_n) ? ordered_json(state.permitted_force_n) : nullptr;
-  entry["force_age_ms"] = state.force_age_ms;
-  if (state.angular_velocity) entry["angular_velocity_radps"] = xyz(*state.angular_velocity);
-  if (state.torque) entry["torque_nm"] = xyz(*state.torque);
-  if (state.grip_rad) entry["grip_rad"] = *state.grip_rad;
-  if (state.grip_force_n) entry["grip_force_n"] = *state.grip_force_n;
-  return entry;
+void add_ours(std::string& out, const DeviceNews& news) {
+  add(out += "{\"device_id\":", news.device_id);
+  add(out += R"(,"name":)", news.name);
+  add(out += R"(,"connected":)", news.state.has_value());
+  if (news.state) {
+    const DeviceNews::State& state = *news.state;
+    out += R"(,"tick":)" + std::to_string(state.tick);
+    add(out += R"(,"state_age_ms":)", state.age_ms);
+    add(out += R"(,"reasons":)", std::string_view(state.reasons));
+    add(out += R"(,"energy_j":)", state.energy_j);
+    add(out += R"(,"permitted_force_n":)", state.permitted_force_n);
+    add(out += R"(,"force_age_ms":)", state.force_age_ms);
+    if (state.angular_velocity) add(out += R"(,"angular_velocity_radps":)", *state.angular_velocity);
+    if (state.torque) add(out += R"(,"torque_nm":)", *state.torque);
+    if (state.grip_rad) add(out += R"(,"grip_rad":)", *state.grip_rad);
+    if (state.grip_force_n) add(out += R"(,"grip_force_n":)", *state.grip_force_n);
+  }
+  out += '}';
+}
+
+/// "[a,b,c]", each written by `add_one`.
+template <class Things, class AddOne>
+void add_array(std::string& out, const Things& things, AddOne add_one) {
+  out += '[';
+  bool first = true;
+  for (const auto& thing : things) {
+    if (!std::exchange(first, false)) out += ',';
+    add_one(thing);
+  }
+  out += ']';
 }
 
 }  // namespace
@@ -231,20 +279,17 @@ Wish read_wish(std::string_view text) {
 
 std::string to_json(const News& news) {
   const bool whole = news.session_id.has_value();
-  ordered_json message = ordered_json::object();
-  if (whole) message["session_id"] = *news.session_id;
-  ordered_json arms = ordered_json::array();
-  ordered_json grips = ordered_json::array();
-  ordered_json own = ordered_json::array();
-  for (const DeviceNews& device : news.devices) {
-    arms.push_back(arm(device, whole));
-    grips.push_back(grip(device, whole));
-    own.push_back(ours(device));
-  }
-  message["inverse3"] = std::move(arms);
-  message["wireless_verse_grip"] = std::move(grips);
-  message["tendon"] = {{"refused", news.refused}, {"devices", std::move(own)}};
-  return message.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+  std::string out = "{";
+  if (whole) out += "\"session_id\":" + std::to_string(*news.session_id) + ",";
+  out += "\"inverse3\":";
+  add_array(out, news.devices, [&](const DeviceNews& device) { add_arm(out, device, whole); });
+  out += ",\"wireless_verse_grip\":";
+  add_array(out, news.devices, [&](const DeviceNews& device) { add_grip(out, device, whole); });
+  out += ",\"tendon\":{\"refused\":";
+  add_array(out, news.refused, [&](const std::string& sentence) { add(out, std::string_view(sentence)); });
+  out += ",\"devices\":";
+  add_array(out, news.devices, [&](const DeviceNews& device) { add_ours(out, device); });
+  return out += "}}";
 }
 
 std::string id_of(std::string_view name) {
