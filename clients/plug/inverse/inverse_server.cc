@@ -368,16 +368,22 @@ struct InverseServer::State {
                                              {"unread", counts.unread},
                                              {"refused", counts.refused},
                                              {"ignored", counts.ignored}}};
-    LocalTime next{};
-    for (int i = 0; i < kMostDeskTurns; ++i) {
-      const LocalTime now = shared.clock();
-      if (i > 0 && next > now) break;
-      next = shared.desk.turn(now, all);
-    }
+    const auto until_nothing_is_due = [&] {
+      LocalTime next{};
+      for (int i = 0; i < kMostDeskTurns; ++i) {
+        const LocalTime now = shared.clock();
+        if (i > 0 && next > now) break;
+        next = shared.desk.turn(now, all);
+      }
+      return next;
+    };
+    const LocalTime next = until_nothing_is_due();
+    const LocalTime now = shared.clock();
+    bool pushed = false;
     for (const auto& connection : shared.connections) {
-      if (connection->has_session()) connection->session()->see();
+      if (connection->has_session()) pushed |= connection->session()->see(now);
     }
-    return next;
+    return pushed ? until_nothing_is_due() : next;
   }
 
   void turn() {
@@ -386,7 +392,10 @@ struct InverseServer::State {
     bool answered = false;
     for (const auto& connection : shared.connections) answered |= connection->answer(now);
     if (answered) next = turn_desk();
-    for (const auto& connection : shared.connections) connection->pump(now);
+    for (const auto& connection : shared.connections) {
+      connection->pump(now);
+      if (connection->has_session()) next = std::min(next, connection->session()->due());
+    }
     std::erase_if(shared.connections, [](const auto& one) { return one->done(); });
     say_owners();
     watch();

@@ -48,7 +48,7 @@ InverseSession::InverseSession(Plug::Program program, std::span<const InverseDev
                                LocalTime now)
     : program_(program), devices_(devices), counts_(counts), eyes_(devices.size()), refilled_(now) {
   ++counts_.clients;
-  see();
+  see(now);
 }
 
 InverseSession::~InverseSession() {
@@ -57,12 +57,46 @@ InverseSession::~InverseSession() {
 
 std::string InverseSession::greeting(LocalTime now) { return reply(now, {}, true); }
 
-void InverseSession::see() {
+bool InverseSession::see(LocalTime now) {
+  bool pushed = false;
   for (std::size_t i = 0; i < devices_.size(); ++i) {
-    const Plug& plug = *devices_[i].plug;
-    if (std::exchange(eyes_[i].states, plug.states()) == plug.states() || !plug.state()) continue;
-    eyes_[i].buttons |= plug.state()->buttons;
+    Plug& plug = *devices_[i].plug;
+    Eye& eye = eyes_[i];
+    if (std::exchange(eye.states, plug.states()) != plug.states() && plug.state()) eye.buttons |= plug.state()->buttons;
+    if (!eye.waiting || !may_push(now, plug, eye)) continue;
+    const Touch waited = *eye.waiting;
+    if (now >= eye.until) {
+      eye.waiting.reset();
+    } else {
+      push(now, plug, eye, waited);
+      pushed = true;
+    }
   }
+  return pushed;
+}
+
+LocalTime InverseSession::due() const noexcept {
+  LocalTime due = LocalTime::max();
+  for (const Eye& eye : eyes_) {
+    if (eye.waiting) due = std::min(due, eye.pushed + kPace);
+  }
+  return due;
+}
+
+bool InverseSession::may_push(LocalTime now, const Plug& plug, const Eye& eye) const noexcept {
+  return plug.owner() != program_ || eye.answered != plug.states() || now >= eye.pushed + kPace;
+}
+
+Plug::Answer InverseSession::push(LocalTime now, Plug& plug, Eye& eye, const Touch& touch) {
+  if (!may_push(now, plug, eye)) {
+    eye.waiting = touch;
+    eye.until = now + kFresh;
+    return Plug::Answer::kTaken;
+  }
+  eye.waiting.reset();
+  eye.pushed = now;
+  eye.answered = plug.states();
+  return plug.push(program_, now, now + kFresh, touch);
 }
 
 /// The newest message is counted before the older ones. It is read even where there is nothing left for it.
@@ -122,7 +156,7 @@ void InverseSession::take(LocalTime now, const DeviceWish& asked, Wish& wish) {
   Touch touch = turned.base_force(asked.force.value_or(Vec3::Zero()));
   if (asked.torque) touch.torque = turned.base_torque(*asked.torque);
   touch.grip_force = asked.grip_force;
-  switch (plug.push(program_, now, now + kFresh, touch)) {
+  switch (push(now, plug, eye, touch)) {
     case Plug::Answer::kTaken:
       return;
     case Plug::Answer::kOwned:

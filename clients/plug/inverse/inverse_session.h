@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -38,6 +39,8 @@ struct InverseCounts {
 ///
 /// * A force is sent once, and the server takes it as fresh for kFresh, which the plugs' `client.valid_for` says. A client
 ///   that falls silent, or leaves, sends no more; the server holds, fades and stops the last one (protocol/SESSION.md).
+/// * One force for each state, or for each kPace where no state comes: a client may say many more, because it is answered
+///   as fast as it asks. Then the newest waits for the next state, and replaces the one that waits.
 /// * A message says all that is wanted of a device: a set_cursor_force without the word `tendon` asks for no torque.
 ///   One without either asks for nothing.
 /// * A force of zero claims nothing, because clients send it to be answered at all. It counts only from the client that
@@ -51,6 +54,7 @@ struct InverseCounts {
 class InverseSession {
  public:
   static constexpr Duration kFresh = std::chrono::milliseconds(100);
+  static constexpr Duration kPace = std::chrono::milliseconds(1);
   static constexpr double kMostPerSecond = 4000;
 
   /// `devices` and `counts` must outlive the session. `program` names this client to the plugs.
@@ -64,8 +68,10 @@ class InverseSession {
   std::string greeting(LocalTime now);
   /// One reply for each message, in their order.
   std::vector<std::string> answer(LocalTime now, std::span<const std::string> messages);
-  /// To be called after each turn of the plugs.
-  void see();
+  /// To be called after each turn of the plugs, and when it is due. Whether a force that waited leaves in the next turn.
+  bool see(LocalTime now);
+  /// When a force that waits leaves without a state; LocalTime::max(): none waits.
+  LocalTime due() const noexcept;
 
   Plug::Program program() const noexcept { return program_; }
 
@@ -76,12 +82,18 @@ class InverseSession {
     Frame frame = inverse_frame(Mat3::Identity());
     std::uint64_t states = 0;   ///< of the plug, when it was seen last
     std::uint32_t buttons = 0;  ///< held since the reply before
+    std::optional<Touch> waiting{};
+    LocalTime until{};           ///< it waits
+    LocalTime pushed{};          ///< when the newest force was sent
+    std::uint64_t answered = 0;  ///< `states` when it was
   };
 
   std::string reply(LocalTime now, std::vector<std::string> refused, bool whole);
   DeviceNews news_of(LocalTime now, const InverseDevice& device, Eye& eye) const;
   void take(LocalTime now, Wish& wish);
   void take(LocalTime now, const DeviceWish& asked, Wish& wish);
+  Plug::Answer push(LocalTime now, Plug& plug, Eye& eye, const Touch& touch);
+  bool may_push(LocalTime now, const Plug& plug, const Eye& eye) const noexcept;
   void refill(LocalTime now);
 
   Plug::Program program_;

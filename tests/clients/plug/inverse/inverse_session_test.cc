@@ -57,7 +57,7 @@ struct Bridge {
   json run(int ms, InverseSession& session, const std::string& message) {
     json last;
     world.run(ms, [&] {
-      session.see();
+      session.see(world.now);
       last = say(session, message);
     });
     return last;
@@ -132,8 +132,28 @@ TEST(InverseSession, OfTooManyMessagesTheOlderAreSkippedAndTheNewestIsTaken) {
   });
   const std::uint64_t read = messages - bridge.counts.skipped;
   EXPECT_NEAR(static_cast<double>(read), 4000 + 400, 50) << "4000 a second and what was saved up";
-  bridge.world.run(1);
+  bridge.world.run(2, [&] { client->see(bridge.world.now); });
   EXPECT_NEAR(bridge.world.step.wanted.y(), last, 1e-6) << "up is the device's y";
+}
+
+TEST(InverseSession, AClientThatSpinsSendsOneForceForEachStateAndTheNewestIsFelt) {
+  Bridge bridge("demo.toml");
+  const auto client = bridge.client();
+  bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.3)));
+  const std::uint64_t before = bridge.plug->forces();
+  bridge.world.run(500, [&] {
+    client->see(bridge.world.now);
+    for (int i = 1; i <= 20; ++i) bridge.say(*client, bridge.force(Vec3(0, 0, 0.3 + 0.01 * i)));
+  });
+  EXPECT_LE(bridge.plug->forces() - before, 501U);
+  EXPECT_GE(bridge.plug->forces() - before, 499U);
+  EXPECT_NE(client->due(), LocalTime::max()) << "the newest one waits";
+  bridge.world.run(2, [&] { client->see(bridge.world.now); });
+  EXPECT_NEAR(bridge.world.step.wanted.y(), 0.5, 1e-9);
+  EXPECT_EQ(client->due(), LocalTime::max());
+  const std::uint64_t sent = bridge.plug->forces();
+  bridge.world.run(300, [&] { client->see(bridge.world.now); });
+  EXPECT_EQ(bridge.plug->forces(), sent) << "once";
 }
 
 TEST(InverseSession, PositionAndForceAreRightAlongEachAxis) {
@@ -214,10 +234,10 @@ TEST(InverseSession, APressBetweenTwoRepliesIsInTheNextOneAndInNoLaterOne) {
   Bridge bridge("handle.toml");
   const auto client = bridge.client();
   const auto held = [&] { return grip(bridge.say(*client, kProbe)).at("buttons").at("a").get<bool>(); };
-  bridge.world.run(1800, [&] { client->see(); });  // until 1.9 s; of a press of 300 ms at 1 s
+  bridge.world.run(1800, [&] { client->see(bridge.world.now); });  // until 1.9 s; of a press of 300 ms at 1 s
   EXPECT_TRUE(held());
   EXPECT_FALSE(held());
-  bridge.world.run(500, [&] { client->see(); });  // of a press of 50 ms at 2 s
+  bridge.world.run(500, [&] { client->see(bridge.world.now); });  // of a press of 50 ms at 2 s
   EXPECT_TRUE(held());
   EXPECT_FALSE(held());
 }
