@@ -8,9 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/frames.h"
-#include "core/base/motion.h"
-#include "core/base/rotation.h"
+#include "clients/plug/view.h"
+#include "protocol/messages.h"
 
 /// The messages of Haply's Inverse service, version 3.5, as values: its documentation, pages "WebSocket Protocol",
 /// "Simulation Channel" and "Basis Permutation"; Isaac Lab's device class for what clients read. SI units. Numbers

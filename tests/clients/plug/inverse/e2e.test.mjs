@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tendon-plug inverse as programs and hostile programs meet it, by the npm package ws. The loops are written from clients/plug/inverse/README.md.
+// tendon-plug inverse as programs and hostile programs meet it, by the npm package ws. The loops are written from
+// clients/plug/inverse/README.md.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { connect as connectTcp } from "node:net";
@@ -11,7 +12,8 @@ const { WebSocket } = packageOf("clients/typescript", "ws");
 
 /** tendon-plug inverse for a server; where it listens. */
 async function startBridge(test, server, ...more) {
-  const program = new Program(test, "tendon-plug", ["inverse", "--server", server, "--listen", "127.0.0.1:0", "--duration-s", "120", "--json", ...more]);
+  const listen = ["--listen", "127.0.0.1:0", "--duration-s", "120", "--json"];
+  const program = new Program(test, "tendon-plug", ["inverse", "--server", server, ...listen, ...more]);
   const { address } = JSON.parse(await program.line('"listening"'));
   await program.line("connected to");
   return { program, address, url: `ws://${address}` };
@@ -22,7 +24,11 @@ async function startBoth(test, scene = "demo", ...more) {
   return { server, bridge: await startBridge(test, server.address, ...more) };
 }
 
-/** A client that has had its first message. What came is in `got`; `next()` waits for one more. */
+/** A message that asks for a force upwards, N. */
+const pushing = (id, z) =>
+  JSON.stringify({ inverse3: [{ device_id: id, commands: { set_cursor_force: { vector: { x: 0, y: 0, z } } } }] });
+
+/** A client that has had its first message. Its messages are in `got`; `next()` waits for one more. */
 async function come(test, url, options = {}) {
   const socket = new WebSocket(url, options);
   const got = [];
@@ -42,7 +48,7 @@ async function come(test, url, options = {}) {
   };
   const first = await next();
   const id = first.inverse3[0].device_id;
-  const push = (z) => JSON.stringify({ inverse3: [{ device_id: id, commands: { set_cursor_force: { vector: { x: 0, y: 0, z } } } }] });
+  const push = (z) => pushing(id, z);
   const ask = async (message) => {
     socket.send(message);
     return next();
@@ -64,7 +70,7 @@ const refusal = (url, options = {}) =>
 
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-test("one reply for each message, never one unasked, with pauses and in a burst", async (t) => {
+test("one reply for each message, never one unasked, even in a burst", async (t) => {
   const { bridge } = await startBoth(t);
   const client = await come(t, bridge.url);
   let asked = 0;
@@ -100,7 +106,7 @@ test("the seventeenth client is refused, and comes in when another has left", as
   assert.equal(ids.size, 16);
 });
 
-test("a client that never reads is dropped, and the others are served meanwhile", async (t) => {
+test("a client that never reads is dropped, and the others are served", async (t) => {
   const { bridge } = await startBoth(t);
   const other = await come(t, bridge.url);
   const deaf = await come(t, bridge.url);
@@ -116,13 +122,15 @@ test("a client that never reads is dropped, and the others are served meanwhile"
   await other.ask("{}");
 });
 
-test("pages from elsewhere, plain HTTP and long messages are refused in a sentence", async (t) => {
+test("pages from elsewhere, plain HTTP and long messages are refused", async (t) => {
   const { bridge } = await startBoth(t, "demo", "--origin", "https://lab.example");
   const from = (origin) => ({ headers: { Origin: origin } });
   const { status, text } = await refusal(bridge.url, from("https://evil.example"));
   assert.equal(status, 403);
   assert.match(text, /--origin/);
-  for (const origin of ["http://localhost:8000", "https://lab.example"]) await (await come(t, bridge.url, from(origin))).ask("{}");
+  for (const origin of ["http://localhost:8000", "https://lab.example"]) {
+    await (await come(t, bridge.url, from(origin))).ask("{}");
+  }
 
   const response = await fetch(`http://${bridge.address}/inverse3/0/config`);
   assert.equal(response.status, 404);
@@ -138,13 +146,21 @@ test("pages from elsewhere, plain HTTP and long messages are refused in a senten
   await bridge.program.line("left: a message above 64 kB");
 });
 
-test("broken frames and halves of requests end their connection and nobody else's", async (t) => {
+test("broken frames and half requests end nobody else's connection", async (t) => {
   const { bridge } = await startBoth(t);
   const other = await come(t, bridge.url);
   const [host, port] = bridge.address.split(":");
   let random = 22; // of the bytes: a linear congruential generator, the same in each run
   const byte = () => (random = (random * 1103515245 + 12345) % 2147483648) >> 16 & 255;
-  const hello = `GET / HTTP/1.1\r\nHost: ${bridge.address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n`;
+  const hello = [
+    "GET / HTTP/1.1",
+    `Host: ${bridge.address}`,
+    "Upgrade: websocket",
+    "Connection: Upgrade",
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+    "Sec-WebSocket-Version: 13",
+    "\r\n",
+  ].join("\r\n");
   for (let i = 0; i < 200; ++i) {
     const socket = connectTcp(Number(port), host);
     socket.on("error", () => {});
@@ -159,7 +175,8 @@ test("broken frames and halves of requests end their connection and nobody else'
     await ended;
     await other.ask("{}");
   }
-  await until("all have left", () => bridge.program.lines.filter((line) => / left/.test(line)).length === bridge.program.lines.filter((line) => /client \d+ came/.test(line)).length - 1);
+  const said = (what) => bridge.program.lines.filter((line) => what.test(line)).length;
+  await until("all have left", () => said(/client \d+ left/) === said(/client \d+ came/) - 1);
 });
 
 test("beyond this machine only with --anybody", async (t) => {
@@ -167,7 +184,8 @@ test("beyond this machine only with --anybody", async (t) => {
   assert.equal(await refused.ended, 2);
   assert.match(refused.lines.join("\n"), /only with --anybody, for whoever reaches the port moves a motor/);
   const server = await startServer(t, scratch(t), ["demo"], "--record", "/dev/null");
-  const open = new Program(t, "tendon-plug", ["inverse", "--server", server.address, "--listen", "0.0.0.0:0", "--anybody", "--json"]);
+  const anybody = ["--server", server.address, "--listen", "0.0.0.0:0", "--anybody", "--json"];
+  const open = new Program(t, "tendon-plug", ["inverse", ...anybody]);
   await open.line('"listening"');
   await open.line("moves a motor");
 });
@@ -177,7 +195,7 @@ test("two devices are two arms with forces of their own", async (t) => {
   const bridge = await startBridge(t, server.address, "--device", "left", "--device", "right");
   const client = await come(t, bridge.url);
   assert.deepEqual(client.first.tendon.devices.map((one) => one.name), ["left", "right"]);
-  const message = JSON.stringify({ inverse3: [{ device_id: client.first.inverse3[1].device_id, commands: { set_cursor_force: { values: { x: 0, y: 0, z: 0.3 } } } }] });
+  const message = pushing(client.first.inverse3[1].device_id, 0.3);
   await until("the right one is pushed up", async () => {
     const { inverse3 } = await client.ask(message);
     assert.equal(inverse3[0].state.current_cursor_force.z, 0);

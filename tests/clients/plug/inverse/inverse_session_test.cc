@@ -78,7 +78,7 @@ const json& refused(const json& reply) { return reply.at("tendon").at("refused")
 
 const std::string kProbe = R"({"inverse3":[{"device_id":"0","commands":{"probe_position":{}}}]})";
 
-TEST(InverseSession, SpeaksFirstAndListsAnArmAndAGripEvenWithoutAnyMeasurement) {
+TEST(InverseSession, SpeaksFirstAndListsAGripEvenWhereNothingMeasuresIt) {
   Bridge bridge("demo.toml");  // a Falcon has no orientation
   const auto client = bridge.client();
   const json first = json::parse(client->greeting(bridge.world.now));
@@ -91,7 +91,7 @@ TEST(InverseSession, SpeaksFirstAndListsAnArmAndAGripEvenWithoutAnyMeasurement) 
   EXPECT_EQ(ours(first).at("name"), "right");
 }
 
-TEST(InverseSession, HundredThousandMessagesWithPausesHaveExactlyOneReplyEach) {
+TEST(InverseSession, HundredThousandMessagesHaveExactlyOneReplyEach) {
   Bridge bridge("demo.toml");
   const auto client = bridge.client();
   std::mt19937_64 random(221);
@@ -136,7 +136,7 @@ TEST(InverseSession, OfTooManyMessagesTheOlderAreSkippedAndTheNewestIsTaken) {
   EXPECT_NEAR(bridge.world.step.wanted.y(), last, 1e-6) << "up is the device's y";
 }
 
-TEST(InverseSession, AClientThatSpinsSendsOneForceForEachStateAndTheNewestIsFelt) {
+TEST(InverseSession, ASpinningClientSendsOneForceForEachState) {
   Bridge bridge("demo.toml");
   const auto client = bridge.client();
   bridge.run(300, *client, bridge.force(Vec3(0, 0, 0.3)));

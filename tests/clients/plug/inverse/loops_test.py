@@ -33,8 +33,8 @@ class Bridge(Process):
 
 
 class ArmAndGrip:
-    """As Isaac Lab's device class: a thread that reads one message, keeps what it needs, sends a force under `values`, and
-    sleeps; whoever made it waits 5 s for an arm *and* a grip."""
+    """As Isaac Lab's device class: a thread that reads one message, keeps what it needs, sends a force under `values`,
+    and sleeps; whoever made it waits 5 s for an arm *and* a grip."""
 
     def __init__(self, uri: str, hz: float = 200.0) -> None:
         self._uri, self._hz = uri, hz
@@ -138,7 +138,8 @@ async def steps_until_nothing(uri: str, act) -> int:
     """Looks on while somebody else pushes, and then calls `act`; haptic steps until the device gives out nothing."""
     async with websockets.connect(uri) as socket:
         first = json.loads(await socket.recv())
-        probe = json.dumps({"inverse3": [{"device_id": first["inverse3"][0]["device_id"], "commands": {"probe_position": {}}}]})
+        device = first["inverse3"][0]["device_id"]
+        probe = json.dumps({"inverse3": [{"device_id": device, "commands": {"probe_position": {}}}]})
 
         async def look() -> tuple[float, int]:
             await socket.send(probe)

@@ -1,9 +1,10 @@
 #!/usr/bin/env node
 // SPDX-License-Identifier: Apache-2.0
 //
-// turnaround.mjs [SECONDS]: how long a client of tendon-plug inverse waits for its reply, beside a plain WebSocket echo of the same library (ws) on the
-// same machine, turn by turn; how long until a force that it asks for is in a reply as given out; turns a second; eight clients at 500; and the
-// processor. No test and no gate: it prints a table. TENDON_PROGRAMS: where the programs are.
+// turnaround.mjs [SECONDS]: how long a client of tendon-plug inverse waits for its reply, beside a plain WebSocket echo
+// of the same library (ws) on the same machine, turn by turn; how long until a force that it asks for is in a reply as
+// given out; turns a second; eight clients at 500; and the processor. No test and no gate: it prints a table.
+// TENDON_PROGRAMS: where the programs are.
 import { fork } from "node:child_process";
 import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
@@ -13,7 +14,8 @@ const { WebSocket, WebSocketServer } = packageOf("clients/typescript", "ws");
 process.env.TENDON_PROGRAMS ??= fileURLToPath(new URL("../../../../build/release/bin", import.meta.url));
 
 if (process.argv[2] === "echo") {
-  const server = new WebSocketServer({ host: "127.0.0.1", port: 0, perMessageDeflate: false }, () => process.send(server.address().port));
+  const options = { host: "127.0.0.1", port: 0, perMessageDeflate: false };
+  const server = new WebSocketServer(options, () => process.send(server.address().port));
   server.on("connection", (socket) => socket.on("message", () => socket.send(process.argv[3])));
 } else {
   const seconds = Number(process.argv[2] ?? 5);
@@ -22,7 +24,8 @@ if (process.argv[2] === "echo") {
   const quantile = (sorted, q) => sorted[Math.min(sorted.length - 1, Math.floor(q * sorted.length))];
   const us = (values) => {
     const sorted = [...values].sort((a, b) => a - b);
-    return `p50 ${(1000 * quantile(sorted, 0.5)).toFixed(0)} µs, p99 ${(1000 * quantile(sorted, 0.99)).toFixed(0)} µs, n = ${sorted.length}`;
+    const at = (q) => `${(1000 * quantile(sorted, q)).toFixed(0)} µs`;
+    return `p50 ${at(0.5)}, p99 ${at(0.99)}, n = ${sorted.length}`;
   };
   const open = async (url) => {
     const socket = new WebSocket(url, { perMessageDeflate: false });
@@ -37,12 +40,14 @@ if (process.argv[2] === "echo") {
   const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
   const server = await startServer(run, scratch(run), ["demo"], "--record", "/dev/null");
-  const plug = new Program(run, "tendon-plug", ["inverse", "--server", server.address, "--listen", "127.0.0.1:0", "--json"]);
+  const listen = ["--listen", "127.0.0.1:0", "--json"];
+  const plug = new Program(run, "tendon-plug", ["inverse", "--server", server.address, ...listen]);
   const url = `ws://${JSON.parse(await plug.line('"listening"')).address}`;
   await plug.line("connected to");
   const client = await open(url);
   const id = JSON.parse(await client.next()).inverse3[0].device_id;
-  const push = (z) => JSON.stringify({ inverse3: [{ device_id: id, commands: { set_cursor_force: { vector: { x: 0, y: 0, z } } } }] });
+  const push = (z) =>
+    JSON.stringify({ inverse3: [{ device_id: id, commands: { set_cursor_force: { vector: { x: 0, y: 0, z } } } }] });
   const reply = String(await client.ask(push(0.1)));
   const child = fork(fileURLToPath(import.meta.url), ["echo", reply]);
   run.after(() => child.kill());
@@ -71,7 +76,8 @@ if (process.argv[2] === "echo") {
     const wanted = 0.1 + 0.01 * (i % 10) + (i % 2) * 0.05;
     const begin = performance.now();
     let text = await client.ask(push(wanted));
-    while (Math.abs(JSON.parse(text).inverse3[0].state.current_cursor_force.z - wanted) > 0.004 && performance.now() - begin < 100) text = await client.ask(push(wanted));
+    const differs = () => Math.abs(JSON.parse(text).inverse3[0].state.current_cursor_force.z - wanted) > 0.004;
+    while (differs() && performance.now() - begin < 100) text = await client.ask(push(wanted));
     felt.push(performance.now() - begin);
     await wait(1 + 3 * ((i * 0.618) % 1));
   }
@@ -101,7 +107,8 @@ if (process.argv[2] === "echo") {
     const before = cpu(plug.process.pid);
     const begin = performance.now();
     const said = await work();
-    console.log(`${what.padEnd(20)} ${(100 * (cpu(plug.process.pid) - before) / (performance.now() - begin)).toFixed(1)} % of a core${said}`);
+    const part = (cpu(plug.process.pid) - before) / (performance.now() - begin);
+    console.log(`${what.padEnd(20)} ${(100 * part).toFixed(1)} % of a core${said}`);
   };
   await share("no client asks", async () => (await wait(1000 * seconds), ""));
   await share("one at 1000 Hz", async () => {
@@ -114,7 +121,8 @@ if (process.argv[2] === "echo") {
   await share("eight at 500 Hz", async () => {
     const times = eight.map(() => []);
     await Promise.all(eight.map((one, i) => paced(one, 500, times[i])));
-    return `, ${times.map((one) => (one.length / seconds).toFixed(0)).join(" ")} turns/s, ${us(times.flat())}`;
+    const rates = times.map((one) => (one.length / seconds).toFixed(0));
+    return `, ${rates.join(" ")} turns/s, ${us(times.flat())}`;
   });
   for (const one of [client, echo, ...eight]) one.socket.terminate();
   for (const end of ends) await end();
