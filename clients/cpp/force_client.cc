@@ -386,7 +386,9 @@ void ForceClient::send(LocalTime now, const Touch& touch, const DeviceState& ans
     ++stats_.forces_alike;
     return;
   }
-  command.valid_for = touch.valid_for ? *touch.valid_for : valid_for(answered.tick);
+  command.valid_for = touch.valid_for
+                          ? std::clamp<Duration>(*touch.valid_for, std::chrono::microseconds(1), limits::kMaxValidFor)
+                          : valid_for(answered.tick);
   command.sequence = ++sequence_;
   answered_tick_ = answered.tick;
   connection_.session()->send(command);

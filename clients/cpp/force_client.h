@@ -43,7 +43,7 @@ struct Touch {
   /// spring is positive. Only in answer to a state with an orientation.
   std::optional<Mat3> angular_stiffness{};
   std::optional<double> grip_force{};  ///< N, on the fingers of the gripper; > 0 opens them
-  /// How long the server may take this answer as fresh, for an engine that knows it: > 0, at most limits::kMaxValidFor.
+  /// How long the server may take this answer as fresh, for an engine that knows it: cut to 1 µs … limits::kMaxValidFor.
   /// Empty: Config::valid_for.
   std::optional<Duration> valid_for{};
   /// The engine knows no force: nothing is sent, because a zero would look known. The rest does not matter.

@@ -67,6 +67,7 @@ int run(int argc, char** argv) {
   add_chai3d(app, chosen);
   add_vrpn(app, chosen);
   add_ros2(app, chosen);
+  add_inverse(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -23,5 +23,6 @@ void add_common(CLI::App& app, DeskConfig& desk);
 void add_chai3d(CLI::App& app, Chosen& chosen);
 void add_vrpn(CLI::App& app, Chosen& chosen);
 void add_ros2(CLI::App& app, Chosen& chosen);
+void add_inverse(CLI::App& app, Chosen& chosen);
 
 }  // namespace tendon::plug

@@ -63,7 +63,9 @@ const std::vector<Door>& front_doors() {
   static const std::vector<Door> kDoors = {
       {"Asio", {"asio.hpp", "asio/"}, {"server/machine/udp_link.cc", "clients/cpp/udp_transport.cc"}},
       // HTTP and WebSockets of a process of its own, which is not the haptic one.
-      {"Boost.Beast and Boost.Asio", {"boost/"}, {"clients/dashboard/web_server.cc"}},
+      {"Boost.Beast and Boost.Asio",
+       {"boost/"},
+       {"clients/dashboard/web_server.cc", "clients/plug/inverse/inverse_server.cc"}},
       {"CHOLMOD", {"cholmod.h", "Eigen/CholmodSupport"}, {"clients/softbody/fem/sparse.cc"}},
       {"CLI11", {"CLI/"}, {"server/main.cc", "clients/cpp/options.cc", "*_main.cc"}},
       // DDS, and the types that idlc makes of ros2_types.idl.
@@ -76,7 +78,8 @@ const std::vector<Door>& front_doors() {
       {"nlohmann's JSON",
        {"nlohmann/"},
        {"server/commands/", "server/main.cc", "clients/cpp/engine/self_test.cc", "clients/cpp/run.cc",
-        "clients/dashboard/page_json.cc", "clients/plug/desk.cc", "clients/softbody/explain.cc", "*_main.cc"}},
+        "clients/dashboard/page_json.cc", "clients/plug/desk.cc", "clients/plug/inverse/inverse_json.cc",
+        "clients/softbody/explain.cc", "*_main.cc"}},
       {"prometheus-cpp", {"prometheus/"}, {"clients/dashboard/metrics.cc"}},
       {"protobuf",
        {"google/protobuf/", "*.pb.h", "protocol/wire/fields.h", "protocol/wire/frame_codec.h"},
