@@ -65,9 +65,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   Chosen chosen;
   add_chai3d(app, chosen);
-  add_vrpn(app, chosen);
-  add_ros2(app, chosen);
   add_inverse(app, chosen);
+  add_ros2(app, chosen);
+  add_vrpn(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

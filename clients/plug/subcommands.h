@@ -21,8 +21,8 @@ void add_common(CLI::App& app, DeskConfig& desk);
 
 // Each bridge adds its subcommand, in FOLDER/…_main.cc, and sets `chosen` when it is the one.
 void add_chai3d(CLI::App& app, Chosen& chosen);
-void add_vrpn(CLI::App& app, Chosen& chosen);
-void add_ros2(CLI::App& app, Chosen& chosen);
 void add_inverse(CLI::App& app, Chosen& chosen);
+void add_ros2(CLI::App& app, Chosen& chosen);
+void add_vrpn(CLI::App& app, Chosen& chosen);
 
 }  // namespace tendon::plug
