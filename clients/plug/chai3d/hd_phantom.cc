@@ -77,6 +77,30 @@ struct Handle {
 /// has its own: one that draws takes no state from the one that pushes.
 thread_local std::array<std::uint64_t, SharedHands::kMaxDevices> tick_read{};
 
+/// Which device a thread waits for: of several that it pushes in turn, the first. One turn of the program is then one
+/// haptic step, whether it reads all of them before it pushes or one after the other.
+class Pacer {
+ public:
+  /// Whether the force that this thread has set on that device waits. Once the thread pushes another device twice in
+  /// between, as after the first one's Close, that one sets the pace.
+  bool waits(int id) noexcept {
+    const std::uint32_t bit = 1U << static_cast<unsigned>(id);
+    if (id != device_ && device_ >= 0 && (others_ & bit) == 0) {
+      others_ |= bit;
+      return false;
+    }
+    device_ = id;
+    others_ = 0;
+    return true;
+  }
+
+ private:
+  int device_ = -1;           ///< none yet
+  std::uint32_t others_ = 0;  ///< pushed since it was, by bit
+};
+static_assert(SharedHands::kMaxDevices <= 32);
+thread_local Pacer pacer;
+
 /// The shared memory and the socket. Made once, by the first call, and kept until the process ends.
 class Attached {
  public:
@@ -158,7 +182,7 @@ bool read(int id, HandNow& hand) noexcept {
 /// by themselves.
 void pace(int id) noexcept {
   Attached& memory = attached();
-  if (memory.hands()->paced == 0) return;
+  if (memory.hands()->paced == 0 || !pacer.waits(id)) return;
   std::uint64_t& known = tick_read[static_cast<std::size_t>(id)];
   const std::int64_t end = now_ns() + kLongestPace;
   for (;;) {

@@ -24,7 +24,7 @@ namespace {
 /// The library waits this long for a state, at most.
 constexpr auto kLongestPace = std::chrono::milliseconds(2);
 
-/// One device in memory that the library has found. The library looks for it once in a process, so there is one.
+/// Two devices in memory that the library has found. The library looks for it once in a process, so there is one.
 class Library {
  public:
   static Library& get() {
@@ -32,24 +32,26 @@ class Library {
     return once;
   }
 
-  /// A state comes that is newer than all before.
+  /// A state of each device comes that is newer than all before.
   void come() {
     ++tick_;
-    hands_->device[0].hand.put(
-        {.at_ns = std::chrono::nanoseconds(read_clock().time_since_epoch()).count(), .tick = tick_});
+    for (std::size_t i = 0; i < hands_->devices; ++i) {
+      hands_->device[i].hand.put(
+          {.at_ns = std::chrono::nanoseconds(read_clock().time_since_epoch()).count(), .tick = tick_});
+    }
     hands_->news.fetch_add(1);
   }
-  void read() {
+  void read(int device = 0) {
     double x = 0;
     double y = 0;
     double z = 0;
-    EXPECT_NE(position_(0, &x, &y, &z), 0);
+    EXPECT_NE(position_(device, &x, &y, &z), 0);
   }
   /// How long it took.
-  Duration set_force() {
+  Duration set_force(int device = 0) {
     const double zero = 0;
     const LocalTime before = read_clock();
-    EXPECT_NE(force_(0, &zero, &zero, &zero), -1);
+    EXPECT_NE(force_(device, &zero, &zero, &zero), -1);
     return read_clock() - before;
   }
 
@@ -62,7 +64,7 @@ class Library {
     }
     if (memory == MAP_FAILED) throw std::runtime_error("no shared memory");
     hands_ = new (memory) SharedHands;
-    hands_->devices = 1;
+    hands_->devices = 2;
     hands_->ready = 1;
     ::setenv(kMemoryVariable, ("/proc/self/fd/" + std::to_string(file)).c_str(), 1);
     ::setenv(kWakeVariable, "nobody", 1);
@@ -70,7 +72,8 @@ class Library {
     if (library == nullptr) throw std::runtime_error(::dlerror());
     position_ = reinterpret_cast<Position>(::dlsym(library, "hdPhantomGetPosition"));
     force_ = reinterpret_cast<Force>(::dlsym(library, "hdPhantomSetForce"));
-    reinterpret_cast<int (*)(int)>(::dlsym(library, "hdPhantomOpen"))(0);
+    const auto open = reinterpret_cast<int (*)(int)>(::dlsym(library, "hdPhantomOpen"));
+    for (int device = 0; device < 2; ++device) open(device);
   }
 
   using Position = int (*)(int, double*, double*, double*);
@@ -92,6 +95,7 @@ TEST(HdPhantom, AForceWaitsForAStateThatItsThreadHasNotRead) {
 TEST(HdPhantom, AThreadThatLooksOnTakesNoStateFromTheThreadThatPushes) {
   // A program draws in one thread and pushes in another. The machine may pause in one of the tries, not in all.
   Library& library = Library::get();
+  library.come();
   Duration shortest = Duration::max();
   for (int i = 0; i < 20; ++i) {
     library.read();
@@ -108,6 +112,24 @@ TEST(HdPhantom, AThreadThatReadsNothingPushesOnceAState) {
   std::thread([&] {
     library.set_force();
     EXPECT_GE(library.set_force(), kLongestPace) << "the same state paces no second force";
+  }).join();
+}
+
+TEST(HdPhantom, AThreadThatPushesTwoDevicesInTurnWaitsOnceATurn) {
+  // CHAI3D's example of several devices reads and pushes one after the other.
+  Library& library = Library::get();
+  library.come();
+  std::thread([&] {
+    Duration shortest = Duration::max();
+    for (int i = 0; i < 20; ++i) {
+      library.read(0);
+      EXPECT_GE(library.set_force(0), kLongestPace) << i;
+      library.read(1);
+      shortest = std::min(shortest, library.set_force(1));
+    }
+    EXPECT_LT(shortest, kLongestPace);
+    EXPECT_GE(library.set_force(1), kLongestPace) << "the first device is pushed no more: the other one sets the pace";
+    EXPECT_GE(library.set_force(1), kLongestPace);
   }).join();
 }
 
