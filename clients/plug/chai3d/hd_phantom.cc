@@ -24,6 +24,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <utility>
 
 #include "clients/plug/chai3d/shared_hand.h"
 
@@ -69,9 +70,36 @@ class Turnstile {
 /// The program's end of one device.
 struct Handle {
   std::atomic_flag writing = ATOMIC_FLAG_INIT;
-  Asked asked;                              ///< the newest, under `writing`
-  std::atomic<std::uint64_t> tick_read{0};  ///< of the newest state that the program has seen
+  Asked asked;  ///< the newest, under `writing`
 };
+
+/// Of the newest state of each device that this thread has read, or that a force of its own has waited for. Each thread
+/// has its own: one that draws takes no state from the one that pushes.
+thread_local std::array<std::uint64_t, SharedHands::kMaxDevices> tick_read{};
+
+/// Which device a thread waits for: of several that it pushes in turn, the first. One turn of the program is then one
+/// haptic step, whether it reads all of them before it pushes or one after the other.
+class Pacer {
+ public:
+  /// Whether the force that this thread has set on that device waits. Once the thread pushes another device twice in
+  /// between, as after the first one's Close, that one sets the pace.
+  bool waits(int id) noexcept {
+    const std::uint32_t bit = 1U << static_cast<unsigned>(id);
+    if (id != device_ && device_ >= 0 && (others_ & bit) == 0) {
+      others_ |= bit;
+      return false;
+    }
+    device_ = id;
+    others_ = 0;
+    return true;
+  }
+
+ private:
+  int device_ = -1;           ///< none yet
+  std::uint32_t others_ = 0;  ///< pushed since it was, by bit
+};
+static_assert(SharedHands::kMaxDevices <= 32);
+thread_local Pacer pacer;
 
 /// The shared memory and the socket. Made once, by the first call, and kept until the process ends.
 class Attached {
@@ -146,21 +174,21 @@ Attached& attached() noexcept {
 bool read(int id, HandNow& hand) noexcept {
   const SharedDevice* const device = attached().device(id);
   if (device == nullptr || !device->hand.get(hand)) return false;
-  attached().handle(id).tick_read.store(hand.tick, std::memory_order_relaxed);
+  tick_read[static_cast<std::size_t>(id)] = hand.tick;
   return now_ns() - hand.at_ns <= kOldestState;
 }
 
-/// Returns once a state is there that the program has not read, at most kLongestPace later: CHAI3D's loops do not sleep
+/// Returns once a state is there that this thread has not read, at most kLongestPace later: CHAI3D's loops do not sleep
 /// by themselves.
 void pace(int id) noexcept {
   Attached& memory = attached();
-  if (memory.hands()->paced == 0) return;
+  if (memory.hands()->paced == 0 || !pacer.waits(id)) return;
+  std::uint64_t& known = tick_read[static_cast<std::size_t>(id)];
   const std::int64_t end = now_ns() + kLongestPace;
   for (;;) {
     const std::uint32_t seen = memory.hands()->news.load();
     HandNow hand;
-    const bool readable = memory.device(id)->hand.get(hand);
-    if (readable && hand.tick != memory.handle(id).tick_read.load(std::memory_order_relaxed)) return;
+    if (memory.device(id)->hand.get(hand) && hand.tick != std::exchange(known, hand.tick)) return;
     if (now_ns() >= end) return;
     memory.sleep_until_news(seen, end);
   }

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// libhdPhantom.so itself, in this process, on memory of ours: what its threads do to each other.
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "clients/cpp/machine.h"
+#include "clients/plug/chai3d/shared_hand.h"
+
+namespace tendon::plug::chai3d {
+namespace {
+
+/// The library waits this long for a state, at most.
+constexpr auto kLongestPace = std::chrono::milliseconds(2);
+
+/// Two devices in memory that the library has found. The library looks for it once in a process, so there is one.
+class Library {
+ public:
+  static Library& get() {
+    static Library once;
+    return once;
+  }
+
+  /// A state of each device comes that is newer than all before.
+  void come() {
+    ++tick_;
+    for (std::size_t i = 0; i < hands_->devices; ++i) {
+      hands_->device[i].hand.put(
+          {.at_ns = std::chrono::nanoseconds(read_clock().time_since_epoch()).count(), .tick = tick_});
+    }
+    hands_->news.fetch_add(1);
+  }
+  void read(int device = 0) {
+    double x = 0;
+    double y = 0;
+    double z = 0;
+    EXPECT_NE(position_(device, &x, &y, &z), 0);
+  }
+  /// How long it took.
+  Duration set_force(int device = 0) {
+    const double zero = 0;
+    const LocalTime before = read_clock();
+    EXPECT_NE(force_(device, &zero, &zero, &zero), -1);
+    return read_clock() - before;
+  }
+
+ private:
+  Library() {
+    const int file = ::memfd_create("hands", MFD_CLOEXEC);
+    void* memory = MAP_FAILED;
+    if (file >= 0 && ::ftruncate(file, sizeof(SharedHands)) == 0) {
+      memory = ::mmap(nullptr, sizeof(SharedHands), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    }
+    if (memory == MAP_FAILED) throw std::runtime_error("no shared memory");
+    hands_ = new (memory) SharedHands;
+    hands_->devices = 2;
+    hands_->ready = 1;
+    ::setenv(kMemoryVariable, ("/proc/self/fd/" + std::to_string(file)).c_str(), 1);
+    ::setenv(kWakeVariable, "nobody", 1);
+    void* const library = ::dlopen(TENDON_HD_PHANTOM, RTLD_NOW);
+    if (library == nullptr) throw std::runtime_error(::dlerror());
+    position_ = reinterpret_cast<Position>(::dlsym(library, "hdPhantomGetPosition"));
+    force_ = reinterpret_cast<Force>(::dlsym(library, "hdPhantomSetForce"));
+    const auto open = reinterpret_cast<int (*)(int)>(::dlsym(library, "hdPhantomOpen"));
+    for (int device = 0; device < 2; ++device) open(device);
+  }
+
+  using Position = int (*)(int, double*, double*, double*);
+  using Force = int (*)(int, const double*, const double*, const double*);
+
+  SharedHands* hands_ = nullptr;
+  std::uint64_t tick_ = 0;
+  Position position_ = nullptr;
+  Force force_ = nullptr;
+};
+
+TEST(HdPhantom, AForceWaitsForAStateThatItsThreadHasNotRead) {
+  Library& library = Library::get();
+  library.come();
+  library.read();
+  EXPECT_GE(library.set_force(), kLongestPace);
+}
+
+TEST(HdPhantom, AThreadThatLooksOnTakesNoStateFromTheThreadThatPushes) {
+  // A program draws in one thread and pushes in another. The machine may pause in one of the tries, not in all.
+  Library& library = Library::get();
+  library.come();
+  Duration shortest = Duration::max();
+  for (int i = 0; i < 20; ++i) {
+    library.read();
+    library.come();
+    std::thread([&] { library.read(); }).join();
+    shortest = std::min(shortest, library.set_force());
+  }
+  EXPECT_LT(shortest, kLongestPace);
+}
+
+TEST(HdPhantom, AThreadThatReadsNothingPushesOnceAState) {
+  Library& library = Library::get();
+  library.come();
+  std::thread([&] {
+    library.set_force();
+    EXPECT_GE(library.set_force(), kLongestPace) << "the same state paces no second force";
+  }).join();
+}
+
+TEST(HdPhantom, AThreadThatPushesTwoDevicesInTurnWaitsOnceATurn) {
+  // CHAI3D's example of several devices reads and pushes one after the other.
+  Library& library = Library::get();
+  library.come();
+  std::thread([&] {
+    Duration shortest = Duration::max();
+    for (int i = 0; i < 20; ++i) {
+      library.read(0);
+      EXPECT_GE(library.set_force(0), kLongestPace) << i;
+      library.read(1);
+      shortest = std::min(shortest, library.set_force(1));
+    }
+    EXPECT_LT(shortest, kLongestPace);
+    EXPECT_GE(library.set_force(1), kLongestPace) << "the first device is pushed no more: the other one sets the pace";
+    EXPECT_GE(library.set_force(1), kLongestPace);
+  }).join();
+}
+
+}  // namespace
+}  // namespace tendon::plug::chai3d
