@@ -7,8 +7,8 @@
 #include "tests/clients/plug/vrpn/program.h"
 #include "tests/fuzz/target.h"
 
-// What a VRPN program sends, in pieces by TCP and in datagrams: whatever comes, what is drawn is a finite force, what is
-// answered can be read, and no more is kept than the limits say.
+// What a VRPN program sends, in pieces by TCP and in datagrams: whatever comes, what is drawn is a finite force, what
+// is answered can be read, and no more is kept than the limits say.
 
 using namespace tendon;
 using namespace tendon::plug;

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How late tendon-plug vrpn makes a state and a force, beside the floor of the same run: `latency.py [--samples 2000]`.
 
-The script is the network between tendond and tendon-plug, and the VRPN program. Arrivals are the kernel's stamps, so that
-Python's own wake-ups are left out:
+The script is the network between tendond and tendon-plug, and the VRPN program. Arrivals are the kernel's stamps, so
+that Python's own wake-ups are left out:
 
 * state: from a datagram handed to tendon-plug to the pose at the program
 * force: from a force field handed to tendon-plug, half a millisecond after a state, to the datagram for tendond
@@ -146,8 +146,8 @@ def main() -> None:
                 while not network.handed:
                     network.turn(client, 0.01)
                 half = time.time_ns() + 500_000
-                while time.time_ns() < half:
-                    network.turn(client, 0)
+                while (left := half - time.time_ns()) > 0:  # asleep: who has been busy is interrupted sooner
+                    network.turn(client, left / 1e9)
                 n += 1
                 network.asked = time.time_ns()
                 client.force_field(force=(0, 0.5 + 1e-3 * (n % 2), 0))
@@ -185,7 +185,8 @@ def flood(network: Network, client: Client, between: Program, samples: int) -> N
         lines = between.out.read_text().splitlines()
         measure_states(network, client, samples)
         show("state, while fields pour in", network.poses)
-        rates = [int(line.partition('"messages":')[2].partition(",")[0]) for line in between.out.read_text().splitlines()[1:]]
+        said = between.out.read_text().splitlines()[1:]
+        rates = [int(line.partition('"messages":')[2].partition(",")[0]) for line in said]
         fields = max(b - a for a, b in zip(rates[len(lines) - 2 :], rates[len(lines) - 1 :]))
         print(f"  {fields} fields in a second", flush=True)
         other.kill()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import socket
@@ -224,12 +225,20 @@ def test_who_says_nothing_is_dropped(stage):
     stage.plug.wait_for("does not say that it speaks VRPN")
 
 
-def test_every_state_is_one_report(stage):
+def processor_time_s(program: Program) -> float:
+    fields = Path(f"/proc/{program.process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_every_state_is_one_report_and_nobody_waits_busily(stage):
     with Client(stage.address) as client:
         client.wait(POSE)
         before = stage.plug.counts()
+        busy = processor_time_s(stage.plug)
         time.sleep(2)
+        busy = processor_time_s(stage.plug) - busy
         after = stage.plug.counts()
+    assert busy < 2 * 0.3  # measured 0.03; a loop that does not sleep has 1
     reports = after["reports"] - before["reports"]
     # Each line is written between the two.
     assert abs(reports - (after["states"] - before["states"])) <= 2
