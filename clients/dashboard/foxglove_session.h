@@ -25,7 +25,7 @@ namespace tendon::dash {
 /// Thread-safe: no. Realtime-safe: no.
 class FoxgloveSession {
  public:
-  /// 3 s of one device's steps.
+  /// About 5 s of one device's steps.
   static constexpr std::size_t kMaxBytes = 1'000'000;
   /// Far more than a client causes that reads what it is told.
   static constexpr std::size_t kMaxTexts = 64;

@@ -36,7 +36,7 @@ class WebServer {
     std::size_t max_connections = 256;                    ///< of all kinds
     std::size_t max_per_address = 64;                     ///< all pages and bridges of one machine, and their requests
     std::size_t max_pages = 16;                           ///< pages that look on: each costs 150 kB/s of JSON
-    std::size_t max_viewers = 8;                          ///< on /foxglove: each costs up to 400 kB/s for a device
+    std::size_t max_viewers = 8;                          ///< on /foxglove: each costs 200 kB/s for each device
     std::size_t max_bridges = 32;                         ///< as many as a server takes observers
     std::size_t max_request = 16 * 1024;                  ///< bytes of a request's headers
     Duration request_patience = std::chrono::seconds(5);  ///< for a whole request, counted from when it may begin
