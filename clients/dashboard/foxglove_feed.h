@@ -54,7 +54,7 @@ class FoxgloveFeed {
   bool wants_states() const;
 
   /// Takes a text message of a client. False when it came too fast, or more waits for this client than can be: it should
-  /// then be closed. What is not understood is answered by a status.
+  /// then be closed. A status tells the client which message was not understood.
   bool hear(LocalTime now, ClientId client, std::string_view text);
   /// Takes what is new on the board. Call it after each turn of the Observer, before Feed::tick takes the states away.
   void take(LocalTime now);

@@ -14,7 +14,7 @@ function ticksOf(steps) {
   return { count: steps.length, span: steps.at(-1).tick - steps[0].tick + 1, inOrder: steps.every((step, i) => i === 0 || step.tick > steps[i - 1].tick) };
 }
 
-it("gives every step to Foxglove's client under each name of the protocol, and nothing after it unsubscribes", async (test) => {
+it("gives Foxglove's client every step until it unsubscribes", async (test) => {
   const server = await startServer(test, scratch(test), ["demo"], "--record", "/dev/null");
   new Program(test, "virtual_wall", ["--server", server.address, "--rate-hz", "200"]);
   const { url, address } = await startDash(test, server.address);
@@ -59,7 +59,7 @@ it("gives every step to Foxglove's client under each name of the protocol, and n
   }
 });
 
-it("asks for the states only while somebody looks, and the loop does not overrun more often", async (test) => {
+it("asks for states only while somebody looks, and no loop overruns more", async (test) => {
   const server = await startServer(test, scratch(test), ["demo"], "--record", "/dev/null");
   const { url, address } = await startDash(test, server.address);
   const viewer = new Viewer(test, address);
@@ -131,7 +131,7 @@ it("serves 8 viewers of the right protocol and origin, and refuses others", asyn
   await viewers[2].status("there is no such channel", (status) => status.message.includes("no channel 99"));
 });
 
-it("drops whole tenths of a second for a viewer that does not read, says so, and others miss nothing", async (test) => {
+it("drops whole tenths of a second for one that does not read", async (test) => {
   const server = await startServer(test, scratch(test), ["left", "right", "handle", "peg"], "--record", "/dev/null");
   const { address } = await startDash(test, server.address);
   const viewers = [new Viewer(test, address), new Viewer(test, address)];
