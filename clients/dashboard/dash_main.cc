@@ -63,7 +63,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       "tendon-dash");
   app.footer(
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
-      "then open http://127.0.0.1:8080 in a browser.");
+      "then open http://127.0.0.1:8080 in a browser, or ws://127.0.0.1:8080/foxglove in Foxglove or Lichtblick.");
   app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   std::string server = options.server.text();

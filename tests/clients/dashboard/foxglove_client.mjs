@@ -45,7 +45,7 @@ export class Viewer {
       const topic = this.subscriptions.get(subscriptionId);
       const { type } = this.channels.get(topic);
       const bytes = new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
-      this.messages.get(topic).push({ time: timestamp, at: performance.now(), now: process.hrtime.bigint(), ...type.toObject(type.decode(bytes), { defaults: true, longs: Number }) });
+      this.messages.get(topic).push({ time: timestamp, now: process.hrtime.bigint(), ...type.toObject(type.decode(bytes), { defaults: true, longs: Number }) });
     });
     test.after(() => this.socket.terminate());
   }
