@@ -49,8 +49,8 @@ bool FoxgloveFeed::wants_states() const {
   });
 }
 
-bool FoxgloveFeed::hear(LocalTime now, ClientId id, std::string_view text) {
-  const auto found = clients_.find(id);
+bool FoxgloveFeed::hear(LocalTime now, ClientId client, std::string_view text) {
+  const auto found = clients_.find(client);
   if (found == clients_.end() || !found->second.orders.take(now)) return false;
   FoxgloveSession& session = found->second.session;
   const auto object = [&](const std::string& sentence) {
@@ -59,7 +59,8 @@ bool FoxgloveFeed::hear(LocalTime now, ClientId id, std::string_view text) {
   const FoxgloveOrder order = parse_foxglove_order(text);
   if (const auto* subscribe = std::get_if<Subscribe>(&order)) {
     for (const auto& [subscription, channel] : subscribe->all) {
-      const bool known = std::ranges::any_of(channels_, [&](const Channel& one) { return one.about.id == channel; });
+      const bool known =
+          std::ranges::any_of(channels_, [wanted = channel](const Channel& one) { return one.about.id == wanted; });
       if (!known) {
         object("There is no channel " + std::to_string(channel) + ".");
       } else if (!session.subscribe(subscription, channel)) {
