@@ -242,9 +242,9 @@ TEST_F(FoxgloveFeedTest, AnotherServersDevicesTakeThePlaceOfTheOld) {
   feed_.take(now_);
   const auto texts = told(client).texts;
   ASSERT_GE(texts.size(), 2U);
-  EXPECT_EQ(texts[0]["op"], "unadvertise");
+  ASSERT_EQ(texts[0]["op"], "unadvertise");
   EXPECT_EQ(texts[0]["channelIds"].size(), 7U) << "three of the first, four of the second";
-  EXPECT_EQ(texts[1]["op"], "advertise");
+  ASSERT_EQ(texts[1]["op"], "advertise");
   EXPECT_EQ(texts[1]["channels"].size(), 3U) << "/haptic/step and /tf stay";
   states(0, 1);
   feed_.tick(now_);
