@@ -88,14 +88,13 @@ void FoxgloveFeed::take(LocalTime now) {
     take_states(now, number, device);
     take_reports(now, number, device);
   }
-  if (std::string state = server_state(); state != said_) {
-    said_ = std::move(state);
-    for (auto& [id, client] : clients_) client.session.put_server_state(said_);
-  }
+  if (board_.contact() == said_.first && board_.words() == said_.second) return;
+  said_ = {board_.contact(), board_.words()};
+  for (auto& [id, client] : clients_) client.session.put_server_state(server_state());
 }
 
 void FoxgloveFeed::tick(LocalTime now) {
-  if (board_.contact() != Contact::kOpen) return;
+  if (clients_.empty() || board_.contact() != Contact::kOpen) return;
   std::vector<Drawn> devices;
   for (const auto& [number, device] : board_.devices()) {
     if (!device.about || !device.newest) continue;

@@ -89,7 +89,7 @@ class FoxgloveFeed {
   std::vector<Channel> channels_;
   std::uint32_t last_channel_ = 0;
   std::uint64_t version_ = 0;                      ///< of the board that the channels were made from
-  std::string said_;                               ///< of the server, to all clients
+  std::pair<Contact, std::string> said_{};         ///< of the server, to all clients
   std::optional<Duration> unix_ahead_;             ///< Unix time − the server's clock
   std::map<std::uint32_t, std::uint64_t> states_;  ///< of each device, as the board counts them, that were taken
   std::map<std::uint32_t, PeerTime> reported_;     ///< the newest report on each device that was taken
