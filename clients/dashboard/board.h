@@ -101,12 +101,15 @@ class Board {
   void observe(const PeerReport& report);
   void observe(const PortFrame& port);
   void observe(const LinkStats& link) { link_ = link; }
+  /// How far the server's clock is ahead of ours; empty: not known yet in this session.
+  void observe_clock(std::optional<Duration> server_ahead) { server_ahead_ = server_ahead; }
 
   Contact contact() const noexcept { return contact_; }
   const std::string& words() const noexcept { return words_; }  ///< about the contact, for people
   const std::optional<Press>& press() const noexcept { return press_; }
   const std::optional<Welcome>& welcome() const noexcept { return welcome_; }
   const LinkStats& link() const noexcept { return link_; }
+  std::optional<Duration> server_ahead() const noexcept { return server_ahead_; }
   std::uint64_t sessions() const noexcept { return sessions_; }
   const std::map<std::uint32_t, Device>& devices() const noexcept { return devices_; }  ///< by number
 
@@ -123,6 +126,7 @@ class Board {
   std::optional<Press> press_;
   std::optional<Welcome> welcome_;
   LinkStats link_;
+  std::optional<Duration> server_ahead_;
   std::uint64_t sessions_ = 0;
   std::uint64_t version_ = 1;
   std::map<std::uint32_t, Device> devices_;

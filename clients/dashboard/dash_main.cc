@@ -19,6 +19,7 @@
 #include "clients/cpp/udp_transport.h"
 #include "clients/dashboard/board.h"
 #include "clients/dashboard/feed.h"
+#include "clients/dashboard/foxglove_feed.h"
 #include "clients/dashboard/metrics.h"
 #include "clients/dashboard/observer.h"
 #include "clients/dashboard/operator.h"
@@ -62,7 +63,7 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
       "tendon-dash");
   app.footer(
       "Example: tendon-dash --server 127.0.0.1:47100 --recordings . --listen 127.0.0.1:8080\n"
-      "then open http://127.0.0.1:8080 in a browser.");
+      "then open http://127.0.0.1:8080 in a browser, or ws://127.0.0.1:8080/foxglove in Foxglove or Lichtblick.");
   app.set_help_flag("-h,--help", "Print this text and exit");
   app.set_version_flag("--version", TENDON_VERSION);
   std::string server = options.server.text();
@@ -110,7 +111,8 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   app.add_option("--host", options.routes.hosts,
                  "A name under which browsers on other machines find this one. Whoever can reach it sees everything")
       ->type_name("NAME");
-  app.add_option("--origin", options.routes.origins, "Pages from there may use /bridge: https://lab.example")
+  app.add_option("--origin", options.routes.origins,
+                 "Pages from there may use /bridge and /foxglove: https://lab.example")
       ->type_name("URL");
   app.add_option("--recordings", options.recordings, "Folder whose recordings (*.mcap) the page may open")
       ->type_name("FOLDER");
@@ -175,7 +177,10 @@ int run(const Options& options) {
                                        .metrics = [&] { return metrics_text(board, counts, bridge); },
                                        .press = press,
                                        .pass = pass});
-  WebServer web(web_config, routes, feed, counts, bridge, read_clock);
+  FoxgloveFeed foxglove(
+      board, {.name = "tendon-dash of " + abilities.server,
+              .unix_offset = std::chrono::system_clock::now().time_since_epoch() - read_clock().time_since_epoch()});
+  WebServer web(web_config, routes, feed, foxglove, counts, bridge, read_clock);
   Observer observer(web.link(), web_config.server,
                     {.key = key ? std::optional(key->key) : std::nullopt, .seed = seed_from_system()}, board, start);
 
@@ -192,7 +197,7 @@ int run(const Options& options) {
 
   std::string said;
   const auto turn = [&](LocalTime now) {
-    observer.set_watched(feed.pages() > 0);
+    observer.set_watched(feed.pages() > 0 || foxglove.wants_states());
     const LocalTime next = observer.turn(now);
     if (board.contact() != Contact::kGreeting && board.words() != said) {
       std::cerr << "tendon-dash: " << (said = board.words()) << '\n';

@@ -29,7 +29,11 @@ LocalTime Observer::turn(LocalTime now) {
   while (const auto event = connection_.next(now)) take(now, *event);
   ask(now);
   connection_.flush(now);
-  if (const Session* const session = connection_.session()) board_.observe(session->stats());
+  if (const Session* const session = connection_.session()) {
+    board_.observe(session->stats());
+    const auto clock = session->peer_clock();
+    board_.observe_clock(clock ? std::optional(clock->offset) : std::nullopt);
+  }
   if (connection_.more()) return now;
   const LocalTime next = connection_.next_turn();
   return connection_.session() != nullptr ? std::min(next, describe_at_) : next;

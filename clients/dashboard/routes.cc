@@ -112,6 +112,20 @@ std::string_view origin_host(std::string_view origin) {
   return {};
 }
 
+/// The first subprotocol of the list that /foxglove speaks; empty when there is none. Names are compared as they are.
+std::string foxglove_protocol(std::string_view list) {
+  while (!list.empty()) {
+    const auto comma = list.find(',');
+    std::string_view name = list.substr(0, comma);
+    list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
+    const auto begin = std::min(name.find_first_not_of(" \t"), name.size());
+    name.remove_prefix(begin);
+    name = name.substr(0, name.find_last_not_of(" \t") + 1);
+    if (name == "foxglove.sdk.v1" || name == "foxglove.websocket.v1") return std::string(name);
+  }
+  return {};
+}
+
 void set(Reply& reply, std::string_view name, std::string_view value) { reply.headers.emplace_back(name, value); }
 
 /// Headers that every answer has.
@@ -183,9 +197,16 @@ bool Routes::is_our_host(std::string_view host) const {
          });
 }
 
-bool Routes::may_bridge(std::string_view origin) const {
-  return std::ranges::find(config_.origins, origin) != config_.origins.end() ||
-         is_loopback_name(host_name(origin_host(origin)));
+bool Routes::is_our_origin(std::string_view origin) const {
+  return std::ranges::find(config_.origins, origin) != config_.origins.end();
+}
+
+/// Of a WebSocket: the page that asks may not have it.
+bool Routes::is_foreign(const Request& request, std::string_view path) const {
+  if (!request.origin) return false;
+  if (path != "/live" && is_our_origin(*request.origin)) return false;
+  const std::string_view host = origin_host(*request.origin);
+  return path == "/bridge" ? !is_loopback_name(host_name(host)) : !equal_but_for_case(host, *request.host);
 }
 
 Reply Routes::order(const Request& request, std::string_view path, Order order) const {
@@ -222,14 +243,16 @@ Answer Routes::answer(const Request& request) const {
   if (!request.host || !is_our_host(*request.host)) {
     return plain(421, "this is not what this machine is called; see --host of tendon-dash");
   }
-  if (path == "/live" || path == "/bridge") {
-    const bool live = path == "/live";
-    const bool foreign = request.origin && !(live ? equal_but_for_case(origin_host(*request.origin), *request.host)
-                                                  : may_bridge(*request.origin));
-    if (foreign) return plain(403, "not for pages from elsewhere; see --origin of tendon-dash for the bridge");
+  if (path == "/live" || path == "/bridge" || path == "/foxglove") {
+    if (is_foreign(request, path)) {
+      return plain(403, "not for pages from elsewhere; see --origin of tendon-dash for /bridge and /foxglove");
+    }
     if (!request.upgrade) return plain(426, "tendon-dash speaks WebSocket here");
-    if (live) return LiveSocket{};
-    return BridgeSocket{request.local && !request.proxied};
+    if (path == "/live") return LiveSocket{};
+    if (path == "/bridge") return BridgeSocket{request.local && !request.proxied};
+    std::string protocol = foxglove_protocol(request.protocols);
+    if (protocol.empty()) return plain(400, "expected the subprotocol foxglove.sdk.v1 or foxglove.websocket.v1");
+    return FoxgloveSocket{std::move(protocol)};
   }
   if (path == "/metrics") {
     Reply reply = begin(200, kMetricsType);

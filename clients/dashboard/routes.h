@@ -26,9 +26,10 @@ struct Request {
   std::optional<std::string_view> authorization{};
   std::optional<std::string_view> range{};
   std::string_view accept_encoding{};
-  bool upgrade = false;  ///< asks for a WebSocket
-  bool local = false;    ///< from an address of this machine …
-  bool proxied = false;  ///< … but passed on by a proxy: Forwarded, X-Forwarded-For, X-Real-IP or Via
+  bool upgrade = false;     ///< asks for a WebSocket …
+  std::string protocols{};  ///< … of one of these: Sec-WebSocket-Protocol, several joined by commas
+  bool local = false;       ///< from an address of this machine …
+  bool proxied = false;     ///< … but passed on by a proxy: Forwarded, X-Forwarded-For, X-Real-IP or Via
 };
 
 /// An answer: everything but Date and Connection.
@@ -52,13 +53,18 @@ struct BridgeSocket {
   bool local = false;  ///< datagrams in the clear may pass
 };
 
-using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
+struct FoxgloveSocket {
+  std::string protocol;  ///< one of those that were asked for
+};
+
+using Answer = std::variant<Reply, LiveSocket, BridgeSocket, FoxgloveSocket>;
 
 /// Answers requests, without a socket. All rules about who may see or do what are here.
 ///
 ///     GET /                    the page, GET /assets/… its parts
 ///     GET /live                WebSocket: what the server does now
 ///     GET /bridge              WebSocket: datagrams
+///     GET /foxglove            WebSocket: the same as /live for Foxglove and Lichtblick, in their protocol
 ///     GET /metrics             for Prometheus
 ///     GET /api/recordings      the list of recordings
 ///     GET /recordings/NAME     the bytes of one; Range is understood
@@ -67,9 +73,11 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 /// Any page that is open in a browser on this machine could send these requests. Therefore:
 /// * **Host** must name this machine (localhost, 127.0.0.1, [::1]) or one of Config::hosts. Another name that has been
 ///   made to point here (DNS rebinding) is refused: 421.
-/// * **Origin** of a WebSocket must be that same host for /live, and a page of this machine or one of Config::origins
-///   for /bridge; otherwise 403. A program that is no browser sends no Origin. Other origins cannot read anything else,
-///   because no CORS header is ever sent.
+/// * **Origin** of a WebSocket must be that same host for /live, that host or one of Config::origins for /foxglove, and
+///   a page of this machine or one of Config::origins for /bridge; otherwise 403. A program that is no browser sends no
+///   Origin. Other origins cannot read anything else, because no CORS header is ever sent.
+/// * **Subprotocol** of /foxglove: the first one asked for that is `foxglove.sdk.v1` or `foxglove.websocket.v1`, which
+///   are one protocol with two names; where neither is asked for, 400.
 /// * **Arming**, like the other three orders, moves a machine, so only this page in a browser on this machine may do
 /// it;
 ///   otherwise 403. It is refused from another machine, through a proxy, with another Origin, and from a program that
@@ -83,8 +91,9 @@ using Answer = std::variant<Reply, LiveSocket, BridgeSocket>;
 class Routes {
  public:
   struct Config {
-    std::vector<std::string> hosts{};    ///< other names of this machine, with ":PORT" or without
-    std::vector<std::string> origins{};  ///< pages from there may use the bridge: "https://lab.example"
+    std::vector<std::string> hosts{};  ///< other names of this machine, with ":PORT" or without
+    /// Pages from there may use /bridge and /foxglove: "https://lab.example".
+    std::vector<std::string> origins{};
   };
   /// Where the answers come from. All must outlive the routes; `recordings` may be null.
   struct Sources {
@@ -106,7 +115,8 @@ class Routes {
 
  private:
   bool is_our_host(std::string_view host) const;
-  bool may_bridge(std::string_view origin) const;
+  bool is_our_origin(std::string_view origin) const;
+  bool is_foreign(const Request& request, std::string_view path) const;
   Reply order(const Request& request, std::string_view path, Order order) const;
   Reply file(const Request& request, std::string_view path) const;
   Reply recording(const Request& request, std::string_view name) const;

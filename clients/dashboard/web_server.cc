@@ -56,6 +56,10 @@ constexpr Duration kLinger = std::chrono::seconds(1);
 constexpr std::size_t kMaxLingered = 64 * 1024;
 /// Longest message of a page that looks on: "watch 15".
 constexpr std::size_t kMaxLine = 64;
+/// Longest message of a viewer, which may subscribe to all channels of 16 devices in one.
+constexpr std::size_t kMaxOrder = 16 * 1024;
+/// What the system may hold for a viewer that does not read, beside FoxgloveSession::kMaxBytes. Linux takes twice that.
+constexpr int kViewerSendBuffer = 128 * 1024;
 
 asio::ip::address ip_of(const Address& address) {
   const asio::ip::address_v6 v6(address.ip);
@@ -136,6 +140,7 @@ struct Shared {
   const WebServer::Config& config;
   const Routes& routes;
   Feed& feed;
+  FoxgloveFeed& foxglove;
   WebCounts& counts;
   BridgeCounts& bridge;
   WebServer::Clock clock;
@@ -159,6 +164,7 @@ class Connection {
   }
   ~Connection() {
     if (page_) shared_.feed.leave(*page_);
+    if (viewer_) shared_.foxglove.leave(*viewer_);
     if (gate_) --shared_.bridge.pages;
   }
   Connection(const Connection&) = delete;
@@ -193,6 +199,12 @@ class Connection {
       if (auto text = shared_.feed.next(*page_)) {
         text_ = std::move(*text);
         web_socket_->text(true);
+        return write_message(asio::buffer(text_));
+      }
+    } else if (viewer_) {
+      if (auto message = shared_.foxglove.next(*viewer_)) {
+        text_ = std::move(message->bytes);
+        web_socket_->binary(message->binary);
         return write_message(asio::buffer(text_));
       }
     } else if (auto datagram = gate_->next()) {
@@ -261,6 +273,8 @@ class Connection {
     request.range = header(http::field::range);
     request.accept_encoding = header(http::field::accept_encoding).value_or("");
     request.upgrade = websocket::is_upgrade(message);
+    const auto [first, last] = message.equal_range(http::field::sec_websocket_protocol);
+    for (auto one = first; one != last; ++one) request.protocols += std::string(one->value()) + ",";
     request.local = local_;
     request.proxied = header(http::field::forwarded) || header(http::field::via) ||
                       message.count("X-Forwarded-For") > 0 || message.count("X-Real-IP") > 0;
@@ -275,7 +289,13 @@ class Connection {
         return write_reply(Routes::plain(503, "too many pages look on already"));
       }
       page_ = shared_.feed.join(shared_.clock());
-      accept(true);
+      accept(Side::kPage);
+    } else if (const auto* viewer = std::get_if<FoxgloveSocket>(&answer)) {
+      if (shared_.foxglove.clients() >= shared_.config.max_viewers) {
+        return write_reply(Routes::plain(503, "too many viewers look on already"));
+      }
+      viewer_ = shared_.foxglove.join(shared_.clock());
+      accept(Side::kViewer, viewer->protocol);
     } else {
       if (shared_.bridge.pages >= shared_.config.max_bridges) {
         ++shared_.bridge.refused_full;
@@ -284,7 +304,7 @@ class Connection {
       ++shared_.bridge.pages;
       ++shared_.bridge.opened;
       gate_.emplace(shared_.config.bridge, std::get<BridgeSocket>(answer).local, shared_.bridge, shared_.clock());
-      accept(false);
+      accept(Side::kBridge);
     }
   }
 
@@ -330,16 +350,27 @@ class Connection {
 
   // ---- WebSockets
 
-  void accept(bool live) {
+  enum class Side : std::uint8_t { kPage, kViewer, kBridge };
+
+  void accept(Side side, const std::string& protocol = {}) {
     stream_.expires_never();
+    if (side == Side::kViewer) {
+      error_code gone;
+      stream_.socket().set_option(asio::socket_base::send_buffer_size(kViewerSendBuffer), gone);
+    }
     web_socket_.emplace(std::move(stream_));
     websocket::stream_base::timeout timeout{};
     timeout.handshake_timeout = waiting_time(shared_.config.patience);
     timeout.idle_timeout = waiting_time(shared_.config.patience);
-    timeout.keep_alive_pings = live;
+    timeout.keep_alive_pings = side != Side::kBridge;
     web_socket_->set_option(timeout);
-    web_socket_->read_message_max(live ? kMaxLine : kMaxDatagram);
-    if (!live) {
+    web_socket_->read_message_max(side == Side::kPage ? kMaxLine : side == Side::kViewer ? kMaxOrder : kMaxDatagram);
+    if (!protocol.empty()) {
+      web_socket_->set_option(websocket::stream_base::decorator([protocol](websocket::response_type& response) {
+        response.set(http::field::sec_websocket_protocol, protocol);
+      }));
+    }
+    if (side == Side::kBridge) {
       try {
         server_ = std::make_unique<ServerSocket>(shared_.context, shared_.config.server, shared_.clock);
       } catch (const std::runtime_error&) {
@@ -357,20 +388,22 @@ class Connection {
 
   void read_message() {
     message_.clear();
-    web_socket_->async_read(message_, with([this](error_code error, std::size_t) {
-                              if (error) return close();
-                              const LocalTime now = shared_.clock();
-                              const Bytes bytes = bytes_of(message_);
-                              if (gate_) {
-                                if (gate_->passes(now, bytes, web_socket_->got_binary())) server_->send(bytes);
-                              } else {
-                                const std::string_view line(static_cast<const char*>(message_.data().data()),
-                                                            message_.data().size());
-                                if (web_socket_->got_binary() || !shared_.feed.hear(now, *page_, line)) return close();
-                                pump();
-                              }
-                              read_message();
-                            }));
+    web_socket_->async_read(
+        message_, with([this](error_code error, std::size_t) {
+          if (error) return close();
+          const LocalTime now = shared_.clock();
+          const Bytes bytes = bytes_of(message_);
+          if (gate_) {
+            if (gate_->passes(now, bytes, web_socket_->got_binary())) server_->send(bytes);
+          } else {
+            const std::string_view text(static_cast<const char*>(message_.data().data()), message_.data().size());
+            const bool heard = !web_socket_->got_binary() && (viewer_ ? shared_.foxglove.hear(now, *viewer_, text)
+                                                                      : shared_.feed.hear(now, *page_, text));
+            if (!heard) return close();
+            pump();
+          }
+          read_message();
+        }));
   }
 
   void write_message(asio::const_buffer bytes) {
@@ -413,6 +446,7 @@ class Connection {
   std::optional<websocket::stream<beast::tcp_stream>> web_socket_;
   beast::flat_buffer message_;
   std::optional<Feed::PageId> page_;
+  std::optional<FoxgloveFeed::ClientId> viewer_;
   std::optional<BridgeGate> gate_;
   std::unique_ptr<ServerSocket> server_;
   std::vector<std::byte> datagram_;  ///< being sent
@@ -426,11 +460,13 @@ class Connection {
 }  // namespace
 
 struct WebServer::State {
-  State(const Config& own, const Routes& routes, Feed& feed, WebCounts& counts, BridgeCounts& bridge, Clock clock)
+  State(const Config& own, const Routes& routes, Feed& feed, FoxgloveFeed& foxglove, WebCounts& counts,
+        BridgeCounts& bridge, Clock clock)
       : config(own),
         shared{.config = config,
                .routes = routes,
                .feed = feed,
+               .foxglove = foxglove,
                .counts = counts,
                .bridge = bridge,
                .clock = clock,
@@ -513,6 +549,8 @@ struct WebServer::State {
       if (cancelled) return;
       const LocalTime now = shared.clock();
       const LocalTime next = turn(now);
+      shared.foxglove.take(now);
+      for (const auto& connection : shared.connections) connection->pump();
       // This cancels the pending wait, if there is one.
       schedule_turn(std::min(next - now, Duration(std::chrono::seconds(1))));
       wait_for_server();
@@ -524,6 +562,7 @@ struct WebServer::State {
     tick_timer.async_wait([this](error_code) {
       const LocalTime now = shared.clock();
       tick(now);
+      shared.foxglove.tick(now);
       shared.feed.tick(now);
       for (const auto& connection : shared.connections) connection->pump();
       schedule_tick();
@@ -542,9 +581,9 @@ struct WebServer::State {
   std::function<void(LocalTime)> tick;
 };
 
-WebServer::WebServer(const Config& config, const Routes& routes, Feed& feed, WebCounts& counts, BridgeCounts& bridge,
-                     Clock clock)
-    : state_(std::make_unique<State>(config, routes, feed, counts, bridge, clock)) {}
+WebServer::WebServer(const Config& config, const Routes& routes, Feed& feed, FoxgloveFeed& foxglove, WebCounts& counts,
+                     BridgeCounts& bridge, Clock clock)
+    : state_(std::make_unique<State>(config, routes, feed, foxglove, counts, bridge, clock)) {}
 
 WebServer::~WebServer() = default;
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -9,9 +10,11 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/dashboard/metrics.h"
+#include "recording.pb.h"
 #include "tests/clients/dashboard/full_board.h"
 
 // deploy/monitoring asks for nothing that is not there.
@@ -127,6 +130,50 @@ TEST(Monitoring, PrometheusLoadsTheseAlertsAndLooksAtThemAsOftenAsItScrapes) {
   EXPECT_NE(text.find("\n  evaluation_interval: 5s"), std::string::npos);
   EXPECT_NE(text.find("\n  - alerts.yml\n"), std::string::npos);
   EXPECT_NE(text.find("127.0.0.1:8080"), std::string::npos);
+}
+
+/// The panels that a part of a layout names.
+std::set<std::string> panels_of(const nlohmann::json& part) {
+  if (part.is_string()) return {part.get<std::string>()};
+  std::set<std::string> all = panels_of(part.at("first"));
+  all.merge(panels_of(part.at("second")));
+  return all;
+}
+
+/// "/haptic/step.position_m.x" leads to a number, a bool or an enum of a step.
+bool is_plotted_field(const std::string& path) {
+  constexpr std::string_view kTopic = "/haptic/step.";
+  if (!path.starts_with(kTopic)) return false;
+  const google::protobuf::Descriptor* message = recording::v1::Step::descriptor();
+  std::istringstream names(path.substr(kTopic.size()));
+  const google::protobuf::FieldDescriptor* field = nullptr;
+  for (std::string name; std::getline(names, name, '.'); message = field->message_type()) {
+    field = message == nullptr ? nullptr : message->FindFieldByName(name);
+    if (field == nullptr || field->is_repeated()) return false;
+  }
+  return message == nullptr;
+}
+
+TEST(Monitoring, TheFoxgloveLayoutPlotsStepsLiveAndRecorded) {
+  const auto file = nlohmann::json::parse(read("foxglove-layout.json"));
+  std::set<std::string> configured;
+  std::size_t paths = 0;
+  for (const auto& [name, panel] : file.at("configById").items()) {
+    configured.insert(name);
+    if (name.starts_with("3D!")) {
+      EXPECT_EQ(panel.at("followTf"), "world");
+      for (const auto& [topic, shown] : panel.at("topics").items()) EXPECT_TRUE(topic.ends_with("/scene")) << topic;
+      continue;
+    }
+    for (const auto& path : panel.at("paths")) {
+      EXPECT_TRUE(is_plotted_field(path.at("value").get<std::string>())) << path;
+      ++paths;
+    }
+  }
+  EXPECT_EQ(panels_of(file.at("layout")), configured);
+  EXPECT_GT(paths, 10U);
+  EXPECT_FALSE(is_plotted_field("/haptic/step.position_m"));
+  EXPECT_FALSE(is_plotted_field("/haptic/step.position"));
 }
 
 }  // namespace

@@ -111,6 +111,14 @@ TEST_F(ObserverTest, IsToldWhatTheEnginesWant) {
   }
 }
 
+TEST_F(ObserverTest, ComparesTheServersClockWithOurs) {
+  serve({"left"});
+  EXPECT_FALSE(board_.server_ahead());
+  run(seconds(2));
+  ASSERT_TRUE(board_.server_ahead());
+  EXPECT_LE(std::chrono::abs(*board_.server_ahead()), milliseconds(1)) << "both are told the same time here";
+}
+
 TEST_F(ObserverTest, IsToldWhatTheHandlesAre) {
   serve({"left", "right"});
   run(seconds(1));

@@ -303,5 +303,42 @@ TEST(ReplyHead, SaysHowLongItIsAndWhetherTheConnectionStays) {
   EXPECT_NE(reply.head(false).find("Connection: close"), std::string::npos);
 }
 
+TEST_F(RoutesTest, AViewerGetsTheFirstProtocolThatItNamesAndNoneIsRefused) {
+  const auto protocol = [&](const std::string& names) {
+    Request request = get("/foxglove");
+    request.upgrade = true;
+    request.protocols = names;
+    const Answer answer = routes_.answer(request);
+    if (const auto* viewer = std::get_if<FoxgloveSocket>(&answer)) return viewer->protocol;
+    return std::to_string(std::get<Reply>(answer).status);
+  };
+  EXPECT_EQ(protocol("foxglove.sdk.v1,"), "foxglove.sdk.v1");
+  EXPECT_EQ(protocol("foxglove.websocket.v1"), "foxglove.websocket.v1");
+  EXPECT_EQ(protocol("foxglove.websocket.v1, foxglove.sdk.v1"), "foxglove.websocket.v1");
+  EXPECT_EQ(protocol("a,, \t,\tfoxglove.sdk.v1 ,foxglove.websocket.v1"), "foxglove.sdk.v1");
+  for (const char* none :
+       {"", ",", " ", "foxglove.sdk.v2", "xfoxglove.sdk.v1", "foxglove.sdk.v1 x", "FOXGLOVE.SDK.V1"}) {
+    EXPECT_EQ(protocol(none), "400") << none;
+  }
+  EXPECT_EQ(status(get("/foxglove")), 426U);
+}
+
+TEST_F(RoutesTest, ViewersComeFromThisPageOrFromAnOriginThatIsNamed) {
+  const auto from = [&](const char* path, const char* origin) {
+    Request request = get(path);
+    request.upgrade = true;
+    request.protocols = "foxglove.sdk.v1";
+    request.origin = origin;
+    return status(request);
+  };
+  EXPECT_EQ(from("/foxglove", "http://127.0.0.1:8080"), 101U);
+  EXPECT_EQ(from("/foxglove", "https://lab.example"), 101U);
+  for (const char* origin :
+       {"http://localhost:9", "http://127.0.0.1:8081", "https://evil.example", "null", "file://"}) {
+    EXPECT_EQ(from("/foxglove", origin), 403U) << origin;
+  }
+  EXPECT_EQ(from("/live", "https://lab.example"), 403U) << "only the two that --origin is for";
+}
+
 }  // namespace
 }  // namespace tendon::dash
