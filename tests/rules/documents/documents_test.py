@@ -82,7 +82,7 @@ def wrong(command, root, folders):
     if program is None:
         return f"there is no program {name}"
     usage = help_of(program, "")
-    named = re.findall(r"^  ([a-z][a-z-]+) {2,}", usage[usage.find("Subcommands:") :], re.M) if "Subcommands:" in usage else []
+    named = re.findall(r"^  ([a-z][a-z0-9-]+) {2,}", usage[usage.find("Subcommands:") :], re.M) if "Subcommands:" in usage else []
     subcommand = next((w for w in found[1:] if w in named), "")
     if subcommand:
         usage += help_of(program, subcommand)
