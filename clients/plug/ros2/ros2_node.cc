@@ -35,11 +35,12 @@ std::string configuration(const Ros2Node::Config& config) {
     interface = "name=\"" + config.interface + "\"";
     multicast = "true";
   }
-  std::string xml = "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface " + interface +
-                    "/></Interfaces><AllowMulticast>" + multicast +
-                    "</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-                    "<MaxAutoParticipantIndex>" +
-                    std::to_string(kMostParticipants - 1) + "</MaxAutoParticipantIndex><Peers>";
+  std::string xml =
+      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface " + interface +
+      "/></Interfaces><AllowMulticast>" + multicast +
+      "</AllowMulticast></General><Discovery><SPDPInterval>1s</SPDPInterval><ParticipantIndex>auto</ParticipantIndex>"
+      "<MaxAutoParticipantIndex>" +
+      std::to_string(kMostParticipants - 1) + "</MaxAutoParticipantIndex><Peers>";
   for (const std::string& peer : peers) xml += "<Peer Address=\"" + peer + "\"/>";
   return xml + "</Peers></Discovery></Domain></CycloneDDS>";
 }

@@ -20,7 +20,8 @@ namespace tendon::plug {
 ///   one message for those who are slow, and never wait for one.
 /// * Readers of `wrench_command`: best effort, keep last 1, volatile: newest wins.
 /// * Without Config::interface all is on the loopback, by unicast: the participants of this machine with the indices
-///   0 … 99 are looked for. With one, it is that interface with multicast, and with the unicast of Config::peers.
+///   0 … 99 are greeted once a second, and those that announce the loopback are found (ROS_LOCALHOST_ONLY=1). With one,
+///   it is that interface with multicast, and with the unicast of Config::peers.
 /// * CYCLONEDDS_URI is not heeded: it would let the motors be reached from more than was said on the command line.
 ///
 /// DDS has threads of its own; they write to `descriptor()` and do nothing else of ours.

@@ -25,6 +25,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <type_traits>
 #include <vector>
@@ -47,9 +48,13 @@ constexpr const char* kOnTheLoopback = R"(<?xml version="1.0" encoding="UTF-8" ?
   <participant profile_name="loopback"><rtps>
     <userTransports><transport_id>loopback</transport_id></userTransports>
     <useBuiltinTransports>false</useBuiltinTransports>
-    <builtin><initialPeersList><locator><udpv4><address>127.0.0.1</address></udpv4></locator></initialPeersList></builtin>
+    PEERS
   </rtps></participant>
 </profiles></dds>)";
+
+constexpr std::string_view kPeers =
+    "<builtin><initialPeersList><locator><udpv4><address>127.0.0.1</address></udpv4></locator></initialPeersList>"
+    "</builtin>";
 
 double us(Clock::duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
@@ -178,6 +183,7 @@ struct Options {
   std::vector<std::string> read;
   bool best_effort = false;
   bool all_transports = false;
+  bool localhost_only = false;
   std::vector<double> wrench;
   std::string frame;
   double hz = 1000;
@@ -190,7 +196,8 @@ class Peer {
  public:
   explicit Peer(const Options& options) : options_(options) {
     auto* factory = dds::DomainParticipantFactory::get_instance();
-    const std::string xml = kOnTheLoopback;
+    std::string xml = kOnTheLoopback;
+    xml.replace(xml.find("PEERS"), 5, options.localhost_only ? "" : kPeers);
     if (options.all_transports) {
       participant_ = factory->create_participant(options.domain, dds::PARTICIPANT_QOS_DEFAULT);
     } else {
@@ -324,6 +331,7 @@ int run(int argc, char** argv) {
       ->delimiter(',');
   app.add_flag("--best-effort", o.best_effort, "Readers that ask for no more; else reliable ones");
   app.add_flag("--all-transports", o.all_transports, "As Fast DDS is without a profile; else UDP on the loopback");
+  app.add_flag("--localhost-only", o.localhost_only, "As ROS_LOCALHOST_ONLY=1 makes it: nobody is asked by unicast");
   app.add_option("--wrench", o.wrench, "fx,fy,fz or fx,fy,fz,tx,ty,tz for wrench_command")->delimiter(',');
   app.add_option("--frame", o.frame, "frame_id of it");
   app.add_option("--hz", o.hz);

@@ -285,6 +285,13 @@ TEST(Ros2, AReaderThatComesLateGetsNothingOld) {
   }
 }
 
+TEST(Ros2, AReaderOfRosLocalhostOnlyThatAsksNobodyIsFound) {
+  Room room;
+  std::this_thread::sleep_for(milliseconds(500));
+  Peer late(room.folder, room.domain, {"--read", "pose,wrench", "--wrench", "0,0.3,0", "--localhost-only"});
+  late.until_pushed(0.3);
+}
+
 // ---- Forces ---------------------------------------------------------------------------------------------------------
 
 TEST(Ros2, AWrenchIsFeltAndItsEndLeavesTheHandToTheLadder) {
