@@ -208,6 +208,10 @@ void Plug::note(std::string& said, std::string words) {
 }
 
 void Plug::note_changes() {
+  const Shown shown{.watcher = watcher_ ? watcher_->phase() : Phase::kStopped,
+                    .controller = controller_ ? controller_->phase() : Phase::kStopped,
+                    .pushes = pushes()};
+  if (shown == std::exchange(shown_, shown)) return;
   note(said_, connection_in_words());
   note(said_of_force_, force_in_words());
 }

@@ -146,6 +146,14 @@ class Plug {
   std::uint64_t dropped_ = 0;
   std::uint64_t forces_before_ = 0;  ///< of the controllers that have ended
   std::uint64_t unusable_before_ = 0;
+  /// What sentences are made from: while it stays, there is nothing new to say.
+  struct Shown {
+    ForceClient::Phase watcher = ForceClient::Phase::kStopped;
+    ForceClient::Phase controller = ForceClient::Phase::kStopped;
+    bool pushes = false;
+    bool operator==(const Shown&) const = default;
+  };
+  Shown shown_;
   std::deque<std::string> sentences_;  ///< that nobody has taken yet
   std::string said_;                   ///< the newest sentence about the connection
   std::string said_of_axes_;           ///< … about how the device lies
