@@ -52,6 +52,8 @@ struct Options {
   std::vector<std::string> program;
 };
 
+// NOLINTBEGIN(concurrency-mt-unsafe): this program has one thread, and so has its child until it becomes the other one
+
 [[noreturn]] void fail(const std::string& what) { throw std::runtime_error(what + ": " + std::strerror(errno)); }
 
 /// The memory that the program shares: it lives as long as one of the two processes.
@@ -167,6 +169,8 @@ void refuse_openhaptics(const std::filesystem::path& program) {
   std::perror(("tendon-plug: " + options.program[0]).c_str());
   ::_exit(127);
 }
+
+// NOLINTEND(concurrency-mt-unsafe)
 
 /// Serves the program until it has ended, and returns its exit code, 128 + the signal that has killed it.
 int serve(const Options& options) {

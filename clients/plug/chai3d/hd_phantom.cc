@@ -105,8 +105,10 @@ thread_local Pacer pacer;
 class Attached {
  public:
   Attached() noexcept {
+    // NOLINTBEGIN(concurrency-mt-unsafe): nobody here changes the environment
     const char* const memory = std::getenv(kMemoryVariable);
     const char* const wake = std::getenv(kWakeVariable);
+    // NOLINTEND(concurrency-mt-unsafe)
     if (memory == nullptr || wake == nullptr || !map(memory)) {
       constexpr char kSaid[] = "libhdPhantom: no device: start this program with `tendon-plug chai3d -- PROGRAM`\n";
       if (::write(STDERR_FILENO, kSaid, sizeof kSaid - 1) < 0) return;  // nobody can be told
@@ -220,6 +222,7 @@ void set(std::array<double, 3>& vector, const double* x, const double* y, const 
 using namespace tendon::plug::chai3d;  // NOLINT(google-build-using-namespace): 14 functions for C
 
 #pragma GCC visibility push(default)
+// NOLINTBEGIN(readability-identifier-naming): the names are CHAI3D's
 extern "C" {
 
 int hdPhantomGetNumDevices() {
@@ -334,4 +337,5 @@ void hdPhantomStartServo() {}
 void hdPhantomStopServo() {}
 
 }  // extern "C"
+// NOLINTEND(readability-identifier-naming)
 #pragma GCC visibility pop
