@@ -151,12 +151,13 @@ LocalTime ForceClient::turn(LocalTime now) {
   if (stats_.phase == Phase::kStopped) return LocalTime::max();
   connection_.flush(now);  // the force of the last turn waits for no system call
   connection_.begin_turn();
+  const LocalTime begun = now;  // what is read moves `now` on to when it was read
   while (const auto event = connection_.next(now)) take(now, *event);
   if (connection_.session() != nullptr && now >= ask_lease_ && !asked_lease_ && !take_lease()) {
     ask_lease_ = now + kAskLeaseAgain;
   }
   connection_.flush(now);
-  return call(now) || connection_.more() ? now : next_turn();
+  return call(now) || connection_.more() ? begun : next_turn();
 }
 
 void ForceClient::stop(LocalTime now) {

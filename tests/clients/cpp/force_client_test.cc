@@ -617,5 +617,33 @@ TEST(ForceClient, RefusesAnImpossibleConfigurationByFieldValueAndExpectation) {
   EXPECT_EQ(complaint({.max_datagrams = 0}), "max_datagrams = 0: expected 1 or more");
 }
 
+/// A socket that is read a little after the turn has begun, as every real one is.
+class LateLink : public Link {
+ public:
+  explicit LateLink(Link& link) : link_(link) {}
+  void send(const Address& to, std::span<const std::byte> datagram) override { link_.send(to, datagram); }
+  std::size_t receive(Address& from, std::span<std::byte> buffer) override { return link_.receive(from, buffer); }
+  LocalTime received_by(LocalTime now) const override { return now + std::chrono::microseconds(34); }
+
+ private:
+  Link& link_;
+};
+
+TEST(ForceClient, AForceLeavesAtOnceThoughItsStateIsReadAfterTheTurnBegan) {
+  World world(11, Weather{.loss = 0, .delay = milliseconds(5), .jitter = Duration::zero()});
+  LateLink late(world.a_port);
+  std::vector<LocalTime> computed;
+  const Physics physics = [&](const DeviceState&) {
+    computed.push_back(world.now);
+    return Vec3(1, 0, 0);
+  };
+  world.a.emplace(late, a_and_z::z_address, ForceClient::Config{}, physics, world.now);
+  world.run(milliseconds(500));
+  ASSERT_GT(world.z->forces.size(), 300U);
+  for (std::size_t i = 0; i < world.z->forces.size(); ++i) {
+    EXPECT_EQ(world.z->forces[i].first - computed[i], milliseconds(5)) << i;
+  }
+}
+
 }  // namespace
 }  // namespace tendon
