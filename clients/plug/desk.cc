@@ -37,16 +37,7 @@ Desk::Desk(DeskConfig config, LocalTime now) : config_(std::move(config)), next_
   for (const std::string& device : config_.devices) places_.emplace_back(config_, device, now);
 }
 
-std::optional<std::size_t> Desk::find(std::string_view name) const {
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    if (places_[i].name == name) return i;
-  }
-  return {};
-}
-
-void Desk::say(const std::string& sentence) const {
-  if (!config_.quiet) std::cerr << "tendon-plug: " << sentence << '\n';
-}
+void Desk::say(const std::string& sentence) const { std::cerr << "tendon-plug: " << sentence << '\n'; }
 
 /// The server may have another address by now. Where nobody answered at one, the next one is tried.
 void Desk::look_up_again(Place& place) {

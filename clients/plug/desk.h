@@ -23,8 +23,7 @@ struct DeskConfig {
   ForceClient::Config client{};        ///< `device` and `seed` are set for each plug
   std::vector<std::string> devices{};  ///< their names; none: the server's first device, which is called "device"
   bool observe = false;
-  bool quiet = false;  ///< says nothing on stderr
-  bool json = false;   ///< a line a second on stdout
+  bool json = false;  ///< a line a second on stdout
 };
 
 /// All devices of one bridge with their sockets: what a bridge's loop turns and sleeps on.
@@ -33,7 +32,7 @@ struct DeskConfig {
 ///     for (LocalTime now = read_clock(); !stop; now = read_clock()) {
 ///       const LocalTime next = desk.turn(now);
 ///       … serve the programs: desk.plug(0).state(), desk.plug(0).ask(…); when something was asked: desk.turn(now)
-///       desk.wait(sockets_of_the_programs, next);
+///       desk.wait(sockets_of_the_programs, now, next);
 ///     }
 ///
 /// It looks the server's name up again between two attempts, and says each change of a plug in one sentence on stderr:
@@ -54,13 +53,11 @@ class Desk {
   std::size_t size() const noexcept { return places_.size(); }
   Plug& plug(std::size_t i) { return places_[i].plug; }
   const std::string& name(std::size_t i) const { return places_[i].name; }
-  /// The place of a device's name; empty: there is none.
-  std::optional<std::size_t> find(std::string_view name) const;
 
   /// Turns every plug; the latest time for the next turn. `counts` are for the JSON lines.
   LocalTime turn(LocalTime now, std::span<const Count> counts = {});
 
-  /// One sentence on stderr, "tendon-plug: …"; nothing when quiet.
+  /// One sentence on stderr, "tendon-plug: …".
   void say(const std::string& sentence) const;
 
   /// Sleeps until a datagram of the server or one of `others` is ready, or until `until`; at most 100 ms, so that a

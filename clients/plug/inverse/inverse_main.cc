@@ -49,7 +49,6 @@ int run_inverse(const InverseOptions& options) {
     return 2;
   }
   DeskConfig desk_config = options.desk;
-  if (desk_config.client.name == DeskConfig{}.client.name) desk_config.client.name = "inverse";
   desk_config.client.valid_for = InverseSession::kFresh;
   Desk desk(std::move(desk_config), read_clock());
   InverseServer server(config, desk, read_clock);

@@ -195,7 +195,6 @@ class Ros2Bridge {
 void add_ros2(CLI::App& app, Chosen& chosen) {
   static Ros2Options o;  // lives until the chosen subcommand has run
   CLI::App& ros2 = *app.add_subcommand("ros2", "A device as topics of ROS 2, by plain DDS: /tendon/NAME/pose, …");
-  o.desk.client.name = "tendon-plug ros2";
   o.desk.client.joints = true;
   o.desk.client.diagnostics = true;
   add_common(ros2, o.desk);

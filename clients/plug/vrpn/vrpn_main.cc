@@ -114,7 +114,6 @@ int run_vrpn(VrpnOptions& options) {
 void add_vrpn(CLI::App& app, Chosen& chosen) {
   CLI::App* vrpn = app.add_subcommand("vrpn", "A VRPN server: programs find NAME@localhost");
   static VrpnOptions options;  // the command line is parsed into it, after this function
-  options.desk.client.name = "tendon-plug vrpn";
   add_common(*vrpn, options.desk);
   vrpn->add_option(
           "--name", options.names,
