@@ -139,14 +139,20 @@ async def steps_until_nothing(uri: str, act) -> int:
     async with websockets.connect(uri) as socket:
         first = json.loads(await socket.recv())
         device = first["inverse3"][0]["device_id"]
+        end = time.monotonic() + 30
         probe = json.dumps({"inverse3": [{"device_id": device, "commands": {"probe_position": {}}}]})
 
         async def look() -> tuple[float, int]:
-            await socket.send(probe)
-            news = json.loads(await socket.recv())
+            # The bridge is connected before the device has told its first state: until then there is none to read.
+            while True:
+                await socket.send(probe)
+                news = json.loads(await socket.recv())
+                if "state" in news["inverse3"][0]:
+                    break
+                assert time.monotonic() < end, "the device tells no state"
+                await asyncio.sleep(0.002)
             return news["inverse3"][0]["state"]["current_cursor_force"]["z"], news["tendon"]["devices"][0]["tick"]
 
-        end = time.monotonic() + 30
         while (await look())[0] < 0.3:
             assert time.monotonic() < end, "nobody pushes"
             await asyncio.sleep(0.002)
